@@ -1,0 +1,109 @@
+"""Magnitudes: for each entry of M, C, N the sum of the absolute values of the terms added into it.
+
+Rounding in an entry is proportional to its terms, not to their sum, so this is the scale on which two roads must agree,
+and u times this the size of a rounding error. A term is bounded by the lengths of its vectors: in body b the column of
+joint i turns at rate aᵢ ≤ 1 and moves the frame at lᵢ ≤ the lever from i to b.
+
+    ‖Jᵢᵀ 𝓜 Jⱼ‖ ≤ m lᵢ lⱼ + m c (lᵢ aⱼ + aᵢ lⱼ) + I aᵢ aⱼ       ‖[Jⱼ, J_k]‖: l = aⱼ l_k + lⱼ a_k, a = aⱼ a_k
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from robot_dyn.arithmetic import apply
+from robot_dyn.lagrange.linkage import BASE, Body, Linkage
+from robot_dyn.model.ties import Ties
+
+
+@final
+@dataclass(frozen=True)
+class Magnitudes:
+    """Bounds of the terms at one configuration q (n,) of a float64 linkage; entries as those of the quantities.
+
+    Attributes:
+        M: (n, n).
+        dM: Of ∂M_ij/∂q_k, (n, n, n).
+        N: (n,).
+        V: A number.
+        lever: Of the linear part of each column of the Jacobian of each link, by name, (n,).
+        reach: Distance from the base to each link along the joints, by name.
+    """
+
+    M: np.ndarray
+    dM: np.ndarray
+    N: np.ndarray
+    V: float
+    lever: dict[str, np.ndarray]
+    reach: dict[str, float]
+
+    def C(self, v: np.ndarray) -> np.ndarray:
+        """Of the Coriolis matrix, (n, n)."""
+        dM, v = self.dM, np.abs(v)
+        W = np.swapaxes(dM, -1, -2) @ v
+        return (dM @ v + W + W.T) / 2
+
+    def inverse_dynamics(self, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+        """Of M a + C v + N, (n,)."""
+        return self.M @ np.abs(a) + self.C(v) @ np.abs(v) + self.N
+
+
+def magnitudes(linkage: Linkage, q: np.ndarray) -> Magnitudes:
+    """The magnitudes of a linkage at q."""
+    N, ties = len(linkage.bodies), Ties(np.abs(linkage.ties.S), np.abs(linkage.ties.s0))
+    steps = np.abs(linkage.ties.position(q))
+    M, dM, gravity, V = np.diag(linkage.armature), np.zeros((N, N, N)), np.zeros(N), 0.0
+    g = float(np.linalg.norm(linkage.gravity))
+    columns = [_columns(linkage.bodies, body, steps) for body in linkage.bodies]
+    for body, inertia, (lin, ang) in zip(linkage.bodies, linkage.inertias, columns, strict=True):
+        m, mc = inertia[0, 0], float(np.linalg.norm([inertia[5, 1], inertia[3, 2], inertia[4, 0]]))
+        block = np.array([[m, mc], [mc, np.linalg.norm(inertia[3:, 3:], 2)]])
+        J = np.stack([lin, ang])
+        M[np.ix_(body.path, body.path)] += J.T @ block @ J
+        dJ = np.stack([np.outer(ang, lin) + np.outer(lin, ang), np.outer(ang, ang)])  # [:, j, k]
+        half = np.einsum("ajk,ab,bi->jik", dJ, block, J)
+        dM[np.ix_(body.path, body.path, body.path)] += half + half.swapaxes(0, 1)
+        gravity[list(body.path)] += g * (block[0] @ J)
+        V += g * (m * _reach(linkage.bodies, body, steps) + mc)
+    lever, reach = {}, {}
+    for name, (index, pose, _) in linkage.links.items():
+        lever[name], reach[name] = np.zeros(N), float(np.linalg.norm(pose.p))
+        if index != BASE:
+            body = linkage.bodies[index]
+            lin, ang = columns[index]
+            lever[name][list(body.path)] = lin + ang * reach[name]
+            reach[name] += _reach(linkage.bodies, body, steps)
+        lever[name] = ties.torque(lever[name])
+    return Magnitudes(ties.matrix(M), ties.cube(dM), ties.torque(gravity), V, lever, reach)
+
+
+def _step(body: Body, steps: np.ndarray) -> float:
+    """Distance from the frame of the body before to this body's."""
+    return float(np.linalg.norm(body.pose.p)) + (0.0 if body.revolute else steps[body.path[-1]])
+
+
+def _columns(bodies: tuple[Body, ...], body: Body, steps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Length of the linear and of the angular part of each column of a body's Jacobian."""
+    ang = np.array([1.0 if bodies[i].revolute else 0.0 for i in body.path])
+    beyond = np.array([_step(bodies[i], steps) for i in body.path])
+    lever = np.append(np.cumsum(beyond[:0:-1])[::-1], 0.0)
+    return ang * lever + (1 - ang), ang
+
+
+def _reach(bodies: tuple[Body, ...], body: Body, steps: np.ndarray) -> float:
+    return sum(_step(bodies[i], steps) for i in body.path)
+
+
+def scaled(error: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """|error| / scale, with 0 / 0 = 0: no term, no error."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.abs(error) / scale
+    return np.where(np.asarray(error) == 0, 0.0, ratio)
+
+
+def mass_norm(M: np.ndarray, x: np.ndarray) -> float:
+    """‖x‖_M = √(xᵀ M x)."""
+    return float(np.sqrt(max(x @ apply(M, x), 0.0)))

@@ -1,0 +1,210 @@
+"""The numbers the equations run in: float32, float64, longdouble, or balls with a proven radius.
+
+Every formulation is written once with NumPy's operators; an `Arithmetic` makes its own numbers of the literals a file
+states, and the functions below hide what NumPy does not do for every kind of number. A ball is an interval
+midpoint ± radius that is certain to hold the exact value [Johansson, Arb, 2017].
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass, field
+from functools import wraps
+from threading import RLock
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.errors import QueryError
+
+Array = Any  # numpy.ndarray of floats, or of flint.arb objects; NumPy's own types do not tell them apart
+
+
+class Arithmetic(ABC):
+    """A kind of number.
+
+    Attributes:
+        dtype: Of the arrays that hold these numbers.
+    """
+
+    dtype: np.dtype
+
+    @abstractmethod
+    def number(self, literal: Any) -> Any:
+        """One number from the text of a file, or from a number, which is taken exactly."""
+
+    @abstractmethod
+    def scope(self) -> AbstractContextManager[None]:
+        """The context in which operations have this arithmetic's precision."""
+
+    @abstractmethod
+    def asarray(self, values: Any) -> Array:
+        """Array of numbers; TypeError or ValueError if some are none. Not copied if they are of this kind already."""
+
+    @abstractmethod
+    def finite(self, x: Array) -> np.ndarray:
+        """Which entries are finite numbers."""
+
+    def array(self, literals: Any) -> Array:
+        """Array of numbers, of the shape of the nested literals."""
+        source = np.asarray(literals, dtype=object)
+        result = np.empty(source.size, dtype=self.dtype)
+        result[:] = [self.number(literal) for literal in source.flat]
+        return result.reshape(source.shape)
+
+
+@final
+@dataclass(frozen=True)
+class Float(Arithmetic):
+    """Floating-point numbers of one NumPy dtype, rounded to nearest."""
+
+    dtype: np.dtype
+
+    def number(self, literal: Any) -> Any:
+        return self.dtype.type(literal)
+
+    def scope(self) -> AbstractContextManager[None]:
+        return nullcontext()
+
+    def asarray(self, values: Any) -> Array:
+        array = np.asarray(values)
+        if array.dtype.kind not in "fiu":
+            raise TypeError(f"not real numbers: {array.dtype}")
+        return array.astype(self.dtype, copy=False)
+
+    def finite(self, x: Array) -> np.ndarray:
+        return np.isfinite(x)
+
+
+FLOAT64 = Float(np.dtype(np.float64))
+
+# flint keeps one working precision for the whole process, so balls of two precisions must take turns.
+_flint_turn = RLock()
+
+
+@final
+@dataclass(frozen=True)
+class Ball(Arithmetic):
+    """Balls (flint.arb) with midpoints of `bits` bits: every result encloses the exact value.
+
+    Attributes:
+        bits: Precision of the midpoints, 53 for that of float64.
+    """
+
+    bits: int = 53
+    dtype: np.dtype = field(default_factory=lambda: np.dtype(object), init=False, repr=False)
+
+    def number(self, literal: Any) -> Any:
+        from flint import arb
+
+        if literal.__class__ is np.longdouble:
+            high = float(literal)  # two exact parts, each a float64
+            return arb(high) + arb(float(literal - np.longdouble(high)))
+        exact = (arb, str, int)
+        return arb(literal if isinstance(literal, exact) else float(literal))
+
+    @contextmanager
+    def scope(self) -> Iterator[None]:
+        from flint import ctx
+
+        with _flint_turn, ctx.workprec(self.bits):
+            yield
+
+    def asarray(self, values: Any) -> Array:
+        return self.array(values)
+
+    def finite(self, x: Array) -> np.ndarray:
+        return np.vectorize(lambda ball: ball.is_finite(), otypes=[bool])(x)
+
+
+def arithmetic_of(dtype: Any) -> Arithmetic:
+    """The arithmetic that a user names: a float dtype of NumPy, or an `Arithmetic` such as `Ball(200)`.
+
+    Raises:
+        QueryError: If it is neither.
+    """
+    if isinstance(dtype, Arithmetic):
+        return dtype
+    try:
+        found = np.dtype(dtype)
+    except TypeError:
+        found = None
+    if found is None or found.kind != "f" or found.itemsize < 4:
+        raise QueryError(f"no arithmetic {dtype!r}: give float32, float64, np.longdouble or Ball(bits)")
+    return Float(found)
+
+
+def in_arithmetic(method: Callable[..., Any]) -> Callable[..., Any]:
+    """Run a method in the precision of its object's `arithmetic`."""
+
+    @wraps(method)
+    def scoped(self: Any, *args: Any, **options: Any) -> Any:
+        with self.arithmetic.scope():
+            return method(self, *args, **options)
+
+    return scoped
+
+
+def midpoint(x: Array) -> Array:
+    """The float64 nearest to the midpoint of each ball."""
+    return np.vectorize(lambda ball: float(ball.mid()), otypes=[float])(x)
+
+
+def radius(x: Array) -> Array:
+    """A float64 upper bound of the radius of each ball."""
+    return np.vectorize(lambda ball: float(ball.rad().upper()), otypes=[float])(x)
+
+
+# NumPy applies these to object arrays by calling the method of the same name on each entry, so one name serves all.
+sin, cos, sqrt, tanh = np.sin, np.cos, np.sqrt, np.tanh
+
+
+def transpose(x: Array) -> Array:
+    """Transpose of the last two axes."""
+    return np.swapaxes(x, -1, -2)
+
+
+def apply(A: Array, x: Array) -> Array:
+    """A x for A (..., m, n) and x (..., n)."""
+    return (A @ x[..., None])[..., 0]
+
+
+class NotPositiveDefiniteError(Exception):
+    """Internal: a pivot of a factorisation is not positive; the caller names the joint of `row`."""
+
+    def __init__(self, row: int) -> None:
+        super().__init__(f"pivot {row} is not positive")
+        self.row = row
+
+
+def cholesky_solve(M: Array, b: Array) -> Array:
+    """Solve M x = b for symmetric positive definite M by its factorisation L D Lᵀ.
+
+    Args:
+        M: Shape (..., n, n).
+        b: Shape (..., n).
+
+    Returns:
+        The solution, shape (..., n).
+
+    Raises:
+        NotPositiveDefiniteError: If a pivot is not certain to be positive; tells the row.
+
+    Source: Golub and Van Loan, Matrix Computations, 4th ed., 2013, alg. 4.1.2.
+    """
+    n = M.shape[-1]
+    L, x = M.copy(), b.copy()  # unit lower triangle of L, and the pivots D on its diagonal
+    for j in range(n):
+        LD = L[..., j, :j] * np.diagonal(L, axis1=-2, axis2=-1)[..., :j]
+        L[..., j, j] = L[..., j, j] - (L[..., j, :j] * LD).sum(axis=-1)
+        if not np.all(L[..., j, j] > 0):
+            raise NotPositiveDefiniteError(j)
+        below = L[..., j + 1 :, j] - (L[..., j + 1 :, :j] * LD[..., None, :]).sum(axis=-1)
+        L[..., j + 1 :, j] = below / L[..., j, j, None]
+        x[..., j] = x[..., j] - (L[..., j, :j] * x[..., :j]).sum(axis=-1)
+    x = x / np.diagonal(L, axis1=-2, axis2=-1)
+    for j in reversed(range(n)):
+        x[..., j] = x[..., j] - (L[..., j + 1 :, j] * x[..., j + 1 :]).sum(axis=-1)
+    return x

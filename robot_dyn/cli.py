@@ -1,0 +1,199 @@
+"""The command line: parse, call, print. Every command has --help; errors go to stderr with exit code 2."""
+
+from __future__ import annotations
+
+import json
+import sys
+import warnings
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+import robot_dyn as rd
+from robot_dyn.errors import ModelWarning, QueryError, RobotDynError, nearest
+
+if TYPE_CHECKING:
+    import numpy as np
+
+app = typer.Typer(
+    name="robot-dyn",
+    help="Dynamics of robot arms from a URDF: M(q) a + C(q, v) v + N(t, q, v) = τ.",
+    no_args_is_help=True,
+    add_completion=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+Name = Annotated[str, typer.Argument(metavar="ROBOT", help="A name of `robot-dyn list`, or the path of a URDF file.")]
+Lock = Annotated[
+    list[str] | None, typer.Option(metavar="JOINT=VALUE", help="Hold a joint at a value; may be repeated.")
+]
+PackageDir = Annotated[
+    list[str] | None, typer.Option(help="Folder in which ROS packages are searched; may be repeated.")
+]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON, as documented in docs/json.md.")]
+
+
+@app.command("list")
+def list_(as_json: Json = False) -> None:
+    """List the robots that can be named."""
+    names = rd.list_robots()
+    _print_json({"robots": names}) if as_json else print("\n".join(names))
+
+
+@app.command()
+def info(robot: Name, lock: Lock = None, package_dir: PackageDir = None, as_json: Json = False) -> None:
+    """Show a robot: joints, limits, friction, mass, and what is odd about it."""
+    from robot_dyn import report
+
+    loaded = _load(robot, lock, package_dir)
+    _print_json(report.info(loaded)) if as_json else _show(report.info_tables(loaded))
+
+
+@app.command()
+def query(
+    robot: Name,
+    q: Annotated[str | None, typer.Option(help="Positions: 0.1,-0.2,… or joint=0.1,…; 0 if not given.")] = None,
+    v: Annotated[str | None, typer.Option(help="Velocities, in the same form.")] = None,
+    a: Annotated[str | None, typer.Option(help="Accelerations: the torque is computed.")] = None,
+    tau: Annotated[str | None, typer.Option(help="Torques: the acceleration is computed.")] = None,
+    why: Annotated[
+        str | None, typer.Option(metavar="JOINT", help="Split this joint's torque by link and cause.")
+    ] = None,
+    effects: Annotated[str | None, typer.Option(help='"urdf" adds the friction that the file states.')] = None,
+    lock: Lock = None,
+    package_dir: PackageDir = None,
+    as_json: Json = False,
+) -> None:
+    """Ask for M, C, N at a state, and for the torque of an acceleration or the acceleration of a torque."""
+    from robot_dyn import report
+
+    loaded = _load(robot, lock, package_dir)
+    if a is not None and tau is not None:
+        raise QueryError("give --a or --tau, not both: one follows from the other")
+    state = {name: _vector(f"--{name}", text, loaded.joint_names) for name, text in (("q", q), ("v", v))}
+    given = None if tau is None else _vector("--tau", tau, loaded.joint_names)
+    answer = report.query(loaded, effects or "", **state, a=_vector("--a", a, loaded.joint_names), tau=given)
+    if why is not None:
+        answer |= report.why(loaded, answer, why)
+    _print_json(answer) if as_json else _show(report.query_tables(answer))
+
+
+@app.command()
+def compare(
+    robots: Annotated[list[str] | None, typer.Argument(metavar="ROBOT...", help="Names or paths.")] = None,
+    every: Annotated[bool, typer.Option("--all", help="All robots of `robot-dyn list` that load.")] = False,
+    samples: Annotated[int, typer.Option(min=1, help="Random states for each robot.")] = 20,
+    seed: Annotated[int, typer.Option(help="Of the random states.")] = 0,
+    lock: Lock = None,
+    package_dir: PackageDir = None,
+    as_json: Json = False,
+) -> None:
+    """Cross-check Pinocchio against the library's own Lagrangian; exit code 1 if they disagree."""
+    from robot_dyn import report
+
+    if bool(robots) == every:
+        raise QueryError("name the robots to compare, or give --all, not both")
+    results, refused = [], {}
+    for name in _progress(rd.list_robots() if every else robots or (), "comparing"):
+        try:
+            results.append((name, rd.compare(_load(name, lock, package_dir, quiet=every), samples=samples, seed=seed)))
+        except RobotDynError as error:
+            if not every:
+                raise
+            refused[name] = str(error)
+    _print_json(report.comparison(results, refused)) if as_json else _show(report.comparison_tables(results, refused))
+    if not all(result.ok for _, result in results):
+        raise typer.Exit(1)
+
+
+@app.command()
+def demo() -> None:
+    """Load a real arm, show its joints, M, C and N at a state, and cross-check the two roads."""
+    from robot_dyn import report
+
+    panda = rd.load("panda").with_(lock={"panda_finger_joint1": 0.0})
+    _show(report.demo_tables(panda))
+
+
+def main() -> None:
+    """Entry point: run the command; say what went wrong in one line."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", ModelWarning)
+        warnings.showwarning = _show_warning
+        try:
+            app()
+        except RobotDynError as error:
+            print(f"robot-dyn: error: {error}", file=sys.stderr)
+            sys.exit(2)
+        except BrokenPipeError:  # the reader of a pipe has seen enough
+            sys.stderr.close()
+            sys.exit(0)
+
+
+def _load(name: str, lock: list[str] | None, package_dirs: list[str] | None, quiet: bool = False) -> rd.Robot:
+    with warnings.catch_warnings():
+        if quiet:
+            warnings.simplefilter("ignore", ModelWarning)
+        robot = rd.load(name, package_dirs=package_dirs or ())
+    return robot.with_(lock=dict(_assignment("--lock", text) for text in lock)) if lock else robot
+
+
+def _assignment(option: str, text: str) -> tuple[str, float]:
+    name, equals, value = text.partition("=")
+    if not equals:
+        raise QueryError(f"{option} must be JOINT=VALUE, got {text!r}")
+    return name.strip(), _number(option, value)
+
+
+def _number(option: str, text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise QueryError(f"{option}: {text.strip()!r} is not a number") from None
+
+
+def _vector(option: str, text: str | None, joint_names: tuple[str, ...]) -> np.ndarray:
+    """Numbers separated by commas or blanks, one for each joint; or joint=value pairs, 0 elsewhere."""
+    import numpy as np
+
+    words = (text or "").replace(",", " ").split()
+    if any("=" in word for word in words):
+        values = dict(_assignment(option, word) for word in words)
+        for name in values.keys() - set(joint_names):
+            raise QueryError(f"{option}: no joint {name!r}; {nearest(name, joint_names)}")
+        return np.array([values.get(name, 0.0) for name in joint_names])
+    if text is None:
+        return np.zeros(len(joint_names))
+    if len(words) != len(joint_names):
+        raise QueryError(f"{option} needs {len(joint_names)} numbers, got {len(words)}: {', '.join(joint_names)}")
+    return np.array([_number(option, word) for word in words])
+
+
+def _show(renderables: Iterable[Any]) -> None:
+    from rich.console import Console
+
+    watched = sys.stdout.isatty()
+    console = Console(highlight=False, markup=False, width=None if watched else 1000)  # a pipe has no edge
+    for each in renderables:
+        print(each) if isinstance(each, str) else console.print(each)
+
+
+def _progress(items: Iterable[str], description: str) -> Iterator[str]:
+    """The items, with a bar on stderr while a person watches."""
+    from rich.console import Console
+    from rich.progress import track
+
+    items = list(items)
+    return iter(
+        track(items, description, console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty())
+    )
+
+
+def _print_json(value: Any) -> None:
+    print(json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False))
+
+
+def _show_warning(message: Any, *_: Any, **__: Any) -> None:
+    print(f"robot-dyn: warning: {message}", file=sys.stderr)

@@ -1,0 +1,1 @@
+"""What acts on the joints besides actuation: each effect a torque, summed by the plant."""

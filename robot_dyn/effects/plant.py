@@ -1,0 +1,92 @@
+"""Plant: rigid bodies and what acts on them, M(q) a + C(q, v) v + N(t, q, v) = Υ, with N = ∂V/∂q − Σ τ_effect.
+
+[Murray, Li, Sastry 1994, eq. 4.24]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.effects.effect import Effect
+from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFriction
+from robot_dyn.errors import EffectError, QueryError
+from robot_dyn.model.dynamics import Dynamics
+
+
+@final
+@dataclass(frozen=True)
+class Plant:
+    """A `Dynamics` and the effects that act on it.
+
+    Attributes:
+        dynamics: The rigid bodies in gravity.
+        effects: What else acts; "urdf" for the friction that the robot's file states, each kind only if it states any.
+    """
+
+    dynamics: Dynamics
+    effects: tuple[Effect, ...] = ()
+
+    def __init__(self, dynamics: Dynamics, effects: Iterable[Effect] | str = ()) -> None:
+        object.__setattr__(self, "dynamics", dynamics)
+        if isinstance(effects, str):
+            if effects != "urdf":
+                raise EffectError(f"effects={effects!r}; give effects, or 'urdf' for those the file states")
+            effects = stated_friction(dynamics)
+        effects = tuple(effects)
+        for effect in effects:
+            if not isinstance(effect, Effect):
+                raise EffectError(f"{effect!r} is no Effect; subclass Conservative, Dissipative or Active")
+        object.__setattr__(self, "effects", effects)
+
+    def M(self, q: Array) -> Array:
+        """Mass matrix, (..., n, n)."""
+        return self.dynamics.M(q)
+
+    def C(self, q: Array, v: Array) -> Array:
+        """Coriolis matrix, (..., n, n)."""
+        return self.dynamics.C(q, v)
+
+    def N(self, t: float, q: Array, v: Array) -> Array:
+        """Every force but actuation, as what must be overcome: N = ∂V/∂q − Σ τ_effect, (..., n)."""
+        return self.dynamics.N(q) - self.torque(t, q, v)
+
+    def torque(self, t: float, q: Array, v: Array) -> Array:
+        """Σ τ_effect, the torque of all effects on the joints, (..., n); 0 without effects.
+
+        Raises:
+            QueryError: If v has the wrong shape.
+        """
+        if np.shape(v)[-1:] != (self.dynamics.n,):
+            raise QueryError(f"v must have shape ({self.dynamics.n},) or (..., {self.dynamics.n}), got {np.shape(v)}")
+        return sum(effect.torque(self.dynamics, t, q, v) for effect in self.effects)
+
+    def inverse_dynamics(self, t: float, q: Array, v: Array, a: Array) -> Array:
+        """Actuation Υ = M a + C v + N that gives the acceleration a, (..., n)."""
+        return self.dynamics.inverse_dynamics(q, v, a) - self.torque(t, q, v)
+
+    def forward_dynamics(self, t: float, q: Array, v: Array, u: Array) -> Array:
+        """Acceleration under the actuation u, (..., n)."""
+        return self.dynamics.forward_dynamics(q, v, np.asarray(u) + self.torque(t, q, v))
+
+
+def stated_friction(dynamics: Any) -> tuple[Effect, ...]:
+    """The friction that the file of a robot states.
+
+    Raises:
+        EffectError: If the dynamics comes from no file.
+    """
+    try:
+        damping, friction = dynamics.damping, dynamics.friction
+    except AttributeError:
+        raise EffectError(f"effects='urdf' needs a robot with a URDF, got {type(dynamics).__name__}") from None
+    effects: list[Effect] = []
+    if np.any(damping):
+        effects.append(ViscousFriction(damping))
+    if np.any(friction):
+        effects.append(RegularisedCoulombFriction(friction))
+    return tuple(effects)

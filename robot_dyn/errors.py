@@ -1,0 +1,54 @@
+"""Errors a user can act on: each message says what, where, the value and the remedy."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+class RobotDynError(Exception):
+    """Base of every error this library raises."""
+
+
+class CatalogError(RobotDynError):
+    """No robot, file or package of that name was found."""
+
+
+class DescriptionError(RobotDynError):
+    """A robot description that cannot be read safely or has no single meaning."""
+
+
+class EditError(RobotDynError):
+    """An edit of a robot (lock, payload, armature, gravity) that cannot be made."""
+
+
+class EffectError(RobotDynError):
+    """An effect with coefficients that have no physical meaning, or of the wrong shape."""
+
+
+class QueryError(RobotDynError):
+    """An argument of a query with the wrong shape, a value that is not finite, or an unknown name."""
+
+
+class OverflowedError(QueryError):
+    """Arguments so large that the result is not a finite number."""
+
+
+class SingularError(RobotDynError):
+    """A query that has no answer at this state, such as forward dynamics of a massless joint."""
+
+
+class ModelWarning(UserWarning):
+    """A robot that loads although some of its bodies cannot exist as described."""
+
+
+def nearest(name: str, names: Iterable[str]) -> str:
+    """Advice after an unknown name: the nearest valid names, or the first few."""
+    names = list(names)
+    by_key = {known.casefold(): known for known in names}
+    close = [by_key[key] for key in get_close_matches(name.casefold(), by_key, n=4, cutoff=0.5)]
+    shown = close or names[:8]
+    if not shown:
+        return "there are none"
+    more = "" if close or len(names) == len(shown) else f", … ({len(names)} in all)"
+    return ("nearest: " if close else "known: ") + ", ".join(shown) + more

@@ -1,0 +1,76 @@
+"""Forward dynamics in O(n): the articulated-body algorithm, in body coordinates and any arithmetic.
+
+    V_i = Ad⁻¹ V_λ + ξ_i v_i,   c_i = [V_i, ξ_i v_i],   𝓜ᴬ = 𝓜 + Σ Adᵀ (𝓜ᴬ − U Uᵀ / d) Ad,   U = 𝓜ᴬ ξ,   d = ξᵀ U
+    a_i = (u_i − U_iᵀ A') / d_i  with  A' = Ad⁻¹ A_λ + c_i,   u_i = τ_i − ξᵀ Fᴬ,   A_0 = −g
+
+[Featherstone 2008, §7.3]
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array, apply, transpose
+from robot_dyn.errors import QueryError, SingularError
+from robot_dyn.lagrange.linkage import BASE, Linkage
+from robot_dyn.spatial import adjoint_inverse, bracket
+
+
+def articulated_body(linkage: Linkage, q: Array, v: Array, tau: Array) -> Array:
+    """Acceleration a = M⁻¹ (τ − C v − N), shape (..., n).
+
+    Args:
+        linkage: Its joints must not be tied; `Lagrangian.forward_dynamics` takes those that are.
+        q: Positions, (..., n), numbers of the linkage's arithmetic.
+        v: Velocities, (..., n).
+        tau: Torques, (..., n).
+
+    Raises:
+        QueryError: If joints are tied.
+        SingularError: If a joint carries no inertia.
+    """
+    if linkage.ties.S.shape[0] != linkage.ties.S.shape[1]:
+        raise QueryError("the articulated-body algorithm takes no tied joints; use Lagrangian.forward_dynamics")
+    S = linkage.ties.S  # at most an exchange of joints
+    at = linkage.at(q)
+    v, tau = linkage.ties.velocity(v), tau @ S.T
+    batch = np.broadcast_shapes(at.batch, v.shape[:-1], tau.shape[:-1])
+    X = [adjoint_inverse(R, p) for R, p in at.in_parent]  # takes twists from the parent to the body
+    coriolis, inertia, force = _outward(linkage, X, v, batch)
+
+    U, d, u = {}, {}, {}
+    for i, body in reversed(list(enumerate(linkage.bodies))):
+        U[i] = apply(inertia[i], np.broadcast_to(body.screw, (*batch, 6)))
+        d[i] = U[i] @ body.screw + linkage.armature[i]
+        if not np.all(d[i] > 0):
+            raise SingularError(f"no forward dynamics: joint {body.joint!r} carries no inertia at this q")
+        u[i] = tau[..., i] - force[i] @ body.screw
+        if body.parent != BASE:
+            left = inertia[i] - U[i][..., :, None] * U[i][..., None, :] / d[i][..., None, None]
+            pushed = force[i] + apply(left, coriolis[i]) + U[i] * (u[i] / d[i])[..., None]
+            inertia[body.parent] = inertia[body.parent] + transpose(X[i]) @ left @ X[i]
+            force[body.parent] = force[body.parent] + apply(transpose(X[i]), pushed)
+
+    acceleration: list[Array] = []
+    a = np.zeros((*batch, len(linkage.bodies)), dtype=linkage.gravity.dtype)
+    free_fall = np.concatenate([-linkage.gravity, np.zeros_like(linkage.gravity)])
+    for i, body in enumerate(linkage.bodies):
+        carried = apply(X[i], free_fall if body.parent == BASE else acceleration[body.parent]) + coriolis[i]
+        a[..., i] = (u[i] - (U[i] * carried).sum(axis=-1)) / d[i]
+        acceleration.append(carried + a[..., i, None] * body.screw)
+    return a @ S
+
+
+def _outward(
+    linkage: Linkage, X: list[Array], v: Array, batch: tuple[int, ...]
+) -> tuple[list[Array], list[Array], list[Array]]:
+    """For each body c = [V, ξ v], 𝓜, and the bias wrench −ad_Vᵀ 𝓜 V, base to tips."""
+    twist, coriolis, inertia, force = [], [], [], []
+    for i, body in enumerate(linkage.bodies):
+        own = v[..., i, None] * body.screw
+        V = np.broadcast_to(own if body.parent == BASE else apply(X[i], twist[body.parent]) + own, (*batch, 6))
+        twist.append(V)
+        coriolis.append(apply(bracket(V), own))
+        inertia.append(np.broadcast_to(linkage.inertias[i], (*batch, 6, 6)))
+        force.append(-apply(transpose(bracket(V)), apply(linkage.inertias[i], V)))
+    return coriolis, inertia, force

@@ -1,0 +1,211 @@
+"""The linkage: a Tree in the numbers of one arithmetic, and its kinematics g(q) = Π gᵢ exp(ξ̂ᵢ qᵢ).
+
+Links that do not move against each other are one body; its generalised inertia is 𝓜 = Σ Adᵀ 𝓜_link Ad, taken in the
+frame of the joint that carries it. [Murray, Li, Sastry 1994, ch. 3 and 4]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.arithmetic import Arithmetic, Array, apply, sqrt
+from robot_dyn.model.ties import Ties, resolve
+from robot_dyn.model.tree import Joint, Link, Tree
+from robot_dyn.spatial import adjoint_inverse, rotation, rotation_rpy, spatial_inertia
+
+BASE = -1  # the body that does not move
+
+
+@final
+@dataclass(frozen=True)
+class Pose:
+    """A constant placement (R, p)."""
+
+    R: Array
+    p: Array
+
+    def __matmul__(self, other: Pose) -> Pose:
+        return Pose(self.R @ other.R, self.R @ other.p + self.p)
+
+
+@final
+@dataclass(frozen=True)
+class Body:
+    """A moving body and the joint that carries it.
+
+    Attributes:
+        joint: Name of the joint.
+        parent: Index of the body before it, or BASE.
+        pose: Placement of the joint in the parent's frame at q = 0.
+        axis: Unit vector (3,).
+        revolute: Whether it turns about the axis, or slides along it.
+        path: Indices of the bodies from the base to this one, itself last.
+    """
+
+    joint: str
+    parent: int
+    pose: Pose
+    axis: Array
+    revolute: bool
+    path: tuple[int, ...]
+
+    @cached_property
+    def screw(self) -> Array:
+        """ξ, the body twist at unit rate, (6,)."""
+        zero = np.zeros_like(self.axis)
+        return np.concatenate([zero, self.axis] if self.revolute else [self.axis, zero])
+
+    @cached_property
+    def block(self) -> tuple[Any, ...]:
+        """Index of the entries of a matrix (..., N, N) that couple the joints of the path."""
+        return (..., *np.ix_(self.path, self.path))
+
+    def moved(self, q: Array) -> tuple[Array, Array]:
+        """(R, p) in the parent's frame at the joint's coordinate q (...,)."""
+        if self.revolute:
+            return self.pose.R @ rotation(self.axis, q), np.broadcast_to(self.pose.p, (*q.shape, 3))
+        slide = self.pose.R @ self.axis
+        return np.broadcast_to(self.pose.R, (*q.shape, 3, 3)), self.pose.p + q[..., None] * slide
+
+
+@final
+@dataclass(frozen=True)
+class Linkage:
+    """The N bodies that move, parents first.
+
+    Attributes:
+        bodies: Each with its joint.
+        links: By name: the body a link belongs to, its placement in that body's frame, its own 𝓜 in that frame (6, 6).
+        ties: q_full = S q + s₀, from the coordinates that the user sees to the N joints.
+        gravity: (3,) in [m/s²].
+        armature: Of the N joints, (N,).
+    """
+
+    bodies: tuple[Body, ...]
+    links: dict[str, tuple[int, Pose, Array]]
+    ties: Ties
+    gravity: Array
+    armature: Array
+
+    @cached_property
+    def inertias(self) -> tuple[Array, ...]:
+        """𝓜 of each body in its frame, (6, 6)."""
+        total = [np.zeros((6, 6), dtype=self.gravity.dtype) for _ in self.bodies]
+        for body, _, inertia in self.links.values():
+            if body != BASE:
+                total[body] = total[body] + inertia
+        return tuple(total)
+
+    def at(self, q: Array) -> Configuration:
+        """The linkage at coordinates q (..., n)."""
+        q = self.ties.position(q)
+        in_parent = [body.moved(q[..., i]) for i, body in enumerate(self.bodies)]
+        return Configuration(self, q.shape[:-1], in_parent)
+
+
+@final
+@dataclass(frozen=True)
+class Configuration:
+    """The linkage at one configuration, or a batch.
+
+    Attributes:
+        batch: Shape of the batch axes.
+        in_parent: (R, p) of each body in its parent's frame.
+    """
+
+    linkage: Linkage
+    batch: tuple[int, ...]
+    in_parent: list[tuple[Array, Array]]
+
+    @cached_property
+    def in_base(self) -> list[tuple[Array, Array]]:
+        """(R, p) of each body in the base."""
+        result: list[tuple[Array, Array]] = []
+        for body, (R, p) in zip(self.linkage.bodies, self.in_parent, strict=True):
+            if body.parent != BASE:
+                R0, p0 = result[body.parent]
+                R, p = R0 @ R, apply(R0, p) + p0
+            result.append((R, p))
+        return result
+
+    @cached_property
+    def jacobians(self) -> list[Array]:
+        """Body Jacobian of each body, (..., 6, len(path)): its columns are the joints of its path.
+
+        Jᵢ = [Ad⁻¹ J_parent, ξᵢ].  [Murray, Li, Sastry 1994, eq. 3.56]
+        """
+        J: list[Array] = []
+        for body, (R, p) in zip(self.linkage.bodies, self.in_parent, strict=True):
+            own = np.broadcast_to(body.screw[:, None], (*self.batch, 6, 1))
+            if body.parent != BASE:
+                own = np.concatenate([adjoint_inverse(R, p) @ J[body.parent], own], axis=-1)
+            J.append(own)
+        return J
+
+    def bodies(self) -> Iterator[tuple[Body, Array, Array]]:
+        """Each body with its generalised inertia and its Jacobian."""
+        return zip(self.linkage.bodies, self.linkage.inertias, self.jacobians, strict=True)
+
+
+def linkage(tree: Tree, joint_names: tuple[str, ...], arithmetic: Arithmetic) -> Linkage:
+    """The numbers of a tree; coordinates in the order of `joint_names`. To be called in the arithmetic's scope."""
+    mimics = {joint.name: joint.mimic for joint in tree.joints if joint.mimic and joint.kind != "fixed"}
+    held = {joint.name: arithmetic.number(joint.locked) for joint in tree.joints if joint.locked is not None}
+    followed = {joint.name: resolve(joint.name, mimics, arithmetic) for joint in tree.joints}
+    identity = Pose(np.eye(3, dtype=arithmetic.dtype), np.zeros(3, dtype=arithmetic.dtype))
+    where: dict[str, tuple[int, Pose]] = {tree.root: (BASE, identity)}
+    bodies: list[Body] = []
+    for joint in tree.joints:
+        parent, pose = where[joint.parent]
+        pose = pose @ Pose(rotation_rpy(arithmetic.array(joint.rpy)), arithmetic.array(joint.xyz))
+        if joint.kind != "fixed":
+            path = bodies[parent].path if parent != BASE else ()
+            body = Body(
+                joint.name, parent, pose, _unit(joint, arithmetic), joint.kind != "prismatic", (*path, len(bodies))
+            )
+            source, ratio, offset = followed[joint.name]
+            if source in held:
+                pose = Pose(*body.moved(np.asarray(ratio * held[source] + offset, dtype=arithmetic.dtype)))
+            else:
+                bodies.append(body)
+                parent, pose = len(bodies) - 1, identity
+        where[joint.child] = parent, pose
+    links = {link.name: (*where[link.name], _inertia(link, where[link.name][1], arithmetic)) for link in tree.links}
+    armature = {joint.name: joint.armature for joint in tree.joints}
+    return Linkage(
+        tuple(bodies),
+        links,
+        _ties(bodies, followed, joint_names, arithmetic),
+        arithmetic.array(tree.gravity),
+        arithmetic.array([armature[body.joint] for body in bodies]),
+    )
+
+
+def _unit(joint: Joint, arithmetic: Arithmetic) -> Array:
+    axis = arithmetic.array(joint.axis)
+    return axis / sqrt((axis * axis).sum())
+
+
+def _inertia(link: Link, pose: Pose, arithmetic: Arithmetic) -> Array:
+    """𝓜 of a link in its body's frame: change of frame 𝓜_b = Ad⁻ᵀ 𝓜_c Ad⁻¹ of each part."""
+    total = np.zeros((6, 6), dtype=arithmetic.dtype)
+    for part in link.inertials:
+        at = pose @ Pose(rotation_rpy(arithmetic.array(part.rpy)), arithmetic.array(part.xyz))
+        Ixx, Ixy, Ixz, Iyy, Iyz, Izz = arithmetic.array(part.moments)
+        about_com = np.array([[Ixx, Ixy, Ixz], [Ixy, Iyy, Iyz], [Ixz, Iyz, Izz]], dtype=arithmetic.dtype)
+        total = total + spatial_inertia(arithmetic.number(part.mass), at.p, at.R @ about_com @ at.R.T)
+    return total
+
+
+def _ties(bodies: list[Body], followed: dict[str, Any], joint_names: tuple[str, ...], arithmetic: Arithmetic) -> Ties:
+    S = np.zeros((len(bodies), len(joint_names)), dtype=arithmetic.dtype)
+    s0 = np.zeros(len(bodies), dtype=arithmetic.dtype)
+    for row, body in enumerate(bodies):
+        source, ratio, s0[row] = followed[body.joint]
+        S[row, joint_names.index(source)] = ratio
+    return Ties(S, s0)

@@ -1,0 +1,104 @@
+"""The catalog: a name, a path or a package:// address → a URDF file.
+
+Names are those of the files of `urdf/` and of every URDF of the installed example-robot-data.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+
+from robot_dyn.errors import CatalogError, nearest
+
+# Files whose own stem is shared, or says nothing.
+_RENAMED = {
+    "anymal_b_simple_description/robots/anymal.urdf": "anymal_b",
+    "anymal_b_simple_description/robots/anymal-kinova.urdf": "anymal_b_kinova",
+    "anymal_c_simple_description/urdf/anymal.urdf": "anymal_c",
+    "alexander_description/urdf/alexander_v1.lowerBodyOnly.urdf": "alexander",
+    "hector_description/robots/quadrotor_base.urdf": "hector",
+    "ur_description/urdf/ur3.urdf": "ur3_empty",
+}
+
+
+def list_robots() -> tuple[str, ...]:
+    """Names that `load` takes, sorted."""
+    return tuple(sorted(_files()))
+
+
+def find(name_or_path: str | Path, package_dirs: Iterable[str | Path] = ()) -> Path:
+    """The URDF file of a name, a path or a package:// address.
+
+    Raises:
+        CatalogError: If there is none; names the nearest robots or the places tried.
+    """
+    text = str(name_or_path)
+    if text.startswith("package://"):
+        return resolve(text, Path.cwd() / "x", package_dirs)
+    if text in _files():
+        return _files()[text]
+    path = Path(name_or_path).expanduser()
+    if path.exists():
+        return path
+    if path.suffix or len(path.parts) > 1:
+        raise CatalogError(f"no file {text}; looked for {path.absolute()}")
+    raise CatalogError(f"no robot {text!r}; {nearest(text, list_robots())}; or give the path of a URDF file")
+
+
+def resolve(address: str, urdf: Path, package_dirs: Iterable[str | Path] = ()) -> Path:
+    """The file of a package://package/path address that stands in `urdf`.
+
+    A package is a folder of that name: searched in `package_dirs`, then upwards from the file, then in
+    ROS_PACKAGE_PATH.
+
+    Raises:
+        CatalogError: If it is in none of these; lists the places tried.
+    """
+    inside = Path(address.removeprefix("package://"))
+    tried = []
+    for folder in _package_folders(urdf, package_dirs):
+        if (folder / inside).is_file():
+            return folder / inside
+        tried.append(str(folder))
+    raise CatalogError(
+        f"no file for {address}; tried in {', '.join(dict.fromkeys(tried))}; name the folder that holds"
+        f" {inside.parts[0] if inside.parts else 'the package'!r} in package_dirs or ROS_PACKAGE_PATH"
+    )
+
+
+def _package_folders(urdf: Path, package_dirs: Iterable[str | Path]) -> Iterator[Path]:
+    yield from (Path(folder).expanduser() for folder in package_dirs)
+    yield from urdf.absolute().parents
+    yield from (Path(folder) for folder in os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep) if folder)
+
+
+@cache
+def _files() -> dict[str, Path]:
+    """File by name."""
+    own = {path.stem: path for path in sorted(_own_folder().glob("*.urdf"))}
+    files = dict(_example_robot_data())
+    clash = own.keys() & files.keys()
+    assert not clash, f"names taken twice: {clash}"
+    return files | own
+
+
+def _own_folder() -> Path:
+    """`urdf/`: inside the installed package, or beside it in a checkout."""
+    package = Path(__file__).parents[1]
+    inside = package / "urdf"
+    return inside if inside.is_dir() else package.parent / "urdf"
+
+
+def _example_robot_data() -> Iterator[tuple[str, Path]]:
+    try:
+        distribution = metadata.distribution("example-robot-data")
+    except metadata.PackageNotFoundError:
+        return
+    for file in distribution.files or ():
+        if file.suffix == ".urdf":
+            inside = str(file).partition("/example-robot-data/robots/")[2]
+            name = _RENAMED.get(inside, file.stem.removesuffix("_robot").lower().replace("-", "_"))
+            yield name, Path(str(distribution.locate_file(file))).resolve()

@@ -1,0 +1,122 @@
+"""Edits of a described robot: gravity, locked joints, payloads, armature. Values; each road applies them itself."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.errors import EditError, nearest
+
+STANDARD_GRAVITY = (0.0, 0.0, -9.80665)  # [m/s²], CGPM 1901
+
+Matrix3 = tuple[tuple[float, float, float], ...]
+
+
+@final
+@dataclass(frozen=True)
+class Payload:
+    """A rigid body fastened to a frame of the robot.
+
+    Attributes:
+        frame: Link that carries it.
+        mass: In [kg], not negative.
+        com: Centre of mass in the frame, shape (3,), in [m].
+        inertia: Rotational inertia about its centre of mass, axes of the frame, shape (3, 3), in [kg m²].
+    """
+
+    frame: str
+    mass: float
+    com: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    inertia: Matrix3 = ((0.0, 0.0, 0.0),) * 3
+
+    def __post_init__(self) -> None:
+        inertia = _numbers("payload inertia", self.inertia, (3, 3))
+        if not np.array_equal(inertia, inertia.T):
+            raise EditError(f"payload inertia must be symmetric, got {inertia.tolist()}")
+        mass = float(_numbers("payload mass", self.mass, ()))
+        if mass < 0:
+            raise EditError(f"payload mass must not be negative, got {mass:g} kg")
+        object.__setattr__(self, "mass", mass)
+        object.__setattr__(self, "com", tuple(_numbers("payload com", self.com, (3,)).tolist()))
+        object.__setattr__(self, "inertia", tuple(map(tuple, inertia.tolist())))
+
+
+@final
+@dataclass(frozen=True)
+class Edits:
+    """What was changed of a description.
+
+    Attributes:
+        gravity: Acceleration of free fall in base axes, in [m/s²].
+        lock: Joints held at a value: (name, value in [rad] or [m]) each.
+        payloads: Bodies fastened to links.
+        armature: Inertia of the drives felt at the joints: (name, value in [kg m²] or [kg]) each.
+    """
+
+    gravity: tuple[float, float, float] = STANDARD_GRAVITY
+    lock: tuple[tuple[str, float], ...] = ()
+    payloads: tuple[Payload, ...] = ()
+    armature: tuple[tuple[str, float], ...] = ()
+
+    def with_(
+        self,
+        joint_names: tuple[str, ...],
+        *,
+        gravity: Any = None,
+        lock: Mapping[str, float] | None = None,
+        payload: Payload | Iterable[Payload] | None = None,
+        armature: Any = None,
+    ) -> Edits:
+        """These edits and more. Locks and payloads add up; gravity and armature replace what was given before.
+
+        Args:
+            joint_names: The joints that can be named: those of the robot being edited.
+            gravity: Shape (3,), in [m/s²].
+            lock: Value by joint name, in [rad] or [m].
+            payload: One or several.
+            armature: A scalar or shape (n,) or by joint name, in [kg m²] or [kg], not negative.
+
+        Raises:
+            EditError: If a joint is unknown or a value is not a finite number of the right shape.
+        """
+        new = self
+        if gravity is not None:
+            new = replace(new, gravity=tuple(_numbers("gravity", gravity, (3,)).tolist()))
+        if armature is not None:
+            new = replace(new, armature=_by_joint("armature", armature, joint_names))
+        if lock is not None:
+            new = replace(new, lock=new.lock + _by_joint("lock", dict(lock), joint_names))
+        if payload is not None:
+            more = (payload,) if isinstance(payload, Payload) else tuple(payload)
+            if not all(isinstance(each, Payload) for each in more):
+                raise EditError(f"payload must be a Payload or several, got {payload!r}")
+            new = replace(new, payloads=new.payloads + more)
+        return new
+
+
+def _by_joint(what: str, values: Any, joint_names: tuple[str, ...]) -> tuple[tuple[str, float], ...]:
+    """(name, value) pairs of a scalar, an array (n,) or a mapping."""
+    if not isinstance(values, Mapping):
+        n = len(joint_names)
+        numbers = _numbers(what, values, (n,) if np.ndim(values) else ())
+        values = dict(zip(joint_names, np.broadcast_to(numbers, (n,)).tolist(), strict=True))
+    for name, value in values.items():
+        if name not in joint_names:
+            raise EditError(f"{what}: no joint {name!r} that moves freely; {nearest(str(name), joint_names)}")
+        number = float(_numbers(f"{what} of {name!r}", value, ()))
+        if what == "armature" and number < 0:
+            raise EditError(f"armature of {name!r} must not be negative, got {number:g}")
+    return tuple((name, float(value)) for name, value in values.items())
+
+
+def _numbers(what: str, values: Any, shape: tuple[int, ...]) -> np.ndarray:
+    try:
+        array = np.array(values, dtype=float)
+    except (TypeError, ValueError):
+        raise EditError(f"{what} must be numbers of shape {shape}, got {values!r}") from None
+    if array.shape != shape or not np.isfinite(array).all():
+        raise EditError(f"{what} must be finite numbers of shape {shape}, got {values!r}")
+    return array

@@ -1,0 +1,121 @@
+"""A `pinocchio.Model` of a description and its edits, and what of its bodies cannot exist."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin  # pyright: ignore[reportMissingImports]
+from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
+
+from robot_dyn.arithmetic import FLOAT64
+from robot_dyn.errors import DescriptionError, EditError, nearest
+from robot_dyn.model.description import Description
+from robot_dyn.model.edits import Edits
+from robot_dyn.model.inertia import implausibility
+from robot_dyn.model.ties import Mimic, Ties, resolve
+from robot_dyn.model.urdf import UNBOUNDED
+
+_SINGULAR = 1e-12  # of a pivot of M scaled to a unit diagonal; rounding leaves 1e-14
+
+
+def build(description: Description, edits: Edits) -> tuple[Any, Ties, tuple[str, ...]]:
+    """The Pinocchio model of all joints that move, the ties between them, and the names of the independent ones.
+
+    Raises:
+        DescriptionError: If Pinocchio refuses it, or no joint moves.
+        EditError: If a payload's frame is unknown, or no joint is left to move.
+    """
+    robot = description.element
+    mimics = {
+        joint.get("name"): Mimic(mimic.get("joint"), mimic.get("multiplier"), mimic.get("offset"))
+        for joint in robot.iterfind("joint")
+        if (mimic := joint.find("mimic")) is not None
+    }
+    for joint in robot.iterfind("joint[@type='continuous']"):
+        joint.set("type", "revolute")  # with its limits of ±1e308: an angle, one number for q as for v
+    try:
+        model = pin.buildModelFromXML(etree.tostring(robot, encoding="unicode"))
+    except Exception as error:  # Pinocchio raises bare Exceptions of several kinds
+        raise DescriptionError(f"{description.source}: Pinocchio refuses it: {error}") from None
+    if model.nv == 0:
+        raise DescriptionError(f"{description.source}: no joint moves; with a fixed base there is no dynamics to query")
+    _apply(edits, model)
+    model = _locked(model, edits, mimics)
+    return model, *_ties(tuple(model.names[1:]), mimics)
+
+
+def _apply(edits: Edits, model: Any) -> None:
+    model.gravity = pin.Motion(np.array(edits.gravity), np.zeros(3))
+    for name, value in edits.armature:
+        model.armature[model.idx_vs[model.getJointId(name)]] = value
+    links = link_frames(model)
+    for payload in edits.payloads:
+        if payload.frame not in links:
+            raise EditError(f"payload: no frame {payload.frame!r}; {nearest(payload.frame, links)}")
+        frame = model.frames[links[payload.frame]]
+        body = pin.Inertia(payload.mass, np.array(payload.com), np.array(payload.inertia))
+        model.appendBodyToJoint(frame.parentJoint, body, frame.placement)
+
+
+def _locked(model: Any, edits: Edits, mimics: dict[str, Mimic]) -> Any:
+    """The model without the joints that are held, and without those that follow a held joint."""
+    values = dict(edits.lock)
+    q, held = np.zeros(model.nq), []
+    for name in model.names[1:]:
+        source, ratio, offset = resolve(name, mimics, FLOAT64)
+        if source in values:
+            held.append(model.getJointId(name))
+            q[model.idx_qs[held[-1]]] = ratio * values[source] + offset
+    if len(held) == model.nv:
+        raise EditError(f"lock: no joint is left to move, of {', '.join(model.names[1:])}")
+    return pin.buildReducedModel(model, held, q) if held else model
+
+
+def _ties(joints: tuple[str, ...], mimics: dict[str, Mimic]) -> tuple[Ties, tuple[str, ...]]:
+    independent = tuple(name for name in joints if name not in mimics)
+    S, s0 = np.zeros((len(joints), len(independent))), np.zeros(len(joints))
+    for row, name in enumerate(joints):
+        source, ratio, s0[row] = resolve(name, mimics, FLOAT64)
+        S[row, independent.index(source)] = ratio
+    return Ties(S, s0), independent
+
+
+def link_frames(model: Any) -> dict[str, int]:
+    """Index of the frame of each link, by name."""
+    return {frame.name: i for i, frame in enumerate(model.frames) if frame.type == pin.FrameType.BODY}
+
+
+def per_joint(model: Any, joint_names: tuple[str, ...], full: np.ndarray) -> np.ndarray:
+    """The entries of some joints, ±inf where the file states none; read-only."""
+    values = full[[model.idx_vs[model.getJointId(name)] for name in joint_names]]
+    values[np.abs(values) >= float(UNBOUNDED)] *= np.inf
+    values.setflags(write=False)
+    return values
+
+
+def findings(model: Any) -> tuple[str, ...]:
+    """What is wrong with the merged bodies that move, each named by the link its joint carries."""
+    found = []
+    for joint in range(1, model.njoints):
+        body = model.inertias[joint]
+        link = next(f.name for f in model.frames if f.parentJoint == joint and f.type == pin.FrameType.BODY)
+        if body.mass == 0 and not body.inertia.any():
+            found.append(f"link {link!r} moves but has no mass; give it an <inertial>, or make its joint fixed")
+        elif why := implausibility(body.mass, body.lever, body.inertia):
+            found.append(f"link {link!r}: with what is fixed to it, {why}; correct the inertia of these links")
+    return tuple(found)
+
+
+def joint_without_inertia(M: np.ndarray) -> int | None:
+    """The first row at which M, scaled to a unit diagonal, fails to be positive definite; or None."""
+    diagonal = np.diagonal(M)
+    if not (diagonal > 0).all():
+        return int(np.argmin(diagonal > 0))
+    scale = 1 / np.sqrt(diagonal)
+    A = M * scale * scale[:, None]
+    for row in range(len(A)):
+        if not A[row, row] > _SINGULAR:
+            return row
+        A[row + 1 :, row + 1 :] -= np.outer(A[row + 1 :, row], A[row, row + 1 :]) / A[row, row]
+    return None

@@ -1,0 +1,259 @@
+"""Robot: a URDF arm behind the Dynamics protocol, M(q) a + C(q, v) v + N(q) = τ, computed by Pinocchio.
+
+A thin layer over CRBA, RNEA and ABA [Featherstone 2008, ch. 5–7]. One state of float64 goes straight to Pinocchio,
+after checks that cost a fraction of a microsecond; lists, batches and tied joints take the general way, `ask`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import isfinite
+from typing import Any, final
+
+import numpy as np
+import pinocchio as pin  # pyright: ignore[reportMissingImports]
+from numpy import ndarray
+
+from robot_dyn.errors import OverflowedError, SingularError
+from robot_dyn.model import kernels, pinocchio_model
+from robot_dyn.model.description import Description
+from robot_dyn.model.dynamics import Array, Axes, acceleration, checked, entry
+from robot_dyn.model.edits import Edits, Payload
+from robot_dyn.model.kernels import Kernel, Scratch, ask, is_state
+from robot_dyn.model.ties import Ties
+
+
+@final
+@dataclass(frozen=True)
+class Robot:
+    """A robot: its description and what was changed of it. Immutable; may be shared between threads and pickled.
+
+    Attributes:
+        description: The checked file.
+        edits: Gravity, locks, payloads, armature.
+    """
+
+    description: Description
+    edits: Edits = field(default_factory=Edits)
+
+    def __post_init__(self) -> None:
+        _ = self._built  # so that what is wrong is said now, not at the first query
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Robot, (self.description, self.edits)
+
+    def with_(
+        self,
+        *,
+        gravity: Any = None,
+        lock: Mapping[str, float] | None = None,
+        payload: Payload | Iterable[Payload] | None = None,
+        armature: Any = None,
+    ) -> Robot:
+        """A new robot with more edits. Locks and payloads add up; gravity and armature replace earlier ones.
+
+        Args:
+            gravity: Acceleration of free fall in base axes, (3,) in [m/s²].
+            lock: Joints to hold, with their value in [rad] or [m].
+            payload: One body or several to fasten to links.
+            armature: Inertia of the drives felt at the joints: scalar, (n,) or by name, in [kg m²] or [kg].
+
+        Raises:
+            EditError: If a name is unknown or a value has no meaning.
+        """
+        edits = self.edits.with_(self.joint_names, gravity=gravity, lock=lock, payload=payload, armature=armature)
+        return Robot(self.description, edits)
+
+    # --- what it is
+
+    @property
+    def name(self) -> str:
+        """The robot's name in its file."""
+        return self.description.name
+
+    @cached_property
+    def n(self) -> int:
+        """Number of degrees of freedom."""
+        return len(self.joint_names)
+
+    @cached_property
+    def model(self) -> Any:
+        """The `pinocchio.Model` of all joints that move, tied ones included. Read it, do not change it."""
+        return self._built[0]
+
+    @cached_property
+    def ties(self) -> Ties:
+        """How the joints of `model` follow q."""
+        return self._built[1]
+
+    @cached_property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the n joints, in the order of q."""
+        return self._built[2]
+
+    @property
+    def frame_names(self) -> tuple[str, ...]:
+        """Names of the links; each can be asked for its placement and Jacobian."""
+        return tuple(self._frames)
+
+    @property
+    def lower(self) -> ndarray:
+        """Lower position limits, −inf where none is stated, (n,) in [rad] or [m]."""
+        return self._per_joint(self.model.lowerPositionLimit)
+
+    @property
+    def upper(self) -> ndarray:
+        """Upper position limits, inf where none is stated, (n,) in [rad] or [m]."""
+        return self._per_joint(self.model.upperPositionLimit)
+
+    @property
+    def effort_limit(self) -> ndarray:
+        """Effort limits, inf where none is stated, (n,) in [N m] or [N]."""
+        return self._per_joint(self.model.effortLimit)
+
+    @property
+    def velocity_limit(self) -> ndarray:
+        """Velocity limits, inf where none is stated, (n,) in [rad/s] or [m/s]."""
+        return self._per_joint(self.model.velocityLimit)
+
+    @property
+    def armature(self) -> ndarray:
+        """Inertia of the drives felt at the joints, (n,) in [kg m²] or [kg]; part of M."""
+        return self._per_joint(self.model.armature)
+
+    @property
+    def damping(self) -> ndarray:
+        """Viscous friction the file states, with tied joints Σ s² b, (n,) in [N m s/rad] or [N s/m]; see `Plant`."""
+        return self.model.damping @ self.ties.S**2
+
+    @property
+    def friction(self) -> ndarray:
+        """Dry friction the file states, with tied joints Σ |s| f, (n,) in [N m] or [N]; see `Plant`."""
+        return self.model.friction @ np.abs(self.ties.S)
+
+    @property
+    def total_mass(self) -> float:
+        """Mass of all links, those of the base included, in [kg]."""
+        return sum(body.mass for body in self.model.inertias)
+
+    @cached_property
+    def findings(self) -> tuple[str, ...]:
+        """Bodies that cannot exist as described, in words."""
+        return pinocchio_model.findings(self.model)
+
+    # --- its dynamics
+
+    def M(self, q: Array) -> ndarray:
+        if is_state(q, self._shape) and isfinite(q.dot(q)):
+            return pin.crba(self.model, self._scratch.data, q)
+        return self._ask(pin.crba, self.ties.matrix, q=q)
+
+    def C(self, q: Array, v: Array) -> ndarray:
+        if is_state(q, self._shape) and is_state(v, self._shape) and isfinite(q.dot(v)):
+            return pin.computeCoriolisMatrix(self.model, self._scratch.data, q, v)
+        return self._ask(pin.computeCoriolisMatrix, self.ties.matrix, q=q, v=v)
+
+    def N(self, q: Array) -> ndarray:
+        if is_state(q, self._shape) and isfinite(q.dot(q)):
+            return pin.computeGeneralizedGravity(self.model, self._scratch.data, q)
+        return self._ask(pin.computeGeneralizedGravity, self.ties.torque, q=q)
+
+    def coriolis_torque(self, q: Array, v: Array) -> ndarray:
+        return np.matvec(self.C(q, v), v)
+
+    def coriolis_transpose(self, q: Array, v: Array) -> ndarray:
+        return np.vecmat(v, self.C(q, v))
+
+    def inverse_dynamics(self, q: Array, v: Array, a: Array) -> ndarray:
+        shape = self._shape
+        if is_state(q, shape) and is_state(v, shape) and is_state(a, shape):
+            tau = pin.rnea(self.model, self._scratch.data, q, v, a)
+            if isfinite(tau.dot(tau)):  # one that is not finite, in any argument, shows in tau
+                return tau
+        return self._ask(pin.rnea, self.ties.torque, q=q, v=v, a=a)
+
+    def forward_dynamics(self, q: Array, v: Array, tau: Array) -> ndarray:
+        shape = self._solvable_shape
+        if is_state(q, shape) and is_state(v, shape) and is_state(tau, shape):
+            a = pin.aba(self.model, self._scratch.data, q, v, tau)
+            if isfinite(a.dot(a)):
+                return a
+        return self._forward_dynamics(q, v, tau)
+
+    def kinetic_energy(self, q: Array, v: Array) -> Any:
+        return self._ask(pin.computeKineticEnergy, None, q=q, v=v)
+
+    def potential_energy(self, q: Array) -> Any:
+        return self._ask(pin.computePotentialEnergy, None, q=q)
+
+    def momentum(self, q: Array, v: Array) -> ndarray:
+        return np.matvec(self.M(q), checked("v", v, self.joint_names))
+
+    def placement(self, q: Array, frame: str) -> ndarray:
+        return self._ask(kernels.placement(entry(self._frames, frame)), None, q=q)
+
+    def jacobian(self, q: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED) -> ndarray:
+        kernel = kernels.jacobian(entry(self._frames, frame), Axes.of(expressed_in))
+        return self._ask(kernel, self.ties.columns, q=q)
+
+    def jacobian_rate(self, q: Array, v: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED) -> ndarray:
+        kernel = kernels.jacobian_rate(entry(self._frames, frame), Axes.of(expressed_in))
+        return self._ask(kernel, self.ties.columns, q=q, v=v)
+
+    # --- how it is asked
+
+    @cached_property
+    def _built(self) -> tuple[Any, Ties, tuple[str, ...]]:
+        return pinocchio_model.build(self.description, self.edits)
+
+    @cached_property
+    def _scratch(self) -> Scratch:
+        return Scratch(self.model)
+
+    @cached_property
+    def _frames(self) -> dict[str, int]:
+        return pinocchio_model.link_frames(self.model)
+
+    @cached_property
+    def _shape(self) -> tuple[int] | None:
+        """Shape of a state that goes straight to Pinocchio; None if joints are tied."""
+        return (self.n,) if self.ties.trivial else None
+
+    @cached_property
+    def _solvable_shape(self) -> tuple[int] | None:
+        """The same for forward dynamics; None also if M is singular everywhere."""
+        return self._shape if self.joint_without_inertia is None else None
+
+    @cached_property
+    def joint_without_inertia(self) -> str | None:
+        """The joint at which M is singular at every configuration, or None: then forward dynamics has no answer."""
+        M = self.M(np.linspace(0.3, 0.9, self.n))  # a configuration without symmetries
+        row = pinocchio_model.joint_without_inertia(M)
+        return None if row is None else self.joint_names[row]
+
+    def _ask(self, kernel: Kernel, reduce: Callable[[Any], Any] | None, **state: Array) -> Any:
+        return ask(kernel, reduce, self.model, self._scratch.data, self.ties, self.joint_names, state)
+
+    def _forward_dynamics(self, q: Array, v: Array, tau: Array) -> ndarray:
+        """Forward dynamics in general; where joints are tied, by the factorisation of M."""
+        joint = self.joint_without_inertia
+        if joint is not None:
+            raise SingularError(
+                f"no forward dynamics: joint {joint!r} carries no inertia; give its link a mass or lock it"
+            )
+        if self.ties.trivial:
+            try:
+                return self._ask(pin.aba, None, q=q, v=v, tau=tau)
+            except OverflowedError:
+                self._by_factorisation(q, v, tau)  # says so if it is M that is singular at this q
+                raise
+        return self._by_factorisation(q, v, tau)
+
+    def _by_factorisation(self, q: Array, v: Array, tau: Array) -> ndarray:
+        rest = checked("tau", tau, self.joint_names) - self.inverse_dynamics(q, v, np.zeros(self.n))
+        return acceleration(self.M(q), rest, self.joint_names)
+
+    def _per_joint(self, full: ndarray) -> ndarray:
+        return pinocchio_model.per_joint(self.model, self.joint_names, full)

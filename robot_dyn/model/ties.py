@@ -1,0 +1,79 @@
+"""Mimic joints as a constant linear map: q_full = S q + s₀, so that M = Sᵀ M_full S and N = Sᵀ N_full."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.arithmetic import Arithmetic, Array
+
+
+@final
+@dataclass(frozen=True)
+class Mimic:
+    """The tie of a joint to another: q = multiplier · q_source + offset, in literals."""
+
+    source: str
+    multiplier: Any
+    offset: Any
+
+
+def resolve(name: str, mimics: Mapping[str, Mimic], arithmetic: Arithmetic) -> tuple[str, Any, Any]:
+    """The independent joint that `name` follows through a chain of mimics, with the composed multiplier and offset."""
+    ratio, offset = arithmetic.number("1"), arithmetic.number("0")
+    while name in mimics:
+        tie = mimics[name]
+        offset = offset + ratio * arithmetic.number(tie.offset)
+        ratio = ratio * arithmetic.number(tie.multiplier)
+        name = tie.source
+    return name, ratio, offset
+
+
+@final
+@dataclass(frozen=True)
+class Ties:
+    """The map q_full = S q + s₀ from n independent coordinates to all N joints that move.
+
+    Attributes:
+        S: Shape (N, n); one entry a row.
+        s0: Shape (N,).
+    """
+
+    S: Array
+    s0: Array
+
+    @cached_property
+    def trivial(self) -> bool:
+        """Whether q_full = q."""
+        N, n = self.S.shape
+        return n == N and bool(np.all(np.eye(n, dtype=int) == self.S)) and bool(np.all(self.s0 == 0))
+
+    def position(self, q: Array) -> Array:
+        """q_full = S q + s₀."""
+        return q if self.trivial else self.velocity(q) + self.s0
+
+    def velocity(self, v: Array) -> Array:
+        """v_full = S v, and accelerations alike: S is constant."""
+        return v if self.trivial else v @ self.S.T
+
+    def torque(self, tau: Array) -> Array:
+        """τ = Sᵀ τ_full, by virtual work."""
+        return tau if self.trivial else tau @ self.S
+
+    def matrix(self, A: Array) -> Array:
+        """Sᵀ A S, for quadratic forms."""
+        return A if self.trivial else self.S.T @ A @ self.S
+
+    def cube(self, A: Array) -> Array:
+        """A with S applied to each of its last three axes, for ∂M/∂q."""
+        for axis in () if self.trivial else (-3, -2, -1):
+            A = np.moveaxis(np.moveaxis(A, axis, -1) @ self.S, -1, axis)
+        return A
+
+    def columns(self, J: Array) -> Array:
+        """J S, for Jacobians."""
+        return J if self.trivial else J @ self.S

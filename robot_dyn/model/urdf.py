@@ -1,0 +1,222 @@
+"""The elements of a URDF that dynamics needs, each checked and written anew with its own literals.
+
+What is refused here is what the two parsers would read in silence, in two ways, or not at all.
+"""
+
+from __future__ import annotations
+
+import re
+from math import hypot, isfinite
+
+from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
+
+from robot_dyn.errors import DescriptionError, nearest
+
+MAX_JOINTS = 1000  # Pinocchio crashes the process on chains of some thousands
+MOVING = ("revolute", "continuous", "prismatic")
+UNBOUNDED = "1e308"  # stands for a limit that is not stated; urdfdom refuses "inf"
+
+_LITERAL = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,4})?")
+_MAX_NAME, _MAX_LITERAL = 256, 64
+_MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+
+
+def checked_robot(robot: etree._Element, source: str) -> etree._Element:
+    """A canonical copy of a `<robot>` element.
+
+    Raises:
+        DescriptionError: If anything in it has no meaning, or more than one.
+    """
+    if robot.tag != "robot":
+        raise DescriptionError(f"{source}: the outermost element is <{robot.tag}>, not <robot>; give a URDF file")
+    check = _Check(source)
+    if any("xacro" in str(element.tag) for element in robot.iter()):
+        check.refuse("robot", "holds xacro macros; expand the file first: xacro robot.xacro > robot.urdf")
+    out = etree.Element("robot", name=check.name(robot, "robot"))
+    links = [check.link(link, out) for link in robot.iterfind("link")]
+    if not links:
+        check.refuse("robot", "holds no <link>; a robot needs one link at least")
+    if len(robot.findall("joint")) > MAX_JOINTS:
+        check.refuse("robot", f"has {len(robot.findall('joint'))} joints; at most {MAX_JOINTS} are taken")
+    check.distinct("link", links)
+    joints = [check.joint(joint, out, set(links)) for joint in robot.iterfind("joint")]
+    check.distinct("joint", joints)
+    check.one_tree(links, out)
+    check.mimics(out)
+    return out
+
+
+class _Check:
+    """Copies elements while checking them; every refusal names the file and the link or joint."""
+
+    def __init__(self, source: str) -> None:
+        self.source = source
+
+    def refuse(self, where: str, why: str) -> None:
+        raise DescriptionError(f"{self.source}: {where}: {why}")
+
+    def name(self, element: etree._Element, where: str) -> str:
+        name = (element.get("name") or "").strip()
+        if not name:
+            self.refuse(f"<{element.tag}> in line {element.sourceline}", 'has no name; write name="…"')
+        if len(name) > _MAX_NAME or not name.isprintable():
+            self.refuse(where, f"the name {name[:40]!r} has control characters or more than {_MAX_NAME} characters")
+        return name
+
+    def distinct(self, kind: str, names: list[str]) -> None:
+        seen: set[str] = set()
+        for name in names:
+            if name in seen:
+                self.refuse(f"{kind} {name!r}", f"is defined twice; rename or remove one <{kind}>")
+            seen.add(name)
+
+    def one(self, parent: etree._Element, tag: str, where: str) -> etree._Element | None:
+        """The only child of that tag, or None."""
+        found = parent.findall(tag)
+        if len(found) > 1:
+            self.refuse(where, f"has {len(found)} <{tag}> elements; keep one")
+        return found[0] if found else None
+
+    def number(
+        self, element: etree._Element, key: str, where: str, default: str | None = None, minimum: float | None = None
+    ) -> str:
+        """The literal of an attribute, checked to be one finite decimal number."""
+        text = element.get(key, default)
+        if text is None:
+            self.refuse(where, f'<{element.tag}> has no {key}; write {key}="…"')
+        return self.literal(text, f"<{element.tag}> {key}", where, minimum)
+
+    def literal(self, text: str | None, what: str, where: str, minimum: float | None = None) -> str:
+        text = (text or "").strip()
+        if len(text) > _MAX_LITERAL or not _LITERAL.fullmatch(text) or not isfinite(float(text)):
+            self.refuse(where, f"{what} must be a finite decimal number, got {text[:40]!r}; correct it")
+        if minimum is not None and float(text) < minimum:
+            self.refuse(where, f"{what} must not be below {minimum:g}, got {text}; correct it")
+        return text
+
+    def triple(self, element: etree._Element | None, key: str, where: str, default: str) -> str:
+        """Three literals separated by single spaces."""
+        text = default if element is None else element.get(key, default)
+        tag = key if element is None else f"<{element.tag}> {key}"
+        words = text.split()
+        if len(words) != 3:
+            self.refuse(where, f"{tag} must be three numbers, got {text[:60]!r}; correct it")
+        return " ".join(self.literal(word, tag, where) for word in words)
+
+    def origin(self, parent: etree._Element, out: etree._Element, where: str) -> None:
+        origin = self.one(parent, "origin", where)
+        xyz, rpy = (self.triple(origin, key, where, "0 0 0") for key in ("xyz", "rpy"))
+        etree.SubElement(out, "origin", xyz=xyz, rpy=rpy)
+
+    def link(self, link: etree._Element, robot: etree._Element) -> str:
+        name = self.name(link, "link")
+        where = f"link {name!r}"
+        out = etree.SubElement(robot, "link", name=name)
+        inertial = self.one(link, "inertial", where)
+        if inertial is not None:
+            mass, inertia = self.one(inertial, "mass", where), self.one(inertial, "inertia", where)
+            if mass is None or inertia is None:
+                self.refuse(where, "<inertial> needs both <mass> and <inertia>; add the one that is missing")
+            copy = etree.SubElement(out, "inertial")
+            self.origin(inertial, copy, where)
+            etree.SubElement(copy, "mass", value=self.number(mass, "value", where, minimum=0.0))
+            etree.SubElement(copy, "inertia", {key: self.number(inertia, key, where) for key in _MOMENTS})
+        return name
+
+    def joint(self, joint: etree._Element, robot: etree._Element, links: set[str]) -> str:
+        name = self.name(joint, "joint")
+        where, kind = f"joint {name!r}", joint.get("type")
+        if kind in ("floating", "planar"):
+            self.refuse(where, f"is {kind}; only joints of one degree of freedom are taken: {', '.join(MOVING)}, fixed")
+        if kind not in (*MOVING, "fixed"):
+            self.refuse(where, f"has the unknown type {kind!r}; write one of {', '.join(MOVING)}, fixed")
+        out = etree.SubElement(robot, "joint", name=name, type=str(kind))
+        self.origin(joint, out, where)
+        for role in ("parent", "child"):
+            end = self.one(joint, role, where)
+            link = None if end is None else (end.get("link") or "").strip()
+            if link not in links:
+                self.refuse(where, f"its {role} link {link!r} is not defined; {nearest(link or '', sorted(links))}")
+            etree.SubElement(out, role, link=str(link))
+        if kind != "fixed":
+            self.motion(joint, out, where)
+        return name
+
+    def motion(self, joint: etree._Element, out: etree._Element, where: str) -> None:
+        """Axis, limits, friction and coupling of a joint that moves."""
+        axis = self.triple(self.one(joint, "axis", where), "xyz", where, "1 0 0")
+        if not 1e-9 < hypot(*map(float, axis.split())) < 1e9:
+            self.refuse(where, f"<axis> xyz must be a direction, got {axis!r}; write a unit vector")
+        etree.SubElement(out, "axis", xyz=axis)
+        self.limit(joint, out, where)
+        dynamics = self.one(joint, "dynamics", where)
+        if dynamics is not None:
+            terms = {key: self.number(dynamics, key, where, "0", minimum=0.0) for key in ("damping", "friction")}
+            etree.SubElement(out, "dynamics", terms)
+        mimic = self.one(joint, "mimic", where)
+        if mimic is not None:
+            ratio = self.number(mimic, "multiplier", where, "1")
+            offset = self.number(mimic, "offset", where, "0")
+            etree.SubElement(out, "mimic", joint=(mimic.get("joint") or ""), multiplier=ratio, offset=offset)
+
+    def limit(self, joint: etree._Element, out: etree._Element, where: str) -> None:
+        """Limits as stated; where none is stated, `UNBOUNDED`, since urdfdom insists on all four."""
+        limit = self.one(joint, "limit", where)
+        bounds = {"lower": "-" + UNBOUNDED, "upper": UNBOUNDED, "effort": UNBOUNDED, "velocity": UNBOUNDED}
+        if limit is not None:
+            stated = [key for key in bounds if limit.get(key) is not None]
+            for key in stated:
+                bounds[key] = self.number(limit, key, where, minimum=0.0 if key in ("effort", "velocity") else None)
+            # the URDF reference: lower and upper default to 0 where the other one is stated
+            for key in {"lower", "upper"} - set(stated) if {"lower", "upper"} & set(stated) else ():
+                bounds[key] = "0"
+        if joint.get("type") == "continuous":
+            bounds["lower"], bounds["upper"] = "-" + UNBOUNDED, UNBOUNDED
+        if float(bounds["lower"]) > float(bounds["upper"]):
+            self.refuse(where, f"its lower limit {bounds['lower']} is above its upper {bounds['upper']}; exchange them")
+        etree.SubElement(out, "limit", bounds)
+
+    def one_tree(self, links: list[str], robot: etree._Element) -> None:
+        """One root, one parent each, no cycle."""
+        parent_of: dict[str, str] = {}
+        for joint in robot.iterfind("joint"):
+            parent, child = joint.find("parent").get("link"), joint.find("child").get("link")
+            if child in parent_of:
+                self.refuse(
+                    f"link {child!r}", f"has two parents, {parent_of[child]!r} and {parent!r}; remove one joint"
+                )
+            parent_of[child] = parent
+        roots = [link for link in links if link not in parent_of]
+        if len(roots) > 1:
+            listed = ", ".join(repr(root) for root in roots[:5])
+            self.refuse("robot", f"has {len(roots)} roots: {listed}; join them to one root by joints")
+        reached = set(roots)
+        for link in links:
+            path: list[str] = []
+            while link not in reached:
+                if link in path:
+                    listed = " → ".join([*path[path.index(link) :], link][:8])
+                    self.refuse(f"link {link!r}", f"is its own ancestor: {listed}; remove one joint of the loop")
+                path.append(link)
+                link = parent_of[link]
+            reached.update(path)
+
+    def mimics(self, robot: etree._Element) -> None:
+        """Every mimic follows a joint that moves, and none follows itself."""
+        kinds = {joint.get("name"): joint.get("type") for joint in robot.iterfind("joint")}
+        source_of: dict[str, str] = {
+            joint.get("name"): joint.find("mimic").get("joint")
+            for joint in robot.iterfind("joint")
+            if joint.find("mimic") is not None
+        }
+        for follower, source in source_of.items():
+            where = f"joint {follower!r}"
+            if source not in kinds:
+                self.refuse(where, f"mimics {source!r}, which is not defined; {nearest(source, kinds)}")
+            if kinds[source] == "fixed":
+                self.refuse(where, f"mimics {source!r}, which is fixed and never moves; make {follower!r} fixed too")
+            chain = [follower]
+            while chain[-1] in source_of:
+                chain.append(source_of[chain[-1]])
+                if chain[-1] in chain[:-1]:
+                    self.refuse(where, f"mimics itself: {' → '.join(chain[:8])}; remove one <mimic>")

@@ -1,0 +1,226 @@
+"""What the command line says: plain documents for --json (docs/json.md), and the same as tables for a person."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from math import isfinite
+from typing import Any
+
+import numpy as np
+from rich.table import Table
+
+from robot_dyn.accuracy.compare import Comparison, compare
+from robot_dyn.effects.plant import Plant
+from robot_dyn.errors import QueryError, nearest
+from robot_dyn.lagrange.breakdown import torque_breakdown
+from robot_dyn.lagrange.manipulator import Lagrangian
+from robot_dyn.model.robot import Robot
+
+Document = dict[str, Any]
+
+
+def info(robot: Robot) -> Document:
+    """A robot's joints, ties, mass and findings."""
+    kinds = {joint.get("name"): joint.get("type") for joint in robot.description.element.iterfind("joint")}
+    columns = ("lower", "upper", "effort_limit", "velocity_limit", "damping", "friction", "armature")
+    values = np.column_stack([getattr(robot, column) for column in columns])
+    joints = [
+        {"name": name, "kind": kinds[name]} | {key: _finite(x) for key, x in zip(columns, row, strict=True)}
+        for name, row in zip(robot.joint_names, values, strict=True)
+    ]
+    return {
+        "robot": robot.name,
+        "source": robot.description.source,
+        "n": robot.n,
+        "total_mass": robot.total_mass,
+        "gravity": list(robot.edits.gravity),
+        "joints": joints,
+        "ties": _ties(robot),
+        "locked": dict(robot.edits.lock),
+        "links": list(robot.frame_names),
+        "findings": list(robot.findings),
+    }
+
+
+def query(robot: Robot, effects: str, q: np.ndarray, v: np.ndarray, a: np.ndarray, tau: np.ndarray | None) -> Document:
+    """M, C, N and the effects at a state; tau from a, or a from tau where tau is given."""
+    plant = Plant(robot, effects or ())
+    if tau is None:
+        tau = plant.inverse_dynamics(0.0, q, v, a)
+    else:
+        a = plant.forward_dynamics(0.0, q, v, tau)
+    acting = {type(e).__name__: e.torque(robot, 0.0, q, v).tolist() for e in plant.effects}
+    terms = {"M": plant.M(q), "C": plant.C(q, v), "N": plant.N(0.0, q, v)}
+    state = {"q": q, "v": v, "a": a, "tau": tau}
+    return {
+        "robot": robot.name,
+        "joints": list(robot.joint_names),
+        **{name: array.tolist() for name, array in (state | terms).items()},
+        "effects": acting,
+    }
+
+
+def why(robot: Robot, answer: Document, joint: str) -> Document:
+    """One joint's torque in an answer of `query`, split by link and cause.
+
+    Raises:
+        QueryError: If the joint is unknown.
+    """
+    joints = answer["joints"]
+    if joint not in joints:
+        raise QueryError(f"--why: no joint {joint!r}; {nearest(joint, joints)}")
+    i = joints.index(joint)
+    state = (np.array(answer[name]) for name in "qva")
+    shares = [
+        {"source": share.source}
+        | {cause: float(getattr(share, cause)[i]) for cause in ("inertia", "coriolis", "gravity")}
+        for share in torque_breakdown(Lagrangian(robot), *state)
+    ]
+    effects = {name: -torque[i] for name, torque in answer["effects"].items()}
+    return {"why": {"joint": joint, "tau": answer["tau"][i], "shares": shares, "effects": effects}}
+
+
+def comparison(results: Sequence[tuple[str, Comparison]], refused: dict[str, str]) -> Document:
+    """Comparisons by name, and what was refused."""
+    robots = {
+        name: {
+            "ok": result.ok,
+            "samples": result.samples,
+            "notes": list(result.notes),
+            "quantities": {
+                each.quantity: {
+                    "ok": each.ok,
+                    "error": _finite(each.error),
+                    "tolerance": each.tolerance,
+                    "entry": each.entry,
+                    "pinocchio": _finite(each.pinocchio),
+                    "own": _finite(each.own),
+                    "state": each.state,
+                }
+                for each in result.agreements
+            },
+        }
+        for name, result in results
+    }
+    return {"ok": all(result.ok for _, result in results), "robots": robots, "refused": refused}
+
+
+# --- the same for a person
+
+
+def info_tables(robot: Robot) -> Iterator[Any]:
+    """`info` as text and a table."""
+    document = info(robot)
+    yield f"{robot.name}: {robot.n} joints, {robot.total_mass:.4g} kg, gravity {_row(robot.edits.gravity)} m/s²"
+    yield document["source"]
+    table = _table("joint", "kind", "lower", "upper", "effort", "velocity", "damping", "dry friction", "armature")
+    for joint in document["joints"]:
+        name, kind, *numbers = joint.values()
+        table.add_row(name, kind, *("—" if x is None else f"{x:.4g}" for x in numbers))
+    yield table
+    yield "units: rad and N m for a joint that turns, m and N for one that slides; — is not stated"
+    for tie in document["ties"]:
+        yield f"tied: {tie['joint']} = {tie['multiplier']:g} · {tie['source']} + {tie['offset']:g}"
+    for name, value in document["locked"].items():
+        yield f"locked: {name} = {value:g}"
+    for finding in robot.findings:
+        yield f"odd: {finding}"
+
+
+def query_tables(answer: Document) -> Iterator[Any]:
+    """`query` and `why` as text."""
+    joints = answer["joints"]
+    for name, unit in (("q", "rad, m"), ("v", "rad/s, m/s"), ("a", "rad/s², m/s²"), ("tau", "N m, N")):
+        yield f"{name:4}{_row(answer[name])}  [{unit}]"
+    for name, meaning in (("M", "mass matrix"), ("C", "Coriolis matrix"), ("N", "gravity and effects")):
+        yield f"\n{name}, {meaning}:"
+        rows = answer[name] if name != "N" else [[x] for x in answer[name]]
+        yield from (f"  {_row(row)}  {joint}" for row, joint in zip(rows, joints, strict=True))
+    if "why" in answer:
+        yield from _why_tables(answer["why"])
+
+
+def _why_tables(why: Document) -> Iterator[Any]:
+    yield f"\nwhy {why['joint']} needs {why['tau']:.6g}:"
+    table = _table("from", "inertia", "Coriolis", "gravity", "effect", "sum")
+    rows = [(s["source"], s["inertia"], s["coriolis"], s["gravity"], 0.0) for s in why["shares"]]
+    rows += [(effect, 0.0, 0.0, 0.0, torque) for effect, torque in why["effects"].items()]
+    inertia, coriolis, gravity, effect = (sum(column) for column in list(zip(*rows, strict=True))[1:])
+    rows.append(("sum", inertia, coriolis, gravity, effect))
+    for source, *terms in rows:
+        table.add_row(source, *(f"{x:.6g}" for x in [*terms, sum(terms)]))
+    yield table
+
+
+def comparison_tables(results: Sequence[tuple[str, Comparison]], refused: dict[str, str]) -> Iterator[Any]:
+    """One robot quantity by quantity, or several a line each with the worst."""
+    if len(results) == 1:
+        ((_, result),) = results
+        yield f"{result.robot}: Pinocchio and the own Lagrangian at {result.samples} random states"
+        table = _table("quantity", "worst error", "allowed", "where", "Pinocchio", "own")
+        for each in result.agreements:
+            values = f"{each.pinocchio:.16g}", f"{each.own:.16g}"
+            table.add_row(each.quantity, _mark(each.ok, each.error), f"{each.tolerance:.1e}", each.entry, *values)
+        yield table
+        yield from result.notes
+    else:
+        table = _table("robot", "joints", "worst error", "allowed", "quantity", "where")
+        for name, result in results:
+            worst = result.worst
+            joints = str(len(worst.state["q"]))
+            table.add_row(
+                name, joints, _mark(result.ok, worst.error), f"{worst.tolerance:.1e}", worst.quantity, worst.entry
+            )
+        yield table
+        yield from (f"{name}: {note}" for name, result in results for note in result.notes if "forward" in note)
+        yield from (f"{name} refused: {why}" for name, why in refused.items())
+    agreed = sum(result.ok for _, result in results)
+    yield f"{agreed} of {len(results)} agree"
+    if results:
+        name, result = max(results, key=lambda pair: pair[1].worst.error / pair[1].worst.tolerance)
+        worst = result.worst
+        yield f"worst: {name}, {worst.quantity}, {worst.error:.2e} of {worst.tolerance:.1e} allowed, at {worst.entry}"
+        if not result.ok:
+            yield from (f"  {key} = {_row(x)}" for key, x in worst.state.items())
+
+
+def demo_tables(robot: Robot) -> Iterator[Any]:
+    """A robot, its dynamics at a general state, and the cross-check."""
+    yield from info_tables(robot)
+    rng = np.random.default_rng(7)
+    q, v, a = np.round(rng.uniform(-1, 1, (3, robot.n)), 2)
+    yield "\nM(q) a + C(q, v) v + N(q) = tau at a general state\n"
+    yield from query_tables(query(robot, "", q, v, a, None))
+    yield ""
+    yield from comparison_tables([(robot.name, compare(robot, samples=20))], {})
+
+
+def _ties(robot: Robot) -> list[Document]:
+    """Joints that follow another one."""
+    followers = []
+    for name, row, offset in zip(robot.model.names[1:], robot.ties.S, robot.ties.s0, strict=True):
+        (source,) = np.flatnonzero(row) if row.any() else (0,)
+        if name not in robot.joint_names:
+            tie = {"joint": name, "source": robot.joint_names[source]}
+            followers.append(tie | {"multiplier": float(row[source]), "offset": float(offset)})
+    return followers
+
+
+def _finite(x: float) -> float | None:
+    """JSON has no infinity: what is unlimited is null."""
+    return float(x) if isfinite(x) else None
+
+
+def _mark(ok: bool, error: float) -> str:
+    return f"{error:.1e}" if ok else f"{error:.1e}  DISAGREE"
+
+
+def _row(numbers: Sequence[float]) -> str:
+    return " ".join(f"{x:10.5g}" for x in numbers)
+
+
+def _table(*headings: str) -> Table:
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for heading in headings:
+        table.add_column(heading, no_wrap=True)
+    return table

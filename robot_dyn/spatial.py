@@ -1,0 +1,84 @@
+"""Rigid motions, twists and wrenches: V_b = Ad_g V_c and F_c = Ad_gᵀ F_b for g = g_bc = (R, p).
+
+A twist is V = (v, ω) and a wrench F = (f, τ): linear part first. [Murray, Li, Sastry 1994, ch. 2]
+Every argument may carry batch axes in front.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array, cos, sin, transpose
+
+
+def hat(a: Array) -> Array:
+    """Skew matrix â with â b = a × b, shape (..., 3, 3), of a vector of shape (..., 3)."""
+    result = np.zeros((*a.shape, 3), dtype=a.dtype)
+    x, y, z = a[..., 0], a[..., 1], a[..., 2]
+    result[..., 0, 1], result[..., 0, 2], result[..., 1, 2] = -z, y, -x
+    result[..., 1, 0], result[..., 2, 0], result[..., 2, 1] = z, -y, x
+    return result
+
+
+def rotation(axis: Array, angle: Array) -> Array:
+    """Rotation exp(â θ) = 1 + sin θ â + (1 − cos θ) â² about a unit axis (3,) by angles (...,): shape (..., 3, 3).
+
+    Source: Murray, Li, Sastry 1994, eq. 2.14 (Rodrigues' formula).
+    """
+    A, theta = hat(axis), np.asarray(angle)[..., None, None]
+    return np.eye(3, dtype=axis.dtype) + sin(theta) * A + (1 - cos(theta)) * (A @ A)
+
+
+def rotation_rpy(rpy: Array) -> Array:
+    """Rotation Rz(yaw) Ry(pitch) Rx(roll) of the fixed-axis angles of a URDF, shape (3, 3), from (3,)."""
+    x, y, z = np.eye(3, dtype=rpy.dtype)
+    return rotation(z, rpy[2]) @ rotation(y, rpy[1]) @ rotation(x, rpy[0])
+
+
+def adjoint(R: Array, p: Array) -> Array:
+    """Ad_g = [[R, p̂ R], [0, R]], shape (..., 6, 6)."""
+    return _upper_blocks(R, hat(p) @ R)
+
+
+def adjoint_inverse(R: Array, p: Array) -> Array:
+    """Ad_g⁻¹ = [[Rᵀ, −Rᵀ p̂], [0, Rᵀ]], shape (..., 6, 6)."""
+    return _upper_blocks(transpose(R), -transpose(R) @ hat(p))
+
+
+def bracket(V: Array) -> Array:
+    """ad_V = [[ω̂, v̂], [0, ω̂]], so that the Lie bracket is [V, W] = ad_V W; shape (..., 6, 6).
+
+    Source: Murray, Li, Sastry 1994, ch. 2, appendix A.
+    """
+    return _upper_blocks(hat(V[..., 3:]), hat(V[..., :3]))
+
+
+def spatial_inertia(mass: Array, com: Array, inertia: Array) -> Array:
+    """𝓜 = [[m 1, −m ĉ], [m ĉ, I − m ĉ ĉ]] in a frame where the centre of mass is c and I is about it; (6, 6)."""
+    mc = mass * hat(com)
+    result = np.zeros((6, 6), dtype=com.dtype)
+    result[:3, :3] = mass * np.eye(3, dtype=com.dtype)
+    result[:3, 3:], result[3:, :3] = -mc, mc
+    result[3:, 3:] = inertia - mc @ hat(com)
+    return result
+
+
+def homogeneous(R: Array, p: Array) -> Array:
+    """The matrix [[R, p], [0, 1]] of g, shape (..., 4, 4)."""
+    result = np.zeros((*p.shape[:-1], 4, 4), dtype=p.dtype)
+    result[..., :3, :3], result[..., :3, 3] = R, p
+    result[..., 3, 3] = np.eye(1, dtype=p.dtype)[0, 0]
+    return result
+
+
+def block_diagonal(R: Array) -> Array:
+    """diag(R, R), which turns both parts of a twist; shape (..., 6, 6)."""
+    return _upper_blocks(R, np.zeros_like(R))
+
+
+def _upper_blocks(diagonal: Array, corner: Array) -> Array:
+    """[[D, C], [0, D]] of two blocks of shape (..., 3, 3)."""
+    result = np.zeros((*diagonal.shape[:-2], 6, 6), dtype=diagonal.dtype)
+    result[..., :3, :3] = result[..., 3:, 3:] = diagonal
+    result[..., :3, 3:] = corner
+    return result
