@@ -42,12 +42,21 @@ class ModelWarning(UserWarning):
     """A robot that loads although some of its bodies cannot exist as described."""
 
 
+_COMPARED = 48  # characters of a name: likeness costs the square of it
+
+
+def shorten(value: object, most: int = 60) -> str:
+    """The text of a value that a message shows, cut if it is long."""
+    text = str(value)
+    return text if len(text) <= most else text[: most - 1] + "…"
+
+
 def nearest(name: str, names: Iterable[str]) -> str:
     """Advice after an unknown name: the nearest valid names, or the first few."""
     names = list(names)
-    by_key = {known.casefold(): known for known in names}
-    close = [by_key[key] for key in get_close_matches(name.casefold(), by_key, n=4, cutoff=0.5)]
-    shown = close or names[:8]
+    by_key = {known.casefold()[:_COMPARED]: known for known in names}
+    close = [by_key[key] for key in get_close_matches(name.casefold()[:_COMPARED], by_key, n=4, cutoff=0.5)]
+    shown = [shorten(each) for each in close or names[:8]]
     if not shown:
         return "there are none"
     more = "" if close or len(names) == len(shown) else f", … ({len(names)} in all)"

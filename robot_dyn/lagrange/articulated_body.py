@@ -41,13 +41,13 @@ def articulated_body(linkage: Linkage, q: Array, v: Array, tau: Array) -> Array:
     U, d, u = {}, {}, {}
     for i, body in reversed(list(enumerate(linkage.bodies))):
         U[i] = apply(inertia[i], np.broadcast_to(body.screw, (*batch, 6)))
-        d[i] = U[i] @ body.screw + linkage.armature[i]
+        d[i] = U[i][..., None, :] @ body.screw + linkage.armature[i]
         if not np.all(d[i] > 0):
             raise SingularError(f"no forward dynamics: joint {body.joint!r} carries no inertia at this q")
-        u[i] = tau[..., i] - force[i] @ body.screw
+        u[i] = tau[..., i, None] - force[i][..., None, :] @ body.screw
         if body.parent != BASE:
-            left = inertia[i] - U[i][..., :, None] * U[i][..., None, :] / d[i][..., None, None]
-            pushed = force[i] + apply(left, coriolis[i]) + U[i] * (u[i] / d[i])[..., None]
+            left = inertia[i] - U[i][..., :, None] * (U[i] / d[i])[..., None, :]
+            pushed = force[i] + apply(left, coriolis[i]) + U[i] * (u[i] / d[i])
             inertia[body.parent] = inertia[body.parent] + transpose(X[i]) @ left @ X[i]
             force[body.parent] = force[body.parent] + apply(transpose(X[i]), pushed)
 
@@ -56,8 +56,9 @@ def articulated_body(linkage: Linkage, q: Array, v: Array, tau: Array) -> Array:
     free_fall = np.concatenate([-linkage.gravity, np.zeros_like(linkage.gravity)])
     for i, body in enumerate(linkage.bodies):
         carried = apply(X[i], free_fall if body.parent == BASE else acceleration[body.parent]) + coriolis[i]
-        a[..., i] = (u[i] - (U[i] * carried).sum(axis=-1)) / d[i]
-        acceleration.append(carried + a[..., i, None] * body.screw)
+        own = (u[i] - apply(U[i][..., None, :], carried)) / d[i]
+        acceleration.append(carried + own * body.screw)
+        a[..., i] = own[..., 0]
     return a @ S
 
 

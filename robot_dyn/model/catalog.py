@@ -11,7 +11,7 @@ from functools import cache
 from importlib import metadata
 from pathlib import Path
 
-from robot_dyn.errors import CatalogError, nearest
+from robot_dyn.errors import CatalogError, nearest, shorten
 
 # Files whose own stem is shared, or says nothing.
 _RENAMED = {
@@ -40,12 +40,15 @@ def find(name_or_path: str | Path, package_dirs: Iterable[str | Path] = ()) -> P
         return resolve(text, Path.cwd() / "x", package_dirs)
     if text in _files():
         return _files()[text]
-    path = Path(name_or_path).expanduser()
-    if path.exists():
-        return path
+    try:
+        path = Path(name_or_path).expanduser()
+        if path.exists():
+            return path
+    except (OSError, RuntimeError, ValueError) as error:  # too long, not to be searched, no such user, a NUL
+        raise CatalogError(f"no file {shorten(text)!r}: {shorten(error)}; give the path of a URDF file") from None
     if path.suffix or len(path.parts) > 1:
         raise CatalogError(f"no file {text}; looked for {path.absolute()}")
-    raise CatalogError(f"no robot {text!r}; {nearest(text, list_robots())}; or give the path of a URDF file")
+    raise CatalogError(f"no robot {shorten(text)!r}; {nearest(text, list_robots())}; or give the path of a URDF file")
 
 
 def resolve(address: str, urdf: Path, package_dirs: Iterable[str | Path] = ()) -> Path:

@@ -14,7 +14,7 @@ from typing import final
 
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
-from robot_dyn.errors import DescriptionError
+from robot_dyn.errors import DescriptionError, shorten
 from robot_dyn.model import urdf
 
 MAX_BYTES = 16 * 2**20  # the largest robot of example-robot-data has 0.2 MiB
@@ -108,11 +108,21 @@ def _parse(text: bytes, source: str) -> etree._Element:
                     )
         root = parser.close()
     except etree.XMLSyntaxError as error:
-        raise DescriptionError(f"{source}: is not well-formed XML: {error.msg}; correct the file") from None
-    except (LookupError, ValueError) as error:
-        raise DescriptionError(f"{source}: cannot be decoded: {error}; save the file as UTF-8") from None
+        raise DescriptionError(f"{source}: {_syntax(error, parser)}") from None
     _refuse_document_type(root, source)
     return root
+
+
+def _syntax(error: etree.XMLSyntaxError, parser: etree.XMLPullParser) -> str:
+    """What is wrong with the XML, from the first complaint of the parser, and what to do."""
+    first = parser.error_log[0] if len(parser.error_log) else None
+    why, line = (first.message, first.line) if first else (str(error.msg), error.lineno)
+    why = shorten(" ".join(why.split()), 200)
+    if "XML_PARSE_HUGE" in why or "mplification" in why:
+        return f"line {line}: text, nesting or entities grow beyond what a robot description needs; remove them"
+    if "xacro" in why:
+        return f"line {line}: holds xacro macros; expand the file first: xacro robot.xacro > robot.urdf"
+    return f"is not well-formed XML: line {line}: {why}; correct the file"
 
 
 def _refuse_document_type(element: etree._Element, source: str) -> None:

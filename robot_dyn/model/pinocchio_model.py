@@ -16,6 +16,8 @@ from robot_dyn.model.inertia import implausibility
 from robot_dyn.model.ties import Mimic, Ties, resolve
 from robot_dyn.model.urdf import UNBOUNDED
 
+MAX_MOVING = 250  # Pinocchio's scratch memory for n joints has 63 n³ bytes: 1 GB
+_MARK = "joint:"  # while Pinocchio works by name: a joint may share its name with a link, or be called "universe"
 _SINGULAR = 1e-12  # of a pivot of M scaled to a unit diagonal; rounding leaves 1e-14
 
 
@@ -32,23 +34,49 @@ def build(description: Description, edits: Edits) -> tuple[Any, Ties, tuple[str,
         for joint in robot.iterfind("joint")
         if (mimic := joint.find("mimic")) is not None
     }
-    for joint in robot.iterfind("joint[@type='continuous']"):
-        joint.set("type", "revolute")  # with its limits of ±1e308: an angle, one number for q as for v
+    for joint in robot.iterfind("joint"):
+        joint.set("name", _MARK + joint.get("name"))
+        if joint.get("type") == "continuous":
+            joint.set("type", "revolute")  # with its limits of ±1e308: an angle, one number for q as for v
     try:
         model = pin.buildModelFromXML(etree.tostring(robot, encoding="unicode"))
     except Exception as error:  # Pinocchio raises bare Exceptions of several kinds
         raise DescriptionError(f"{description.source}: Pinocchio refuses it: {error}") from None
     if model.nv == 0:
-        raise DescriptionError(f"{description.source}: no joint moves; with a fixed base there is no dynamics to query")
+        raise DescriptionError(
+            f"{description.source}: no joint moves, and with a fixed base there is no dynamics to query;"
+            " make a joint revolute, continuous or prismatic"
+        )
+    if model.nv > MAX_MOVING:
+        raise DescriptionError(
+            f"{description.source}: {model.nv} joints move; at most {MAX_MOVING} are taken, since the memory of"
+            " Pinocchio's algorithms grows with their cube; make some fixed or split the robot"
+        )
     _apply(edits, model)
     model = _locked(model, edits, mimics)
+    _unmark(model)
     return model, *_ties(tuple(model.names[1:]), mimics)
+
+
+def _unmark(model: Any) -> None:
+    """Give the joints their own names again."""
+    for i, name in enumerate(model.names):
+        model.names[i] = name.removeprefix(_MARK)
+    for frame in model.frames:
+        if frame.type != pin.FrameType.BODY:
+            frame.name = frame.name.removeprefix(_MARK)
+
+
+def joint_ids(model: Any) -> dict[str, int]:
+    """Index of each joint by its name, which may be "universe" too."""
+    return {name.removeprefix(_MARK): i for i, name in enumerate(model.names) if i}
 
 
 def _apply(edits: Edits, model: Any) -> None:
     model.gravity = pin.Motion(np.array(edits.gravity), np.zeros(3))
+    ids = joint_ids(model)
     for name, value in edits.armature:
-        model.armature[model.idx_vs[model.getJointId(name)]] = value
+        model.armature[model.idx_vs[ids[name]]] = value
     links = link_frames(model)
     for payload in edits.payloads:
         if payload.frame not in links:
@@ -62,13 +90,13 @@ def _locked(model: Any, edits: Edits, mimics: dict[str, Mimic]) -> Any:
     """The model without the joints that are held, and without those that follow a held joint."""
     values = dict(edits.lock)
     q, held = np.zeros(model.nq), []
-    for name in model.names[1:]:
+    for name, index in joint_ids(model).items():
         source, ratio, offset = resolve(name, mimics, FLOAT64)
         if source in values:
-            held.append(model.getJointId(name))
-            q[model.idx_qs[held[-1]]] = ratio * values[source] + offset
+            held.append(index)
+            q[model.idx_qs[index]] = ratio * values[source] + offset
     if len(held) == model.nv:
-        raise EditError(f"lock: no joint is left to move, of {', '.join(model.names[1:])}")
+        raise EditError(f"lock: no joint is left to move, of {', '.join(joint_ids(model))}")
     return pin.buildReducedModel(model, held, q) if held else model
 
 
@@ -88,7 +116,8 @@ def link_frames(model: Any) -> dict[str, int]:
 
 def per_joint(model: Any, joint_names: tuple[str, ...], full: np.ndarray) -> np.ndarray:
     """The entries of some joints, ±inf where the file states none; read-only."""
-    values = full[[model.idx_vs[model.getJointId(name)] for name in joint_names]]
+    ids = joint_ids(model)
+    values = full[[model.idx_vs[ids[name]] for name in joint_names]]
     values[np.abs(values) >= float(UNBOUNDED)] *= np.inf
     values.setflags(write=False)
     return values

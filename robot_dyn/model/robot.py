@@ -73,7 +73,7 @@ class Robot:
         """The robot's name in its file."""
         return self.description.name
 
-    @cached_property
+    @property
     def n(self) -> int:
         """Number of degrees of freedom."""
         return len(self.joint_names)
@@ -88,7 +88,7 @@ class Robot:
         """How the joints of `model` follow q."""
         return self._built[1]
 
-    @cached_property
+    @property
     def joint_names(self) -> tuple[str, ...]:
         """Names of the n joints, in the order of q."""
         return self._built[2]

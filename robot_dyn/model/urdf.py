@@ -6,16 +6,18 @@ What is refused here is what the two parsers would read in silence, in two ways,
 from __future__ import annotations
 
 import re
-from math import hypot, isfinite
+from itertools import islice
+from math import hypot, inf, isfinite
 
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
-from robot_dyn.errors import DescriptionError, nearest
+from robot_dyn.errors import DescriptionError, nearest, shorten
 
 MAX_JOINTS = 1000  # Pinocchio crashes the process on chains of some thousands
 MOVING = ("revolute", "continuous", "prismatic")
 UNBOUNDED = "1e308"  # stands for a limit that is not stated; urdfdom refuses "inf"
 
+LARGEST = 1e12  # of a length, a mass, a moment, a ratio: beyond it the equations of motion overflow
 _LITERAL = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,4})?")
 _MAX_NAME, _MAX_LITERAL = 256, 64
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
@@ -27,19 +29,22 @@ def checked_robot(robot: etree._Element, source: str) -> etree._Element:
     Raises:
         DescriptionError: If anything in it has no meaning, or more than one.
     """
-    if robot.tag != "robot":
-        raise DescriptionError(f"{source}: the outermost element is <{robot.tag}>, not <robot>; give a URDF file")
     check = _Check(source)
+    if robot.tag != "robot":
+        check.refuse(
+            f"line {robot.sourceline}", f"it begins with <{shorten(robot.tag)}>, not <robot>; give a URDF file"
+        )
     if any("xacro" in str(element.tag) for element in robot.iter()):
         check.refuse("robot", "holds xacro macros; expand the file first: xacro robot.xacro > robot.urdf")
     out = etree.Element("robot", name=check.name(robot, "robot"))
-    links = [check.link(link, out) for link in robot.iterfind("link")]
-    if not links:
-        check.refuse("robot", "holds no <link>; a robot needs one link at least")
     if len(robot.findall("joint")) > MAX_JOINTS:
-        check.refuse("robot", f"has {len(robot.findall('joint'))} joints; at most {MAX_JOINTS} are taken")
+        check.refuse("robot", f"has {len(robot.findall('joint'))} joints; at most {MAX_JOINTS} are taken: split it")
+    links = [check.link(link, out) for link in islice(robot.iterfind("link"), MAX_JOINTS + 2)]
+    if not links:
+        check.refuse("robot", "holds no <link>; add one link at least")
     check.distinct("link", links)
-    joints = [check.joint(joint, out, set(links)) for joint in robot.iterfind("joint")]
+    names = frozenset(links)
+    joints = [check.joint(joint, out, names) for joint in robot.iterfind("joint")]
     check.distinct("joint", joints)
     check.one_tree(links, out)
     check.mimics(out)
@@ -60,7 +65,7 @@ class _Check:
         if not name:
             self.refuse(f"<{element.tag}> in line {element.sourceline}", 'has no name; write name="…"')
         if len(name) > _MAX_NAME or not name.isprintable():
-            self.refuse(where, f"the name {name[:40]!r} has control characters or more than {_MAX_NAME} characters")
+            self.refuse(where, f"rename {name[:40]!r}: it has control characters, or more than {_MAX_NAME} characters")
         return name
 
     def distinct(self, kind: str, names: list[str]) -> None:
@@ -78,18 +83,29 @@ class _Check:
         return found[0] if found else None
 
     def number(
-        self, element: etree._Element, key: str, where: str, default: str | None = None, minimum: float | None = None
+        self,
+        element: etree._Element,
+        key: str,
+        where: str,
+        default: str | None = None,
+        minimum: float | None = None,
+        largest: float = LARGEST,
     ) -> str:
         """The literal of an attribute, checked to be one finite decimal number."""
         text = element.get(key, default)
         if text is None:
             self.refuse(where, f'<{element.tag}> has no {key}; write {key}="…"')
-        return self.literal(text, f"<{element.tag}> {key}", where, minimum)
+        return self.literal(text, f"<{element.tag}> {key}", where, minimum, largest)
 
-    def literal(self, text: str | None, what: str, where: str, minimum: float | None = None) -> str:
+    def literal(
+        self, text: str | None, what: str, where: str, minimum: float | None = None, largest: float = LARGEST
+    ) -> str:
         text = (text or "").strip()
         if len(text) > _MAX_LITERAL or not _LITERAL.fullmatch(text) or not isfinite(float(text)):
-            self.refuse(where, f"{what} must be a finite decimal number, got {text[:40]!r}; correct it")
+            limit = f" of at most {_MAX_LITERAL} characters" if len(text) > _MAX_LITERAL else ""
+            self.refuse(where, f"{what} must be a finite decimal number{limit}, got {shorten(text)!r}; correct it")
+        if abs(float(text)) > largest:
+            self.refuse(where, f"{what} is {text}, beyond ±{largest:g} in SI units; correct it")
         if minimum is not None and float(text) < minimum:
             self.refuse(where, f"{what} must not be below {minimum:g}, got {text}; correct it")
         return text
@@ -100,7 +116,7 @@ class _Check:
         tag = key if element is None else f"<{element.tag}> {key}"
         words = text.split()
         if len(words) != 3:
-            self.refuse(where, f"{tag} must be three numbers, got {text[:60]!r}; correct it")
+            self.refuse(where, f"{tag} must be three numbers, got {shorten(text)!r}; correct it")
         return " ".join(self.literal(word, tag, where) for word in words)
 
     def origin(self, parent: etree._Element, out: etree._Element, where: str) -> None:
@@ -123,21 +139,23 @@ class _Check:
             etree.SubElement(copy, "inertia", {key: self.number(inertia, key, where) for key in _MOMENTS})
         return name
 
-    def joint(self, joint: etree._Element, robot: etree._Element, links: set[str]) -> str:
+    def joint(self, joint: etree._Element, robot: etree._Element, links: frozenset[str]) -> str:
         name = self.name(joint, "joint")
         where, kind = f"joint {name!r}", joint.get("type")
         if kind in ("floating", "planar"):
             self.refuse(where, f"is {kind}; only joints of one degree of freedom are taken: {', '.join(MOVING)}, fixed")
         if kind not in (*MOVING, "fixed"):
-            self.refuse(where, f"has the unknown type {kind!r}; write one of {', '.join(MOVING)}, fixed")
+            self.refuse(where, f"has the unknown type {shorten(kind)!r}; write one of {', '.join(MOVING)}, fixed")
         out = etree.SubElement(robot, "joint", name=name, type=str(kind))
         self.origin(joint, out, where)
         for role in ("parent", "child"):
             end = self.one(joint, role, where)
-            link = None if end is None else (end.get("link") or "").strip()
+            link = "" if end is None else (end.get("link") or "").strip()
+            if not link:
+                self.refuse(where, f'has no {role} link; add <{role} link="…"/>')
             if link not in links:
-                self.refuse(where, f"its {role} link {link!r} is not defined; {nearest(link or '', sorted(links))}")
-            etree.SubElement(out, role, link=str(link))
+                self.refuse(where, f"its {role} link {shorten(link)!r} is not defined; {nearest(link, sorted(links))}")
+            etree.SubElement(out, role, link=link)
         if kind != "fixed":
             self.motion(joint, out, where)
         return name
@@ -157,7 +175,7 @@ class _Check:
         if mimic is not None:
             ratio = self.number(mimic, "multiplier", where, "1")
             offset = self.number(mimic, "offset", where, "0")
-            etree.SubElement(out, "mimic", joint=(mimic.get("joint") or ""), multiplier=ratio, offset=offset)
+            etree.SubElement(out, "mimic", joint=(mimic.get("joint") or "").strip(), multiplier=ratio, offset=offset)
 
     def limit(self, joint: etree._Element, out: etree._Element, where: str) -> None:
         """Limits as stated; where none is stated, `UNBOUNDED`, since urdfdom insists on all four."""
@@ -166,7 +184,8 @@ class _Check:
         if limit is not None:
             stated = [key for key in bounds if limit.get(key) is not None]
             for key in stated:
-                bounds[key] = self.number(limit, key, where, minimum=0.0 if key in ("effort", "velocity") else None)
+                minimum = 0.0 if key in ("effort", "velocity") else None
+                bounds[key] = self.number(limit, key, where, minimum=minimum, largest=inf)
             # the URDF reference: lower and upper default to 0 where the other one is stated
             for key in {"lower", "upper"} - set(stated) if {"lower", "upper"} & set(stated) else ():
                 bounds[key] = "0"
@@ -202,21 +221,23 @@ class _Check:
             reached.update(path)
 
     def mimics(self, robot: etree._Element) -> None:
-        """Every mimic follows a joint that moves, and none follows itself."""
+        """Every mimic follows a joint that moves, none follows itself, and no chain of them grows without bound."""
         kinds = {joint.get("name"): joint.get("type") for joint in robot.iterfind("joint")}
-        source_of: dict[str, str] = {
-            joint.get("name"): joint.find("mimic").get("joint")
-            for joint in robot.iterfind("joint")
-            if joint.find("mimic") is not None
-        }
-        for follower, source in source_of.items():
-            where = f"joint {follower!r}"
+        ties = {joint.get("name"): joint.find("mimic") for joint in robot.iterfind("joint[mimic]")}
+        for follower, tie in ties.items():
+            where, source = f"joint {follower!r}", tie.get("joint")
             if source not in kinds:
-                self.refuse(where, f"mimics {source!r}, which is not defined; {nearest(source, kinds)}")
+                self.refuse(where, f"mimics {shorten(source)!r}, which is not defined; {nearest(source, kinds)}")
             if kinds[source] == "fixed":
                 self.refuse(where, f"mimics {source!r}, which is fixed and never moves; make {follower!r} fixed too")
-            chain = [follower]
-            while chain[-1] in source_of:
-                chain.append(source_of[chain[-1]])
-                if chain[-1] in chain[:-1]:
-                    self.refuse(where, f"mimics itself: {' → '.join(chain[:8])}; remove one <mimic>")
+        for follower in ties:
+            chain, ratio = {follower: None}, 1.0  # a dict, for its order and its quick look-up
+            while (name := next(reversed(chain))) in ties:
+                ratio *= float(ties[name].get("multiplier"))
+                source = ties[name].get("joint")
+                if source in chain:
+                    listed = " → ".join([*list(chain)[:8], source])
+                    self.refuse(f"joint {follower!r}", f"mimics itself: {listed}; remove one <mimic>")
+                chain[source] = None
+            if abs(ratio) > LARGEST:
+                self.refuse(f"joint {follower!r}", f"its chain of mimics multiplies by {ratio:g}; correct a multiplier")

@@ -1,0 +1,186 @@
+"""The contract of effects, and the plant that sums them: M a + C v + N(t, q, v) = Υ."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import final
+
+import numpy as np
+import pytest
+from flint import arb
+
+import robot_dyn as rd
+from robot_dyn.effects.effect import Active, Conservative, Dissipative, Effect
+from robot_dyn.effects.plant import Plant
+from robot_dyn.errors import EffectError, QueryError
+
+ROBOT = rd.load("cart_pole")
+B, F, V_S = np.array([0.7, 0.2]), np.array([1.4, 0.3]), np.array([0.05, 0.2])
+
+# every effect of the library, with its formula written out once more
+FORMULAS = {
+    rd.ViscousFriction(B): lambda t, q, v: -B * v,
+    rd.RegularisedCoulombFriction(F, V_S): lambda t, q, v: (
+        -F * (np.exp(v / V_S) - np.exp(-v / V_S)) / (np.exp(v / V_S) + np.exp(-v / V_S))
+    ),
+}
+EFFECTS = list(FORMULAS)
+
+
+def states(count: int = 200) -> np.ndarray:
+    """Positions and velocities of many sizes, both signs."""
+    rng = np.random.default_rng(11)
+    return rng.normal(size=(2, count, ROBOT.n)) * rng.choice([0.01, 0.1, 1.0, 3.0], size=(2, count, 1))
+
+
+def every_effect(base: type = Effect) -> set[type]:
+    """The concrete effects of the library."""
+    below = {each for sub in base.__subclasses__() for each in {sub} | every_effect(sub)}
+    return {each for each in below if each.__module__.startswith("robot_dyn.") and not each.__abstractmethods__}
+
+
+def test_no_effect_escapes_the_contract() -> None:
+    assert {type(effect) for effect in EFFECTS} == every_effect()
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: type(e).__name__)
+def test_effect_is_of_exactly_one_kind(effect: Effect) -> None:
+    assert sum(isinstance(effect, kind) for kind in (Conservative, Dissipative, Active)) == 1
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: type(e).__name__)
+def test_torque_is_that_of_the_formula(effect: Effect) -> None:
+    """A handful of roundings of the largest value: 1e-14 of it."""
+    q, v = states()
+    expected = FORMULAS[effect](0.3, q, v)
+    got = effect.torque(ROBOT, 0.3, q, v)
+    np.testing.assert_allclose(got, expected, rtol=1e-14, atol=1e-14 * np.abs(expected).max())
+    one_by_one = [effect.torque(ROBOT, 0.3, *state) for state in zip(q, v, strict=True)]
+    np.testing.assert_allclose(one_by_one, got, rtol=1e-15)
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: type(e).__name__)
+def test_effect_keeps_what_its_kind_declares(effect: Effect) -> None:
+    """Dissipative: no joint gains power at any state. Conservative: −∂E/∂q, by differences."""
+    q, v = states()
+    torque = effect.torque(ROBOT, 0.0, q, v)
+    if isinstance(effect, Dissipative):
+        assert np.all(torque * v <= 0)
+        assert np.all((torque * v).sum(axis=-1)[np.abs(v).min(axis=-1) > 1e-3] < 0)
+    if isinstance(effect, Conservative):
+        h = 1e-6
+        for i, step in enumerate(h * np.eye(ROBOT.n)):
+            slope = (effect.potential(ROBOT, 0.0, q + step) - effect.potential(ROBOT, 0.0, q - step)) / (2 * h)
+            np.testing.assert_allclose(torque[..., i], -slope, atol=1e-6)
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: type(e).__name__)
+def test_effect_runs_in_every_arithmetic(effect: Effect) -> None:
+    """The same lines in longdouble, and in balls that hold the float64 value to its rounding (1e-15)."""
+    _, v = states(3)
+    expected = effect.torque(ROBOT, 0.0, v, v)
+    wide = effect.torque(ROBOT, 0.0, v, v.astype(np.longdouble))
+    assert wide.dtype == np.longdouble
+    np.testing.assert_allclose(wide.astype(float), expected, rtol=1e-14)
+    ball = rd.Ball(100)
+    with ball.scope():
+        got = effect.torque(ROBOT, 0.0, ball.array(v), ball.array(v))
+        assert isinstance(got.flat[0], arb)
+    np.testing.assert_allclose(rd.midpoint(got), expected, rtol=1e-14)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Counted(Active):
+    """A constant push that counts how often it is evaluated."""
+
+    calls: list[float] = field(default_factory=list)
+
+    def torque(self, dynamics, t, q, v):
+        self.calls.append(t)
+        return np.full(np.shape(v), 0.5)
+
+
+def test_what_is_off_is_evaluated_zero_times_and_what_is_on_once() -> None:
+    on, off = Counted(), Counted()
+    (q,), (v,) = states(1)
+    plant = Plant(ROBOT, [on])
+    plant.forward_dynamics(1.5, q, v, v)
+    assert on.calls == [1.5]
+    plant.inverse_dynamics(2.0, q, v, v)
+    plant.N(2.5, q, v)
+    assert on.calls == [1.5, 2.0, 2.5]
+    plant.M(q)
+    plant.C(q, v)
+    assert len(on.calls) == 3
+    assert off.calls == []
+
+
+@pytest.mark.parametrize("engine", [ROBOT, rd.Lagrangian(ROBOT)], ids=["Robot", "Lagrangian"])
+@pytest.mark.parametrize("batch", [(), (4,), (2, 3)])
+def test_plant_keeps_the_equation_of_motion(engine, batch) -> None:
+    """M a + C v + N = Υ with the deck's full N, and forward dynamics inverts it; κ < 100, so 1e-13."""
+    rng = np.random.default_rng(2)
+    q, v, a = rng.normal(size=(3, *batch, ROBOT.n))
+    plant = Plant(engine, EFFECTS)
+    u = plant.inverse_dynamics(0.2, q, v, a)
+    terms = np.matvec(plant.M(q), a) + np.matvec(plant.C(q, v), v) + plant.N(0.2, q, v)
+    np.testing.assert_allclose(u, terms, rtol=1e-13, atol=1e-13)
+    np.testing.assert_allclose(plant.forward_dynamics(0.2, q, v, u), a, rtol=1e-12, atol=1e-12)
+    full_N = engine.N(q) - sum(FORMULAS[effect](0.2, q, v) for effect in EFFECTS)
+    np.testing.assert_allclose(plant.N(0.2, q, v), full_N, rtol=1e-13, atol=1e-13)
+
+
+def test_plant_without_effects_is_its_dynamics() -> None:
+    (q,), (v,) = states(1)
+    plant = Plant(ROBOT)
+    assert np.array_equal(plant.forward_dynamics(0.0, q, v, list(v)), ROBOT.forward_dynamics(q, v, v))
+    assert np.array_equal(plant.N(0.0, q, v), ROBOT.N(q))
+
+
+def test_urdf_effects_are_what_the_file_states() -> None:
+    viscous, dry = Plant(ROBOT, "urdf").effects
+    np.testing.assert_array_equal(viscous.damping, [0.8, 0.02])
+    np.testing.assert_array_equal(dry.friction, [1.5, 0.01])
+    assert Plant(rd.load("ur5"), effects="urdf").effects == ()
+
+
+def test_friction_of_tied_joints_counts_by_virtual_work() -> None:
+    """mimic_chain: q2 = q1/2 + …, q3 = −3/8 q1 + …; b = Σ s² b_i and f = Σ |s| f_i, from the file's 0.01 and 0.02."""
+    finger = rd.load("mimic_chain")
+    np.testing.assert_allclose(finger.damping, [0.01 * (1 + 0.25 + 0.375**2), 0.0], rtol=1e-15)
+    np.testing.assert_allclose(finger.friction, [0.02 * (1 + 0.5 + 0.375), 0.0], rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: rd.ViscousFriction(-0.1), "damping must be finite and not negative"),
+        (lambda: rd.ViscousFriction([0.1, np.nan]), "damping must be finite"),
+        (lambda: rd.ViscousFriction("much"), "damping must be a number"),
+        (lambda: rd.RegularisedCoulombFriction(1.0, 0.0), "velocity_scale must be positive"),
+        (lambda: Plant(ROBOT, "friction"), "give effects, or 'urdf'"),
+        (lambda: Plant(ROBOT, [3]), "3 is no Effect"),
+        (lambda: Plant(object(), "urdf"), "needs a robot with a URDF"),
+    ],
+)
+def test_meaningless_coefficients_are_refused(make, message: str) -> None:
+    with pytest.raises(EffectError, match=message):
+        make()
+
+
+@pytest.mark.parametrize("method", ["N", "forward_dynamics", "inverse_dynamics", "torque"])
+def test_a_velocity_of_the_wrong_shape_is_refused(method: str) -> None:
+    plant = Plant(ROBOT, EFFECTS)
+    arguments = (np.ones(2),) if method in ("forward_dynamics", "inverse_dynamics") else ()
+    with pytest.raises(QueryError, match="v must have shape"):
+        getattr(plant, method)(0.0, np.ones(2), np.ones(3), *arguments)
+
+
+def test_coefficients_are_copied_and_frozen() -> None:
+    given = np.array([1.0, 2.0])
+    effect = rd.ViscousFriction(given)
+    given[0] = 9.0
+    assert effect.damping[0] == 1.0
+    with pytest.raises(ValueError, match="read-only"):
+        effect.damping[0] = 3.0
