@@ -72,7 +72,8 @@ class Float(Arithmetic):
         array = np.asarray(values)
         if array.dtype.kind not in "fiu":
             raise TypeError(f"not real numbers: {array.dtype}")
-        return array.astype(self.dtype, copy=False)
+        with np.errstate(over="ignore"):  # a longdouble may be too large: then it is not finite
+            return array.astype(self.dtype, copy=False)
 
     def finite(self, x: Array) -> np.ndarray:
         return np.isfinite(x)
@@ -190,16 +191,18 @@ def cholesky_solve(M: Array, b: Array) -> Array:
         The solution, shape (..., n).
 
     Raises:
-        NotPositiveDefiniteError: If a pivot is not certain to be positive; tells the row.
+        NotPositiveDefiniteError: If a pivot is not certain to be positive: for floats, 4 n ε of the diagonal at least;
+            for balls, positive throughout. Tells the row.
 
     Source: Golub and Van Loan, Matrix Computations, 4th ed., 2013, alg. 4.1.2.
     """
     n = M.shape[-1]
+    least = 4 * n * np.finfo(M.dtype).eps if M.dtype.kind == "f" else 0
     L, x = M.copy(), b.copy()  # unit lower triangle of L, and the pivots D on its diagonal
     for j in range(n):
         LD = L[..., j, :j] * np.diagonal(L, axis1=-2, axis2=-1)[..., :j]
         L[..., j, j] = L[..., j, j] - (L[..., j, :j] * LD).sum(axis=-1)
-        if not np.all(L[..., j, j] > 0):
+        if not np.all((L[..., j, j] > least * M[..., j, j]) & (M[..., j, j] > 0)):
             raise NotPositiveDefiniteError(j)
         below = L[..., j + 1 :, j] - (L[..., j + 1 :, :j] * LD[..., None, :]).sum(axis=-1)
         L[..., j + 1 :, j] = below / L[..., j, j, None]

@@ -119,6 +119,8 @@ def demo() -> None:
 
 def main() -> None:
     """Entry point: run the command; say what went wrong in one line."""
+    for stream in (sys.stdout, sys.stderr):  # a terminal without mathematical signs shows ? for them
+        stream.reconfigure(errors="replace")  # pyright: ignore[reportAttributeAccessIssue]
     with warnings.catch_warnings():
         warnings.simplefilter("always", ModelWarning)
         warnings.showwarning = _show_warning
@@ -137,7 +139,15 @@ def _load(name: str, lock: list[str] | None, package_dirs: list[str] | None, qui
         if quiet:
             warnings.simplefilter("ignore", ModelWarning)
         robot = rd.load(name, package_dirs=package_dirs or ())
-    return robot.with_(lock=dict(_assignment("--lock", text) for text in lock)) if lock else robot
+    return robot.with_(lock=_assignments("--lock", lock)) if lock else robot
+
+
+def _assignments(option: str, texts: list[str]) -> dict[str, float]:
+    pairs = [_assignment(option, text) for text in texts]
+    values = dict(pairs)
+    if len(values) < len(pairs):
+        raise QueryError(f"{option} names a joint twice: {', '.join(texts)}")
+    return values
 
 
 def _assignment(option: str, text: str) -> tuple[str, float]:
@@ -160,7 +170,7 @@ def _vector(option: str, text: str | None, joint_names: tuple[str, ...]) -> np.n
 
     words = (text or "").replace(",", " ").split()
     if any("=" in word for word in words):
-        values = dict(_assignment(option, word) for word in words)
+        values = _assignments(option, words)
         for name in values.keys() - set(joint_names):
             raise QueryError(f"{option}: no joint {name!r}; {nearest(name, joint_names)}")
         return np.array([values.get(name, 0.0) for name in joint_names])
@@ -175,7 +185,7 @@ def _show(renderables: Iterable[Any]) -> None:
     from rich.console import Console
 
     watched = sys.stdout.isatty()
-    console = Console(highlight=False, markup=False, width=None if watched else 1000)  # a pipe has no edge
+    console = Console(highlight=False, markup=False, emoji=False, width=None if watched else 1000)  # a pipe has no edge
     for each in renderables:
         print(each) if isinstance(each, str) else console.print(each)
 

@@ -35,7 +35,15 @@ class OverflowedError(QueryError):
 
 
 class SingularError(RobotDynError):
-    """A query that has no answer at this state, such as forward dynamics of a massless joint."""
+    """Forward dynamics that has no answer: M is singular.
+
+    Attributes:
+        joint: Name of the joint that carries no inertia.
+    """
+
+    def __init__(self, joint: str, where_or_remedy: str) -> None:
+        super().__init__(f"no forward dynamics: joint {joint!r} carries no inertia {where_or_remedy}")
+        self.joint = joint
 
 
 class ModelWarning(UserWarning):

@@ -196,14 +196,17 @@ def demo_tables(robot: Robot) -> Iterator[Any]:
 
 
 def _ties(robot: Robot) -> list[Document]:
-    """Joints that follow another one."""
-    followers = []
-    for name, row, offset in zip(robot.model.names[1:], robot.ties.S, robot.ties.s0, strict=True):
-        (source,) = np.flatnonzero(row) if row.any() else (0,)
-        if name not in robot.joint_names:
-            tie = {"joint": name, "source": robot.joint_names[source]}
-            followers.append(tie | {"multiplier": float(row[source]), "offset": float(offset)})
-    return followers
+    """Joints that follow another one, as the file states them."""
+    return [
+        {
+            "joint": joint.get("name"),
+            "source": mimic.get("joint"),
+            "multiplier": float(mimic.get("multiplier")),
+            "offset": float(mimic.get("offset")),
+        }
+        for joint in robot.description.element.iterfind("joint[mimic]")
+        if joint.get("name") in robot.model.names[1:] and (mimic := joint.find("mimic")) is not None
+    ]
 
 
 def _finite(x: float) -> float | None:

@@ -2,8 +2,8 @@
 
     |x_Pinocchio − x_own| ≤ 1e-12 · (Σ of the absolute values of the terms added into x)
 
-M_ij is held to √(M_ii M_jj), and forward dynamics to max(1e-12, 8 n u κ) in the norm of M, with κ the condition number
-of M scaled to a unit diagonal.
+M_ij is held to √(M_ii M_jj), and forward dynamics to max(1e-12, 8 n u κ) of its terms M⁻¹τ, M⁻¹C v, M⁻¹N in the norm of
+M, with κ the condition number of M scaled to a unit diagonal.
 """
 
 from __future__ import annotations
@@ -212,7 +212,8 @@ def _forward_pairs(
     """Forward dynamics by three algorithms, and there and back."""
     M = own.M(q)
     tolerance = max(tolerance, 8 * robot.n * _U * unit_diagonal_condition(M))
-    a = robot.forward_dynamics(q, v, tau)
+    a, C, N = robot.forward_dynamics(q, v, tau), own.C(q, v), own.N(q)
+    terms = sum(mass_norm(M, np.linalg.solve(M, term)) for term in (tau, C @ v, N))
     roads = {"forward_dynamics": own.forward_dynamics(q, v, tau)}
     if robot.ties.trivial:
         roads["forward_dynamics (articulated body)"] = articulated_body(own.linkage, q, v, tau)
@@ -220,7 +221,7 @@ def _forward_pairs(
         weight = np.abs(a - b) * np.sqrt(np.diagonal(M))
         joint = int(np.argmax(weight))  # names the joint; the error is that of the whole vector, in the norm of M
         error = mass_norm(M, a - b)
-        scale = mass_norm(M, b) * np.abs(a - b)[joint] / error if error else 1.0
+        scale = terms * np.abs(a - b)[joint] / error if error else 1.0
         yield _Pair(
             quantity, a[joint : joint + 1], b[joint : joint + 1], scale, tolerance, ((robot.joint_names[joint],),)
         )

@@ -37,11 +37,13 @@ class Plant:
             if effects != "urdf":
                 raise EffectError(f"effects={effects!r}; give effects, or 'urdf' for those the file states")
             effects = stated_friction(dynamics)
-        effects = tuple(effects)
-        for effect in effects:
+        try:
+            object.__setattr__(self, "effects", tuple(effects))
+        except TypeError:
+            raise EffectError(f"effects must be several, such as [rd.ViscousFriction(0.1)], got {effects!r}") from None
+        for effect in self.effects:
             if not isinstance(effect, Effect):
                 raise EffectError(f"{effect!r} is no Effect; subclass Conservative, Dissipative or Active")
-        object.__setattr__(self, "effects", effects)
 
     def M(self, q: Array) -> Array:
         """Mass matrix, (..., n, n)."""
@@ -60,10 +62,15 @@ class Plant:
 
         Raises:
             QueryError: If v has the wrong shape.
+            EffectError: If an effect does not fit the joints.
         """
-        if np.shape(v)[-1:] != (self.dynamics.n,):
-            raise QueryError(f"v must have shape ({self.dynamics.n},) or (..., {self.dynamics.n}), got {np.shape(v)}")
-        return sum(effect.torque(self.dynamics, t, q, v) for effect in self.effects)
+        n, q, v = self.dynamics.n, np.asarray(q), np.asarray(v)
+        if v.shape[-1:] != (n,):
+            raise QueryError(f"v must have shape ({n},) or (..., {n}), got {v.shape}")
+        try:
+            return sum(effect.torque(self.dynamics, t, q, v) for effect in self.effects)
+        except (TypeError, ValueError) as error:
+            raise EffectError(f"an effect does not fit {n} joints and v of shape {v.shape}: {error}") from None
 
     def inverse_dynamics(self, t: float, q: Array, v: Array, a: Array) -> Array:
         """Actuation Υ = M a + C v + N that gives the acceleration a, (..., n)."""
@@ -71,7 +78,10 @@ class Plant:
 
     def forward_dynamics(self, t: float, q: Array, v: Array, u: Array) -> Array:
         """Acceleration under the actuation u, (..., n)."""
-        return self.dynamics.forward_dynamics(q, v, np.asarray(u) + self.torque(t, q, v))
+        u = np.asarray(u)
+        if u.dtype.kind not in "fiuO":
+            raise QueryError(f"u must be an array of {self.dynamics.n} numbers, got {u!r}")
+        return self.dynamics.forward_dynamics(q, v, u + self.torque(t, q, v))
 
 
 def stated_friction(dynamics: Any) -> tuple[Effect, ...]:

@@ -43,7 +43,7 @@ def articulated_body(linkage: Linkage, q: Array, v: Array, tau: Array) -> Array:
         U[i] = apply(inertia[i], np.broadcast_to(body.screw, (*batch, 6)))
         d[i] = U[i][..., None, :] @ body.screw + linkage.armature[i]
         if not np.all(d[i] > 0):
-            raise SingularError(f"no forward dynamics: joint {body.joint!r} carries no inertia at this q")
+            raise SingularError(body.joint, "at this q")
         u[i] = tau[..., i, None] - force[i][..., None, :] @ body.screw
         if body.parent != BASE:
             left = inertia[i] - U[i][..., :, None] * (U[i] / d[i])[..., None, :]

@@ -11,7 +11,7 @@ from functools import cache
 from importlib import metadata
 from pathlib import Path
 
-from robot_dyn.errors import CatalogError, nearest, shorten
+from robot_dyn.errors import CatalogError, nearest
 
 # Files whose own stem is shared, or says nothing.
 _RENAMED = {
@@ -35,20 +35,23 @@ def find(name_or_path: str | Path, package_dirs: Iterable[str | Path] = ()) -> P
     Raises:
         CatalogError: If there is none; names the nearest robots or the places tried.
     """
+    if not isinstance(name_or_path, str | Path) or not str(name_or_path).strip():
+        raise CatalogError(f"give the name of a robot or the path of a URDF file, got {name_or_path!r}")
     text = str(name_or_path)
-    if text.startswith("package://"):
-        return resolve(text, Path.cwd() / "x", package_dirs)
     if text in _files():
         return _files()[text]
     try:
+        if text.startswith("package://"):
+            return resolve(text, Path.cwd() / "x", package_dirs)
         path = Path(name_or_path).expanduser()
         if path.exists():
             return path
+        if path.suffix or len(path.parts) > 1:
+            raise CatalogError(f"no file {text}; looked for {path.absolute()}")
     except (OSError, RuntimeError, ValueError) as error:  # too long, not to be searched, no such user, a NUL
-        raise CatalogError(f"no file {shorten(text)!r}: {shorten(error)}; give the path of a URDF file") from None
-    if path.suffix or len(path.parts) > 1:
-        raise CatalogError(f"no file {text}; looked for {path.absolute()}")
-    raise CatalogError(f"no robot {shorten(text)!r}; {nearest(text, list_robots())}; or give the path of a URDF file")
+        why = getattr(error, "strerror", error)
+        raise CatalogError(f"no file {text!r}: {why}; give the path of a URDF file") from None
+    raise CatalogError(f"no robot {text!r}; {nearest(text, list_robots())}; or give the path of a URDF file")
 
 
 def resolve(address: str, urdf: Path, package_dirs: Iterable[str | Path] = ()) -> Path:

@@ -7,6 +7,7 @@ not need (meshes, materials, simulator extensions) is left out.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from stat import S_ISDIR, S_ISREG
@@ -108,21 +109,25 @@ def _parse(text: bytes, source: str) -> etree._Element:
                     )
         root = parser.close()
     except etree.XMLSyntaxError as error:
-        raise DescriptionError(f"{source}: {_syntax(error, parser)}") from None
+        raise DescriptionError(f"{source}: {_syntax(error, parser, text)}") from None
     _refuse_document_type(root, source)
     return root
 
 
-def _syntax(error: etree.XMLSyntaxError, parser: etree.XMLPullParser) -> str:
+def _syntax(error: etree.XMLSyntaxError, parser: etree.XMLPullParser, text: bytes) -> str:
     """What is wrong with the XML, from the first complaint of the parser, and what to do."""
-    first = parser.error_log[0] if len(parser.error_log) else None
-    why, line = (first.message, first.line) if first else (str(error.msg), error.lineno)
-    why = shorten(" ".join(why.split()), 200)
+    if not len(parser.error_log):  # it stops without a word at an entity that is not declared
+        entity = re.search(rb"&(?!(?:amp|lt|gt|quot|apos);)(\w{1,40});", text)
+        if entity:
+            return f"uses the entity &{entity[1].decode()};, which is not declared; write its text instead"
+        return f"is not well-formed XML: {shorten(' '.join(str(error.msg).split()), 200)}; correct the file"
+    first = parser.error_log[0]
+    why = shorten(" ".join(first.message.split()), 200)
     if "XML_PARSE_HUGE" in why or "mplification" in why:
-        return f"line {line}: text, nesting or entities grow beyond what a robot description needs; remove them"
+        return f"line {first.line}: a text, the nesting or an entity exceeds the limits of the parser; remove it"
     if "xacro" in why:
-        return f"line {line}: holds xacro macros; expand the file first: xacro robot.xacro > robot.urdf"
-    return f"is not well-formed XML: line {line}: {why}; correct the file"
+        return f"line {first.line}: holds xacro macros; expand the file first: xacro robot.xacro > robot.urdf"
+    return f"is not well-formed XML: line {first.line}: {why}; correct the file"
 
 
 def _refuse_document_type(element: etree._Element, source: str) -> None:

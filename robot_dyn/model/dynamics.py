@@ -132,11 +132,12 @@ def acceleration(M: Array, tau: Array, joint_names: tuple[str, ...]) -> Array:
     Raises:
         SingularError: If M is not positive definite; names the joint.
     """
+    n = len(joint_names)
+    batch = np.broadcast_shapes(M.shape[:-2], tau.shape[:-1])
     try:
-        return cholesky_solve(np.broadcast_to(M, (*tau.shape, len(joint_names))), tau)
+        return cholesky_solve(np.broadcast_to(M, (*batch, n, n)), np.broadcast_to(tau, (*batch, n)))
     except NotPositiveDefiniteError as error:
-        name = joint_names[error.row]
-        raise SingularError(f"no forward dynamics: joint {name!r} carries no inertia at this q") from None
+        raise SingularError(joint_names[error.row], "at this q") from None
 
 
 def entry(table: Mapping[str, T], frame: str) -> T:

@@ -8,6 +8,7 @@ from typing import Any, final
 
 import numpy as np
 
+from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.errors import EditError, nearest
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.80665)  # [m/s²], CGPM 1901
@@ -33,6 +34,8 @@ class Payload:
     inertia: Matrix3 = ((0.0, 0.0, 0.0),) * 3
 
     def __post_init__(self) -> None:
+        if not isinstance(self.frame, str):
+            raise EditError(f"payload frame must be the name of a link, got {self.frame!r}")
         inertia = _numbers("payload inertia", self.inertia, (3, 3))
         if not np.array_equal(inertia, inertia.T):
             raise EditError(f"payload inertia must be symmetric, got {inertia.tolist()}")
@@ -42,6 +45,10 @@ class Payload:
         object.__setattr__(self, "mass", mass)
         object.__setattr__(self, "com", tuple(_numbers("payload com", self.com, (3,)).tolist()))
         object.__setattr__(self, "inertia", tuple(map(tuple, inertia.tolist())))
+
+
+Lock = Mapping[str, float] | None  # value by joint name
+Payloads = Payload | Iterable[Payload] | None
 
 
 @final
@@ -66,8 +73,8 @@ class Edits:
         joint_names: tuple[str, ...],
         *,
         gravity: Any = None,
-        lock: Mapping[str, float] | None = None,
-        payload: Payload | Iterable[Payload] | None = None,
+        lock: Lock = None,
+        payload: Payloads = None,
         armature: Any = None,
     ) -> Edits:
         """These edits and more. Locks and payloads add up; gravity and armature replace what was given before.
@@ -88,9 +95,13 @@ class Edits:
         if armature is not None:
             new = replace(new, armature=_by_joint("armature", armature, joint_names))
         if lock is not None:
+            if not isinstance(lock, Mapping):
+                raise EditError(
+                    f"lock must give a value by joint name, such as {{{joint_names[0]!r}: 0.0}}, got {lock!r}"
+                )
             new = replace(new, lock=new.lock + _by_joint("lock", dict(lock), joint_names))
         if payload is not None:
-            more = (payload,) if isinstance(payload, Payload) else tuple(payload)
+            more = tuple(payload) if isinstance(payload, Iterable) else (payload,)
             if not all(isinstance(each, Payload) for each in more):
                 raise EditError(f"payload must be a Payload or several, got {payload!r}")
             new = replace(new, payloads=new.payloads + more)
@@ -114,7 +125,7 @@ def _by_joint(what: str, values: Any, joint_names: tuple[str, ...]) -> tuple[tup
 
 def _numbers(what: str, values: Any, shape: tuple[int, ...]) -> np.ndarray:
     try:
-        array = np.array(values, dtype=float)
+        array = np.array(FLOAT64.asarray(values))
     except (TypeError, ValueError):
         raise EditError(f"{what} must be numbers of shape {shape}, got {values!r}") from None
     if array.shape != shape or not np.isfinite(array).all():

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from math import hypot
 from typing import Any
 
 import numpy as np
@@ -30,8 +31,39 @@ class Scratch(threading.local):
 
 
 def is_state(x: Any, shape: tuple[int] | None) -> bool:
-    """Whether x can go to Pinocchio as it is: float64 of that shape."""
+    """Whether x has the form that goes to Pinocchio as it is: float64 of that shape."""
     return x.__class__ is ndarray and x.dtype is _F8 and x.shape == shape
+
+
+def is_moderate(x: ndarray, most: float = 1e100) -> bool:
+    """Whether ‖x‖ < most: then x holds neither NaN nor inf, nor numbers whose products overflow."""
+    return hypot(*x.tolist()) < most  # faster than any reduction of NumPy at this size, and never warns
+
+
+def frozen(x: ndarray) -> ndarray:
+    """x, read-only from now on."""
+    x.setflags(write=False)
+    return x
+
+
+def coriolis_torque(model: Any, data: Any, q: ndarray, v: ndarray) -> ndarray:
+    """C v."""
+    return pin.computeCoriolisMatrix(model, data, q, v) @ v
+
+
+def coriolis_transpose(model: Any, data: Any, q: ndarray, v: ndarray) -> ndarray:
+    """Cᵀ v."""
+    return v @ pin.computeCoriolisMatrix(model, data, q, v)
+
+
+def momentum(model: Any, data: Any, q: ndarray, v: ndarray) -> ndarray:
+    """M v."""
+    return pin.crba(model, data, q) @ v
+
+
+def kinetic_energy(model: Any, data: Any, q: ndarray, v: ndarray) -> float:
+    """½ vᵀ M v; pin.computeKineticEnergy leaves out the armature of joints whose axis is none of x, y, z."""
+    return v @ pin.crba(model, data, q) @ v / 2
 
 
 def placement(frame: int) -> Kernel:
@@ -91,7 +123,8 @@ def ask(
     batch = check_batches(**arrays)
     full = [ties.position(x) if name == "q" else ties.velocity(x) for name, x in arrays.items()]
     rows = [np.broadcast_to(x, (*batch, model.nv)).reshape(-1, model.nv) for x in full]
-    answers = [kernel(model, data, *row) for row in zip(*rows, strict=True)]
+    with np.errstate(all="ignore"):  # what overflows is told below
+        answers = [kernel(model, data, *row) for row in zip(*rows, strict=True)]
     if not answers:  # an empty batch has a shape all the same
         answers = np.empty((0, *np.shape(kernel(model, data, *np.zeros((len(rows), model.nv))))))
     answer = np.array(answers)

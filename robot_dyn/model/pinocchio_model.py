@@ -18,7 +18,6 @@ from robot_dyn.model.urdf import UNBOUNDED
 
 MAX_MOVING = 250  # Pinocchio's scratch memory for n joints has 63 n³ bytes: 1 GB
 _MARK = "joint:"  # while Pinocchio works by name: a joint may share its name with a link, or be called "universe"
-_SINGULAR = 1e-12  # of a pivot of M scaled to a unit diagonal; rounding leaves 1e-14
 
 
 def build(description: Description, edits: Edits) -> tuple[Any, Ties, tuple[str, ...]]:
@@ -134,17 +133,3 @@ def findings(model: Any) -> tuple[str, ...]:
         elif why := implausibility(body.mass, body.lever, body.inertia):
             found.append(f"link {link!r}: with what is fixed to it, {why}; correct the inertia of these links")
     return tuple(found)
-
-
-def joint_without_inertia(M: np.ndarray) -> int | None:
-    """The first row at which M, scaled to a unit diagonal, fails to be positive definite; or None."""
-    diagonal = np.diagonal(M)
-    if not (diagonal > 0).all():
-        return int(np.argmin(diagonal > 0))
-    scale = 1 / np.sqrt(diagonal)
-    A = M * scale * scale[:, None]
-    for row in range(len(A)):
-        if not A[row, row] > _SINGULAR:
-            return row
-        A[row + 1 :, row + 1 :] -= np.outer(A[row + 1 :, row], A[row, row + 1 :]) / A[row, row]
-    return None

@@ -6,10 +6,9 @@ after checks that cost a fraction of a microsecond; lists, batches and tied join
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import isfinite
 from typing import Any, final
 
 import numpy as np
@@ -19,10 +18,12 @@ from numpy import ndarray
 from robot_dyn.errors import OverflowedError, SingularError
 from robot_dyn.model import kernels, pinocchio_model
 from robot_dyn.model.description import Description
-from robot_dyn.model.dynamics import Array, Axes, acceleration, checked, entry
-from robot_dyn.model.edits import Edits, Payload
-from robot_dyn.model.kernels import Kernel, Scratch, ask, is_state
+from robot_dyn.model.dynamics import Array, Axes, acceleration, check_batches, checked, entry
+from robot_dyn.model.edits import Edits, Lock, Payloads
+from robot_dyn.model.kernels import Kernel, Scratch, ask, frozen, is_moderate, is_state
 from robot_dyn.model.ties import Ties
+
+_DOUBTFUL = 1e10  # of ‖a‖: M may be singular at this q, which rounding hides
 
 
 @final
@@ -44,14 +45,7 @@ class Robot:
     def __reduce__(self) -> tuple[Any, ...]:
         return Robot, (self.description, self.edits)
 
-    def with_(
-        self,
-        *,
-        gravity: Any = None,
-        lock: Mapping[str, float] | None = None,
-        payload: Payload | Iterable[Payload] | None = None,
-        armature: Any = None,
-    ) -> Robot:
+    def with_(self, *, gravity: Any = None, lock: Lock = None, payload: Payloads = None, armature: Any = None) -> Robot:
         """A new robot with more edits. Locks and payloads add up; gravity and armature replace earlier ones.
 
         Args:
@@ -65,8 +59,6 @@ class Robot:
         """
         edits = self.edits.with_(self.joint_names, gravity=gravity, lock=lock, payload=payload, armature=armature)
         return Robot(self.description, edits)
-
-    # --- what it is
 
     @property
     def name(self) -> str:
@@ -98,6 +90,10 @@ class Robot:
         """Names of the links; each can be asked for its placement and Jacobian."""
         return tuple(self._frames)
 
+    @cached_property
+    def _frames(self) -> dict[str, int]:
+        return pinocchio_model.link_frames(self.model)
+
     @property
     def lower(self) -> ndarray:
         """Lower position limits, −inf where none is stated, (n,) in [rad] or [m]."""
@@ -126,12 +122,12 @@ class Robot:
     @property
     def damping(self) -> ndarray:
         """Viscous friction the file states, with tied joints Σ s² b, (n,) in [N m s/rad] or [N s/m]; see `Plant`."""
-        return self.model.damping @ self.ties.S**2
+        return frozen(self.model.damping @ self.ties.S**2)
 
     @property
     def friction(self) -> ndarray:
         """Dry friction the file states, with tied joints Σ |s| f, (n,) in [N m] or [N]; see `Plant`."""
-        return self.model.friction @ np.abs(self.ties.S)
+        return frozen(self.model.friction @ np.abs(self.ties.S))
 
     @property
     def total_mass(self) -> float:
@@ -143,34 +139,33 @@ class Robot:
         """Bodies that cannot exist as described, in words."""
         return pinocchio_model.findings(self.model)
 
-    # --- its dynamics
-
     def M(self, q: Array) -> ndarray:
-        if is_state(q, self._shape) and isfinite(q.dot(q)):
+        if is_state(q, self._shape) and is_moderate(q):
             return pin.crba(self.model, self._scratch.data, q)
         return self._ask(pin.crba, self.ties.matrix, q=q)
 
     def C(self, q: Array, v: Array) -> ndarray:
-        if is_state(q, self._shape) and is_state(v, self._shape) and isfinite(q.dot(v)):
+        shape = self._shape
+        if is_state(q, shape) and is_state(v, shape) and is_moderate(q) and is_moderate(v):
             return pin.computeCoriolisMatrix(self.model, self._scratch.data, q, v)
         return self._ask(pin.computeCoriolisMatrix, self.ties.matrix, q=q, v=v)
 
     def N(self, q: Array) -> ndarray:
-        if is_state(q, self._shape) and isfinite(q.dot(q)):
+        if is_state(q, self._shape) and is_moderate(q):
             return pin.computeGeneralizedGravity(self.model, self._scratch.data, q)
         return self._ask(pin.computeGeneralizedGravity, self.ties.torque, q=q)
 
     def coriolis_torque(self, q: Array, v: Array) -> ndarray:
-        return np.matvec(self.C(q, v), v)
+        return self._ask(kernels.coriolis_torque, self.ties.torque, q=q, v=v)
 
     def coriolis_transpose(self, q: Array, v: Array) -> ndarray:
-        return np.vecmat(v, self.C(q, v))
+        return self._ask(kernels.coriolis_transpose, self.ties.torque, q=q, v=v)
 
     def inverse_dynamics(self, q: Array, v: Array, a: Array) -> ndarray:
         shape = self._shape
         if is_state(q, shape) and is_state(v, shape) and is_state(a, shape):
             tau = pin.rnea(self.model, self._scratch.data, q, v, a)
-            if isfinite(tau.dot(tau)):  # one that is not finite, in any argument, shows in tau
+            if is_moderate(tau):  # NaN and inf, in any argument, show in tau
                 return tau
         return self._ask(pin.rnea, self.ties.torque, q=q, v=v, a=a)
 
@@ -178,18 +173,18 @@ class Robot:
         shape = self._solvable_shape
         if is_state(q, shape) and is_state(v, shape) and is_state(tau, shape):
             a = pin.aba(self.model, self._scratch.data, q, v, tau)
-            if isfinite(a.dot(a)):
+            if is_moderate(a, _DOUBTFUL):
                 return a
         return self._forward_dynamics(q, v, tau)
 
     def kinetic_energy(self, q: Array, v: Array) -> Any:
-        return self._ask(pin.computeKineticEnergy, None, q=q, v=v)
+        return self._ask(kernels.kinetic_energy, None, q=q, v=v)
 
     def potential_energy(self, q: Array) -> Any:
         return self._ask(pin.computePotentialEnergy, None, q=q)
 
     def momentum(self, q: Array, v: Array) -> ndarray:
-        return np.matvec(self.M(q), checked("v", v, self.joint_names))
+        return self._ask(kernels.momentum, self.ties.torque, q=q, v=v)
 
     def placement(self, q: Array, frame: str) -> ndarray:
         return self._ask(kernels.placement(entry(self._frames, frame)), None, q=q)
@@ -202,8 +197,6 @@ class Robot:
         kernel = kernels.jacobian_rate(entry(self._frames, frame), Axes.of(expressed_in))
         return self._ask(kernel, self.ties.columns, q=q, v=v)
 
-    # --- how it is asked
-
     @cached_property
     def _built(self) -> tuple[Any, Ties, tuple[str, ...]]:
         return pinocchio_model.build(self.description, self.edits)
@@ -213,47 +206,47 @@ class Robot:
         return Scratch(self.model)
 
     @cached_property
-    def _frames(self) -> dict[str, int]:
-        return pinocchio_model.link_frames(self.model)
-
-    @cached_property
     def _shape(self) -> tuple[int] | None:
         """Shape of a state that goes straight to Pinocchio; None if joints are tied."""
         return (self.n,) if self.ties.trivial else None
 
     @cached_property
     def _solvable_shape(self) -> tuple[int] | None:
-        """The same for forward dynamics; None also if M is singular everywhere."""
+        """The same for forward dynamics; None also where M is singular everywhere."""
         return self._shape if self.joint_without_inertia is None else None
 
     @cached_property
     def joint_without_inertia(self) -> str | None:
         """The joint at which M is singular at every configuration, or None: then forward dynamics has no answer."""
-        M = self.M(np.linspace(0.3, 0.9, self.n))  # a configuration without symmetries
-        row = pinocchio_model.joint_without_inertia(M)
-        return None if row is None else self.joint_names[row]
+        q = np.linspace(0.3, 0.9, self.n)  # a configuration without symmetries
+        try:
+            acceleration(self.M(q), q, self.joint_names)
+        except SingularError as error:
+            return error.joint
+        return None
 
     def _ask(self, kernel: Kernel, reduce: Callable[[Any], Any] | None, **state: Array) -> Any:
         return ask(kernel, reduce, self.model, self._scratch.data, self.ties, self.joint_names, state)
 
     def _forward_dynamics(self, q: Array, v: Array, tau: Array) -> ndarray:
-        """Forward dynamics in general; where joints are tied, by the factorisation of M."""
-        joint = self.joint_without_inertia
-        if joint is not None:
-            raise SingularError(
-                f"no forward dynamics: joint {joint!r} carries no inertia; give its link a mass or lock it"
-            )
-        if self.ties.trivial:
-            try:
-                return self._ask(pin.aba, None, q=q, v=v, tau=tau)
-            except OverflowedError:
-                self._by_factorisation(q, v, tau)  # says so if it is M that is singular at this q
-                raise
-        return self._by_factorisation(q, v, tau)
-
-    def _by_factorisation(self, q: Array, v: Array, tau: Array) -> ndarray:
-        rest = checked("tau", tau, self.joint_names) - self.inverse_dynamics(q, v, np.zeros(self.n))
-        return acceleration(self.M(q), rest, self.joint_names)
+        """Forward dynamics in general: tied joints by the factorisation of M, which also tells where M is singular."""
+        if self.joint_without_inertia is not None:
+            raise SingularError(self.joint_without_inertia, "at any q; give its link a mass, or lock it")
+        state = {name: checked(name, x, self.joint_names) for name, x in (("q", q), ("v", v), ("tau", tau))}
+        check_batches(**state)
+        try:
+            if self.ties.trivial:
+                a = self._ask(pin.aba, None, **state)
+            else:
+                rest = state["tau"] - self.inverse_dynamics(state["q"], state["v"], np.zeros(self.n))
+                a = acceleration(self.M(state["q"]), rest, self.joint_names)
+        except OverflowedError:
+            a = None
+        if a is None or np.any(np.abs(a) > _DOUBTFUL):
+            acceleration(self.M(state["q"]), state["tau"], self.joint_names)  # tells if M is singular at this q
+        if a is None:
+            raise OverflowedError("q, v, tau are so large that the result overflows")
+        return a
 
     def _per_joint(self, full: ndarray) -> ndarray:
         return pinocchio_model.per_joint(self.model, self.joint_names, full)

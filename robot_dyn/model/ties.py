@@ -46,6 +46,10 @@ class Ties:
     S: Array
     s0: Array
 
+    def __post_init__(self) -> None:
+        self.S.setflags(write=False)
+        self.s0.setflags(write=False)
+
     @cached_property
     def trivial(self) -> bool:
         """Whether q_full = q."""

@@ -6,7 +6,6 @@ What is refused here is what the two parsers would read in silence, in two ways,
 from __future__ import annotations
 
 import re
-from itertools import islice
 from math import hypot, inf, isfinite
 
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
@@ -37,9 +36,11 @@ def checked_robot(robot: etree._Element, source: str) -> etree._Element:
     if any("xacro" in str(element.tag) for element in robot.iter()):
         check.refuse("robot", "holds xacro macros; expand the file first: xacro robot.xacro > robot.urdf")
     out = etree.Element("robot", name=check.name(robot, "robot"))
-    if len(robot.findall("joint")) > MAX_JOINTS:
-        check.refuse("robot", f"has {len(robot.findall('joint'))} joints; at most {MAX_JOINTS} are taken: split it")
-    links = [check.link(link, out) for link in islice(robot.iterfind("link"), MAX_JOINTS + 2)]
+    for tag, most in (("joint", MAX_JOINTS), ("link", MAX_JOINTS + 1)):
+        count = len(robot.findall(tag))
+        if count > most:
+            check.refuse("robot", f"has {count} {tag}s; at most {most} are taken: split it")
+    links = [check.link(link, out) for link in robot.iterfind("link")]
     if not links:
         check.refuse("robot", "holds no <link>; add one link at least")
     check.distinct("link", links)

@@ -1,0 +1,129 @@
+"""The cross-check: every robot of the catalog agrees by both roads, and a wrong road is caught and named."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import robot_dyn as rd
+from robot_dyn.accuracy.compare import compare, random_state
+from robot_dyn.errors import DescriptionError, ModelWarning, QueryError
+from robot_dyn.lagrange.breakdown import torque_breakdown
+from robot_dyn.lagrange.linkage import Linkage
+from robot_dyn.lagrange.manipulator import Lagrangian
+
+REFUSED = {"alex_psyonic_hands", "hector", "iris_simple", "ur3_empty"}  # a mimic of nothing; nothing moves; no link
+
+
+def quiet(name: str) -> rd.Robot:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ModelWarning)
+        return rd.load(name)
+
+
+@pytest.mark.parametrize("name", [name for name in rd.list_robots() if name not in REFUSED])
+def test_the_roads_agree_on(name: str) -> None:
+    """1e-12 on the scale of the terms added; forward dynamics max(1e-12, 8 n u κ) in the norm of M."""
+    result = compare(quiet(name), samples=2, seed=3)
+    assert result.ok, result.worst
+    quantities = {agreement.quantity for agreement in result.agreements}
+    expected = {"M", "C", "N", "inverse_dynamics", "kinetic_energy", "potential_energy", "momentum", "jacobian"}
+    assert expected <= quantities
+    assert ("forward_dynamics" in quantities) != any("no forward dynamics" in note for note in result.notes)
+
+
+@pytest.mark.parametrize("name", sorted(REFUSED))
+def test_a_refused_robot_says_why(name: str) -> None:
+    with pytest.raises(DescriptionError, match=r"no joint moves|not defined|has no name"):
+        rd.load(name)
+
+
+def test_a_robot_of_69_files_is_each_in_the_catalog() -> None:
+    """example-robot-data 6.0.0 has 69 URDFs, urdf/ seven; no two share a name."""
+    assert len(rd.list_robots()) == 69 + 7
+
+
+@pytest.mark.parametrize("name", ["ur5", "skew_tree", "mimic_chain"])
+def test_edited_robots_agree(name: str) -> None:
+    """Gravity in any direction, armature, payload and a lock are taken by both roads alike."""
+    robot = rd.load(name)
+    payload = rd.Payload(robot.frame_names[-1], 0.8, (0.05, -0.02, 0.1), np.diag([0.01, 0.02, 0.025]).tolist())
+    edited = robot.with_(gravity=(1.0, -2.0, 3.0), armature=0.3, payload=payload, lock={robot.joint_names[-1]: 0.4})
+    result = compare(edited, samples=5)
+    assert result.ok, result.worst
+
+
+@pytest.mark.parametrize(
+    ("member", "change", "quantities"),
+    [
+        ("gravity", lambda g: g + np.array([0, 0, 1e-10]), {"N", "inverse_dynamics", "potential_energy"}),
+        ("armature", lambda a: a + 1e-11, {"M", "momentum", "kinetic_energy"}),
+    ],
+)
+def test_a_road_that_errs_by_1e_11_is_caught(monkeypatch, member: str, change, quantities: set[str]) -> None:
+    """One number of the own road moved by 1e-11 of its size: the quantities that depend on it are named, no others."""
+    robot = rd.load("planar_2r").with_(gravity=(0.3, -9.0, 0.5))
+    whole = Lagrangian.linkage.func  # pyright: ignore[reportFunctionMemberAccess]
+
+    def wrong(self: Lagrangian) -> Linkage:
+        linkage = whole(self)
+        return replace(linkage, **{member: change(getattr(linkage, member))})
+
+    monkeypatch.setattr(Lagrangian, "linkage", property(wrong))
+    result = compare(robot, samples=5)
+    failed = {agreement.quantity for agreement in result.agreements if not agreement.ok}
+    if member == "gravity":  # along z, which these joints do not feel, only the placements of a vertical plane would
+        assert failed <= quantities | {"ID(FD(τ)) = τ", "forward_dynamics", "forward_dynamics (articulated body)"}
+    else:
+        assert quantities <= failed
+    assert not {"jacobian", "placement", "C"} & failed
+
+
+def test_a_disagreement_names_its_state_and_entry(monkeypatch) -> None:
+    """N of the second joint moved by 1e-9 N m: the worst entry is that joint, at a state that reproduces it."""
+    robot, original = rd.load("planar_2r").with_(gravity=(0.0, -9.81, 0.0)), Lagrangian.N
+    monkeypatch.setattr(Lagrangian, "N", lambda self, q: original(self, q) + np.array([0.0, 1e-9]))
+    result = compare(robot, samples=4)
+    assert not result.ok
+    (N,) = (agreement for agreement in result.agreements if agreement.quantity == "N")
+    assert not N.ok
+    assert N.entry == "joint_2"
+    assert N.pinocchio == robot.N(N.state["q"])[1]
+    np.testing.assert_allclose(N.own - N.pinocchio, 1e-9, rtol=1e-5)
+
+
+def test_a_comparison_is_repeatable() -> None:
+    robot = rd.load("ur5")
+    assert compare(robot, samples=2, seed=1) == compare(robot, samples=2, seed=1)
+    assert compare(robot, samples=2, seed=1) != compare(robot, samples=2, seed=2)
+
+
+def test_samples_must_be_positive() -> None:
+    with pytest.raises(QueryError, match="samples must be at least 1, got 0"):
+        compare(rd.load("ur5"), samples=0)
+
+
+def test_states_lie_within_the_limits_and_have_no_zeros() -> None:
+    robot = rd.load("panda")
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        state = random_state(robot, rng)
+        assert np.all((state["q"] >= robot.lower) & (state["q"] <= robot.upper))
+        assert all(np.all(x != 0) for x in state.values())
+
+
+@pytest.mark.parametrize("name", ["ur5", "panda", "mimic_chain", "skew_tree", "cart_pole"])
+def test_shares_of_the_links_add_up_to_the_torque(name: str) -> None:
+    """Σ over links of inertia, Coriolis and gravity is the inverse dynamics; a few roundings of the largest share."""
+    robot = rd.load(name).with_(armature=0.1)
+    q, v, a = np.random.default_rng(4).uniform(-1, 1, (3, robot.n))
+    shares = torque_breakdown(rd.Lagrangian(robot), q, v, a)
+    total = sum(share.total for share in shares)
+    size = sum(np.abs(share.inertia) + np.abs(share.coriolis) + np.abs(share.gravity) for share in shares)
+    assert np.all(np.abs(total - robot.inverse_dynamics(q, v, a)) <= 1e-14 * size)
+    np.testing.assert_allclose(sum(s.gravity for s in shares), robot.N(q), atol=1e-14 * size.max())
+    (armature,) = (share for share in shares if share.source == "(armature)")
+    np.testing.assert_allclose(armature.inertia, 0.1 * a, rtol=1e-15)
