@@ -19,7 +19,8 @@ TABLE = [kind for topic in TOPICS for kind in topic.KINDS]
 SECONDS = 20
 LONGEST_MESSAGE = 1500  # characters besides the path: what still fits a terminal
 REMEDY = re.compile(
-    r"\b(give|write|correct|remove|rename|keep|add|make|join|expand|exchange|check|split|known|nearest|looked for|only)\b"
+    r"\b(give|needs|write|correct|remove|rename|keep|add|make|join|expand|exchange|check|split"
+    r"|known|nearest|looked for|only)\b"
 )
 
 CHILD = """

@@ -26,7 +26,6 @@ KINDS = [
         mimicking('<mimic joint="sholder"/>'),
         ("joint 'elbow'", "mimics 'sholder'", "not defined", "nearest: shoulder"),
     ),
-    Kind("a mimic of nothing", mimicking("<mimic/>"), ("joint 'elbow'", "mimics ''", "known: shoulder, elbow")),
     Kind("a mimic of itself", mimicking('<mimic joint="elbow"/>'), ("joint 'elbow'", "elbow → elbow", "remove one")),
     Kind(
         "two joints that mimic each other",
@@ -38,16 +37,10 @@ KINDS = [
         text(welded("weld").replace(ELBOW, ELBOW + '<mimic joint="weld"/>')),
         ("joint 'elbow'", "mimics 'weld'", "fixed", "make 'elbow' fixed too"),
     ),
-    Kind("two mimics", mimicking('<mimic joint="shoulder"/>' * 2), ("joint 'elbow'", "2 <mimic> elements", "keep one")),
     Kind(
         "a mimic multiplier of nan",
         mimicking('<mimic joint="shoulder" multiplier="nan"/>'),
         ("joint 'elbow'", "<mimic> multiplier", "'nan'", "correct it"),
-    ),
-    Kind(
-        "a mimic offset without end",
-        mimicking('<mimic joint="shoulder" offset="-inf"/>'),
-        ("joint 'elbow'", "<mimic> offset", "'-inf'", "correct it"),
     ),
     Kind(
         "a mimic multiplier of 1e200",
@@ -64,11 +57,7 @@ KINDS = [
         following(("1e7", "1e7")),
         ("joint 'j2'", "chain of mimics multiplies by 1e+14", "correct a multiplier"),
     ),
-    Kind(
-        "multipliers whose product overflows, after a zero",
-        following(("0", *["1e12"] * 30)),
-        ("chain of mimics", "correct a multiplier"),
-    ),
+    Kind("multipliers without end after a zero", following(("0", *["1e12"] * 30))),
     Kind(
         "offsets that grow along a chain whose multipliers cancel out",
         following(("1e-12",) * 14 + ("1e12",) * 14, ("1e12",) * 28),

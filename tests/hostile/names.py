@@ -8,7 +8,7 @@ RENAME = ("rename", "control characters, or more than 256 characters")
 KINDS = [
     Kind("a line break in a name", altered('<link name="base"/>', '<link name="ba&#10;se"/>'), (r"'ba\nse'", *RENAME)),
     Kind(
-        "a terminal command in a name", altered('name="elbow"', 'name="&#x9b;2Jelbow"'), (r"\x9b2J", "joint", *RENAME)
+        "a terminal command in a name", altered('"elbow"', '"&#x9b;2Jelbow"'), (r"\x9b2J", "joint", *RENAME)
     ),
     Kind("a change of writing direction in a name", altered('"arm"', '"a&#x202e;mr"'), (r"\u202e", "robot", *RENAME)),
     Kind("a name of 257 letters", altered('"arm"', f'"{"a" * 257}"'), ("robot", "'aaaa", *RENAME)),
@@ -28,9 +28,7 @@ KINDS = [
         ("the first joint named like Pinocchio's world", ARM.replace("shoulder", "universe")),
         ("the last joint named like Pinocchio's world", ARM.replace("elbow", "universe")),
         ("the first link named like Pinocchio's world", ARM.replace('"base"', '"universe"')),
-        ("the last link named like Pinocchio's world", ARM.replace('"fore"', '"universe"')),
         ("a fixed joint named like Pinocchio's world", welded("universe")),
-        ("a joint named like Pinocchio's root", ARM.replace("elbow", "root_joint")),
         ("a joint named like the library's mark", ARM.replace("shoulder", "joint:elbow")),
         ("links named like their joints", ARM.replace('"upper"', '"shoulder"').replace('"fore"', '"elbow"')),
         ("a fixed joint named like a link", welded("fore")),

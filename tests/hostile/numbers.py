@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import re
+
 from tests.hostile.kinds import ARM, AXIS, LIMIT, MASS, MOMENTS, Kind, altered, text
 
 NOT_DECIMAL = (
-    *("nan", "inf", "Infinity", "1e999", "1e99999", "1,5", "1_000", "0x10", "0x1p4", "1d3", "--1", "1e", ".", ""),
-    *("1.5 kg", "1 5", "${mass}", "$(arg mass)", "١٢", "１．５", "½", "0" * 65),
+    *("nan", "inf", "1e999", "1e99999", "1,5", "1_000", "0x1p4", "1d3", "--1", "", "1.5 kg", "1 5", "${mass}"),
+    *("١٢", "1½", "0" * 65),
 )
 XYZ, RPY, CENTRE = 'xyz="0 0 0.7"', 'rpy="0 0 0.7"', 'xyz="0 0 0.1"'
+
+LARGEST = re.sub(r'(value|i(?:xx|yy|zz)|damping|friction)="[^"]*"', r'\1="1e12"', ARM).replace("0.4 0 0", "1e12 1e12 1e12")
 
 
 def moment(key: str, value: str) -> tuple[str, str]:
@@ -20,57 +24,41 @@ def moment(key: str, value: str) -> tuple[str, str]:
 ON_LINK = (
     ("a mass below zero", MASS, '<mass value="-1e-9"/>', ("<mass> value", "below 0", "-1e-9", "correct it")),
     ("a mass without value", MASS, "<mass/>", ("<mass> has no value", 'write value="')),
-    ("a mass as text", MASS, "<mass>1.5</mass>", ("<mass> has no value", 'write value="')),
     ("no mass", MASS, "", ("both <mass> and <inertia>", "add the one that is missing")),
-    ("no inertia", f"<inertia {MOMENTS}/>", "", ("both <mass> and <inertia>", "add the one that is missing")),
     ("two masses", MASS, MASS + MASS, ("2 <mass> elements", "keep one")),
     ("two inertials", MASS, f"{MASS}</inertial><inertial>", ("2 <inertial> elements", "keep one")),
-    ("two centres", MASS, MASS + "<origin/>", ("2 <origin> elements", "keep one")),
     ("a moment missing", ' izz="0.01"', "", ("<inertia> has no izz", 'write izz="')),
-    ("a product that is nan", *moment("iyz", "nan"), ("<inertia> iyz", "'nan'", "correct it")),
     (
         "a centre of four numbers",
         CENTRE,
         'xyz="0 0 0.1 0"',
-        ("<origin> xyz", "three numbers", "'0 0 0.1 0'", "correct"),
+        ("<origin> xyz", "three numbers", "'0 0 0.1 0'"),
     ),
-    ("a centre at infinity", CENTRE, 'xyz="0 0 -inf"', ("<origin> xyz", "'-inf'", "correct it")),
-    ("a mass of 1e308", MASS, '<mass value="1e308"/>', ("<mass> value is 1e308, beyond ±1e+12", "correct it")),
     (
         "a mass just too large",
         MASS,
         '<mass value="1.0001e12"/>',
-        ("is 1.0001e12, beyond ±1e+12 in SI units", "correct"),
+        ("is 1.0001e12, beyond ±1e+12 in SI units; correct",),
     ),
     ("a moment of 1e308", *moment("ixx", "1e308"), ("<inertia> ixx is 1e308, beyond ±1e+12", "correct it")),
-    ("a product of -1e200", *moment("ixy", "-1e200"), ("<inertia> ixy is -1e200, beyond ±1e+12", "correct it")),
     ("a centre at 1e200 m", CENTRE, 'xyz="1e200 0 0.1"', ("<origin> xyz is 1e200, beyond ±1e+12", "correct it")),
 )
 ON_JOINT = (
     ("zero axis", AXIS, '<axis xyz="0 0 0"/>', ("<axis> xyz must be a direction", "'0 0 0'", "write a unit vector")),
-    ("an axis of 1e-200", AXIS, '<axis xyz="0 0 1e-200"/>', ("must be a direction", "'0 0 1e-200'", "unit vector")),
     ("an axis of 1e11", AXIS, '<axis xyz="0 0 1e11"/>', ("must be a direction", "'0 0 1e11'", "unit vector")),
     ("an axis of 1e300", AXIS, '<axis xyz="0 1e300 0"/>', ("<axis> xyz is 1e300, beyond ±1e+12", "correct it")),
-    ("an axis of two numbers", AXIS, '<axis xyz="0 1"/>', ("<axis> xyz", "three numbers", "'0 1'", "correct it")),
     ("an axis that is nan", AXIS, '<axis xyz="0 0 nan"/>', ("<axis> xyz", "'nan'", "correct it")),
     ("an axis with commas", AXIS, '<axis xyz="0,0,1"/>', ("<axis> xyz", "three numbers", "'0,0,1'", "correct it")),
-    ("two axes", AXIS, AXIS + AXIS, ("2 <axis> elements", "keep one")),
-    ("an origin of two numbers", XYZ, 'xyz="0 0.7"', ("<origin> xyz", "three numbers", "'0 0.7'", "correct it")),
     ("an empty origin", XYZ, 'xyz=""', ("<origin> xyz", "three numbers", "''", "correct it")),
-    ("two origins", AXIS, AXIS + "<origin/>", ("2 <origin> elements", "keep one")),
     ("an arm of 1e200 m", XYZ, 'xyz="0 1e200 0"', ("<origin> xyz is 1e200, beyond ±1e+12 in SI units", "correct it")),
-    ("an infinite turn", RPY, 'rpy="0 0 inf"', ("<origin> rpy", "'inf'", "correct it")),
     ("a turn in terms of pi", RPY, 'rpy="0 0 pi/2"', ("<origin> rpy", "'pi/2'", "correct it")),
     ("a turn of 1e308 rad", RPY, 'rpy="0 0 1e308"', ("<origin> rpy is 1e308, beyond ±1e+12", "correct it")),
     ("two limits", LIMIT, LIMIT + LIMIT, ("2 <limit> elements", "keep one")),
-    ("an infinite limit", 'upper="1"', 'upper="inf"', ("<limit> upper", "'inf'", "correct it")),
     ("a limit of nan", 'lower="-1"', 'lower="nan"', ("<limit> lower", "'nan'", "correct it")),
     ("limits exchanged", 'lower="-1"', 'lower="1.5"', ("lower limit 1.5", "above its upper 1", "exchange them")),
     ("a lower limit alone, above 0", LIMIT, '<limit lower="1"/>', ("lower limit 1", "above its upper 0", "exchange")),
-    ("negative effort", 'effort="9"', 'effort="-9"', ("<limit> effort", "-9", "below 0", "correct it")),
     ("negative velocity", 'velocity="2"', 'velocity="-2"', ("<limit> velocity", "-2", "below 0", "correct it")),
     ("negative damping", 'damping="0.1"', 'damping="-0.1"', ("damping", "-0.1", "below 0", "correct it")),
-    ("friction that is nan", 'friction="0.2"', 'friction="nan"', ("<dynamics> friction", "'nan'", "correct it")),
     ("damping of 1e200", 'damping="0.1"', 'damping="1e200"', ("<dynamics> damping is 1e200, beyond", "correct it")),
     ("two dynamics", LIMIT, LIMIT + "<dynamics/>", ("2 <dynamics> elements", "keep one")),
 )
@@ -88,15 +76,12 @@ KINDS = [
         Kind(f"a joint with {word}", altered(old, new), ("joint 'shoulder'", *said))
         for word, old, new, said in ON_JOINT
     ),
-    Kind("the largest mass", altered(MASS, '<mass value="1e12"/>'), upper=(1, 2)),
-    Kind("the longest arm", altered('xyz="0.4 0 0"', 'xyz="-1e12 0 0"'), upper=(1, 2)),
     Kind("the widest turn", altered(RPY, 'rpy="1e12 -1e12 1e12"'), upper=(1, 2)),
     Kind(
-        "the widest limits", altered(LIMIT, '<limit upper="1e300" effort="1e300" velocity="1e300"/>'), upper=(1e300, 2)
+        "the widest limits", altered(LIMIT, '<limit upper="1e300" effort="1e308"/>'), upper=(1e300, 2)
     ),
     Kind("a mass of 1e-320", altered(MASS, '<mass value="1e-320"/>'), upper=(1, 2)),
-    Kind("a mass of 1e-9999", altered(MASS, '<mass value="1e-9999"/>'), upper=(1, 2)),
     Kind("numbers in odd but sound spelling", altered(MASS, '<mass value=" +01.50E+0 "/>'), upper=(1, 2)),
     Kind("an axis over several lines", altered(AXIS, '<axis xyz="\n0\t0\n1 "/>'), upper=(1, 2)),
-    Kind("every number the largest", text(ARM.replace('="0.02"', '="1e12"').replace("0.4 0 0", "1e12 1e12 1e12"))),
+    Kind("every number the largest", text(LARGEST), upper=(1, 2)),
 ]
