@@ -17,6 +17,7 @@ from robot_dyn.lagrange.manipulator import Lagrangian
 from robot_dyn.model.robot import Robot
 
 Document = dict[str, Any]
+_WORDS = {"joint", "kind", "from", "quantity", "robot", "where"}  # columns of words; the others hold numbers
 
 
 def info(robot: Robot) -> Document:
@@ -111,7 +112,7 @@ def comparison(results: Sequence[tuple[str, Comparison]], refused: dict[str, str
 def info_tables(robot: Robot) -> Iterator[Any]:
     """`info` as text and a table."""
     document = info(robot)
-    yield f"{robot.name}: {robot.n} joints, {robot.total_mass:.4g} kg, gravity {_row(robot.edits.gravity)} m/s²"
+    yield f"{robot.name}: {robot.n} joints, {robot.total_mass:.4g} kg, gravity {robot.edits.gravity} m/s²"
     yield document["source"]
     table = _table("joint", "kind", "lower", "upper", "effort", "velocity", "damping", "dry friction", "armature")
     for joint in document["joints"]:
@@ -164,13 +165,11 @@ def comparison_tables(results: Sequence[tuple[str, Comparison]], refused: dict[s
         yield table
         yield from result.notes
     else:
-        table = _table("robot", "joints", "worst error", "allowed", "quantity", "where")
+        table = _table("robot", "n", "worst error", "allowed", "quantity", "where")
         for name, result in results:
             worst = result.worst
-            joints = str(len(worst.state["q"]))
-            table.add_row(
-                name, joints, _mark(result.ok, worst.error), f"{worst.tolerance:.1e}", worst.quantity, worst.entry
-            )
+            n, error, allowed = len(worst.state["q"]), _mark(result.ok, worst.error), f"{worst.tolerance:.1e}"
+            table.add_row(name, str(n), error, allowed, worst.quantity, worst.entry)
         yield table
         yield from (f"{name}: {note}" for name, result in results for note in result.notes if "forward" in note)
         yield from (f"{name} refused: {why}" for name, why in refused.items())
@@ -225,5 +224,5 @@ def _row(numbers: Sequence[float]) -> str:
 def _table(*headings: str) -> Table:
     table = Table(box=None, pad_edge=False, header_style="bold")
     for heading in headings:
-        table.add_column(heading, no_wrap=True)
+        table.add_column(heading, no_wrap=True, justify="left" if heading in _WORDS else "right")
     return table

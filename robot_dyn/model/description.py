@@ -105,29 +105,27 @@ def _parse(text: bytes, source: str) -> etree._Element:
                 if depth > MAX_DEPTH:
                     raise DescriptionError(
                         f"{source}: line {element.sourceline}: elements are nested deeper than {MAX_DEPTH};"
-                        " a URDF needs no more than 6 levels"
+                        " a URDF needs 6 levels at most: remove the others"
                     )
         root = parser.close()
     except etree.XMLSyntaxError as error:
-        raise DescriptionError(f"{source}: {_syntax(error, parser, text)}") from None
+        raise DescriptionError(f"{source}: {_syntax(error, parser)}") from None
     _refuse_document_type(root, source)
     return root
 
 
-def _syntax(error: etree.XMLSyntaxError, parser: etree.XMLPullParser, text: bytes) -> str:
+def _syntax(error: etree.XMLSyntaxError, parser: etree.XMLPullParser) -> str:
     """What is wrong with the XML, from the first complaint of the parser, and what to do."""
-    if not len(parser.error_log):  # it stops without a word at an entity that is not declared
-        entity = re.search(rb"&(?!(?:amp|lt|gt|quot|apos);)(\w{1,40});", text)
-        if entity:
-            return f"uses the entity &{entity[1].decode()};, which is not declared; write its text instead"
-        return f"is not well-formed XML: {shorten(' '.join(str(error.msg).split()), 200)}; correct the file"
-    first = parser.error_log[0]
-    why = shorten(" ".join(first.message.split()), 200)
+    log = parser.feed_error_log
+    message, line = (log[0].message, log[0].line) if len(log) else (str(error.msg), error.lineno or 1)
+    why = shorten(" ".join(message.split()), 200)
+    if entity := re.search(r"Entity '(.*?)' not defined", why):
+        return f"line {line}: uses the entity &{entity[1]};, which is not declared; write its text instead"
     if "XML_PARSE_HUGE" in why or "mplification" in why:
-        return f"line {first.line}: a text, the nesting or an entity exceeds the limits of the parser; remove it"
+        return f"line {line}: a text, the nesting or an entity exceeds the limits of the parser; remove it"
     if "xacro" in why:
-        return f"line {first.line}: holds xacro macros; expand the file first: xacro robot.xacro > robot.urdf"
-    return f"is not well-formed XML: line {first.line}: {why}; correct the file"
+        return f"line {line}: holds xacro macros; expand the file first: xacro robot.xacro > robot.urdf"
+    return f"is not well-formed XML: line {line}: {why}; correct the file"
 
 
 def _refuse_document_type(element: etree._Element, source: str) -> None:

@@ -66,14 +66,14 @@ def _unmark(model: Any) -> None:
             frame.name = frame.name.removeprefix(_MARK)
 
 
-def joint_ids(model: Any) -> dict[str, int]:
-    """Index of each joint by its name, which may be "universe" too."""
-    return {name.removeprefix(_MARK): i for i, name in enumerate(model.names) if i}
+def joint_ids(model: Any, mark: str = "") -> dict[str, int]:
+    """Index of each joint by its name, which may be "universe" too; `mark` is taken off."""
+    return {name.removeprefix(mark): i for i, name in enumerate(model.names) if i}
 
 
 def _apply(edits: Edits, model: Any) -> None:
     model.gravity = pin.Motion(np.array(edits.gravity), np.zeros(3))
-    ids = joint_ids(model)
+    ids = joint_ids(model, _MARK)
     for name, value in edits.armature:
         model.armature[model.idx_vs[ids[name]]] = value
     links = link_frames(model)
@@ -88,14 +88,14 @@ def _apply(edits: Edits, model: Any) -> None:
 def _locked(model: Any, edits: Edits, mimics: dict[str, Mimic]) -> Any:
     """The model without the joints that are held, and without those that follow a held joint."""
     values = dict(edits.lock)
-    q, held = np.zeros(model.nq), []
-    for name, index in joint_ids(model).items():
+    q, held, ids = np.zeros(model.nq), [], joint_ids(model, _MARK)
+    for name, index in ids.items():
         source, ratio, offset = resolve(name, mimics, FLOAT64)
         if source in values:
             held.append(index)
             q[model.idx_qs[index]] = ratio * values[source] + offset
     if len(held) == model.nv:
-        raise EditError(f"lock: no joint is left to move, of {', '.join(joint_ids(model))}")
+        raise EditError(f"lock: no joint is left to move, of {', '.join(ids)}")
     return pin.buildReducedModel(model, held, q) if held else model
 
 

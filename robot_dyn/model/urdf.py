@@ -52,6 +52,12 @@ def checked_robot(robot: etree._Element, source: str) -> etree._Element:
     return out
 
 
+def _loop(names: list[str]) -> str:
+    """Names along a loop, the first again at the end; long ones cut in between."""
+    shown = names if len(names) <= 8 else [*names[:6], "…", names[-1]]
+    return " → ".join(shorten(name) for name in shown)
+
+
 class _Check:
     """Copies elements while checking them; every refusal names the file and the link or joint."""
 
@@ -146,7 +152,8 @@ class _Check:
         if kind in ("floating", "planar"):
             self.refuse(where, f"is {kind}; only joints of one degree of freedom are taken: {', '.join(MOVING)}, fixed")
         if kind not in (*MOVING, "fixed"):
-            self.refuse(where, f"has the unknown type {shorten(kind)!r}; write one of {', '.join(MOVING)}, fixed")
+            what = f"has the unknown type {shorten(kind)!r}" if kind else "has no type"
+            self.refuse(where, f"{what}; write one of {', '.join(MOVING)}, fixed")
         out = etree.SubElement(robot, "joint", name=name, type=str(kind))
         self.origin(joint, out, where)
         for role in ("parent", "child"):
@@ -215,8 +222,8 @@ class _Check:
             path: list[str] = []
             while link not in reached:
                 if link in path:
-                    listed = " → ".join([*path[path.index(link) :], link][:8])
-                    self.refuse(f"link {link!r}", f"is its own ancestor: {listed}; remove one joint of the loop")
+                    loop = _loop([*path[path.index(link) :], link])
+                    self.refuse(f"link {link!r}", f"is its own ancestor: {loop}; remove one joint of the loop")
                 path.append(link)
                 link = parent_of[link]
             reached.update(path)
@@ -237,8 +244,7 @@ class _Check:
                 ratio *= float(ties[name].get("multiplier"))
                 source = ties[name].get("joint")
                 if source in chain:
-                    listed = " → ".join([*list(chain)[:8], source])
-                    self.refuse(f"joint {follower!r}", f"mimics itself: {listed}; remove one <mimic>")
+                    self.refuse(f"joint {follower!r}", f"mimics itself: {_loop([*chain, source])}; remove one <mimic>")
+                if abs(ratio) > LARGEST:
+                    self.refuse(f"joint {follower!r}", f"its chain of mimics multiplies by {ratio:g}; correct one")
                 chain[source] = None
-            if abs(ratio) > LARGEST:
-                self.refuse(f"joint {follower!r}", f"its chain of mimics multiplies by {ratio:g}; correct a multiplier")

@@ -57,7 +57,11 @@ KINDS = [
         beside(lambda secret: doctype(f'[<!ENTITY % x SYSTEM "{secret.as_uri()}"> %x;]')),
         NO_DOCTYPE,
     ),
-    Kind("a parameter entity that holds itself", text(doctype('[<!ENTITY % x "&#37;x;"> %x;]')), ("line 1", "entity reference loop", "correct the file")),
+    Kind(
+        "a parameter entity that holds itself",
+        text(doctype('[<!ENTITY % x "&#37;x;"> %x;]')),
+        ("line 1", "entity reference loop", "correct the file"),
+    ),
     Kind(
         "an inclusion of another file",
         beside(

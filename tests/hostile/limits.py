@@ -49,7 +49,7 @@ KINDS = [
     Kind(
         "an attribute of 12 MiB",
         text(lambda: inside(f"<link name='{'x' * (12 << 20)}'/>")),
-        ("line 28", "a text", "exceeds the limits of the parser", "remove it"),
+        ("line 29", "a text", "exceeds the limits of the parser", "remove it"),
     ),
     Kind("a link name of 8 MiB", text(lambda: inside(f"<link name='{LONG}'/>")), ("link: rename 'xxxx", "256 char")),
     Kind(
@@ -85,6 +85,11 @@ KINDS = [
         text(alike),
         ("joint 'j'", "parent link 'c", "not defined"),
     ),
+    Kind(
+        "1000 links in a cycle",
+        text(lambda: chain(999, 999).replace("</robot>", joint("back", "l999", "l0") + "</robot>")),
+        ("link 'l0'", "own ancestor: l0 → l999", "→ …", "→ l0; remove one joint"),
+    ),
     Kind("1001 joints", text(lambda: chain(1001, 1)), ("robot: has 1001 joints", "at most 1000 are taken", "split it")),
     Kind("1000 joints in a chain", text(lambda: chain(1000, 1))),
     Kind("1000 joints in a chain, backwards", text(lambda: backwards(chain(1000, 1)))),
@@ -105,6 +110,6 @@ KINDS = [
     Kind(
         "1000 joints, following in a circle",
         text(lambda: chain(1000, 1000, lambda i: f'<mimic joint="j{(i - 1) % 1000}"/>')),
-        ("joint 'j0'", "mimics itself", "j0 → j999", "remove one <mimic>"),
+        ("joint 'j0'", "mimics itself", "j0 → j999", "→ …", "→ j0; remove one <mimic>"),
     ),
 ]

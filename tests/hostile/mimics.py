@@ -57,7 +57,11 @@ KINDS = [
         following(("1e7", "1e7")),
         ("joint 'j2'", "chain of mimics multiplies by 1e+14", "correct a multiplier"),
     ),
-    Kind("multipliers without end after a zero", following(("0", *["1e12"] * 30))),
+    Kind(
+        "multipliers whose product overflows but for a zero at its end",
+        following(("0", *["1e12"] * 30)),
+        ("chain of mimics multiplies by", "correct a multiplier"),
+    ),
     Kind(
         "offsets that grow along a chain whose multipliers cancel out",
         following(("1e-12",) * 14 + ("1e12",) * 14, ("1e12",) * 28),

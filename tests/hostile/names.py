@@ -7,9 +7,7 @@ from tests.hostile.kinds import ARM, Kind, altered, text, welded
 RENAME = ("rename", "control characters, or more than 256 characters")
 KINDS = [
     Kind("a line break in a name", altered('<link name="base"/>', '<link name="ba&#10;se"/>'), (r"'ba\nse'", *RENAME)),
-    Kind(
-        "a terminal command in a name", altered('"elbow"', '"&#x9b;2Jelbow"'), (r"\x9b2J", "joint", *RENAME)
-    ),
+    Kind("a terminal command in a name", altered('"elbow"', '"&#x9b;2Jelbow"'), (r"\x9b2J", "joint", *RENAME)),
     Kind("a change of writing direction in a name", altered('"arm"', '"a&#x202e;mr"'), (r"\u202e", "robot", *RENAME)),
     Kind("a name of 257 letters", altered('"arm"', f'"{"a" * 257}"'), ("robot", "'aaaa", *RENAME)),
     Kind(

@@ -13,7 +13,7 @@ NOT_OWN = (
 )
 MESH = """<link name="base"><visual><geometry><mesh filename="package://../../nowhere.dae" scale="nan"/></geometry>
   <material name="unknown"/></visual><collision><geometry><cylinder radius="-1"/></geometry></collision></link>"""
-STUCK = ("SingularError", "joint 'wrist' carries no inertia", "give its link a mass, or lock it")
+STUCK = ("SingularError", "joint 'wrist' carries no inertia", "give its link a mass", "lock it")
 KINDS = [
     Kind("the sound arm", text(ARM), upper=(1, 2)),
     Kind("a revolute joint without limit", altered(LIMIT, ""), upper=(inf, 2)),

@@ -65,7 +65,7 @@ KINDS = [
 ] + [
     Kind(f"a joint of {word}", altered(ELBOW, f'<joint name="elbow"{kind}>'), ("joint 'elbow'", *said, "revolute"))
     for word, kind, said in (
-        ("no type", "", ("unknown type", "write one of")),
+        ("no type", "", ("has no type", "write one of")),
         ("unknown type", ' type="hinge"', ("unknown type 'hinge'", "write one of")),
         ("type floating", ' type="floating"', ("is floating", "only joints of one degree of freedom")),
         ("type planar", ' type="planar"', ("is planar", "only joints of one degree of freedom")),

@@ -7,7 +7,7 @@ import gzip
 
 from tests.hostile.kinds import ARM, CHILD, MASS, Kind, altered, inside, text
 
-NOT_XML = ("is not well-formed XML: line ", "correct the file")
+NOT_XML = ("is not well-formed XML: ", "line ", "correct the file")
 XML_16 = '<?xml version="1.0" encoding="UTF-16"?>'
 KINDS = [
     Kind("nothing", text(""), ("is empty", "give a URDF file")),
