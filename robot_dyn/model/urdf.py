@@ -239,12 +239,12 @@ class _Check:
             if kinds[source] == "fixed":
                 self.refuse(where, f"mimics {source!r}, which is fixed and never moves; make {follower!r} fixed too")
         for follower in ties:
-            chain, ratio = {follower: None}, 1.0  # a dict, for its order and its quick look-up
+            where, chain, ratio = f"joint {follower!r}", {follower: None}, 1.0  # a dict: ordered, quick to look up
             while (name := next(reversed(chain))) in ties:
                 ratio *= float(ties[name].get("multiplier"))
                 source = ties[name].get("joint")
                 if source in chain:
-                    self.refuse(f"joint {follower!r}", f"mimics itself: {_loop([*chain, source])}; remove one <mimic>")
+                    self.refuse(where, f"mimics itself: {_loop([*chain, source])}; remove one <mimic>")
                 if abs(ratio) > LARGEST:
-                    self.refuse(f"joint {follower!r}", f"its chain of mimics multiplies by {ratio:g}; correct one")
+                    self.refuse(where, f"its chain of mimics multiplies by {ratio:g}; correct a multiplier")
                 chain[source] = None
