@@ -11,11 +11,34 @@ if TYPE_CHECKING:
     from robot_dyn.arithmetic import Ball as Ball
     from robot_dyn.arithmetic import midpoint as midpoint
     from robot_dyn.arithmetic import radius as radius
+    from robot_dyn.control.cartesian import circle as circle
+    from robot_dyn.control.cartesian import line as line
+    from robot_dyn.control.computed_torque import ComputedTorque as ComputedTorque
+    from robot_dyn.control.computed_torque import FeedForward as FeedForward
+    from robot_dyn.control.computed_torque import PDGravity as PDGravity
+    from robot_dyn.control.independent_joint import PD as PD
+    from robot_dyn.control.independent_joint import PID as PID
+    from robot_dyn.control.independent_joint import gains_from as gains_from
+    from robot_dyn.control.operational_space import OperationalSpace as OperationalSpace
+    from robot_dyn.control.operational_space import task_dynamics as task_dynamics
+    from robot_dyn.control.reference import PiecewisePolynomial as PiecewisePolynomial
+    from robot_dyn.control.reference import hold as hold
+    from robot_dyn.control.reference import quintic as quintic
+    from robot_dyn.control.reference import via_points as via_points
+    from robot_dyn.effects.actuator import EffortLimit as EffortLimit
     from robot_dyn.effects.friction import RegularisedCoulombFriction as RegularisedCoulombFriction
     from robot_dyn.effects.friction import ViscousFriction as ViscousFriction
+    from robot_dyn.effects.joint_limit import JointStopDamper as JointStopDamper
+    from robot_dyn.effects.joint_limit import JointStopSpring as JointStopSpring
+    from robot_dyn.effects.joint_limit import joint_stops as joint_stops
     from robot_dyn.effects.plant import Plant as Plant
+    from robot_dyn.effects.spring import Spring as Spring
+    from robot_dyn.effects.wrench import ExternalWrench as ExternalWrench
     from robot_dyn.errors import ModelWarning as ModelWarning
     from robot_dyn.errors import RobotDynError as RobotDynError
+    from robot_dyn.integrate.adaptive import Adaptive as Adaptive
+    from robot_dyn.integrate.methods import method as method
+    from robot_dyn.lagrange.euler_lagrange import euler_lagrange as euler_lagrange
     from robot_dyn.lagrange.manipulator import Lagrangian as Lagrangian
     from robot_dyn.model.catalog import list_robots as list_robots
     from robot_dyn.model.dynamics import Dynamics as Dynamics
@@ -23,26 +46,63 @@ if TYPE_CHECKING:
     from robot_dyn.model.edits import Payload as Payload
     from robot_dyn.model.loading import load as load
     from robot_dyn.model.robot import Robot as Robot
+    from robot_dyn.scene.scene import read_scene as read_scene
+    from robot_dyn.simulation.linearise import linearise as linearise
+    from robot_dyn.simulation.run_file import load_run as load_run
+    from robot_dyn.simulation.run_file import save_run as save_run
+    from robot_dyn.simulation.setup import Setup as Setup
+    from robot_dyn.simulation.simulate import simulate as simulate
+    from robot_dyn.simulation.trajectory import Trajectory as Trajectory
 
 # Public names and where they live; imported when first used, so that `import robot_dyn` stays light (PEP 562).
 _HOME = {
+    "Adaptive": "integrate.adaptive",
     "Ball": "arithmetic",
     "Comparison": "accuracy.compare",
+    "ComputedTorque": "control.computed_torque",
     "Dynamics": "model.dynamics",
+    "EffortLimit": "effects.actuator",
+    "ExternalWrench": "effects.wrench",
+    "FeedForward": "control.computed_torque",
+    "JointStopDamper": "effects.joint_limit",
+    "JointStopSpring": "effects.joint_limit",
     "Lagrangian": "lagrange.manipulator",
     "ModelWarning": "errors",
+    "OperationalSpace": "control.operational_space",
+    "PD": "control.independent_joint",
+    "PDGravity": "control.computed_torque",
+    "PID": "control.independent_joint",
     "Payload": "model.edits",
+    "PiecewisePolynomial": "control.reference",
     "Plant": "effects.plant",
     "RegularisedCoulombFriction": "effects.friction",
     "Robot": "model.robot",
     "RobotDynError": "errors",
     "STANDARD_GRAVITY": "model.edits",
+    "Setup": "simulation.setup",
+    "Spring": "effects.spring",
+    "Trajectory": "simulation.trajectory",
     "ViscousFriction": "effects.friction",
+    "circle": "control.cartesian",
     "compare": "accuracy.compare",
+    "euler_lagrange": "lagrange.euler_lagrange",
+    "gains_from": "control.independent_joint",
+    "hold": "control.reference",
+    "joint_stops": "effects.joint_limit",
+    "line": "control.cartesian",
+    "linearise": "simulation.linearise",
     "list_robots": "model.catalog",
     "load": "model.loading",
+    "load_run": "simulation.run_file",
+    "method": "integrate.methods",
     "midpoint": "arithmetic",
+    "quintic": "control.reference",
     "radius": "arithmetic",
+    "read_scene": "scene.scene",
+    "save_run": "simulation.run_file",
+    "simulate": "simulation.simulate",
+    "task_dynamics": "control.operational_space",
+    "via_points": "control.reference",
 }
 
 __all__ = sorted(_HOME)  # pyright: ignore[reportUnsupportedDunderAll]

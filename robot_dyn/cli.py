@@ -5,16 +5,15 @@ from __future__ import annotations
 import json
 import sys
 import warnings
-from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Annotated, Any
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from typing import Annotated, Any
 
 import typer
 
 import robot_dyn as rd
-from robot_dyn.errors import ModelWarning, QueryError, RobotDynError, nearest
-
-if TYPE_CHECKING:
-    import numpy as np
+from robot_dyn import arguments
+from robot_dyn.errors import ModelWarning, QueryError, RobotDynError
 
 app = typer.Typer(
     name="robot-dyn",
@@ -47,7 +46,7 @@ def info(robot: Name, lock: Lock = None, package_dir: PackageDir = None, as_json
     """Show a robot: joints, limits, friction, mass, and what is odd about it."""
     from robot_dyn import report
 
-    loaded = _load(robot, lock, package_dir)
+    loaded = arguments.load(robot, lock, package_dir)
     _print_json(report.info(loaded)) if as_json else _show(report.info_tables(loaded))
 
 
@@ -69,12 +68,12 @@ def query(
     """Ask for M, C, N at a state, and for the torque of an acceleration or the acceleration of a torque."""
     from robot_dyn import report
 
-    loaded = _load(robot, lock, package_dir)
+    loaded = arguments.load(robot, lock, package_dir)
     if a is not None and tau is not None:
         raise QueryError("give --a or --tau, not both: one follows from the other")
-    state = {name: _vector(f"--{name}", text, loaded.joint_names) for name, text in (("q", q), ("v", v))}
-    given = None if tau is None else _vector("--tau", tau, loaded.joint_names)
-    answer = report.query(loaded, effects or "", **state, a=_vector("--a", a, loaded.joint_names), tau=given)
+    state = {name: arguments.vector(f"--{name}", text, loaded.joint_names) for name, text in (("q", q), ("v", v))}
+    given = None if tau is None else arguments.vector("--tau", tau, loaded.joint_names)
+    answer = report.query(loaded, effects or "", **state, a=arguments.vector("--a", a, loaded.joint_names), tau=given)
     if why is not None:
         answer |= report.why(loaded, answer, why)
     _print_json(answer) if as_json else _show(report.query_tables(answer))
@@ -98,7 +97,9 @@ def compare(
     results, refused = [], {}
     for name in _progress(rd.list_robots() if every else robots or (), "comparing"):
         try:
-            results.append((name, rd.compare(_load(name, lock, package_dir, quiet=every), samples=samples, seed=seed)))
+            results.append(
+                (name, rd.compare(arguments.load(name, lock, package_dir, quiet=every), samples=samples, seed=seed))
+            )
         except RobotDynError as error:
             if not every:
                 raise
@@ -106,6 +107,47 @@ def compare(
     _print_json(report.comparison(results, refused)) if as_json else _show(report.comparison_tables(results, refused))
     if not all(result.ok for _, result in results):
         raise typer.Exit(1)
+
+
+@app.command()
+def simulate(
+    scene: Annotated[str, typer.Argument(metavar="SCENE.toml", help="A scene file; `robot-dyn scene` prints some.")],
+    output: Annotated[str | None, typer.Option("-o", "--output", metavar="RUN.npz", help="Keep the run.")] = None,
+    csv: Annotated[str | None, typer.Option(metavar="TABLE.csv", help="Write the samples as a table.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Run a scene; exit code 1 if it diverges. Ctrl-C ends the run and keeps its samples."""
+    from robot_dyn import report
+    from robot_dyn.simulation.run_file import export_csv
+
+    setup = rd.read_scene(scene)
+    with _bar(setup.duration_s) as advance:
+        run = rd.simulate(setup, on_progress=advance)
+    _print_json(report.run(run)) if as_json else print(run.summary)
+    for path in (output and rd.save_run(run, output), csv and export_csv(run, csv)):
+        if path:
+            print(f"written: {path}", file=sys.stderr)
+    if run.outcome.ending != "finished":
+        raise typer.Exit(130 if run.outcome.ending == "stopped" else 1)
+
+
+@app.command()
+def explain(scene: Annotated[str, typer.Argument(metavar="SCENE.toml", help="A scene file.")]) -> None:
+    """Say what a scene integrates: each term, what is not simulated, and where every number came from."""
+    from robot_dyn.scene.explain import explain as lines
+    from robot_dyn.scene.scene import read_both
+
+    print("\n".join(lines(*read_both(scene))))
+
+
+@app.command()
+def scene(
+    name: Annotated[str | None, typer.Argument(metavar="NAME", help="Name of a starter; none lists them.")] = None,
+) -> None:
+    """Print a scene file to start from."""
+    from robot_dyn.scene.starters import starter, starters
+
+    print(starter(name) if name else "\n".join(starters()), end="" if name else "\n")
 
 
 @app.command()
@@ -134,53 +176,6 @@ def main() -> None:
             sys.exit(0)
 
 
-def _load(name: str, lock: list[str] | None, package_dirs: list[str] | None, quiet: bool = False) -> rd.Robot:
-    with warnings.catch_warnings():
-        if quiet:
-            warnings.simplefilter("ignore", ModelWarning)
-        robot = rd.load(name, package_dirs=package_dirs or ())
-    return robot.with_(lock=_assignments("--lock", lock)) if lock else robot
-
-
-def _assignments(option: str, texts: list[str]) -> dict[str, float]:
-    pairs = [_assignment(option, text) for text in texts]
-    values = dict(pairs)
-    if len(values) < len(pairs):
-        raise QueryError(f"{option} names a joint twice: {', '.join(texts)}")
-    return values
-
-
-def _assignment(option: str, text: str) -> tuple[str, float]:
-    name, equals, value = text.partition("=")
-    if not equals:
-        raise QueryError(f"{option} must be JOINT=VALUE, got {text!r}")
-    return name.strip(), _number(option, value)
-
-
-def _number(option: str, text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise QueryError(f"{option}: {text.strip()!r} is not a number") from None
-
-
-def _vector(option: str, text: str | None, joint_names: tuple[str, ...]) -> np.ndarray:
-    """Numbers separated by commas or blanks, one for each joint; or joint=value pairs, 0 elsewhere."""
-    import numpy as np
-
-    words = (text or "").replace(",", " ").split()
-    if any("=" in word for word in words):
-        values = _assignments(option, words)
-        for name in values.keys() - set(joint_names):
-            raise QueryError(f"{option}: no joint {name!r}; {nearest(name, joint_names)}")
-        return np.array([values.get(name, 0.0) for name in joint_names])
-    if text is None:
-        return np.zeros(len(joint_names))
-    if len(words) != len(joint_names):
-        raise QueryError(f"{option} needs {len(joint_names)} numbers, got {len(words)}: {', '.join(joint_names)}")
-    return np.array([_number(option, word) for word in words])
-
-
 def _show(renderables: Iterable[Any]) -> None:
     from rich.console import Console
 
@@ -199,6 +194,17 @@ def _progress(items: Iterable[str], description: str) -> Iterator[str]:
     return iter(
         track(items, description, console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty())
     )
+
+
+@contextmanager
+def _bar(duration_s: float) -> Iterator[Callable[[float], object]]:
+    """A progress bar on stderr while a person watches; what it gives is called with the time reached."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    with Progress(console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty()) as progress:
+        task = progress.add_task("simulating", total=duration_s)
+        yield lambda t: progress.update(task, completed=t)
 
 
 def _print_json(value: Any) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import asdict
 from math import isfinite
 from typing import Any
 
@@ -15,6 +16,7 @@ from robot_dyn.errors import QueryError, nearest
 from robot_dyn.lagrange.breakdown import torque_breakdown
 from robot_dyn.lagrange.manipulator import Lagrangian
 from robot_dyn.model.robot import Robot
+from robot_dyn.simulation.trajectory import Trajectory
 
 Document = dict[str, Any]
 _WORDS = {"joint", "kind", "from", "quantity", "robot", "where"}  # columns of words; the others hold numbers
@@ -50,7 +52,7 @@ def query(robot: Robot, effects: str, q: np.ndarray, v: np.ndarray, a: np.ndarra
         tau = plant.inverse_dynamics(0.0, q, v, a)
     else:
         a = plant.forward_dynamics(0.0, q, v, tau)
-    acting = {type(e).__name__: e.torque(robot, 0.0, q, v).tolist() for e in plant.effects}
+    acting = {type(e).__name__: e.torque(robot, 0.0, q, v).tolist() for e in plant.forces}
     terms = {"M": plant.M(q), "C": plant.C(q, v), "N": plant.N(0.0, q, v)}
     state = {"q": q, "v": v, "a": a, "tau": tau}
     return {
@@ -104,6 +106,27 @@ def comparison(results: Sequence[tuple[str, Comparison]], refused: dict[str, str
         for name, result in results
     }
     return {"ok": all(result.ok for _, result in results), "robots": robots, "refused": refused}
+
+
+def run(trajectory: Trajectory) -> Document:
+    """How a run ended, what it took and how far to trust it; samples are in its run file."""
+    error, outcome = trajectory.error, trajectory.outcome
+    return {
+        "ending": str(outcome.ending),
+        "t": outcome.t,
+        "advice": outcome.advice,
+        "samples": len(trajectory.t),
+        "joints": list(trajectory.joint_names),
+        "q": trajectory.q[-1].tolist(),
+        "v": trajectory.v[-1].tolist(),
+        "work": {name: float(work[-1]) for name, work in trajectory.ledger.work.items()},
+        "ledger_residual": float(np.nanmax(np.abs(trajectory.ledger.residual))),
+        "ledger_closure": trajectory.ledger.closure,
+        "error": None if error is None else _finite(error.final),
+        "error_resolved_until": None if error is None else error.resolved_until,
+        "tracking_error": trajectory.tracking_error,
+        "statistics": asdict(trajectory.statistics),
+    }
 
 
 # --- the same for a person
@@ -186,8 +209,7 @@ def comparison_tables(results: Sequence[tuple[str, Comparison]], refused: dict[s
 def demo_tables(robot: Robot) -> Iterator[Any]:
     """A robot, its dynamics at a general state, and the cross-check."""
     yield from info_tables(robot)
-    rng = np.random.default_rng(7)
-    q, v, a = np.round(rng.uniform(-1, 1, (3, robot.n)), 2)
+    q, v, a = np.round(np.random.default_rng(7).uniform(-1, 1, (3, robot.n)), 2)
     yield "\nM(q) a + C(q, v) v + N(q) = tau at a general state\n"
     yield from query_tables(query(robot, "", q, v, a, None))
     yield ""

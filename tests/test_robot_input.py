@@ -1,8 +1,7 @@
-"""What a robot takes: one state or a batch, in any form of real numbers; anything else is refused by name."""
+"""What a robot takes: real numbers in any form; anything else is refused by name."""
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -11,89 +10,15 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import robot_dyn as rd
 from robot_dyn.errors import QueryError
+from tests.queries import ARGUMENTS, FRAMED, arguments_of, ask
 
-ROBOTS = ("pendulum", "ur5", "panda", "skew_tree")  # one joint, six, tied fingers, a tree with a slide
-ARGUMENTS = {
-    "M": ("q",),
-    "C": ("q", "v"),
-    "N": ("q",),
-    "coriolis_torque": ("q", "v"),
-    "coriolis_transpose": ("q", "v"),
-    "inverse_dynamics": ("q", "v", "a"),
-    "forward_dynamics": ("q", "v", "tau"),
-    "kinetic_energy": ("q", "v"),
-    "potential_energy": ("q",),
-    "momentum": ("q", "v"),
-    "placement": ("q",),
-    "jacobian": ("q",),
-    "jacobian_rate": ("q", "v"),
-}
-FRAMED = ("placement", "jacobian", "jacobian_rate")
-SEVERAL = [method for method, names in ARGUMENTS.items() if len(names) > 1]
-
-every_robot = pytest.mark.parametrize("name", ROBOTS)
+every_robot = pytest.mark.parametrize("name", ("pendulum", "ur5", "panda", "skew_tree"))
 every_method = pytest.mark.parametrize("method", ARGUMENTS)
-
-
-def general(n: int, method: str, seed: int = 0, batch: tuple[int, ...] = ()) -> list[np.ndarray]:
-    """General arguments of a method: no zeros, no symmetries."""
-    return list(np.random.default_rng(seed).uniform(0.1, 1.2, (len(ARGUMENTS[method]), *batch, n)))
-
-
-def ask(robot: rd.Robot, method: str, *arguments: Any) -> Any:
-    frame = [robot.frame_names[-1]] if method in FRAMED else []
-    return getattr(robot, method)(*arguments, *frame)
 
 
 def assert_close(actual: Any, expected: Any, case: str = "") -> None:
     """Equal but for the order of sums in products of matrices, 1e-13 of the largest entry."""
     assert_allclose(actual, expected, rtol=0, atol=1e-13 * np.max(np.abs(expected), initial=0), err_msg=case)
-
-
-# --- batches
-
-
-@every_method
-@every_robot
-def test_batch_is_one_state_at_a_time(name: str, method: str):
-    robot = rd.load(name)
-    arguments = general(robot.n, method, 1, (2, 3))
-    answer = ask(robot, method, *arguments)
-    for i in np.ndindex(2, 3):
-        assert_close(answer[i], ask(robot, method, *(x[i] for x in arguments)))
-
-
-@every_method
-@every_robot
-def test_empty_batch_has_the_shape_of_its_answer(name: str, method: str):
-    robot = rd.load(name)
-    shape = np.shape(ask(robot, method, *general(robot.n, method)))
-    for batch in ((0,), (2, 0), (0, 3)):
-        answer = ask(robot, method, *general(robot.n, method, 2, batch))
-        assert answer.shape == batch + shape and answer.dtype == np.float64
-
-
-@pytest.mark.parametrize("method", SEVERAL)
-@every_robot
-def test_arguments_broadcast(name: str, method: str):
-    robot = rd.load(name)
-    one, many = general(robot.n, method, 3), general(robot.n, method, 4, (5,))
-    for single in range(len(one)):  # this one (n,), the others (5, n)
-        mixed = [x if i == single else y for i, (x, y) in enumerate(zip(one, many, strict=True))]
-        full = [np.broadcast_to(x, (5, robot.n)) for x in mixed]
-        assert_close(ask(robot, method, *mixed), ask(robot, method, *full))
-    assert ask(robot, method, one[0], *(x[:, None] for x in many[1:])).shape[:2] == (5, 1)
-
-
-@pytest.mark.parametrize("method", SEVERAL)
-@every_robot
-def test_batches_that_do_not_match_are_refused(name: str, method: str):
-    robot = rd.load(name)
-    for odd in range(len(ARGUMENTS[method])):
-        arguments = general(robot.n, method, 5, (2,))
-        arguments[odd] = general(robot.n, method, 5, (3,))[odd]
-        with pytest.raises(QueryError, match="batch axes do not match"):
-            ask(robot, method, *arguments)
 
 
 # --- forms of numbers
@@ -124,7 +49,7 @@ def forms(x: np.ndarray) -> dict[str, Any]:
 @every_robot
 def test_form_of_the_numbers_does_not_matter(name: str, method: str):
     robot = rd.load(name)
-    arguments = [np.float64(np.float32(x)) for x in general(robot.n, method, 6)]
+    arguments = [np.float64(np.float32(x)) for x in arguments_of(method, robot.n, 6)]
     expected = ask(robot, method, *arguments)
     for form in forms(arguments[0]):
         answer = ask(robot, method, *(forms(x)[form] for x in arguments))
@@ -141,7 +66,7 @@ def test_form_of_the_numbers_does_not_matter(name: str, method: str):
 @every_robot
 def test_batch_in_another_memory_order(name: str, method: str):
     robot = rd.load(name)
-    arguments = general(robot.n, method, 7, (4,))
+    arguments = arguments_of(method, robot.n, 7, (4,))
     for form in (np.asfortranarray, np.ndarray.tolist, lambda x: x.astype(">f8"), lambda x: x[::-1].copy()[::-1]):
         assert_close(ask(robot, method, *map(form, arguments)), ask(robot, method, *arguments))
 
@@ -151,25 +76,19 @@ def test_batch_in_another_memory_order(name: str, method: str):
 def test_inputs_are_kept_and_outputs_are_fresh(name: str, method: str):
     robot = rd.load(name)
     for batch in ((), (2,)):
-        arguments = general(robot.n, method, 8, batch)
+        arguments = arguments_of(method, robot.n, 8, batch)
         copies = [x.copy() for x in arguments]
         answer = np.asarray(ask(robot, method, *arguments))
         expected = answer.copy()
-        others = ask(robot, method, *general(robot.n, method, 9, batch))
+        others = ask(robot, method, *arguments_of(method, robot.n, 9, batch))
         assert_array_equal(answer, expected)  # a later query leaves it alone
         if answer.ndim:
             answer[...] = 7.0
         assert_array_equal(ask(robot, method, *arguments), expected)
-        assert_array_equal(ask(robot, method, *general(robot.n, method, 9, batch)), others)
+        assert_array_equal(ask(robot, method, *arguments_of(method, robot.n, 9, batch)), others)
         for x, copy in zip(arguments, copies, strict=True):
             assert not np.shares_memory(x, answer)
             assert_array_equal(x, copy)
-
-
-def test_one_state_gives_plain_floats_for_energies():
-    robot = rd.load("panda")
-    q, v = general(robot.n, "C")
-    assert type(robot.kinetic_energy(q, v)) is float and type(robot.potential_energy(q)) is float
 
 
 # --- what is refused
@@ -206,7 +125,7 @@ def wrongs(x: np.ndarray) -> list[Any]:
 @every_robot
 def test_what_is_no_array_of_n_numbers_is_refused(name: str, method: str):
     robot = rd.load(name)
-    arguments = general(robot.n, method, 10)
+    arguments = arguments_of(method, robot.n, 10)
     for i, argument in enumerate(ARGUMENTS[method]):
         for wrong in wrongs(arguments[i]):
             with pytest.raises(QueryError, match=rf"^{argument} must (be|have) .*\b{robot.n}\b"):
@@ -218,7 +137,7 @@ def test_what_is_no_array_of_n_numbers_is_refused(name: str, method: str):
 @every_robot
 def test_value_that_is_not_finite_is_refused_by_its_joint(name: str, method: str, value: float):
     robot = rd.load(name)
-    arguments = general(robot.n, method, 11)
+    arguments = arguments_of(method, robot.n, 11)
     for i, argument in enumerate(ARGUMENTS[method]):
         for j, joint in enumerate(robot.joint_names):
             bad = arguments[i].copy()
@@ -241,7 +160,7 @@ def test_number_beyond_float64_is_refused_as_not_finite():
 def test_unknown_frame_is_refused_with_the_nearest(method: str, frame: Any):
     robot = rd.load("ur5")
     with pytest.raises(QueryError, match=r"no frame .*; (nearest: tool0|known: world, base_link)"):
-        getattr(robot, method)(*general(robot.n, method), frame)
+        getattr(robot, method)(*arguments_of(method, robot.n), frame)
 
 
 @pytest.mark.parametrize("axes", ["wrld", "local", "WORLD", "", None, 3, ["world"]])
@@ -249,23 +168,4 @@ def test_unknown_frame_is_refused_with_the_nearest(method: str, frame: Any):
 def test_unknown_axes_are_refused(method: str, axes: Any):
     robot = rd.load("ur5")
     with pytest.raises(QueryError, match=r"expressed_in=.*world"):
-        getattr(robot, method)(*general(robot.n, method), "tool0", expressed_in=axes)
-
-
-# --- threads
-
-
-@pytest.mark.parametrize("name", ["ur5", "panda"])
-def test_threads_that_share_a_robot_get_the_serial_answers(name: str):
-    robot = rd.load(name)
-    jobs = [(method, general(robot.n, method, seed)) for seed in range(60) for method in ARGUMENTS]
-
-    def answer(job: tuple[str, list[np.ndarray]]) -> Any:
-        return ask(robot, job[0], *job[1])
-
-    fresh = rd.load(name)  # so that nothing of `robot` is cached yet
-    serial = [ask(fresh, method, *arguments) for method, arguments in jobs]
-    with ThreadPoolExecutor(8) as pool:
-        parallel = list(pool.map(answer, jobs * 3))
-    for actual, expected in zip(parallel, serial * 3, strict=True):
-        assert_array_equal(actual, expected)
+        getattr(robot, method)(*arguments_of(method, robot.n), "tool0", expressed_in=axes)

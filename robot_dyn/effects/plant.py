@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, final
 
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.effects.effect import Effect
+from robot_dyn.effects.effect import Bound, Effect, Force
 from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFriction
 from robot_dyn.errors import EffectError, QueryError
 from robot_dyn.model.dynamics import Dynamics
@@ -43,7 +44,19 @@ class Plant:
             raise EffectError(f"effects must be several, such as [rd.ViscousFriction(0.1)], got {effects!r}") from None
         for effect in self.effects:
             if not isinstance(effect, Effect):
-                raise EffectError(f"{effect!r} is no Effect; subclass Conservative, Dissipative or Active")
+                raise EffectError(f"{effect!r} is no Effect; subclass Conservative, Dissipative, Active or Bound")
+
+    @cached_property
+    def forces(self) -> tuple[Force, ...]:
+        """The effects that are torques."""
+        return tuple(effect for effect in self.effects if isinstance(effect, Force))
+
+    def actuation(self, u: Array) -> Array:
+        """What the bounds among the effects leave of the actuation u, (..., n)."""
+        for effect in self.effects:
+            if isinstance(effect, Bound):
+                u = effect.actuation(u)
+        return u
 
     def M(self, q: Array) -> Array:
         """Mass matrix, (..., n, n)."""
@@ -68,7 +81,7 @@ class Plant:
         if v.shape[-1:] != (n,):
             raise QueryError(f"v must have shape ({n},) or (..., {n}), got {v.shape}")
         try:
-            return sum(effect.torque(self.dynamics, t, q, v) for effect in self.effects)
+            return sum(force.torque(self.dynamics, t, q, v) for force in self.forces)
         except (TypeError, ValueError) as error:
             raise EffectError(f"an effect does not fit {n} joints and v of shape {v.shape}: {error}") from None
 
@@ -81,7 +94,7 @@ class Plant:
         u = np.asarray(u)
         if u.dtype.kind not in "fiuO":
             raise QueryError(f"u must be an array of {self.dynamics.n} numbers, got {u!r}")
-        return self.dynamics.forward_dynamics(q, v, u + self.torque(t, q, v))
+        return self.dynamics.forward_dynamics(q, v, self.actuation(u) + self.torque(t, q, v))
 
 
 def stated_friction(dynamics: Any) -> tuple[Effect, ...]:

@@ -198,7 +198,8 @@ def _inertia(link: Link, pose: Pose, arithmetic: Arithmetic) -> Array:
         at = pose @ Pose(rotation_rpy(arithmetic.array(part.rpy)), arithmetic.array(part.xyz))
         Ixx, Ixy, Ixz, Iyy, Iyz, Izz = arithmetic.array(part.moments)
         about_com = np.array([[Ixx, Ixy, Ixz], [Ixy, Iyy, Iyz], [Ixz, Iyz, Izz]], dtype=arithmetic.dtype)
-        total = total + spatial_inertia(arithmetic.number(part.mass), at.p, at.R @ about_com @ at.R.T)
+        own = spatial_inertia(arithmetic.number(part.mass), at.p, at.R @ about_com @ at.R.T)
+        total = total + arithmetic.number(part.scale) * own
     return total
 
 

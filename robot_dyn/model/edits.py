@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, final
+from typing import Any, TypedDict, Unpack, final
 
 import numpy as np
 
@@ -47,8 +47,14 @@ class Payload:
         object.__setattr__(self, "inertia", tuple(map(tuple, inertia.tolist())))
 
 
-Lock = Mapping[str, float] | None  # value by joint name
-Payloads = Payload | Iterable[Payload] | None
+class Changes(TypedDict, total=False):
+    """What can be changed of a robot, by keyword; see `Robot.with_`."""
+
+    gravity: Any
+    lock: Mapping[str, float]
+    payload: Payload | Iterable[Payload]
+    armature: Any
+    mass_scale: float
 
 
 @final
@@ -61,55 +67,47 @@ class Edits:
         lock: Joints held at a value: (name, value in [rad] or [m]) each.
         payloads: Bodies fastened to links.
         armature: Inertia of the drives felt at the joints: (name, value in [kg m²] or [kg]) each.
+        mass_scale: Factor on the mass and inertia of all links, payloads excepted: for models that are wrong.
     """
 
     gravity: tuple[float, float, float] = STANDARD_GRAVITY
     lock: tuple[tuple[str, float], ...] = ()
     payloads: tuple[Payload, ...] = ()
     armature: tuple[tuple[str, float], ...] = ()
+    mass_scale: float = 1.0
 
-    def with_(
-        self,
-        joint_names: tuple[str, ...],
-        *,
-        gravity: Any = None,
-        lock: Lock = None,
-        payload: Payloads = None,
-        armature: Any = None,
-    ) -> Edits:
-        """These edits and more. Locks and payloads add up; gravity and armature replace what was given before.
-
-        Args:
-            joint_names: The joints that can be named: those of the robot being edited.
-            gravity: Shape (3,), in [m/s²].
-            lock: Value by joint name, in [rad] or [m].
-            payload: One or several.
-            armature: A scalar or shape (n,) or by joint name, in [kg m²] or [kg], not negative.
-
-        Raises:
-            EditError: If a joint is unknown or a value is not a finite number of the right shape.
-        """
+    def with_(self, joint_names: tuple[str, ...], **changes: Unpack[Changes]) -> Edits:
+        """These edits and more, as `Robot.with_`; `joint_names` are the joints that can be named."""
         new = self
-        if gravity is not None:
+        if (gravity := changes.get("gravity")) is not None:
             new = replace(new, gravity=tuple(_numbers("gravity", gravity, (3,)).tolist()))
-        if armature is not None:
-            new = replace(new, armature=_by_joint("armature", armature, joint_names))
-        if lock is not None:
+        if (armature := changes.get("armature")) is not None:
+            new = replace(new, armature=tuple(by_joint("armature", armature, joint_names).items()))
+        if (lock := changes.get("lock")) is not None:
             if not isinstance(lock, Mapping):
                 raise EditError(
-                    f"lock must give a value by joint name, such as {{{joint_names[0]!r}: 0.0}}, got {lock!r}"
+                    f"lock must give values by joint name, such as {{{joint_names[0]!r}: 0.0}}, got {lock!r}"
                 )
-            new = replace(new, lock=new.lock + _by_joint("lock", dict(lock), joint_names))
-        if payload is not None:
+            new = replace(new, lock=new.lock + tuple(by_joint("lock", lock, joint_names).items()))
+        if (payload := changes.get("payload")) is not None:
             more = tuple(payload) if isinstance(payload, Iterable) else (payload,)
             if not all(isinstance(each, Payload) for each in more):
                 raise EditError(f"payload must be a Payload or several, got {payload!r}")
             new = replace(new, payloads=new.payloads + more)
+        if (mass_scale := changes.get("mass_scale")) is not None:
+            factor = float(_numbers("mass_scale", mass_scale, ()))
+            if factor <= 0:
+                raise EditError(f"mass_scale must be positive, got {factor:g}")
+            new = replace(new, mass_scale=factor)
         return new
 
 
-def _by_joint(what: str, values: Any, joint_names: tuple[str, ...]) -> tuple[tuple[str, float], ...]:
-    """(name, value) pairs of a scalar, an array (n,) or a mapping."""
+def by_joint(what: str, values: Any, joint_names: tuple[str, ...]) -> dict[str, float]:
+    """Values by joint name, of a scalar, an array (n,) or a mapping that may leave joints out.
+
+    Raises:
+        EditError: If a joint is unknown, or a value is not a finite number; armature must not be negative.
+    """
     if not isinstance(values, Mapping):
         n = len(joint_names)
         numbers = _numbers(what, values, (n,) if np.ndim(values) else ())
@@ -120,7 +118,7 @@ def _by_joint(what: str, values: Any, joint_names: tuple[str, ...]) -> tuple[tup
         number = float(_numbers(f"{what} of {name!r}", value, ()))
         if what == "armature" and number < 0:
             raise EditError(f"armature of {name!r} must not be negative, got {number:g}")
-    return tuple((name, float(value)) for name, value in values.items())
+    return {name: float(value) for name, value in values.items()}
 
 
 def _numbers(what: str, values: Any, shape: tuple[int, ...]) -> np.ndarray:

@@ -121,16 +121,16 @@ def ask(
     """
     arrays = {name: checked(name, x, joint_names) for name, x in state.items()}
     batch = check_batches(**arrays)
-    full = [ties.position(x) if name == "q" else ties.velocity(x) for name, x in arrays.items()]
-    rows = [np.broadcast_to(x, (*batch, model.nv)).reshape(-1, model.nv) for x in full]
     with np.errstate(all="ignore"):  # what overflows is told below
+        full = [ties.position(x) if name == "q" else ties.velocity(x) for name, x in arrays.items()]
+        rows = [np.broadcast_to(x, (*batch, model.nv)).reshape(-1, model.nv) for x in full]
         answers = [kernel(model, data, *row) for row in zip(*rows, strict=True)]
-    if not answers:  # an empty batch has a shape all the same
-        answers = np.empty((0, *np.shape(kernel(model, data, *np.zeros((len(rows), model.nv))))))
-    answer = np.array(answers)
-    answer = answer.reshape(batch + answer.shape[1:])
-    if reduce is not None:
-        answer = reduce(answer)
+        if not answers:  # an empty batch has a shape all the same
+            answers = np.empty((0, *np.shape(kernel(model, data, *np.zeros((len(rows), model.nv))))))
+        answer = np.array(answers)
+        answer = answer.reshape(batch + answer.shape[1:])
+        if reduce is not None:
+            answer = reduce(answer)
     if not np.isfinite(answer).all():
         raise OverflowedError(f"{', '.join(state)} are so large that the result overflows")
     return answer if answer.ndim else float(answer)

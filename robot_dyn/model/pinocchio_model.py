@@ -76,6 +76,9 @@ def _apply(edits: Edits, model: Any) -> None:
     ids = joint_ids(model, _MARK)
     for name, value in edits.armature:
         model.armature[model.idx_vs[ids[name]]] = value
+    if edits.mass_scale != 1.0:
+        for i, body in enumerate(model.inertias):
+            model.inertias[i] = pin.Inertia(edits.mass_scale * body.mass, body.lever, edits.mass_scale * body.inertia)
     links = link_frames(model)
     for payload in edits.payloads:
         if payload.frame not in links:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, final
+from typing import Any, Unpack, final
 
 import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
@@ -19,7 +19,7 @@ from robot_dyn.errors import OverflowedError, SingularError
 from robot_dyn.model import kernels, pinocchio_model
 from robot_dyn.model.description import Description
 from robot_dyn.model.dynamics import Array, Axes, acceleration, check_batches, checked, entry
-from robot_dyn.model.edits import Edits, Lock, Payloads
+from robot_dyn.model.edits import Changes, Edits
 from robot_dyn.model.kernels import Kernel, Scratch, ask, frozen, is_moderate, is_state
 from robot_dyn.model.ties import Ties
 
@@ -45,20 +45,19 @@ class Robot:
     def __reduce__(self) -> tuple[Any, ...]:
         return Robot, (self.description, self.edits)
 
-    def with_(self, *, gravity: Any = None, lock: Lock = None, payload: Payloads = None, armature: Any = None) -> Robot:
-        """A new robot with more edits. Locks and payloads add up; gravity and armature replace earlier ones.
+    def with_(self, **changes: Unpack[Changes]) -> Robot:
+        """A new robot with more edits. Locks and payloads add up; the others replace what was given before.
 
         Args:
-            gravity: Acceleration of free fall in base axes, (3,) in [m/s²].
-            lock: Joints to hold, with their value in [rad] or [m].
-            payload: One body or several to fasten to links.
-            armature: Inertia of the drives felt at the joints: scalar, (n,) or by name, in [kg m²] or [kg].
+            **changes: gravity: acceleration of free fall in base axes, (3,) in [m/s²]. lock: joints to hold, with their
+                value in [rad] or [m]. payload: one body or several to fasten to links. armature: inertia of the drives
+                felt at the joints, a scalar, (n,) or by name, in [kg m²] or [kg]. mass_scale: factor on the mass and
+                inertia of all links, for a model that is wrong.
 
         Raises:
             EditError: If a name is unknown or a value has no meaning.
         """
-        edits = self.edits.with_(self.joint_names, gravity=gravity, lock=lock, payload=payload, armature=armature)
-        return Robot(self.description, edits)
+        return Robot(self.description, self.edits.with_(self.joint_names, **changes))
 
     @property
     def name(self) -> str:
@@ -159,6 +158,9 @@ class Robot:
         return self._ask(kernels.coriolis_torque, self.ties.torque, q=q, v=v)
 
     def coriolis_transpose(self, q: Array, v: Array) -> ndarray:
+        shape = self._shape
+        if is_state(q, shape) and is_state(v, shape) and is_moderate(q) and is_moderate(v):
+            return kernels.coriolis_transpose(self.model, self._scratch.data, q, v)
         return self._ask(kernels.coriolis_transpose, self.ties.torque, q=q, v=v)
 
     def inverse_dynamics(self, q: Array, v: Array, a: Array) -> ndarray:

@@ -13,7 +13,7 @@ from typing import Any, Protocol, final
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 from robot_dyn.model.description import Description
-from robot_dyn.model.edits import Edits, Payload
+from robot_dyn.model.edits import Edits
 from robot_dyn.model.ties import Mimic
 
 
@@ -40,13 +40,14 @@ _ZERO: Triple = ("0", "0", "0")
 class Inertial:
     """A rigid body fastened to a link: mass [kg], centre of mass [m], inertia about it [kg m²] in axes turned by rpy.
 
-    `moments` are Ixx, Ixy, Ixz, Iyy, Iyz, Izz.
+    `moments` are Ixx, Ixy, Ixz, Iyy, Iyz, Izz; mass and moments are multiplied by `scale`.
     """
 
     mass: Literal
     moments: tuple[Literal, ...]
     xyz: Triple = _ZERO
     rpy: Triple = _ZERO
+    scale: Literal = "1"
 
 
 @final
@@ -113,7 +114,7 @@ def tree(description: Description, edits: Edits) -> Tree:
     root, ordered = _from_the_root({joint.child: joint for joint in joints})
     return Tree(
         root,
-        tuple(_loaded(link, edits.payloads) for link in links),
+        tuple(_loaded(link, edits) for link in links),
         tuple(_edited(joint, edits) for joint in ordered),
         edits.gravity,
     )
@@ -171,14 +172,14 @@ def _from_the_root(joint_of_child: dict[str, Joint]) -> tuple[str, list[Joint]]:
     return root, ordered
 
 
-def _loaded(link: Link, payloads: tuple[Payload, ...]) -> Link:
-    """The link with the payloads it carries."""
-    more = []
-    for payload in payloads:
+def _loaded(link: Link, edits: Edits) -> Link:
+    """The link with its masses scaled and the payloads it carries."""
+    more = [replace(part, scale=edits.mass_scale) for part in link.inertials]
+    for payload in edits.payloads:
         if payload.frame == link.name:
             (Ixx, Ixy, Ixz), (_, Iyy, Iyz), (_, _, Izz) = payload.inertia
             more.append(Inertial(payload.mass, (Ixx, Ixy, Ixz, Iyy, Iyz, Izz), payload.com))
-    return replace(link, inertials=link.inertials + tuple(more))
+    return replace(link, inertials=tuple(more))
 
 
 def _edited(joint: Joint, edits: Edits) -> Joint:

@@ -1,0 +1,47 @@
+"""Double pendulum: two bars that fall freely from the horizontal, and a neighbour that starts a hair away.
+
+    M(q) q̈ + C(q, v) v + N(q) = 0,    E = ½ vᵀ M(q) v + V(q) is constant
+
+Energy tells that the equation was solved; how fast neighbours part tells how long the solution can be believed.
+
+Run: python examples/double_pendulum.py
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+import robot_dyn as rd
+
+g = -rd.STANDARD_GRAVITY[2]  # [m/s²]
+apart = 1e-6  # between the neighbours at the start, in [rad]
+
+# The joints of urdf/planar_2r.urdf turn about z, so gravity has to point along −y to lie in the plane of motion.
+arm = rd.load("planar_2r").with_(gravity=(0.0, -g, 0.0))
+
+
+def fall(q0):
+    """Let go at q0, at rest."""
+    return rd.simulate(
+        rd.Plant(arm),
+        q0=q0,
+        v0=[0.0, 0.0],
+        duration_s=10.0,
+        integrator=rd.method("order_8"),
+        step_s=0.002,
+        record_period_s=0.01,
+    )
+
+
+trajectory = fall([0.0, 0.0])
+print(trajectory.summary)
+
+E = trajectory.ledger.energy
+print(f"energy: {E[0]:.9f} J at the start, {E[-1]:.9f} J after {trajectory.t[-1]:g} s")
+print(f"largest kinetic energy: {trajectory.ledger.kinetic.max():.3f} J")
+
+neighbour = fall([apart, 0.0])
+distance = np.abs(trajectory.q - neighbour.q).max(axis=1)
+print(f"neighbours {apart:g} rad apart at the start:")
+for t in (2.0, 4.0, 6.0, 8.0, 10.0):
+    print(f"  after {t:4.1f} s: {distance[np.isclose(trajectory.t, t)][0]:.1e} rad")

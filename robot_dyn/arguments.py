@@ -1,0 +1,66 @@
+"""What the command line is given, as values: robots, numbers for joints, assignments."""
+
+from __future__ import annotations
+
+import warnings
+from typing import TYPE_CHECKING
+
+from robot_dyn.errors import ModelWarning, QueryError, nearest
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from robot_dyn.model.robot import Robot
+
+
+def load(name: str, lock: list[str] | None, package_dirs: list[str] | None, quiet: bool = False) -> Robot:
+    """The robot of a name or path, with joints locked; `quiet` keeps its warnings to itself."""
+    import robot_dyn as rd
+
+    with warnings.catch_warnings():
+        if quiet:
+            warnings.simplefilter("ignore", ModelWarning)
+        robot = rd.load(name, package_dirs=package_dirs or ())
+    return robot.with_(lock=assignments("--lock", lock)) if lock else robot
+
+
+def assignments(option: str, texts: list[str]) -> dict[str, float]:
+    """Values by joint of several joint=value; QueryError if a joint comes twice."""
+    pairs = [assignment(option, text) for text in texts]
+    values = dict(pairs)
+    if len(values) < len(pairs):
+        raise QueryError(f"{option} names a joint twice: {', '.join(texts)}")
+    return values
+
+
+def assignment(option: str, text: str) -> tuple[str, float]:
+    """Name and value of joint=value."""
+    name, equals, value = text.partition("=")
+    if not equals:
+        raise QueryError(f"{option} must be JOINT=VALUE, got {text!r}")
+    return name.strip(), number(option, value)
+
+
+def number(option: str, text: str) -> float:
+    """The number that a text states."""
+    try:
+        return float(text)
+    except ValueError:
+        raise QueryError(f"{option}: {text.strip()!r} is not a number") from None
+
+
+def vector(option: str, text: str | None, joint_names: tuple[str, ...]) -> np.ndarray:
+    """Numbers separated by commas or blanks, one for each joint; or joint=value pairs, 0 elsewhere."""
+    import numpy as np
+
+    words = (text or "").replace(",", " ").split()
+    if any("=" in word for word in words):
+        values = assignments(option, words)
+        for name in values.keys() - set(joint_names):
+            raise QueryError(f"{option}: no joint {name!r}; {nearest(name, joint_names)}")
+        return np.array([values.get(name, 0.0) for name in joint_names])
+    if text is None:
+        return np.zeros(len(joint_names))
+    if len(words) != len(joint_names):
+        raise QueryError(f"{option} needs {len(joint_names)} numbers, got {len(words)}: {', '.join(joint_names)}")
+    return np.array([number(option, word) for word in words])

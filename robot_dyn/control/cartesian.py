@@ -1,0 +1,194 @@
+"""What a frame should do at time t: p(t) along a line or a circle, and R(t) = exp(â φ(t)) R₀ about one axis.
+
+Position and angle are piecewise polynomials; the twist is (ṗ, φ̇ a), in base axes. [Siciliano et al. 2009, sec. 4.3]
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.control.controller import ControlError, gain, numbers, positive
+from robot_dyn.control.orientation import orientation_error
+from robot_dyn.control.reference import PiecewisePolynomial, hermite, quintic
+from robot_dyn.spatial import rotation as rotation_about
+
+_TURN_KNOTS, _RAMP_KNOTS = 64, 32  # per turn and per ramp: the accuracy that `circle` states
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class CartesianReference:
+    """A motion of a frame in the base.
+
+    Attributes:
+        position: p(t) of its origin, 3 coordinates, in [m].
+        rotation: R₀, shape (3, 3); None leaves the orientation free.
+        axis: Unit axis a of the turn in base axes, shape (3,).
+        angle: φ(t), 1 coordinate, in [rad]; None for a constant orientation.
+    """
+
+    position: PiecewisePolynomial
+    rotation: Any = None
+    axis: Any = (0.0, 0.0, 1.0)
+    angle: PiecewisePolynomial | None = None
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.position, PiecewisePolynomial) or self.position.n != 3:
+            raise ControlError(f"position must be a PiecewisePolynomial of 3 coordinates, got {self.position!r}")
+        if self.angle is not None and (self.rotation is None or self.angle.n != 1):
+            raise ControlError("angle must have 1 coordinate and needs a rotation R₀ that it turns")
+        if self.rotation is not None:
+            object.__setattr__(self, "rotation", _rotation("rotation", self.rotation))
+        object.__setattr__(self, "axis", _direction("axis", self.axis))
+
+    @property
+    def breaks(self) -> np.ndarray:
+        """Times in [s] at which position or angle pass to another piece."""
+        return self.position.breaks if self.angle is None else np.union1d(self.position.breaks, self.angle.breaks)
+
+    def at(self, t: Array) -> tuple[Array, Array | None, Array, Array]:
+        """Position, orientation, twist and its rate at t.
+
+        Args:
+            t: Time, shape () or (...), in [s].
+
+        Returns:
+            (p, R, V, V̇): shapes (..., 3), (..., 3, 3) or None if it is free, (..., 6) and (..., 6), linear part first.
+        """
+        p, p_rate, p_rate2 = self.position.at(t)
+        if self.angle is None:
+            still = np.zeros_like(p)
+            return p, self.rotation, np.concatenate([p_rate, still], -1), np.concatenate([p_rate2, still], -1)
+        phi, phi_rate, phi_rate2 = self.angle.at(t)
+        R = rotation_about(self.axis, phi[..., 0]) @ self.rotation
+        V, V_rate = (p_rate, phi_rate * self.axis), (p_rate2, phi_rate2 * self.axis)
+        return p, R, np.concatenate(V, -1), np.concatenate(V_rate, -1)
+
+
+def line(
+    p0: Any, p1: Any, duration: float, *, rotation: Any = None, rotation_end: Any = None, start: float = 0.0
+) -> CartesianReference:
+    """The straight line from p0 to p1 and the shortest turn between two orientations, both of least jerk from rest.
+
+    Args:
+        p0: Where it starts, shape (3,), in [m].
+        p1: Where it ends, shape (3,).
+        duration: In [s], positive.
+        rotation: Orientation at the start, (3, 3); None leaves it free.
+        rotation_end: Orientation at the end, (3, 3); None keeps that of the start.
+        start: Time at which it starts, in [s].
+
+    Raises:
+        ControlError: If a value has the wrong shape or is no rotation.
+
+    Source: Siciliano et al. 2009, secs. 4.3.2 and 4.3.3.
+    """
+    p0, p1 = numbers("p0", p0, (3,)), numbers("p1", p1, (3,))
+    position = quintic(p0, p1, duration, start=start)
+    if rotation is None or rotation_end is None:
+        if rotation_end is not None:
+            raise ControlError("rotation_end needs a rotation to start from")
+        return CartesianReference(position, rotation)
+    turn = orientation_error(_rotation("rotation_end", rotation_end), _rotation("rotation", rotation))
+    angle = np.linalg.norm(turn)
+    if angle == 0:
+        return CartesianReference(position, rotation)
+    return CartesianReference(position, rotation, turn, quintic([0.0], [angle], duration, start=start))
+
+
+def circle(
+    centre: Any,
+    radius: float,
+    normal: Any,
+    period: float,
+    *,
+    turns: float = 1.0,
+    ramp: float | None = None,
+    toward: Any = None,
+    rotation: Any = None,
+    start: float = 0.0,
+) -> CartesianReference:
+    """A circle at constant speed, with a smooth start and end: quintic pieces within 1e-9 of the radius.
+
+    The pieces match p, ṗ, p̈ at 64 knots a turn or more; between knots the distance from the centre is off by less than
+    1e-9 of the radius. The speed rises as the quintic of least jerk over `ramp`, and falls alike, so that the motion
+    lasts turns · period + ramp.
+
+    Args:
+        centre: Shape (3,), in [m].
+        radius: In [m], positive.
+        normal: Axis about which it turns by the right hand, shape (3,), of any length.
+        period: Time of one turn at full speed, in [s].
+        turns: Number of turns, positive; ramp may be at most turns · period.
+        ramp: Time to full speed in [s]; 0 starts at full speed, with a jump. Unless given, a quarter of the period, or
+            turns · period if that is less.
+        toward: Direction from the centre to the starting point; unless given, that of the base's axis (x, y or z) which
+            lies best in the plane, projected onto it.
+        rotation: Constant orientation, (3, 3); None leaves it free.
+        start: Time at which it starts, in [s].
+
+    Raises:
+        ControlError: If a value has no meaning.
+
+    Source: Siciliano et al. 2009, sec. 4.3.1 (path primitives).
+    """
+    centre, r, normal = numbers("centre", centre, (3,)), positive("radius", radius), _direction("normal", normal)
+    T, turns = positive("period", period), positive("turns", turns)
+    rise = float(gain("ramp", min(T / 4, turns * T) if ramp is None else ramp))
+    if rise > turns * T:
+        raise ControlError(f"ramp must be at most turns · period = {turns * T} s, got {rise} s")
+    toward = np.eye(3)[np.argmin(np.abs(normal))] if toward is None else numbers("toward", toward, (3,))
+    x = _direction("toward, in the plane of the circle,", toward - (toward @ normal) * normal)
+    y = np.cross(normal, x)
+    angle = _ramped_angle(2 * pi / T, turns * T, rise)
+    knots = _knots(angle, T, rise)
+    phi, rate, rate2 = angle.at(knots)
+    along, across = np.cos(phi) * x + np.sin(phi) * y, np.cos(phi) * y - np.sin(phi) * x
+    data = np.stack([centre + r * along, r * rate * across, r * (rate2 * across - rate**2 * along)], axis=1)
+    pieces = hermite(np.diff(knots), np.concatenate([data[:-1], data[1:]], axis=1))
+    return CartesianReference(PiecewisePolynomial(float(numbers("start", start, ())) + knots, pieces), rotation)
+
+
+def _ramped_angle(speed: float, cruise: float, rise: float) -> PiecewisePolynomial:
+    """The angle of a speed that rises by a quintic over `rise`, and falls so that it ends at speed · cruise."""
+    if rise == 0:
+        return PiecewisePolynomial([0.0, cruise], [[[0.0], [speed]]])
+    # ∫ 10 s³ − 15 s⁴ + 6 s⁵ is of degree 6, and ½ at s = 1
+    up = speed * rise * np.array([0, 0, 0, 0, 2.5, -3, 1]) / rise ** np.arange(7.0)
+    flat = np.array([speed * rise / 2, speed, 0, 0, 0, 0, 0])
+    down = speed * rise * np.array([cruise / rise - 0.5, 1, 0, 0, -2.5, 3, -1]) / rise ** np.arange(7.0)
+    if cruise == rise:
+        return PiecewisePolynomial([0.0, rise, 2 * rise], np.stack([up, down])[..., None])
+    return PiecewisePolynomial([0.0, rise, cruise, cruise + rise], np.stack([up, flat, down])[..., None])
+
+
+def _knots(angle: PiecewisePolynomial, period: float, rise: float) -> np.ndarray:
+    """Times that cut each phase evenly, _TURN_KNOTS a turn and _RAMP_KNOTS a ramp at least."""
+    per_turn = np.ceil(np.diff(angle.breaks) / period * _TURN_KNOTS * (1 - 1e-12)).astype(int)  # 1e-12 for rounding
+    ramps = np.isclose(np.diff(angle.breaks), rise)
+    counts = np.where(ramps, np.maximum(per_turn, _RAMP_KNOTS), per_turn)
+    phases = zip(angle.breaks[:-1], angle.breaks[1:], counts, strict=True)
+    parts = [np.linspace(begin, end, count + 1)[:-1] for begin, end, count in phases]
+    return np.concatenate([*parts, angle.breaks[-1:]])
+
+
+def _rotation(name: str, values: Any) -> np.ndarray:
+    """A rotation matrix, frozen; ControlError if RᵀR is not 1 to 1e-8 or det R is not positive."""
+    R = numbers(name, values, (3, 3))
+    if np.abs(R.T @ R - np.eye(3)).max() > 1e-8 or np.linalg.det(R) < 0:
+        raise ControlError(f"{name} must be a rotation matrix, got {values!r}")
+    return R
+
+
+def _direction(name: str, values: Any) -> np.ndarray:
+    """A unit vector, (3,), frozen; ControlError if there is no direction."""
+    vector = numbers(name, values, (3,))
+    length = np.linalg.norm(vector)
+    if length < 1e-12:
+        raise ControlError(f"{name} must not be zero, got {values!r}")
+    return numbers(name, vector / length, (3,))

@@ -1,0 +1,154 @@
+"""Each joint on its own, the coupling a disturbance: τ = kp e + kd ė + ki ∫ e dt, with e = q_d − q.
+
+[Siciliano et al. 2009, sec. 8.3; Spong, Hutchinson, Vidyasagar 2006, ch. 6]
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.control.controller import ControlError, Controller, Memoryless, freeze, numbers, positive
+from robot_dyn.control.reference import PiecewisePolynomial
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class PD(Memoryless):
+    """Spring and damper toward the reference: τ = kp (q_d − q) + kd (v_d − v).
+
+    Attributes:
+        reference: q_d(t) of the n joints.
+        kp: Stiffness, a scalar or (n,), in [N m/rad] or [N/m], not negative.
+        kd: Damping, a scalar or (n,), in [N m s/rad] or [N s/m], not negative.
+        period_s: In [s], 0 for continuous control.
+    """
+
+    reference: PiecewisePolynomial
+    kp: Any
+    kd: Any
+    period_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        freeze(self, self.n, "kp", "kd")
+
+    @property
+    def n(self) -> int:
+        return joint_count(self.reference)
+
+    def torque(self, t: float, q: Array, v: Array, z: Array) -> Array:
+        q_d, v_d, _ = self.reference.at(t)
+        return self.kp * (q_d - q) + self.kd * (v_d - v)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class PID(Controller):
+    """PD and an integral that a limit on the effort does not wind up.
+
+    The memory z is the integral's torque. Where the wanted torque u exceeds the limit, the excess flows back:
+
+        τ = sat(u),   u = kp e + kd ė + z,   ż = ki e + (sat(u) − u)/T_t
+
+    so that at a held error z settles at sat(u) + T_t ki e − kp e − kd ė instead of growing. Sampled, this is stable
+    for period < 2 T_t.
+
+    Attributes:
+        reference: q_d(t) of the n joints.
+        kp: A scalar or (n,), in [N m/rad] or [N/m], not negative; likewise kd, with [s].
+        ki: A scalar or (n,), in [N m/(rad s)] or [N/(m s)], not negative.
+        kd: A scalar or (n,), in [N m s/rad] or [N s/m], not negative.
+        effort_limit: Greatest torque, a scalar or (n,), in [N m] or [N], positive; inf where there is none.
+        tracking_time_s: T_t, in [s], positive; unless given, the greatest √(kd/ki) of the joints.
+        period_s: In [s], 0 for continuous control.
+
+    Source: Åström and Hägglund, PID Controllers, 1995, sec. 3.5 (back-calculation).
+    """
+
+    reference: PiecewisePolynomial
+    kp: Any
+    ki: Any
+    kd: Any
+    effort_limit: Any = np.inf
+    tracking_time_s: float | None = None
+    period_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        freeze(self, self.n, "kp", "ki", "kd")
+        object.__setattr__(self, "effort_limit", _effort_limit(self.effort_limit, self.n))
+        if self.tracking_time_s is None:
+            kd, ki = np.broadcast_arrays(self.kd, self.ki)
+            acts = (kd > 0) & (ki > 0)
+            time = np.sqrt((kd[acts] / ki[acts]).max()) if acts.any() else 1.0  # without ki nothing winds up
+        else:
+            time = self.tracking_time_s
+        object.__setattr__(self, "tracking_time_s", positive("tracking_time_s", time))
+
+    @property
+    def n(self) -> int:
+        return joint_count(self.reference)
+
+    @property
+    def memory_size(self) -> int:
+        return self.n
+
+    def torque(self, t: float, q: Array, v: Array, z: Array) -> Array:
+        return self._saturated(self._wanted(t, q, v, z)[0])
+
+    def memory_rate(self, t: float, q: Array, v: Array, z: Array) -> Array:
+        u, e = self._wanted(t, q, v, z)
+        return self.ki * e + (self._saturated(u) - u) / self.tracking_time_s
+
+    def _wanted(self, t: float, q: Array, v: Array, z: Array) -> tuple[Array, Array]:
+        q_d, v_d, _ = self.reference.at(t)
+        e = q_d - q
+        return self.kp * e + self.kd * (v_d - v) + z, e
+
+    def _saturated(self, u: Array) -> Array:
+        return np.maximum(np.minimum(u, self.effort_limit), -self.effort_limit)
+
+
+def gains_from(inertia_diagonal: Any, frequency: Any, damping_ratio: Any = 1.0) -> tuple[np.ndarray, np.ndarray]:
+    """Gains of a joint of inertia M_ii for the closed loop ë + 2 ζ ω ė + ω² e = 0: kp = M_ii ω², kd = 2 ζ ω M_ii.
+
+    With inertia 1 they are those of computed torque, which cancels the inertia.
+
+    Args:
+        inertia_diagonal: M_ii, a scalar or (n,), in [kg m²] or [kg], positive.
+        frequency: ω, a scalar or (n,), in [rad/s], positive.
+        damping_ratio: ζ, a scalar or (n,), 1 for critical damping, not negative.
+
+    Raises:
+        ControlError: If a value has the wrong sign or the shapes do not match.
+
+    Source: Siciliano et al. 2009, sec. 8.3.1.
+    """
+    given = {"inertia_diagonal": inertia_diagonal, "frequency": frequency, "damping_ratio": damping_ratio}
+    inertia, omega, zeta = (numbers(name, x, (), ("n",)) for name, x in given.items())
+    if len({x.shape for x in (inertia, omega, zeta)} - {()}) > 1:
+        raise ControlError(f"shapes do not match: {inertia.shape}, {omega.shape}, {zeta.shape}")
+    if not ((inertia > 0).all() and (omega > 0).all() and (zeta >= 0).all()):
+        raise ControlError(f"inertia_diagonal and frequency must be positive, damping_ratio not negative, got {given}")
+    return inertia * omega**2, 2 * zeta * omega * inertia
+
+
+def joint_count(reference: Any) -> int:
+    """Number of joints of a joint reference; ControlError if it is none."""
+    if not isinstance(reference, PiecewisePolynomial):
+        raise ControlError(f"reference must be a PiecewisePolynomial, such as hold(q), got {reference!r}")
+    return reference.n
+
+
+def _effort_limit(values: Any, n: int) -> np.ndarray:
+    """Limits, positive, inf where there is none; ControlError if they are none."""
+    try:
+        limit = np.array(values, dtype=float)
+    except (TypeError, ValueError):
+        raise ControlError(f"effort_limit must be numbers, got {values!r}") from None
+    if limit.shape not in ((), (n,)) or not (limit > 0).all():
+        raise ControlError(f"effort_limit must be positive, a scalar or ({n},), got {values!r}")
+    limit.setflags(write=False)
+    return limit

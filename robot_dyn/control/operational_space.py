@@ -1,0 +1,186 @@
+"""The arm as its end effector feels it: Λ ẍ + μ + p = F, with Λ = (J M⁻¹ Jᵀ)⁻¹ and τ = Jᵀ F.
+
+The task velocity ẋ is made of rows of a frame's world-aligned twist (ṗ, ω). [Khatib 1987, IEEE J. Robotics and
+Automation 3(1), A unified approach for motion and force control of robot manipulators]
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from operator import index
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array, apply, transpose
+from robot_dyn.control.cartesian import CartesianReference
+from robot_dyn.control.controller import ControlError, Memoryless, freeze, gain, numbers, positive
+from robot_dyn.control.orientation import orientation_error
+from robot_dyn.model.dynamics import Dynamics, acceleration
+
+POSITION, POSE = (0, 1, 2), (0, 1, 2, 3, 4, 5)  # rows of a twist
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class TaskDynamics:
+    """The terms of Λ ẍ + μ + p = F at one state, or at several along batch axes.
+
+    Attributes:
+        J: Task Jacobian, shape (..., m, n).
+        Lambda: Λ = (J M⁻¹ Jᵀ)⁻¹, the inertia felt at the task, shape (..., m, m), in [kg], [kg m], [kg m²].
+        J_bar: J̄ = M⁻¹ Jᵀ Λ, the inverse of J that is consistent with the dynamics, shape (..., n, m).
+        mu: μ = J̄ᵀ C v − Λ J̇ v, shape (..., m), in [N] and [N m].
+        p: p = J̄ᵀ N, gravity at the task, shape (..., m), in [N] and [N m].
+        drift: J̇ v, the task acceleration at constant v, shape (..., m).
+        smallest: Smallest eigenvalue of J M⁻¹ Jᵀ, shape (...): below the threshold, Λ and J̄ are damped.
+    """
+
+    J: Array
+    Lambda: Array
+    J_bar: Array
+    mu: Array
+    p: Array
+    drift: Array
+    smallest: Array
+
+    @property
+    def projector(self) -> Array:
+        """1 − Jᵀ J̄ᵀ, which lets pass the torque that does not accelerate the task, shape (..., n, n)."""
+        J = self.J
+        return np.eye(J.shape[-1], dtype=J.dtype) - transpose(J) @ transpose(self.J_bar)
+
+
+def task_dynamics(
+    dynamics: Dynamics, q: Array, v: Array, frame: str, *, rows: tuple[int, ...] = POSE, threshold: float = 0.01
+) -> TaskDynamics:
+    """The dynamics of a frame as a task, damped near singularities.
+
+    Along an eigenvector of A = J M⁻¹ Jᵀ with eigenvalue s, Λ is 1/s; for s below the threshold ε it is
+
+        s/ε² = s/(s² + λ²),   λ² = ε² − s²,
+
+    which keeps Λ below 1/ε and asks for no force at the singularity itself, where none can act. The other directions
+    stay exact. Metres and radians are weighed alike. The eigenvectors come from
+    `numpy.linalg.eigh`, an iteration on values, and so float64 only: a trace must bring its own.
+
+    Args:
+        dynamics: The arm.
+        q: Shape (n,) or (..., n), in [rad] or [m].
+        v: Shape (n,) or (..., n), in [rad/s] or [m/s].
+        frame: Name of a link.
+        rows: Which of (ṗ, ω) are the task: POSE, POSITION, or others such as (0, 1) for a planar arm.
+        threshold: ε in [1/kg] and [1/(kg m²)], positive: the default bounds the apparent mass by 100 kg.
+
+    Raises:
+        QueryError: If q or v has the wrong shape or the frame is unknown.
+        ControlError: If rows or threshold have no meaning.
+        SingularError: If M is singular.
+
+    Source: Khatib 1987; Chiaverini, Siciliano, Egeland 1994 (damping in the singular directions only).
+    """
+    rows, epsilon = _rows(rows), positive("threshold", threshold)
+    J = dynamics.jacobian(q, frame)[..., rows, :]
+    drift = apply(dynamics.jacobian_rate(q, v, frame)[..., rows, :], np.asarray(v))
+    # rows of J M⁻¹, one solve each: M is symmetric
+    J_over_M = acceleration(dynamics.M(q)[..., None, :, :], J, dynamics.joint_names)
+    s, U = np.linalg.eigh(J_over_M @ transpose(J))
+    Lambda = (U * (s / np.maximum(s, epsilon) ** 2)[..., None, :]) @ transpose(U)
+    J_bar = transpose(J_over_M) @ Lambda
+    mu = apply(transpose(J_bar), dynamics.coriolis_torque(q, v)) - apply(Lambda, drift)
+    return TaskDynamics(J, Lambda, J_bar, mu, apply(transpose(J_bar), dynamics.N(q)), drift, s[..., 0])
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class OperationalSpace(Memoryless):
+    """Computed torque for a frame, and a posture in the motions the task leaves free.
+
+        F = Λ (ẍ_d + kd ė + kp e) + μ + p
+        τ = Jᵀ F + (1 − Jᵀ J̄ᵀ)(M (posture_kp (q_p − q) − posture_kd v) + C v + N)
+
+    With the exact model and away from singularities ẍ = ẍ_d + kd ė + kp e. The orientation error is the rotation vector
+    of R_d Rᵀ. Near a singularity (`task_dynamics`) the task torque τ_x = Jᵀ Λ (ẍ_d + kd ė + kp e − J̇ v) obeys
+    τ_xᵀ M⁻¹ τ_x ≤ ‖ẍ_d + kd ė + kp e − J̇ v‖²/ε, and the posture takes over the direction that the task gives up.
+
+    Attributes:
+        model: The controller's model of the arm.
+        frame: Name of the link that is controlled.
+        reference: Its motion; where that leaves the orientation free, only the position is controlled.
+        kp: A scalar or one for each row of the task, in [1/s²], not negative.
+        kd: A scalar or one for each row of the task, in [1/s], not negative.
+        posture: q_p, shape (n,), in [rad] or [m]; None for damping alone.
+        posture_kp: A scalar or (n,), in [1/s²], not negative.
+        posture_kd: A scalar or (n,), in [1/s], not negative.
+        rows: Which of (ṗ, ω) are the task; unless given, POSE, or POSITION if the orientation is free.
+        threshold: ε of `task_dynamics`.
+        period_s: In [s], 0 for continuous control.
+
+    Source: Khatib 1987; Siciliano et al. 2009, sec. 8.6.
+    """
+
+    model: Dynamics
+    frame: str
+    reference: CartesianReference
+    kp: Any
+    kd: Any
+    posture: Any = None
+    posture_kp: Any = 0.0
+    posture_kd: Any = 0.0
+    rows: Any = None
+    threshold: float = 0.01
+    period_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.reference, CartesianReference):
+            raise ControlError(f"reference must be a CartesianReference, such as line(…), got {self.reference!r}")
+        free = self.reference.rotation is None
+        rows = _rows((POSITION if free else POSE) if self.rows is None else self.rows)
+        if free and max(rows) > 2:
+            raise ControlError(f"rows {rows} hold the orientation, which the reference leaves free")
+        self.model.jacobian(np.zeros(self.n), self.frame)  # so that an unknown frame is told now
+        freeze(self, self.n, "posture_kp", "posture_kd")
+        if self.posture is None and self.posture_kp.any():
+            raise ControlError("posture_kp needs a posture")
+        values = {
+            "rows": rows,
+            "kp": gain("kp", self.kp, (len(rows),)),
+            "kd": gain("kd", self.kd, (len(rows),)),
+            "posture": numbers("posture", np.zeros(self.n) if self.posture is None else self.posture, (self.n,)),
+            "threshold": positive("threshold", self.threshold),
+        }
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    @property
+    def n(self) -> int:
+        return self.model.n
+
+    def torque(self, t: float, q: Array, v: Array, z: Array) -> Array:
+        model = self.model
+        task = task_dynamics(model, q, v, self.frame, rows=self.rows, threshold=self.threshold)
+        F = apply(task.Lambda, self.task_acceleration(t, q, v)) + task.mu + task.p
+        free = model.inverse_dynamics(q, v, self.posture_kp * (self.posture - q) - self.posture_kd * v)
+        return apply(transpose(task.J), F) + apply(task.projector, free)
+
+    def task_acceleration(self, t: float, q: Array, v: Array) -> Array:
+        """Wanted acceleration ẍ_d + kd ė + kp e of the task, shape (m,), in [m/s²] and [rad/s²]."""
+        rows = self.rows
+        p_d, R_d, twist_d, rate_d = self.reference.at(t)
+        g = self.model.placement(q, self.frame)
+        p, R = g[..., :3, 3], g[..., :3, :3]
+        turn = np.zeros_like(p) if R_d is None else orientation_error(R_d, R)
+        e = np.concatenate([p_d - p, turn], axis=-1)[..., rows]
+        twist = apply(self.model.jacobian(q, self.frame), np.asarray(v))
+        return rate_d[..., rows] + self.kd * (twist_d - twist)[..., rows] + self.kp * e
+
+
+def _rows(rows: Any) -> tuple[int, ...]:
+    """Rows of a twist, increasing; ControlError if they are none."""
+    try:
+        chosen = tuple(index(row) for row in rows)
+    except TypeError:
+        chosen = ()
+    if not chosen or chosen != tuple(sorted(set(chosen) & set(POSE))):
+        raise ControlError(f"rows must be increasing numbers from 0 to 5, the rows of (ṗ, ω), got {rows!r}")
+    return chosen

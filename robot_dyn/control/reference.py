@@ -1,0 +1,197 @@
+"""What is wanted at time t, as a piecewise polynomial: q(t) = Σⱼ cᵢⱼ (t − tᵢ)ʲ on tᵢ ≤ t ≤ tᵢ₊₁.
+
+Every reference is such a table, whatever made it, so one evaluator serves them all, traced or not.
+Each piece is Hermite's polynomial of what is given at its two ends. [Siciliano et al. 2009, ch. 4]
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import factorial, perm
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.control.controller import ControlError, numbers, positive
+
+# values given at each end of a piece, by kind of spline
+_DERIVATIVES = {"cubic": 2, "quintic": 3}
+_FACTORIALS = np.array([factorial(j) for j in range(6)], dtype=float)
+# The inverse of [j!/(j − r)!] with r < m ≤ j < 2m: from what the low half leaves at s = 1 to the high half.
+_UPPER = {
+    2: np.array([[3, -1], [-2, 1.0]]),
+    3: np.array([[10, -4, 0.5], [-15, 7, -1], [6, -3, 0.5]]),
+}
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class PiecewisePolynomial:
+    """A motion q(t) with its velocity and acceleration; before its first and after its last break it rests there.
+
+    Attributes:
+        breaks: Times tᵢ, increasing, shape (k + 1,), in [s].
+        coefficients: cᵢⱼ of (t − tᵢ)ʲ, shape (k, d + 1, n), in [rad/sʲ] or [m/sʲ].
+    """
+
+    breaks: Any
+    coefficients: Any
+
+    def __post_init__(self) -> None:
+        table = numbers("coefficients", self.coefficients, ("k", "d + 1", "n"))
+        object.__setattr__(self, "coefficients", table)
+        object.__setattr__(self, "breaks", increasing("breaks", self.breaks, len(table) + 1))
+
+    @property
+    def n(self) -> int:
+        """Number of joints or coordinates."""
+        return self.coefficients.shape[-1]
+
+    @property
+    def start(self) -> float:
+        """Time of the first break, in [s]."""
+        return float(self.breaks[0])
+
+    @property
+    def end(self) -> float:
+        """Time of the last break, in [s]."""
+        return float(self.breaks[-1])
+
+    def at(self, t: Array) -> tuple[Array, Array, Array]:
+        """Position, velocity and acceleration at t, by Horner's rule.
+
+        At a break the piece to its right counts; at the last one, the piece to its left. Finding the piece is the one
+        branch on a value: a trace must look it up in `breaks`.
+
+        Args:
+            t: Time, shape () or (...), in [s].
+
+        Returns:
+            (q, v, a), each of shape (n,) or (..., n).
+        """
+        t, breaks = np.asarray(t), self.breaks
+        inside = np.clip(t, breaks[0], breaks[-1])
+        piece = np.searchsorted(breaks[1:-1], inside, side="right")
+        s, c = (inside - breaks[piece])[..., None], self.coefficients[piece]
+        q = c[..., -1, :] + 0 * s  # a fresh array, also where the degree is 0
+        v = a = np.zeros_like(q)
+        for j in reversed(range(c.shape[-2] - 1)):
+            a = a * s + v
+            v = v * s + q
+            q = q * s + c[..., j, :]
+        moves = ((breaks[0] <= t) & (t <= breaks[-1]))[..., None]
+        return q, np.where(moves, v, 0), np.where(moves, 2 * a, 0)
+
+
+def hold(q: Any) -> PiecewisePolynomial:
+    """Rest at q, shape (n,), at all times; ControlError if q is no such array."""
+    return PiecewisePolynomial([0.0, 1.0], numbers("q", q, ("n",))[None, None])
+
+
+def quintic(
+    q0: Any, q1: Any, duration: float, *, start: float = 0.0, v0: Any = 0.0, v1: Any = 0.0, a0: Any = 0.0, a1: Any = 0.0
+) -> PiecewisePolynomial:
+    """The quintic from q0 to q1; between rests the motion of least jerk, q0 + (q1 − q0)(10 s³ − 15 s⁴ + 6 s⁵).
+
+    Between rests its greatest velocity is 15/8 · (q1 − q0)/duration, halfway.
+
+    Args:
+        q0: Where it starts, shape (n,), in [rad] or [m].
+        q1: Where it ends, shape (n,).
+        duration: In [s], positive.
+        start: Time at which it starts, in [s].
+        v0: Velocity at the start, a scalar or (n,), in [rad/s] or [m/s].
+        v1: Velocity at the end, likewise.
+        a0: Acceleration at the start, a scalar or (n,), in [rad/s²] or [m/s²].
+        a1: Acceleration at the end, likewise.
+
+    Raises:
+        ControlError: If a value is not finite or has the wrong shape.
+
+    Source: Siciliano et al. 2009, sec. 4.2.1; Flash and Hogan, The coordination of arm movements, 1985.
+    """
+    T, begin = positive("duration", duration), float(numbers("start", start, ()))
+    q0 = numbers("q0", q0, ("n",))
+    shape = q0.shape
+    q1 = numbers("q1", q1, shape)
+    v0, v1 = numbers("v0", v0, (), shape), numbers("v1", v1, (), shape)
+    a0, a1 = numbers("a0", a0, (), shape), numbers("a1", a1, (), shape)
+    ends = np.stack(np.broadcast_arrays(q0, v0, a0, q1, v1, a1))
+    return PiecewisePolynomial([begin, begin + T], hermite(np.array([T]), ends[None]))
+
+
+def via_points(times: Any, points: Any, *, kind: str = "quintic") -> PiecewisePolynomial:
+    """The spline through points at given times, from rest to rest.
+
+    "quintic" has four continuous derivatives and starts and ends with zero acceleration; "cubic" has two, and its
+    acceleration jumps where it starts and ends.
+
+    Args:
+        times: Increasing, shape (k + 1,), in [s].
+        points: Shape (k + 1, n), in [rad] or [m].
+        kind: "quintic" or "cubic".
+
+    Raises:
+        ControlError: If times do not increase, shapes do not match or the kind is unknown.
+
+    Source: de Boor, A Practical Guide to Splines, 2001; Siciliano et al. 2009, sec. 4.2.2.
+    """
+    if kind not in _DERIVATIVES:
+        raise ControlError(f"kind={kind!r}; give one of {', '.join(_DERIVATIVES)}")
+    m, points = _DERIVATIVES[kind], numbers("points", points, ("k + 1", "n"))
+    if len(points) < 2:
+        raise ControlError(f"points must be 2 at least, got {len(points)}; to rest at one, hold(q)")
+    times = increasing("times", times, len(points))
+    unit = (times[-1] - times[0]) / (len(times) - 1)  # of time: derivatives of one size keep the solve well conditioned
+    data = _smooth_derivatives(np.diff(times) / unit, points, m)
+    pieces = hermite(np.diff(times) / unit, np.concatenate([data[:-1], data[1:]], axis=1))
+    return PiecewisePolynomial(times, pieces / unit ** np.arange(2.0 * m)[:, None])
+
+
+def hermite(h: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """Coefficients of the polynomials of degree 2m − 1 on [0, h] with m values and derivatives given at each end.
+
+    Args:
+        h: Lengths of the pieces, shape (k,), in [s].
+        ends: q, q̇, … at the left end, then at the right one, shape (k, 2m, n).
+
+    Returns:
+        Shape (k, 2m, n).
+    """
+    m = ends.shape[-2] // 2
+    powers = h[:, None, None] ** np.arange(2 * m)[:, None]
+    left, right = ends[:, :m] * powers[:, :m], ends[:, m:] * powers[:, :m]  # derivatives in s = t/h
+    low = left / _FACTORIALS[:m, None]
+    rest = right - np.array([[perm(j, r) for j in range(m)] for r in range(m)], dtype=float) @ low
+    return np.concatenate([low, _UPPER[m] @ rest], axis=1) / powers
+
+
+def _smooth_derivatives(h: np.ndarray, points: np.ndarray, m: int) -> np.ndarray:
+    """Values and m − 1 derivatives at the knots for which derivatives m … 2m − 2 are continuous, (k + 1, m, n)."""
+    k, n = len(h), points.shape[-1]
+    basis = hermite(h, np.broadcast_to(np.eye(2 * m), (k, 2 * m, 2 * m)))  # coefficients of each piece from its ends
+    orders = range(m, 2 * m - 1)
+    jumps = np.zeros((k - 1, m - 1, k + 1, m))
+    for row, r in enumerate(orders):
+        slope = np.array([perm(j, r) for j in range(2 * m)]) * h[:, None] ** np.maximum(np.arange(2 * m) - r, 0)
+        before = np.einsum("kj,kje->ke", slope, basis)[:-1].reshape(k - 1, 2, m)
+        after = (_FACTORIALS[r] * basis[1:, r]).reshape(k - 1, 2, m)
+        for i in range(k - 1):
+            jumps[i, row, i : i + 2] += before[i]
+            jumps[i, row, i + 1 : i + 3] -= after[i]
+    data = np.zeros((k + 1, m, n))
+    data[:, 0] = points
+    size = (k - 1) * (m - 1)
+    known = jumps[..., 0].reshape(size, k + 1) @ points  # the ends are at rest: their derivatives add nothing
+    unknown = jumps[:, :, 1:-1, 1:].reshape(size, size)
+    data[1:-1, 1:] = np.linalg.solve(unknown, -known).reshape(k - 1, m - 1, n)
+    return data
+
+
+def increasing(name: str, values: Any, count: int) -> np.ndarray:
+    """Increasing times, shape (count,), frozen; ControlError if they are none."""
+    times = numbers(name, values, (count,))
+    if not (np.diff(times) > 0).all():
+        raise ControlError(f"{name} must increase, got {values!r}")
+    return times

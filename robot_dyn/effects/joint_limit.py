@@ -1,0 +1,83 @@
+"""Joint stops as one-sided spring and damper: τ = k (δ₋ − δ₊) − c (δ₋ + δ₊) v, with δ the depth beyond a stop.
+
+The damping grows with the depth, so that the torque is continuous at contact [Hunt, Crossley 1975]. Soft stops are
+overrun by about v √(M/k); rigid ones are set-valued and no part of these.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array, positive_part
+from robot_dyn.effects.effect import Conservative, Dissipative, coefficient, number
+from robot_dyn.errors import EffectError
+from robot_dyn.model.dynamics import Dynamics
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class JointStopSpring(Conservative):
+    """The elastic part of joint stops: τ = k (δ₋ − δ₊), of energy ½ k (δ₋² + δ₊²).
+
+    Attributes:
+        lower: Position of the lower stop, −inf for none, a scalar or (n,), in [rad] or [m].
+        upper: Position of the upper stop, inf for none, above the lower one.
+        stiffness: k, a scalar or (n,), in [N m/rad] or [N/m], not negative.
+    """
+
+    lower: Any
+    upper: Any
+    stiffness: Any
+
+    def __post_init__(self) -> None:
+        _check_stops(self)
+        object.__setattr__(self, "stiffness", coefficient("stiffness", self.stiffness))
+
+    def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
+        return self.stiffness * (positive_part(self.lower - q) - positive_part(q - self.upper))
+
+    def potential(self, dynamics: Dynamics, t: float, q: Array) -> Array:
+        depth = positive_part(self.lower - q) + positive_part(q - self.upper)
+        return (self.stiffness * depth**2 / 2).sum(axis=-1)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class JointStopDamper(Dissipative):
+    """The dissipative part of joint stops: τ = −c (δ₋ + δ₊) v.
+
+    Attributes:
+        lower: Position of the lower stop, as of the spring.
+        upper: Position of the upper stop.
+        damping: c, damping for each unit of depth, a scalar or (n,), in [N m s/rad²] or [N s/m²], not negative.
+    """
+
+    lower: Any
+    upper: Any
+    damping: Any
+
+    def __post_init__(self) -> None:
+        _check_stops(self)
+        object.__setattr__(self, "damping", coefficient("damping", self.damping))
+
+    def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
+        return -self.damping * (positive_part(self.lower - q) + positive_part(q - self.upper)) * v
+
+
+def joint_stops(
+    lower: Any, upper: Any, stiffness: Any = 1e4, damping: Any = 1e3
+) -> tuple[JointStopSpring, JointStopDamper]:
+    """Both parts of joint stops; the limits of a robot are `robot.lower` and `robot.upper`."""
+    return JointStopSpring(lower, upper, stiffness), JointStopDamper(lower, upper, damping)
+
+
+def _check_stops(stops: Any) -> None:
+    for name in ("lower", "upper"):
+        stop = number(name, getattr(stops, name), infinite=True)
+        # A stop that does not exist lies where no depth can be reached, and inf − inf is avoided.
+        object.__setattr__(stops, name, np.clip(stop, -1e9, 1e9))
+    if not np.all(stops.lower < stops.upper):
+        raise EffectError(f"lower stops must lie below upper ones, got {stops.lower} and {stops.upper}")

@@ -1,0 +1,34 @@
+"""Spring in a joint: τ = −k (q − q₀), of energy ½ k (q − q₀)²."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, final
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.effects.effect import Conservative, coefficient, number
+from robot_dyn.model.dynamics import Dynamics
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Spring(Conservative):
+    """Torque proportional to the distance from a rest position: τ = −k (q − q₀).
+
+    Attributes:
+        stiffness: k, a scalar or (n,), in [N m/rad] or [N/m], not negative.
+        rest: q₀, a scalar or (n,), in [rad] or [m].
+    """
+
+    stiffness: Any
+    rest: Any = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "stiffness", coefficient("stiffness", self.stiffness))
+        object.__setattr__(self, "rest", number("rest", self.rest))
+
+    def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
+        return -self.stiffness * (q - self.rest)
+
+    def potential(self, dynamics: Dynamics, t: float, q: Array) -> Array:
+        return (self.stiffness * (q - self.rest) ** 2 / 2).sum(axis=-1)

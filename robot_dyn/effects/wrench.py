@@ -1,0 +1,52 @@
+"""External wrench on a link: τ = J(q)ᵀ F, constant or in a window of time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf
+from typing import Any, final
+
+from robot_dyn.arithmetic import Array, transpose
+from robot_dyn.arithmetic import apply as times
+from robot_dyn.effects.effect import Active, number
+from robot_dyn.errors import EffectError
+from robot_dyn.model.dynamics import Axes, Dynamics
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class ExternalWrench(Active):
+    """A force and a torque on a link: τ = Jᵀ F, with F and J in the same axes.
+
+    Attributes:
+        frame: The link.
+        wrench: F = (force, torque), (6,), in [N] and [N m].
+        expressed_in: "world_aligned": at the frame's origin, base axes; "body": its own axes; "world": at the base.
+        start_s: When it starts, in [s].
+        end_s: When it ends, in [s]; it acts for start_s ≤ t < end_s.
+    """
+
+    frame: str
+    wrench: Any
+    expressed_in: str = Axes.WORLD_ALIGNED
+    start_s: float = 0.0
+    end_s: float = inf
+
+    def __post_init__(self) -> None:
+        wrench = number("wrench", self.wrench)
+        if wrench.shape != (6,):
+            raise EffectError(f"wrench must be force and torque, shape (6,), got {wrench.shape}")
+        if not self.start_s < self.end_s:
+            raise EffectError(f"end_s must lie after start_s, got {self.start_s} and {self.end_s}")
+        object.__setattr__(self, "wrench", wrench)
+        object.__setattr__(self, "expressed_in", Axes.of(self.expressed_in))
+
+    @property
+    def switches(self) -> tuple[float, ...]:
+        return self.start_s, self.end_s
+
+    def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
+        if not self.start_s <= t < self.end_s:
+            return 0 * v
+        J = dynamics.jacobian(q, self.frame, expressed_in=self.expressed_in)
+        return times(transpose(J), self.wrench)

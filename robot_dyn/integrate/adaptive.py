@@ -1,0 +1,222 @@
+"""Methods that choose their steps: ‖local error / (atol + rtol |y|)‖ ≤ 1, by SciPy's DOP853 and Radau IIA of order 5.
+
+[Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed., 1993, II.4–II.6 and II.10; Hairer, Wanner,
+II, 2nd ed., 1996, IV.8]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum
+from math import inf
+from typing import Any, cast, final
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.errors import OverflowedError, QueryError
+from robot_dyn.integrate.implicit import jacobian
+from robot_dyn.integrate.integrator import System
+
+_LEAST_RTOL = 100 * np.finfo(float).eps  # SciPy's bound; below it rounding is taken for local error
+
+
+class Status(Enum):
+    """How a run ended."""
+
+    FINISHED = "finished"
+    STOPPED = "stopped"
+    FAILED = "failed"
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """The course of y from t0 to where the run ended, at every time between by the method's own interpolation.
+
+    Attributes:
+        times: Ends of the steps, shape (k,), the first is t0.
+        states: y there, shape (k, m).
+        evaluations: Of the rate, those for Jacobians and interpolation included.
+        status: How the run ended.
+        message: The same in words, with time and remedy if it failed.
+    """
+
+    times: np.ndarray
+    states: np.ndarray
+    evaluations: int
+    status: Status
+    message: str
+    _pieces: tuple[Any, ...] = field(repr=False)
+
+    def __post_init__(self) -> None:
+        self.times.setflags(write=False)
+        self.states.setflags(write=False)
+
+    def __call__(self, t: Any) -> np.ndarray:
+        """State at the times t, shape (...,): shape (..., m).
+
+        Raises:
+            QueryError: If a time is not within the run.
+        """
+        t = np.asarray(t, dtype=float)
+        low, high = sorted((self.times[0], self.times[-1]))
+        if not np.all((t >= low) & (t <= high)):
+            raise QueryError(f"t must be within the run, from {low} to {high}")
+        if not (self._pieces and t.size):
+            return np.broadcast_to(self.states[0], (*t.shape, self.states.shape[1])).copy()
+        from scipy.integrate import OdeSolution
+
+        return OdeSolution(self.times, self._pieces)(t.ravel()).T.reshape(*t.shape, -1)
+
+
+@final
+@dataclass(frozen=True)
+class Adaptive:
+    """An integrator with step-size control and dense output, in float64.
+
+    Tolerances bound the error of a step; that of the run is larger by what the system magnifies.
+
+    Attributes:
+        method: DOP853 (explicit, order 8) or Radau (implicit, order 5, L-stable).
+        rtol: Relative tolerance, 2.3e-14 at least.
+        atol: Absolute tolerance, in the unit of y, not negative.
+        max_step: Longest step, in the unit of t.
+
+    Raises:
+        QueryError: If an option has no meaning.
+    """
+
+    method: str = "DOP853"
+    rtol: float = 1e-10
+    atol: float = 1e-12
+    max_step: float = inf
+
+    def __post_init__(self) -> None:
+        if self.method not in ("DOP853", "Radau"):
+            raise QueryError(f"no adaptive method {self.method!r}: give 'DOP853' or 'Radau'")
+        if not _LEAST_RTOL < self.rtol < 1:
+            raise QueryError(f"rtol must be between {_LEAST_RTOL:.2g} and 1, got {self.rtol!r}")
+        if not 0 <= self.atol < inf:
+            raise QueryError(f"atol must be finite and not negative, got {self.atol!r}")
+        if not self.max_step > 0:
+            raise QueryError(f"max_step must be positive, got {self.max_step!r}")
+
+    def solve(
+        self,
+        system: System,
+        t0: float,
+        y0: Array,
+        t1: float,
+        stop: Callable[[float, Array], float] | None = None,
+    ) -> Solution:
+        """Integrate from t0 to t1.
+
+        Args:
+            system: The equation y' = f(t, y).
+            t0: Start.
+            y0: State there, shape (m,), float64: balls and longdouble have no adaptive method, batches no common step.
+            t1: End; earlier than t0 to go back.
+            stop: A function of (t, y); the run stops where it first changes sign, if it is given.
+
+        Returns:
+            The solution up to where the run ended; a run that fails says so in its status and keeps what it has.
+
+        Raises:
+            QueryError: If y0, t0 or t1 is unfit.
+        """
+        y0 = _initial_state(y0)
+        if not (np.isfinite([t0, t1]).all() and t0 != t1):
+            raise QueryError(f"t0 and t1 must be finite and differ, got {t0!r} and {t1!r}")
+        run = _Run(system, stop, float(t0), y0)
+        with np.errstate(all="ignore"):  # overflow in a trial step shortens it, or ends the run with a status
+            status, message = run.to(self, float(t1))
+        return Solution(np.array(run.times), np.array(run.states), run.evaluations, status, message, tuple(run.pieces))
+
+
+class _NotFiniteError(Exception):
+    """Internal: the rate or its Jacobian is not finite where the solver needs it."""
+
+
+@final
+class _Run:
+    """The steps made so far."""
+
+    def __init__(self, system: System, stop: Callable[[float, Array], float] | None, t0: float, y0: Array) -> None:
+        self.system, self.stop = System(self._rate, system.n), stop
+        self._counted, self.evaluations = system.rate, 0
+        self.times, self.states, self.pieces = [t0], [y0], []
+
+    def _rate(self, t: Any, y: Array) -> Array:
+        self.evaluations += y.size // y.shape[-1]
+        try:
+            return self._counted(t, y)
+        except OverflowedError:  # a trial step went too far; the solver tries a shorter one
+            return np.full_like(y, np.nan)
+
+    def _jacobian(self, t: Any, y: Array) -> Array:
+        J = jacobian(self.system, t, y)
+        if not np.isfinite(J).all():
+            raise _NotFiniteError
+        return J
+
+    def to(self, options: Adaptive, t1: float) -> tuple[Status, str]:
+        """Step until t1, a stop or a failure."""
+        from scipy.integrate import DOP853, Radau
+
+        settings: dict[str, Any] = {"rtol": options.rtol, "atol": options.atol, "max_step": options.max_step}
+        if options.method == "Radau":
+            settings["jac"] = self._jacobian
+        make: Any = {"DOP853": DOP853, "Radau": Radau}[options.method]
+        try:
+            solver = make(self.system.rate, self.times[0], self.states[0], t1, **settings)
+            while solver.status == "running":
+                if not np.isfinite(solver.f).all():
+                    raise _NotFiniteError
+                solver.step()
+                if solver.status == "failed":
+                    return self._failed("the step became smaller than the spacing of floats")
+                if self._add(solver):
+                    return Status.STOPPED, f"stopped at t = {self.times[-1]}"
+        except _NotFiniteError:
+            return self._failed("the rate is not finite")
+        return Status.FINISHED, f"finished at t = {self.times[-1]}"
+
+    def _failed(self, what: str) -> tuple[Status, str]:
+        where = f"{what} at t = {self.times[-1]}, max |y| = {np.abs(self.states[-1]).max():.3g}"
+        return Status.FAILED, f"{where}: y grows without bound, or tolerances are too tight"
+
+    def _add(self, solver: Any) -> bool:
+        """Keep the step just made, up to where `stop` changes sign; tell whether it does."""
+        piece, t, y = solver.dense_output(), float(solver.t), solver.y
+        self.pieces.append(piece)
+        stopped = False
+        if self.stop is not None:
+            before, after = self.stop(self.times[-1], self.states[-1]), self.stop(t, y)
+            stopped = bool(before * after < 0 or (after == 0 and before != 0))
+            if stopped and after != 0:
+                t = self._crossing(piece, self.times[-1], t)
+                y = piece(t)
+        self.times.append(t)
+        self.states.append(y.copy())
+        return stopped
+
+    def _crossing(self, piece: Any, t0: float, t1: float) -> float:
+        from scipy.optimize import brentq
+
+        stop, root = cast(Any, self.stop), cast(Any, brentq)
+        # the ends are states, which interpolation meets up to rounding: the sign must not depend on that
+        ends = {t0: stop(t0, self.states[-1]), t1: -stop(t0, self.states[-1])}
+        t = float(root(lambda t: ends.get(t) or stop(t, piece(t)), t0, t1, xtol=4e-16 * max(1, abs(t1))))
+        return t if t != t0 else float(np.nextafter(t0, t1))  # times ascend
+
+
+def _initial_state(y0: Array) -> np.ndarray:
+    given = np.asarray(y0)
+    if given.dtype.kind not in "fiu" or given.dtype.itemsize > 8 or given.ndim != 1 or not given.size:
+        raise QueryError(f"y0 must be float64 of shape (m,), got {given.dtype} of shape {given.shape}")
+    y = given.astype(float)
+    if not np.isfinite(y).all():
+        raise QueryError(f"y0 must be finite, got {y}")
+    return y

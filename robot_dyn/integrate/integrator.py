@@ -1,0 +1,100 @@
+"""What a fixed-step method is: a map y ↦ y⁺ of one step h that approximates the flow of y' = f(t, y).
+
+A method of order p errs by O(hᵖ⁺¹) in one step and by O(hᵖ) after a fixed time. [Hairer, Nørsett, Wanner, Solving
+Ordinary Differential Equations I, 2nd ed., 1993, II.3]
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, ClassVar, final
+
+import numpy as np
+
+from robot_dyn.arithmetic import Arithmetic, Array, Ball, Float
+from robot_dyn.errors import QueryError, RobotDynError
+
+_FLOATS = {np.dtype(kind): Float(np.dtype(kind)) for kind in (np.float32, np.float64, np.longdouble)}
+_BALL = Ball()  # makes its numbers in the precision of the caller's scope
+
+
+class IntegrationError(RobotDynError):
+    """A step that cannot be made, such as one with a stage iteration that does not converge.
+
+    Attributes:
+        t: Time at which the step starts.
+    """
+
+    def __init__(self, message: str, t: Any) -> None:
+        super().__init__(message)
+        self.t = t
+
+
+@final
+@dataclass(frozen=True)
+class System:
+    """An ordinary differential equation y' = f(t, y).
+
+    y is (q, v, w): n positions, n velocities (or momenta) and any number of quadratures, w' = power, say, which do not
+    act back on q and v. Only the methods that treat positions and velocities differently read n.
+
+    Attributes:
+        rate: f(t, y), a fresh array of the shape of y, (..., m); batch axes come first.
+        n: Number of positions, 0 if y has no such parts.
+    """
+
+    rate: Callable[[Any, Array], Array]
+    n: int
+
+
+class Integrator(ABC):
+    """A method that makes one step of given size. A value without state: two runs share nothing.
+
+    Attributes:
+        name: As a scene file says it.
+        order: Order of convergence p, of the nodes h, 2 h, ….
+        evaluations_per_step: Of the rate in a step, or None where it depends on the state.
+        canonical: Whether it keeps the structure of a Hamiltonian system, which has to be given in (q, p), p = M v.
+        stiff: Whether its step is not bounded by the fastest decay of the system.
+    """
+
+    name: str
+    order: int
+    evaluations_per_step: int | None
+    canonical: ClassVar[bool] = False
+    stiff: ClassVar[bool] = False
+
+    @abstractmethod
+    def step(self, system: System, t: Any, y: Array, h: Any) -> Array:
+        """The state at t + h.
+
+        Args:
+            system: The equation y' = f(t, y).
+            t: Time, a number of the kind of y or a float.
+            y: State, shape (..., m), of floats or balls; the step runs in its arithmetic.
+            h: Step, in the unit of t. Negative for a step back.
+
+        Returns:
+            A fresh array of the shape and kind of y.
+
+        Raises:
+            IntegrationError: If the stages of an implicit method cannot be solved for.
+            QueryError: If y is of a kind of number that the method cannot take.
+        """
+
+
+def arithmetic_like(y: Array) -> Arithmetic:
+    """The arithmetic of an array: that of its float dtype, or balls if it holds objects.
+
+    Raises:
+        QueryError: If it holds other numbers, such as integers.
+    """
+    if y.dtype == object:
+        return _BALL
+    if y.dtype not in _FLOATS:
+        raise QueryError(
+            f"y must hold float32, float64, longdouble or balls, got {y.dtype}: convert it, as y.astype(float)"
+        )
+    return _FLOATS[y.dtype]

@@ -1,0 +1,45 @@
+"""The fixed-step methods by the names of a scene file.
+
+    y⁺ = method(name).step(system, t, y, h)
+
+Each names its source where it is defined: Hairer, Nørsett, Wanner (two volumes), or Hairer, Lubich, Wanner.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+from robot_dyn.errors import QueryError, nearest, shorten
+from robot_dyn.integrate.explicit import EXPLICIT_EULER, MIDPOINT, RK4, SemiImplicitEuler, order_8
+from robot_dyn.integrate.gauss import Gauss
+from robot_dyn.integrate.implicit import SDIRK_3, LinearlyImplicitEuler
+from robot_dyn.integrate.integrator import Integrator
+
+_READY = (
+    EXPLICIT_EULER,
+    SemiImplicitEuler(),
+    MIDPOINT,
+    RK4,
+    Gauss(2),
+    Gauss(4),
+    Gauss(6),
+    LinearlyImplicitEuler(),
+    SDIRK_3,
+)
+
+# How to get each; order_8 takes its coefficients from SciPy when asked for, so that this module stays light.
+METHODS: Mapping[str, Callable[[], Integrator]] = MappingProxyType(
+    {**{each.name: lambda each=each: each for each in _READY}, "order_8": order_8}
+)
+
+
+def method(name: str) -> Integrator:
+    """The fixed-step method of that name.
+
+    Raises:
+        QueryError: If there is none, with the nearest names.
+    """
+    if name not in METHODS:
+        raise QueryError(f"no integration method {shorten(name)!r}; {nearest(name, METHODS)}")
+    return METHODS[name]()

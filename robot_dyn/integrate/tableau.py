@@ -1,0 +1,133 @@
+"""The coefficients of a Runge–Kutta method as data.
+
+    k_i = f(t + c_i h, y + h Σ_j a_ij k_j),    y⁺ = y + h Σ_i b_i k_i
+
+[Butcher, 1964; Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed., 1993, II.1 and II.7]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from math import sqrt as root
+from typing import Any, NamedTuple, final
+
+import numpy as np
+
+from robot_dyn.arithmetic import Arithmetic, Array, sqrt
+from robot_dyn.errors import QueryError
+from robot_dyn.integrate.integrator import arithmetic_like
+
+_ROUNDINGS = 8  # of float64, relative to Σ |a_ij|, that a row may be off by
+
+
+@final
+@dataclass(frozen=True)
+class Surd:
+    """The number rational + factor · √radicand, of which every arithmetic makes its own nearest one."""
+
+    rational: Fraction
+    factor: Fraction
+    radicand: int
+
+    def __float__(self) -> float:
+        return float(self.rational) + float(self.factor) * root(self.radicand)
+
+
+Coefficient = int | Fraction | float | Surd
+Row = tuple[tuple[int, Any], ...]  # (j, a_ij) of the coefficients that are not zero, j ascending
+
+
+class Numbers(NamedTuple):
+    """A tableau in one arithmetic."""
+
+    arithmetic: Arithmetic
+    a: tuple[Row, ...]
+    b: Row
+    c: tuple[Any, ...]
+
+
+@final
+@dataclass(frozen=True)
+class ButcherTableau:
+    """Coefficients a, b, c of a Runge–Kutta method, exact where they are fractions or surds.
+
+    Attributes:
+        a: One row a stage; a row may end early, its further entries are zero.
+        b: Weights, Σ b_i = 1.
+        c: Nodes, c_i = Σ_j a_ij.
+        order: Order of convergence that the source states; not checked here, but measured in the tests.
+
+    Raises:
+        QueryError: If the lengths do not fit, or a sum is off by more than rounding.
+    """
+
+    a: tuple[tuple[Coefficient, ...], ...]
+    b: tuple[Coefficient, ...]
+    c: tuple[Coefficient, ...]
+    order: int
+    _in_floats: dict[np.dtype, Numbers] = field(default_factory=dict, init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        stages = len(self.b)
+        if not stages or len(self.a) != stages or len(self.c) != stages or any(len(row) > stages for row in self.a):
+            raise QueryError(f"a tableau of {stages} weights needs {stages} nodes and rows of {stages} entries at most")
+        if self.order < 1:
+            raise QueryError(f"order must be positive, got {self.order}")
+        _require_sum("b", self.b, 1)
+        for i, (row, node) in enumerate(zip(self.a, self.c, strict=True)):
+            _require_sum(f"a[{i}]", row, node)
+
+    @property
+    def explicit(self) -> bool:
+        """Whether each stage needs only those before it."""
+        return all(len(row) <= i for i, row in enumerate(self.a))
+
+    def numbers(self, y: Array) -> Numbers:
+        """The coefficients in the arithmetic of y.
+
+        Raises:
+            QueryError: If y holds neither floats nor balls.
+        """
+        known = self._in_floats.get(y.dtype)
+        if known is not None:
+            return known
+        kind = arithmetic_like(y)
+        made = Numbers(
+            kind,
+            tuple(_nonzero(kind, row) for row in self.a),
+            _nonzero(kind, self.b),
+            tuple(_number(kind, node) for node in self.c),
+        )
+        if y.dtype != object:  # balls change with the precision, which is the caller's
+            self._in_floats[y.dtype] = made
+        return made
+
+
+def combine(row: Row, k: Sequence[Array] | Array) -> Array:
+    """Σ_j a_ij k_j over the coefficients that are not zero; at least one must be."""
+    (first, weight), *rest = row
+    total = k[first] * weight
+    for j, weight in rest:
+        total = total + k[j] * weight
+    return total
+
+
+def _require_sum(name: str, row: Sequence[Coefficient], expected: Coefficient) -> None:
+    total, size = sum(map(float, row)), sum(abs(float(entry)) for entry in row)
+    if not abs(total - float(expected)) <= _ROUNDINGS * np.finfo(float).eps * max(size, 1.0):
+        raise QueryError(f"tableau: the sum of {name} must be {float(expected)!r}, got {total!r}")
+
+
+def _nonzero(kind: Arithmetic, row: Sequence[Coefficient]) -> Row:
+    return tuple((j, _number(kind, entry)) for j, entry in enumerate(row) if float(entry) != 0)
+
+
+def _number(kind: Arithmetic, coefficient: Coefficient) -> Any:
+    if isinstance(coefficient, Surd):
+        surd = sqrt(kind.array([coefficient.radicand]))[0]
+        return _number(kind, coefficient.rational) + _number(kind, coefficient.factor) * surd
+    if isinstance(coefficient, float):
+        return kind.number(float(coefficient))
+    return kind.number(coefficient.numerator) / kind.number(coefficient.denominator)

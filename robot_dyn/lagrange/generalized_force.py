@@ -1,0 +1,154 @@
+"""Particles in generalised coordinates: positions r_i(t, q), forces F_i, and what they become on the coordinates.
+
+    Q_j = Σ_i F_i · ∂r_i/∂q_j,   ṙ_i = (∂r_i/∂q) v + ∂r_i/∂t,   K = Σ_i ½ m_i ‖ṙ_i‖²
+
+N particles with k holonomic constraints, which may move, have 3N − k coordinates q. [Goldstein, 3rd ed., §1.4]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.errors import OverflowedError, QueryError
+from robot_dyn.lagrange.euler_lagrange import EulerLagrange, Potential, euler_lagrange, traced
+from robot_dyn.model.inertia import numbers
+
+Positions = Callable[[Any, Any], Sequence[Any]]
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class GeneralizedForce:
+    """Forces on N particles as forces on n coordinates; made by `generalized_force`.
+
+    Arguments are t in [s] and q (n,). QueryError for a wrong shape or a value that is not finite.
+
+    Attributes:
+        n: Number of coordinates.
+        count: Number of particles N.
+        kernels: CasADi functions of (t, q) by name.
+    """
+
+    n: int
+    count: int
+    kernels: dict[str, Any]
+
+    def __call__(self, t: float, q: Any, forces: Any) -> np.ndarray:
+        """Q_j = Σ_i F_i · ∂r_i/∂q_j, shape (n,), such that the virtual work Σ F_i · δr_i is Q · δq.
+
+        Args:
+            t: Time, in [s].
+            q: Coordinates, shape (n,).
+            forces: F_i, shape (N, 3), in [N].
+        """
+        forces = numbers("forces", forces, self.count, 3)
+        if forces.ndim > 2:
+            raise QueryError(f"forces must have shape ({self.count}, 3), got {forces.shape}")
+        return np.einsum("ik,ikj->j", forces, self.jacobian(t, q))
+
+    def positions(self, t: float, q: Any) -> np.ndarray:
+        """r_i, shape (N, 3), in [m]."""
+        return self._evaluate("r", t, q).reshape(self.count, 3)
+
+    def jacobian(self, t: float, q: Any) -> np.ndarray:
+        """∂r_i/∂q_j at index [i, :, j], shape (N, 3, n)."""
+        return self._evaluate("J", t, q).reshape(self.count, 3, self.n)
+
+    def _evaluate(self, name: str, t: Any, q: Any) -> np.ndarray:
+        t, q = numbers("t", t), numbers("q", q, self.n)
+        if t.ndim or q.ndim > 1:
+            raise QueryError(f"t must be one time and q have shape ({self.n},), got {t.shape} and {q.shape}")
+        result = self.kernels[name](t, q).full()
+        if not np.isfinite(result).all():
+            raise OverflowedError("positions or their derivatives are not finite at this q")
+        return result
+
+
+def generalized_force(positions: Positions, n: int) -> GeneralizedForce:
+    """The map from forces on particles to generalised forces, Q_j = Σ_i F_i · ∂r_i/∂q_j.
+
+    Args:
+        positions: r(t, q), a sequence of N vectors of 3, written in CasADi's operations as for `euler_lagrange`.
+        n: Number of coordinates.
+
+    Raises:
+        QueryError: If n is not a positive integer, or a position cannot be evaluated or is no 3-vector.
+
+    Source: Goldstein, 3rd ed., eq. 1.49.
+    """
+    import casadi as ca
+
+    if isinstance(n, bool) or not isinstance(n, int) or n < 1:
+        raise QueryError(f"n must be the number of coordinates, 1 or more; got {n!r}")
+    t, q = ca.SX.sym("t"), ca.SX.sym("q", n)
+    r = _positions(positions, t, q)
+    expressions = {"r": r, "J": ca.jacobian(r, q)}
+    kernels = {name: ca.Function(name, [t, q], [ca.densify(x)]) for name, x in expressions.items()}
+    return GeneralizedForce(n, r.shape[0] // 3, kernels)
+
+
+def lagrangian_of_particles(
+    masses: Sequence[float],
+    positions: Positions,
+    n: int,
+    *,
+    gravity: Any = (0.0, 0.0, 0.0),
+    potential: Potential | None = None,
+) -> EulerLagrange:
+    """The equation of motion of N particles whose constraints, fixed or moving, are solved by r_i(t, q).
+
+        K = Σ ½ m_i ‖(∂r_i/∂q) v + ∂r_i/∂t‖²,   V = V_extra − Σ m_i gᵀ r_i
+
+    Args:
+        masses: m_i, N positive numbers, in [kg].
+        positions: r(t, q), a sequence of N vectors of 3, in [m], written in CasADi's operations.
+        n: Number of coordinates, 3N − k.
+        gravity: g, shape (3,), in [m/s²].
+        potential: V_extra(t, q) in [J], such as springs between the particles.
+
+    Raises:
+        QueryError: If a shape is wrong, a mass is not positive, or a function cannot be evaluated.
+    """
+    import casadi as ca
+
+    m, g = numbers("masses", masses), numbers("gravity", gravity, 3)
+    if m.ndim != 1 or not np.all(m > 0) or g.ndim > 1:
+        raise QueryError(f"masses must be positive, shape (N,), and gravity (3,); got {m} and shape {g.shape}")
+    weights = ca.DM(np.repeat(m, 3))
+
+    def kinetic(t: Any, q: Any, v: Any) -> Any:
+        r = placed(t, q)
+        velocity = ca.jacobian(r, q) @ v + ca.jacobian(r, t)
+        return ca.dot(weights * velocity, velocity) / 2
+
+    def total_potential(t: Any, q: Any) -> Any:
+        extra = 0 if potential is None else potential(t, q)
+        return extra - ca.dot(weights * ca.DM(np.tile(g, len(m))), placed(t, q))
+
+    def placed(t: Any, q: Any) -> Any:
+        r = _positions(positions, t, q)
+        if r.shape[0] != 3 * len(m):
+            raise QueryError(f"{len(m)} masses but {r.shape[0] // 3} positions; give one mass a particle")
+        return r
+
+    return euler_lagrange(kinetic, total_potential, n)
+
+
+def _positions(positions: Positions, t: Any, q: Any) -> Any:
+    """All positions below each other, (3N, 1)."""
+    import casadi as ca
+
+    try:
+        vectors = list(positions(t, q))
+    except QueryError:
+        raise
+    except Exception as error:
+        reason = (str(error).strip().splitlines() or [type(error).__name__])[0]
+        raise QueryError(f"positions(t, q) cannot be evaluated on CasADi symbols ({reason})") from error
+    if not vectors:
+        raise QueryError("positions(t, q) must give one particle at least")
+    return ca.vertcat(*(traced(f"position {i}", lambda *_, r=r: r, (t, q), (3, 1)) for i, r in enumerate(vectors)))

@@ -1,0 +1,192 @@
+"""Newton–Euler: the motion of one rigid body under a wrench, in world axes and in body axes.
+
+    world axes   m p̈ = f,             I_s ω̇ + ω × I_s ω = τ,   I_s = R I Rᵀ
+    body axes    m v̇ + ω × m v = f,   I ω̇ + ω × I ω = τ
+
+p is the centre of mass and the wrench (f, τ) acts there; the body's frame sits at it, turned by R. In world axes the
+twist is (ṗ, ω), in body axes (v, ω) = (Rᵀ ṗ, Rᵀ ω_s). The world-axes twist is not the spatial twist ġg⁻¹ of the frame,
+whose linear part is ṗ + p × ω. Arrays are float64 and may carry batch axes in front.
+[Murray, Li, Sastry 1994, ch. 4 §2.4]
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from robot_dyn.arithmetic import NotPositiveDefiniteError, apply, cholesky_solve, transpose
+from robot_dyn.errors import OverflowedError, QueryError
+from robot_dyn.model.inertia import MassProperties, numbers, rotation_matrix
+
+_too_large_shows_in_the_result = np.errstate(over="ignore", invalid="ignore")
+
+
+@_too_large_shows_in_the_result
+def world_wrench(body: MassProperties, R: Any, omega: Any, acceleration: Any) -> np.ndarray:
+    """Wrench that gives an acceleration, in world axes: (m p̈, I_s ω̇ + ω × I_s ω).
+
+    Args:
+        body: Mass and inertia; its `com` plays no part, for p is the centre of mass.
+        R: Rotation from body axes to world axes, shape (..., 3, 3).
+        omega: Angular velocity ω in world axes, shape (..., 3), in [rad/s].
+        acceleration: (p̈, ω̇) in world axes, shape (..., 6), in [m/s²] and [rad/s²].
+
+    Returns:
+        (f, τ) at the centre of mass in world axes, shape (..., 6), in [N] and [N m].
+
+    Raises:
+        QueryError: If a shape is wrong, a value is not finite, or R is no rotation.
+    """
+    R, omega = rotation_matrix(R), numbers("omega", omega, 3)
+    acceleration = numbers("acceleration", acceleration, 6)
+    _batches(R=R[..., 0], omega=omega, acceleration=acceleration)
+    I_s = R @ body.inertia @ transpose(R)
+    torque = apply(I_s, acceleration[..., 3:]) + np.cross(omega, apply(I_s, omega))
+    return _pair(body.mass * acceleration[..., :3], torque)
+
+
+@_too_large_shows_in_the_result
+def world_acceleration(body: MassProperties, R: Any, omega: Any, wrench: Any) -> np.ndarray:
+    """Acceleration under a wrench, in world axes: (f / m, I_s⁻¹ (τ − ω × I_s ω)).
+
+    Args:
+        body: Mass and inertia.
+        R: Rotation from body axes to world axes, shape (..., 3, 3).
+        omega: Angular velocity ω in world axes, shape (..., 3), in [rad/s].
+        wrench: (f, τ) at the centre of mass in world axes, shape (..., 6), in [N] and [N m].
+
+    Returns:
+        (p̈, ω̇) in world axes, shape (..., 6), in [m/s²] and [rad/s²].
+
+    Raises:
+        QueryError: As `world_wrench`, or if the inertia is singular.
+    """
+    R, omega, wrench = rotation_matrix(R), numbers("omega", omega, 3), numbers("wrench", wrench, 6)
+    _batches(R=R[..., 0], omega=omega, wrench=wrench)
+    I_s = R @ body.inertia @ transpose(R)
+    torque = wrench[..., 3:] - np.cross(omega, apply(I_s, omega))
+    return _pair(wrench[..., :3] / body.mass, apply(R, _solve(body, apply(transpose(R), torque))))
+
+
+@_too_large_shows_in_the_result
+def body_wrench(body: MassProperties, twist: Any, rate: Any) -> np.ndarray:
+    """Wrench that gives a change of twist, in body axes: (m v̇ + ω × m v, I ω̇ + ω × I ω).
+
+    Args:
+        body: Mass and inertia.
+        twist: (v, ω) of the centre of mass in body axes, shape (..., 6), in [m/s] and [rad/s].
+        rate: (v̇, ω̇), the derivative of these components, shape (..., 6), in [m/s²] and [rad/s²].
+
+    Returns:
+        (f, τ) at the centre of mass in body axes, shape (..., 6), in [N] and [N m].
+
+    Raises:
+        QueryError: If a shape is wrong or a value is not finite.
+    """
+    twist, rate = numbers("twist", twist, 6), numbers("rate", rate, 6)
+    _batches(twist=twist, rate=rate)
+    force, torque = _gyroscopic(body, twist)
+    return _pair(body.mass * rate[..., :3] + force, apply(body.inertia, rate[..., 3:]) + torque)
+
+
+@_too_large_shows_in_the_result
+def body_acceleration(body: MassProperties, twist: Any, wrench: Any) -> np.ndarray:
+    """Change of twist under a wrench, in body axes: (f/m − ω × v, I⁻¹ (τ − ω × I ω)); Euler's equations.
+
+    Args:
+        body: Mass and inertia.
+        twist: (v, ω) of the centre of mass in body axes, shape (..., 6), in [m/s] and [rad/s].
+        wrench: (f, τ) at the centre of mass in body axes, shape (..., 6), in [N] and [N m].
+
+    Returns:
+        (v̇, ω̇), shape (..., 6), in [m/s²] and [rad/s²].
+
+    Raises:
+        QueryError: If a shape is wrong, a value is not finite, or the inertia is singular.
+    """
+    twist, wrench = numbers("twist", twist, 6), numbers("wrench", wrench, 6)
+    _batches(twist=twist, wrench=wrench)
+    force, torque = _gyroscopic(body, twist)
+    return _pair((wrench[..., :3] - force) / body.mass, _solve(body, wrench[..., 3:] - torque))
+
+
+@_too_large_shows_in_the_result
+def kinetic_energy(body: MassProperties, twist: Any) -> np.ndarray:
+    """K = ½ m ‖ṗ‖² + ½ ωᵀ I ω in [J], shape (...), from the twist (v, ω) of the centre of mass in body axes (..., 6).
+
+    There, and only there, no term mixes v and ω; `MassProperties.spatial` serves every other point.
+
+    Raises:
+        QueryError: If the shape is wrong or a value is not finite.
+    """
+    twist = numbers("twist", twist, 6)
+    v, omega = twist[..., :3], twist[..., 3:]
+    return _finite((body.mass * (v * v).sum(-1) + (omega * apply(body.inertia, omega)).sum(-1)) / 2)
+
+
+@_too_large_shows_in_the_result
+def point_velocity(twist: Any, r: Any) -> np.ndarray:
+    """Velocity ṗ = ṗ_c + ω × r of the point at r from the centre of mass, all in the same axes; (..., 3), in [m/s].
+
+    Args:
+        twist: (ṗ_c, ω), shape (..., 6), in [m/s] and [rad/s].
+        r: Shape (..., 3), in [m].
+
+    Raises:
+        QueryError: If a shape is wrong or a value is not finite.
+    """
+    twist, r = numbers("twist", twist, 6), numbers("r", r, 3)
+    _batches(twist=twist, r=r)
+    return _finite(twist[..., :3] + np.cross(twist[..., 3:], r))
+
+
+@_too_large_shows_in_the_result
+def angular_momentum(body: MassProperties, R: Any, omega: Any) -> np.ndarray:
+    """Angular momentum I_s ω about the centre of mass in world axes, (..., 3), in [N m s]; kept when no torque acts.
+
+    Args:
+        body: Mass and inertia.
+        R: Rotation from body axes to world axes, shape (..., 3, 3).
+        omega: Angular velocity in world axes, shape (..., 3), in [rad/s].
+
+    Raises:
+        QueryError: If a shape is wrong, a value is not finite, or R is no rotation.
+    """
+    R, omega = rotation_matrix(R), numbers("omega", omega, 3)
+    _batches(R=R[..., 0], omega=omega)
+    return _finite(apply(R @ body.inertia @ transpose(R), omega))
+
+
+def _gyroscopic(body: MassProperties, twist: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """ω × m v and ω × I ω."""
+    v, omega = twist[..., :3], twist[..., 3:]
+    return np.cross(omega, body.mass * v), np.cross(omega, apply(body.inertia, omega))
+
+
+def _solve(body: MassProperties, torque: np.ndarray) -> np.ndarray:
+    try:
+        return cholesky_solve(np.broadcast_to(body.inertia, (*torque.shape[:-1], 3, 3)), torque)
+    except NotPositiveDefiniteError:
+        raise QueryError(
+            "no angular acceleration: the inertia is singular, as of points on a line; give it extent"
+        ) from None
+
+
+def _batches(**arrays: np.ndarray) -> None:
+    try:
+        np.broadcast_shapes(*(array.shape[:-1] for array in arrays.values()))
+    except ValueError:
+        shapes = ", ".join(f"{name} {array.shape[:-1]}" for name, array in arrays.items())
+        raise QueryError(f"batch axes do not match: {shapes}") from None
+
+
+def _pair(linear: np.ndarray, angular: np.ndarray) -> np.ndarray:
+    batch = np.broadcast_shapes(linear.shape, angular.shape)
+    return _finite(np.concatenate([np.broadcast_to(linear, batch), np.broadcast_to(angular, batch)], axis=-1))
+
+
+def _finite(result: np.ndarray) -> np.ndarray:
+    if not np.isfinite(result).all():
+        raise OverflowedError("the result is too large for float64; check the units of the arguments")
+    return result

@@ -1,0 +1,155 @@
+"""The effects a scene can name: edits of the robot (gravity, lock, payload, armature) and effects of the plant."""
+
+from __future__ import annotations
+
+from math import inf
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from robot_dyn.effects.actuator import EffortLimit
+from robot_dyn.effects.effect import Effect
+from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFriction
+from robot_dyn.effects.joint_limit import joint_stops
+from robot_dyn.effects.spring import Spring
+from robot_dyn.effects.wrench import ExternalWrench
+from robot_dyn.model.edits import STANDARD_GRAVITY, Payload
+from robot_dyn.model.robot import Robot
+from robot_dyn.scene.schema import NotNegative, Number, Part, PerJoint, Positive, Stated, Vector3, per_joint
+
+
+class Gravity(Part):
+    """Gravity, standard unless said."""
+
+    kind: Literal["gravity"]
+    acceleration_m_s2: Vector3 = STANDARD_GRAVITY
+
+    def edit(self, robot: Robot) -> Robot:
+        """The robot in this gravity."""
+        return robot.with_(gravity=self.acceleration_m_s2)
+
+
+class Lock(Part):
+    """Joints held at a value."""
+
+    kind: Literal["lock"]
+    joints: dict[str, Number]
+
+    def edit(self, robot: Robot) -> Robot:
+        """The robot with these joints held."""
+        return robot.with_(lock=self.joints)
+
+
+class Load(Part):
+    """A payload."""
+
+    kind: Literal["payload"]
+    frame: str
+    mass_kg: NotNegative
+    com_m: Vector3 = (0.0, 0.0, 0.0)
+    inertia_kg_m2: tuple[Vector3, Vector3, Vector3] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+    def edit(self, robot: Robot) -> Robot:
+        """The robot that carries it."""
+        return robot.with_(payload=Payload(self.frame, self.mass_kg, self.com_m, self.inertia_kg_m2))
+
+
+class Armature(Part):
+    """Inertia of the drives."""
+
+    kind: Literal["armature"]
+    inertia_kg_m2: PerJoint
+
+    def edit(self, robot: Robot) -> Robot:
+        """The robot with these drives."""
+        return robot.with_(armature=self.inertia_kg_m2)
+
+
+class Viscous(Part):
+    """Viscous friction."""
+
+    kind: Literal["viscous_friction"]
+    damping_N_m_s_per_rad: Stated = "urdf"
+
+    def build(self, robot: Robot) -> tuple[Effect, ...]:
+        """The effect."""
+        return (ViscousFriction(per_joint("damping", self.damping_N_m_s_per_rad, robot, robot.damping)),)
+
+
+class RegularisedCoulomb(Part):
+    """Dry friction, regularised."""
+
+    kind: Literal["regularised_coulomb_friction"]
+    friction_N_m: Stated = "urdf"
+    velocity_scale_rad_per_s: Positive = 0.01
+
+    def build(self, robot: Robot) -> tuple[Effect, ...]:
+        """The effect."""
+        friction = per_joint("friction", self.friction_N_m, robot, robot.friction)
+        return (RegularisedCoulombFriction(friction, self.velocity_scale_rad_per_s),)
+
+
+class JointSpring(Part):
+    """Springs in the joints."""
+
+    kind: Literal["spring"]
+    stiffness_N_m_per_rad: PerJoint
+    rest_rad: PerJoint = 0.0
+
+    def build(self, robot: Robot) -> tuple[Effect, ...]:
+        """The effect."""
+        stiffness = per_joint("stiffness", self.stiffness_N_m_per_rad, robot)
+        return (Spring(stiffness, per_joint("rest", self.rest_rad, robot)),)
+
+
+class JointStops(Part):
+    """Joint stops, at the limits of the file unless said."""
+
+    kind: Literal["joint_stops"]
+    lower_rad: Stated = "urdf"
+    upper_rad: Stated = "urdf"
+    stiffness_N_m_per_rad: PerJoint = 1e4
+    damping_N_m_s_per_rad2: PerJoint = 1e3
+
+    def build(self, robot: Robot) -> tuple[Effect, ...]:
+        """The elastic and the dissipative part."""
+        return joint_stops(
+            per_joint("lower", self.lower_rad, robot, robot.lower, elsewhere=-1e9),
+            per_joint("upper", self.upper_rad, robot, robot.upper, elsewhere=1e9),
+            per_joint("stiffness", self.stiffness_N_m_per_rad, robot),
+            per_joint("damping", self.damping_N_m_s_per_rad2, robot),
+        )
+
+
+class Wrench(Part):
+    """A wrench on a link."""
+
+    kind: Literal["external_wrench"]
+    frame: str
+    force_N: Vector3 = (0.0, 0.0, 0.0)
+    torque_N_m: Vector3 = (0.0, 0.0, 0.0)
+    expressed_in: Literal["world_aligned", "body", "world"] = "world_aligned"
+    start_s: NotNegative = 0.0
+    end_s: Positive | None = None
+
+    def build(self, robot: Robot) -> tuple[Effect, ...]:
+        """The effect; an unknown link is told now."""
+        robot.jacobian([0.0] * robot.n, self.frame)
+        end = inf if self.end_s is None else self.end_s
+        return (ExternalWrench(self.frame, [*self.force_N, *self.torque_N_m], self.expressed_in, self.start_s, end),)
+
+
+class Effort(Part):
+    """Effort limits, those of the file unless said."""
+
+    kind: Literal["effort_limit"]
+    limit_N_m: Stated = "urdf"
+
+    def build(self, robot: Robot) -> tuple[Effect, ...]:
+        """The bound."""
+        return (EffortLimit(per_joint("limit", self.limit_N_m, robot, robot.effort_limit, elsewhere=inf)),)
+
+
+Edit = Gravity | Lock | Load | Armature
+Acting = Viscous | RegularisedCoulomb | JointSpring | JointStops | Wrench | Effort
+AnyEffect = Annotated[Edit | Acting, Field(discriminator="kind")]

@@ -1,0 +1,94 @@
+"""What a scene integrates: the equation term by term, what is in it, what is not, and where each number came from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, get_args
+
+import numpy as np
+
+from robot_dyn.scene.effects import Acting, Edit
+from robot_dyn.scene.scene import ADAPTIVE, Scene
+from robot_dyn.scene.schema import Part
+from robot_dyn.simulation.setup import Setup
+
+_TERMS = {
+    "viscous_friction": "−b v",
+    "regularised_coulomb_friction": "−f tanh(v / v_s)",
+    "spring": "−k (q − q₀)",
+    "joint_stops": "k (δ₋ − δ₊) − c (δ₋ + δ₊) v",
+    "external_wrench": "Jᵀ F",
+    "effort_limit": "|u| ≤ u_max",
+}
+_EDITS = {
+    "gravity": "∂V/∂q in N, with V = −Σ m gᵀ p",
+    "lock": "a joint held, its link part of the one before",
+    "payload": "a body more in M, C and N",
+    "armature": "a constant diagonal in M",
+}
+_LAWS = {
+    "pd": "u = kp (q_d − q) + kd (v_d − v)",
+    "pid": "u = sat(kp e + kd ė + z),  ż = ki e + (u − wanted u)/T_t",
+    "pd_gravity": "u = kp e + kd ė + N(q)",
+    "feed_forward": "u = M a_d + C v_d + N at the reference + kp e + kd ė",
+    "computed_torque": "u = M (a_d + kd ė + kp e) + C v + N",
+    "operational_space": "u = Jᵀ (Λ (ẍ_d + kd ė + kp e) + μ + p) + null-space posture",
+}
+
+
+def explain(scene: Scene, setup: Setup) -> Iterator[str]:
+    """The explanation, line by line."""
+    named = {effect.kind for effect in scene.effect}
+    forces = [kind for kind in _TERMS if kind in named and kind != "effort_limit"]
+    gravity = ["∂V/∂q"] if "gravity" in named else []
+    N = " ".join([*gravity, *(f"− τ_{kind}" for kind in forces)]).removeprefix("− ") or "0"
+    N = f"−{N}" if not gravity and forces else N
+    yield f"{setup.plant.dynamics.n} joints of {scene.robot}: {', '.join(setup.plant.dynamics.joint_names)}"
+    yield "\n    M(q) a + C(q, v) v + N = u"
+    yield f"    N = {N}"
+    yield f"    u = {'0' if scene.control is None else _LAWS[scene.control.kind].removeprefix('u = ')}"
+    yield "\nin it:"
+    for effect in scene.effect:
+        yield f"  {effect.kind}: {(_TERMS | _EDITS)[effect.kind]}"
+        yield from _numbers(effect, "    ")
+    yield "\nnot simulated, since the scene does not name it:"
+    missing = [kind for kind in (*_EDITS, *_TERMS) if kind not in named]
+    yield f"  {', '.join(missing)}"
+    if scene.control is not None:
+        every = f"every {scene.control.period_s:g} s, held between" if scene.control.period_s else "continuously"
+        yield f"\ncontrol: {scene.control.kind}, {every}"
+        yield from _numbers(scene.control, "  ")
+        yield f"reference: {scene.reference.kind}"
+        yield from _numbers(scene.reference, "  ")
+    yield f"\nmethod: {scene.method}, {scene.duration_s:g} s"
+    used = ("rtol", "atol") if scene.method in ADAPTIVE else ("step_s",)
+    for key in (*used, "record_period_s", "estimate_error"):
+        yield f"  {key} = {getattr(scene, key)}  ({_source(scene, key)})"
+    yield "start:"
+    yield from _numbers(scene.start, "  ")
+    yield f"\nthe file of the robot: {setup.plant.dynamics.description.source}"  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def kinds() -> tuple[str, ...]:
+    """All kinds of effects that a scene can name."""
+    return tuple(
+        str(get_args(part.model_fields["kind"].annotation)[0]) for part in (*get_args(Edit), *get_args(Acting))
+    )
+
+
+def _numbers(part: Part, indent: str) -> Iterator[str]:
+    for key in type(part).model_fields:
+        if key != "kind":
+            yield f"{indent}{key} = {_shown(getattr(part, key))}  ({_source(part, key)})"
+
+
+def _source(part: Part, key: str) -> str:
+    if isinstance(getattr(part, key), str) and getattr(part, key) == "urdf":
+        return "the robot's file"
+    return "scene" if key in part.model_fields_set else "default"
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, Part):
+        return "{" + ", ".join(f"{key} = {_shown(getattr(value, key))}" for key in type(value).model_fields) + "}"
+    return np.array2string(value, precision=6) if isinstance(value, np.ndarray) else str(value)

@@ -1,0 +1,20 @@
+"""Scene files to start from, each tested; `robot-dyn scene NAME` prints one."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+
+from robot_dyn.errors import nearest
+from robot_dyn.scene.schema import SceneError
+
+
+def starters() -> tuple[str, ...]:
+    """Names of the starter scenes."""
+    return tuple(sorted(file.name.removesuffix(".toml") for file in files(__name__).iterdir() if ".toml" in file.name))
+
+
+def starter(name: str) -> str:
+    """The text of a starter scene; SceneError with the nearest names if there is none."""
+    if name not in starters():
+        raise SceneError(f"no scene {name!r}; {nearest(name, starters())}")
+    return (files(__name__) / f"{name}.toml").read_text(encoding="utf-8")

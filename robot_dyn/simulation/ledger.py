@@ -1,0 +1,48 @@
+"""The energy ledger of a run: E(t) − E(0) = Σ W_k(t) + residual, with E = K + Σ potentials.
+
+A residual near zero is necessary for a run to be right, not sufficient: the error estimate is the figure of accuracy.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+
+@final
+@dataclass(frozen=True)
+class Ledger:
+    """Energy at the samples of a run, in [J]; arrays of shape (m,).
+
+    Attributes:
+        kinetic: K.
+        potential: Of gravity and of the conservative effects.
+        work: Done up to each sample by the control and by each other effect, by name.
+    """
+
+    kinetic: np.ndarray
+    potential: np.ndarray
+    work: dict[str, np.ndarray]
+
+    @property
+    def energy(self) -> np.ndarray:
+        """E = K + Σ potentials."""
+        return self.kinetic + self.potential
+
+    @property
+    def residual(self) -> np.ndarray:
+        """E(t) − E(0) − Σ W_k(t): energy that came from nowhere."""
+        return self.energy - self.energy[0] - sum(self.work.values(), start=np.zeros_like(self.kinetic))
+
+    @property
+    def exchanged(self) -> float:
+        """Energy that changed hands: max K + Σ ∫ |P_k|, the integrals over the samples."""
+        moved = sum(float(np.abs(np.diff(work)).sum()) for work in self.work.values())
+        return float(np.nanmax(self.kinetic)) + moved
+
+    @property
+    def closure(self) -> float:
+        """Largest residual, as a part of the energy exchanged; 0 if nothing moved."""
+        return float(np.nanmax(np.abs(self.residual))) / self.exchanged if self.exchanged > 0 else 0.0

@@ -1,0 +1,160 @@
+"""The march through time: y at the start of each step, of a setup run with 1, 2 or 4 times its step.
+
+The step itself is the integrator's; here are its ends: ticks, switches, samples, and what ends a run before its time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import final
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.errors import RobotDynError
+from robot_dyn.integrate.adaptive import Adaptive, Status
+from robot_dyn.integrate.integrator import Integrator, System
+from robot_dyn.simulation.motion import Motion
+from robot_dyn.simulation.setup import Setup, Stretch
+
+_WATCHED = 64  # steps between looks at the energy
+_SAMPLES = 1000  # of an adaptive run without a record period
+
+
+@final
+@dataclass(frozen=True)
+class Sample:
+    """A state on the way.
+
+    Attributes:
+        t: In [s].
+        y: The state of the motion.
+        held: What a sampled controller holds, or None.
+        shared: Whether the companion runs pass here too.
+    """
+
+    t: float
+    y: Array
+    held: Array | None
+    shared: bool
+
+
+class DivergedError(Exception):
+    """Internal: the run cannot go on from `t`; the message is advice."""
+
+    def __init__(self, t: float, advice: str) -> None:
+        super().__init__(advice)
+        self.t = t
+
+
+@final
+class Counter:
+    """Counts the steps and evaluations of a march."""
+
+    def __init__(self) -> None:
+        self.steps = 0
+        self.evaluations = 0
+
+    def counted(self, system: System) -> System:
+        """The same system, its evaluations counted."""
+
+        def rate(t: float, y: Array) -> Array:
+            self.evaluations += 1
+            return system.rate(t, y)
+
+        return System(rate, system.n)
+
+
+def march(setup: Setup, motion: Motion, factor: int, counter: Counter) -> Iterator[Sample]:
+    """The states of a run, at the start of each step and at the end.
+
+    Args:
+        setup: What to run.
+        motion: Its equation of motion.
+        factor: Length of a step, in steps of the setup; tolerances of an adaptive method are multiplied by it.
+        counter: Counts what it takes.
+
+    Raises:
+        DivergedError: If it cannot go on.
+    """
+    y, held = motion.start(setup.q0, setup.v0), None
+    watch = _Watch(setup, motion)
+    for stretch in setup.stretches:
+        if stretch.tick:
+            y, held = motion.tick(stretch.start, y)
+        system = counter.counted(motion.system(held, stretch.end))
+        method = setup.integrator
+        try:
+            with np.errstate(all="ignore"):  # what overflows is told by the watch
+                if isinstance(method, Adaptive):
+                    y = yield from _adaptively(
+                        setup, replace_tolerance(method, factor), system, stretch, y, held, counter
+                    )
+                else:
+                    y = yield from _by_steps(setup, method, system, stretch, y, held, factor, counter, watch)
+        except RobotDynError as error:
+            raise watch.diverged(float(getattr(error, "t", stretch.start)), y, str(error)) from None
+    if motion.sampled:
+        y, held = motion.tick(setup.duration_s, y)
+    yield Sample(setup.duration_s, y, held, shared=True)
+
+
+def replace_tolerance(method: Adaptive, factor: int) -> Adaptive:
+    """The method with its tolerances multiplied."""
+    return method if factor == 1 else replace(method, rtol=method.rtol * factor, atol=method.atol * factor)
+
+
+def _by_steps(
+    setup: Setup, method: Integrator, system: System, stretch: Stretch, y: Array, held: Array | None,
+    factor: int, counter: Counter, watch: _Watch,
+) -> Iterator[Sample]:  # fmt: skip
+    count = setup.steps(stretch)
+    h = (stretch.end - stretch.start) / count * factor
+    for k in range(max(1, count // factor)):
+        t = stretch.start + k * h
+        yield Sample(t, y, held, shared=k * factor % 4 == 0)
+        before, y = y, method.step(system, t, y, h)
+        counter.steps += 1
+        if not np.isfinite(y).all():
+            raise watch.diverged(t, before, "a number overflowed")
+        if counter.steps % _WATCHED == 0 and watch.gains(t + h, y):
+            raise watch.diverged(t + h, y, "energy grows without a source")
+    return y
+
+
+def _adaptively(
+    setup: Setup, method: Adaptive, system: System, stretch: Stretch, y: Array, held: Array | None, counter: Counter
+) -> Iterator[Sample]:
+    solution = method.solve(system, stretch.start, y, stretch.end)
+    counter.steps += len(solution.times) - 1
+    reached = float(solution.times[-1])
+    period = setup.record_period_s or setup.duration_s / _SAMPLES
+    first = np.ceil(stretch.start / period - 1e-9)
+    times = period * np.arange(first, np.ceil(stretch.end / period - 1e-9))
+    for t in np.unique(np.append(times[times <= reached], stretch.start)):
+        yield Sample(float(t), solution(float(t)), held, shared=True)
+    if solution.status is Status.FAILED:
+        raise DivergedError(reached, solution.message)
+    return solution.states[-1]
+
+
+@final
+class _Watch:
+    """Tells when energy grows without a source: the ledger's residual exceeds all there was and came a thousandfold."""
+
+    def __init__(self, setup: Setup, motion: Motion) -> None:
+        self.setup, self.motion = setup, motion
+        K, V = (float(x[0]) for x in motion.energy(np.zeros(1), setup.q0[None], setup.v0[None]))
+        self.energy, self.scale = K + V, 1.0 + abs(K) + abs(V)
+
+    def gains(self, t: float, y: Array) -> bool:
+        q, v, _, W = self.motion.state(y)
+        K, V = self.motion.energy(np.array([t]), q[None], v[None])
+        return bool((K + V)[0] - self.energy - W.sum() > 1e3 * (self.scale + np.abs(W).sum()))
+
+    def diverged(self, t: float, y: Array, why: str) -> DivergedError:
+        names = self.motion.plant.dynamics.joint_names
+        fastest = names[int(np.argmax(np.abs(y[len(names) : 2 * len(names)])))]
+        remedy = f"take a smaller step than {self.setup.step_s:g} s, or an implicit method"
+        return DivergedError(t, f"{why}; the fastest joint is {fastest!r}: {remedy}")

@@ -1,0 +1,140 @@
+"""The motion of a plant as a first-order system y' = f(t, y), with y = (q, v or p, z, W).
+
+    q' = v,   v' = M⁻¹ (u + Σ τ − C v − N)   or   p' = u + Σ τ + Cᵀ v − N with p = M v,
+    z' = memory of the controller,   W_k' = τ_kᵀ v: the work of the control and of each effect without a potential
+
+[Murray, Li, Sastry 1994, ch. 4; Hairer, Lubich, Wanner 2006, §VI.1 for canonical coordinates]
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array, apply
+from robot_dyn.control.controller import Controller
+from robot_dyn.effects.effect import Conservative, Force
+from robot_dyn.effects.plant import Plant
+from robot_dyn.integrate.integrator import System
+from robot_dyn.model.dynamics import acceleration
+
+CONTROL = "control"
+
+
+@final
+@dataclass(frozen=True)
+class Motion:
+    """The equation of motion of a plant under a controller.
+
+    Attributes:
+        plant: What moves.
+        controller: What drives it, or None.
+        canonical: Whether the second part of y is the momentum p instead of v.
+    """
+
+    plant: Plant
+    controller: Controller | None
+    canonical: bool = False
+
+    @cached_property
+    def working(self) -> tuple[Force, ...]:
+        """The effects whose work is integrated: those without a potential."""
+        return tuple(force for force in self.plant.forces if not isinstance(force, Conservative))
+
+    @cached_property
+    def sources(self) -> tuple[str, ...]:
+        """Names of the works in y: control, then effects; a second effect of a name gets a number."""
+        names: list[str] = [CONTROL]
+        for force in self.working:
+            count = sum(name.split(" ")[0] == force.name for name in names)
+            names.append(f"{force.name} {count + 1}" if count else force.name)
+        return tuple(names)
+
+    @cached_property
+    def memory_size(self) -> int:
+        """Number of states of the controller."""
+        return self.controller.memory_size if self.controller else 0
+
+    def start(self, q: Array, v: Array) -> Array:
+        """Y at the start: no work done, no memory."""
+        second = self.plant.dynamics.momentum(q, v) if self.canonical else v
+        return np.concatenate([q, second, np.zeros(self.memory_size + len(self.sources))])
+
+    def state(self, y: Array) -> tuple[Array, Array, Array, Array]:
+        """q, v, z, W of y."""
+        n, m = self.plant.dynamics.n, self.memory_size
+        q, second = y[:n], y[n : 2 * n]
+        v = acceleration(self.plant.M(q), second, self.plant.dynamics.joint_names) if self.canonical else second
+        return q, v, y[2 * n : 2 * n + m], y[2 * n + m :]
+
+    def command(self, t: float, q: Array, v: Array, z: Array) -> Array:
+        """The actuation that the controller asks for, within the bounds of the plant."""
+        if self.controller is None:
+            return np.zeros_like(v)
+        return self.plant.actuation(self.controller.torque(t, q, v, z))
+
+    @property
+    def sampled(self) -> bool:
+        """Whether the controller acts at ticks and is held between them."""
+        return self.controller is not None and self.controller.period_s > 0
+
+    def tick(self, t: float, y: Array) -> tuple[Array, Array | None]:
+        """A tick of a sampled controller: y with its next memory, and what it holds; y and None for any other."""
+        if self.controller is None or not self.sampled:
+            return y, None
+        q, v, z, _ = self.state(y)
+        held, n = self.command(t, q, v, z), self.plant.dynamics.n
+        if self.memory_size:
+            y = y.copy()
+            y[2 * n : 2 * n + self.memory_size] = self.controller.next_memory(t, q, v, z)
+        return y, held
+
+    def system(self, held: Array | None, until: float) -> System:
+        """The equation on one stretch of time.
+
+        Args:
+            held: The actuation that a sampled controller holds; None if it acts continuously.
+            until: End of the stretch; what switches there acts as before it.
+        """
+        dynamics, controller, forces = self.plant.dynamics, self.controller, self.plant.forces
+        n, last, working = dynamics.n, np.nextafter(until, -np.inf), self.working
+        remembers = held is None and controller is not None and self.memory_size > 0
+
+        def rate(t: float, y: Array) -> Array:
+            if y.ndim > 1:  # an implicit method asks for its Jacobian
+                return np.array([rate(t, row) for row in y.reshape(-1, y.shape[-1])]).reshape(y.shape)
+            t = min(t, last)
+            q, v, z, _ = self.state(y)
+            u = self.command(t, q, v, z) if held is None else held
+            torques = [force.torque(dynamics, t, q, v) for force in forces]
+            tau = sum(torques, start=u)
+            result = np.empty_like(y)
+            result[:n] = v
+            if self.canonical:
+                result[n : 2 * n] = tau + dynamics.coriolis_transpose(q, v) - dynamics.N(q)
+            else:
+                result[n : 2 * n] = dynamics.forward_dynamics(q, v, tau)
+            end = 2 * n + self.memory_size
+            result[2 * n : end] = controller.memory_rate(t, q, v, z) if remembers and controller else 0.0
+            result[end] = u @ v
+            result[end + 1 :] = [x @ v for force, x in zip(forces, torques, strict=True) if force in working]
+            return result
+
+        return System(rate, n)
+
+    def energy(self, t: Array, q: Array, v: Array) -> tuple[Array, Array]:
+        """Kinetic energy, and the potential of gravity and of all conservative effects, of samples (m, n)."""
+        dynamics = self.plant.dynamics
+        potential = dynamics.potential_energy(q)
+        for force in self.plant.forces:
+            if isinstance(force, Conservative):
+                potential = potential + force.potential(dynamics, t, q)
+        return dynamics.kinetic_energy(q, v), potential
+
+    def powers(self, t: float, q: Array, v: Array, u: Any) -> list[float]:
+        """Power of the control and of the effects that work, in the order of `sources`."""
+        torques = [force.torque(self.plant.dynamics, t, q, v) for force in self.working]
+        return [float(apply(v[None], x)[0]) for x in (u, *torques)]

@@ -1,0 +1,138 @@
+"""Run files: one .npz that holds a trajectory and all it came from, and a table of it as CSV.
+
+Arrays keep their names; what is text (joint names, outcome, statistics, URDF, edits, scene, versions) is one JSON text.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+import tempfile
+import zipfile
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from robot_dyn.errors import RobotDynError
+from robot_dyn.simulation.error import ErrorEstimate
+from robot_dyn.simulation.ledger import Ledger
+from robot_dyn.simulation.trajectory import Ending, Outcome, Statistics, Trajectory
+
+FORMAT = 1
+_SAMPLES = ("t", "q", "v", "a", "tau")
+
+
+class RunFileError(RobotDynError):
+    """A run file that cannot be written or read."""
+
+
+def save_run(trajectory: Trajectory, path: str | Path) -> Path:
+    """Write a trajectory to `path` (.npz is added if it has no suffix), whole or not at all.
+
+    Raises:
+        RunFileError: If it cannot be written.
+    """
+    path = Path(path)
+    path = path if path.suffix else path.with_suffix(".npz")
+    arrays: dict[str, np.ndarray] = {name: getattr(trajectory, name) for name in _SAMPLES}
+    arrays |= {"kinetic": trajectory.ledger.kinetic, "potential": trajectory.ledger.potential}
+    arrays |= {f"work/{name}": work for name, work in trajectory.ledger.work.items()}
+    arrays |= {f"power/{name}": power for name, power in trajectory.power.items()}
+    if trajectory.wanted is not None:
+        arrays["wanted"] = trajectory.wanted
+    about: dict[str, Any] = {
+        "format": FORMAT,
+        "joint_names": trajectory.joint_names,
+        "outcome": asdict(trajectory.outcome),
+        "statistics": asdict(trajectory.statistics),
+        "about": trajectory.about,
+    }
+    if trajectory.error is not None:
+        arrays |= {"error/t": trajectory.error.t, "error/error": trajectory.error.error}
+        about["error"] = {"resolved_until": trajectory.error.resolved_until, "note": trajectory.error.note}
+    arrays["about"] = np.array(json.dumps(about))
+    _write(path, lambda stream: np.savez_compressed(stream, **arrays))  # pyright: ignore[reportArgumentType]
+    return path
+
+
+def load_run(path: str | Path) -> Trajectory:
+    """The trajectory of a run file.
+
+    Raises:
+        RunFileError: If it is missing, damaged, cut short or of another format.
+    """
+    try:
+        with np.load(io.BytesIO(Path(path).read_bytes()), allow_pickle=False) as file:
+            arrays = dict(file)
+        about = json.loads(str(arrays["about"]))
+        if about["format"] != FORMAT:
+            raise RunFileError(f"{path}: has format {about['format']}, this version reads {FORMAT}")
+        return _trajectory(arrays, about)
+    except FileNotFoundError:
+        raise RunFileError(f"{path}: there is no such file; write one with robot-dyn simulate … -o {path}") from None
+    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+        raise RunFileError(f"{path}: is no whole run file ({type(error).__name__}); simulate again") from None
+
+
+def export_csv(trajectory: Trajectory, path: str | Path) -> Path:
+    """Write the samples as a table, a row each, with names and units in the heading.
+
+    Raises:
+        RunFileError: If it cannot be written.
+    """
+    names = trajectory.joint_names
+    heading = ["t [s]"]
+    for key, unit in (("q", "rad or m"), ("v", "rad/s or m/s"), ("a", "rad/s² or m/s²"), ("tau", "N m or N")):
+        heading += [f"{key} {name} [{unit}]" for name in names]
+    heading += [f"power {name} [W]" for name in trajectory.power] + ["energy [J]", "residual [J]"]
+    columns = [trajectory.t[:, None], trajectory.q, trajectory.v, trajectory.a, trajectory.tau]
+    columns += [power[:, None] for power in trajectory.power.values()]
+    columns += [trajectory.ledger.energy[:, None], trajectory.ledger.residual[:, None]]
+
+    table = io.StringIO()
+    csv.writer(table).writerows([heading, *np.hstack(columns).tolist()])
+    path = Path(path)
+    _write(path, lambda stream: stream.write(table.getvalue().encode()))
+    return path
+
+
+def _trajectory(arrays: dict[str, np.ndarray], about: dict[str, Any]) -> Trajectory:
+    def group(prefix: str) -> dict[str, np.ndarray]:
+        return {name.removeprefix(prefix): x for name, x in arrays.items() if name.startswith(prefix)}
+
+    error = None
+    if "error" in about:
+        error = ErrorEstimate(arrays["error/t"], arrays["error/error"], **about["error"])
+    outcome = about["outcome"]
+    return Trajectory(
+        joint_names=tuple(about["joint_names"]),
+        **{name: arrays[name] for name in _SAMPLES},
+        power=group("power/"),
+        ledger=Ledger(arrays["kinetic"], arrays["potential"], group("work/")),
+        wanted=arrays.get("wanted"),
+        outcome=Outcome(Ending(outcome["ending"]), outcome["t"], outcome["advice"]),
+        statistics=Statistics(**about["statistics"]),
+        error=error,
+        about=about["about"],
+    )
+
+
+def _write(path: Path, write: Any) -> None:
+    """Write beside the target and rename: a reader sees the old file or the new one, never half of it."""
+    try:
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        try:
+            with os.fdopen(handle, "wb") as stream:
+                write(stream)
+            os.replace(name, path)
+        except BaseException:
+            Path(name).unlink(missing_ok=True)
+            raise
+    except OSError as error:
+        raise RunFileError(
+            f"{path}: cannot be written ({error.strerror}); give a path in a folder that is writable"
+        ) from None

@@ -1,0 +1,92 @@
+"""The setup of a run: plant, start, duration, controller, method. A value; `simulate` turns it into a Trajectory."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import pairwise
+from math import ceil, inf
+from typing import final
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.control.controller import Controller
+from robot_dyn.effects.plant import Plant
+from robot_dyn.errors import QueryError
+from robot_dyn.integrate.adaptive import Adaptive
+from robot_dyn.integrate.explicit import RK4
+from robot_dyn.integrate.integrator import Integrator
+from robot_dyn.model.dynamics import checked
+
+
+@final
+@dataclass(frozen=True)
+class Stretch:
+    """A part of the run without ticks or switches inside.
+
+    Attributes:
+        start: In [s].
+        end: In [s].
+        tick: Whether a sampled controller acts at its start.
+    """
+
+    start: float
+    end: float
+    tick: bool
+
+
+@final
+@dataclass(frozen=True)
+class Setup:
+    """All that a run depends on.
+
+    Attributes:
+        plant: What moves.
+        q0: Position at the start, (n,).
+        v0: Velocity at the start, (n,).
+        duration_s: In [s].
+        controller: What drives it, or None.
+        integrator: A method of fixed step, or an `Adaptive` one.
+        step_s: Fixed step; made a little smaller where ticks, switches and the end ask for it.
+        record_period_s: Time between samples; 0 for every step.
+        estimate_error: Whether companion runs of longer steps are made, which cost 3/4 of the run.
+        about: Texts kept with the run.
+    """
+
+    plant: Plant
+    q0: Array
+    v0: Array
+    duration_s: float
+    controller: Controller | None = None
+    integrator: Integrator | Adaptive = RK4
+    step_s: float = 1e-3
+    record_period_s: float = 0.0
+    estimate_error: bool = True
+    about: dict[str, str] = field(default_factory=dict, repr=False)
+
+    def __post_init__(self) -> None:
+        names = self.plant.dynamics.joint_names
+        for name in ("q0", "v0"):
+            value = checked(name, getattr(self, name), names)
+            if value.ndim != 1:
+                raise QueryError(f"{name} must be one state of shape ({len(names)},), got {value.shape}")
+            object.__setattr__(self, name, value)
+        for name in ("duration_s", "step_s", "record_period_s"):
+            value, least = getattr(self, name), 0.0 if name == "record_period_s" else 1e-12
+            if not (isinstance(value, int | float) and least <= value < inf):
+                raise QueryError(f"{name} must be a positive number of seconds, got {value!r}")
+        if self.controller is not None and self.controller.n != len(names):
+            raise QueryError(f"the controller drives {self.controller.n} joints, the plant has {len(names)}")
+
+    @property
+    def stretches(self) -> tuple[Stretch, ...]:
+        """The run cut at the ticks of the controller, the breaks of its reference and the switches of effects."""
+        period = self.controller.period_s if self.controller else 0.0
+        ticks = {k * period for k in range(ceil(self.duration_s / period - 1e-9))} if period > 0 else {0.0}
+        switches = {t for effect in self.plant.effects for t in effect.switches}
+        switches |= set(self.controller.breaks if self.controller else ())
+        cuts = [*sorted(ticks | {t for t in switches if 0.0 < t < self.duration_s}), self.duration_s]
+        return tuple(Stretch(a, b, a in ticks) for a, b in pairwise(cuts))
+
+    def steps(self, stretch: Stretch) -> int:
+        """Number of steps on a stretch: a multiple of 4, for the companion runs, where it has that many."""
+        count = max(1, ceil((stretch.end - stretch.start) / self.step_s - 1e-9))
+        return 4 * ceil(count / 4) if count >= 4 else count

@@ -1,0 +1,119 @@
+"""The trajectory of a run: samples with names and units, what each effect did, how it ended, how far to trust it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import final
+
+import numpy as np
+
+from robot_dyn.simulation.error import ErrorEstimate
+from robot_dyn.simulation.ledger import Ledger
+
+
+class Ending(StrEnum):
+    """How a run ended."""
+
+    FINISHED = "finished"
+    DIVERGED = "diverged"
+    STOPPED = "stopped"
+
+
+@final
+@dataclass(frozen=True)
+class Outcome:
+    """How a run ended: `ending` at time `t` in [s], and `advice` for a reader."""
+
+    ending: Ending
+    t: float
+    advice: str = ""
+
+
+@final
+@dataclass(frozen=True)
+class Statistics:
+    """What a run took.
+
+    Attributes:
+        method: Name of the integrator.
+        step_s: Its step, or 0 if it chose its own.
+        steps: Number of steps.
+        evaluations: Evaluations of the equation of motion.
+        wall_s: Time of the run itself.
+        companions_s: Time of the companion runs of the error estimate.
+    """
+
+    method: str
+    step_s: float
+    steps: int
+    evaluations: int
+    wall_s: float
+    companions_s: float = 0.0
+
+
+@final
+@dataclass(frozen=True)
+class Trajectory:
+    """Samples of a run, m of them; arrays are (m,) or (m, n).
+
+    Attributes:
+        joint_names: Of the n joints.
+        t: In [s].
+        q, v, a: In [rad], [rad/s], [rad/s²] or [m], [m/s], [m/s²].
+        tau: Actuation within its bounds, in [N m] or [N].
+        power: Of the control and of each effect without a potential, by name, in [W].
+        ledger: Energy and work.
+        wanted: Positions of the reference, or None.
+        outcome: How it ended.
+        statistics: What it took.
+        error: Its estimated error; None if companions were switched off.
+        about: Texts that make it whole: URDF, edits, scene, versions.
+    """
+
+    joint_names: tuple[str, ...]
+    t: np.ndarray
+    q: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+    tau: np.ndarray
+    power: dict[str, np.ndarray]
+    ledger: Ledger
+    wanted: np.ndarray | None
+    outcome: Outcome
+    statistics: Statistics
+    error: ErrorEstimate | None = None
+    about: dict[str, str] = field(default_factory=dict, repr=False)
+
+    @property
+    def tracking_error(self) -> float | None:
+        """Root mean square of q − q_wanted over samples and joints; None without a reference."""
+        return None if self.wanted is None else float(np.sqrt(np.mean((self.q - self.wanted) ** 2)))
+
+    @property
+    def summary(self) -> str:
+        """A few lines: outcome, ledger, error, tracking, cost."""
+        s, ledger = self.statistics, self.ledger
+        lines = [
+            f"{self.outcome.ending} at t = {self.outcome.t:g} s, {len(self.t)} samples" + _after(self.outcome.advice)
+        ]
+        lines.append(f"effects: {', '.join(self.power)}")
+        lines.append(
+            f"energy ledger: residual {np.nanmax(np.abs(ledger.residual)):.2e} J, {ledger.closure:.1e} of exchanged"
+        )
+        if self.error is None:
+            lines.append("error: not estimated (companion runs are off)")
+        else:
+            lines.append(f"error of q: {self.error.final:.1e}, estimated" + _after(self.error.note))
+        if self.tracking_error is not None:
+            lines.append(f"tracking error of q: {self.tracking_error:.3e} rms")
+        step = f"step {s.step_s:g} s, " if s.step_s else ""
+        lines.append(
+            f"{s.method}: {step}{s.steps} steps, {s.evaluations} evaluations, {s.wall_s:.2f} s"
+            + (f" and {s.companions_s:.2f} s for companions" if s.companions_s else "")
+        )
+        return "\n".join(lines)
+
+
+def _after(text: str) -> str:
+    return f"; {text}" if text else ""

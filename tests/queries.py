@@ -1,0 +1,42 @@
+"""Every query of a robot and its arguments, with general states to ask at."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+import robot_dyn as rd
+
+ARGUMENTS = {
+    "M": ("q",),
+    "C": ("q", "v"),
+    "N": ("q",),
+    "coriolis_torque": ("q", "v"),
+    "coriolis_transpose": ("q", "v"),
+    "inverse_dynamics": ("q", "v", "a"),
+    "forward_dynamics": ("q", "v", "tau"),
+    "kinetic_energy": ("q", "v"),
+    "potential_energy": ("q",),
+    "momentum": ("q", "v"),
+    "placement": ("q",),
+    "jacobian": ("q",),
+    "jacobian_rate": ("q", "v"),
+}
+FRAMED = ("placement", "jacobian", "jacobian_rate")
+SEVERAL = [method for method, names in ARGUMENTS.items() if len(names) > 1]
+
+
+def general(robot: rd.Robot, seed: int) -> np.ndarray:
+    """General q, v and a (or tau): no zeros, no symmetries."""
+    return np.random.default_rng(seed).uniform(0.1, 1.2, (3, robot.n)) * [[1], [-1], [1]]
+
+
+def arguments_of(method: str, n: int, seed: int = 0, batch: tuple[int, ...] = ()) -> list[np.ndarray]:
+    """General arguments of a method."""
+    return list(np.random.default_rng(seed).uniform(0.1, 1.2, (len(ARGUMENTS[method]), *batch, n)))
+
+
+def ask(robot: rd.Robot, method: str, *arguments: Any) -> Any:
+    frame = [robot.frame_names[-1]] if method in FRAMED else []
+    return getattr(robot, method)(*arguments, *frame)

@@ -1,0 +1,160 @@
+"""What `info` and `query` answer: the numbers of the library, ties and locks as stated, shares that add up."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import robot_dyn as rd
+from tests.command import ROOT, document, refusal, run, said
+
+Q, V, A = "-0.1,0.7,-0.4,0.3,0.9,-0.6", "0.2,-0.3,0.4,0.5,-0.6,0.7", "1.1,-1.2,1.3,0.4,0.5,-0.6"
+
+
+def numbers(text: str) -> list[float]:
+    return [float(word) for word in text.split(",")]
+
+
+# --- info
+
+
+def test_info_shows_joints_ties_and_locks():
+    text = said("info", "panda", "--lock", "panda_joint2=0.25")
+    robot = rd.load("panda")
+    for name in set(robot.joint_names) - {"panda_joint2"}:
+        assert re.search(rf"^{name} +(revolute|prismatic) ", text, re.M)
+    assert re.search(r"^tied: panda_finger_joint2 = 1 · panda_finger_joint1 \+ 0$", text, re.M)
+    assert re.search(r"^locked: panda_joint2 = 0\.25$", text, re.M)
+    assert robot.description.source in text.splitlines()
+
+
+def test_info_has_the_numbers_of_the_library():
+    panda = document("info", "panda", "--lock", "panda_joint2=0.25")
+    robot = rd.load("panda").with_(lock={"panda_joint2": 0.25})
+    assert (panda["n"], panda["links"]) == (7, list(robot.frame_names))
+    assert panda["total_mass"] == pytest.approx(rd.load("panda").total_mass, rel=1e-14)
+    assert panda["locked"] == {"panda_joint2": 0.25}
+    joints = document("info", "ur5")["joints"]
+    for key in ("lower", "upper", "effort_limit", "velocity_limit", "damping", "friction", "armature"):
+        assert [joint[key] for joint in joints] == getattr(rd.load("ur5"), key).tolist()
+    assert [document("info", "pendulum")["joints"][0][key] for key in ("lower", "upper", "effort_limit")] == [None] * 3
+
+
+def test_ties_are_those_that_the_file_states(tmp_path: Path):
+    """Each with the joint it names, not composed; a ratio of 0 and the defaults of URDF included."""
+    keys = ("joint", "source", "multiplier", "offset")
+    stated = [tuple(tie[key] for key in keys) for tie in document("info", "mimic_chain")["ties"]]
+    assert stated == [("flex_1", "spread", 0.5, 0.1), ("flex_2", "flex_1", -0.75, 0.2)]
+    text = (ROOT / "urdf" / "mimic_chain.urdf").read_text()
+    text = text.replace('<mimic joint="flex_1" multiplier="-0.75"', '<mimic joint="twist" multiplier="0"')
+    text = text.replace('<mimic joint="spread" multiplier="0.5" offset="0.1"', '<mimic joint="spread"')
+    (tmp_path / "other.urdf").write_text(text)
+    ties = [tuple(tie[key] for key in keys) for tie in document("info", tmp_path / "other.urdf")["ties"]]
+    assert ties == [("flex_1", "spread", 1, 0), ("flex_2", "twist", 0, 0.2)]
+    assert document("info", "mimic_chain", "--lock", "spread=0.1")["ties"] == []  # what follows it is held too
+
+
+@pytest.mark.parametrize("name", ["[red]x[/red]", "[/]", ":smile:"])
+def test_names_with_markup_are_shown_as_they_are(name: str, tmp_path: Path):
+    text = (ROOT / "urdf" / "pendulum.urdf").read_text()
+    (tmp_path / "odd.urdf").write_text(text.replace('"pivot"', f'"{name}"'))
+    for command in (("info",), ("query", "--why", name), ("compare", "--samples", "2")):
+        assert name in said(command[0], tmp_path / "odd.urdf", *command[1:])
+
+
+def test_odd_bodies_are_a_warning_on_stderr():
+    done = run("info", "massless_tip", "--json")
+    assert done.returncode == 0 and json.loads(done.stdout)["findings"]
+    assert re.fullmatch(r"robot-dyn: warning: massless_tip: link 'pointer' moves but has no mass; .*\n", done.stderr)
+
+
+# --- query
+
+
+def test_numbers_are_those_of_the_library():
+    robot = rd.load("ur5")
+    q, v, a = (np.array(numbers(text)) for text in (Q, V, A))
+    answer = document("query", "ur5", "--q", Q, "--v", V, "--a", A)
+    expected = {"M": robot.M(q), "C": robot.C(q, v), "N": robot.N(q), "tau": robot.inverse_dynamics(q, v, a)}
+    expected |= {"q": q, "v": v, "a": a}
+    for key, value in expected.items():
+        assert answer[key] == value.tolist(), key
+    back = document("query", "ur5", "--q", Q, "--v", V, f"--tau={','.join(map(repr, answer['tau']))}")
+    assert back["a"] == robot.forward_dynamics(q, v, expected["tau"]).tolist()
+    assert back["tau"] == answer["tau"]
+
+
+def test_numbers_may_be_named_or_separated_by_blanks():
+    assert document("query", "ur5", "--q", "elbow_joint=-0.4,shoulder_pan_joint=-0.1")["q"] == [-0.1, 0, -0.4, 0, 0, 0]
+    assert document("query", "ur5", "--q", Q.replace(",", " "))["q"] == numbers(Q)
+    assert document("query", "ur5", "--q", Q.replace(",", ", "))["q"] == numbers(Q)
+    assert document("query", "ur5")["q"] == [0] * 6
+
+
+def test_stated_friction_acts_with_effects_urdf():
+    robot = rd.load("cart_pole")
+    state = ("--q", "-0.2,0.7", "--v", "0.3,-0.4", "--a", "0.5,0.6")
+    plain, rubbed = document("query", "cart_pole", *state), document("query", "cart_pole", *state, "--effects", "urdf")
+    assert plain["effects"] == {} and set(rubbed["effects"]) == {"ViscousFriction", "RegularisedCoulombFriction"}
+    torque = sum(np.array(each) for each in rubbed["effects"].values())
+    v = np.array([0.3, -0.4])
+    expected = -robot.damping * v - robot.friction * np.tanh(v / 0.01)
+    np.testing.assert_allclose(torque, expected, rtol=1e-14)
+    np.testing.assert_allclose(rubbed["tau"], plain["tau"] - expected, rtol=1e-14)
+    np.testing.assert_allclose(rubbed["N"], plain["N"] - expected, rtol=1e-14)
+
+
+@pytest.mark.parametrize("given", ["--a", "--tau"])
+def test_why_adds_up(given: str):
+    """Shares of the links and effects add up to τ, 1e-9 of a torque of about 10."""
+    state = ("--q", "-0.2,0.7", "--v", "0.3,-0.4", given, "0.5,0.6", "--effects", "urdf")
+    for joint in ("slide", "hinge"):
+        answer = document("query", "cart_pole", *state, "--why", joint)
+        why = answer["why"]
+        shares = [share[cause] for share in why["shares"] for cause in ("inertia", "coriolis", "gravity")]
+        assert sum(shares) + sum(why["effects"].values()) == pytest.approx(why["tau"], rel=0, abs=1e-9)
+        assert why["tau"] == answer["tau"][answer["joints"].index(joint)]
+        assert {share["source"] for share in why["shares"]} == {"cart", "pole"}
+
+
+def test_query_and_why_as_text():
+    text = said("query", "ur5", "--q", Q, "--why", "elbow_joint", "--effects", "urdf")
+    for part in ("M, mass matrix:", "C, Coriolis matrix:", "N, gravity and effects:", "why elbow_joint needs"):
+        assert part in text
+    assert re.search(r"^sum ", text, re.M)
+
+
+def test_query_without_forward_dynamics_names_the_joint():
+    done = run("query", "massless_tip", "--tau", "0.1,0.2")
+    assert (done.returncode, done.stdout) == (2, "")
+    warning, error = done.stderr.splitlines()
+    assert warning.startswith("robot-dyn: warning: ")
+    assert re.match(r"robot-dyn: error: no forward dynamics: joint 'pointer_joint' carries no inertia", error)
+
+
+@pytest.mark.parametrize(
+    ("args", "message"),
+    [
+        (["--a", A, "--tau", A], r"give --a or --tau, not both.*"),
+        (["--q", "0.1,0.2"], r"--q needs 6 numbers, got 2: shoulder_pan_joint, .*wrist_3_joint"),
+        (["--q", ""], r"--q needs 6 numbers, got 0: .*"),
+        (["--v", V + ",1"], r"--v needs 6 numbers, got 7: .*"),
+        (["--tau", "1,2,3,4,5,six"], r"--tau: 'six' is not a number"),
+        (["--q", "elbow=1"], r"--q: no joint 'elbow'; nearest: elbow_joint"),
+        (["--q", "elbow_joint=1,2"], r"--q must be JOINT=VALUE, got '2'"),
+        (["--q", "elbow_joint=1,elbow_joint=2"], r"--q names a joint twice: .*elbow_joint.*"),
+        (["--q", Q.replace("-0.1", "nan")], r"q must be finite, got nan for joint 'shoulder_pan_joint'"),
+        (["--v", V.replace("0.7", "-inf")], r"v must be finite, got -inf for joint 'wrist_3_joint'"),
+        (["--a", "elbow_joint=1e999"], r"a must be finite, got inf for joint 'elbow_joint'"),
+        (["--tau", "elbow_joint=nan"], r"tau must be finite, got nan for joint 'elbow_joint'"),
+        (["--v", "elbow_joint=1e200"], r"q, v.* are so large that the result overflows"),
+        (["--why", "elbow"], r"--why: no joint 'elbow'; nearest: elbow_joint"),
+        (["--effects", "friction"], r"effects='friction'; give effects, or 'urdf'.*"),
+    ],
+)
+def test_query_without_meaning_is_refused_in_one_line(args: list[str], message: str):
+    assert re.fullmatch(message, refusal(["query", "ur5", *args]))

@@ -1,0 +1,99 @@
+"""The commands simulate, explain and scene, as a user meets them."""
+
+from __future__ import annotations
+
+import json
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import robot_dyn as rd
+from robot_dyn.scene.starters import starter, starters
+
+COMMAND = [sys.executable, "-c", "from robot_dyn.cli import main; main()"]
+DOCUMENT = (Path(__file__).parents[1] / "docs" / "json.md").read_text(encoding="utf-8")
+
+
+def run(*arguments: object) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([*COMMAND, *map(str, arguments)], capture_output=True, text=True, timeout=120, check=False)
+
+
+@pytest.fixture
+def scene(tmp_path) -> Path:
+    path = tmp_path / "scene.toml"
+    path.write_text(starter("cart_pole").replace("4.0", "0.2", 1), encoding="utf-8")
+    return path
+
+
+def test_simulate_prints_a_summary_and_keeps_the_run(scene, tmp_path) -> None:
+    done = run("simulate", scene, "-o", tmp_path / "run.npz", "--csv", tmp_path / "run.csv")
+    assert done.returncode == 0, done.stderr
+    for said in ("finished at t = 0.2 s", "effects: control, viscous_friction", "energy ledger", "error of q"):
+        assert said in done.stdout
+    assert rd.load_run(tmp_path / "run.npz").summary in done.stdout
+    assert (tmp_path / "run.csv").is_file()
+
+
+def test_document_has_the_keys_that_are_promised(scene) -> None:
+    document = json.loads(run("simulate", scene, "--json").stdout)
+    section = DOCUMENT.split("## `robot-dyn simulate")[1].split("\n## ")[0]
+    promised = {
+        key
+        for line in section.splitlines()
+        if line.startswith("| `")
+        for key in re.findall(r"`(\w+)`", line.split("|")[1])
+    }
+    assert set(document) == promised
+
+
+def test_explain_shows_the_equation(scene) -> None:
+    done = run("explain", scene)
+    assert done.returncode == 0
+    assert "N = ∂V/∂q − τ_viscous_friction" in done.stdout
+
+
+def test_scene_prints_starters() -> None:
+    assert run("scene").stdout.split() == list(starters())
+    assert run("scene", "pendulum").stdout == starter("pendulum")
+    wrong = run("scene", "pendulun")
+    assert wrong.returncode == 2
+    assert "nearest: pendulum" in wrong.stderr
+
+
+def test_a_scene_with_a_mistake_is_an_error_of_one_line(scene) -> None:
+    scene.write_text(scene.read_text().replace("hinge", "hing"))
+    done = run("simulate", scene)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert re.fullmatch(r"robot-dyn: error: .*scene\.toml: .*'hing'.*nearest: hinge.*\n", done.stderr)
+
+
+def test_a_run_that_diverges_says_when_and_what_to_do(scene) -> None:
+    scene.write_text(
+        'robot = "planar_2r"\nduration_s = 1.0\nmethod = "explicit_euler"\nstep_s = 0.1\n'
+        '[[effect]]\nkind = "spring"\nstiffness_N_m_per_rad = 1e5\nrest_rad = 1.0\n'
+    )
+    done = run("simulate", scene)
+    assert done.returncode == 1
+    assert re.search(r"diverged at t = .*joint_\d.*smaller step", done.stdout)
+
+
+def test_ctrl_c_ends_a_run_and_keeps_it(scene, tmp_path) -> None:
+    text = starter("ur5_circle").replace("3.0", "3000.0", 1).replace("duration_s", 'method = "rk4"\nduration_s', 1)
+    scene.write_text(text + "turns = 1000.0\n")
+    output = tmp_path / "run.npz"
+    process = subprocess.Popen(
+        [*COMMAND, "simulate", str(scene), "-o", str(output)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    time.sleep(4)  # imports take 1 s; the run itself would take hours
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 130, err
+    assert "stopped at t = " in out
+    assert "Traceback" not in err
+    assert len(rd.load_run(output).t) > 1

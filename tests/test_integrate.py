@@ -1,0 +1,196 @@
+"""The contract of fixed-step methods: tableaus, batches, every float, counted evaluations, quadratures."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import FrozenInstanceError
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+from flint import arb
+
+from robot_dyn.arithmetic import Ball
+from robot_dyn.errors import QueryError
+from robot_dyn.integrate.explicit import RK4, ExplicitRungeKutta
+from robot_dyn.integrate.gauss import Gauss
+from robot_dyn.integrate.implicit import SinglyDiagonallyImplicit
+from robot_dyn.integrate.integrator import Integrator, System
+from robot_dyn.integrate.methods import METHODS, method
+from robot_dyn.integrate.tableau import ButcherTableau, Surd
+
+ALL = [method(name) for name in METHODS]
+STIFF = [each for each in ALL if each.stiff]
+ANY_ARITHMETIC = [each for each in ALL if not each.stiff]
+RNG = np.random.default_rng(5)
+
+
+def name_of(integrator: Integrator) -> str:
+    return integrator.name
+
+
+def pendulum(t: Any, y: np.ndarray) -> np.ndarray:
+    """Driven by u = t/4, with the power as quadrature: q' = v, v' = −sin q − v/5 + u, w' = u v."""
+    q, v = y[..., 0], y[..., 1]
+    u = t / 4
+    return np.stack([v, -np.sin(q) - v / 5 + u, u * v], axis=-1)
+
+
+def oscillator(t: Any, y: np.ndarray) -> np.ndarray:
+    return np.stack([y[..., 1], -y[..., 0]], axis=-1)
+
+
+PENDULUM, OSCILLATOR = System(pendulum, 1), System(oscillator, 1)
+
+
+def test_tableau_is_checked_when_it_is_made() -> None:
+    half = Fraction(1, 2)
+    assert ButcherTableau(((), (half,)), (0, 1), (0, half), 2) == ButcherTableau(((), (half,)), (0, 1), (0, half), 2)
+    with pytest.raises(QueryError, match=r"sum of b must be 1\.0, got 1\.5"):
+        ButcherTableau(((), (half,)), (half, 1), (0, half), 2)
+    with pytest.raises(QueryError, match=r"sum of a\[1\] must be 0.75, got 0.5"):
+        ButcherTableau(((), (half,)), (0, 1), (0, 0.75), 2)
+    with pytest.raises(QueryError, match="2 nodes and rows of 2 entries"):
+        ButcherTableau(((),), (0, 1), (0, half), 2)
+    with pytest.raises(QueryError, match="sum of b"):
+        ButcherTableau(((),), (float("nan"),), (0,), 1)
+    with pytest.raises(QueryError, match="order must be positive"):
+        ButcherTableau(((),), (1,), (0,), 0)
+
+
+def test_an_engine_refuses_a_tableau_it_cannot_run() -> None:
+    implicit = ButcherTableau(((1,),), (1,), (1,), 1)
+    with pytest.raises(QueryError, match="i entries at most"):
+        ExplicitRungeKutta("wrong", implicit)
+    with pytest.raises(QueryError, match="same γ > 0"):
+        SinglyDiagonallyImplicit("wrong", RK4.tableau)
+    with pytest.raises(QueryError, match="give 2, 4 or 6"):
+        Gauss(3)
+
+
+def test_methods_are_values() -> None:
+    assert Gauss(4) == Gauss(4)
+    assert hash(RK4) == hash(method("rk4"))
+    with pytest.raises(FrozenInstanceError):
+        RK4.name = "other"  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def test_a_surd_is_as_fine_as_its_arithmetic() -> None:
+    """Gauss nodes x = 1/2 ± √3/6 satisfy 6 x² − 6 x + 1 = 0, to the rounding of each kind of number."""
+    tableau = ButcherTableau(
+        ((Surd(Fraction(1, 2), Fraction(1, 6), 3),),), (1,), (Surd(Fraction(1, 2), Fraction(1, 6), 3),), 1
+    )
+    for kind in (np.float32, np.float64, np.longdouble):
+        x = tableau.numbers(np.zeros(1, kind)).c[0]
+        assert type(x) is kind
+        assert abs(6 * x * x - 6 * x + 1) <= 8 * np.finfo(kind).eps
+    with Ball(300).scope():
+        x = tableau.numbers(Ball(300).array([0])).c[0]
+        assert (6 * x * x - 6 * x + 1).contains(arb(0))
+        assert float(x.rad()) < 1e-85
+
+
+def test_an_unknown_method_is_refused_with_the_nearest_names() -> None:
+    with pytest.raises(QueryError, match="no integration method 'rk44'; nearest: rk4"):
+        method("rk44")
+
+
+def test_names_and_traits_of_the_table() -> None:
+    assert {each.name for each in ALL} == set(METHODS)
+    assert {each.name for each in ALL if each.canonical} == {"gauss_2", "gauss_4", "gauss_6"}
+    assert {each.name for each in STIFF} == {"linearly_implicit_euler", "sdirk_3"}
+
+
+@pytest.mark.parametrize("integrator", ALL, ids=name_of)
+def test_batch_equals_one_at_a_time(integrator: Integrator) -> None:
+    """Iterations of a batch end together, so some run a round longer: a few roundings of stages, 1e-14 allows them."""
+    y = RNG.normal(size=(2, 3, 3))
+    got = integrator.step(PENDULUM, 0.3, y, 0.05)
+    single = [[integrator.step(PENDULUM, 0.3, each, 0.05) for each in row] for row in y]
+    np.testing.assert_allclose(got, single, rtol=1e-14, atol=1e-14)
+
+
+@pytest.mark.parametrize("integrator", ALL, ids=name_of)
+def test_inputs_are_left_alone_and_the_result_is_fresh(integrator: Integrator) -> None:
+    y = RNG.normal(size=3)
+    before = y.copy()
+    y.setflags(write=False)
+    got = integrator.step(PENDULUM, 0.3, y, 0.05)
+    assert np.array_equal(y, before)
+    assert got.flags.writeable
+    assert not np.shares_memory(got, y)
+    assert np.array_equal(got, integrator.step(PENDULUM, 0.3, y, 0.05))  # no state is left from the first
+
+
+@pytest.mark.parametrize("integrator", ANY_ARITHMETIC, ids=name_of)
+def test_longdouble_stays_longdouble(integrator: Integrator) -> None:
+    """And agrees with float64 to the rounding of that."""
+    y = RNG.normal(size=3)
+    wide = integrator.step(PENDULUM, np.longdouble("0.3"), y.astype(np.longdouble), 0.05)
+    assert wide.dtype == np.longdouble
+    np.testing.assert_allclose(wide.astype(float), integrator.step(PENDULUM, 0.3, y, 0.05), rtol=1e-14, atol=1e-15)
+
+
+@pytest.mark.parametrize("integrator", ALL, ids=name_of)
+def test_float32_stays_float32(integrator: Integrator) -> None:
+    y = RNG.normal(size=3).astype(np.float32)
+    got = integrator.step(PENDULUM, 0.25, y, 0.05)
+    assert got.dtype == np.float32
+    np.testing.assert_allclose(got, integrator.step(PENDULUM, 0.25, y.astype(float), 0.05), atol=1e-5)
+
+
+@pytest.mark.parametrize("integrator", ALL, ids=name_of)
+def test_a_state_of_integers_is_refused(integrator: Integrator) -> None:
+    with pytest.raises(QueryError, match="float32"):
+        integrator.step(OSCILLATOR, 0.0, np.array([1, 0]), 0.1)
+
+
+@pytest.mark.parametrize("integrator", STIFF, ids=name_of)
+def test_implicit_methods_say_which_floats_they_take(integrator: Integrator) -> None:
+    for y in (np.ones(2, np.longdouble), Ball().array([1, 0])):
+        if y.dtype != np.float64:
+            with pytest.raises(QueryError, match="works in float32 and float64"):
+                integrator.step(OSCILLATOR, 0.0, y, 0.1)
+
+
+@pytest.mark.parametrize("integrator", [each for each in ALL if each.evaluations_per_step], ids=name_of)
+def test_evaluations_are_as_declared(integrator: Integrator) -> None:
+    calls: list[Any] = []
+
+    def counted(t: Any, y: np.ndarray) -> np.ndarray:
+        calls.append(t)
+        return pendulum(t, y)
+
+    integrator.step(System(counted, 1), 0.3, RNG.normal(size=3), 0.05)
+    assert len(calls) == integrator.evaluations_per_step
+
+
+def test_only_iterative_methods_leave_their_evaluations_open() -> None:
+    known = {each.name: each.evaluations_per_step for each in ALL if each.evaluations_per_step}
+    assert known == {"explicit_euler": 1, "semi_implicit_euler": 1, "midpoint": 2, "rk4": 4, "order_8": 12}
+
+
+@pytest.mark.parametrize("integrator", ALL, ids=name_of)
+def test_quadratures_integrate_power(integrator: Integrator) -> None:
+    """E(t) − E(0) = ∫ u v dt for the undamped pendulum; the residual is of the method's order, 5 hᵖ over 2 s here."""
+
+    def undamped(t: Any, y: np.ndarray) -> np.ndarray:
+        return pendulum(t, y) + np.stack([0 * y[..., 1], y[..., 1] / 5, 0 * y[..., 1]], axis=-1)
+
+    def energy(y: np.ndarray) -> Any:
+        return y[1] ** 2 / 2 - np.cos(y[0])
+
+    start, h = np.array([0.4, 0.7, 0.0]), 1 / 64
+    y = start
+    for i in range(128):
+        y = integrator.step(System(undamped, 1), i * h, y, h)
+    assert abs(energy(y) - energy(start) - y[2]) < 5 * h**integrator.order + 1e-13
+    assert abs(y[2]) > 0.02
+
+
+def test_importing_the_package_loads_no_scipy() -> None:
+    modules = "explicit, gauss, implicit, adaptive, methods"
+    code = f"import sys, robot_dyn.integrate; from robot_dyn.integrate import {modules}; print('scipy' in sys.modules)"
+    assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "False"

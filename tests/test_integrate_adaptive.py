@@ -1,0 +1,147 @@
+"""Methods with step-size control: error against tolerance, dense output, and runs that end early say so."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from robot_dyn.errors import OverflowedError, QueryError
+from robot_dyn.integrate.adaptive import Adaptive, Status
+from robot_dyn.integrate.integrator import System
+
+BOTH = ["DOP853", "Radau"]
+OSCILLATOR = System(lambda t, y: np.stack([y[..., 1], -y[..., 0]], axis=-1), 1)
+START = np.array([1.0, 0.5])
+
+
+def motion(t: Any) -> np.ndarray:
+    return np.stack([np.cos(t) + np.sin(t) / 2, np.cos(t) / 2 - np.sin(t)], axis=-1)
+
+
+@pytest.mark.parametrize("name", BOTH)
+def test_dense_output_is_within_the_tolerance(name: str) -> None:
+    """Over 10 s of ẍ = −x errors only add up, some 20 steps of them: 100 tolerances bound it between the steps too."""
+    for tolerance in (1e-5, 1e-8):
+        solution = Adaptive(name, rtol=tolerance, atol=tolerance).solve(OSCILLATOR, 0.0, START, 10.0)
+        assert solution.status is Status.FINISHED
+        assert (solution.times[0], solution.times[-1]) == (0.0, 10.0)
+        t = np.linspace(0, 10, 400).reshape(2, 200)
+        assert solution(t).shape == (2, 200, 2)
+        assert np.abs(solution(t) - motion(t)).max() < 100 * tolerance
+        np.testing.assert_allclose(solution(solution.times), solution.states, atol=1e-14)
+
+
+@pytest.mark.parametrize("name", BOTH)
+def test_evaluations_are_all_counted(name: str) -> None:
+    """One a row: those of Jacobians come in batches."""
+    rows: list[int] = []
+
+    def counted(t: Any, y: np.ndarray) -> np.ndarray:
+        rows.append(y.size // 2)
+        return OSCILLATOR.rate(t, y)
+
+    solution = Adaptive(name, rtol=1e-6).solve(System(counted, 1), 0.0, START, 3.0)
+    assert solution.evaluations == sum(rows)
+
+
+@pytest.mark.parametrize("name", BOTH)
+def test_a_run_can_go_back(name: str) -> None:
+    options = Adaptive(name, rtol=1e-8, atol=1e-10)
+    solution = options.solve(OSCILLATOR, 2.0, motion(2.0), 0.0)
+    np.testing.assert_allclose(solution(0.0), START, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", BOTH)
+def test_a_run_stops_where_it_is_told(name: str) -> None:
+    """Position crosses zero at t = π − atan 2; the solution ends there, and the start on zero is no crossing."""
+    options = Adaptive(name, rtol=1e-9, atol=1e-11)
+    solution = options.solve(OSCILLATOR, 0.0, START, 10.0, stop=lambda t, y: y[0])
+    assert solution.status is Status.STOPPED
+    assert solution.times[-1] == pytest.approx(np.pi - np.arctan(2), abs=1e-7)
+    assert solution.states[-1][0] == pytest.approx(0, abs=1e-12)
+    with pytest.raises(QueryError, match="within the run"):
+        solution(solution.times[-1] + 0.1)
+    again = options.solve(OSCILLATOR, 0.0, np.array([0.0, 1.0]), 10.0, stop=lambda t, y: y[0])
+    assert again.times[-1] == pytest.approx(np.pi, abs=1e-7)
+
+
+@pytest.mark.parametrize("name", BOTH)
+def test_blow_up_is_reported_and_keeps_what_it_has(name: str) -> None:
+    """From 1, the solution of y' = y² is 1/(1 − t): no step reaches beyond 1."""
+    solution = Adaptive(name, rtol=1e-8).solve(System(lambda t, y: y**2, 0), 0.0, np.array([1.0]), 2.0)
+    assert solution.status is Status.FAILED
+    assert "grows without bound" in solution.message
+    assert solution.times[-1] == pytest.approx(1, abs=1e-6)
+    assert solution(0.5)[0] == pytest.approx(2, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", BOTH)
+@pytest.mark.parametrize("kind", ["nan", "refusal"])
+def test_a_rate_that_is_not_finite_from_the_start_is_reported(name: str, kind: str) -> None:
+    def rate(t: Any, y: np.ndarray) -> np.ndarray:
+        if kind == "refusal":
+            raise OverflowedError("too large")
+        return np.nan * y
+
+    solution = Adaptive(name).solve(System(rate, 0), 0.0, START, 1.0)
+    assert solution.status is Status.FAILED
+    assert "not finite at t = 0.0" in solution.message
+    np.testing.assert_array_equal(solution([0.0, 0.0]), [START, START])
+
+
+@pytest.mark.parametrize("name", BOTH)
+def test_a_rate_that_ends_to_be_finite_is_reported(name: str) -> None:
+    solution = Adaptive(name, rtol=1e-6).solve(System(lambda t, y: np.sqrt(1 - t) * y, 0), 0.0, START, 2.0)
+    assert solution.status is Status.FAILED
+    assert solution.times[-1] == pytest.approx(1, abs=1e-6)
+
+
+def test_radau_takes_few_steps_on_a_stiff_system_and_dop853_many() -> None:
+    """For y' = −1e6 (y − cos t) an explicit method needs some 1e5 steps a second, so only 1e-3 s of it are run."""
+    stiff = System(lambda t, y: -1e6 * (y - np.cos(t)), 0)
+    implicit = Adaptive("Radau", rtol=1e-6, atol=1e-8).solve(stiff, 0.0, np.array([1.0]), 1.0)
+    explicit = Adaptive("DOP853", rtol=1e-6, atol=1e-8).solve(stiff, 0.0, np.array([1.0]), 1e-3)
+    assert implicit.states[-1][0] == pytest.approx(np.cos(1), abs=1e-5)
+    assert len(implicit.times) < 50 < len(explicit.times)
+
+
+def test_longest_step_is_kept_and_inputs_are_left_alone() -> None:
+    y0 = START.copy()
+    y0.setflags(write=False)
+    solution = Adaptive(rtol=1e-3, max_step=0.1).solve(OSCILLATOR, 0.0, y0, 1.0)
+    assert np.diff(solution.times).max() <= 0.1 * (1 + 1e-12)
+    assert np.array_equal(y0, START)
+    with pytest.raises(ValueError, match="read-only"):
+        solution.states[0] = 1
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"method": "LSODA"}, "give 'DOP853' or 'Radau'"),
+        ({"rtol": 1e-15}, "rtol must be between 2.2e-14 and 1"),
+        ({"rtol": float("nan")}, "rtol must be"),
+        ({"atol": -1.0}, "atol must be"),
+        ({"max_step": 0.0}, "max_step must be positive"),
+    ],
+)
+def test_meaningless_options_are_refused(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(QueryError, match=message):
+        Adaptive(**options)
+
+
+@pytest.mark.parametrize(
+    ("y0", "t1", "message"),
+    [
+        (np.ones((2, 2)), 1.0, r"shape \(m,\)"),
+        (np.array([1.0, np.inf]), 1.0, "must be finite"),
+        (START.astype(object), 1.0, "float64"),
+        (START, 0.0, "must be finite and differ"),
+        (START, float("inf"), "must be finite and differ"),
+    ],
+)
+def test_an_unfit_start_is_refused(y0: np.ndarray, t1: float, message: str) -> None:
+    with pytest.raises(QueryError, match=message):
+        Adaptive().solve(OSCILLATOR, 0.0, y0, t1)

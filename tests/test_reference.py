@@ -1,0 +1,231 @@
+"""What is wanted at time t: piecewise polynomials, their ends and joints, lines, circles and turns."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from robot_dyn.control.cartesian import CartesianReference, circle, line
+from robot_dyn.control.controller import ControlError
+from robot_dyn.control.orientation import orientation_error, rotation_vector
+from robot_dyn.control.reference import PiecewisePolynomial, hold, quintic, via_points
+from robot_dyn.spatial import rotation
+
+Q0, Q1 = np.array([0.3, -1.2, 2.0]), np.array([1.1, 0.4, -0.7])
+TIMES = np.array([0.5, 0.9, 2.2, 2.9, 4.4, 5.0])
+POINTS = np.random.default_rng(3).normal(size=(6, 3))
+AXIS = np.array([2.0, -1.0, 2.0]) / 3
+REFERENCES = {
+    "hold": hold(Q0),
+    "quintic": quintic(Q0, Q1, 1.7, start=0.4),
+    "quintic between motions": quintic(Q0, Q1, 1.7, v0=[0.3, -0.4, 0.5], v1=-0.8, a0=1.3, a1=[0.2, 0.6, -0.9]),
+    "cubic spline": via_points(TIMES, POINTS, kind="cubic"),
+    "quintic spline": via_points(TIMES, POINTS),
+    "circle": circle([0.4, -0.2, 0.5], 0.3, [1.0, -2.0, 0.5], 2.0, turns=1.3).position,
+}
+
+
+@pytest.mark.parametrize("reference", REFERENCES.values(), ids=REFERENCES)
+def test_velocity_and_acceleration_are_derivatives(reference: PiecewisePolynomial) -> None:
+    """Central differences, h = 1e-5 s: h² q⁗ / 6 and ε q / h are below 1e-8 for motions of this size.
+
+    Times keep 1e-3 s from the breaks: there only the lower derivatives are continuous.
+    """
+    t = np.random.default_rng(1).uniform(reference.start, reference.end, 300)
+    t, h = t[np.abs(t[:, None] - reference.breaks).min(axis=1) > 1e-3], 1e-5
+    _, v, a = reference.at(t)
+    (q_after, v_after, _), (q_before, v_before, _) = reference.at(t + h), reference.at(t - h)
+    np.testing.assert_allclose((q_after - q_before) / (2 * h), v, atol=1e-7)
+    np.testing.assert_allclose((v_after - v_before) / (2 * h), a, atol=1e-7)
+
+
+@pytest.mark.parametrize("reference", REFERENCES.values(), ids=REFERENCES)
+def test_position_velocity_and_acceleration_are_continuous(reference: PiecewisePolynomial) -> None:
+    """Either side of an inner break, a few ulps of time apart: what changes is a rounding."""
+    inner = reference.breaks[1:-1]
+    for right, left in zip(reference.at(inner), reference.at(np.nextafter(inner, 0)), strict=True):
+        np.testing.assert_allclose(right, left, rtol=1e-11, atol=1e-11)
+
+
+def test_at_a_break_the_piece_to_its_right_counts() -> None:
+    """A sawtooth, 3 t and then −2 t: what a sampled controller at a tick sees is what comes."""
+    saw = PiecewisePolynomial([0.0, 1.0, 2.0], [[[0.0], [3.0]], [[5.0], [-2.0]]])
+    assert [float(x[0]) for x in saw.at(1.0)] == [5.0, -2.0, 0.0]
+    assert [float(x[0]) for x in saw.at(2.0)] == [3.0, -2.0, 0.0]
+
+
+@pytest.mark.parametrize("reference", REFERENCES.values(), ids=REFERENCES)
+def test_it_rests_before_its_start_and_after_its_end(reference: PiecewisePolynomial) -> None:
+    for outside, end in [(reference.start - 0.3, reference.start), (reference.end + 7.0, reference.end)]:
+        q, v, a = reference.at(outside)
+        np.testing.assert_array_equal(q, reference.at(end)[0])
+        assert not v.any()
+        assert not a.any()
+
+
+@pytest.mark.parametrize("reference", REFERENCES.values(), ids=REFERENCES)
+@pytest.mark.parametrize("shape", [(), (4,), (2, 3)])
+def test_times_may_carry_axes(reference: PiecewisePolynomial, shape: tuple[int, ...]) -> None:
+    t = np.random.default_rng(5).uniform(reference.start - 0.2, reference.end + 0.2, shape)
+    batch = reference.at(t)
+    for got in batch:
+        assert got.shape == (*shape, reference.n)
+    for index in np.ndindex(*shape):
+        for got, one in zip(batch, reference.at(t[index] if shape else float(t)), strict=True):
+            np.testing.assert_array_equal(got[index], one)
+
+
+def test_quintic_is_the_minimum_jerk_motion() -> None:
+    """10 s³ − 15 s⁴ + 6 s⁵, of greatest velocity 15/8 halfway; roundings only."""
+    s = np.linspace(0, 1, 101)
+    q, v, a = quintic(Q0, Q1, 1.7, start=0.4).at(0.4 + 1.7 * s)
+    expected = Q0 + (Q1 - Q0) * (10 * s**3 - 15 * s**4 + 6 * s**5)[:, None]
+    np.testing.assert_allclose(q, expected, atol=1e-14)
+    np.testing.assert_allclose(np.abs(v).max(axis=0), 15 / 8 * np.abs(Q1 - Q0) / 1.7, rtol=1e-13)
+    np.testing.assert_allclose(v[50], 15 / 8 * (Q1 - Q0) / 1.7, rtol=1e-13)
+    np.testing.assert_allclose(np.stack([v, a])[:, [0, -1]], 0, atol=1e-13)
+
+
+def test_quintic_meets_its_end_conditions() -> None:
+    start, end = REFERENCES["quintic between motions"].at(0.0), REFERENCES["quintic between motions"].at(1.7)
+    for got, expected in zip([*start, *end], [Q0, [0.3, -0.4, 0.5], 1.3, Q1, -0.8, [0.2, 0.6, -0.9]], strict=True):
+        np.testing.assert_allclose(got, np.broadcast_to(expected, 3), rtol=1e-13, atol=1e-13)
+
+
+@pytest.mark.parametrize(("kind", "degree"), [("cubic", 3), ("quintic", 5)])
+def test_spline_is_the_one_of_scipy(kind: str, degree: int) -> None:
+    """An independent solver (B-splines) with the same end conditions; both solve well-conditioned systems: 1e-11."""
+    from scipy.interpolate import make_interp_spline
+
+    rest = [(order, np.zeros(3)) for order in range(1, (degree + 1) // 2)]
+    expected = make_interp_spline(TIMES, POINTS, k=degree, bc_type=(rest, rest))
+    t = np.linspace(TIMES[0], TIMES[-1], 200)[:-1]
+    for order, got in enumerate(via_points(TIMES, POINTS, kind=kind).at(t)):
+        np.testing.assert_allclose(got, expected(t, nu=order), rtol=1e-11, atol=1e-10)
+
+
+@pytest.mark.parametrize("kind", ["cubic", "quintic"])
+def test_spline_passes_its_points_from_rest_to_rest(kind: str) -> None:
+    spline = via_points(TIMES, POINTS, kind=kind)
+    np.testing.assert_allclose(spline.at(TIMES)[0], POINTS, atol=1e-13)
+    np.testing.assert_allclose(spline.at(TIMES[[0, -1]])[1], 0, atol=1e-12)
+    only_two = via_points(TIMES[:2], POINTS[:2])
+    np.testing.assert_allclose(
+        only_two.coefficients,
+        quintic(*POINTS[:2], duration=TIMES[1] - TIMES[0], start=TIMES[0]).coefficients,
+        rtol=1e-12,
+    )
+
+
+def test_spline_does_not_depend_on_the_unit_of_time() -> None:
+    """In milliseconds the coefficients of tʲ scale by 1000⁻ʲ: to rounding, by the scaling before the solve."""
+    slow, fast = via_points(TIMES, POINTS), via_points(TIMES / 1000, POINTS)
+    np.testing.assert_allclose(fast.at(1.7 / 1000)[0], slow.at(1.7)[0], rtol=1e-11)
+
+
+@pytest.mark.parametrize("ramp", [None, 0.0, 0.02, 0.3, 0.9, 1.0, 1.7, 2.6])
+@pytest.mark.parametrize("turns", [0.3, 1.3])
+def test_circle_stays_on_its_circle(ramp: float | None, turns: float) -> None:
+    """Within 1e-9 of the radius, as stated, and in its plane to rounding."""
+    centre, normal, r, period = np.array([0.4, -0.2, 0.5]), np.array([1.0, -2.0, 0.5]), 0.3, 2.0
+    if ramp is not None and ramp > turns * period:
+        with pytest.raises(ControlError, match="ramp must be at most"):
+            circle(centre, r, normal, period, turns=turns, ramp=ramp)
+        return
+    reference = circle(centre, r, normal, period, turns=turns, ramp=ramp, start=0.7)
+    path = reference.position
+    p, _, V, _ = reference.at(np.linspace(path.start, path.end, 20001))
+    assert np.abs(np.linalg.norm(p - centre, axis=-1) / r - 1).max() < 1e-9
+    np.testing.assert_allclose((p - centre) @ normal, 0, atol=1e-15)
+    speed = np.linalg.norm(V[:, :3], axis=-1)
+    np.testing.assert_allclose(speed.max(), 2 * np.pi * r / period, rtol=1e-6)
+    ends = 2 * np.pi * r / period if ramp == 0 else 0
+    np.testing.assert_allclose(speed[[0, -1]], ends, atol=1e-12)
+    rise = min(0.5, turns * period) if ramp is None else ramp
+    assert path.end - path.start == pytest.approx(turns * period + rise, rel=1e-14)
+
+
+def test_circle_turns_by_the_right_hand_from_where_it_is_told() -> None:
+    """A quarter turn about z from x ends at y; the angle is exact, so roundings only."""
+    quarter = circle([0.0, 0.0, 1.0], 2.0, [0, 0, 5.0], 4.0, turns=0.25, toward=[3.0, 0.0, 0.7], start=1.0)
+    np.testing.assert_allclose(quarter.at(1.0)[0], [2, 0, 1], atol=1e-14)
+    np.testing.assert_allclose(quarter.at(9.0)[0], [0, 2, 1], atol=1e-14)
+
+
+def test_line_is_straight_and_its_turn_is_the_shortest() -> None:
+    """p(t) and R(t) share one time law; Ṙ = ω̂ R by central differences, h = 1e-5 s: 1e-9."""
+    R0 = rotation(np.array([0.6, 0.0, 0.8]), 0.9)
+    reference = line([0.1, 0.2, 0.3], [0.5, -0.1, 0.9], 1.5, rotation=R0, rotation_end=rotation(AXIS, 2.5) @ R0)
+    s, h = 0.37, 1e-5
+    share = 10 * s**3 - 15 * s**4 + 6 * s**5
+    p, R, V, V_rate = reference.at(1.5 * s)
+    np.testing.assert_allclose(p, np.array([0.1, 0.2, 0.3]) + share * np.array([0.4, -0.3, 0.6]), atol=1e-15)
+    np.testing.assert_allclose(R, rotation(AXIS, 2.5 * share) @ R0, atol=1e-14)
+    (_, R_after, V_after, _), (_, R_before, V_before, _) = reference.at(1.5 * s + h), reference.at(1.5 * s - h)
+    np.testing.assert_allclose(rotation_vector(R_after @ R_before.T) / (2 * h), V[3:], atol=1e-9)
+    np.testing.assert_allclose((V_after - V_before) / (2 * h), V_rate, atol=1e-8)
+
+
+def test_line_without_a_turn_holds_its_orientation_or_leaves_it_free() -> None:
+    R = rotation(AXIS, 0.4)
+    for reference in (line(Q0, Q1, 1.0, rotation=R), line(Q0, Q1, 1.0, rotation=R, rotation_end=R)):
+        np.testing.assert_array_equal(reference.at(0.4)[1], R)
+        assert not reference.at(0.4)[2][3:].any()
+    assert line(Q0, Q1, 1.0).at(0.4)[1] is None
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-160, 1e-9, 1e-3, 0.5, 1.6, 2.4, 3.1, np.pi - 1e-7])
+def test_rotation_vector_is_the_angle_times_the_axis(angle: float) -> None:
+    """Any angle up to half a turn keeps all digits: R itself is rounded, which moves φ by some 1e-16: 2e-15."""
+    for axis in [AXIS, -AXIS, np.array([0.0, 1.0, 0.0]), np.array([-0.6, 1e-9, 0.8])]:
+        np.testing.assert_allclose(rotation_vector(rotation(axis, angle)), angle * axis, atol=2e-15, rtol=1e-15)
+
+
+def test_rotation_vector_of_half_a_turn_is_one_of_the_two() -> None:
+    half = 2 * np.outer(AXIS, AXIS) - np.eye(3)
+    np.testing.assert_allclose(rotation_vector(half) * np.sign(rotation_vector(half)[0]), np.pi * AXIS, rtol=1e-14)
+
+
+def test_orientation_error_is_the_turn_in_base_axes_that_is_missing() -> None:
+    R = rotation(np.array([0.6, 0.0, 0.8]), np.linspace(0.1, 3.0, 7))
+    np.testing.assert_allclose(orientation_error(rotation(AXIS, 1.9) @ R, R), np.tile(1.9 * AXIS, (7, 1)), atol=1e-14)
+
+
+def test_references_are_copied_and_frozen() -> None:
+    q = Q0.copy()
+    reference = hold(q)
+    q[0] = 9.0
+    assert reference.at(0.0)[0][0] == Q0[0]
+    with pytest.raises(ValueError, match="read-only"):
+        reference.coefficients[0] = 1.0
+    reference.at(0.0)[0][0] = 4.0  # the answer is a fresh array
+    assert reference.at(0.0)[0][0] == Q0[0]
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: hold(0.3), r"q must have shape \(n,\), got \(\)"),
+        (lambda: hold([]), "q must have shape"),
+        (lambda: hold([0.1, np.nan]), "q must be finite"),
+        (lambda: hold([[1.0], [1.0, 2.0]]), "q must be an array of numbers"),
+        (lambda: quintic(Q0, Q1[:2], 1.0), r"q1 must have shape \(3,\), got \(2,\)"),
+        (lambda: quintic(Q0, Q1, 0.0), "duration must be positive"),
+        (lambda: quintic(Q0, Q1, 1.0, v0=[1.0]), "v0 must have shape"),
+        (lambda: via_points([0.0, 1.0], POINTS), r"times must have shape \(6,\)"),
+        (lambda: via_points(TIMES[::-1], POINTS), "times must increase"),
+        (lambda: via_points(TIMES, POINTS, kind="linear"), "give one of cubic, quintic"),
+        (lambda: via_points([0.0], POINTS[:1]), "points must be 2 at least"),
+        (lambda: PiecewisePolynomial([0.0, 1.0], [1.0]), "coefficients must have shape"),
+        (lambda: line(Q0, Q1, 1.0, rotation=np.ones((3, 3))), "rotation must be a rotation matrix"),
+        (lambda: line(Q0, Q1, 1.0, rotation_end=np.eye(3)), "needs a rotation to start from"),
+        (lambda: circle(Q0, 1.0, [0, 0, 0], 1.0), "normal must not be zero"),
+        (lambda: circle(Q0, 1.0, [0, 0, 1], 1.0, toward=[0, 0, 2]), "toward, in the plane of the circle, must not"),
+        (lambda: circle(Q0, -1.0, [0, 0, 1], 1.0), "radius must be positive"),
+        (lambda: CartesianReference(hold([1.0])), "position must be"),
+        (lambda: CartesianReference(hold(Q0), angle=hold([1.0])), "needs a rotation"),
+    ],
+)
+def test_references_without_meaning_are_refused(make, message: str) -> None:
+    with pytest.raises(ControlError, match=message):
+        make()

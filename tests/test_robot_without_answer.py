@@ -1,0 +1,123 @@
+"""What has no answer: forward dynamics where M is singular, results that are too large for a float64."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+import robot_dyn as rd
+from robot_dyn.errors import ModelWarning, OverflowedError, SingularError
+from tests.queries import general
+
+INERTIA = ((0.02, 0.001, -0.002), (0.001, 0.03, 0.003), (-0.002, 0.003, 0.04))
+
+
+def urdf(tmp_path: Path, links: dict[str, str], joints: dict[str, tuple[str, str, str]]) -> Path:
+    """A file of links (name → content) and joints (name → parent, child, content)."""
+    parts = [f'<link name="{name}">{content}</link>' for name, content in links.items()]
+    parts += [
+        f'<joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{child}"/>{content}</joint>'
+        for name, (parent, child, content) in joints.items()
+    ]
+    path = tmp_path / "arm.urdf"
+    path.write_text(f'<robot name="arm">{"".join(parts)}</robot>')
+    return path
+
+
+def point_mass(xyz: str) -> str:
+    moments = " ".join(f'{key}="0"' for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
+    return f'<inertial><origin xyz="{xyz}"/><mass value="1"/><inertia {moments}/></inertial>'
+
+
+# --- where M is singular
+
+
+def test_massless_tip_has_no_forward_dynamics_until_it_is_held_or_loaded():
+    with pytest.warns(ModelWarning, match="link 'pointer'"):
+        robot = rd.load("massless_tip")
+    q, v, tau = general(robot, 9)
+    assert np.isfinite(robot.inverse_dynamics(q, v, tau)).all()
+    for x in (q, q.tolist(), [q, q]):
+        with pytest.raises(SingularError, match="'pointer_joint'"):
+            robot.forward_dynamics(x, v, tau)
+    assert np.isfinite(robot.with_(lock={"pointer_joint": 0.2}).forward_dynamics(q[:1], v[:1], tau[:1])).all()
+    loaded = robot.with_(payload=rd.Payload("pointer", 0.1, inertia=INERTIA))
+    assert_allclose(loaded.inverse_dynamics(q, v, loaded.forward_dynamics(q, v, tau)), tau, rtol=1e-12)
+
+
+@pytest.mark.filterwarnings("ignore::robot_dyn.errors.ModelWarning")
+def test_M_that_is_singular_where_the_mass_lies_on_the_outer_axis(tmp_path: Path):
+    """M = diag(m l² sin² q₂, m l²) for a point mass on the z axis at q₂ = 0."""
+    links = {"base": "", "yoke": "", "bob": point_mass("0 0 0.5")}
+    joints = {"pan": ("base", "yoke", '<axis xyz="0 0 1"/>'), "tilt": ("yoke", "bob", '<axis xyz="0 1 0"/>')}
+    robot = rd.load(urdf(tmp_path, links, joints))
+    v, tau = np.array([0.3, -0.4]), np.array([0.6, 0.7])
+    assert_allclose(robot.M(np.array([0.7, 0.9])), np.diag([0.25 * np.sin(0.9) ** 2, 0.25]), rtol=0, atol=1e-16)
+    for tilt in (0.9, 0.1, -0.1, 2.0):
+        q = np.array([0.7, tilt])
+        assert_allclose(robot.inverse_dynamics(q, v, robot.forward_dynamics(q, v, tau)), tau, rtol=1e-10)
+    for q in (np.array([0.7, 0.0]), [0.7, 0.0], [[0.7, 0.9], [0.7, 0.0]]):
+        with pytest.raises(SingularError, match="'pan' carries no inertia at this q"):
+            robot.forward_dynamics(q, v, tau)
+
+
+@pytest.mark.filterwarnings("ignore::robot_dyn.errors.ModelWarning")
+@pytest.mark.parametrize(("l1", "l2"), [(0.3, 0.7), (0.67, 0.34), (0.83, 0.92)])
+def test_M_that_is_singular_where_the_arm_is_straight(tmp_path: Path, l1: float, l2: float):
+    """M has det M = m² l₁² l₂² sin² q₂ for a point mass at the tip alone; rounding decides how ABA fails at q₂ = 0."""
+    links = {"base": "", "upper": "", "lower": point_mass(f"{l2} 0 0")}
+    z = '<axis xyz="0 0 1"/>'
+    joints = {"shoulder": ("base", "upper", z), "elbow": ("upper", "lower", f'<origin xyz="{l1} 0 0"/>{z}')}
+    robot = rd.load(urdf(tmp_path, links, joints))
+    v, tau = np.array([0.3, -0.4]), np.array([0.6, 0.7])
+    q = np.array([0.2, 0.9])
+    assert_allclose(robot.inverse_dynamics(q, v, robot.forward_dynamics(q, v, tau)), tau, rtol=1e-10)
+    with pytest.raises(SingularError, match=r"no forward dynamics: joint '(shoulder|elbow)'"):
+        robot.forward_dynamics(np.array([0.2, 0.0]), v, tau)
+
+
+# --- what overflows
+
+
+@pytest.mark.parametrize("name", ["ur5", "panda", "skew_tree"])
+@pytest.mark.parametrize("form", [np.asarray, np.ndarray.tolist])
+def test_arguments_too_large_for_float64_raise(name: str, form: Any):
+    """A force quadratic in v, 1e200² > 1.8e308; the argument that the user gave is named."""
+    robot = rd.load(name)
+    q, v, a = general(robot, 10)
+    fast = 1e200 * v
+    for method in ("coriolis_torque", "coriolis_transpose", "kinetic_energy"):
+        with pytest.raises(OverflowedError, match="q, v are so large"):
+            getattr(robot, method)(form(q), form(fast))
+    with pytest.raises(OverflowedError, match="q, v, a are so large"):
+        robot.inverse_dynamics(form(q), form(fast), form(a))
+    with pytest.raises(OverflowedError, match="q, v, tau are so large"):
+        robot.forward_dynamics(form(q), form(fast), form(a))
+    with pytest.raises(OverflowedError, match="q, v are so large"):
+        robot.momentum(form(q), form(np.full(robot.n, 1e308)))
+
+
+def test_overflow_is_seen_where_position_and_velocity_are_orthogonal():
+    """C of a slide at 1e200 m on a shaft at 1e200 rad/s overflows although q · v = 0."""
+    robot = rd.load("skew_tree")
+    with pytest.raises(OverflowedError):
+        robot.C(np.array([0, 0, 1e200, 0, 0]), np.array([1e200, 0, 0, 0, 0]))
+    with pytest.raises(OverflowedError):
+        robot.M(np.array([0, 0, 1e200, 0, 0]))
+
+
+def test_huge_arguments_with_a_finite_answer_are_answered_without_a_warning():
+    """sin(1e200) is a number; pytest turns NumPy's warnings into errors."""
+    robot = rd.load("ur5")
+    q, v, a = general(robot, 11)
+    far = 1e200 * q
+    assert_array_equal(robot.M(far), robot.M(far.tolist()))
+    assert_array_equal(robot.N(far), robot.N(far.tolist()))
+    assert_array_equal(robot.C(far, v), robot.C(far.tolist(), v))
+    assert np.isfinite(robot.M(np.full(robot.n, 1.7e308))).all()
+    assert np.isfinite(robot.inverse_dynamics(q, v, 1e200 * a)).all()
+    assert np.isfinite(robot.forward_dynamics(q, v, 1e200 * a)).all()

@@ -1,0 +1,165 @@
+"""Scenes: every starter runs, what a scene does not name does not act, and a mistake is told by file, key and value."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import robot_dyn as rd
+from robot_dyn.scene.explain import explain, kinds
+from robot_dyn.scene.scene import parse_scene, read_both
+from robot_dyn.scene.schema import SceneError
+from robot_dyn.scene.starters import starter, starters
+
+SCENE = """
+robot = "planar_2r"
+duration_s = 0.1
+[start]
+q = [0.3, -0.4]
+v = {joint_2 = 0.5}
+"""
+PD = """
+[control]
+kind = "pd"
+frequency_rad_per_s = 10.0
+[reference]
+kind = "quintic"
+q = [1.0, 0.5]
+duration_s = 0.5
+"""
+
+
+@pytest.fixture
+def write(tmp_path):
+    def file(text: str):
+        path = tmp_path / "scene.toml"
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return file
+
+
+@pytest.mark.parametrize("name", starters())
+def test_starter_runs_and_closes_its_ledger(write, name: str) -> None:
+    """At its own settings, cut to half a second: residual ≤ 1e-9 of the energy exchanged."""
+    setup = rd.read_scene(write(starter(name)))
+    run = rd.simulate(setup, duration_s=min(setup.duration_s, 0.5), estimate_error=False)
+    assert run.outcome.ending == "finished"
+    assert run.ledger.closure <= 1e-9
+
+
+def test_what_a_scene_does_not_name_does_not_act(write) -> None:
+    """Without gravity and effects the arm keeps its kinetic energy; N is 0 at any state."""
+    setup = rd.read_scene(write(SCENE))
+    assert setup.plant.effects == ()
+    np.testing.assert_array_equal(setup.plant.N(0.0, [0.3, 0.4], [1.0, 2.0]), [0.0, 0.0])
+    run = rd.simulate(setup)
+    np.testing.assert_allclose(run.ledger.energy, run.ledger.energy[0], rtol=1e-9)
+
+
+def test_start_is_by_joint_or_in_order(write) -> None:
+    setup = rd.read_scene(write(SCENE))
+    np.testing.assert_array_equal(setup.q0, [0.3, -0.4])
+    np.testing.assert_array_equal(setup.v0, [0.0, 0.5])
+
+
+EFFECTS = {
+    "gravity": "",
+    "viscous_friction": "damping_N_m_s_per_rad = 0.3",
+    "regularised_coulomb_friction": "friction_N_m = {joint_1 = 0.2}",
+    "spring": "stiffness_N_m_per_rad = 2.0\nrest_rad = [0.1, 0.2]",
+    "joint_stops": "lower_rad = -1.0\nupper_rad = {joint_1 = 1.0}",
+    "external_wrench": 'frame = "tip"\nforce_N = [1.0, 0.0, 0.0]',
+    "effort_limit": "limit_N_m = 3.0",
+    "payload": 'frame = "tip"\nmass_kg = 0.5',
+    "armature": "inertia_kg_m2 = 0.1",
+    "lock": "joints = {joint_1 = 0.2}",
+}
+
+
+def test_every_kind_of_effect_is_tried() -> None:
+    assert set(EFFECTS) == set(kinds())
+
+
+@pytest.mark.parametrize("kind", EFFECTS)
+def test_effect_of_a_scene_is_that_of_python(write, kind: str) -> None:
+    """Each kind read from a file changes the motion as the object of the same name made by hand."""
+    text = 'robot = "planar_2r"\nduration_s = 0.1\n' + f'[[effect]]\nkind = "{kind}"\n{EFFECTS[kind]}\n'
+    robot = rd.load("planar_2r").with_(gravity=(0, 0, 0))
+    by_hand = {
+        "gravity": lambda: rd.Plant(rd.load("planar_2r")),
+        "viscous_friction": lambda: rd.Plant(robot, [rd.ViscousFriction(0.3)]),
+        "regularised_coulomb_friction": lambda: rd.Plant(robot, [rd.RegularisedCoulombFriction([0.2, 0.0])]),
+        "spring": lambda: rd.Plant(robot, [rd.Spring(2.0, [0.1, 0.2])]),
+        "joint_stops": lambda: rd.Plant(robot, rd.joint_stops([-1.0, -1.0], [1.0, 1e9])),
+        "external_wrench": lambda: rd.Plant(robot, [rd.ExternalWrench("tip", [1, 0, 0, 0, 0, 0])]),
+        "effort_limit": lambda: rd.Plant(robot, [rd.EffortLimit(3.0)]),
+        "payload": lambda: rd.Plant(robot.with_(payload=rd.Payload("tip", 0.5))),
+        "armature": lambda: rd.Plant(robot.with_(armature=0.1)),
+        "lock": lambda: rd.Plant(robot.with_(lock={"joint_1": 0.2})),
+    }[kind]()
+    plant = rd.read_scene(write(text)).plant
+    q, v, u = np.random.default_rng(3).uniform(1.0, 4.0, (3, plant.dynamics.n))
+    expected = by_hand.forward_dynamics(0.05, q, v, u)
+    np.testing.assert_array_equal(plant.forward_dynamics(0.05, q, v, u), expected)
+
+
+@pytest.mark.parametrize("kind", ["pd", "pid", "pd_gravity", "feed_forward", "computed_torque"])
+def test_every_joint_controller_follows_its_plan(write, kind: str) -> None:
+    """In zero gravity all end within 5 % of the way; the gains are those of the frequency."""
+    text = SCENE.replace("0.1", "1.0", 1) + PD.replace('"pd"', f'"{kind}"')
+    run = rd.simulate(rd.read_scene(write(text)))
+    np.testing.assert_allclose(run.q[-1], [1.0, 0.5], atol=0.05)
+    assert run.tracking_error is not None
+
+
+def test_explanation_names_each_term_and_its_source(write) -> None:
+    text = "\n".join(explain(*read_both(write(starter("panda_payload")))))
+    for said in ("N = ∂V/∂q", "mass_kg = 1.5  (scene)", "limit_N_m = urdf  (the robot's file)", "not simulated"):
+        assert said in text
+    absent = text.split("not simulated")[1].split("\n\n")[0]
+    assert "viscous_friction" in absent
+    assert "payload" not in absent
+
+
+MISTAKES = {
+    "is no TOML": ("robot = ", ["scene.toml", "correct"]),
+    "unknown key": (SCENE + "colour = 3", ["start.colour", "unknown key", "3"]),
+    "near key": (SCENE.replace("duration_s", "duration"), ["duration", "duration_s"]),
+    "wrong type": (SCENE.replace("0.1", '"long"'), ["duration_s", "'long'"]),
+    "negative": (SCENE.replace("0.1", "-1.0"), ["duration_s", "greater than 0", "-1.0"]),
+    "nan": (SCENE.replace("0.1", "nan"), ["duration_s", "nan"]),
+    "unknown joint": (SCENE.replace("joint_2 =", "joint_3 ="), ["joint_3", "nearest: joint_"]),
+    "wrong shape": (SCENE.replace("[0.3, -0.4]", "[0.3]"), ["q must be", "(2,)"]),
+    "unknown robot": (SCENE.replace("planar_2r", "planar_3r"), ["planar_3r", "nearest: planar_2r"]),
+    "unknown method": ('method = "rk5"' + SCENE, ["method", "rk5", "rk4"]),
+    "unknown effect": (SCENE + '[[effect]]\nkind = "viscous"', ["effect[0]", "viscous"]),
+    "unknown frame": (SCENE + '[[effect]]\nkind = "external_wrench"\nframe = "tipp"', ["tipp", "nearest: tip"]),
+    "missing gain": (SCENE + '[control]\nkind = "pd"', ["control.frequency_rad_per_s", "required"]),
+    "wrong reference": (
+        SCENE + PD.replace('"pd"', '"operational_space"\nframe = "tip"'),
+        ["reference.kind", "line or circle", "quintic"],
+    ),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_is_told_by_file_key_and_value(write, mistake: str) -> None:
+    text, fragments = MISTAKES[mistake]
+    with pytest.raises(SceneError) as caught:
+        rd.read_scene(write(text))
+    for fragment in ["scene.toml", *fragments]:
+        assert fragment in str(caught.value)
+
+
+def test_a_missing_scene_is_told(tmp_path) -> None:
+    with pytest.raises(SceneError, match="cannot be read"):
+        rd.read_scene(tmp_path / "none.toml")
+    (tmp_path / "latin.toml").write_bytes(b'robot = "\xe9"')
+    with pytest.raises(SceneError, match="no UTF-8"):
+        rd.read_scene(tmp_path / "latin.toml")
+
+
+def test_a_scene_is_checked_before_its_robot_is_loaded() -> None:
+    with pytest.raises(SceneError, match="unknown key"):
+        parse_scene('robot = "none"\nduration_s = 1.0\nx = 1', "here")
