@@ -36,9 +36,8 @@ def fall(q0):
 trajectory = fall([0.0, 0.0])
 print(trajectory.summary)
 
-E = trajectory.ledger.energy
-print(f"energy: {E[0]:.9f} J at the start, {E[-1]:.9f} J after {trajectory.t[-1]:g} s")
-print(f"largest kinetic energy: {trajectory.ledger.kinetic.max():.3f} J")
+E, K = trajectory.ledger.energy, trajectory.ledger.kinetic
+print(f"energy drifts by {np.ptp(E):.1e} J while up to {K.max():.3f} J are kinetic")
 
 neighbour = fall([apart, 0.0])
 distance = np.abs(trajectory.q - neighbour.q).max(axis=1)

@@ -1,6 +1,6 @@
 """Panda with a payload that its controller does not know: feed-forward against computed torque.
 
-    feed-forward        τ = M(q_d) a_d + C(q_d, v_d) v_d + N(q_d) + kp e + kd ė       kp = diag(M) ω²,  kd = 2 ζ ω diag(M)
+    feed-forward        τ = M(q_d) a_d + C(q_d, v_d) v_d + N(q_d) + kp e + kd ė,  kp = diag(M) ω²,  kd = 2 ζ ω diag(M)
     computed torque     τ = M(q) (a_d + 2 ζ ω ė + ω² e) + C(q, v) v + N(q)
 
 Without the payload both models are exact. With it the arm asks for ΔM q̈ + ΔC v + ΔN more than they give, which only
@@ -42,7 +42,7 @@ for carried, arm in arms.items():
             v0=np.zeros(arm.n),
             duration_s=duration_s,
             controller=controller,
-            integrator=rd.Adaptive(rtol=1e-9, atol=1e-11),
+            integrator=rd.Adaptive(rtol=1e-8, atol=1e-10),
             record_period_s=0.01,
         )
         print(f"--- {name}, {carried}\n{trajectory.summary}\n")

@@ -14,7 +14,7 @@ from scipy.special import ellipk
 
 import robot_dyn as rd
 
-l = 1.0  # length of the rod of urdf/pendulum.urdf, in [m]
+length = 1.0  # l of the rod of urdf/pendulum.urdf, in [m]
 g = -rd.STANDARD_GRAVITY[2]  # [m/s²]
 q0 = 2.0  # from hanging down, in [rad]
 periods = 10
@@ -22,7 +22,7 @@ periods = 10
 pendulum = rd.load("pendulum")
 plant = rd.Plant(pendulum)
 
-small_swing = np.sqrt(2 * l / (3 * g))
+small_swing = np.sqrt(2 * length / (3 * g))
 T = 4 * small_swing * ellipk(np.sin(q0 / 2) ** 2)
 
 trajectory = rd.simulate(

@@ -2,7 +2,8 @@
 
     F = Λ (ẍ_d + kd ė + kp e) + μ + p,    τ = Jᵀ F,    Λ = (J M⁻¹ Jᵀ)⁻¹
 
-With the exact model the error obeys ë + kd ė + kp e = 0: it starts at zero and stays there.
+With the exact model the error obeys ë + kd ė + kp e = 0: it starts at zero and stays there. What is left of the radius
+error is the reference's own: `rd.circle` is made of quintics, within 1e-9 of the radius.
 
 Run: python examples/ur5_circle.py
 """
@@ -35,8 +36,7 @@ for name, model in (("exact model", arm), ("model 20 % too heavy", arm.with_(mas
         v0=np.zeros(arm.n),
         duration_s=circle.position.end,
         controller=rd.OperationalSpace(model, frame, circle, kp, kd),
-        integrator=rd.method("order_8"),
-        step_s=0.005,
+        integrator=rd.Adaptive(rtol=1e-8, atol=1e-10),
         record_period_s=0.01,
     )
     print(f"--- {name}\n{trajectory.summary}")

@@ -16,21 +16,19 @@ from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.model.dynamics import Dynamics
 
 
-@final
 @dataclass(frozen=True, eq=False)
-class ComputedTorque(Memoryless):
-    """Inverse dynamics in the loop (feedback linearisation): τ = M (a_d + kd ė + kp e) + C v + N.
-
-    With the exact model each joint obeys ë + kd ė + kp e = 0; `gains_from(1.0, frequency, damping_ratio)` gives gains.
+class ModelBased(Memoryless):
+    """A controller with a model of the arm and a plan.
 
     Attributes:
         model: The controller's model of the arm.
         reference: q_d(t) of the n joints.
-        kp: A scalar or (n,), in [1/s²], not negative.
-        kd: A scalar or (n,), in [1/s], not negative.
+        kp: A scalar or (n,), not negative: in [1/s²] for computed torque, else in [N m/rad] or [N/m].
+        kd: A scalar or (n,), not negative: in [1/s] for computed torque, else in [N m s/rad] or [N s/m].
         period_s: In [s], 0 for continuous control.
 
-    Source: Murray, Li, Sastry 1994, sec. 4.5.2; Siciliano et al. 2009, sec. 8.5.2.
+    Raises:
+        ControlError: If model and reference differ in their joints, or a gain has no meaning.
     """
 
     model: Dynamics
@@ -40,11 +38,24 @@ class ComputedTorque(Memoryless):
     period_s: float = 0.0
 
     def __post_init__(self) -> None:
-        _accept(self)
+        n, count = self.model.n, joint_count(self.reference)
+        if n != count:
+            raise ControlError(f"the model has {n} joints, the reference {count}")
+        freeze(self, n, "kp", "kd")
 
     @property
     def n(self) -> int:
         return self.model.n
+
+
+@final
+class ComputedTorque(ModelBased):
+    """Inverse dynamics in the loop (feedback linearisation): τ = M (a_d + kd ė + kp e) + C v + N.
+
+    With the exact model each joint obeys ë + kd ė + kp e = 0; `gains_from(1.0, frequency, damping_ratio)` gives gains.
+
+    Source: Murray, Li, Sastry 1994, sec. 4.5.2; Siciliano et al. 2009, sec. 8.5.2.
+    """
 
     def torque(self, t: float, q: Array, v: Array, z: Array) -> Array:
         q_d, v_d, a_d = self.reference.at(t)
@@ -52,32 +63,11 @@ class ComputedTorque(Memoryless):
 
 
 @final
-@dataclass(frozen=True, eq=False)
-class PDGravity(Memoryless):
+class PDGravity(ModelBased):
     """PD with gravity compensation: τ = kp e + kd ė + N(q); asymptotically stable at rest, for the exact N.
-
-    Attributes:
-        model: The controller's model of the arm.
-        reference: q_d(t) of the n joints.
-        kp: Stiffness, a scalar or (n,), in [N m/rad] or [N/m], not negative.
-        kd: Damping, a scalar or (n,), in [N m s/rad] or [N s/m], not negative.
-        period_s: In [s], 0 for continuous control.
 
     Source: Siciliano et al. 2009, sec. 8.5.1; Takegaki and Arimoto, 1981.
     """
-
-    model: Dynamics
-    reference: PiecewisePolynomial
-    kp: Any
-    kd: Any
-    period_s: float = 0.0
-
-    def __post_init__(self) -> None:
-        _accept(self)
-
-    @property
-    def n(self) -> int:
-        return self.model.n
 
     def torque(self, t: float, q: Array, v: Array, z: Array) -> Array:
         q_d, v_d, _ = self.reference.at(t)
@@ -85,42 +75,13 @@ class PDGravity(Memoryless):
 
 
 @final
-@dataclass(frozen=True, eq=False)
-class FeedForward(Memoryless):
+class FeedForward(ModelBased):
     """Inverse dynamics along the reference, and PD: τ = M(q_d) a_d + C(q_d, v_d) v_d + N(q_d) + kp e + kd ė.
-
-    Attributes:
-        model: The controller's model of the arm.
-        reference: q_d(t) of the n joints.
-        kp: Stiffness, a scalar or (n,), in [N m/rad] or [N/m], not negative.
-        kd: Damping, a scalar or (n,), in [N m s/rad] or [N s/m], not negative.
-        period_s: In [s], 0 for continuous control.
 
     Source: Siciliano et al. 2009, sec. 8.4.
     """
-
-    model: Dynamics
-    reference: PiecewisePolynomial
-    kp: Any
-    kd: Any
-    period_s: float = 0.0
-
-    def __post_init__(self) -> None:
-        _accept(self)
-
-    @property
-    def n(self) -> int:
-        return self.model.n
 
     def torque(self, t: float, q: Array, v: Array, z: Array) -> Array:
         q_d, v_d, a_d = self.reference.at(t)
         feedback = self.kp * (q_d - q) + self.kd * (v_d - v)
         return self.model.inverse_dynamics(q_d, v_d, a_d) + feedback
-
-
-def _accept(controller: ComputedTorque | PDGravity | FeedForward) -> None:
-    """Check what a controller is made of; ControlError if its parts do not fit."""
-    n, count = controller.model.n, joint_count(controller.reference)
-    if n != count:
-        raise ControlError(f"the model has {n} joints, the reference {count}")
-    freeze(controller, n, "kp", "kd")

@@ -49,10 +49,8 @@ class Robot:
         """A new robot with more edits. Locks and payloads add up; the others replace what was given before.
 
         Args:
-            **changes: gravity: acceleration of free fall in base axes, (3,) in [m/s²]. lock: joints to hold, with their
-                value in [rad] or [m]. payload: one body or several to fasten to links. armature: inertia of the drives
-                felt at the joints, a scalar, (n,) or by name, in [kg m²] or [kg]. mass_scale: factor on the mass and
-                inertia of all links, for a model that is wrong.
+            **changes: gravity (3,) in base axes, in [m/s²]; lock: values by joint, in [rad] or [m]; payload: one or
+                several; armature: inertia of the drives, a scalar, (n,) or by joint, in [kg m²] or [kg]; mass_scale.
 
         Raises:
             EditError: If a name is unknown or a value has no meaning.
@@ -172,7 +170,7 @@ class Robot:
         return self._ask(pin.rnea, self.ties.torque, q=q, v=v, a=a)
 
     def forward_dynamics(self, q: Array, v: Array, tau: Array) -> ndarray:
-        shape = self._solvable_shape
+        shape = self._shape if self.joint_without_inertia is None else None
         if is_state(q, shape) and is_state(v, shape) and is_state(tau, shape):
             a = pin.aba(self.model, self._scratch.data, q, v, tau)
             if is_moderate(a, _DOUBTFUL):
@@ -211,11 +209,6 @@ class Robot:
     def _shape(self) -> tuple[int] | None:
         """Shape of a state that goes straight to Pinocchio; None if joints are tied."""
         return (self.n,) if self.ties.trivial else None
-
-    @cached_property
-    def _solvable_shape(self) -> tuple[int] | None:
-        """The same for forward dynamics; None also where M is singular everywhere."""
-        return self._shape if self.joint_without_inertia is None else None
 
     @cached_property
     def joint_without_inertia(self) -> str | None:

@@ -2,7 +2,8 @@
 
     |q_h − q| ≈ |q_h − q_2h| / (2ᵖ − 1)  while  |q_2h − q_4h| / |q_h − q_2h| is near 2ᵖ
 
-Where the ratio leaves that, the step is too large for the method's order to show (or rounding rules): not resolved.
+Where the ratio falls below that, the step is too large for the method's order to show: not resolved. Where it lies
+above, the longest step alone is too large, and the estimate errs on the safe side.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from typing import final
 import numpy as np
 
 ROUNDING = 1e-12  # of the largest |q| + 1: differences below it are rounding
-_BAND = 2.5  # the ratio may be this factor off 2ᵖ
+_BAND = 2.5  # the ratio may be this factor below 2ᵖ
 
 
 @final
@@ -32,6 +33,11 @@ class ErrorEstimate:
     error: np.ndarray
     resolved_until: float
     note: str = ""
+
+    def __str__(self) -> str:
+        if not self.resolved_until > 0:
+            return f"not estimated; {self.note}"
+        return f"{self.final:.1e}, estimated" + (f"; {self.note}" if self.note else "")
 
     @property
     def final(self) -> float:
@@ -55,7 +61,7 @@ def richardson(t: np.ndarray, fine: np.ndarray, middle: np.ndarray, coarse: np.n
     first_so_far, second_so_far = np.maximum.accumulate(first), np.maximum.accumulate(second)
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = second_so_far / first_so_far
-    near = (ratio > factor / _BAND) & (ratio < factor * _BAND) | (first_so_far <= floor)
+    near = (ratio > factor / _BAND) | (first_so_far <= floor)
     bad = np.flatnonzero(~near)
     until = float(t[bad[0] - 1]) if len(bad) and bad[0] else (0.0 if len(bad) else float(t[-1]))
     note = f"not resolved after t* = {until:g} s: take a smaller step" if len(bad) else ""

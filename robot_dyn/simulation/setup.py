@@ -7,6 +7,8 @@ from itertools import pairwise
 from math import ceil, inf
 from typing import final
 
+import numpy as np
+
 from robot_dyn.arithmetic import Array
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.plant import Plant
@@ -41,7 +43,7 @@ class Setup:
     Attributes:
         plant: What moves.
         q0: Position at the start, (n,).
-        v0: Velocity at the start, (n,).
+        v0: Velocity at the start, (n,); 0 if not given.
         duration_s: In [s].
         controller: What drives it, or None.
         integrator: A method of fixed step, or an `Adaptive` one.
@@ -53,8 +55,8 @@ class Setup:
 
     plant: Plant
     q0: Array
-    v0: Array
-    duration_s: float
+    v0: Array = None
+    duration_s: float = 1.0
     controller: Controller | None = None
     integrator: Integrator | Adaptive = RK4
     step_s: float = 1e-3
@@ -64,6 +66,10 @@ class Setup:
 
     def __post_init__(self) -> None:
         names = self.plant.dynamics.joint_names
+        if self.v0 is None:
+            object.__setattr__(self, "v0", np.zeros(len(names)))
+        if not isinstance(self.integrator, Integrator | Adaptive):
+            raise QueryError(f"integrator: give one, as rd.method('rk4') or rd.Adaptive(), got {self.integrator!r}")
         for name in ("q0", "v0"):
             value = checked(name, getattr(self, name), names)
             if value.ndim != 1:

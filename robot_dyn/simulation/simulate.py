@@ -17,6 +17,7 @@ from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import RobotDynError
 from robot_dyn.integrate.adaptive import Adaptive
+from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.simulation.error import ErrorEstimate, difference, richardson
 from robot_dyn.simulation.ledger import Ledger
 from robot_dyn.simulation.march import Counter, DivergedError, Sample, march
@@ -28,9 +29,9 @@ _SHARED = 2000  # at most about this many times at which companion runs are comp
 
 
 def simulate(
-    what: Setup | Plant, *, on_progress: Callable[[float], object] | None = None, **options: Any
+    what: Setup | Plant | Dynamics, *, on_progress: Callable[[float], object] | None = None, **options: Any
 ) -> Trajectory:
-    """Run a setup; or a plant, with the attributes of a `Setup` as options: q0, v0, duration_s, controller, ….
+    """Run a setup; or a plant or robot, with the attributes of a `Setup` as options: q0, duration_s, controller, ….
 
     Args:
         what: What to run.
@@ -40,7 +41,10 @@ def simulate(
     Raises:
         QueryError: If the setup has no meaning. Whatever happens later is told by the trajectory's outcome.
     """
-    setup = Setup(what, **options) if isinstance(what, Plant) else replace(what, **options)
+    if isinstance(what, Setup):
+        setup = replace(what, **options)
+    else:
+        setup = Setup(what if isinstance(what, Plant) else Plant(what), **options)
     motion = Motion(setup.plant, setup.controller, getattr(setup.integrator, "canonical", False))
     counter, kept, shared = Counter(), [], []
     began = perf_counter()
@@ -52,7 +56,7 @@ def simulate(
     companions = perf_counter() - began - wall if setup.estimate_error else 0.0
     adaptive = isinstance(setup.integrator, Adaptive)
     name = setup.integrator.method if isinstance(setup.integrator, Adaptive) else setup.integrator.name
-    step = 0.0 if adaptive else setup.step_s
+    step = 0.0 if adaptive else outcome.t / max(counter.steps, 1)
     statistics = Statistics(name, step, counter.steps, counter.evaluations, wall, companions)
     return _trajectory(setup, motion, kept, outcome, statistics, error)
 
@@ -93,7 +97,7 @@ def _estimate(setup: Setup, motion: Motion, run: list[tuple[float, np.ndarray]])
     """Companion runs: of 2 and 4 times the step, or of 10 times the tolerance."""
     adaptive = isinstance(setup.integrator, Adaptive)
     if not adaptive and min(map(setup.steps, setup.stretches)) < 4:
-        return ErrorEstimate(np.empty(0), np.empty(0), 0.0, "no companions: fewer than 4 steps between ticks")
+        return ErrorEstimate(np.empty(0), np.empty(0), 0.0, "fewer than 4 steps between ticks, switches or breaks")
     runs = [run]
     for factor in (10,) if adaptive else (2, 4):
         runs.append([])

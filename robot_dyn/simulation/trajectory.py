@@ -11,6 +11,8 @@ import numpy as np
 from robot_dyn.simulation.error import ErrorEstimate
 from robot_dyn.simulation.ledger import Ledger
 
+_OPEN = 1e-3  # part of the energy exchanged beyond which a residual is no rounding and no small error
+
 
 class Ending(StrEnum):
     """How a run ended."""
@@ -94,20 +96,18 @@ class Trajectory:
     def summary(self) -> str:
         """A few lines: outcome, ledger, error, tracking, cost."""
         s, ledger = self.statistics, self.ledger
+        opening = f"{self.outcome.ending} at t = {self.outcome.t:g} s, {len(self.t)} samples"
+        residual = f"residual {np.nanmax(np.abs(ledger.residual)):.2e} J, {ledger.closure:.1e} of exchanged"
+        leak = "it does not close: take a smaller step" if ledger.closure > _OPEN else ""
         lines = [
-            f"{self.outcome.ending} at t = {self.outcome.t:g} s, {len(self.t)} samples" + _after(self.outcome.advice)
+            opening + _after(self.outcome.advice),
+            f"effects: {', '.join(self.power)}",
+            f"energy ledger: {residual}" + _after(leak),
+            f"error of q: {self.error or 'not estimated (companion runs are off)'}",
         ]
-        lines.append(f"effects: {', '.join(self.power)}")
-        lines.append(
-            f"energy ledger: residual {np.nanmax(np.abs(ledger.residual)):.2e} J, {ledger.closure:.1e} of exchanged"
-        )
-        if self.error is None:
-            lines.append("error: not estimated (companion runs are off)")
-        else:
-            lines.append(f"error of q: {self.error.final:.1e}, estimated" + _after(self.error.note))
         if self.tracking_error is not None:
             lines.append(f"tracking error of q: {self.tracking_error:.3e} rms")
-        step = f"step {s.step_s:g} s, " if s.step_s else ""
+        step = f"step {s.step_s:.4g} s, " if s.step_s else ""
         lines.append(
             f"{s.method}: {step}{s.steps} steps, {s.evaluations} evaluations, {s.wall_s:.2f} s"
             + (f" and {s.companions_s:.2f} s for companions" if s.companions_s else "")

@@ -1,0 +1,140 @@
+"""The error estimate of a run, against errors known from references that agree among themselves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import robot_dyn as rd
+
+DOUBLE = rd.load("planar_2r").with_(gravity=(0.0, -9.80665, 0.0))
+PANDA = rd.load("panda").with_(lock={"panda_finger_joint1": 0.0})
+READY = np.array([0.3, 0.6, -0.4, -1.2, 0.5, 1.1, 0.2])
+REACH = rd.quintic(READY, READY + [0.4, -0.3, 0.5, 0.2, -0.6, 0.3, 0.4], 0.5)
+
+# plant, controller, q0, v0, duration, step of RK4
+SCENES = {
+    "pendulum": (rd.Plant(rd.load("pendulum")), None, [2.5], [0.7], 2.0, 4e-3),
+    "planar_2r with friction": (
+        rd.Plant(DOUBLE, [rd.ViscousFriction([0.4, 0.2])]), None, [0.4, -0.7], [0.3, 0.5], 1.0, 5e-3,
+    ),
+    "panda, free swing": (rd.Plant(PANDA), None, READY, np.zeros(7), 1.0, 2e-3),
+    "panda, computed torque": (
+        rd.Plant(PANDA), rd.ComputedTorque(PANDA, REACH, *rd.gains_from(1.0, 8.0, 0.9)),
+        READY + 0.1, np.full(7, -0.2), 0.5, 5e-3,
+    ),
+    "cart_pole with spring": (
+        rd.Plant(rd.load("cart_pole"), [rd.Spring([30.0, 0.0], [0.2, 0.0])]), None, [0.1, 0.8], [0.3, -0.5], 1.0, 5e-3,
+    ),
+}  # fmt: skip
+
+
+def setup(plant, law, q0, v0, duration, step) -> rd.Setup:
+    return rd.Setup(plant, q0=q0, v0=v0, duration_s=duration, controller=law, step_s=step)
+
+
+def true_error(run: rd.Trajectory, reference: rd.Trajectory) -> np.ndarray:
+    """Largest error of any joint up to each sample of a run."""
+    np.testing.assert_allclose(run.t, reference.t, atol=1e-12)
+    return np.maximum.accumulate(np.abs(run.q - reference.q).max(axis=1))
+
+
+@pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES)
+def test_estimate_is_within_a_factor_of_ten_of_the_true_error(scene) -> None:
+    """At its end and at most times on the way; order 8 at half the step is exact to 1e-4 of that, and says so."""
+    run = rd.simulate(setup(*scene))
+    reference = rd.simulate(setup(*scene), integrator=rd.method("order_8"), step_s=scene[-1] / 2,
+                            record_period_s=scene[-1], estimate_error=False)  # fmt: skip
+    tight = rd.simulate(setup(*scene), integrator=rd.Adaptive(rtol=1e-13, atol=1e-14), estimate_error=False)
+    error, estimate = true_error(run, reference), run.error
+    assert estimate is not None
+    assert np.abs(reference.q[-1] - tight.q[-1]).max() < 1e-3 * error[-1]  # the referees agree
+    assert estimate.resolved_until == scene[-2]
+    assert estimate.note == ""
+    assert 0.1 < estimate.final / error[-1] < 10
+    at = np.searchsorted(run.t, estimate.t - 1e-12)
+    known = error[at] > 1e-11  # below it the floor of the estimate rules
+    ratio = estimate.error[known] / error[at][known]
+    assert ((ratio > 0.1) & (ratio < 10)).mean() > 0.95
+    assert known.sum() > 20
+    assert f"{estimate.final:.1e}" in run.summary
+
+
+@pytest.mark.parametrize("name", ["gauss_4", "sdirk_3", "midpoint", "explicit_euler"])
+def test_estimate_holds_for_methods_of_every_order(name: str) -> None:
+    plant, law, q0, v0, duration, _ = SCENES["planar_2r with friction"]
+    step = {"explicit_euler": 5e-4, "midpoint": 2e-3}.get(name, 4e-3)
+    run = rd.simulate(setup(plant, law, q0, v0, duration, step), integrator=rd.method(name))
+    tight = rd.simulate(setup(plant, law, q0, v0, duration, step), integrator=rd.Adaptive(rtol=1e-13, atol=1e-14))
+    error = np.abs(run.q[-1] - tight.q[-1]).max()
+    assert run.error is not None
+    assert run.error.resolved_until == duration
+    assert error / 10 < run.error.final < 10 * max(error, 1e-12)
+
+
+def test_estimate_of_a_sampled_controller_is_that_of_the_same_ticks() -> None:
+    """Companions take longer steps, never fewer ticks: order 4 shows although the torque jumps."""
+    plant, _, q0, v0, duration, _ = SCENES["planar_2r with friction"]
+    law = rd.PD(rd.quintic(q0, [0.9, 0.2], 0.5), [60.0, 20.0], [4.0, 1.0], period_s=0.05)
+    run = rd.simulate(setup(plant, law, q0, v0, duration, 5e-3))
+    exact = rd.simulate(setup(plant, law, q0, v0, duration, 5e-3), integrator=rd.method("order_8"), step_s=2e-3)
+    assert run.error is not None
+    assert run.error.note == ""
+    error = np.abs(run.q[-1] - exact.q[-1]).max()
+    assert error / 10 < run.error.final < 10 * error
+
+
+def test_estimate_of_an_adaptive_run_bounds_its_error() -> None:
+    """The run of ten times the tolerance errs more: an upper bound, and no more than a thousandfold."""
+    for scene in SCENES.values():
+        run = rd.simulate(setup(*scene), integrator=rd.Adaptive())
+        tight = rd.simulate(setup(*scene), integrator=rd.Adaptive(rtol=1e-13, atol=1e-14), estimate_error=False)
+        error = np.abs(run.q[-1] - tight.q[-1]).max()
+        assert run.error is not None
+        assert error < run.error.final < 1000 * max(error, 1e-12)
+
+
+@pytest.mark.parametrize("step", [0.05, 0.02])
+def test_chaos_at_a_coarse_step_is_not_resolved(step: float) -> None:
+    """The double pendulum from 2.5 rad tumbles: errors grow e-fold in less than 1 s, up to the size of the motion."""
+    chaos = setup(rd.Plant(DOUBLE), None, [2.5, 0.7], [0.3, 0.5], 20.0, step)
+    run = rd.simulate(chaos)
+    reference = rd.simulate(
+        chaos, integrator=rd.method("order_8"), step_s=step / 10, record_period_s=step, estimate_error=False
+    )
+    error, estimate = true_error(run, reference), run.error
+    assert error[-1] > 1.0  # the end of the run is fiction
+    assert estimate is not None
+    assert estimate.resolved_until < 20.0
+    assert f"not resolved after t* = {estimate.resolved_until:g} s" in estimate.note
+    assert estimate.note in run.summary
+    before = error[run.t <= estimate.resolved_until]
+    assert before[-1] < 0.1
+    assert 0.1 < estimate.final / before[-1] < 10
+
+
+def test_a_long_adaptive_run_of_chaos_is_not_resolved() -> None:
+    chaos = setup(rd.Plant(DOUBLE), None, [2.5, 0.7], [0.3, 0.5], 20.0, 0.01)
+    run = rd.simulate(chaos, integrator=rd.Adaptive(rtol=1e-4, atol=1e-6))
+    assert run.error is not None
+    assert run.error.resolved_until < 20.0
+    assert "take a smaller tolerance" in run.error.note
+    assert run.error.final <= 0.1
+
+
+def test_rounding_alone_is_not_an_error_of_the_method() -> None:
+    """Free fall on a rail is exact in RK4: differences are rounding, which resolves nothing but is no reason for doubt."""
+    cart = rd.load("cart_pole").with_(lock={"hinge": 0.4}, gravity=(1.7, 0.0, -9.80665))
+    run = rd.simulate(rd.Plant(cart), q0=[0.3], v0=[-0.8], duration_s=1.0)
+    assert run.error is not None
+    assert run.error.resolved_until == 1.0
+    assert run.error.final < 1e-11
+
+
+def test_too_few_steps_between_ticks_leave_no_companions_and_say_so() -> None:
+    plant, _, q0, v0, _, _ = SCENES["planar_2r with friction"]
+    law = rd.PD(rd.hold(q0), 60.0, 4.0, period_s=2e-3)
+    run = rd.simulate(setup(plant, law, q0, v0, 0.1, 1e-3))
+    assert run.error is not None
+    assert np.isnan(run.error.final)
+    assert "fewer than 4 steps" in run.error.note

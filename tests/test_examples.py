@@ -1,0 +1,101 @@
+"""Every page of examples/ runs as a student runs it, closes its energy ledger, and shows what it says it shows."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PAGES = {page.stem: page for page in sorted((ROOT / "examples").glob("*.py"))}
+TESTED = {"pendulum", "double_pendulum", "planar_2r_arm", "panda_computed_torque", "ur5_circle", "panda_payload"}
+
+
+def test_every_page_is_tested_and_fits_a_screen() -> None:
+    assert set(PAGES) == TESTED
+    assert max(len(page.read_text().splitlines()) for page in PAGES.values()) <= 70
+
+
+def output(name: str, runs: int) -> str:
+    """What a page prints; warnings are errors. Each of its runs ends, closes its ledger and knows its error to the end.
+
+    1e-9 of the energy exchanged: the tolerances of the pages are 1e-8 a step or less, and what they leave is 1e-11.
+    """
+    done = subprocess.run(
+        [sys.executable, "-W", "error", str(PAGES[name])],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    closures = [float(x) for x in re.findall(r"^energy ledger: .* (\S+) of exchanged$", done.stdout, re.MULTILINE)]
+    errors = [float(x) for x in re.findall(r"^error of q: (\S+), estimated$", done.stdout, re.MULTILINE)]
+    assert len(re.findall(r"^finished at", done.stdout, re.MULTILINE)) == len(closures) == len(errors) == runs
+    assert max(closures) <= 1e-9
+    assert max(errors) <= 1e-6
+    return done.stdout
+
+
+def number(label: str, text: str) -> float:
+    """The number that follows a label."""
+    (found,) = re.findall(rf"{re.escape(label)}\s+(\S+)", text)
+    return float(found)
+
+
+def row(label: str, text: str) -> list[float]:
+    """The numbers of the line of a table that starts with a label."""
+    (found,) = re.findall(rf"^{re.escape(label)} +([-+.e\d ]+)$", text, re.MULTILINE)
+    return [float(x) for x in found.split()]
+
+
+def test_pendulum_has_the_period_of_the_elliptic_integral() -> None:
+    """Order 8 at h = 0.01 s errs by rounding, 1e-12 over ten periods."""
+    assert number("difference of periods:", output("pendulum", runs=1)) < 1e-11
+
+
+def test_double_pendulum_keeps_its_energy_and_parts_from_its_neighbour() -> None:
+    text = output("double_pendulum", runs=1)
+    assert number("energy drifts by", text) < 1e-9
+    assert number("after  2.0 s:", text) < 1e-4
+    assert number("after 10.0 s:", text) > 0.1
+
+
+def test_planar_arm_rests_at_its_target_only_without_gravity() -> None:
+    """With gravity the steady error is N(q)/kp, some 0.08 rad, and both are printed."""
+    text = output("planar_2r_arm", runs=2)
+    assert number("steady error in zero gravity:", text) < 1e-9
+    assert number("steady error in gravity along -y:", text) > 0.05
+    _, error = re.findall(r"^error at rest: \[(.*)\]", text, re.MULTILINE)
+    _, weight = re.findall(r"^N\(q\)/kp there: \[(.*)\]", text, re.MULTILINE)
+    assert [float(x) for x in error.split()] == pytest.approx([float(x) for x in weight.split()], abs=1e-7)
+
+
+def test_computed_torque_beats_independent_joints_and_the_integral_leaves_nothing() -> None:
+    text = output("panda_computed_torque", runs=4)
+    pd, pid, gravity, computed = (row(name, text) for name in ("PD", "PID", "PD + gravity", "computed torque"))
+    rms, last = 0, -1
+    assert computed[rms] < pd[rms] / 3
+    assert computed[last] < pd[last] / 3
+    assert computed[rms] < gravity[rms] < pd[rms]
+    assert pid[last] < pd[last] / 100
+
+
+def test_circle_is_round_with_the_exact_model_and_nearly_so_with_a_wrong_one() -> None:
+    """1e-9 of a radius of 0.1 m is what `rd.circle` promises; the integration adds 1e-12 m."""
+    text = output("ur5_circle", runs=2)
+    assert number("radius error, exact model:", text) < 2e-10
+    assert 1e-4 < number("radius error, model 20 % too heavy:", text) < 4e-3
+
+
+def test_payload_costs_either_controller_and_computed_torque_less() -> None:
+    text = output("panda_payload", runs=4)
+    for name in ("feed-forward", "computed torque"):
+        assert row(f"{name}, empty hand", text)[0] < 1e-9
+    forward, computed = (row(f"{name}, 2 kg in the hand", text) for name in ("feed-forward", "computed torque"))
+    assert 1e-3 < computed[0] < forward[0]
+    assert computed[1] < forward[1]

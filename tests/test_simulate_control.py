@@ -1,0 +1,176 @@
+"""Runs under control: zero-order hold, ticks, memory, effort limits; and what a run evaluates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import final
+
+import numpy as np
+import pytest
+
+import robot_dyn as rd
+from robot_dyn.effects.effect import Active
+
+DOUBLE = rd.load("planar_2r").with_(gravity=(0.0, -9.80665, 0.0))
+PLANT = rd.Plant(DOUBLE, [rd.ViscousFriction([0.4, 0.2])])
+START = {"q0": [0.4, -0.7], "v0": [0.3, 0.5]}
+GOAL = rd.quintic([0.4, -0.7], [0.9, 0.2], 0.2)
+METHODS = [rd.method("rk4"), rd.method("gauss_4"), rd.Adaptive()]
+
+
+def controllers(period: float) -> list:
+    """Every law of joint space, with gains that are not round."""
+    kp, kd = rd.gains_from([3.0, 0.4], 9.0, 0.8)
+    laws = [
+        rd.PD(GOAL, kp, kd, period_s=period),
+        rd.PID(GOAL, kp, 40.0, kd, effort_limit=[30.0, 12.0], period_s=period),
+    ]
+    laws += [law(DOUBLE, GOAL, kp, kd, period_s=period) for law in (rd.ComputedTorque, rd.PDGravity, rd.FeedForward)]
+    return laws
+
+
+def name(each) -> str:
+    return getattr(each, "name", type(each).__name__)
+
+
+@pytest.mark.parametrize("method", METHODS, ids=name)
+def test_torque_of_a_sampled_controller_is_held_between_its_ticks(method) -> None:
+    """At a tick it is the law's, of the state there; up to the next one, the same to the last bit."""
+    period, count = 0.012, 20
+    law = rd.PDGravity(DOUBLE, GOAL, [80.0, 20.0], [9.0, 2.0], period_s=period)
+    run = rd.simulate(
+        PLANT, **START, duration_s=period * count, controller=law, integrator=method, step_s=2e-3, record_period_s=1e-4
+    )
+    ticks = np.searchsorted(run.t, period * np.arange(count + 1) - 1e-12)
+    np.testing.assert_allclose(run.t[ticks], period * np.arange(count + 1), atol=1e-14)  # steps end there
+    for tick, following in zip(ticks[:-1], ticks[1:], strict=True):
+        assert following - tick >= 6
+        np.testing.assert_array_equal(run.tau[tick:following], np.tile(run.tau[tick], (following - tick, 1)))
+    for i in ticks:
+        expected = law.torque(run.t[i], run.q[i], run.v[i], np.zeros(0))
+        np.testing.assert_allclose(run.tau[i], expected, rtol=1e-12, atol=1e-12)
+    assert (np.abs(np.diff(run.tau[ticks], axis=0)) > 1e-6).all(axis=1).sum() >= count - 1
+
+
+@pytest.mark.parametrize("method", METHODS, ids=name)
+@pytest.mark.parametrize("step", [0.012, 1e-3], ids=["a step a tick", "twelve steps a tick"])
+def test_memory_of_a_sampled_pid_advances_once_a_tick(method, step: float) -> None:
+    """z⁺ = z + period · ż at the tick, z = 0 at the first: τ at each tick is that of the recursion, to rounding."""
+    law = rd.PID(GOAL, [80.0, 20.0], [900.0, 400.0], [9.0, 2.0], effort_limit=[25.0, 8.0], period_s=0.012)
+    run = rd.simulate(PLANT, **START, duration_s=0.24, controller=law, integrator=method, step_s=step)
+    assert run.outcome.ending == "finished", run.outcome.advice
+    ticks = np.searchsorted(run.t, 0.012 * np.arange(21) - 1e-12)
+    z = np.zeros(2)
+    for i in ticks:
+        t, q, v = run.t[i], run.q[i], run.v[i]
+        np.testing.assert_allclose(run.tau[i], law.torque(t, q, v, z), rtol=1e-11)
+        z = z + 0.012 * law.memory_rate(t, q, v, z)
+    assert (np.abs(z) > 1.0).all()  # an integral that matters
+
+
+@pytest.mark.parametrize("kind", range(5), ids=[name(law) for law in controllers(0.0)])
+def test_continuous_control_is_the_limit_of_a_small_period(kind: int) -> None:
+    """A hold is late by half a period: the difference is O(period), and halves with it, ± 10 %."""
+    ends = {}
+    for period in (0.0, 1e-3, 2e-3, 4e-3):
+        law = controllers(period)[kind]
+        run = rd.simulate(PLANT, **START, duration_s=0.2, controller=law, step_s=1e-3, estimate_error=False)
+        ends[period] = run.q[-1]
+    distance = [np.linalg.norm(ends[period] - ends[0.0]) for period in (1e-3, 2e-3, 4e-3)]
+    assert 1e-7 < distance[0] < 1e-2
+    np.testing.assert_allclose(np.divide(distance[1:], distance[:-1]), 2.0, rtol=0.1)
+
+
+def test_exact_computed_torque_makes_each_joint_a_linear_oscillator() -> None:
+    """ë + 2 ζ ω ė + ω² e = 0 from e(0), whatever the arm: the closed form within the 1e-10 of its estimate."""
+    omega, zeta = 9.0, 0.6
+    law = rd.ComputedTorque(DOUBLE, rd.hold([0.9, 0.2]), *rd.gains_from(1.0, omega, zeta))
+    run = rd.simulate(rd.Plant(DOUBLE), **START, duration_s=0.5, controller=law, step_s=5e-4)
+    e0, de0, decay = np.array([0.5, 0.9]), -np.array(START["v0"]), zeta * omega
+    damped, t = omega * np.sqrt(1 - zeta**2), run.t[:, None]
+    wave = e0 * np.cos(damped * t) + (de0 + decay * e0) / damped * np.sin(damped * t)
+    np.testing.assert_allclose([0.9, 0.2] - run.q, np.exp(-decay * t) * wave, atol=1e-10)
+    assert run.wanted is not None
+    np.testing.assert_array_equal(run.wanted, np.tile([0.9, 0.2], (len(run.t), 1)))
+    rms = np.sqrt(np.mean((np.exp(-decay * t) * wave) ** 2))
+    assert run.tracking_error == pytest.approx(rms, rel=1e-8)
+
+
+@pytest.mark.parametrize("period", [0.0, 0.01])
+def test_recorded_torque_is_within_the_effort_limit(period: float) -> None:
+    """What is recorded is what acts, cut at the limit where the law asks for more, and the motion is that of it."""
+    limit = np.array([20.0, 3.0])
+    law = rd.PD(GOAL, [900.0, 300.0], [20.0, 8.0], period_s=period)
+    plant = rd.Plant(DOUBLE, [rd.EffortLimit(limit)])
+    run = rd.simulate(plant, **START, duration_s=0.3, controller=law, estimate_error=False)
+    assert (np.abs(run.tau) <= limit).all()
+    assert (np.abs(run.tau) == limit).any(axis=0).all()
+    assert (np.abs(run.tau) < limit).any(axis=0).all()
+    if period == 0.0:
+        asked = [law.torque(*state, np.zeros(0)) for state in zip(run.t, run.q, run.v, strict=True)]
+        np.testing.assert_allclose(run.tau, np.clip(asked, -limit, limit), atol=1e-12)
+    expected = DOUBLE.forward_dynamics(run.q, run.v, run.tau)
+    np.testing.assert_allclose(run.a, expected, atol=1e-11 * np.abs(expected).max())
+    np.testing.assert_allclose(run.power["control"], (run.tau * run.v).sum(axis=1), atol=1e-12)
+
+
+@pytest.mark.parametrize("edge", [0.3, 0.6, 0.7])
+def test_a_switch_on_a_tick_is_one_cut(edge: float) -> None:
+    """3 · 0.1 = 0.30000000000000004 is not 0.3: the two are one end of a step, and companions are not lost to it."""
+    push = rd.ExternalWrench("tip", [1.0, -2.0, 0.0, 0.0, 0.0, 0.5], start_s=0.1, end_s=edge)
+    law = rd.PD(GOAL, [80.0, 20.0], [9.0, 2.0], period_s=0.1)
+    run = rd.simulate(rd.Plant(DOUBLE, [push]), **START, duration_s=0.9, controller=law, step_s=5e-3)
+    assert np.diff(run.t).min() > 1e-3
+    assert run.error is not None
+    assert run.error.final < 1e-6
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Counted(Active):
+    """A constant push that counts how often it is evaluated."""
+
+    calls: list[float] = field(default_factory=list)
+
+    def torque(self, dynamics, t, q, v):
+        self.calls.append(t)
+        return np.full(np.shape(v), 0.5)
+
+
+@pytest.mark.parametrize("method", ["explicit_euler", "semi_implicit_euler", "midpoint", "rk4", "order_8"])
+def test_a_run_evaluates_what_its_method_declares_and_nothing_it_does_not_name(method: str) -> None:
+    """48 steps; besides them an effect is asked at the two samples only, for their acceleration and power."""
+    on, off = Counted(), Counted()
+    integrator = rd.method(method)
+    run = rd.simulate(
+        rd.Plant(DOUBLE, [on]), **START, duration_s=0.048, integrator=integrator, record_period_s=0.048,
+        estimate_error=False,
+    )  # fmt: skip
+    assert integrator.evaluations_per_step is not None
+    assert run.statistics.steps == 48
+    assert run.statistics.evaluations == 48 * integrator.evaluations_per_step
+    assert len(run.t) == 2
+    assert run.statistics.evaluations <= len(on.calls) <= run.statistics.evaluations + 2 * 2
+    assert off.calls == []
+
+
+@pytest.mark.parametrize("method", [rd.method("rk4"), rd.method("gauss_2"), rd.Adaptive()], ids=name)
+def test_companions_that_are_off_cost_nothing(method) -> None:
+    """Of twice and four times the step: (1/2 + 1/4) of the evaluations more; the run itself is the same."""
+    runs, calls = [], []
+    for estimate in (False, True):
+        effect = Counted()
+        plant = rd.Plant(DOUBLE, [effect])
+        runs.append(rd.simulate(plant, **START, duration_s=0.04, integrator=method, estimate_error=estimate))
+        calls.append(len(effect.calls))
+    without, with_companions = runs
+    assert without.error is None
+    assert "not estimated" in without.summary
+    assert without.statistics.companions_s == 0.0
+    assert with_companions.error is not None
+    assert np.array_equal(without.q, with_companions.q)
+    assert without.statistics.evaluations == with_companions.statistics.evaluations
+    more = calls[1] - calls[0]
+    assert more > 0.3 * without.statistics.evaluations
+    if method == rd.method("rk4"):
+        assert more == 3 * without.statistics.evaluations // 4

@@ -1,0 +1,195 @@
+"""How runs end: finished, diverged, stopped; each keeps its samples and says what to do. And setups without meaning."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+import pytest
+
+import robot_dyn as rd
+from robot_dyn.control.controller import Memoryless
+from robot_dyn.effects.effect import Active
+from robot_dyn.errors import QueryError
+
+DOUBLE = rd.load("planar_2r").with_(gravity=(0.0, -9.80665, 0.0))
+UR5 = rd.load("ur5")
+START = {"q0": [0.4, -0.7], "v0": [0.3, 0.5]}
+METHODS = [rd.method(name) for name in ("rk4", "gauss_4", "sdirk_3")] + [rd.Adaptive()]
+
+
+def name(each) -> str:
+    return getattr(each, "name", type(each).__name__)
+
+
+@final
+@dataclass(frozen=True)
+class Interrupted(Memoryless):
+    """No torque up to `until`; then `ending` is raised, or returned."""
+
+    ending: BaseException | float
+    until: float = 0.05
+    period_s: float = 0.0
+    n: int = 2
+
+    def torque(self, t, q, v, z):
+        if t <= self.until:
+            return np.zeros(2)
+        if isinstance(self.ending, BaseException):
+            raise self.ending
+        return np.array([0.1, self.ending])
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class InterruptedEffect(Active):
+    def torque(self, dynamics, t, q, v):
+        if t > 0.05:
+            raise KeyboardInterrupt
+        return 0 * v
+
+
+def check_kept(run: rd.Trajectory, until: float) -> None:
+    """All samples up to where it ended are there, one a step of 1 ms or less; only torques at the last may be broken."""
+    assert run.t[-1] == pytest.approx(until, abs=2e-3)
+    assert len(run.t) >= round(until / 1e-3)
+    for array in (run.q, run.v, run.ledger.residual, run.a[:-1], run.tau[:-1], *(P[:-1] for P in run.power.values())):
+        assert np.isfinite(array).all()
+    assert run.summary.startswith(str(run.outcome.ending))
+
+
+def test_a_finished_run_says_so() -> None:
+    run = rd.simulate(rd.Plant(DOUBLE), **START, duration_s=0.05)
+    assert (run.outcome.ending, run.outcome.t, run.outcome.advice) == ("finished", 0.05, "")
+    check_kept(run, 0.05)
+
+
+LAWS = {
+    "PD": rd.PD(rd.hold(np.full(6, 0.3)), 1e4, 1e3),
+    "sampled PD": rd.PD(rd.hold(np.full(6, 0.3)), 1e4, 1e3, period_s=0.05),
+    "computed torque": rd.ComputedTorque(UR5, rd.hold(np.full(6, 0.3)), 1e6, 1e3),
+}
+
+
+@pytest.mark.parametrize("estimate", [False, True], ids=["alone", "with companions"])
+@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+@pytest.mark.parametrize("method", ["explicit_euler", "rk4"])
+def test_stiff_gains_at_too_large_a_step_diverge_and_the_run_says_what_to_do(method: str, law, estimate) -> None:
+    """kd/M ≈ 1e5/s at 10 ms is far outside the region of stability, 2/h: the state grows until it overflows."""
+    run = rd.simulate(
+        rd.Plant(UR5), q0=np.linspace(0.1, 1.0, 6), v0=np.zeros(6), duration_s=10.0, controller=law,
+        integrator=rd.method(method), step_s=0.01, estimate_error=estimate,
+    )  # fmt: skip
+    assert run.outcome.ending == "diverged"
+    assert 0 <= run.outcome.t < 10.0
+    assert any(joint in run.outcome.advice for joint in UR5.joint_names)
+    assert "smaller step" in run.outcome.advice
+    assert run.t[-1] <= run.outcome.t + 0.01
+    assert np.isfinite(run.q).all()
+    assert np.isfinite(run.v).all()
+    assert len(run.t) > 1
+    assert "diverged" in run.summary
+
+
+@pytest.mark.parametrize("period", [0.0, 0.01])
+@pytest.mark.parametrize("method", METHODS, ids=name)
+def test_an_interrupted_run_keeps_its_samples(method, period: float) -> None:
+    law = Interrupted(KeyboardInterrupt(), period_s=period)
+    run = rd.simulate(rd.Plant(DOUBLE), **START, duration_s=0.2, controller=law, integrator=method)
+    assert run.outcome.ending == "stopped"
+    assert run.outcome.advice
+    assert run.error is None
+    check_kept(run, 0.05 + period)  # a sampled controller is asked at its next tick
+
+
+def test_an_effect_may_be_interrupted_too() -> None:
+    run = rd.simulate(rd.Plant(DOUBLE, [InterruptedEffect()]), **START, duration_s=0.2)
+    assert run.outcome.ending == "stopped"
+    check_kept(run, 0.05)
+
+
+@pytest.mark.parametrize("ending", [np.nan, np.inf, rd.RobotDynError("the arm is stretched out")], ids=str)
+@pytest.mark.parametrize("period", [0.0, 0.01])
+@pytest.mark.parametrize("method", METHODS, ids=name)
+def test_a_controller_that_fails_ends_the_run_where_it_fails(method, period: float, ending) -> None:
+    """At 50 ms, or the tick after it; the outcome names that time, not the start, and no foreign error leaves."""
+    law = Interrupted(ending, period_s=period)
+    run = rd.simulate(rd.Plant(DOUBLE), **START, duration_s=0.2, controller=law, integrator=method)
+    assert run.outcome.ending == "diverged"
+    assert run.outcome.t == pytest.approx(0.05 + period, abs=2e-3)
+    check_kept(run, 0.05 + period)
+    if isinstance(ending, rd.RobotDynError):
+        assert "stretched out" in run.outcome.advice
+
+
+@pytest.mark.parametrize("method", METHODS, ids=name)
+def test_a_robot_without_forward_dynamics_is_told_by_its_joint(method) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", rd.ModelWarning)
+        robot = rd.load("massless_tip")
+    try:
+        run = rd.simulate(rd.Plant(robot), q0=[0.1, 0.2], v0=[0.3, 0.4], duration_s=0.1, integrator=method)
+    except rd.RobotDynError as error:
+        told = str(error)
+    else:
+        assert (run.outcome.ending, run.outcome.t) == ("diverged", 0.0)
+        told = run.outcome.advice
+    assert "'pointer_joint' carries no inertia" in told
+
+
+GOOD = {**START, "duration_s": 0.1}
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"q0": [0.1, 0.2, 0.3]}, r"q0 must have shape \(2,\).*got \(3,\)"),
+        ({"q0": [[0.1, 0.2]]}, r"q0 must be one state of shape \(2,\)"),
+        ({"q0": "up"}, "q0 must be an array of 2 numbers"),
+        ({"v0": [0.1, np.nan]}, "v0 must be finite, got nan for joint 'joint_2'"),
+        ({"v0": 0.0}, r"v0 must have shape \(2,\)"),
+        ({"duration_s": -1.0}, "duration_s must be a positive number of seconds, got -1.0"),
+        ({"duration_s": np.nan}, "duration_s must be a positive"),
+        ({"duration_s": np.inf}, "duration_s must be a positive"),
+        ({"step_s": 0}, "step_s must be a positive number of seconds, got 0"),
+        ({"step_s": "fine"}, "step_s must be a positive"),
+        ({"record_period_s": -0.1}, "record_period_s must"),
+        ({"controller": rd.PD(rd.hold([0.0, 0.0, 0.0]), 1.0, 1.0)}, "drives 3 joints, the plant has 2"),
+        ({"controller": 3}, "controller"),
+        ({"integrator": "rk4"}, "integrator"),
+    ],
+    ids=str,
+)
+def test_a_setup_without_meaning_is_refused(options: dict, message: str) -> None:
+    with pytest.raises(QueryError, match=message):
+        rd.simulate(rd.Plant(DOUBLE), **{**GOOD, **options})
+
+
+def test_an_unknown_method_is_refused_with_the_nearest() -> None:
+    with pytest.raises(QueryError, match="no integration method 'rk5'.*rk4"):
+        rd.method("rk5")
+
+
+def test_a_robot_that_is_no_plant_is_refused() -> None:
+    with pytest.raises(QueryError, match="Plant"):
+        rd.simulate(DOUBLE, **GOOD)
+
+
+@pytest.mark.parametrize(
+    ("effect", "message"),
+    [
+        (rd.ViscousFriction([0.1, 0.2, 0.3]), "fit|shape"),
+        (rd.Spring([0.1, 0.2, 0.3]), "fit|shape"),
+        (rd.EffortLimit([0.1, 0.2, 0.3]), "fit|shape"),
+        (rd.ExternalWrench("tipp", np.ones(6)), "no frame 'tipp'; nearest: tip"),
+    ],
+    ids=lambda each: getattr(each, "name", ""),
+)
+@pytest.mark.parametrize("method", [rd.method("rk4"), rd.method("gauss_4"), rd.Adaptive()], ids=name)
+def test_an_effect_that_does_not_fit_the_robot_is_refused(method, effect, message: str) -> None:
+    """A mistake of the caller, not a run that diverged."""
+    law = rd.PD(rd.hold([0.1, 0.2]), 3.0, 1.0)
+    with pytest.raises(rd.RobotDynError, match=message):
+        rd.simulate(rd.Plant(DOUBLE, [effect]), **GOOD, controller=law, integrator=method)
