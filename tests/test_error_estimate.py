@@ -10,7 +10,7 @@ import robot_dyn as rd
 DOUBLE = rd.load("planar_2r").with_(gravity=(0.0, -9.80665, 0.0))
 PANDA = rd.load("panda").with_(lock={"panda_finger_joint1": 0.0})
 READY = np.array([0.3, 0.6, -0.4, -1.2, 0.5, 1.1, 0.2])
-REACH = rd.quintic(READY, READY + [0.4, -0.3, 0.5, 0.2, -0.6, 0.3, 0.4], 0.5)
+REACH = rd.quintic(READY, READY + np.array([0.4, -0.3, 0.5, 0.2, -0.6, 0.3, 0.4]), 0.5)
 
 # plant, controller, q0, v0, duration, step of RK4
 SCENES = {
@@ -123,7 +123,7 @@ def test_a_long_adaptive_run_of_chaos_is_not_resolved() -> None:
 
 
 def test_rounding_alone_is_not_an_error_of_the_method() -> None:
-    """Free fall on a rail is exact in RK4: differences are rounding, which resolves nothing but is no reason for doubt."""
+    """Free fall on a rail is exact in RK4: differences are rounding, no reason for doubt."""
     cart = rd.load("cart_pole").with_(lock={"hinge": 0.4}, gravity=(1.7, 0.0, -9.80665))
     run = rd.simulate(rd.Plant(cart), q0=[0.3], v0=[-0.8], duration_s=1.0)
     assert run.error is not None

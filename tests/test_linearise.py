@@ -52,7 +52,7 @@ def test_slopes_of_the_acceleration_are_those_of_its_equation(robot) -> None:
 
 
 def test_gravity_compensated_pd_has_the_eigenvalues_of_its_gains() -> None:
-    """u = kp e − kd v + N(q) at rest: M ë + kd ė + kp e = 0, so eigenvalues are the roots of det(s² M + s kd + kp)."""
+    """Then M ë + kd ė + kp e = 0 near rest, and the eigenvalues are the roots of det(s² M + s kd + kp)."""
     n, q, zero = 7, np.array([0.3, 0.6, -0.4, -1.2, 0.5, 1.1, 0.2]), np.zeros(7)
     kp, kd = np.linspace(900.0, 100.0, n), np.linspace(60.0, 9.0, n)
     law = rd.PDGravity(PANDA, rd.hold(q), kp, kd)

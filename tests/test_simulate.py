@@ -35,7 +35,7 @@ def test_pendulum_swings_with_the_exact_period(amplitude: float) -> None:
 
 @pytest.mark.parametrize("name", ["rk4", "gauss_2", "gauss_4", "order_8", "sdirk_3"])
 def test_free_fall_on_a_rail_is_a_parabola(name: str) -> None:
-    """x = x₀ + v₀ t + g t²/2, a polynomial that order 2 keeps exactly: rounding of some 100 steps, 1e-13."""
+    """Motion x = x₀ + v₀ t + g t²/2, a polynomial that order 2 keeps exactly: rounding of some 100 steps, 1e-13."""
     falling = rd.Plant(CART.with_(gravity=(1.7, 0.0, -G)))
     method = rd.method(name)
     run = rd.simulate(
@@ -47,7 +47,7 @@ def test_free_fall_on_a_rail_is_a_parabola(name: str) -> None:
 
 
 def test_cart_with_spring_and_damper_is_the_damped_oscillator() -> None:
-    """m ẍ + b ẋ + k (x − x₀) = 0; order 8 at 5 ms leaves rounding, 1e-12."""
+    """The law m ẍ + b ẋ + k (x − x₀) = 0; order 8 at 5 ms leaves rounding, 1e-12."""
     m, b, k, rest, x0, v0 = 6.2, 2.5, 80.0, 0.15, 0.5, -0.4
     run = rd.simulate(
         rd.Plant(CART, [rd.ViscousFriction(b), rd.Spring(k, rest)]),
@@ -60,7 +60,7 @@ def test_cart_with_spring_and_damper_is_the_damped_oscillator() -> None:
 
 
 def test_cart_pole_keeps_the_momentum_along_its_rail() -> None:
-    """No force acts along x: p_x constant, and the centre of mass moves uniformly. Linear invariants: rounding, 1e-12."""
+    """No force acts along x: p_x is constant (to rounding if it is a coordinate), the centre of mass uniform."""
     run = rd.simulate(rd.Plant(CART_POLE), q0=[0.1, 0.8], v0=[0.3, -0.5], duration_s=1.0, estimate_error=False)
     momentum = CART_POLE.momentum(run.q, run.v)[:, 0]
     centre = run.q[:, 0] + 1.2 * 0.6 * np.sin(run.q[:, 1]) / 6.2
@@ -92,7 +92,7 @@ def test_whole_runs_converge_with_the_order_of_the_method(name: str, step: float
 
 @pytest.mark.parametrize("effects", [(), (rd.ViscousFriction(0.3), rd.Spring(4.0, 0.1))], ids=["free", "effects"])
 def test_canonical_and_velocity_coordinates_give_one_trajectory(effects) -> None:
-    """p = M v with ṗ = Cᵀ v − N + τ, and v' = M⁻¹ (…): both within 1e-11 of the flow, on a tree of general axes."""
+    """Equations p = M v with ṗ = Cᵀ v − N + τ, and v' = M⁻¹ (…): both within 1e-11 of the flow, on general axes."""
     q0, v0 = np.linspace(0.2, -0.5, SKEW.n), np.linspace(-0.8, 0.9, SKEW.n)
     common = {"q0": q0, "v0": v0, "duration_s": 0.32, "record_period_s": 0.02, "estimate_error": False}
     canonical, velocity = (

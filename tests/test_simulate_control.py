@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import final
 
 import numpy as np
@@ -43,7 +44,7 @@ def test_torque_of_a_sampled_controller_is_held_between_its_ticks(method) -> Non
     )
     ticks = np.searchsorted(run.t, period * np.arange(count + 1) - 1e-12)
     np.testing.assert_allclose(run.t[ticks], period * np.arange(count + 1), atol=1e-14)  # steps end there
-    for tick, following in zip(ticks[:-1], ticks[1:], strict=True):
+    for tick, following in pairwise(ticks):
         assert following - tick >= 6
         np.testing.assert_array_equal(run.tau[tick:following], np.tile(run.tau[tick], (following - tick, 1)))
     for i in ticks:

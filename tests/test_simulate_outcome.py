@@ -51,11 +51,16 @@ class InterruptedEffect(Active):
         return 0 * v
 
 
-def check_kept(run: rd.Trajectory, until: float) -> None:
-    """All samples up to where it ended are there, one a step of 1 ms or less; only torques at the last may be broken."""
-    assert run.t[-1] == pytest.approx(until, abs=2e-3)
-    assert len(run.t) >= round(until / 1e-3)
-    for array in (run.q, run.v, run.ledger.residual, run.a[:-1], run.tau[:-1], *(P[:-1] for P in run.power.values())):
+def slack(method, period: float) -> float:
+    """How much earlier a run may end: a fixed step, or one that an adaptive method chose."""
+    return 0.04 if isinstance(method, rd.Adaptive) and period == 0 else 2e-3
+
+
+def check_kept(run: rd.Trajectory, until: float, early: float = 2e-3) -> None:
+    """All samples up to where it ended are there, one a step of 1 ms or less; the last may lack what has no value."""
+    assert run.t[-1] == pytest.approx(until, abs=early)
+    assert len(run.t) >= round(run.t[-1] / 1e-3)
+    for array in (run.q, run.v, *(x[:-1] for x in (run.a, run.tau, run.ledger.residual, *run.power.values()))):
         assert np.isfinite(array).all()
     assert run.summary.startswith(str(run.outcome.ending))
 
@@ -101,7 +106,7 @@ def test_an_interrupted_run_keeps_its_samples(method, period: float) -> None:
     assert run.outcome.ending == "stopped"
     assert run.outcome.advice
     assert run.error is None
-    check_kept(run, 0.05 + period)  # a sampled controller is asked at its next tick
+    check_kept(run, 0.05 + period, slack(method, period))  # a sampled controller is asked at its next tick
 
 
 def test_an_effect_may_be_interrupted_too() -> None:
@@ -118,8 +123,8 @@ def test_a_controller_that_fails_ends_the_run_where_it_fails(method, period: flo
     law = Interrupted(ending, period_s=period)
     run = rd.simulate(rd.Plant(DOUBLE), **START, duration_s=0.2, controller=law, integrator=method)
     assert run.outcome.ending == "diverged"
-    assert run.outcome.t == pytest.approx(0.05 + period, abs=2e-3)
-    check_kept(run, 0.05 + period)
+    assert run.outcome.t == pytest.approx(0.05 + period, abs=slack(method, period))
+    check_kept(run, 0.05 + period, slack(method, period))
     if isinstance(ending, rd.RobotDynError):
         assert "stretched out" in run.outcome.advice
 
@@ -136,6 +141,7 @@ def test_a_robot_without_forward_dynamics_is_told_by_its_joint(method) -> None:
     else:
         assert (run.outcome.ending, run.outcome.t) == ("diverged", 0.0)
         told = run.outcome.advice
+        assert "diverged" in run.summary
     assert "'pointer_joint' carries no inertia" in told
 
 
@@ -168,13 +174,12 @@ def test_a_setup_without_meaning_is_refused(options: dict, message: str) -> None
 
 
 def test_an_unknown_method_is_refused_with_the_nearest() -> None:
-    with pytest.raises(QueryError, match="no integration method 'rk5'.*rk4"):
+    with pytest.raises(QueryError, match=r"no integration method 'rk5'.*rk4"):
         rd.method("rk5")
 
 
-def test_a_robot_that_is_no_plant_is_refused() -> None:
-    with pytest.raises(QueryError, match="Plant"):
-        rd.simulate(DOUBLE, **GOOD)
+def test_a_robot_alone_is_a_plant_without_effects() -> None:
+    np.testing.assert_array_equal(rd.simulate(DOUBLE, **GOOD).q, rd.simulate(rd.Plant(DOUBLE), **GOOD).q)
 
 
 @pytest.mark.parametrize(
