@@ -119,7 +119,7 @@ def test_recorded_torque_is_within_the_effort_limit(period: float) -> None:
 def test_a_switch_on_a_tick_is_one_cut(edge: float) -> None:
     """3 · 0.1 = 0.30000000000000004 is not 0.3: the two are one end of a step, and companions are not lost to it."""
     push = rd.ExternalWrench("tip", [1.0, -2.0, 0.0, 0.0, 0.0, 0.5], start_s=0.1, end_s=edge)
-    law = rd.PD(GOAL, [80.0, 20.0], [9.0, 2.0], period_s=0.1)
+    law = rd.PD(GOAL, [8.0, 2.0], [1.0, 0.2], period_s=0.1)  # slow enough for 10 Hz
     run = rd.simulate(rd.Plant(DOUBLE, [push]), **START, duration_s=0.9, controller=law, step_s=5e-3)
     assert np.diff(run.t).min() > 1e-3
     assert run.error is not None
@@ -151,7 +151,8 @@ def test_a_run_evaluates_what_its_method_declares_and_nothing_it_does_not_name(m
     assert run.statistics.steps == 48
     assert run.statistics.evaluations == 48 * integrator.evaluations_per_step
     assert len(run.t) == 2
-    assert run.statistics.evaluations <= len(on.calls) <= run.statistics.evaluations + 2 * 2
+    # twice a sample, of which there are two, and once to see that it fits
+    assert run.statistics.evaluations <= len(on.calls) <= run.statistics.evaluations + 2 * 2 + 1
     assert off.calls == []
 
 

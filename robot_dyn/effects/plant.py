@@ -52,10 +52,14 @@ class Plant:
         return tuple(effect for effect in self.effects if isinstance(effect, Force))
 
     def actuation(self, u: Array) -> Array:
-        """What the bounds among the effects leave of the actuation u, (..., n)."""
+        """What the bounds among the effects leave of the actuation u, (..., n); EffectError if one does not fit."""
+        shape = np.shape(u)
         for effect in self.effects:
             if isinstance(effect, Bound):
-                u = effect.actuation(u)
+                try:
+                    u = effect.actuation(u)
+                except (TypeError, ValueError) as error:
+                    raise EffectError(f"{effect.name} does not fit an actuation of shape {shape}: {error}") from None
         return u
 
     def M(self, q: Array) -> Array:

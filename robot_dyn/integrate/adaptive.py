@@ -15,7 +15,7 @@ from typing import Any, cast, final
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.errors import OverflowedError, QueryError
+from robot_dyn.errors import OverflowedError, QueryError, RobotDynError
 from robot_dyn.integrate.implicit import jacobian
 from robot_dyn.integrate.integrator import System
 
@@ -28,6 +28,7 @@ class Status(Enum):
     FINISHED = "finished"
     STOPPED = "stopped"
     FAILED = "failed"
+    INTERRUPTED = "interrupted"
 
 
 @final
@@ -181,6 +182,10 @@ class _Run:
                     return Status.STOPPED, f"stopped at t = {self.times[-1]}"
         except _NotFiniteError:
             return self._failed("the rate is not finite")
+        except RobotDynError as error:
+            return Status.FAILED, f"{error}, at t = {self.times[-1]}"
+        except KeyboardInterrupt:
+            return Status.INTERRUPTED, f"interrupted at t = {self.times[-1]}"
         return Status.FINISHED, f"finished at t = {self.times[-1]}"
 
     def _failed(self, what: str) -> tuple[Status, str]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.effects.plant import Plant
+from robot_dyn.errors import QueryError
 from robot_dyn.model.dynamics import checked
 
 _H = 1e-3  # of Richardson's extrapolated central difference: error O(h⁴) and u/h, both about 1e-12
@@ -28,7 +29,11 @@ def linearise(plant: Plant, q: Array, v: Array, u: Array, t: float = 0.0) -> tup
         QueryError: If an argument is wrong.
     """
     names, n = plant.dynamics.joint_names, plant.dynamics.n
-    x = np.concatenate([checked(name, value, names) for name, value in (("q", q), ("v", v), ("u", u))])
+    state = {name: checked(name, value, names) for name, value in (("q", q), ("v", v), ("u", u))}
+    for name, value in state.items():
+        if value.ndim != 1:
+            raise QueryError(f"{name} must be one state of shape ({n},), got {value.shape}")
+    x = np.concatenate(list(state.values()))
 
     def a(x: np.ndarray) -> np.ndarray:
         return plant.forward_dynamics(t, x[:n], x[n : 2 * n], x[2 * n :])

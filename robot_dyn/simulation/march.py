@@ -82,21 +82,15 @@ def march(setup: Setup, motion: Motion, factor: int, counter: Counter) -> Iterat
     watch = _Watch(setup, motion)
     for stretch in setup.stretches:
         if stretch.tick:
-            y, held = motion.tick(stretch.start, y)
+            y, held = watch.tick(stretch.start, y)
         system = counter.counted(motion.system(held, stretch.end))
         method = setup.integrator
-        try:
-            with np.errstate(all="ignore"):  # what overflows is told by the watch
-                if isinstance(method, Adaptive):
-                    y = yield from _adaptively(
-                        setup, replace_tolerance(method, factor), system, stretch, y, held, counter
-                    )
-                else:
-                    y = yield from _by_steps(setup, method, system, stretch, y, held, factor, counter, watch)
-        except RobotDynError as error:
-            raise watch.diverged(float(getattr(error, "t", stretch.start)), y, str(error)) from None
-    if motion.sampled:
-        y, held = motion.tick(setup.duration_s, y)
+        with np.errstate(all="ignore"):  # what overflows is told by the watch
+            if isinstance(method, Adaptive):
+                y = yield from _adaptively(setup, replace_tolerance(method, factor), system, stretch, y, held, counter)
+            else:
+                y = yield from _by_steps(setup, method, system, stretch, y, held, factor, counter, watch)
+    y, held = watch.tick(setup.duration_s, y)
     yield Sample(setup.duration_s, y, held, shared=True)
 
 
@@ -114,7 +108,11 @@ def _by_steps(
     for k in range(max(1, count // factor)):
         t = stretch.start + k * h
         yield Sample(t, y, held, shared=k * factor % 4 == 0)
-        before, y = y, method.step(system, t, y, h)
+        before = y
+        try:
+            y = method.step(system, t, y, h)
+        except RobotDynError as error:
+            raise watch.diverged(t, before, str(error)) from None
         counter.steps += 1
         if not np.isfinite(y).all():
             raise watch.diverged(t, before, "a number overflowed")
@@ -131,9 +129,11 @@ def _adaptively(
     reached = float(solution.times[-1])
     period = setup.record_period_s or setup.duration_s / _SAMPLES
     first = np.ceil(stretch.start / period - 1e-9)
-    times = period * np.arange(first, np.ceil(stretch.end / period - 1e-9))
+    times = np.clip(period * np.arange(first, np.ceil(stretch.end / period - 1e-9)), stretch.start, stretch.end)
     for t in np.unique(np.append(times[times <= reached], stretch.start)):
         yield Sample(float(t), solution(float(t)), held, shared=True)
+    if solution.status is Status.INTERRUPTED:
+        raise KeyboardInterrupt
     if solution.status is Status.FAILED:
         raise DivergedError(reached, solution.message)
     return solution.states[-1]
@@ -147,6 +147,16 @@ class _Watch:
         self.setup, self.motion = setup, motion
         K, V = (float(x[0]) for x in motion.energy(np.zeros(1), setup.q0[None], setup.v0[None]))
         self.energy, self.scale = K + V, 1.0 + abs(K) + abs(V)
+
+    def tick(self, t: float, y: Array) -> tuple[Array, Array | None]:
+        """A tick of the controller; DivergedError if it fails, or asks for no finite torque."""
+        try:
+            y, held = self.motion.tick(t, y)
+        except RobotDynError as error:
+            raise self.diverged(t, y, str(error)) from None
+        if held is not None and not np.isfinite(held).all():
+            raise self.diverged(t, y, "the controller asks for a torque that is not finite")
+        return y, held
 
     def gains(self, t: float, y: Array) -> bool:
         q, v, _, W = self.motion.state(y)

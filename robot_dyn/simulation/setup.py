@@ -79,8 +79,12 @@ class Setup:
             value, least = getattr(self, name), 0.0 if name == "record_period_s" else 1e-12
             if not (isinstance(value, int | float) and least <= value < inf):
                 raise QueryError(f"{name} must be a positive number of seconds, got {value!r}")
+        if not isinstance(self.controller, Controller | None):
+            raise QueryError(f"controller: give one, such as rd.PD(…), or None, got {self.controller!r}")
         if self.controller is not None and self.controller.n != len(names):
             raise QueryError(f"the controller drives {self.controller.n} joints, the plant has {len(names)}")
+        self.plant.torque(0.0, self.q0, self.v0)  # so that an effect that does not fit is told now
+        self.plant.actuation(np.zeros(len(names)))
 
     @property
     def stretches(self) -> tuple[Stretch, ...]:
@@ -89,10 +93,29 @@ class Setup:
         ticks = {k * period for k in range(ceil(self.duration_s / period - 1e-9))} if period > 0 else {0.0}
         switches = {t for effect in self.plant.effects for t in effect.switches}
         switches |= set(self.controller.breaks if self.controller else ())
-        cuts = [*sorted(ticks | {t for t in switches if 0.0 < t < self.duration_s}), self.duration_s]
-        return tuple(Stretch(a, b, a in ticks) for a, b in pairwise(cuts))
+        least = 1e-9 * self.duration_s  # cuts nearer than this differ by rounding alone
+        cuts: list[tuple[float, bool]] = []
+        for cut in sorted(ticks | {t for t in switches if 0.0 < t < self.duration_s}):
+            if (
+                cuts and cut - cuts[-1][0] < least
+            ):  # one cut: at the switch, whose window is exact, and a tick if one is
+                at = cut if cut in switches else cuts[-1][0]
+                cuts[-1] = at, cuts[-1][1] or cut in ticks
+            elif self.duration_s - cut >= least:
+                cuts.append((cut, cut in ticks))
+        return tuple(Stretch(a, b, tick) for (a, tick), (b, _) in pairwise([*cuts, (self.duration_s, False)]))
 
     def steps(self, stretch: Stretch) -> int:
-        """Number of steps on a stretch: a multiple of 4, for the companion runs, where it has that many."""
-        count = max(1, ceil((stretch.end - stretch.start) / self.step_s - 1e-9))
+        """Number of steps on a stretch: a multiple of 4, for the companion runs, where it has that many.
+
+        Where the stretch holds record periods, each is a number of steps, so that samples lie on them.
+        """
+        length, record = stretch.end - stretch.start, self.record_period_s
+        periods = round(length / record) if record else 0
+        if periods and abs(length / record - periods) < 1e-9:
+            each = max(1, ceil(record / self.step_s - 1e-9))
+            while periods * each >= 4 and periods * each % 4:
+                each += 1
+            return periods * each
+        count = max(1, ceil(length / self.step_s - 1e-9))
         return 4 * ceil(count / 4) if count >= 4 else count

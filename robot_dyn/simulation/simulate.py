@@ -133,11 +133,14 @@ def _trajectory(
 def _row(setup: Setup, motion: Motion, sample: Sample) -> tuple[Any, ...]:
     """q, v, a, u, work, power and energies of a sample; nan for what has no value just before a run diverged."""
     q, v, z, W = motion.state(sample.y)
-    lost = np.full_like(q, np.nan), np.full_like(q, np.nan), W, np.full_like(W, np.nan), np.full(2, np.nan)
+    u = a = np.full_like(q, np.nan)
+    power, energy = np.full_like(W, np.nan), np.full(2, np.nan)
     try:
         with np.errstate(all="ignore"):
+            energy = np.array(motion.energy(sample.t, q, v))
             u = motion.command(sample.t, q, v, z) if sample.held is None else sample.held
+            power = motion.powers(sample.t, q, v, u)
             a = setup.plant.forward_dynamics(sample.t, q, v, u)
-            return q, v, a, u, W, motion.powers(sample.t, q, v, u), np.array(motion.energy(sample.t, q, v))
     except RobotDynError:
-        return q, v, *lost
+        pass
+    return q, v, a, u, W, power, energy
