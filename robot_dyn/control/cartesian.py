@@ -47,9 +47,9 @@ class CartesianReference:
         object.__setattr__(self, "axis", _direction("axis", self.axis))
 
     @property
-    def breaks(self) -> np.ndarray:
-        """Times in [s] at which position or angle pass to another piece."""
-        return self.position.breaks if self.angle is None else np.union1d(self.position.breaks, self.angle.breaks)
+    def knots(self) -> np.ndarray:
+        """Times in [s] at which position or angle pass to another polynomial."""
+        return self.position.knots if self.angle is None else np.union1d(self.position.knots, self.angle.knots)
 
     def at(self, t: Array) -> tuple[Array, Array | None, Array, Array]:
         """Position, orientation, twist and its rate at t.

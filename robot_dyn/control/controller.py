@@ -39,10 +39,10 @@ class Controller(ABC):
         """Number of states in the memory z, which starts at zero."""
 
     @property
-    def breaks(self) -> tuple[float, ...]:
-        """Times in [s] at which its reference passes to another piece: a step of integration ends there."""
+    def knots(self) -> tuple[float, ...]:
+        """Times in [s] at which its reference passes to another polynomial: a step of integration ends there."""
         reference = getattr(self, "reference", None)
-        return () if reference is None else tuple(reference.breaks)
+        return () if reference is None else tuple(reference.knots.tolist())
 
     @abstractmethod
     def torque(self, t: float, q: Array, v: Array, z: Array) -> Array:

@@ -49,6 +49,11 @@ class PiecewisePolynomial:
         return self.coefficients.shape[-1]
 
     @property
+    def knots(self) -> np.ndarray:
+        """Times in [s] at which it passes to another polynomial: its breaks, or none if it rests."""
+        return self.breaks[:0] if self.coefficients.shape[1] == 1 else self.breaks
+
+    @property
     def start(self) -> float:
         """Time of the first break, in [s]."""
         return float(self.breaks[0])

@@ -19,6 +19,7 @@ from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.setup import Setup, Stretch
 
 _WATCHED = 64  # steps between looks at the energy
+_RUNAWAY = 1e6  # [rad/s] or [m/s]: an adaptive method would follow an exploding state without end
 _SAMPLES = 1000  # of an adaptive run without a record period
 
 
@@ -124,11 +125,16 @@ def _by_steps(
 def _adaptively(
     setup: Setup, method: Adaptive, system: System, stretch: Stretch, y: Array, held: Array | None, counter: Counter
 ) -> Iterator[Sample]:
-    solution = method.solve(system, stretch.start, y, stretch.end)
+    n = system.n
+
+    def sane(_: float, y: Array) -> float:
+        return 1.0 if np.abs(y[n : 2 * n]).max() < _RUNAWAY else -1.0
+
+    solution = method.solve(system, stretch.start, y, stretch.end, stop=sane)
     counter.steps += len(solution.times) - 1
     reached = float(solution.times[-1])
     period = setup.record_period_s or setup.duration_s / _SAMPLES
-    first = np.ceil(stretch.start / period - 1e-9)
+    first = max(0.0, np.ceil(stretch.start / period - 1e-9))
     times = np.clip(period * np.arange(first, np.ceil(stretch.end / period - 1e-9)), stretch.start, stretch.end)
     for t in np.unique(np.append(times[times <= reached], stretch.start)):
         yield Sample(float(t), solution(float(t)), held, shared=True)
@@ -136,6 +142,8 @@ def _adaptively(
         raise KeyboardInterrupt
     if solution.status is Status.FAILED:
         raise DivergedError(reached, solution.message)
+    if solution.status is Status.STOPPED:
+        raise DivergedError(reached, f"a joint moves faster than {_RUNAWAY:g} rad/s: the control is unstable")
     return solution.states[-1]
 
 

@@ -100,7 +100,8 @@ class Motion:
             until: End of the stretch; what switches there acts as before it.
         """
         dynamics, controller, forces = self.plant.dynamics, self.controller, self.plant.forces
-        n, last, working = dynamics.n, np.nextafter(until, -np.inf), self.working
+        n, last = dynamics.n, np.nextafter(until, -np.inf)
+        works = [not isinstance(force, Conservative) for force in forces]
         remembers = held is None and controller is not None and self.memory_size > 0
 
         def rate(t: float, y: Array) -> Array:
@@ -120,7 +121,7 @@ class Motion:
             end = 2 * n + self.memory_size
             result[2 * n : end] = controller.memory_rate(t, q, v, z) if remembers and controller else 0.0
             result[end] = u @ v
-            result[end + 1 :] = [x @ v for force, x in zip(forces, torques, strict=True) if force in working]
+            result[end + 1 :] = [x @ v for works_, x in zip(works, torques, strict=True) if works_]
             return result
 
         return System(rate, n)

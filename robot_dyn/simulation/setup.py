@@ -92,7 +92,7 @@ class Setup:
         period = self.controller.period_s if self.controller else 0.0
         ticks = {k * period for k in range(ceil(self.duration_s / period - 1e-9))} if period > 0 else {0.0}
         switches = {t for effect in self.plant.effects for t in effect.switches}
-        switches |= set(self.controller.breaks if self.controller else ())
+        switches |= set(self.controller.knots if self.controller else ())
         least = 1e-9 * self.duration_s  # cuts nearer than this differ by rounding alone
         cuts: list[tuple[float, bool]] = []
         for cut in sorted(ticks | {t for t in switches if 0.0 < t < self.duration_s}):
