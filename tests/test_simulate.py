@@ -168,3 +168,25 @@ def test_a_setup_and_its_options_are_one() -> None:
     assert np.array_equal(times, one.t)
     assert one.joint_names == DOUBLE.joint_names
     assert [array.shape for array in (one.q, one.v, one.a, one.tau)] == [(len(one.t), 2)] * 4
+
+
+def test_a_frame_that_follows_a_circle_has_a_deviation_in_metres() -> None:
+    """With the exact model the tool stays on its circle; what is told is the distance of the frame from it."""
+    arm = rd.load("ur5")
+    q0 = np.array([0.3, -1.3, 1.6, -1.9, -1.5, 0.2])
+    g = arm.placement(q0, "tool0")
+    path = rd.circle(g[:3, 3] + [0.0, 0.05, 0.0], 0.05, [0, 0, 1], 1.0, toward=[0, -1, 0], rotation=g[:3, :3])
+    law = rd.OperationalSpace(arm, "tool0", path, 400.0, 40.0)
+    run = rd.simulate(arm, q0=q0, duration_s=0.2, controller=law, step_s=4e-3, estimate_error=False)
+    wanted, p = path.at(run.t)[0], arm.placement(run.q, "tool0")[:, :3, 3]
+    assert run.wanted is None
+    np.testing.assert_allclose(run.deviation, p - wanted, atol=1e-15)
+    assert run.tracking_error == pytest.approx(np.sqrt(np.mean((p - wanted) ** 2)))
+    assert "tracking error of the frame, m" in run.summary
+
+
+def test_a_run_from_python_carries_its_origin() -> None:
+    about = rd.simulate(DOUBLE, q0=[0.1, 0.2], duration_s=0.01).about
+    assert "<robot" in about["urdf"]
+    assert "gravity" in about["edits"]
+    assert "pin" in about["versions"]

@@ -25,7 +25,7 @@ class EffortLimit(Bound):
 
     def __post_init__(self) -> None:
         limit = number("limit", self.limit, infinite=True)
-        if (limit < 0).any():
+        if isinstance(limit, np.ndarray) and (limit < 0).any():
             raise EffectError(f"limit must not be negative, got {self.limit!r}")
         object.__setattr__(self, "limit", limit)
 

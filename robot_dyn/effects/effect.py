@@ -8,13 +8,19 @@ from __future__ import annotations
 
 import re
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from robot_dyn.arithmetic import FLOAT64, Array
-from robot_dyn.errors import EffectError
+from robot_dyn.errors import EffectError, nearest
 from robot_dyn.model.dynamics import Dynamics
+
+URDF = "urdf"  # in place of a coefficient: what the robot's file states
+_ELSEWHERE = {"limit": np.inf, "lower": -np.inf, "upper": np.inf}  # for joints not named; 0 for other coefficients
+_STATED = {"limit": "effort_limit"}  # the attribute of a Robot, where it is not called as that of the effect
 
 
 class Effect:
@@ -24,6 +30,18 @@ class Effect:
     def name(self) -> str:
         """Its name in a scene and in a ledger: that of its class, in small letters."""
         return re.sub(r"(?<!^)(?=[A-Z])", "_", type(self).__name__).lower()
+
+    def on(self, dynamics: Any) -> Effect:
+        """This effect with coefficients given by joint name, or "urdf", made arrays (n,) of these joints.
+
+        Raises:
+            EffectError: If a joint is unknown, or no file states the coefficient.
+        """
+        if not is_dataclass(self):
+            return self
+        named = {field.name: getattr(self, field.name) for field in fields(self) if field.init}
+        made = {key: _of(dynamics, key, x) for key, x in named.items() if isinstance(x, Mapping) or x is URDF}
+        return replace(self, **made) if made else self
 
     @property
     def switches(self) -> tuple[float, ...]:
@@ -66,13 +84,20 @@ class Bound(Effect, ABC):
 def coefficient(name: str, values: Any) -> np.ndarray:
     """A coefficient that is not negative: a scalar or (n,), frozen; EffectError if it is anything else."""
     array = number(name, values)
-    if (array < 0).any():
+    if isinstance(array, np.ndarray) and (array < 0).any():
         raise EffectError(f"{name} must not be negative, got {values!r}")
     return array
 
 
 def number(name: str, values: Any, infinite: bool = False) -> np.ndarray:
-    """A parameter of any sign: a scalar or (n,), finite unless said, frozen; EffectError if it is anything else."""
+    """A parameter of any sign: a scalar or (n,), finite unless said, frozen; EffectError if it is anything else.
+
+    Values by joint name, and "urdf", stay until the plant that the effect acts on is known.
+    """
+    if isinstance(values, Mapping):
+        return values  # pyright: ignore[reportReturnType]
+    if isinstance(values, str) and values == URDF:
+        return URDF  # pyright: ignore[reportReturnType]
     try:
         array = np.array(FLOAT64.asarray(values))
     except (TypeError, ValueError):
@@ -81,3 +106,16 @@ def number(name: str, values: Any, infinite: bool = False) -> np.ndarray:
         raise EffectError(f"{name} must be finite, a scalar or (n,), got {values!r}")
     array.setflags(write=False)
     return array
+
+
+def _of(dynamics: Any, key: str, values: Any) -> np.ndarray:
+    """The (n,) array of values by joint name, or of what the file states."""
+    names = dynamics.joint_names
+    if values is URDF:
+        try:
+            return getattr(dynamics, _STATED.get(key, key))
+        except AttributeError:
+            raise EffectError(f"{key}='urdf' needs a Robot, got {type(dynamics).__name__}") from None
+    for name in values.keys() - set(names):
+        raise EffectError(f"{key}: no joint {name!r}; {nearest(str(name), names)}")
+    return np.array([values.get(name, _ELSEWHERE.get(key, 0.0)) for name in names])

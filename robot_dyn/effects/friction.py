@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, final
 
+import numpy as np
+
 from robot_dyn.arithmetic import Array, tanh
 from robot_dyn.effects.effect import Dissipative, coefficient
 from robot_dyn.errors import EffectError
@@ -47,7 +49,7 @@ class RegularisedCoulombFriction(Dissipative):
     def __post_init__(self) -> None:
         object.__setattr__(self, "friction", coefficient("friction", self.friction))
         object.__setattr__(self, "velocity_scale", coefficient("velocity_scale", self.velocity_scale))
-        if not (self.velocity_scale > 0).all():
+        if isinstance(self.velocity_scale, np.ndarray) and not (self.velocity_scale > 0).all():
             raise EffectError(f"velocity_scale must be positive, got {self.velocity_scale}")
 
     def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:

@@ -77,6 +77,8 @@ def joint_stops(
 def _check_stops(stops: Any) -> None:
     for name in ("lower", "upper"):
         stop = number(name, getattr(stops, name), infinite=True)
+        if not isinstance(stop, np.ndarray):
+            return  # by name, or as the file states: checked when the joints are known
         # A stop that does not exist lies where no depth can be reached, and inf − inf is avoided.
         object.__setattr__(stops, name, np.clip(stop, -1e9, 1e9))
     if not np.all(stops.lower < stops.upper):

@@ -39,12 +39,13 @@ class Plant:
                 raise EffectError(f"effects={effects!r}; give effects, or 'urdf' for those the file states")
             effects = stated_friction(dynamics)
         try:
-            object.__setattr__(self, "effects", tuple(effects))
+            effects = tuple(effects)
         except TypeError:
             raise EffectError(f"effects must be several, such as [rd.ViscousFriction(0.1)], got {effects!r}") from None
-        for effect in self.effects:
+        for effect in effects:
             if not isinstance(effect, Effect):
                 raise EffectError(f"{effect!r} is no Effect; subclass Conservative, Dissipative, Active or Bound")
+        object.__setattr__(self, "effects", tuple(effect.on(dynamics) for effect in effects))
 
     @cached_property
     def forces(self) -> tuple[Force, ...]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tomllib
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -61,8 +60,6 @@ class Scene(Part):
         acting = [part for effect in self.effect if isinstance(effect, Acting) for part in effect.build(robot)]
         q0, v0 = (per_joint(name, value, robot) for name, value in (("q", self.start.q), ("v", self.start.v)))
         controller = None if self.control is None else self.control.build(described, robot, q0, self.reference)
-        about = about | {"urdf": robot.description.text.decode(errors="replace"), "edits": repr(robot.edits)}
-        about |= {"robot": robot.name, "versions": versions()}
         return Setup(
             Plant(robot, acting), q0, v0, self.duration_s, controller, self.integrator(),
             self.step_s, self.record_period_s, self.estimate_error, about,
@@ -113,11 +110,6 @@ def parse_scene(text: str, source: str) -> Scene:
         names = nearest(scene.method, (*METHODS, *ADAPTIVE))
         raise SceneError(f"{source}: method: no method {shorten(scene.method)!r}; {names}")
     return scene
-
-
-def versions() -> str:
-    """Versions of what computes."""
-    return ", ".join(f"{name} {version(name)}" for name in ("robot-dyn", "pin", "numpy", "scipy"))
 
 
 def _text(path: Path) -> str:

@@ -42,8 +42,7 @@ def save_run(trajectory: Trajectory, path: str | Path) -> Path:
     arrays |= {"kinetic": trajectory.ledger.kinetic, "potential": trajectory.ledger.potential}
     arrays |= {f"work/{name}": work for name, work in trajectory.ledger.work.items()}
     arrays |= {f"power/{name}": power for name, power in trajectory.power.items()}
-    if trajectory.wanted is not None:
-        arrays["wanted"] = trajectory.wanted
+    arrays |= {name: x for name in ("wanted", "deviation") if (x := getattr(trajectory, name)) is not None}
     about: dict[str, Any] = {
         "format": FORMAT,
         "joint_names": trajectory.joint_names,
@@ -114,6 +113,7 @@ def _trajectory(arrays: dict[str, np.ndarray], about: dict[str, Any]) -> Traject
         power=group("power/"),
         ledger=Ledger(arrays["kinetic"], arrays["potential"], group("work/")),
         wanted=arrays.get("wanted"),
+        deviation=arrays.get("deviation"),
         outcome=Outcome(Ending(outcome["ending"]), outcome["t"], outcome["advice"]),
         statistics=Statistics(**about["statistics"]),
         error=error,

@@ -8,16 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from importlib.metadata import version
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
+from robot_dyn.control.cartesian import CartesianReference
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import RobotDynError
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.model.dynamics import Dynamics
+from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.error import ErrorEstimate, difference, richardson
 from robot_dyn.simulation.ledger import Ledger
 from robot_dyn.simulation.march import Counter, DivergedError, Sample, march
@@ -122,12 +125,11 @@ def _trajectory(
     rows = [_row(setup, motion, sample) for sample in kept]
     q, v, a, tau, W, P, E = (np.array(column) for column in zip(*rows, strict=True))
     t = np.array([sample.t for sample in kept])
-    reference = getattr(setup.controller, "reference", None)
-    wanted = reference.at(t)[0] if isinstance(reference, PiecewisePolynomial) else None
+    wanted, deviation = _deviation(setup, t, q)
     ledger = Ledger(E[:, 0], E[:, 1], dict(zip(motion.sources, W.T, strict=True)))
     power = dict(zip(motion.sources, P.T, strict=True))
-    names = setup.plant.dynamics.joint_names
-    return Trajectory(names, t, q, v, a, tau, power, ledger, wanted, outcome, statistics, error, setup.about)
+    names, about = setup.plant.dynamics.joint_names, origin(setup.plant.dynamics) | setup.about
+    return Trajectory(names, t, q, v, a, tau, power, ledger, wanted, deviation, outcome, statistics, error, about)
 
 
 def _row(setup: Setup, motion: Motion, sample: Sample) -> tuple[Any, ...]:
@@ -144,3 +146,25 @@ def _row(setup: Setup, motion: Motion, sample: Sample) -> tuple[Any, ...]:
     except RobotDynError:
         pass
     return q, v, a, u, W, power, energy
+
+
+def _deviation(setup: Setup, t: np.ndarray, q: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:
+    """Wanted positions, and how far the joints, or the frame, are from what the reference wants."""
+    controller: Any = setup.controller
+    reference = getattr(controller, "reference", None)
+    if isinstance(reference, PiecewisePolynomial):
+        wanted = reference.at(t)[0]
+        return wanted, q - wanted
+    if isinstance(reference, CartesianReference):
+        return None, setup.plant.dynamics.placement(q, controller.frame)[:, :3, 3] - reference.at(t)[0]
+    return None, None
+
+
+def origin(dynamics: Any) -> dict[str, str]:
+    """Where a run comes from, as texts: URDF, edits and versions."""
+    robot = getattr(dynamics, "robot", dynamics)
+    texts = {"versions": ", ".join(f"{name} {version(name)}" for name in ("robot-dyn", "pin", "numpy", "scipy"))}
+    if isinstance(robot, Robot):
+        urdf = robot.description.text.decode(errors="replace")
+        texts |= {"robot": robot.name, "urdf": urdf, "edits": repr(robot.edits)}
+    return texts

@@ -66,7 +66,9 @@ class Trajectory:
         tau: Actuation within its bounds, in [N m] or [N].
         power: Of the control and of each effect without a potential, by name, in [W].
         ledger: Energy and work.
-        wanted: Positions of the reference, or None.
+        wanted: Positions of a joint reference, or None.
+        deviation: q − q wanted, (m, n); or p − p wanted of a frame that follows a Cartesian reference, (m, 3) in [m];
+            None without a reference.
         outcome: How it ended.
         statistics: What it took.
         error: Its estimated error; None if companions were switched off.
@@ -82,6 +84,7 @@ class Trajectory:
     power: dict[str, np.ndarray]
     ledger: Ledger
     wanted: np.ndarray | None
+    deviation: np.ndarray | None
     outcome: Outcome
     statistics: Statistics
     error: ErrorEstimate | None = None
@@ -89,8 +92,8 @@ class Trajectory:
 
     @property
     def tracking_error(self) -> float | None:
-        """Root mean square of q − q_wanted over samples and joints; None without a reference."""
-        return None if self.wanted is None else float(np.sqrt(np.mean((self.q - self.wanted) ** 2)))
+        """Root mean square of the deviation over samples and joints or axes; None without a reference."""
+        return None if self.deviation is None else float(np.sqrt(np.mean(self.deviation**2)))
 
     @property
     def summary(self) -> str:
@@ -106,7 +109,8 @@ class Trajectory:
             f"error of q: {self.error or 'not estimated (companion runs are off)'}",
         ]
         if self.tracking_error is not None:
-            lines.append(f"tracking error of q: {self.tracking_error:.3e} rms")
+            what = "the frame, m" if self.wanted is None else "q"
+            lines.append(f"tracking error of {what}: {self.tracking_error:.3e} rms")
         step = f"step {s.step_s:.4g} s, " if s.step_s else ""
         lines.append(
             f"{s.method}: {step}{s.steps} steps, {s.evaluations} evaluations, {s.wall_s:.2f} s"

@@ -1,0 +1,56 @@
+"""Coefficients by joint name or as the file states become arrays when the plant is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import robot_dyn as rd
+from robot_dyn.errors import EffectError
+
+ROBOT = rd.load("cart_pole")
+
+
+def only(effect):
+    return rd.Plant(ROBOT, [effect]).effects[0]
+
+
+def test_what_is_not_named_is_free() -> None:
+    """No friction, no spring, no stop and no limit at a joint that is not named."""
+    np.testing.assert_array_equal(only(rd.ViscousFriction({"hinge": 0.3})).damping, [0.0, 0.3])
+    spring = only(rd.Spring({"slide": 2.0}, rest={"slide": 0.1}))
+    np.testing.assert_array_equal([spring.stiffness, spring.rest], [[2.0, 0.0], [0.1, 0.0]])
+    np.testing.assert_array_equal(only(rd.EffortLimit({"slide": 3.0})).limit, [3.0, np.inf])
+    stop = only(rd.JointStopSpring({"slide": -1.0}, {"slide": 1.0}, 10.0))
+    assert stop.torque(ROBOT, 0.0, np.array([0.5, 99.0]), np.zeros(2)).tolist() == [0.0, 0.0]
+    assert stop.torque(ROBOT, 0.0, np.array([1.5, 99.0]), np.zeros(2)).tolist() == [-5.0, 0.0]
+
+
+def test_urdf_is_what_the_file_states() -> None:
+    np.testing.assert_array_equal(only(rd.ViscousFriction("urdf")).damping, [0.8, 0.02])
+    np.testing.assert_array_equal(only(rd.RegularisedCoulombFriction("urdf")).friction, [1.5, 0.01])
+    np.testing.assert_array_equal(only(rd.EffortLimit("urdf")).limit, [100.0, np.inf])
+    np.testing.assert_array_equal(only(rd.JointStopSpring("urdf", "urdf", 1.0)).upper[0], 2.0)
+
+
+def test_an_effect_given_by_name_is_left_as_it_was() -> None:
+    effect = rd.ViscousFriction({"hinge": 0.3})
+    only(effect)
+    assert effect.damping == {"hinge": 0.3}
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: only(rd.Spring({"slid": 1.0})), "stiffness: no joint 'slid'; nearest: slide"),
+        (lambda: only(rd.ViscousFriction({"slide": -1.0})), "damping must not be negative"),
+        (lambda: only(rd.EffortLimit({"slide": -1.0})), "limit must not be negative"),
+        (lambda: only(rd.RegularisedCoulombFriction(1.0, {"slide": 0.0})), "velocity_scale must be positive"),
+        (lambda: only(rd.JointStopSpring({"slide": 1.0}, {"slide": -1.0}, 1.0)), "lower stops must lie below"),
+        (lambda: rd.Plant(rd.Lagrangian(ROBOT), [rd.ViscousFriction("urdf")]), "damping='urdf' needs a Robot"),
+        (lambda: only(rd.ViscousFriction("file")), "damping must be a number"),
+    ],
+)
+def test_names_and_values_are_checked_when_the_joints_are_known(make, message: str) -> None:
+    with pytest.raises(EffectError, match=message):
+        make()
