@@ -86,11 +86,10 @@ def march(setup: Setup, motion: Motion, factor: int, counter: Counter) -> Iterat
             y, held = watch.tick(stretch.start, y)
         system = counter.counted(motion.system(held, stretch.end))
         method = setup.integrator
-        with np.errstate(all="ignore"):  # what overflows is told by the watch
-            if isinstance(method, Adaptive):
-                y = yield from _adaptively(setup, replace_tolerance(method, factor), system, stretch, y, held, counter)
-            else:
-                y = yield from _by_steps(setup, method, system, stretch, y, held, factor, counter, watch)
+        if isinstance(method, Adaptive):
+            y = yield from _adaptively(setup, replace_tolerance(method, factor), system, stretch, y, held, counter)
+        else:
+            y = yield from _by_steps(setup, method, system, stretch, y, held, factor, counter, watch)
     y, held = watch.tick(setup.duration_s, y)
     yield Sample(setup.duration_s, y, held, shared=True)
 

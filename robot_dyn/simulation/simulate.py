@@ -78,17 +78,18 @@ def _collect(
     thin = max(1, sum(map(setup.steps, setup.stretches)) // (4 * _SHARED))
     seen = 0
     try:
-        for sample in march(setup, motion, factor, counter):
-            t, last = sample.t, sample.t == setup.duration_s
-            if t >= next_record - 1e-9 * setup.step_s or last:
-                kept.append(sample)
-                next_record += setup.record_period_s
-            if sample.shared:
-                if seen % thin == 0 or last:
-                    shared.append((t, sample.y[:n]))
-                seen += 1
-            if on_progress is not None:
-                on_progress(t)
+        with np.errstate(all="ignore"):  # what overflows ends the march
+            for sample in march(setup, motion, factor, counter):
+                t, last = sample.t, sample.t == setup.duration_s
+                if t >= next_record - 1e-9 * setup.step_s or last:
+                    kept.append(sample)
+                    next_record += setup.record_period_s
+                if sample.shared:
+                    if seen % thin == 0 or last:
+                        shared.append((t, sample.y[:n]))
+                    seen += 1
+                if on_progress is not None:
+                    on_progress(t)
     except DivergedError as end:
         return Outcome(Ending.DIVERGED, end.t, str(end))
     except KeyboardInterrupt:
