@@ -111,7 +111,12 @@ class Model(Part):
 
 
 class Control(Part):
-    """A controller; gains follow from the closed loop's frequency and damping ratio."""
+    """A controller; gains follow from the closed loop's frequency ω and damping ratio ζ.
+
+    kp = ω², kd = 2 ζ ω, times the diagonal of M at the start for joint controllers without a model in the loop. PID has
+    ki = integral_rate kp and is cut at the effort limits of the file. Operational space holds the posture of the start
+    with a tenth of the stiffness.
+    """
 
     kind: Literal["pd", "pid", "pd_gravity", "feed_forward", "computed_torque", "operational_space"]
     frequency_rad_per_s: PerJoint
