@@ -119,3 +119,16 @@ def test_effects_and_time_are_taken_into_account() -> None:
 def test_a_state_without_meaning_is_refused(state, message: str) -> None:
     with pytest.raises(QueryError, match=message):
         rd.linearise(rd.Plant(DOUBLE), *state)
+
+
+@pytest.mark.parametrize("scale", [1e-2, 1e-3, 1e-4])
+def test_steep_friction_is_linearised_too(scale: float) -> None:
+    """∂a/∂v = −f/(v_s M) at rest, M = 1/3: the step of the difference shrinks until two agree to 1e-6."""
+    plant = rd.Plant(rd.load("pendulum"), [rd.RegularisedCoulombFriction(0.1, scale)])
+    A, _ = rd.linearise(plant, [0.1], [0.0], [0.0])
+    assert A[1, 1] == pytest.approx(-0.3 / scale, rel=1e-6)
+
+
+def test_a_kink_has_no_linearisation() -> None:
+    with pytest.raises(rd.RobotDynError, match="no derivative"):
+        rd.linearise(rd.Plant(rd.load("pendulum"), [rd.EffortLimit(5.0)]), [0.1], [0.0], [5.0])

@@ -87,3 +87,21 @@ def test_a_table_has_names_units_and_all_samples(run, tmp_path) -> None:
     assert len(rows) == 1 + len(run.t)
     assert [float(row[0]) for row in rows[1:]] == run.t.tolist()
     assert [float(row[2]) for row in rows[1:]] == run.q[:, 1].tolist()
+
+
+def test_a_damaged_file_is_refused_or_whole(run, tmp_path) -> None:
+    """Any byte may be wrong: the file is refused, or what is read is what was written."""
+    path = rd.save_run(run, tmp_path / "run.npz")
+    whole = path.read_bytes()
+    for i in range(0, len(whole), max(1, len(whole) // 300)):
+        path.write_bytes(whole[:i] + bytes([whole[i] ^ 0xFF]) + whole[i + 1 :])
+        try:
+            back = rd.load_run(path)
+        except RunFileError:
+            continue
+        assert np.array_equal(back.q, run.q)
+
+
+def test_a_folder_is_no_target(run, tmp_path) -> None:
+    with pytest.raises(RunFileError, match="is a folder"):
+        rd.save_run(run, tmp_path)

@@ -136,6 +136,7 @@ MISTAKES = {
     "unknown effect": (SCENE + '[[effect]]\nkind = "viscous"', ["effect[0]", "viscous"]),
     "unknown frame": (SCENE + '[[effect]]\nkind = "external_wrench"\nframe = "tipp"', ["tipp", "nearest: tip"]),
     "missing gain": (SCENE + '[control]\nkind = "pd"', ["control.frequency_rad_per_s", "required"]),
+    "reference alone": (SCENE + PD.split("[reference]")[1].join(["[reference]", ""]), ["reference", "[control]"]),
     "wrong reference": (
         SCENE + PD.replace('"pd"', '"operational_space"\nframe = "tip"'),
         ["reference.kind", "line or circle", "quintic"],

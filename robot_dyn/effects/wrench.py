@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf
 from typing import Any, final
+
+import numpy as np
 
 from robot_dyn.arithmetic import Array, transpose
 from robot_dyn.arithmetic import apply as times
@@ -34,8 +37,13 @@ class ExternalWrench(Active):
 
     def __post_init__(self) -> None:
         wrench = number("wrench", self.wrench)
-        if wrench.shape != (6,):
-            raise EffectError(f"wrench must be force and torque, shape (6,), got {wrench.shape}")
+        if np.shape(wrench) != (6,):
+            raise EffectError(f"wrench must be force and torque, shape (6,), got {self.wrench!r}")
+        for name in ("start_s", "end_s"):
+            time = number(name, getattr(self, name), infinite=True)
+            if np.shape(time) != () or isinstance(time, str | Mapping):
+                raise EffectError(f"{name} must be a time in seconds, got {getattr(self, name)!r}")
+            object.__setattr__(self, name, float(time))
         if not self.start_s < self.end_s:
             raise EffectError(f"end_s must lie after start_s, got {self.start_s} and {self.end_s}")
         object.__setattr__(self, "wrench", wrench)

@@ -41,5 +41,6 @@ def method(name: str) -> Integrator:
         QueryError: If there is none, with the nearest names.
     """
     if name not in METHODS:
-        raise QueryError(f"no integration method {shorten(name)!r}; {nearest(name, METHODS)}")
+        adaptive = f"; rd.Adaptive({name!r}) is an adaptive one" if name in ("DOP853", "Radau") else ""
+        raise QueryError(f"no integration method {shorten(name)!r}; {nearest(str(name), METHODS)}{adaptive}")
     return METHODS[name]()

@@ -22,7 +22,9 @@ from robot_dyn.arithmetic import (
     in_arithmetic,
     transpose,
 )
+from robot_dyn.errors import QueryError
 from robot_dyn.lagrange.linkage import BASE, Configuration, Linkage, linkage
+from robot_dyn.model.description import Description
 from robot_dyn.model.dynamics import Axes, acceleration, check_batches, checked, entry
 from robot_dyn.model.tree import Described, tree
 from robot_dyn.spatial import adjoint, adjoint_inverse, block_diagonal, bracket, hat, homogeneous
@@ -42,7 +44,12 @@ class Lagrangian:
     dtype: Any = np.float64
 
     def __post_init__(self) -> None:
+        if not isinstance(getattr(self.robot, "description", None), Description):
+            raise QueryError(f"robot: give a Robot, such as rd.load('ur5'), got {self.robot!r}")
         _ = self.linkage
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Lagrangian, (self.robot, self.dtype)
 
     @cached_property
     def arithmetic(self) -> Arithmetic:

@@ -84,7 +84,11 @@ class Circle(Part):
     def build(self, robot: Robot, q0: np.ndarray, frame: str | None) -> CartesianReference:
         """The reference."""
         g = robot.placement(q0, _frame(frame))
-        direction = np.array(self.to_centre) / np.linalg.norm(self.to_centre)
+        axis, direction = np.array(self.normal), np.array(self.to_centre)
+        if not np.linalg.norm(np.cross(axis, direction)) > 0:
+            raise SceneError("reference.to_centre: must not be zero, nor along reference.normal")
+        direction = direction - axis * (axis @ direction) / (axis @ axis)  # into the plane of the circle
+        direction = direction / np.linalg.norm(direction)
         centre = g[:3, 3] + self.radius_m * direction
         R = g[:3, :3] if self.hold_orientation else None
         return circle(

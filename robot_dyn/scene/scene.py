@@ -106,6 +106,8 @@ def parse_scene(text: str, source: str) -> Scene:
         scene = Scene.model_validate(table)
     except ValidationError as error:
         raise SceneError(f"{source}: {_first(error)}") from None
+    if scene.control is None and "reference" in scene.model_fields_set:
+        raise SceneError(f"{source}: reference: nothing follows it; add a [control]")
     if scene.method not in (*METHODS, *ADAPTIVE):
         names = nearest(scene.method, (*METHODS, *ADAPTIVE))
         raise SceneError(f"{source}: method: no method {shorten(scene.method)!r}; {names}")

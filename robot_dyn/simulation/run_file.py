@@ -11,6 +11,7 @@ import json
 import os
 import tempfile
 import zipfile
+import zlib
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,9 @@ FORMAT = 1
 _SAMPLES = ("t", "q", "v", "a", "tau")
 
 
+_DAMAGE = (OSError, ValueError, KeyError, TypeError, EOFError, NotImplementedError, zipfile.BadZipFile, zlib.error)
+
+
 class RunFileError(RobotDynError):
     """A run file that cannot be written or read."""
 
@@ -37,6 +41,8 @@ def save_run(trajectory: Trajectory, path: str | Path) -> Path:
         RunFileError: If it cannot be written.
     """
     path = Path(path)
+    if not path.name or path.is_dir():
+        raise RunFileError(f"{path}: is a folder; give the name of a file in it, such as {path / 'run.npz'}")
     path = path if path.suffix else path.with_suffix(".npz")
     arrays: dict[str, np.ndarray] = {name: getattr(trajectory, name) for name in _SAMPLES}
     arrays |= {"kinetic": trajectory.ledger.kinetic, "potential": trajectory.ledger.potential}
@@ -73,7 +79,16 @@ def load_run(path: str | Path) -> Trajectory:
         return _trajectory(arrays, about)
     except FileNotFoundError:
         raise RunFileError(f"{path}: there is no such file; write one with robot-dyn simulate … -o {path}") from None
-    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+    except (
+        OSError,
+        ValueError,
+        KeyError,
+        TypeError,
+        EOFError,
+        NotImplementedError,
+        zipfile.BadZipFile,
+        zlib.error,
+    ) as error:
         raise RunFileError(f"{path}: is no whole run file ({type(error).__name__}); simulate again") from None
 
 

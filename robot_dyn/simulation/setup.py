@@ -77,8 +77,10 @@ class Setup:
             object.__setattr__(self, name, value)
         for name in ("duration_s", "step_s", "record_period_s"):
             value, least = getattr(self, name), 0.0 if name == "record_period_s" else 1e-12
-            if not (isinstance(value, int | float) and least <= value < inf):
+            real = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
+            if not (real and least <= value < inf):
                 raise QueryError(f"{name} must be a positive number of seconds, got {value!r}")
+            object.__setattr__(self, name, float(value))
         if not isinstance(self.controller, Controller | None):
             raise QueryError(f"controller: give one, such as rd.PD(…), or None, got {self.controller!r}")
         if self.controller is not None and self.controller.n != len(names):
