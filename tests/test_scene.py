@@ -137,6 +137,12 @@ MISTAKES = {
     "unknown frame": (SCENE + '[[effect]]\nkind = "external_wrench"\nframe = "tipp"', ["tipp", "nearest: tip"]),
     "missing gain": (SCENE + '[control]\nkind = "pd"', ["control.frequency_rad_per_s", "required"]),
     "reference alone": (SCENE + PD.split("[reference]")[1].join(["[reference]", ""]), ["reference", "[control]"]),
+    "times and points": (
+        SCENE
+        + PD.split("[reference]")[0]
+        + '[reference]\nkind = "via_points"\ntimes_s = [0.1, 0.2]\npoints = [[1, 2]]',
+        ["2 times_s for 1 points"],
+    ),
     "wrong reference": (
         SCENE + PD.replace('"pd"', '"operational_space"\nframe = "tip"'),
         ["reference.kind", "line or circle", "quintic"],
