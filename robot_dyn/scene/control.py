@@ -51,6 +51,8 @@ class ViaPoints(Part):
 
     def build(self, robot: Robot, q0: np.ndarray, frame: str | None) -> PiecewisePolynomial:
         """The reference."""
+        if len(self.times_s) != len(self.points):
+            raise SceneError(f"reference: {len(self.times_s)} times_s for {len(self.points)} points; give one for each")
         return via_points([0.0, *self.times_s], [q0.tolist(), *self.points])
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from robot_dyn.arithmetic import Array
 from robot_dyn.errors import RobotDynError
 from robot_dyn.integrate.adaptive import Adaptive, Status
-from robot_dyn.integrate.integrator import Integrator, System
+from robot_dyn.integrate.integrator import IntegrationError, Integrator, System
 from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.setup import Setup, Stretch
 
@@ -111,6 +111,8 @@ def _by_steps(
         before = y
         try:
             y = method.step(system, t, y, h)
+        except IntegrationError as error:  # it names its own remedy
+            raise DivergedError(t, str(error)) from None
         except RobotDynError as error:
             raise watch.diverged(t, before, str(error)) from None
         counter.steps += 1
