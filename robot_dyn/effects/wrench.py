@@ -58,3 +58,13 @@ class ExternalWrench(Active):
             return 0 * v
         J = dynamics.jacobian(q, self.frame, expressed_in=self.expressed_in)
         return times(transpose(J), self.wrench)
+
+    def at(self, placement: Array) -> Array:
+        """The wrench in base axes at the frame's origin, (..., 6), where the frame is placed at (..., 4, 4)."""
+        R, p = placement[..., :3, :3], placement[..., :3, 3]
+        force, torque = self.wrench[:3], self.wrench[3:]
+        if self.expressed_in is Axes.BODY:
+            force, torque = R @ force, R @ torque
+        elif self.expressed_in is Axes.WORLD:  # moved from the base to the frame
+            torque = torque - np.cross(p, force)
+        return np.concatenate(np.broadcast_arrays(force + 0 * p, torque + 0 * p), axis=-1)

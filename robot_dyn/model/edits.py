@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any, TypedDict, Unpack, final
 
 import numpy as np
@@ -100,6 +101,18 @@ class Edits:
                 raise EditError(f"mass_scale must be positive, got {factor:g}")
             new = replace(new, mass_scale=factor)
         return new
+
+    def as_json(self) -> str:
+        """These edits as a JSON text, for run files."""
+        return json.dumps(asdict(self))
+
+    @staticmethod
+    def from_json(text: str) -> Edits:
+        """The edits of a JSON text; KeyError, TypeError or ValueError if it is none."""
+        values = json.loads(text)
+        for name in ("gravity", "lock", "armature"):
+            values[name] = tuple(tuple(each) if isinstance(each, list) else each for each in values[name])
+        return Edits(**values | {"payloads": tuple(Payload(**each) for each in values["payloads"])})
 
 
 def by_joint(what: str, values: Any, joint_names: tuple[str, ...]) -> dict[str, float]:

@@ -23,8 +23,9 @@ from robot_dyn.simulation.error import ErrorEstimate
 from robot_dyn.simulation.ledger import Ledger
 from robot_dyn.simulation.trajectory import Ending, Outcome, Statistics, Trajectory
 
-FORMAT = 1
+FORMAT = 2
 _SAMPLES = ("t", "q", "v", "a", "tau")
+_OPTIONAL = ("wanted", "deviation", "at_stop")
 
 
 _DAMAGE = (OSError, ValueError, KeyError, TypeError, EOFError, NotImplementedError, zipfile.BadZipFile, zlib.error)
@@ -48,7 +49,8 @@ def save_run(trajectory: Trajectory, path: str | Path) -> Path:
     arrays |= {"kinetic": trajectory.ledger.kinetic, "potential": trajectory.ledger.potential}
     arrays |= {f"work/{name}": work for name, work in trajectory.ledger.work.items()}
     arrays |= {f"power/{name}": power for name, power in trajectory.power.items()}
-    arrays |= {name: x for name in ("wanted", "deviation") if (x := getattr(trajectory, name)) is not None}
+    arrays |= {f"wrench/{link}": wrench for link, wrench in trajectory.wrenches.items()}
+    arrays |= {name: x for name in _OPTIONAL if (x := getattr(trajectory, name)) is not None}
     about: dict[str, Any] = {
         "format": FORMAT,
         "joint_names": trajectory.joint_names,
@@ -79,16 +81,7 @@ def load_run(path: str | Path) -> Trajectory:
         return _trajectory(arrays, about)
     except FileNotFoundError:
         raise RunFileError(f"{path}: there is no such file; write one with robot-dyn simulate … -o {path}") from None
-    except (
-        OSError,
-        ValueError,
-        KeyError,
-        TypeError,
-        EOFError,
-        NotImplementedError,
-        zipfile.BadZipFile,
-        zlib.error,
-    ) as error:
+    except _DAMAGE as error:
         raise RunFileError(f"{path}: is no whole run file ({type(error).__name__}); simulate again") from None
 
 
@@ -127,8 +120,8 @@ def _trajectory(arrays: dict[str, np.ndarray], about: dict[str, Any]) -> Traject
         **{name: arrays[name] for name in _SAMPLES},
         power=group("power/"),
         ledger=Ledger(arrays["kinetic"], arrays["potential"], group("work/")),
-        wanted=arrays.get("wanted"),
-        deviation=arrays.get("deviation"),
+        **{name: arrays.get(name) for name in _OPTIONAL},
+        wrenches=group("wrench/"),
         outcome=Outcome(Ending(outcome["ending"]), outcome["t"], outcome["advice"]),
         statistics=Statistics(**about["statistics"]),
         error=error,

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from importlib.metadata import version
 from time import perf_counter
 from typing import Any
 
@@ -20,11 +19,12 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import RobotDynError
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.model.dynamics import Dynamics
-from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.error import ErrorEstimate, difference, richardson
 from robot_dyn.simulation.ledger import Ledger
+from robot_dyn.simulation.loads import at_stop, wrenches
 from robot_dyn.simulation.march import Counter, DivergedError, Sample, march
 from robot_dyn.simulation.motion import Motion
+from robot_dyn.simulation.origin import origin
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.trajectory import Ending, Outcome, Statistics, Trajectory
 
@@ -129,8 +129,14 @@ def _trajectory(
     wanted, deviation = _deviation(setup, t, q)
     ledger = Ledger(E[:, 0], E[:, 1], dict(zip(motion.sources, W.T, strict=True)))
     power = dict(zip(motion.sources, P.T, strict=True))
-    names, about = setup.plant.dynamics.joint_names, origin(setup.plant.dynamics) | setup.about
-    return Trajectory(names, t, q, v, a, tau, power, ledger, wanted, deviation, outcome, statistics, error, about)
+    plant = setup.plant
+    names, about = plant.dynamics.joint_names, origin(plant.dynamics) | setup.about
+    if isinstance(frame := getattr(setup.controller, "frame", None), str):
+        about = {"frame": frame} | about
+    return Trajectory(
+        names, t, q, v, a, tau, power, ledger, wanted, deviation, outcome, statistics, error, about,
+        wrenches(plant, t, q), at_stop(plant, q),
+    )  # fmt: skip
 
 
 def _row(setup: Setup, motion: Motion, sample: Sample) -> tuple[Any, ...]:
@@ -159,13 +165,3 @@ def _deviation(setup: Setup, t: np.ndarray, q: np.ndarray) -> tuple[np.ndarray |
     if isinstance(reference, CartesianReference):
         return None, setup.plant.dynamics.placement(q, controller.frame)[:, :3, 3] - reference.at(t)[0]
     return None, None
-
-
-def origin(dynamics: Any) -> dict[str, str]:
-    """Where a run comes from, as texts: URDF, edits and versions."""
-    robot = getattr(dynamics, "robot", dynamics)
-    texts = {"versions": ", ".join(f"{name} {version(name)}" for name in ("robot-dyn", "pin", "numpy", "scipy"))}
-    if isinstance(robot, Robot):
-        urdf = robot.description.text.decode(errors="replace")
-        texts |= {"robot": robot.name, "urdf": urdf, "edits": repr(robot.edits)}
-    return texts

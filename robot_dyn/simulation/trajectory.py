@@ -72,7 +72,9 @@ class Trajectory:
         outcome: How it ended.
         statistics: What it took.
         error: Its estimated error; None if companions were switched off.
-        about: Texts that make it whole: URDF, edits, scene, versions.
+        about: Texts that make it whole: URDF, its path, edits, scene, versions; the frame under control, if one is.
+        wrenches: External wrench by link, in base axes at the link's frame, (m, 6), in [N] and [N m].
+        at_stop: Whether each joint bears on a stop, (m, n); None without stops.
     """
 
     joint_names: tuple[str, ...]
@@ -89,6 +91,8 @@ class Trajectory:
     statistics: Statistics
     error: ErrorEstimate | None = None
     about: dict[str, str] = field(default_factory=dict, repr=False)
+    wrenches: dict[str, np.ndarray] = field(default_factory=dict)
+    at_stop: np.ndarray | None = None
 
     @property
     def tracking_error(self) -> float | None:
