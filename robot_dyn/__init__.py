@@ -53,6 +53,10 @@ if TYPE_CHECKING:
     from robot_dyn.simulation.setup import Setup as Setup
     from robot_dyn.simulation.simulate import simulate as simulate
     from robot_dyn.simulation.trajectory import Trajectory as Trajectory
+    from robot_dyn.view.plots import plot as plot
+    from robot_dyn.view.plots import save_plot as save_plot
+    from robot_dyn.view.replay import replay as replay
+    from robot_dyn.view.replay import save_replay as save_replay
 
 # Public names and where they live; imported when first used, so that `import robot_dyn` stays light (PEP 562).
 _HOME = {
@@ -96,9 +100,13 @@ _HOME = {
     "load_run": "simulation.run_file",
     "method": "integrate.methods",
     "midpoint": "arithmetic",
+    "plot": "view.plots",
     "quintic": "control.reference",
     "radius": "arithmetic",
     "read_scene": "scene.scene",
+    "replay": "view.replay",
+    "save_plot": "view.plots",
+    "save_replay": "view.replay",
     "save_run": "simulation.run_file",
     "simulate": "simulation.simulate",
     "task_dynamics": "control.operational_space",

@@ -67,12 +67,6 @@ def test_a_road_that_says_nan_disagrees_in_valid_json(monkeypatch: pytest.Monkey
     assert json.loads(done.stdout, parse_constant=pytest.fail)["robots"]["ur5"]["quantities"]["N"]["error"] is None
 
 
-def test_demo_ends_with_the_cross_check():
-    text = said("demo")
-    assert "M, mass matrix:" in text and "tied: " not in text
-    assert text.splitlines()[-2] == "1 of 1 agree"
-
-
 @pytest.mark.parametrize(
     ("args", "message"),
     [

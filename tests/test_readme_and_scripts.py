@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.browser import chromium
+
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
 BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```$", README, flags=re.MULTILINE | re.DOTALL)
@@ -60,6 +62,8 @@ def test_commands_of_the_readme_run(tmp_path) -> None:
 
 @pytest.mark.parametrize("script", sorted((ROOT / "scripts").glob("*.py")), ids=lambda path: path.name)
 def test_script_runs_quickly(script: Path) -> None:
+    if "chromium" in script.read_text(encoding="utf-8"):
+        chromium()
     assert run(sys.executable, str(script), "--quick")
 
 

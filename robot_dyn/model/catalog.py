@@ -63,7 +63,7 @@ def resolve(address: str, urdf: Path, package_dirs: Iterable[str | Path] = ()) -
     Raises:
         CatalogError: If it is in none of these; lists the places tried.
     """
-    inside = Path(address.removeprefix("package://"))
+    inside = Path(address.removeprefix("package://").lstrip("/"))  # a third slash is common, and no root
     tried = []
     for folder in _package_folders(urdf, package_dirs):
         if (folder / inside).is_file():

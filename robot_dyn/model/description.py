@@ -42,7 +42,7 @@ class Description:
     @property
     def element(self) -> etree._Element:
         """The checked bytes as a fresh XML element."""
-        return _parse(self.xml, self.source)
+        return parse(self.xml, self.source)
 
 
 def read(path: str | Path) -> Description:
@@ -77,12 +77,16 @@ def check(text: bytes, source: str) -> Description:
             f"{source}: is larger than {MAX_BYTES >> 20} MiB, the limit for a robot description;"
             " keep meshes in files of their own"
         )
-    checked = urdf.checked_robot(_parse(text, source), source)
+    checked = urdf.checked_robot(parse(text, source), source)
     return Description(checked.get("name", ""), source, text, etree.tostring(checked))
 
 
-def _parse(text: bytes, source: str) -> etree._Element:
-    """Parse XML without entities, DTD, network, recovery, or unbounded nesting."""
+def parse(text: bytes, source: str) -> etree._Element:
+    """The root of an XML text, read without entities, DTD, network, recovery, or unbounded nesting.
+
+    Raises:
+        DescriptionError: If it is none, or uses one of these; `source` names it.
+    """
     if not text.strip():
         raise DescriptionError(f"{source}: is empty; give a URDF file")
     parser = etree.XMLPullParser(

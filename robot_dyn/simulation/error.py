@@ -52,7 +52,7 @@ def richardson(t: np.ndarray, fine: np.ndarray, middle: np.ndarray, coarse: np.n
     The runs may have ended early; what all three reached is used.
     """
     k = min(len(fine), len(middle), len(coarse))
-    if k == 0:
+    if k < 2:
         return ErrorEstimate(t[:0], np.empty(0), 0.0, "a companion run diverged at once: take a smaller step")
     t, fine, middle, coarse = t[:k], fine[:k], middle[:k], coarse[:k]
     first = np.abs(fine - middle).max(axis=1)

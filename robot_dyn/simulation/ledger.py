@@ -39,7 +39,7 @@ class Ledger:
     @property
     def exchanged(self) -> float:
         """Energy that changed hands: max K + Σ ∫ |P_k|, the integrals over the samples."""
-        moved = sum(float(np.abs(np.diff(work)).sum()) for work in self.work.values())
+        moved = sum(float(np.nansum(np.abs(np.diff(work)))) for work in self.work.values())
         return float(np.nanmax(self.kinetic)) + moved
 
     @property

@@ -8,8 +8,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import os
-import tempfile
 import zipfile
 import zlib
 from dataclasses import asdict
@@ -19,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from robot_dyn.errors import RobotDynError
+from robot_dyn.files import save, target
 from robot_dyn.simulation.error import ErrorEstimate
 from robot_dyn.simulation.ledger import Ledger
 from robot_dyn.simulation.trajectory import Ending, Outcome, Statistics, Trajectory
@@ -41,10 +40,7 @@ def save_run(trajectory: Trajectory, path: str | Path) -> Path:
     Raises:
         RunFileError: If it cannot be written.
     """
-    path = Path(path)
-    if not path.name or path.is_dir():
-        raise RunFileError(f"{path}: is a folder; give the name of a file in it, such as {path / 'run.npz'}")
-    path = path if path.suffix else path.with_suffix(".npz")
+    path = target(path, ".npz", RunFileError)
     arrays: dict[str, np.ndarray] = {name: getattr(trajectory, name) for name in _SAMPLES}
     arrays |= {"kinetic": trajectory.ledger.kinetic, "potential": trajectory.ledger.potential}
     arrays |= {f"work/{name}": work for name, work in trajectory.ledger.work.items()}
@@ -62,8 +58,7 @@ def save_run(trajectory: Trajectory, path: str | Path) -> Path:
         arrays |= {"error/t": trajectory.error.t, "error/error": trajectory.error.error}
         about["error"] = {"resolved_until": trajectory.error.resolved_until, "note": trajectory.error.note}
     arrays["about"] = np.array(json.dumps(about))
-    _write(path, lambda stream: np.savez_compressed(stream, **arrays))  # pyright: ignore[reportArgumentType]
-    return path
+    return save(path, lambda stream: np.savez_compressed(stream, **arrays), RunFileError)  # pyright: ignore[reportArgumentType]
 
 
 def load_run(path: str | Path) -> Trajectory:
@@ -102,9 +97,9 @@ def export_csv(trajectory: Trajectory, path: str | Path) -> Path:
 
     table = io.StringIO()
     csv.writer(table).writerows([heading, *np.hstack(columns).tolist()])
-    path = Path(path)
-    _write(path, lambda stream: stream.write(table.getvalue().encode()))
-    return path
+    return save(
+        target(path, ".csv", RunFileError), lambda stream: stream.write(table.getvalue().encode()), RunFileError
+    )
 
 
 def _trajectory(arrays: dict[str, np.ndarray], about: dict[str, Any]) -> Trajectory:
@@ -120,27 +115,12 @@ def _trajectory(arrays: dict[str, np.ndarray], about: dict[str, Any]) -> Traject
         **{name: arrays[name] for name in _SAMPLES},
         power=group("power/"),
         ledger=Ledger(arrays["kinetic"], arrays["potential"], group("work/")),
-        **{name: arrays.get(name) for name in _OPTIONAL},
+        wanted=arrays.get("wanted"),
+        deviation=arrays.get("deviation"),
+        at_stop=arrays.get("at_stop"),
         wrenches=group("wrench/"),
         outcome=Outcome(Ending(outcome["ending"]), outcome["t"], outcome["advice"]),
         statistics=Statistics(**about["statistics"]),
         error=error,
         about=about["about"],
     )
-
-
-def _write(path: Path, write: Any) -> None:
-    """Write beside the target and rename: a reader sees the old file or the new one, never half of it."""
-    try:
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        try:
-            with os.fdopen(handle, "wb") as stream:
-                write(stream)
-            os.replace(name, path)
-        except BaseException:
-            Path(name).unlink(missing_ok=True)
-            raise
-    except OSError as error:
-        raise RunFileError(
-            f"{path}: cannot be written ({error.strerror}); give a path in a folder that is writable"
-        ) from None

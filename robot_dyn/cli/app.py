@@ -1,0 +1,66 @@
+"""The application: what all commands share, their options and the ways they print."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from typing import Annotated, Any
+
+import typer
+
+app = typer.Typer(
+    name="robot-dyn",
+    help="Dynamics of robot arms from a URDF: M(q) a + C(q, v) v + N(t, q, v) = τ.",
+    no_args_is_help=True,
+    add_completion=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+Name = Annotated[str, typer.Argument(metavar="ROBOT", help="A name of `robot-dyn list`, or the path of a URDF file.")]
+Lock = Annotated[
+    list[str] | None, typer.Option(metavar="JOINT=VALUE", help="Hold a joint at a value; may be repeated.")
+]
+PackageDir = Annotated[
+    list[str] | None, typer.Option(help="Folder in which ROS packages are searched; may be repeated.")
+]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON, as documented in docs/json.md.")]
+
+
+def say(renderables: Iterable[Any]) -> None:
+    """Print texts and tables."""
+    from rich.console import Console
+
+    watched = sys.stdout.isatty()
+    console = Console(highlight=False, markup=False, emoji=False, width=None if watched else 1000)  # a pipe has no edge
+    for each in renderables:
+        print(each) if isinstance(each, str) else console.print(each)
+
+
+def progress(items: Iterable[str], description: str) -> Iterator[str]:
+    """The items, with a bar on stderr while a person watches."""
+    from rich.console import Console
+    from rich.progress import track
+
+    items = list(items)
+    return iter(
+        track(items, description, console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty())
+    )
+
+
+@contextmanager
+def bar(duration_s: float) -> Iterator[Callable[[float], object]]:
+    """A progress bar on stderr while a person watches; what it gives is called with the time reached."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    with Progress(console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty()) as progress:
+        task = progress.add_task("simulating", total=duration_s)
+        yield lambda t: progress.update(task, completed=t)
+
+
+def print_json(value: Any) -> None:
+    """Print a document as JSON."""
+    print(json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False))

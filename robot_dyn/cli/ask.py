@@ -1,0 +1,87 @@
+"""Commands that ask a robot: list, info, query, compare."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+import robot_dyn as rd
+from robot_dyn.cli import arguments
+from robot_dyn.cli.app import Json, Lock, Name, PackageDir, app, print_json, progress, say
+from robot_dyn.errors import QueryError, RobotDynError
+
+
+@app.command("list")
+def list_(as_json: Json = False) -> None:
+    """List the robots that can be named."""
+    names = rd.list_robots()
+    print_json({"robots": names}) if as_json else print("\n".join(names))
+
+
+@app.command()
+def info(robot: Name, lock: Lock = None, package_dir: PackageDir = None, as_json: Json = False) -> None:
+    """Show a robot: joints, limits, friction, mass, and what is odd about it."""
+    from robot_dyn.cli import report
+
+    loaded = arguments.load(robot, lock, package_dir)
+    print_json(report.info(loaded)) if as_json else say(report.info_tables(loaded))
+
+
+@app.command()
+def query(
+    robot: Name,
+    q: Annotated[str | None, typer.Option(help="Positions: 0.1,-0.2,… or joint=0.1,…; 0 if not given.")] = None,
+    v: Annotated[str | None, typer.Option(help="Velocities, in the same form.")] = None,
+    a: Annotated[str | None, typer.Option(help="Accelerations: the torque is computed.")] = None,
+    tau: Annotated[str | None, typer.Option(help="Torques: the acceleration is computed.")] = None,
+    why: Annotated[
+        str | None, typer.Option(metavar="JOINT", help="Split this joint's torque by link and cause.")
+    ] = None,
+    effects: Annotated[str | None, typer.Option(help='"urdf" adds the friction that the file states.')] = None,
+    lock: Lock = None,
+    package_dir: PackageDir = None,
+    as_json: Json = False,
+) -> None:
+    """Ask for M, C, N at a state, and for the torque of an acceleration or the acceleration of a torque."""
+    from robot_dyn.cli import report
+
+    loaded = arguments.load(robot, lock, package_dir)
+    if a is not None and tau is not None:
+        raise QueryError("give --a or --tau, not both: one follows from the other")
+    state = {name: arguments.vector(f"--{name}", text, loaded.joint_names) for name, text in (("q", q), ("v", v))}
+    given = None if tau is None else arguments.vector("--tau", tau, loaded.joint_names)
+    answer = report.query(loaded, effects or "", **state, a=arguments.vector("--a", a, loaded.joint_names), tau=given)
+    if why is not None:
+        answer |= report.why(loaded, answer, why)
+    print_json(answer) if as_json else say(report.query_tables(answer))
+
+
+@app.command()
+def compare(
+    robots: Annotated[list[str] | None, typer.Argument(metavar="ROBOT...", help="Names or paths.")] = None,
+    every: Annotated[bool, typer.Option("--all", help="All robots of `robot-dyn list` that load.")] = False,
+    samples: Annotated[int, typer.Option(min=1, help="Random states for each robot.")] = 20,
+    seed: Annotated[int, typer.Option(help="Of the random states.")] = 0,
+    lock: Lock = None,
+    package_dir: PackageDir = None,
+    as_json: Json = False,
+) -> None:
+    """Cross-check Pinocchio against the library's own Lagrangian; exit code 1 if they disagree."""
+    from robot_dyn.cli import report
+
+    if bool(robots) == every:
+        raise QueryError("name the robots to compare, or give --all, not both")
+    results, refused = [], {}
+    for name in progress(rd.list_robots() if every else robots or (), "comparing"):
+        try:
+            results.append(
+                (name, rd.compare(arguments.load(name, lock, package_dir, quiet=every), samples=samples, seed=seed))
+            )
+        except RobotDynError as error:
+            if not every:
+                raise
+            refused[name] = str(error)
+    print_json(report.comparison(results, refused)) if as_json else say(report.comparison_tables(results, refused))
+    if not all(result.ok for _, result in results):
+        raise typer.Exit(1)

@@ -1,0 +1,102 @@
+"""Commands that show a run: replay, plot; and the demo."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import robot_dyn as rd
+from robot_dyn.cli.app import PackageDir, app, say
+from robot_dyn.errors import QueryError
+
+
+@app.command()
+def replay(
+    runs: Annotated[
+        list[str], typer.Argument(metavar="RUN.npz...", help="Run files; those after the first are drawn as ghosts.")
+    ],
+    html: Annotated[
+        str | None, typer.Option(metavar="OUT.html", help="Write one file that needs no server, and end.")
+    ] = None,
+    frame: Annotated[
+        str | None, typer.Option(metavar="LINK", help="Link whose path is drawn; the tip if none.")
+    ] = None,
+    inertia: Annotated[bool, typer.Option("--inertia", help="Draw each link's equivalent inertia box.")] = False,
+    port: Annotated[int | None, typer.Option(min=1, max=65535, help="Where to listen; a free one if none.")] = None,
+    browse: Annotated[bool, typer.Option("--open", help="Open the page in your browser.")] = False,
+    package_dir: PackageDir = None,
+) -> None:
+    """Replay runs in the browser, live on this machine until Ctrl-C, or as one HTML file."""
+    if html is not None and port is not None:
+        raise QueryError("give --html or --port, not both: a file needs no server")
+    trajectories = [rd.load_run(path) for path in runs]
+    options = {"frame": frame, "inertia": inertia, "package_dirs": package_dir or ()}
+    if html is not None:
+        file = rd.save_replay(trajectories[0], html, *trajectories[1:], **options)
+        print(f"written: {file} ({file.stat().st_size / 1e6:.1f} MB)")
+        _open(file.absolute().as_uri(), browse)
+        return
+    with rd.replay(*trajectories, port=port, **options) as server:
+        print(f"{server.url} shows the run; Ctrl-C ends it", flush=True)
+        _open(server.url, browse)
+        server.wait()
+
+
+@app.command()
+def plot(
+    run: Annotated[str, typer.Argument(metavar="RUN.npz", help="A run file, as `robot-dyn simulate … -o` writes.")],
+    output: Annotated[
+        str | None, typer.Option("-o", "--output", metavar="PLOT.png", help="A .png, .svg or .pdf; RUN.png if none.")
+    ] = None,
+    only: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--show",
+            metavar="NAME",
+            help="joints, torques, energy, tracking, phase or error_growth; may be repeated; all that apply if none.",
+        ),
+    ] = None,
+    joint: Annotated[list[str] | None, typer.Option(metavar="JOINT", help="Show this joint; may be repeated.")] = None,
+    dark: Annotated[bool, typer.Option("--dark", help="For dark screens.")] = False,
+) -> None:
+    """Draw a run: joints, torques against limits, energy ledger, tracking error, phase portrait, error."""
+    path = output or Path(run).with_suffix(".png")
+    theme = "dark" if dark else "light"
+    file = rd.save_plot(rd.load_run(run), path, *(only or ()), only=joint or None, theme=theme)
+    print(f"written: {file}")
+
+
+@app.command()
+def demo(
+    output: Annotated[str, typer.Option("-o", "--output", metavar="FOLDER", help="Where its files go.")] = "demo",
+) -> None:
+    """Load a real arm, cross-check the two roads, simulate it, and write a replay and a plot of the run."""
+    from robot_dyn.cli import report
+    from robot_dyn.scene.starters import starter
+
+    panda = rd.load("panda").with_(lock={"panda_finger_joint1": 0.0})
+    say(report.demo_tables(panda))
+    folder = Path(output)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "panda.toml").write_text(starter("panda_computed_torque"), encoding="utf-8")
+    except OSError as error:
+        raise QueryError(f"--output {output}: {error.strerror}; name a folder that can be written") from None
+    print("\nThe same arm under computed torque, its model 20 % too heavy\n")
+    run = rd.simulate(rd.read_scene(folder / "panda.toml"))
+    print(run.summary)
+    print(f"""
+Now look:
+  {rd.save_replay(run, folder / "panda.html")}  the replay: open it in a browser
+  {rd.save_plot(run, folder / "panda.png")}   its plots
+  {rd.save_run(run, folder / "panda.npz")}   the run itself
+  {folder / "panda.toml"}  its scene: change it, then robot-dyn simulate {folder / "panda.toml"}""")
+
+
+def _open(address: str, wanted: bool) -> None:
+    if wanted:
+        import webbrowser
+
+        webbrowser.open(address)

@@ -1,0 +1,61 @@
+"""Inertia made visible: the box, or the ellipsoid, that moves as a body does.
+
+    l_x² = 6 (I_y + I_z − I_x) / m        the uniform box of mass m with principal moments I
+
+[the moments of `robot_dyn.model.solids.box`, solved for its edges]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pinocchio as pin  # pyright: ignore[reportMissingImports]
+from numpy import ndarray
+
+from robot_dyn.model.inertia import implausibility
+from robot_dyn.model.robot import Robot
+from robot_dyn.spatial import homogeneous
+from robot_dyn.view.shapes import box, ellipsoid
+from robot_dyn.view.triangles import Mesh
+
+_THIN = 1e-3  # of the longest edge: what an edge of length 0 is drawn with
+_SMALL = 0.01  # [m], edge drawn for a mass in one point
+
+
+def inertia_boxes(robot: Robot) -> Iterator[tuple[str, ndarray, Mesh, str | None]]:
+    """For each body that moves and has mass: its link, pose there (4, 4), uniform box, and what is bent to draw it.
+
+    The bodies are those of the dynamics: with payloads, and with all links fixed to them. Moments that no body has
+    would need an edge of negative square; that edge is drawn thin.
+    """
+    for frame in robot.model.frames:
+        joint = frame.parentJoint
+        if frame.type != pin.FrameType.BODY or not joint or not frame.placement.isIdentity(0):
+            continue  # the base, or fixed to a link that has its mass
+        body = robot.model.inertias[joint]
+        if body.mass > 0:
+            edges, axes = _lengths(body.mass, body.inertia, 6.0)
+            bent = implausibility(body.mass, body.lever, body.inertia)
+            yield frame.name, homogeneous(axes, np.array(body.lever)), box(*edges), bent
+
+
+def off_centre(mesh: Mesh, pose: ndarray, com: ndarray) -> float:
+    """Distance in [m] of the middle of a mesh, placed by a pose (4, 4), from a centre of mass."""
+    middle = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
+    return float(np.linalg.norm(pose[:3, :3] @ middle + pose[:3, 3] - com))
+
+
+def inertia_ellipsoid(mass: float, inertia: ndarray) -> tuple[Mesh, ndarray]:
+    """The uniform ellipsoid of a mass and an inertia about its centre, a² = 5 (I_y + I_z − I_x) / (2 m); its axes."""
+    lengths, axes = _lengths(mass, inertia, 2.5)
+    return ellipsoid(*np.maximum(lengths, 0.02 * lengths.max())), axes
+
+
+def _lengths(mass: float, inertia: ndarray, factor: float) -> tuple[ndarray, ndarray]:
+    """√(factor (I_y + I_z − I_x) / m) along the principal axes, and these axes as the columns of a rotation."""
+    moments, axes = np.linalg.eigh(inertia)
+    axes = axes * np.sign(np.linalg.det(axes))
+    squares = factor * (moments.sum() - 2 * moments) / mass
+    lengths = np.sqrt(np.maximum(squares, 0.0))
+    return np.maximum(lengths, _THIN * lengths.max() or _SMALL), axes

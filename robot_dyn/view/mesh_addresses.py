@@ -1,0 +1,37 @@
+"""Where the addresses of meshes in a URDF point: package://, file://, or a path from the URDF's folder."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+from itertools import islice
+from pathlib import Path
+from urllib.parse import unquote
+
+from robot_dyn.errors import CatalogError, shorten
+from robot_dyn.model import catalog
+from robot_dyn.view.meshes import MeshError
+
+
+def find_file(address: str | None, source: Path, package_dirs: tuple[str | Path, ...]) -> Path:
+    """The file of an address that stands in the URDF `source`; whether it exists is for its reader to say.
+
+    Raises:
+        MeshError: If the address names none.
+    """
+    address = (address or "").strip()
+    kind = address.partition("://")[0] if "://" in address else ""
+    if not address or kind not in ("", "file", "package"):
+        raise MeshError(f"the address {shorten(address)!r} names no file on this machine; write the file's")
+    if kind != "package":
+        return source.absolute().parent / (unquote(address.removeprefix("file://")) if kind else address)
+    for folders in (package_dirs, _installed()):
+        with suppress(CatalogError, OSError, ValueError):
+            return catalog.resolve(address, source, folders).resolve()
+    raise MeshError(f"no file for {address}; name the folder of the package in package_dirs or ROS_PACKAGE_PATH")
+
+
+def _installed() -> Iterator[Path]:
+    """The folder of the installed package example-robot-data, for runs that were made where it lies elsewhere."""
+    parents = (folder for name in catalog.list_robots() for folder in catalog.find(name).parents)
+    return islice((folder.parent for folder in parents if folder.name == "example-robot-data"), 1)

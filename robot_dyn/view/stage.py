@@ -1,0 +1,132 @@
+"""The stage: a robot as a tree of nodes, one a joint, each moved by its own track: g_parent,i(q) = gᵢ exp(ξ̂ᵢ qᵢ).
+
+A node turns or slides in its parent, as in the product of exponentials, so that what the viewer draws between two
+keyframes is the arm at the q between them. [Murray, Li, Sastry 1994, ch. 3 §2]
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import final
+
+import numpy as np
+
+from robot_dyn.errors import QueryError, nearest
+from robot_dyn.lagrange.linkage import BASE, Body, Linkage, Pose
+from robot_dyn.lagrange.manipulator import Lagrangian
+from robot_dyn.model.robot import Robot
+from robot_dyn.spatial import homogeneous
+from robot_dyn.view import commands
+from robot_dyn.view.commands import Command
+from robot_dyn.view.keyframes import Keyframes
+from robot_dyn.view.visuals import Piece
+
+_GHOST = 0.35  # opacity
+
+
+@final
+@dataclass(frozen=True)
+class Stage:
+    """Where the parts of a robot stand in the viewer's tree.
+
+    Attributes:
+        root: Path of the robot.
+        robot: What is shown.
+    """
+
+    root: str
+    robot: Robot
+
+    @cached_property
+    def linkage(self) -> Linkage:
+        """The own road's kinematics; no line of it is Pinocchio's."""
+        return Lagrangian(self.robot).linkage
+
+    @cached_property
+    def paths(self) -> tuple[str, ...]:
+        """Path of each moving body's node."""
+        paths: list[str] = []
+        for index, body in enumerate(self.linkage.bodies):
+            parent = self.root if body.parent == BASE else paths[body.parent]
+            paths.append(f"{parent}/{index} {_plain(body.joint)}")
+        return tuple(paths)
+
+    def link_path(self, link: str) -> str:
+        """Path of a link's node; QueryError if there is no such link."""
+        if link not in self.linkage.links:
+            raise QueryError(f"no link {link!r}; {nearest(link, self.linkage.links)}")
+        body, _, _ = self.linkage.links[link]
+        return f"{self.root if body == BASE else self.paths[body]}/link {_plain(link)}"
+
+    def draw(self, pieces: tuple[Piece, ...], ghost: bool = False) -> list[Command]:
+        """The commands that put links and their pieces in place; a ghost is clear."""
+        found = [
+            commands.set_transform(self.link_path(link), homogeneous(pose.R, pose.p))
+            for link, (_, pose, _) in self.linkage.links.items()
+        ]
+        meshes = {id(piece.mesh): commands.triangles(piece.mesh) for piece in pieces}
+        for number, piece in enumerate(pieces):
+            path = f"{self.link_path(piece.link)}/{number}"
+            rgba = (*piece.rgba[:3], piece.rgba[3] * (_GHOST if ghost else 1.0))
+            look = commands.material(rgba, vertex_colors=piece.mesh.colors is not None)
+            if piece.image is not None:
+                look["image"] = piece.image
+            found.append(commands.set_object(path, meshes[id(piece.mesh)], look))
+            found.append(commands.set_transform(path, piece.pose))
+        return found
+
+    def tracks(self, keys: Keyframes) -> dict[str, list[Command]]:
+        """The track of each joint, by path; and its place at the first keyframe."""
+        return {
+            path: _tracks(body, keys.t, keys.q[:, index])
+            for index, (path, body) in enumerate(zip(self.paths, self.linkage.bodies, strict=True))
+        }
+
+    @cached_property
+    def tip(self) -> str:
+        """The link at the end of the longest chain of joints, and of those the farthest from its joint."""
+
+        def reach(link: str) -> tuple[int, float]:
+            body, pose, _ = self.linkage.links[link]
+            return (len(self.linkage.bodies[body].path) if body != BASE else 0), float(np.linalg.norm(pose.p))
+
+        return max(self.linkage.links, key=reach)
+
+
+def _tracks(body: Body, t: np.ndarray, q: np.ndarray) -> list[Command]:
+    """Placement g exp(ξ̂ q) of a joint's node at keyframes."""
+    if body.revolute:
+        half = q[:, None] / 2
+        turns = _product(_quaternion(body.pose.R), np.hstack([np.sin(half) * body.axis, np.cos(half)]))
+        still = commands.track("position", "vector", t[:1], body.pose.p)
+        return [still, commands.track("quaternion", "quaternion", t, turns)]
+    slides = body.pose.p + q[:, None] * (body.pose.R @ body.axis)
+    still = commands.track("quaternion", "quaternion", t[:1], _quaternion(body.pose.R))
+    return [still, commands.track("position", "vector", t, slides)]
+
+
+def placement(at: list[tuple[np.ndarray, np.ndarray]], body: int, pose: Pose) -> tuple[np.ndarray, np.ndarray]:
+    """(R, p) in the base of a pose in a body, from those of all bodies."""
+    if body == BASE:
+        return pose.R, pose.p
+    R, p = at[body]
+    return R @ pose.R, R @ pose.p + p
+
+
+def _quaternion(R: np.ndarray) -> np.ndarray:
+    """Unit quaternion (x, y, z, w) of a rotation."""
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_matrix(R).as_quat()
+
+
+def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Product a b of quaternions (x, y, z, w), a (4,) and b (k, 4)."""
+    vector = a[3] * b[:, :3] + b[:, 3:] * a[:3] + np.cross(a[:3], b[:, :3])
+    return np.hstack([vector, a[3] * b[:, 3:] - (b[:, :3] @ a[:3])[:, None]])
+
+
+def _plain(name: str) -> str:
+    """A name as one part of a path, which the viewer cuts at slashes."""
+    return name.replace("/", "∕")

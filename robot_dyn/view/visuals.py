@@ -1,0 +1,235 @@
+"""What a robot looks like: every <visual> of its URDF as pieces of triangles fastened to links.
+
+A piece stands at g_link · pose. What cannot be drawn as described is said in a note, with what is drawn instead: the
+link's collision shape, or else the ellipsoid of its inertia.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cache, partial
+from pathlib import Path
+from typing import Any, final
+
+import numpy as np
+from numpy import ndarray
+
+from robot_dyn.errors import shorten
+from robot_dyn.model.description import parse
+from robot_dyn.model.robot import Robot
+from robot_dyn.spatial import homogeneous, rotation_rpy
+from robot_dyn.view import meshes
+from robot_dyn.view.inertia_boxes import inertia_boxes, inertia_ellipsoid, off_centre
+from robot_dyn.view.mesh_addresses import find_file
+from robot_dyn.view.meshes import WHITE, MeshError, Part, Rgba
+from robot_dyn.view.shapes import PRIMITIVES
+from robot_dyn.view.triangles import Mesh
+
+GREY: Rgba = (0.7, 0.7, 0.7, 1.0)  # of what has no material; rviz takes red
+_STAND_IN: Rgba = (0.9, 0.6, 0.3, 1.0)  # of what is drawn in place of a visual
+_INERTIA: Rgba = (0.2, 0.4, 1.0, 0.35)
+_LARGEST = 1e6  # [m], of a length or a position
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """One mesh with one material, fastened to a link.
+
+    Attributes:
+        link: Name of the link.
+        pose: Placement in the link's frame, shape (4, 4), rotation and translation; scales are in the vertices.
+        mesh: Its triangles; pieces of the same file and scale share the object.
+        rgba: Red, green, blue and opacity, 0 … 1; times the texture, a PNG, if there is one.
+    """
+
+    link: str
+    pose: ndarray
+    mesh: Mesh
+    rgba: Rgba
+    image: bytes | None = None
+
+
+@final
+@dataclass(frozen=True)
+class Drawing:
+    """The look of a robot: pieces, and notes on what could not be drawn as described, in words."""
+
+    pieces: tuple[Piece, ...]
+    notes: tuple[str, ...]
+
+
+def drawing(robot: Robot, package_dirs: Iterable[str | Path] = (), *, inertia: bool = False) -> Drawing:
+    """The pieces of every visual of a robot, wherever its mesh files can be found.
+
+    Args:
+        robot: The robot; its edits do not change its look.
+        package_dirs: Searched first; then folders above the file, ROS_PACKAGE_PATH, the installed example-robot-data.
+        inertia: Also draw the uniform box with the mass and moments of each body that moves, payloads included.
+
+    Returns:
+        Pieces and notes; a mesh that is missing or damaged is noted and replaced, not raised.
+    """
+    artist = _Artist(robot, package_dirs)
+    pieces = artist.robot_pieces()
+    if artist.turn_up():
+        pieces = artist.robot_pieces()
+    if inertia:
+        for link, pose, mesh, bent in inertia_boxes(robot):
+            pieces.append(Piece(link, pose, mesh, _INERTIA))
+            if bent:
+                artist.notes.append(f"inertia box of link {link!r}: {bent}; drawn thin; correct its <inertia>")
+    return Drawing(tuple(pieces), tuple(dict.fromkeys(artist.notes)))
+
+
+class _Artist:
+    """Draws one robot; remembers its meshes, its named materials and its notes."""
+
+    def __init__(self, robot: Robot, package_dirs: Iterable[str | Path]) -> None:
+        self.name, self.source = robot.name, Path(robot.description.source)
+        self.element = parse(robot.description.text, robot.description.source)
+        self.checked = {link.get("name"): link for link in robot.description.element.iterfind("link")}
+        self.file = partial(find_file, source=self.source, package_dirs=tuple(package_dirs))
+        self.notes = list[str]()
+        self._turn, self._y_up = np.eye(4), []  # of what says that y is up: link, pose and mesh
+        self._read = cache(meshes.read)  # so that pieces of one file share their meshes
+        self._primitive = cache(lambda tag, lengths: PRIMITIVES[tag][0](*lengths))
+        self._texture = cache(lambda path: meshes.png(meshes.bounded(path)))
+        # As in urdfdom: a name means its first definition, those of the top level before those of the links.
+        self._materials: dict[str, Any] = {}
+        for material in (*self.element.iterfind("material"), *self.element.iterfind("link/visual/material")):
+            if (name := material.get("name")) and len(material):
+                self._materials.setdefault(name, material)
+
+    def robot_pieces(self) -> list[Piece]:
+        links = [((link.get("name") or "").strip(), link) for link in self.element.iterfind("link")]
+        if self.element.find("link/visual") is not None:
+            return [piece for name, link in links for piece in self.visuals(name, link)]
+        pieces = [piece for name, link in links for piece in self.stand_in(name, link)[0]]
+        what = "its collision shapes and inertia ellipsoids are drawn; add <visual> elements to see more"
+        self.notes.append(f"{self.name}: no link has a <visual>; {what}")
+        return pieces
+
+    def turn_up(self) -> bool:
+        """Turn the meshes that say "y is up", as Gazebo does and rviz does not, if they then stand nearer to masses."""
+        turn = homogeneous(np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]), np.zeros(3))
+        raw = turned = 0.0
+        for name, pose, mesh in self._y_up:
+            for origin in self.checked[name].iterfind("inertial/origin"):
+                com = np.array(origin.get("xyz").split(), dtype=float)  # checked by the hardened read
+                raw += off_centre(mesh, pose, com)
+                turned += off_centre(mesh, pose @ turn, com)
+        if not turned < 0.6 * raw:
+            return False
+        self._turn = turn
+        why = "turned to z up, as in Gazebo: raw, as in rviz, they stand away from the masses of their links"
+        self.notes.append(f"{self.name}: its Collada meshes with <up_axis> Y_UP are {why}")
+        return True
+
+    def visuals(self, name: str, link: Any) -> Iterator[Piece]:
+        failed = []
+        for visual in link.iterfind("visual"):
+            try:
+                yield from self.shape(name, visual, f"link {name!r}")
+            except MeshError as error:
+                failed.append(str(error))
+        if failed:
+            pieces, what = self.stand_in(name, link)
+            yield from pieces
+            self.notes += [f"link {name!r}: {why}; {what} drawn in its place" for why in failed]
+
+    def stand_in(self, name: str, link: Any) -> tuple[list[Piece], str]:
+        """The collision shapes of a link that can be read; else the ellipsoid of its inertia; and which of them."""
+        pieces = []
+        for collision in link.iterfind("collision"):
+            try:
+                pieces += self.shape(name, collision, f"collision shape of link {name!r}", _STAND_IN)
+            except MeshError as error:
+                if link.find("visual") is None:  # else the note on the visual stands for both
+                    self.notes.append(f"collision shape of link {name!r}: {error}")
+        if pieces:
+            return pieces, "the collision shape is"
+        inertial = self.checked[name].find("inertial")
+        if inertial is None or not (mass := float(inertial.find("mass").get("value"))):
+            return [], "the link has no collision shape and no mass, so nothing is"
+        moment = {key: float(value) for key, value in inertial.find("inertia").items()}
+        inertia = np.array([[moment[f"i{min(i, j)}{max(i, j)}"] for j in "xyz"] for i in "xyz"])
+        mesh, axes = inertia_ellipsoid(mass, inertia)
+        pose = self.pose(inertial, f"inertia of link {name!r}") @ homogeneous(axes, np.zeros(3))
+        return [Piece(name, pose, mesh, _STAND_IN)], "the ellipsoid of its inertia is"
+
+    def shape(self, name: str, element: Any, where: str, color: Rgba | None = None) -> list[Piece]:
+        """The pieces of a <visual> or <collision>."""
+        pose, (own, texture) = self.pose(element, where), self.material(element, where)
+        geometry = element.find("geometry")
+        if geometry is None or not len(geometry):
+            raise MeshError("<geometry> is empty; name a box, cylinder, sphere or mesh")
+        parts = self.parts(geometry[0])
+        if any(part.y_up for part in parts):
+            self._y_up += [(name, pose, part.mesh) for part in parts]
+            pose = pose @ self._turn
+        # As in rviz: a material of the mesh file wins over that of the URDF. [robot_link.cpp]
+        return [
+            Piece(name, pose, part.mesh, color or own or GREY, texture if part.mesh.uv is not None else None)
+            if part.rgba is None
+            else Piece(name, pose, part.mesh, part.rgba, part.image)
+            for part in parts
+        ]
+
+    def parts(self, shape: Any) -> tuple[Part, ...]:
+        if shape.tag == "mesh":
+            return self.mesh(shape)
+        if shape.tag not in PRIMITIVES:
+            raise MeshError(f"<{shorten(shape.tag)}> is no shape of URDF; name a box, cylinder, sphere or mesh")
+        lengths = tuple(x for key, count in PRIMITIVES[shape.tag][1].items() for x in _numbers(shape, key, count))
+        if min(lengths) <= 0:
+            raise MeshError(f"<{shape.tag}> has a length that is not positive; correct it")
+        return (Part(self._primitive(shape.tag, lengths)),)
+
+    def mesh(self, element: Any) -> tuple[Part, ...]:
+        path, scale = self.file(element.get("filename")), _numbers(element, "scale", 3, "1 1 1")
+        try:
+            parts, complaints = self._read(path, scale)
+        except MeshError as error:
+            raise MeshError(f"mesh {path}: {error}") from None
+        self.notes += [f"mesh {path}: {complaint}; drawn without it" for complaint in complaints]
+        return parts
+
+    def pose(self, element: Any, where: str) -> ndarray:
+        try:
+            for origin in element.iterfind("origin"):
+                rpy, xyz = (np.array(_numbers(origin, key, 3, "0 0 0")) for key in ("rpy", "xyz"))
+                return homogeneous(rotation_rpy(rpy), xyz)
+        except MeshError as error:
+            self.notes.append(f"{where}: {error}; drawn at the origin of the link")
+        return np.eye(4)
+
+    def material(self, element: Any, where: str) -> tuple[Rgba | None, bytes | None]:
+        """Colour and texture that a visual names, or None."""
+        material = element.find("material")
+        if material is None:
+            return None, None
+        material = self._materials.get(material.get("name") or "", material)
+        color, texture = material.find("color"), material.find("texture")
+        address = None if texture is None else texture.get("filename")
+        try:
+            if address:
+                return WHITE, self._texture(self.file(address))
+            if color is not None:
+                r, g, b, a = (min(max(x, 0.0), 1.0) for x in _numbers(color, "rgba", 4))
+                return (r, g, b, a), None
+        except MeshError as error:
+            what = f"texture {shorten(address)}" if address else "material"
+            self.notes.append(f"{where}: {what}: {error}; drawn without it")
+        return None, None
+
+
+def _numbers(element: Any, key: str, count: int, default: str = "") -> tuple[float, ...]:
+    text, values = element.get(key, default), ()
+    with suppress(ValueError):
+        values = tuple(map(float, text.split()))
+    if len(values) != count or not np.all(np.abs(values) <= _LARGEST):
+        raise MeshError(f"<{element.tag}> {key} must be {count} finite numbers, got {shorten(text)!r}; correct it")
+    return values

@@ -1,0 +1,143 @@
+// The replay page: one clock t moves the slider, the robot (meshcat's animator) and the marks of the plots (uPlot).
+"use strict";
+
+// A document with arrays: gzip of (length of head, head as JSON, arrays); {"$array", offset, length} stands for one.
+async function unpack(text) {
+  const packed = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+  const buffer = await new Response(stream).arrayBuffer();
+  const length = Number(new DataView(buffer).getBigUint64(0, true));
+  const types = { Int8Array, Uint8Array, Uint16Array, Uint32Array, Float32Array, Float64Array };
+  return JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 8, length)), (_, value) =>
+    value && value.$array ? new types[value.$array](buffer, 8 + length + value.offset, value.length) : value);
+}
+
+const element = (id) => document.getElementById(id);
+const ink = () => getComputedStyle(document.body).color;
+const gaps = (values) => Array.from(values, (value) => (Number.isNaN(value) ? null : value));  // as uPlot marks them
+const COLORS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#8c6d31", "#7f7f7f"];
+const DASHES = [[], [6, 3], [2, 3], [8, 3, 2, 3]];
+
+function makePlot(plot, seek) {
+  const box = document.createElement("section");
+  box.className = "plot";
+  const heading = document.createElement("h2");
+  heading.textContent = plot.title;
+  box.append(heading);
+  element("plots").append(box);
+  const axis = { stroke: ink, grid: { stroke: "#8884" }, ticks: { stroke: "#8884" }, font: "12px system-ui, sans-serif" };
+  const number = (value) => (value == null ? "–" : Number(value).toPrecision(4));
+  const series = plot.series.map((each) => ({
+    label: each.label, width: 1.5, points: { show: false }, value: (_, y) => number(y),
+    stroke: COLORS[each.color % COLORS.length], dash: each.ghost ? [4, 4] : DASHES[(each.color / COLORS.length | 0) % 4],
+    alpha: each.ghost ? 0.7 : 1,
+  }));
+  const figure = new uPlot({
+    width: box.clientWidth || 460, height: 230, legend: { live: true },
+    scales: { x: { time: false } },
+    axes: [{ ...axis, label: "t [s]", labelSize: 18 }, { ...axis, label: plot.unit, labelSize: 18, size: 64 }],
+    series: [{ label: "t", value: (_, t) => (t == null ? "–" : t.toFixed(3) + " s") }, ...series],
+  }, [plot.t, ...plot.series.map((each) => gaps(each.values))], box);
+  const mark = document.createElement("div");
+  mark.className = "mark";
+  figure.over.append(mark);
+  figure.over.addEventListener("click", (event) => seek(figure.posToVal(event.offsetX, "x")));
+  new ResizeObserver(() => figure.setSize({ width: box.clientWidth, height: 230 })).observe(box);
+  return (t) => {
+    mark.style.left = figure.valToPos(t, "x") + "px";
+    mark.dataset.t = t;
+    if (!figure.over.matches(":hover")) figure.setLegend({ idx: figure.valToIdx(t) });
+  };
+}
+
+function makeViewer(scene) {
+  const viewer = new MeshCat.Viewer(element("view"));
+  const fit = () => viewer.set_3d_pane_size(element("stage").clientWidth, element("stage").clientHeight);
+  new ResizeObserver(fit).observe(element("stage"));
+  window.addEventListener("load", fit);  // after meshcat's own, which takes the window's height
+  window.addEventListener("resize", fit);
+  requestAnimationFrame(() => requestAnimationFrame(fit));
+  const [x, y, z] = scene.center, away = scene.radius;  // the camera's frame has y up
+  viewer.camera.position.set(x + 0.9 * away, z + 0.5 * away, -y + 0.9 * away);
+  viewer.controls.target.set(x, z, -y);
+  viewer.camera.near = away / 100;
+  viewer.camera.far = 100 * away;
+  viewer.set_property(["Background"], "top_color", [0.96, 0.97, 0.98]);
+  viewer.set_property(["Background"], "bottom_color", [0.82, 0.85, 0.88]);
+  viewer.set_property(["Axes"], "visible", false);
+  viewer.set_property(["Grid"], "visible", false);  // the scene brings its own
+  viewer.scene_tree.find(["Background"]).on_update();
+  return viewer;
+}
+
+function makeClock(duration, show) {
+  let t = 0, playing = false, last = 0;
+  const slider = element("time"), button = element("play");
+  slider.max = duration;
+  slider.disabled = button.disabled = !(duration > 0);
+  const seek = (to) => {
+    t = Math.min(Math.max(to, 0), duration);
+    slider.value = t;
+    element("now").textContent = `${t.toFixed(3)} / ${duration.toFixed(3)} s`;
+    show(t);
+  };
+  const play = (on) => {
+    if (on && t >= duration) seek(0);
+    playing = on && duration > 0;
+    button.textContent = playing ? "❚❚" : "▶";
+    last = performance.now();
+  };
+  const step = (now) => {
+    if (playing) {
+      seek(t + (now - last) / 1000 * Number(element("speed").value));
+      if (t >= duration) play(false);
+    }
+    last = now;
+    requestAnimationFrame(step);
+  };
+  requestAnimationFrame(step);
+  slider.addEventListener("input", () => { play(false); seek(Number(slider.value)); });
+  button.addEventListener("click", () => play(!playing));
+  document.addEventListener("keydown", (event) => {
+    if (event.code !== "Space" || event.target.closest("input, select, button")) return;
+    event.preventDefault();
+    play(!playing);
+  });
+  return { seek, play, get time() { return t; }, get playing() { return playing; }, duration };
+}
+
+async function main() {
+  const data = await unpack(JSON.parse(element("data").textContent));
+  element("title").textContent = data.title;
+  element("outcome").textContent = data.outcome;
+  for (const note of data.notes) {
+    const item = document.createElement("li");
+    item.textContent = note;
+    element("notes").append(item);
+  }
+  const viewer = window.viewer = makeViewer(data.scene);
+  if (data.live) viewer.connect(); else data.commands.forEach((command) => viewer.handle_command(command));
+  const marks = [];
+  let loaded = null;
+  const show = (t) => {
+    viewer.animator.pause();
+    viewer.animator.seek(t);
+    viewer.animator.display_progress(t);
+    marks.forEach((mark) => mark(t));
+  };
+  const clock = window.replay = makeClock(data.duration, show);
+  marks.push(...data.plots.map((plot) => makePlot(plot, (t) => { clock.play(false); clock.seek(t); })));
+  clock.seek(0);
+  const follow = () => {  // meshcat's own panel may move the time, and over a socket the animation comes when it comes
+    const { actions, time } = viewer.animator;
+    if (actions[0] !== loaded) { loaded = actions[0]; clock.seek(clock.time); }
+    else if (actions.length && !clock.playing && time !== clock.time) clock.seek(time);
+    requestAnimationFrame(follow);
+  };
+  requestAnimationFrame(follow);
+}
+
+main().catch((error) => {
+  element("outcome").textContent = `This page cannot be shown: ${error.message}. It needs a browser of 2023 or later.`;
+  throw error;
+});

@@ -1,0 +1,114 @@
+"""A real browser for the pages: Debian's Chromium, driven by Playwright."""
+
+from __future__ import annotations
+
+import base64
+import io
+import os
+import shutil
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+# Root needs --no-sandbox; WebGL comes from software; the rest keeps Chromium from asking the network for itself.
+FLAGS = [
+    "--no-sandbox",
+    "--enable-unsafe-swiftshader",
+    "--use-angle=swiftshader",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+
+
+def chromium() -> str:
+    """Its path; without one tests skip, and fail where CI says so."""
+    if CHROMIUM is None:
+        if os.environ.get("CI") == "true":
+            pytest.fail("no Chromium on this machine; install it: apt-get install chromium")
+        pytest.skip("no Chromium on this machine")
+    return CHROMIUM
+
+
+@dataclass
+class View:
+    """A replay page in the browser."""
+
+    page: Any
+    complaints: list[str] = field(default_factory=list)
+    requests: list[str] = field(default_factory=list)
+
+    def ask(self, script: str) -> Any:
+        """The value of an expression in the page; `node(path)` is a node of the viewer's tree."""
+        return self.page.evaluate(f"() => {{ {_HELPERS} return {script}; }}")
+
+    def placement(self, path: str) -> np.ndarray:
+        """Homogeneous matrix (4, 4) of a node in the scene."""
+        return np.array(self.ask(f"matrix(node({path!r}))")).reshape(4, 4).T
+
+    def bounds(self, path: str) -> np.ndarray:
+        """Least and largest coordinates (2, 3) of all vertices below a node, in the scene."""
+        return np.array(self.ask(f"bounds(node({path!r}))"))
+
+    def picture(self) -> np.ndarray:
+        """What the canvas shows, (h, w, 3)."""
+        from PIL import Image
+
+        url = self.ask("viewer.capture_image()")
+        return np.asarray(Image.open(io.BytesIO(base64.b64decode(url.partition(",")[2]))).convert("RGB")).astype(int)
+
+
+@contextmanager
+def opened(browser: Any, url: str | Path, *, offline: bool = False) -> Iterator[View]:
+    """A page once its animation is loaded."""
+    context = browser.new_context(viewport={"width": 900, "height": 800}, offline=offline)
+    view = View(context.new_page())
+    view.page.on("console", lambda m: view.complaints.append(m.text) if m.type == "error" else None)
+    view.page.on("pageerror", lambda error: view.complaints.append(str(error)))
+    view.page.on("dialog", lambda dialog: (view.complaints.append(dialog.message), dialog.dismiss()))
+    view.page.on("request", lambda request: view.requests.append(request.url))
+    view.page.goto(url.absolute().as_uri() if isinstance(url, Path) else url)
+    until(lambda: view.ask("!!(window.replay && viewer.animator.actions.length)"), "the page did not load", view)
+    yield view
+    context.close()
+
+
+def until(condition: Any, what: str, view: View | None = None, seconds: float = 60.0) -> None:
+    """Wait for a condition."""
+    end = time.monotonic() + seconds
+    while not condition():
+        if time.monotonic() > end:
+            raise AssertionError(f"{what}; {view.complaints if view else ''}")
+        time.sleep(0.05)
+
+
+_HELPERS = """
+const node = (path) => {
+  let at = viewer.scene_tree;
+  for (const name of path.split('/')) if (!(at = at.children[name])) throw Error(`no ${name} of ${path}`);
+  return at.object;
+};
+const base = () => { viewer.scene.updateMatrixWorld(true); return viewer.scene.matrixWorld.clone().invert(); };
+const matrix = (object) => { const from = base(); return from.multiply(object.matrixWorld).toArray(); };
+const bounds = (object) => {
+  const from = base(), low = [1e9, 1e9, 1e9], high = [-1e9, -1e9, -1e9];
+  object.traverse((part) => {
+    if (!part.isMesh) return;
+    const place = from.clone().multiply(part.matrixWorld), points = part.geometry.attributes.position;
+    for (let i = 0; i < points.count; i++) {
+      const p = new MeshCat.THREE.Vector3().fromBufferAttribute(points, i).applyMatrix4(place);
+      p.toArray().forEach((x, k) => { low[k] = Math.min(low[k], x); high[k] = Math.max(high[k], x); });
+    }
+  });
+  return [low, high];
+};
+"""

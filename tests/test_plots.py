@@ -1,0 +1,287 @@
+"""Plots: what stands on the axes is what the run holds, under the joints' names and with units."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from time import perf_counter
+
+import numpy as np
+import pytest
+from matplotlib import rcParams
+from matplotlib.colors import to_rgb
+
+import robot_dyn as rd
+from robot_dyn.errors import QueryError
+from robot_dyn.simulation.ledger import Ledger
+from robot_dyn.simulation.trajectory import Ending, Outcome
+from robot_dyn.view.plots import MOST_JOINTS, PLOTS, PlotError, plot, save_plot
+
+
+@pytest.fixture(scope="module")
+def run():
+    """UR5 under PD, in general position."""
+    arm = rd.load("ur5")
+    q = np.array([0.1, -1.2, 1.8, -2.2, -1.5, 0.3])
+    plan = rd.quintic(q, q + np.array([0.3, -0.2, 0.1, 0.4, -0.3, 0.2]), 0.2)
+    kp, kd = rd.gains_from(np.diag(arm.M(q)), 20.0)
+    controller = rd.PD(plan, kp, kd)
+    return rd.simulate(rd.Plant(arm), q0=q, v0=0 * q, duration_s=0.3, controller=controller, step_s=0.005)
+
+
+@pytest.fixture(scope="module")
+def cart():
+    """A joint that slides and one that turns, without a reference."""
+    plant = rd.Plant(rd.load("cart_pole"), [rd.ViscousFriction(0.1)])
+    return rd.simulate(plant, q0=[0.1, 0.4], v0=[0.2, -0.3], duration_s=0.2, step_s=0.01)
+
+
+def cells(figure, symbol: str) -> list:
+    """The axes whose y axis begins with that symbol."""
+    return [axes for axes in figure.axes if axes.get_ylabel().startswith(f"{symbol} ")]
+
+
+def lines(axes, label: str) -> list:
+    return [line for line in axes.lines if line.get_label() == label]
+
+
+def stretched(run, m: int, **changes):
+    """The run with m samples of made-up, smooth motion, whose ledger does not matter."""
+    t = np.linspace(0.0, 5.0, m)
+    q = np.sin(t[:, None] * np.arange(1, len(run.joint_names) + 1))
+    zero = np.zeros(m)
+    made = {"t": t, "q": q, "v": q, "a": q, "tau": q, "wanted": None, "deviation": None, "error": None}
+    return replace(run, **(made | {"ledger": Ledger(zero, zero, {"control": zero})} | changes))
+
+
+def many(run, n: int, m: int = 50):
+    return stretched(replace(run, joint_names=tuple(f"joint_{i:02d}" for i in range(n)), about={}), m)
+
+
+def test_positions_and_velocities_are_the_runs(run) -> None:
+    figure = plot(run, "joints")
+    for symbol, values in (("q", run.q), ("v", run.v)):
+        for axes, column in zip(cells(figure, symbol), values.T, strict=True):
+            (line,) = lines(axes, "actual")
+            np.testing.assert_array_equal(line.get_xdata(), run.t)
+            np.testing.assert_array_equal(line.get_ydata(), column)
+    assert [axes.get_title(loc="left") for axes in cells(figure, "q")] == list(run.joint_names)
+
+
+def test_wanted_positions_are_dashed(run, cart) -> None:
+    for axes, column in zip(cells(plot(run, "joints"), "q"), run.wanted.T, strict=True):
+        (line,) = lines(axes, "wanted")
+        assert line.is_dashed()
+        np.testing.assert_array_equal(line.get_ydata(), column)
+    assert not any(lines(axes, "wanted") for axes in plot(cart, "joints").axes)
+
+
+def test_units_are_those_of_each_joint(run, cart) -> None:
+    """The URDF in the run tells which joint slides; a run without one leaves it open."""
+    figure = plot(cart)
+    assert [axes.get_ylabel() for axes in cells(figure, "q")] == ["q [m]", "q [rad]"]
+    assert [axes.get_ylabel() for axes in cells(figure, "τ")] == ["τ [N]", "τ [N m]"]
+    assert {axes.get_xlabel() for axes in cells(figure, "v")} >= {"t [s]", "q [m]", "q [rad]"}
+    assert "q [rad or m]" in {axes.get_ylabel() for axes in plot(replace(cart, about={})).axes}
+
+
+def test_every_axis_has_a_unit(run) -> None:
+    for axes in plot(run).axes:
+        assert "[" in axes.get_ylabel()
+        shares = not axes.get_xlabel()  # the axis below has the numbers and the unit
+        assert shares or "[" in axes.get_xlabel()
+
+
+def test_limits_are_drawn_at_plus_and_minus_the_limit(run) -> None:
+    limits = np.array([50.0, 60.0, np.inf, 20.0, 0.0, np.nan])  # 0 and nan: none is known
+    for axes, limit in zip(cells(plot(run, "torques", limits=limits), "τ"), limits, strict=True):
+        levels = [line.get_ydata()[0] for line in lines(axes, "_limit")]
+        assert levels == ([-limit, limit] if 0 < limit < np.inf else [])
+        assert all(line.is_dashed() for line in lines(axes, "_limit"))
+
+
+def test_limits_are_the_urdfs_unless_given(run) -> None:
+    drawn = [lines(axes, "_limit")[1].get_ydata()[0] for axes in cells(plot(run, "torques"), "τ")]
+    np.testing.assert_array_equal(drawn, rd.load("ur5").effort_limit)
+
+
+def test_a_far_limit_does_not_flatten_the_torque(run) -> None:
+    """Peak / limit decides: near limits are in sight, of far ones the title tells the part used."""
+    peak = np.abs(run.tau).max(axis=0)
+    near, far = (cells(plot(run, "torques", limits=factor * peak), "τ") for factor in (2.0, 100.0))
+    for axes, limit in zip(near, 2 * peak, strict=True):
+        assert axes.get_ylim()[0] < -limit and limit < axes.get_ylim()[1]
+        assert axes.get_title(loc="left").endswith("50% used")
+    assert all(axes.get_ylim()[1] < 10 * top for axes, top in zip(far, peak, strict=True))
+
+
+def test_the_energy_ledger_is_the_runs(cart) -> None:
+    stores, work, residual = plot(cart, "energy").axes
+    ledger = cart.ledger
+    np.testing.assert_array_equal(lines(stores, "K")[0].get_ydata(), ledger.kinetic)
+    np.testing.assert_array_equal(lines(stores, "E − E(0)")[0].get_ydata(), ledger.energy - ledger.energy[0])
+    for name, values in ledger.work.items():
+        np.testing.assert_array_equal(lines(work, f"W {name}")[0].get_ydata(), values)
+    assert residual.get_yscale() == "log"
+    drawn = residual.lines[0].get_ydata()
+    np.testing.assert_array_equal(drawn[drawn > 0], np.abs(ledger.residual)[ledger.residual != 0])
+
+
+def test_tracking_is_the_deviation_with_its_rms(run, cart) -> None:
+    figure = plot(run, "tracking")
+    for axes, column in zip(figure.axes, run.deviation.T, strict=True):
+        np.testing.assert_array_equal(axes.lines[0].get_ydata(), column)
+    assert any(f"rms {run.tracking_error:.2e} rad" in text.get_text() for text in figure.texts)
+    frame = plot(replace(run, wanted=None, deviation=run.deviation[:, :3]), "tracking")
+    assert [axes.get_title(loc="left") for axes in frame.axes] == ["frame, x", "frame, y", "frame, z"]
+    assert {axes.get_ylabel() for axes in frame.axes} == {"error [m]"}
+    with pytest.raises(PlotError, match="no reference"):
+        plot(cart, "tracking")
+
+
+def test_phase_is_velocity_over_position(cart) -> None:
+    for i, axes in enumerate(plot(cart, "phase").axes):
+        np.testing.assert_array_equal(
+            lines(axes, "path")[0].get_xydata(), np.column_stack([cart.q[:, i], cart.v[:, i]])
+        )
+
+
+def test_error_growth_is_veiled_where_it_is_not_resolved(run) -> None:
+    error = replace(run.error, resolved_until=0.1, note="not resolved")
+    (axes,) = plot(replace(run, error=error), "error_growth").axes
+    (veil,) = axes.patches
+    assert veil.get_x() == pytest.approx(0.1) and axes.get_yscale() == "log"
+    np.testing.assert_array_equal(axes.lines[0].get_xdata(), error.t)
+    assert not plot(replace(run, error=replace(error, resolved_until=0.3)), "error_growth").axes[0].patches
+    with pytest.raises(PlotError, match="no estimate"):
+        plot(replace(run, error=None), "error_growth")
+
+
+def test_plots_that_do_not_apply_are_left_out(cart) -> None:
+    headings = " ".join(text.get_text() for text in plot(replace(cart, error=None)).texts)
+    assert "Energy" in headings and "Tracking" not in headings and "Error of" not in headings
+
+
+def test_asked_joints_alone_are_shown(run) -> None:
+    figure = plot(run, "joints", "torques", "tracking", only=["elbow_joint"])
+    assert {axes.get_title(loc="left").split(",")[0] for axes in figure.axes} == {"elbow_joint", ""}
+    np.testing.assert_array_equal(figure.axes[0].lines[0].get_ydata(), run.q[:, 2])
+
+
+def test_unknown_names_are_refused_with_the_nearest(run) -> None:
+    for asked, advice in ((["torque"], "no plot 'torque'; nearest: torques"), (["x"], "known: joints, torques")):
+        with pytest.raises(QueryError, match=advice):
+            plot(run, *asked)
+    with pytest.raises(QueryError, match="no joint 'elbow'; nearest: elbow_joint"):
+        plot(run, only=["elbow"])
+    with pytest.raises(QueryError, match="no theme"):
+        plot(run, theme="blue")  # type: ignore[arg-type]
+    with pytest.raises(QueryError, match=r"limits must have shape \(6,\), got \(2,\)"):
+        plot(run, limits=np.ones(2))
+
+
+def test_names_are_drawn_letter_by_letter(run, tmp_path) -> None:
+    """No mathematics, no hidden labels, no letters that the font lacks; a long name keeps both its ends."""
+    names = (r"$\frac", "_first", "a_b^{c$x$", "関節", "arm_" + "x" * 200 + "_end", "per%cent #1")
+    sources = {r"_$\sum$": run.ledger.kinetic, "control": run.ledger.kinetic}
+    hostile = replace(run, joint_names=names, ledger=replace(run.ledger, work=sources), about={})
+    save_plot(hostile, tmp_path / "names.png", dpi=40)  # warnings are errors
+    titles = [axes.get_title(loc="left") for axes in cells(plot(hostile, "joints"), "q")]
+    assert titles[:3] == list(names[:3]) and titles[3] in ("関節", r"\u95a2\u7bc0") and titles[5] == names[5]
+    assert titles[4].startswith("arm_x") and titles[4].endswith("x_end") and "…" in titles[4]
+    legends = [
+        text.get_text()
+        for axes in plot(hostile, "energy").axes
+        if axes.get_legend()
+        for text in axes.get_legend().texts
+    ]
+    assert r"W _$\sum$" in legends
+
+
+@pytest.mark.parametrize(
+    "suffix, opening", [(".png", b"\x89PNG"), (".svg", b"<?xml"), (".PDF", b"%PDF"), ("", b"\x89PNG")]
+)
+def test_the_suffix_says_the_format(cart, tmp_path, suffix: str, opening: bytes) -> None:
+    path = save_plot(cart, tmp_path / f"plot{suffix}", "joints", dpi=40, theme="dark")
+    assert path.read_bytes().startswith(opening) and path.suffix == (suffix or ".png")
+
+
+def test_targets_that_cannot_be_written_are_refused(cart, tmp_path) -> None:
+    with pytest.raises(PlotError, match=r"'.jpeg' is no format.*\.png, \.svg, \.pdf"):
+        save_plot(cart, tmp_path / "plot.jpeg")
+    with pytest.raises(PlotError, match="is a folder"):
+        save_plot(cart, tmp_path)
+    with pytest.raises(PlotError, match="cannot be written"):
+        save_plot(cart, tmp_path / "no folder" / "plot.png", "joints", dpi=40)
+    with pytest.raises(PlotError, match="cannot be drawn at 50000 dpi"):
+        save_plot(cart, tmp_path / "plot.png", "joints", dpi=50_000)
+
+
+def test_a_run_without_samples_is_refused(cart) -> None:
+    with pytest.raises(PlotError, match="no samples"):
+        plot(replace(cart, t=cart.t[:0]))
+
+
+def test_a_run_of_one_sample_is_a_point(cart, tmp_path) -> None:
+    one = stretched(cart, 1)
+    save_plot(one, tmp_path / "one.png", dpi=40)
+    assert {line.get_marker() for axes in cells(plot(one, "joints"), "q") for line in axes.lines} == {"o"}
+
+
+def test_a_diverged_run_shows_how_it_began_and_how_it_ended(cart, tmp_path) -> None:
+    """What is not finite is left out, and the scale has room for 0.1 and 1e200."""
+    growth = np.exp(np.linspace(0, 460, 200))[:, None] * [0.1, -0.1]
+    growth[-3:] = [[np.nan], [np.inf], [np.nan]]
+    energy = Ledger(growth[:, 0], growth[:, 1], {"control": growth[:, 0]})
+    end = Outcome(Ending.DIVERGED, 5.0, "take a smaller step")
+    fast = {"q": growth, "v": growth, "tau": growth, "ledger": energy, "outcome": end}
+    run = stretched(cart, 200, **fast, deviation=growth, wanted=growth)
+    save_plot(run, tmp_path / "diverged.png", dpi=40)
+    figure = plot(run)
+    assert all(np.isfinite([*axes.get_xlim(), *axes.get_ylim()]).all() for axes in figure.axes)
+    assert {axes.get_yscale() for axes in cells(figure, "q")} == {"symlog"}
+    assert any("take a smaller step" in text.get_text() for text in figure.texts)
+    nothing = np.full((200, 2), np.nan)
+    save_plot(stretched(run, 200, q=nothing, v=nothing, tau=nothing), tmp_path / "nan.png", dpi=40)
+
+
+def test_thirty_joints_keep_their_names_and_do_not_overlap(run) -> None:
+    figure = plot(many(run, 30), "joints")
+    figure.draw_without_rendering()
+    assert [axes.get_title(loc="left") for axes in cells(figure, "q")] == [f"joint_{i:02d}" for i in range(30)]
+    boxes = [axes.get_window_extent() for axes in figure.axes]
+    assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
+    page = figure.bbox
+    assert all(page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 and box.y1 <= page.y1 for box in boxes)
+    with pytest.raises(PlotError, match=f"1 to {MOST_JOINTS}; name those to show"):
+        plot(many(run, MOST_JOINTS + 1), "joints")
+
+
+def test_a_long_run_is_thinned_and_keeps_its_peaks(run) -> None:
+    """Of 300 000 samples one is a peak, one a trough; all joints are drawn in seconds."""
+    long = stretched(run, 300_000)
+    tau = long.tau.copy()
+    tau[123_457], tau[222_223] = 50.0, -70.0
+    began = perf_counter()
+    figure = plot(replace(long, tau=tau))
+    assert perf_counter() - began < 10
+    for axes in cells(figure, "τ"):
+        drawn = axes.lines[0].get_ydata()
+        assert len(drawn) < 5000 and (drawn.min(), drawn.max()) == (-70.0, 50.0)
+        assert axes.lines[0].get_xdata()[[0, -1]].tolist() == [0.0, 5.0]
+
+
+def test_themes_differ_in_paper_and_nothing_global_is_set(cart) -> None:
+    before = dict(rcParams)
+    light, dark = (plot(cart, theme=theme) for theme in ("light", "dark"))
+    assert sum(light.get_facecolor()[:3]) > 2.5 and sum(dark.get_facecolor()[:3]) < 0.5
+    dark.draw_without_rendering()
+    for axes in dark.axes:
+        texts = [axes.yaxis.label, axes.title, *axes.get_yticklabels(), *axes.get_xticklabels()]
+        assert all(min(to_rgb(text.get_color())) > 0.7 for text in texts if text.get_text())
+    assert dict(rcParams) == before
+
+
+def test_the_list_of_plots_cannot_be_changed() -> None:
+    assert list(PLOTS) == ["joints", "torques", "energy", "tracking", "phase", "error_growth"]
+    with pytest.raises(TypeError):
+        PLOTS["mine"] = PLOTS["joints"]  # type: ignore[index]

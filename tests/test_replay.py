@@ -1,0 +1,219 @@
+"""The replay page in a real browser: what stands in its scene is what the run, and Pinocchio, say."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pinocchio as pin  # pyright: ignore[reportMissingImports]
+import pytest
+
+import robot_dyn as rd
+from tests.browser import opened, until
+
+UR5_Q = np.array([0.3, -1.1, 0.9, -0.6, 1.2, 0.4])
+
+
+@pytest.fixture(scope="module")
+def fall():
+    """UR5 under friction, with a push at its hand for a while and stops that some joints reach."""
+    arm = rd.load("ur5")
+    push = rd.ExternalWrench("ee_link", [20.0, 0, 10, 0, 2, 0], start_s=0.2, end_s=0.7)
+    effects = [rd.ViscousFriction(1.0), push, *rd.joint_stops(arm.lower * 0 - 1.2, arm.upper * 0 + 2.2)]
+    return rd.simulate(rd.Plant(arm, effects), q0=UR5_Q, duration_s=1.0, record_period_s=0.005, estimate_error=False)
+
+
+@pytest.fixture(scope="module")
+def view(fall, browser, tmp_path_factory):
+    """Its page, opened from disk with the network off."""
+    file = rd.save_replay(fall, tmp_path_factory.mktemp("replay") / "fall.html")
+    with opened(browser, file, offline=True) as opened_view:
+        yield opened_view
+
+
+def keyframes(view) -> np.ndarray:
+    """Times of the joints' keyframes, as the viewer holds them."""
+    path = chain(rd.load("ur5"), "shoulder_pan_joint")
+    return np.array(view.ask(f"[...viewer.animator.actions.find(a => a._clip.name == {path!r})._clip.tracks[1].times]"))
+
+
+def chain(arm: rd.Robot, joint: str, root: str = "run") -> str:
+    """Path of a joint's node in a robot of one chain."""
+    names = arm.joint_names[: arm.joint_names.index(joint) + 1]
+    return "/".join([root, *(f"{i} {name}" for i, name in enumerate(names))])
+
+
+def at(run, t: float) -> np.ndarray:
+    """The q of a time between samples, on a line."""
+    return np.array([np.interp(t, run.t, column) for column in run.q.T])
+
+
+def test_the_page_opens_without_network_or_complaint(view) -> None:
+    assert view.complaints == []
+    assert all(url.startswith(("file:", "data:", "blob:")) for url in view.requests)
+
+
+def test_the_canvas_shows_the_arm(view) -> None:
+    """With the robot hidden the picture differs in more than 1 % of its pixels; a blank canvas never does."""
+    shown = view.picture()
+    view.ask("(viewer.set_property(['run'], 'visible', false), 0)")
+    hidden = view.picture()
+    view.ask("(viewer.set_property(['run'], 'visible', true), 0)")
+    assert (np.abs(shown - hidden).sum(axis=2) > 30).mean() > 0.01
+
+
+def test_links_stand_where_forward_kinematics_puts_them(view, fall) -> None:
+    """Pinocchio's placement of each link; single precision of six quaternions in a chain of 1 m: 1e-6."""
+    arm = rd.load("ur5")
+    links = {name: i for i, name in enumerate(arm.joint_names)}
+    for t in keyframes(view)[[0, 7, -9, -1]]:
+        view.ask(f"(replay.seek({t}), 0)")
+        q = fall.q[np.abs(fall.t - t).argmin()]
+        for joint in links:
+            link = arm.description.element.xpath(f"joint[@name='{joint}']/child/@link")[0]
+            seen = view.placement(f"{chain(arm, joint)}/link {link}")
+            np.testing.assert_allclose(seen, arm.placement(q, link), atol=1e-6)
+
+
+def test_the_thinning_error_is_as_stated(view, fall) -> None:
+    """The page's own number bounds what is seen between keyframes: the last joint's angle at samples."""
+    note = next(
+        text
+        for text in view.ask("[...document.querySelectorAll('#notes li')].map(e => e.textContent)")
+        if "keyframes" in text
+    )
+    stated = float(note.partition("at most ")[2].split()[0])
+    assert stated <= 5.1e-4  # 5e-4, printed with two digits
+    arm = rd.load("ur5")
+    path, parent = chain(arm, "wrist_3_joint"), chain(arm, "wrist_2_joint")
+    for t, q in zip(fall.t[3::40], fall.q[3::40], strict=True):
+        view.ask(f"(replay.seek({t}), 0)")
+        seen = np.linalg.inv(view.placement(parent)) @ view.placement(path)
+        true = np.linalg.inv(arm.placement(q, "wrist_2_link")) @ arm.placement(q, "wrist_3_link")
+        assert np.linalg.norm(pin.log3(seen[:3, :3].T @ true[:3, :3])) <= stated * 1.05 + 1e-6
+
+
+def test_the_slider_moves_robot_and_plots_together(view, fall) -> None:
+    view.page.locator("#time").fill("0.4")
+    arm = rd.load("ur5")
+    seen = view.placement(f"{chain(arm, 'elbow_joint')}/link forearm_link")
+    np.testing.assert_allclose(seen, arm.placement(at(fall, 0.4), "forearm_link"), atol=2e-3)  # the thinning error
+    numbers = "m => [Number(m.dataset.t), parseFloat(m.style.left), m.parentElement.clientWidth]"
+    marks = view.ask(f"[...document.querySelectorAll('.mark')].map({numbers})")
+    assert len(marks) == 4
+    for t, left, width in marks:
+        assert t == 0.4
+        assert left == pytest.approx(0.4 * width, abs=1.5)  # the axis of a run of 1 s spans the plot
+    view.page.locator("#time").fill("0.9")
+    assert np.abs(view.placement(f"{chain(arm, 'elbow_joint')}/link forearm_link") - seen).max() > 0.05
+    assert view.ask("document.querySelector('#now').textContent").startswith("0.900")
+
+
+def test_a_click_on_a_plot_moves_the_robot_there(view) -> None:
+    plot = view.page.locator(".u-over").first
+    box = plot.bounding_box()
+    plot.click(position={"x": 0.25 * box["width"], "y": 20})
+    assert view.ask("replay.time") == pytest.approx(0.25, abs=0.01)
+
+
+def test_play_runs_at_the_chosen_speed_and_stops_at_the_end(view) -> None:
+    view.ask("(replay.seek(0.8), 0)")
+    view.page.locator("#speed").select_option("5")
+    view.page.locator("#play").click()
+    until(lambda: not view.ask("replay.playing"), "it plays on", view)
+    assert view.ask("replay.time") == 1.0
+    view.page.locator("#speed").select_option("0.1")
+    view.page.locator("#play").click()  # from the end it starts again
+    until(lambda: 0 < view.ask("replay.time") < 0.5, "it does not play", view)
+    view.page.locator("#play").click()
+    assert not view.ask("replay.playing")
+
+
+def test_meshcats_own_panel_moves_plots_too(view) -> None:
+    view.ask("(replay.seek(0.1), viewer.animator.time_scrubber.setValue(0.6), 0)")
+    until(lambda: abs(view.ask("replay.time") - 0.6) < 1e-6, "the clock did not follow", view)
+
+
+def test_the_ball_is_the_centre_of_mass(view, fall) -> None:
+    """Of what moves: Pinocchio's, whose model leaves the fixed base out as well; single precision."""
+    model, data = rd.load("ur5").model, rd.load("ur5").model.createData()
+    view.ask("(replay.seek(0.5), 0)")
+    com = pin.centerOfMass(model, data, at(fall, 0.5))
+    np.testing.assert_allclose(view.placement("run/centre of mass")[:3, 3], com, atol=1e-6)
+
+
+def test_the_trace_is_the_path_of_the_hand(view, fall) -> None:
+    points = np.array(view.ask("[...node('run/trace/<object>').geometry.attributes.position.array]")).reshape(-1, 3)
+    arm = rd.load("ur5")
+    np.testing.assert_allclose(points, arm.placement(fall.q, "ee_link")[:, :3, 3], atol=1e-6)
+
+
+@pytest.mark.parametrize("t, acts", [(0.1, False), (0.3, True), (0.65, True), (0.75, False)])
+def test_an_arrow_stands_at_the_hand_while_the_wrench_acts(view, fall, t: float, acts: bool) -> None:
+    """It points along the force (20, 0, 10) and starts where the force acts."""
+    view.ask(f"(replay.seek({t}), 0)")
+    assert view.ask("node('run/force on ee_link').visible") is acts
+    if acts:
+        place = view.placement("run/force on ee_link")
+        np.testing.assert_allclose(place[:3, 2] / np.linalg.norm(place[:3, 2]), [2 / 5**0.5, 0, 1 / 5**0.5], atol=1e-5)
+        np.testing.assert_allclose(place[:3, 3], rd.load("ur5").placement(at(fall, t), "ee_link")[:3, 3], atol=1e-4)
+
+
+def test_a_joint_is_red_while_it_bears_on_its_stop(view, fall) -> None:
+    assert fall.at_stop.any(axis=0).sum() >= 2  # the scene has something to show
+    arm = rd.load("ur5")
+    for name, bears in zip(fall.joint_names, fall.at_stop.T, strict=True):
+        if not bears.any():
+            continue
+        for k in (0, int(bears.argmax()), int(bears.argmax()) - 1):
+            view.ask(f"(replay.seek({fall.t[k]} + 1e-7), 0)")
+            assert view.ask(f"node({chain(arm, name) + '/at its stop'!r}).visible") is bool(bears[k])
+
+
+def test_a_ghost_is_a_second_arm_that_lets_light_through(browser, fall, tmp_path) -> None:
+    """Both stand where their own runs put them; the plots hold both; the meshes stand in the file once."""
+    arm = rd.load("ur5")
+    other = rd.simulate(rd.Plant(arm, [rd.ViscousFriction(5.0)]), q0=UR5_Q, duration_s=0.8, estimate_error=False)
+    alone = rd.save_replay(fall, tmp_path / "alone.html").stat().st_size
+    both = rd.save_replay(fall, tmp_path / "both.html", other)
+    assert both.stat().st_size < 1.2 * alone
+    with opened(browser, both) as view:
+        view.ask("(replay.seek(0.7), 0)")
+        for run, root in ((fall, "run"), (other, "ghost 1")):
+            seen = view.placement(f"{chain(arm, 'elbow_joint', root)}/link forearm_link")
+            np.testing.assert_allclose(seen, arm.placement(at(run, 0.7), "forearm_link"), atol=2e-3)
+        collect = "node({!r}).traverse(o => o.isMesh && all.push(o.material.opacity))"
+        clear = "(() => {{ const all = []; " + collect + "; return all; }})()"
+        assert max(view.ask(clear.format(chain(arm, "elbow_joint", "ghost 1")))) < 0.5
+        assert min(view.ask(clear.format(chain(arm, "elbow_joint") + "/link forearm_link"))) == 1
+        labels = view.ask("[...document.querySelectorAll('.plot')].map(p => p.textContent)")
+        assert all("elbow_joint" in text and "elbow_joint (ghost)" in text for text in labels[:3])
+        assert view.complaints == []
+
+
+def test_ten_seconds_of_ur5_stay_under_fifteen_megabytes(tmp_path) -> None:
+    arm = rd.load("ur5")
+    plan = rd.via_points([0, 4, 7, 10], [UR5_Q, UR5_Q + 1, UR5_Q - 0.5, UR5_Q])
+    kp, kd = rd.gains_from(1.0, frequency=20.0)
+    drive = rd.ComputedTorque(arm, plan, kp, kd)
+    run = rd.simulate(rd.Plant(arm), q0=UR5_Q, duration_s=10.0, controller=drive, estimate_error=False)
+    assert len(run.t) == 10_001
+    assert rd.save_replay(run, tmp_path / "ten.html").stat().st_size < 15e6
+
+
+def test_names_of_a_file_are_text_and_no_code(browser, tmp_path) -> None:
+    """Joint, link and robot names with HTML, slashes and quotes are shown, not run."""
+    evil = "</script><img src=x onerror=alert(1)>"
+    source = (rd.load("planar_2r").description.text).decode()
+    joint, link = rd.load("planar_2r").joint_names[0], "evil link"
+    tree = source.replace(f'"{joint}"', json.dumps(evil).replace("<", "&lt;"))
+    path = tmp_path / "evil.urdf"
+    path.write_text(tree.replace('robot name="', 'robot name="&lt;/title&gt;&lt;script&gt;alert(2)&lt;/script&gt;'))
+    arm = rd.load(path)
+    assert evil in arm.joint_names and link
+    run = rd.simulate(arm, q0=np.full(arm.n, 0.3), duration_s=0.2, estimate_error=False)
+    with opened(browser, rd.save_replay(run, tmp_path / "evil.html")) as view:
+        view.page.wait_for_timeout(300)
+        assert view.complaints == []
+        assert evil in view.ask("document.querySelector('.plot').textContent")
+        assert "alert(2)" in view.page.title()
