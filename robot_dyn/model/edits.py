@@ -106,14 +106,6 @@ class Edits:
         """These edits as a JSON text, for run files."""
         return json.dumps(asdict(self))
 
-    @staticmethod
-    def from_json(text: str) -> Edits:
-        """The edits of a JSON text; KeyError, TypeError or ValueError if it is none."""
-        values = json.loads(text)
-        for name in ("gravity", "lock", "armature"):
-            values[name] = tuple(tuple(each) if isinstance(each, list) else each for each in values[name])
-        return Edits(**values | {"payloads": tuple(Payload(**each) for each in values["payloads"])})
-
 
 def by_joint(what: str, values: Any, joint_names: tuple[str, ...]) -> dict[str, float]:
     """Values by joint name, of a scalar, an array (n,) or a mapping that may leave joints out.

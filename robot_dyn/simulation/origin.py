@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from robot_dyn.errors import QueryError
 from robot_dyn.model.description import check
-from robot_dyn.model.edits import Edits
+from robot_dyn.model.edits import Payload
 from robot_dyn.model.robot import Robot
 
 if TYPE_CHECKING:
@@ -38,14 +38,22 @@ def robot_of(run: Trajectory) -> Robot:
     about = run.about
     if "urdf" not in about:
         raise QueryError("the run carries no URDF, so there is no robot to show; simulate one that rd.load gives")
+    robot = Robot(check(about["urdf"].encode(), about.get("source", "the run's URDF")))
     try:
-        edits = Edits.from_json(about.get("edits", "{}"))
-    except (json.JSONDecodeError, TypeError, KeyError, ValueError):
+        robot = _edited(robot, json.loads(about["edits"]))
+    except (KeyError, TypeError, ValueError):
         raise QueryError("the edits that the run carries cannot be read; simulate again") from None
-    robot = Robot(check(about["urdf"].encode(), about.get("source", "the run's URDF")), edits)
     if robot.joint_names != run.joint_names:
         raise QueryError(
             f"the run's joints {', '.join(run.joint_names)} are not those of its URDF, {', '.join(robot.joint_names)};"
             " simulate again"
         )
     return robot
+
+
+def _edited(robot: Robot, edits: Any) -> Robot:
+    """The robot with the edits of `Edits.as_json`, checked as a user's are; locks come last, they take joints away."""
+    payloads = [Payload(**each) for each in edits["payloads"]]
+    armature, lock = dict(edits["armature"]), dict(edits["lock"])
+    free = robot.with_(gravity=edits["gravity"], armature=armature, payload=payloads, mass_scale=edits["mass_scale"])
+    return free.with_(lock=lock) if lock else free
