@@ -46,8 +46,12 @@ class SingularError(RobotDynError):
         self.joint = joint
 
 
-class ModelWarning(UserWarning):
-    """A robot that loads although some of its bodies cannot exist as described."""
+class RobotDynWarning(UserWarning):
+    """Base of the warnings of this library."""
+
+
+class ModelWarning(RobotDynWarning):
+    """A robot that loads although some of its bodies cannot exist, or cannot be drawn, as described."""
 
 
 _COMPARED = 48  # characters of a name: likeness costs the square of it

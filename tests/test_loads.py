@@ -21,17 +21,20 @@ def test_a_wrench_in_base_axes_does_the_same_work(axes: str) -> None:
     arm = rd.load("ur5")
     effect = rd.ExternalWrench("tool0", F, expressed_in=axes, end_s=1.0)
     plant = rd.Plant(arm, [effect])
-    recorded = wrenches(plant, np.zeros(2), Q)["tool0"]
+    recorded = wrenches(plant, np.array([0.0, 0.5]), Q)["tool0"][:, 1:]
     J = arm.jacobian(Q, "tool0", expressed_in="world_aligned")
     for q, wrench, jacobian in zip(Q, recorded, J, strict=True):
         np.testing.assert_allclose(jacobian.T @ wrench, effect.torque(arm, 0.0, q, 0 * q), atol=1e-12)
 
 
 def test_wrenches_on_one_link_add_up_and_act_in_their_windows() -> None:
+    """Both sides of a switch are kept, though no sample lies there."""
     arm = rd.load("ur5")
-    effects = [rd.ExternalWrench("tool0", F, end_s=0.5), rd.ExternalWrench("tool0", 2 * F, start_s=0.5)]
-    recorded = wrenches(rd.Plant(arm, effects), np.array([0.49, 0.5]), Q)["tool0"]
-    np.testing.assert_allclose(recorded, [F, 2 * F])
+    effects = [rd.ExternalWrench("tool0", F, end_s=0.5), rd.ExternalWrench("tool0", 2 * F, start_s=0.2, end_s=0.3)]
+    rows = wrenches(rd.Plant(arm, effects), np.array([0.0, 1.0]), Q)["tool0"]
+    np.testing.assert_allclose(rows[:, 0], [0, 0.2, 0.2, 0.3, 0.3, 0.5, 0.5, 1.0], rtol=1e-6)
+    np.testing.assert_allclose(rows[:, 1:], np.outer([1, 1, 3, 3, 1, 1, 0, 0], F))
+    assert (np.diff(rows[:, 0].astype(np.float32)) > 0).all()
 
 
 def test_a_joint_is_at_its_stop_exactly_where_the_stop_pushes() -> None:

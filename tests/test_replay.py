@@ -129,9 +129,25 @@ def test_play_runs_at_the_chosen_speed_and_stops_at_the_end(view) -> None:
     assert not view.ask("replay.playing")
 
 
-def test_meshcats_own_panel_moves_plots_too(view) -> None:
-    view.ask("(replay.seek(0.1), viewer.animator.time_scrubber.setValue(0.6), 0)")
-    until(lambda: abs(view.ask("replay.time") - 0.6) < 1e-6, "the clock did not follow", view)
+def test_the_mark_keeps_its_time_when_the_window_changes(view) -> None:
+    view.ask("(replay.seek(0.5), 0)")
+    where = "(m => [parseFloat(m.style.left), m.parentElement.clientWidth])(document.querySelector('.mark'))"
+    size = view.page.viewport_size
+    for width in (600, 1100):
+        view.page.set_viewport_size({"width": width, "height": 700})
+        view.page.wait_for_timeout(300)
+        left, plot = view.ask(where)
+        assert left == pytest.approx(0.5 * plot, abs=1.5)
+    view.page.set_viewport_size(size)
+
+
+def test_the_space_bar_plays_after_the_slider_was_used(view) -> None:
+    view.page.locator("#time").fill("0.2")
+    view.page.locator("#time").focus()
+    view.page.keyboard.press("Space")
+    until(lambda: view.ask("replay.time") > 0.2, "it does not play", view)
+    view.page.keyboard.press("Space")
+    assert not view.ask("replay.playing")
 
 
 def test_the_ball_is_the_centre_of_mass(view, fall) -> None:
@@ -139,16 +155,25 @@ def test_the_ball_is_the_centre_of_mass(view, fall) -> None:
     model, data = rd.load("ur5").model, rd.load("ur5").model.createData()
     view.ask("(replay.seek(0.5), 0)")
     com = pin.centerOfMass(model, data, at(fall, 0.5))
-    np.testing.assert_allclose(view.placement("run/centre of mass")[:3, 3], com, atol=1e-6)
+    np.testing.assert_allclose(view.placement("run/centre of mass")[:3, 3], com, atol=1e-3)  # its path is thinned
 
 
 def test_the_trace_is_the_path_of_the_hand(view, fall) -> None:
     points = np.array(view.ask("[...node('run/trace/<object>').geometry.attributes.position.array]")).reshape(-1, 3)
     arm = rd.load("ur5")
-    np.testing.assert_allclose(points, arm.placement(fall.q, "ee_link")[:, :3, 3], atol=1e-6)
+    true = arm.placement(fall.q, "ee_link")[:, :3, 3]
+    note = next(
+        n for n in view.ask("[...document.querySelectorAll('#notes li')].map(e => e.textContent)") if "path" in n
+    )
+    stated = float(note.partition("at most ")[2].split()[0]) * 1e-3
+    assert 0 < stated < 2e-3
+    for p in true:  # the distance of each sample from the nearest piece of the line
+        a, d = points[:-1], np.diff(points, axis=0)
+        part = np.clip(((p - a) * d).sum(axis=1) / (d * d).sum(axis=1), 0, 1)
+        assert np.linalg.norm(a + part[:, None] * d - p, axis=1).min() <= 1.1 * stated + 1e-6
 
 
-@pytest.mark.parametrize("t, acts", [(0.1, False), (0.3, True), (0.65, True), (0.75, False)])
+@pytest.mark.parametrize("t, acts", [(0.1, False), (0.201, True), (0.3, True), (0.699, True), (0.701, False)])
 def test_an_arrow_stands_at_the_hand_while_the_wrench_acts(view, fall, t: float, acts: bool) -> None:
     """It points along the force (20, 0, 10) and starts where the force acts."""
     view.ask(f"(replay.seek({t}), 0)")
@@ -156,7 +181,7 @@ def test_an_arrow_stands_at_the_hand_while_the_wrench_acts(view, fall, t: float,
     if acts:
         place = view.placement("run/force on ee_link")
         np.testing.assert_allclose(place[:3, 2] / np.linalg.norm(place[:3, 2]), [2 / 5**0.5, 0, 1 / 5**0.5], atol=1e-5)
-        np.testing.assert_allclose(place[:3, 3], rd.load("ur5").placement(at(fall, t), "ee_link")[:3, 3], atol=1e-4)
+        np.testing.assert_allclose(place[:3, 3], rd.load("ur5").placement(at(fall, t), "ee_link")[:3, 3], atol=1e-3)
 
 
 def test_a_joint_is_red_while_it_bears_on_its_stop(view, fall) -> None:

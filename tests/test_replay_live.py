@@ -149,7 +149,9 @@ def test_a_diverged_run_is_shown_as_far_as_it_is_finite(browser, tmp_path) -> No
     swing = rd.simulate(rd.load("planar_2r"), q0=[0.4, -0.7], duration_s=0.4, estimate_error=False)
     q = swing.q.copy()
     q[300:] = np.nan
-    with opened(browser, rd.save_replay(replace(swing, q=q), tmp_path / "bad.html")) as view:
-        assert "the last 101 samples are not shown" in view.ask("document.querySelector('footer').textContent")
+    with pytest.warns(rd.ModelWarning, match="the last 101 samples are not shown"):
+        page = rd.save_replay(replace(swing, q=q), tmp_path / "bad.html")
+    with opened(browser, page) as view:
+        assert "the last 101 samples are not shown" in view.ask("document.querySelector('header').textContent")
         assert view.ask("replay.duration") == pytest.approx(0.299)
         assert view.complaints == []

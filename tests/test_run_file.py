@@ -105,3 +105,30 @@ def test_a_damaged_file_is_refused_or_whole(run, tmp_path) -> None:
 def test_a_folder_is_no_target(run, tmp_path) -> None:
     with pytest.raises(RunFileError, match="is a folder"):
         rd.save_run(run, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "said"),
+    [
+        ("t", lambda t: t[:5], "not float64"),
+        ("t", lambda t: t[::-1].copy(), "its times"),
+        ("t", lambda t: np.where(t > 0.1, np.nan, t), "its times"),
+        ("q", lambda q: q[:, :1], "q holds"),
+        ("q", lambda q: q.astype(complex), "complex128"),
+        ("q", lambda q: q.astype(str), "q holds"),
+        ("kinetic", lambda K: K[:5], "kinetic holds"),
+        ("wanted", lambda _: np.zeros(3), "wanted holds"),
+        ("deviation", lambda _: np.zeros((2, 2)), "deviation holds"),
+        ("at_stop", lambda _: np.zeros((10, 2), bool), "at_stop holds"),
+        ("wrench/tip", lambda _: np.full((3, 7), np.nan), "its times"),
+        ("wrench/tip", lambda _: np.zeros((3, 6)), "wrench on tip holds"),
+        ("about", lambda text: np.array(str(text).replace('"urdf": "', '"urdf": 3, "x": "')), "no text"),
+        ("about", lambda text: np.array(str(text).replace('"format": 2', '"format": "2"')), "has format '2'"),
+    ],
+)
+def test_arrays_that_do_not_fit_together_are_refused(run, tmp_path, name: str, change, said: str) -> None:
+    with np.load(rd.save_run(run, tmp_path / "run.npz")) as file:
+        arrays = dict(file)
+    np.savez(tmp_path / "bent.npz", **arrays | {name: change(arrays.get(name, np.zeros(0)))})
+    with pytest.raises(RunFileError, match=said):
+        rd.load_run(tmp_path / "bent.npz")

@@ -60,7 +60,7 @@ def test_up_axis_is_followed_only_where_the_masses_say_so(name: str) -> None:
     """A URDF does not say whether it was written for Gazebo, which turns y-up meshes, or for rviz, which does not."""
     robot = rd.load(name)
     here = drawing(robot)
-    assert any("Y_UP" in note for note in here.notes) == (name in WRITTEN_FOR_GAZEBO)
+    assert any("Y_UP" in note for note in here.remarks) == (name in WRITTEN_FOR_GAZEBO)
     if name in WRITTEN_FOR_GAZEBO:
         q = np.clip(np.zeros(robot.n), robot.lower, robot.upper)
         for link in ("l_lower_leg", "r_lower_leg"):  # hangs from the knee to the ankle, instead of across

@@ -208,7 +208,7 @@ def test_a_texture_is_reduced_and_a_damaged_one_is_noted(tmp_path: Path) -> None
 def test_a_robot_without_visuals_is_drawn_by_its_inertia_and_says_so() -> None:
     here = drawing(rd.load("planar_2r"))
     assert len(here.pieces) == 2
-    assert "no link has a <visual>" in here.notes[0]
+    assert "no link has a <visual>" in here.remarks[0]
 
 
 @pytest.mark.parametrize("name", ["ur5", "panda", "kinova", "skew_tree"])

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from threading import Event
 from typing import Annotated, Any
 
 import typer
@@ -64,3 +66,15 @@ def bar(duration_s: float) -> Iterator[Callable[[float], object]]:
 def print_json(value: Any) -> None:
     """Print a document as JSON."""
     print(json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False))
+
+
+def noticed_interrupts() -> Event:
+    """An event that Ctrl-C sets as well: packages that guard their own imports against everything swallow the other."""
+    noticed = Event()
+
+    def notice(*_: object) -> None:
+        noticed.set()
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGINT, notice)
+    return noticed

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 import robot_dyn as rd
-from robot_dyn.cli.app import PackageDir, app, say
+from robot_dyn.cli.app import PackageDir, app, noticed_interrupts, say
 from robot_dyn.errors import QueryError
 
 
@@ -29,6 +29,7 @@ def replay(
     package_dir: PackageDir = None,
 ) -> None:
     """Replay runs in the browser, live on this machine until Ctrl-C, or as one HTML file."""
+    interrupted = noticed_interrupts()
     if html is not None and port is not None:
         raise QueryError("give --html or --port, not both: a file needs no server")
     trajectories = [rd.load_run(path) for path in runs]
@@ -41,7 +42,7 @@ def replay(
     with rd.replay(*trajectories, port=port, **options) as server:
         print(f"{server.url} shows the run; Ctrl-C ends it", flush=True)
         _open(server.url, browse)
-        server.wait()
+        server.wait(interrupted)
 
 
 @app.command()
@@ -76,14 +77,14 @@ def demo(
     from robot_dyn.cli import report
     from robot_dyn.scene.starters import starter
 
-    panda = rd.load("panda").with_(lock={"panda_finger_joint1": 0.0})
-    say(report.demo_tables(panda))
     folder = Path(output)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "panda.toml").write_text(starter("panda_computed_torque"), encoding="utf-8")
     except OSError as error:
         raise QueryError(f"--output {output}: {error.strerror}; name a folder that can be written") from None
+    panda = rd.load("panda").with_(lock={"panda_finger_joint1": 0.0})
+    say(report.demo_tables(panda))
     print("\nThe same arm under computed torque, its model 20 % too heavy\n")
     run = rd.simulate(rd.read_scene(folder / "panda.toml"))
     print(run.summary)

@@ -59,6 +59,10 @@ class ExternalWrench(Active):
         J = dynamics.jacobian(q, self.frame, expressed_in=self.expressed_in)
         return times(transpose(J), self.wrench)
 
+    def acts(self, t: Array) -> Array:
+        """Whether it acts at times t (...,)."""
+        return (self.start_s <= t) & (t < self.end_s)
+
     def at(self, placement: Array) -> Array:
         """The wrench in base axes at the frame's origin, (..., 6), where the frame is placed at (..., 4, 4)."""
         R, p = placement[..., :3, :3], placement[..., :3, 3]

@@ -9,17 +9,30 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.effects.wrench import ExternalWrench
 
 _FAR = 1e9  # a run that diverged has samples beyond any placement
+_BEFORE = 2.0**-22  # of its time, a switch's own past: apart from it in single precision too, which viewers keep
 
 
 def wrenches(plant: Plant, t: np.ndarray, q: np.ndarray) -> dict[str, np.ndarray]:
-    """External wrench on each link that has one, in base axes at the link's frame, (m, 6), in [N] and [N m]."""
+    """External wrench on each link that has one, in base axes at the link's frame.
+
+    Args:
+        plant: What moves.
+        t: Times of the samples, (m,), in [s].
+        q: Positions, (m, n).
+
+    Returns:
+        By link, rows (t, force, torque), (k, 7), in [s], [N], [N m]: at the samples, and at both sides of each switch.
+    """
+    effects = [effect for effect in plant.effects if isinstance(effect, ExternalWrench)]
     total: dict[str, np.ndarray] = {}
-    for effect in plant.effects:
-        if isinstance(effect, ExternalWrench):
-            placement = plant.dynamics.placement(np.clip(np.nan_to_num(q), -_FAR, _FAR), effect.frame)
-            acting = (effect.start_s <= t) & (t < effect.end_s)
-            F = np.where(acting[:, None], effect.at(placement), 0.0)
-            total[effect.frame] = total.get(effect.frame, 0.0) + F
+    for link in dict.fromkeys(effect.frame for effect in effects):
+        mine = [effect for effect in effects if effect.frame == link]
+        switches = np.array([s for effect in mine for s in effect.switches if t[0] < s <= t[-1]])
+        times = np.unique(np.concatenate([t, switches, switches * (1 - _BEFORE)]))
+        at = np.stack([np.interp(times, t, np.clip(np.nan_to_num(column), -_FAR, _FAR)) for column in q.T], axis=1)
+        placement = plant.dynamics.placement(at, link)
+        F = sum(np.where(effect.acts(times)[:, None], effect.at(placement), 0.0) for effect in mine)
+        total[link] = np.column_stack([times, F])
     return total
 
 

@@ -72,12 +72,18 @@ def load_run(path: str | Path) -> Trajectory:
             arrays = dict(file)
         about = json.loads(str(arrays["about"]))
         if about["format"] != FORMAT:
-            raise RunFileError(f"{path}: has format {about['format']}, this version reads {FORMAT}")
-        return _trajectory(arrays, about)
+            raise RunFileError(
+                f"{path}: has format {about['format']!r}, this version reads {FORMAT}; simulate again with this version"
+            )
+        return _consistent(_trajectory(arrays, about))
     except FileNotFoundError:
         raise RunFileError(f"{path}: there is no such file; write one with robot-dyn simulate … -o {path}") from None
+    except RunFileError:
+        raise
     except _DAMAGE as error:
         raise RunFileError(f"{path}: is no whole run file ({type(error).__name__}); simulate again") from None
+    except _InconsistentError as error:
+        raise RunFileError(f"{path}: is no whole run file: {error}; simulate again") from None
 
 
 def export_csv(trajectory: Trajectory, path: str | Path) -> Path:
@@ -124,3 +130,33 @@ def _trajectory(arrays: dict[str, np.ndarray], about: dict[str, Any]) -> Traject
         error=error,
         about=about["about"],
     )
+
+
+class _InconsistentError(Exception):
+    """Internal: an array of a run does not fit the others."""
+
+
+def _consistent(run: Trajectory) -> Trajectory:
+    """The run, whose arrays fit together: lengths, kinds, order of time."""
+    m, n = len(run.t), len(run.joint_names)
+    ledger = {"kinetic": run.ledger.kinetic, "potential": run.ledger.potential} | run.ledger.work | run.power
+    shapes = [(name, getattr(run, name), (m, n)) for name in ("q", "v", "a", "tau")]
+    shapes += [("t", run.t, (m,)), *((name, column, (m,)) for name, column in ledger.items())]
+    shapes += [(f"wrench on {link}", F, (len(F), 7)) for link, F in run.wrenches.items()]
+    for name, array, columns in (("wanted", run.wanted, (n,)), ("deviation", run.deviation, (n, 3))):
+        if array is not None:
+            shapes.append((name, array, (m, array.shape[-1] if array.shape[-1:] and array.shape[-1] in columns else n)))
+    for name, array, shape in shapes:
+        if array.shape != shape or array.dtype != np.float64:
+            raise _InconsistentError(f"{name} holds {array.dtype} {array.shape}, not float64 {shape}")
+    if run.at_stop is not None and (run.at_stop.shape != (m, n) or run.at_stop.dtype != bool):
+        raise _InconsistentError(f"at_stop holds {run.at_stop.dtype} {run.at_stop.shape}, not bool {(m, n)}")
+    times = [run.t, *(F[:, 0] for F in run.wrenches.values())]
+    if not all(np.isfinite(t).all() and (np.diff(t) >= 0).all() for t in times):
+        raise _InconsistentError("its times are not finite, or do not grow")
+    if not all(np.isfinite(F).all() for F in run.wrenches.values()):
+        raise _InconsistentError("a wrench is not finite")
+    texts: dict[Any, Any] = run.about
+    if not isinstance(texts, dict) or not all(isinstance(text, str) for text in (*texts, *texts.values())):
+        raise _InconsistentError("what it is about is no text")
+    return run

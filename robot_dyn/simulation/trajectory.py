@@ -44,6 +44,7 @@ class Statistics:
         evaluations: Evaluations of the equation of motion.
         wall_s: Time of the run itself.
         companions_s: Time of the companion runs of the error estimate.
+        engine: Which loop ran, and why if another was possible.
     """
 
     method: str
@@ -52,6 +53,7 @@ class Statistics:
     evaluations: int
     wall_s: float
     companions_s: float = 0.0
+    engine: str = "interpreted"
 
 
 @final
@@ -73,7 +75,8 @@ class Trajectory:
         statistics: What it took.
         error: Its estimated error; None if companions were switched off.
         about: Texts that make it whole: URDF, its path, edits, scene, versions; the frame under control, if one is.
-        wrenches: External wrench by link, in base axes at the link's frame, (m, 6), in [N] and [N m].
+        wrenches: External wrench by link, rows (t, force, torque), (k, 7), in base axes at its frame, in SI units:
+            at the samples and at both sides of each switch.
         at_stop: Whether each joint bears on a stop, (m, n); None without stops.
     """
 
@@ -119,6 +122,7 @@ class Trajectory:
         lines.append(
             f"{s.method}: {step}{s.steps} steps, {s.evaluations} evaluations, {s.wall_s:.2f} s"
             + (f" and {s.companions_s:.2f} s for companions" if s.companions_s else "")
+            + f", {s.engine}"
         )
         return "\n".join(lines)
 

@@ -177,7 +177,7 @@ def _scale(axes: Any, side: str, z: np.ndarray, limit: float, diverged: bool, lo
         powers = 10.0 ** np.linspace(np.log10(usual), np.log10(size.max()), 4).round()[1:]
         axis.set_major_locator(FixedLocator([0.0, *powers, *-powers]))
     else:
-        if size.max() >= NEAR * limit:
+        if np.any(z) and size.max() >= NEAR * limit:
             low, high = min(low, -limit), max(high, limit)
         middle = low / 2 + high / 2
         half = max(high / 2 - low / 2, 5e-4 * abs(middle)) or 1.0  # noise on a constant stays noise

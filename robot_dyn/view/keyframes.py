@@ -36,7 +36,7 @@ class Keyframes:
 
 def keyframes(t: np.ndarray, q: np.ndarray, tolerance: float = TOLERANCE) -> Keyframes:
     """Keyframes of samples t (m,), q (m, N)."""
-    kept = np.flatnonzero(_corners(t, q, tolerance))
+    kept = np.flatnonzero(corners(t, q, tolerance))
     times, positions = _short_turns(t[kept], q[kept])
     drawn = times.astype(np.float32).astype(float)
     apart = np.concatenate([[True], np.diff(drawn) > 0])
@@ -45,14 +45,14 @@ def keyframes(t: np.ndarray, q: np.ndarray, tolerance: float = TOLERANCE) -> Key
     return Keyframes(drawn, positions, len(t), error)
 
 
-def _corners(t: np.ndarray, q: np.ndarray, tolerance: float) -> np.ndarray:
-    """Which samples are kept: split each span at its sample farthest from the chord until all are near."""
+def corners(t: np.ndarray, q: np.ndarray, tolerance: float) -> np.ndarray:
+    """Which samples are kept, (m,): split each span at its sample farthest from the chord until all are near."""
     kept = np.zeros(len(t), dtype=bool)
     kept[[0, -1]] = True
     spans = [(0, len(t) - 1)]
     while spans:
         a, b = spans.pop()
-        if b - a < 2:
+        if b - a < 2 or t[b] == t[a]:
             continue
         part = ((t[a + 1 : b] - t[a]) / (t[b] - t[a]))[:, None]
         away = np.abs(q[a + 1 : b] - (q[a] + part * (q[b] - q[a]))).max(axis=1)

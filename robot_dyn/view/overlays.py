@@ -1,10 +1,11 @@
-"""Overlays of a replay: what a run recorded, drawn into it: p_com = Σ mᵢ pᵢ / Σ mᵢ, wrenches, a trace, stops.
+"""Overlays of a replay: what a run recorded, drawn into it: p_com = Σ mᵢ pᵢ / Σ mᵢ, a trace, stops, the ground.
 
-Arrows are as long as their force or torque, measured by the largest of the run; the notes give the scale.
+Paths are thinned like joints: a straight line replaces the samples between keyframes, to a part of what is seen.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import final
 
@@ -13,64 +14,92 @@ import numpy as np
 from robot_dyn.simulation.trajectory import Trajectory
 from robot_dyn.view import commands
 from robot_dyn.view.commands import Command
-from robot_dyn.view.shapes import arrow, cylinder, sphere
+from robot_dyn.view.keyframes import Keyframes, keyframes
+from robot_dyn.view.shapes import cylinder, sphere
 from robot_dyn.view.stage import Stage, placement
 from robot_dyn.view.triangles import Mesh
 
-_GROUND = (0.7, 0.73, 0.77, 1.0)
-_COM, _TRACE, _FORCE, _TORQUE, _STOP = (
-    (0.94, 0.89, 0.26, 1.0),
-    (0.0, 0.62, 0.45, 1.0),
-    (0.84, 0.37, 0.0, 1.0),
-    (0.8, 0.47, 0.65, 1.0),
-    (0.9, 0.05, 0.05, 0.75),
-)
-_MOST = 2000  # points of a trace, and keyframes of an overlay
+Rgba = tuple[float, float, float, float]
+Placements = list[tuple[np.ndarray, np.ndarray]]
+
+_GROUND: Rgba = (0.7, 0.73, 0.77, 1.0)
+_COM: Rgba = (0.94, 0.89, 0.26, 1.0)
+_TRACE: Rgba = (0.0, 0.62, 0.45, 1.0)
+_STOP: Rgba = (0.9, 0.05, 0.05, 0.75)
+GHOST = 0.35  # opacity
+PART = 5e-4  # of what is seen: how far a path may be off between keyframes
+_CHUNK = 20_000  # samples whose placements are held at a time
 
 
 @final
 @dataclass
 class Overlays:
-    """Commands, tracks by path, and notes, gathered."""
+    """Commands, tracks by path, and notes, gathered.
 
+    Attributes:
+        ghost: Whether what is added lets light through.
+    """
+
+    ghost: bool = False
     commands: list[Command] = field(default_factory=list)
     tracks: dict[str, list[Command]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
-    def add(self, path: str, mesh: Mesh, rgba: tuple[float, ...], *tracks: Command) -> None:
+    def colour(self, rgba: Rgba) -> Rgba:
+        """A colour, clear if it is a ghost's."""
+        return (*rgba[:3], rgba[3] * GHOST) if self.ghost else rgba
+
+    def add(self, path: str, mesh: Mesh, rgba: Rgba, *tracks: Command) -> None:
         """An object with its tracks."""
-        self.commands.append(commands.set_object(path, commands.triangles(mesh), commands.material(rgba)))
+        look = commands.material(self.colour(rgba))
+        self.commands.append(commands.set_object(path, commands.triangles(mesh), look))
         if tracks:
             self.tracks[path] = list(tracks)
 
 
-def overlays(stage: Stage, run: Trajectory, reach: float, frame: str | None = None) -> Overlays:
-    """What a run recorded: centre of mass, trace of a frame, external wrenches, joints at their stops.
+def overlays(stage: Stage, run: Trajectory, reach: float, frame: str | None = None, ghost: bool = False) -> Overlays:
+    """What a run recorded: centre of mass, trace of a frame, joints at their stops.
 
     Args:
         stage: Where the robot stands.
         run: Its samples.
         reach: Radius of what is seen, in [m].
         frame: Link whose path is traced; the one under control, or the tip, if not given.
+        ghost: Whether it is drawn clear.
     """
-    found = Overlays()
-    few = np.unique(np.linspace(0, len(run.t) - 1, min(len(run.t), _MOST)).round().astype(int))
-    t, at = run.t[few], stage.linkage.at(run.q[few]).in_base
-    place = commands.track("position", "vector", t, centre_of_mass(stage, at))
+    found = Overlays(ghost)
+    com = keyframes(run.t, over(stage, run.q, lambda at: centre_of_mass(stage, at)), PART * reach)
+    place = commands.track("position", "vector", com.t, com.q)
     found.add(f"{stage.root}/centre of mass", sphere(0.02 * reach), _COM, place)
 
     frame = frame or run.about.get("frame") or stage.tip
-    stage.link_path(frame)  # so that a name that is wrong is told
-    path = np.broadcast_to(placement(at, *stage.linkage.links[frame][:2])[1], (len(t), 3))
-    line = commands.polyline(path), commands.material(_TRACE, line=True)
+    path = keyframes(run.t, of_link(stage, run.q, frame), PART * reach)
+    line = commands.polyline(path.q), commands.material(found.colour(_TRACE), line=True)
     found.commands.append(commands.set_object(f"{stage.root}/trace", *line, kind="Line"))
-    found.notes.append(f"the line is the path of {frame}; the yellow ball is the centre of mass of what moves")
-
-    for which, rgba, unit in ((slice(0, 3), _FORCE, "N"), (slice(3, 6), _TORQUE, "N m")):
-        _arrows(found, stage, run, reach, which, rgba, unit)
+    what = f"the line is the path of {frame}, the yellow ball the centre of mass of what moves"
+    found.notes.append(f"{what}; they are off by at most {1e3 * _off(com, path):.1g} mm")
     if run.at_stop is not None:
         _stops(found, stage, run, reach)
     return found
+
+
+def _off(*paths: Keyframes) -> float:
+    """Largest distance of a path from a sample, bounded by its coordinates'."""
+    return max(float(np.linalg.norm(path.error)) for path in paths)
+
+
+def over(stage: Stage, q: np.ndarray, ask: Callable[[Placements], np.ndarray]) -> np.ndarray:
+    """What is asked of the placements of all bodies, at positions q (m, n)."""
+    chunks = [q[i : i + _CHUNK] for i in range(0, len(q), _CHUNK)]
+    return np.concatenate([ask(stage.linkage.at(chunk).in_base) for chunk in chunks])
+
+
+def of_link(stage: Stage, q: np.ndarray, link: str) -> np.ndarray:
+    """Positions of a link's frame, (m, 3); QueryError if there is no such link."""
+    stage.link_path(link)
+    body, pose, _ = stage.linkage.links[link]
+    shape = (-1, 3)
+    return over(stage, q, lambda at: np.broadcast_to(placement(at, body, pose)[1], (len(at[0][1]), 3)).reshape(shape))
 
 
 def squares(reach: float) -> float:
@@ -91,41 +120,13 @@ def ground(center: np.ndarray, reach: float) -> Command:
     return commands.set_object("ground", commands.polyline(points), look, kind="LineSegments")
 
 
-def centre_of_mass(stage: Stage, at: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+def centre_of_mass(stage: Stage, at: Placements) -> np.ndarray:
     """Centre of mass of the bodies that move, (m, 3), where they are placed at (R, p) each."""
     total, mass = np.zeros_like(at[0][1]), 0.0
     for inertia, (R, p) in zip(stage.linkage.inertias, at, strict=True):
         mc = np.stack([inertia[5, 1], inertia[3, 2], inertia[4, 0]])  # 𝓜 holds m ĉ in its lower left block
         total, mass = total + inertia[0, 0] * p + R @ mc, mass + inertia[0, 0]
     return total / mass if mass > 0 else total
-
-
-def _arrows(
-    found: Overlays, stage: Stage, run: Trajectory, reach: float, which: slice, rgba: tuple[float, ...], unit: str
-) -> None:
-    """One arrow a link: forces in [N], or torques in [N m]."""
-    largest = max((np.linalg.norm(F[:, which], axis=1).max() for F in run.wrenches.values()), default=0.0)
-    if not largest > 0:
-        return
-    found.notes.append(
-        f"arrows: {0.4 * reach:.2g} m long for the largest {'force' if unit == 'N' else 'torque'}, {largest:.4g} {unit}"
-    )
-    for link, F in run.wrenches.items():
-        few = _changes(F, len(run.t))
-        vectors = F[few, which]
-        at = stage.linkage.at(run.q[few]).in_base
-        points = np.broadcast_to(placement(at, *stage.linkage.links[link][:2])[1], vectors.shape)
-        lengths = np.linalg.norm(vectors, axis=1)
-        t = run.t[few]
-        found.add(
-            f"{stage.root}/{'force' if unit == 'N' else 'torque'} on {link.replace('/', '∕')}",
-            arrow(0.4 * reach),
-            rgba,
-            commands.track("position", "vector", t, points),
-            commands.track("quaternion", "quaternion", t, _along(vectors)),
-            commands.track("scale", "vector", t, np.maximum(lengths / largest, 1e-6)[:, None] * np.ones(3)),
-            commands.track("visible", "bool", t, lengths > 0),
-        )
 
 
 def _stops(found: Overlays, stage: Stage, run: Trajectory, reach: float) -> None:
@@ -138,20 +139,13 @@ def _stops(found: Overlays, stage: Stage, run: Trajectory, reach: float) -> None
         first = np.concatenate([[True], bears[1:] != bears[:-1]])
         body = next(i for i, each in enumerate(stage.linkage.bodies) if each.joint == name)
         path, axis = f"{stage.paths[body]}/at its stop", stage.linkage.bodies[body].axis
-        along = commands.track("quaternion", "quaternion", run.t[:1], _along(axis[None]))
+        turned = commands.track("quaternion", "quaternion", run.t[:1], along(axis[None]))
         seen = commands.track("visible", "bool", run.t[first], bears[first])
-        found.add(path, cylinder(0.06 * reach, 0.15 * reach), _STOP, along, seen)
+        found.add(path, cylinder(0.06 * reach, 0.15 * reach), _STOP, turned, seen)
         found.notes.append(f"{name} turns red while it bears on a stop")
 
 
-def _changes(F: np.ndarray, m: int) -> np.ndarray:
-    """A few samples, and both sides of each jump of a wrench, whose end would else be drawn late."""
-    few = np.linspace(0, m - 1, min(m, _MOST)).round().astype(int)
-    jump = np.flatnonzero((F[1:] != 0).any(axis=1) != (F[:-1] != 0).any(axis=1))
-    return np.unique(np.concatenate([few, jump, jump + 1]))
-
-
-def _along(vectors: np.ndarray) -> np.ndarray:
+def along(vectors: np.ndarray) -> np.ndarray:
     """Quaternions (k, 4) that turn the z axis along vectors (k, 3); none where a vector is 0."""
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     x, y, z = (vectors / np.where(length > 0, length, 1.0)).T

@@ -6,9 +6,11 @@ Other meshcat programs may draw into the scene, by `meshcat.Visualizer(zmq_url)`
 from __future__ import annotations
 
 import asyncio
+import json
 import os
 import threading
 import warnings
+from contextlib import suppress
 from socket import create_server, socket
 from typing import Any
 
@@ -72,6 +74,10 @@ class _Socket(_Local, WebSocketHandler):
     def on_close(self) -> None:
         self.bridge.websocket_pool.discard(self)
 
+    def on_message(self, message: str | bytes) -> None:
+        with suppress(ValueError, KeyError, TypeError):  # what is no picture that was asked for
+            self.bridge.send_image(json.loads(message)["data"])
+
 
 class _Bridge(ZMQWebSocketBridge):
     """meshcat's bridge, which would listen on every interface, on a socket of this machine alone."""
@@ -133,10 +139,10 @@ class Server:
             self._loop.call_soon_threadsafe(self._loop.stop)
             self._thread.join()
 
-    def wait(self) -> None:
-        """Serve until interrupted (Ctrl-C), then end."""
+    def wait(self, interrupted: threading.Event | None = None) -> None:
+        """Serve until interrupted (Ctrl-C), or until `interrupted` is set, then end."""
         try:
-            while self._thread.is_alive():
+            while self._thread.is_alive() and not (interrupted and interrupted.is_set()):
                 self._thread.join(0.2)
         except KeyboardInterrupt:
             pass

@@ -22,8 +22,6 @@ from robot_dyn.view.commands import Command
 from robot_dyn.view.keyframes import Keyframes
 from robot_dyn.view.visuals import Piece
 
-_GHOST = 0.35  # opacity
-
 
 @final
 @dataclass(frozen=True)
@@ -59,8 +57,8 @@ class Stage:
         body, _, _ = self.linkage.links[link]
         return f"{self.root if body == BASE else self.paths[body]}/link {_plain(link)}"
 
-    def draw(self, pieces: tuple[Piece, ...], ghost: bool = False) -> list[Command]:
-        """The commands that put links and their pieces in place; a ghost is clear."""
+    def draw(self, pieces: tuple[Piece, ...], opacity: float = 1.0) -> list[Command]:
+        """The commands that put links and their pieces in place."""
         found = [
             commands.set_transform(self.link_path(link), homogeneous(pose.R, pose.p))
             for link, (_, pose, _) in self.linkage.links.items()
@@ -68,7 +66,7 @@ class Stage:
         meshes = {id(piece.mesh): commands.triangles(piece.mesh) for piece in pieces}
         for number, piece in enumerate(pieces):
             path = f"{self.link_path(piece.link)}/{number}"
-            rgba = (*piece.rgba[:3], piece.rgba[3] * (_GHOST if ghost else 1.0))
+            rgba = (*piece.rgba[:3], piece.rgba[3] * opacity)
             look = commands.material(rgba, vertex_colors=piece.mesh.colors is not None)
             if piece.image is not None:
                 look["image"] = piece.image

@@ -55,10 +55,17 @@ class Piece:
 @final
 @dataclass(frozen=True)
 class Drawing:
-    """The look of a robot: pieces, and notes on what could not be drawn as described, in words."""
+    """The look of a robot.
+
+    Attributes:
+        pieces: What is drawn.
+        notes: What could not be drawn as described, in words.
+        remarks: What else a reader should know.
+    """
 
     pieces: tuple[Piece, ...]
     notes: tuple[str, ...]
+    remarks: tuple[str, ...] = ()
 
 
 def drawing(robot: Robot, package_dirs: Iterable[str | Path] = (), *, inertia: bool = False) -> Drawing:
@@ -81,7 +88,7 @@ def drawing(robot: Robot, package_dirs: Iterable[str | Path] = (), *, inertia: b
             pieces.append(Piece(link, pose, mesh, _INERTIA))
             if bent:
                 artist.notes.append(f"inertia box of link {link!r}: {bent}; drawn thin; correct its <inertia>")
-    return Drawing(tuple(pieces), tuple(dict.fromkeys(artist.notes)))
+    return Drawing(tuple(pieces), tuple(dict.fromkeys(artist.notes)), tuple(artist.remarks))
 
 
 class _Artist:
@@ -92,7 +99,7 @@ class _Artist:
         self.element = parse(robot.description.text, robot.description.source)
         self.checked = {link.get("name"): link for link in robot.description.element.iterfind("link")}
         self.file = partial(find_file, source=self.source, package_dirs=tuple(package_dirs))
-        self.notes = list[str]()
+        self.notes, self.remarks = list[str](), list[str]()
         self._turn, self._y_up = np.eye(4), []  # of what says that y is up: link, pose and mesh
         self._read = cache(meshes.read)  # so that pieces of one file share their meshes
         self._primitive = cache(lambda tag, lengths: PRIMITIVES[tag][0](*lengths))
@@ -109,7 +116,7 @@ class _Artist:
             return [piece for name, link in links for piece in self.visuals(name, link)]
         pieces = [piece for name, link in links for piece in self.stand_in(name, link)[0]]
         what = "its collision shapes and inertia ellipsoids are drawn; add <visual> elements to see more"
-        self.notes.append(f"{self.name}: no link has a <visual>; {what}")
+        self.remarks.append(f"{self.name}: no link has a <visual>; {what}")
         return pieces
 
     def turn_up(self) -> bool:
@@ -125,7 +132,7 @@ class _Artist:
             return False
         self._turn = turn
         why = "turned to z up, as in Gazebo: raw, as in rviz, they stand away from the masses of their links"
-        self.notes.append(f"{self.name}: its Collada meshes with <up_axis> Y_UP are {why}")
+        self.remarks.append(f"{self.name}: its Collada meshes with <up_axis> Y_UP are {why}")
         return True
 
     def visuals(self, name: str, link: Any) -> Iterator[Piece]:

@@ -15,6 +15,8 @@ async function unpack(text) {
 const element = (id) => document.getElementById(id);
 const ink = () => getComputedStyle(document.body).color;
 const gaps = (values) => Array.from(values, (value) => (Number.isNaN(value) ? null : value));  // as uPlot marks them
+const tick = (value) => (value !== 0 && (Math.abs(value) >= 1e5 || Math.abs(value) < 1e-3)
+  ? value.toExponential(Number.isInteger(Math.log10(Math.abs(value))) ? 0 : 1) : String(Number(value.toPrecision(6))));
 const COLORS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#8c6d31", "#7f7f7f"];
 const DASHES = [[], [6, 3], [2, 3], [8, 3, 2, 3]];
 
@@ -28,37 +30,57 @@ function makePlot(plot, seek) {
   const axis = { stroke: ink, grid: { stroke: "#8884" }, ticks: { stroke: "#8884" }, font: "12px system-ui, sans-serif" };
   const number = (value) => (value == null ? "–" : Number(value).toPrecision(4));
   const series = plot.series.map((each) => ({
-    label: each.label, width: 1.5, points: { show: false }, value: (_, y) => number(y),
+    label: each.label, width: 1.5, points: { show: plot.t.length === 1 }, value: (_, y) => number(y),
     stroke: COLORS[each.color % COLORS.length], dash: each.ghost ? [4, 4] : DASHES[(each.color / COLORS.length | 0) % 4],
     alpha: each.ghost ? 0.7 : 1,
   }));
-  const figure = new uPlot({
-    width: box.clientWidth || 460, height: 230, legend: { live: true },
-    scales: { x: { time: false } },
-    axes: [{ ...axis, label: "t [s]", labelSize: 18 }, { ...axis, label: plot.unit, labelSize: 18, size: 64 }],
-    series: [{ label: "t", value: (_, t) => (t == null ? "–" : t.toFixed(3) + " s") }, ...series],
-  }, [plot.t, ...plot.series.map((each) => gaps(each.values))], box);
+  let now = 0;
+  const place = (figure) => {  // after each change of time, size or zoom
+    const left = figure.valToPos(now, "x");
+    mark.style.left = left + "px";
+    mark.hidden = !(left >= 0 && left <= figure.over.clientWidth);
+    mark.dataset.t = now;
+  };
   const mark = document.createElement("div");
   mark.className = "mark";
+  const wide = (u, low, high) => (low < high ? uPlot.rangeNum(low, high, 0.1, true) : [(low ?? 0) - 1, (low ?? 0) + 1]);
+  const figure = new uPlot({
+    width: box.clientWidth || 460, height: 230, legend: { live: true }, hooks: { draw: [place] },
+    scales: { x: { time: false, range: (u, low, high) => (low < high ? [low, high] : [low - 1, low + 1]) }, y: { range: wide } },
+    axes: [{ ...axis, label: "t [s]", labelSize: 18 },
+      { ...axis, label: plot.unit, labelSize: 18, size: 70, values: (u, ticks) => ticks.map(tick) }],
+    series: [{ label: "t", value: (_, t) => (t == null ? "–" : t.toFixed(3) + " s") }, ...series],
+  }, [plot.t, ...plot.series.map((each) => gaps(each.values))], box);
   figure.over.append(mark);
   figure.over.addEventListener("click", (event) => seek(figure.posToVal(event.offsetX, "x")));
   new ResizeObserver(() => figure.setSize({ width: box.clientWidth, height: 230 })).observe(box);
+  const read = () => figure.setLegend({ idx: figure.valToIdx(now) });
+  figure.over.addEventListener("mouseleave", () => requestAnimationFrame(read));
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => figure.redraw());
   return (t) => {
-    mark.style.left = figure.valToPos(t, "x") + "px";
-    mark.dataset.t = t;
-    if (!figure.over.matches(":hover")) figure.setLegend({ idx: figure.valToIdx(t) });
+    now = t;
+    place(figure);
+    if (!figure.over.matches(":hover")) read();
   };
 }
 
 function makeViewer(scene) {
   const viewer = new MeshCat.Viewer(element("view"));
-  const fit = () => viewer.set_3d_pane_size(element("stage").clientWidth, element("stage").clientHeight);
+  const [x, y, z] = scene.center, away = scene.radius;  // the camera's frame has y up
+  let stood = 0;
+  const fit = () => {
+    const { clientWidth: width, clientHeight: height } = element("stage");
+    viewer.set_3d_pane_size(width, height);
+    const up = viewer.camera.fov * Math.PI / 360, narrow = Math.min(up, Math.atan(Math.tan(up) * width / height));
+    const distance = away / Math.sin(narrow);  // from which a sphere about all that is drawn fills the view
+    if (stood) return;  // the user's view stays
+    viewer.camera.position.set(x + 0.67 * distance, z + 0.32 * distance, -y + 0.67 * distance);
+    stood = distance;
+  };
   new ResizeObserver(fit).observe(element("stage"));
   window.addEventListener("load", fit);  // after meshcat's own, which takes the window's height
   window.addEventListener("resize", fit);
   requestAnimationFrame(() => requestAnimationFrame(fit));
-  const [x, y, z] = scene.center, away = scene.radius;  // the camera's frame has y up
-  viewer.camera.position.set(x + 0.9 * away, z + 0.5 * away, -y + 0.9 * away);
   viewer.controls.target.set(x, z, -y);
   viewer.camera.near = away / 100;
   viewer.camera.far = 100 * away;
@@ -67,6 +89,7 @@ function makeViewer(scene) {
   viewer.set_property(["Axes"], "visible", false);
   viewer.set_property(["Grid"], "visible", false);  // the scene brings its own
   viewer.scene_tree.find(["Background"]).on_update();
+  viewer.animator.folder.hide();  // one clock is enough: the page's
   return viewer;
 }
 
@@ -98,8 +121,9 @@ function makeClock(duration, show) {
   requestAnimationFrame(step);
   slider.addEventListener("input", () => { play(false); seek(Number(slider.value)); });
   button.addEventListener("click", () => play(!playing));
+  element("speed").addEventListener("change", () => element("speed").blur());
   document.addEventListener("keydown", (event) => {
-    if (event.code !== "Space" || event.target.closest("input, select, button")) return;
+    if (event.code !== "Space" || event.target.closest("select, button")) return;
     event.preventDefault();
     play(!playing);
   });
@@ -110,11 +134,11 @@ async function main() {
   const data = await unpack(JSON.parse(element("data").textContent));
   element("title").textContent = data.title;
   element("outcome").textContent = data.outcome;
-  for (const note of data.notes) {
-    const item = document.createElement("li");
-    item.textContent = note;
-    element("notes").append(item);
+  for (const [list, notes] of [["problems", data.problems], ["notes", data.notes]]) {
+    element(list).append(...notes.map((note) => Object.assign(document.createElement("li"), { textContent: note })));
   }
+  element("trouble").hidden = !data.problems.length;
+  element("count").textContent = `not shown as described: ${data.problems.length}`;
   const viewer = window.viewer = makeViewer(data.scene);
   if (data.live) viewer.connect(); else data.commands.forEach((command) => viewer.handle_command(command));
   const marks = [];
@@ -122,16 +146,13 @@ async function main() {
   const show = (t) => {
     viewer.animator.pause();
     viewer.animator.seek(t);
-    viewer.animator.display_progress(t);
     marks.forEach((mark) => mark(t));
   };
   const clock = window.replay = makeClock(data.duration, show);
   marks.push(...data.plots.map((plot) => makePlot(plot, (t) => { clock.play(false); clock.seek(t); })));
   clock.seek(0);
-  const follow = () => {  // meshcat's own panel may move the time, and over a socket the animation comes when it comes
-    const { actions, time } = viewer.animator;
-    if (actions[0] !== loaded) { loaded = actions[0]; clock.seek(clock.time); }
-    else if (actions.length && !clock.playing && time !== clock.time) clock.seek(time);
+  const follow = () => {  // over a socket the animation comes when it comes
+    if (viewer.animator.actions[0] !== loaded) { loaded = viewer.animator.actions[0]; clock.seek(clock.time); }
     requestAnimationFrame(follow);
   };
   requestAnimationFrame(follow);

@@ -1,0 +1,161 @@
+"""The document of a replay: what its page is made of, from runs, their robots and their meshes.
+
+The first run is drawn as it is, the others as ghosts. What is not drawn as described is said.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from itertools import product
+from pathlib import Path
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.errors import QueryError, RobotDynError
+from robot_dyn.simulation.origin import robot_of
+from robot_dyn.simulation.trajectory import Trajectory
+from robot_dyn.view import commands
+from robot_dyn.view.arrows import arrows
+from robot_dyn.view.keyframes import Keyframes, keyframes
+from robot_dyn.view.overlays import GHOST, Overlays, ground, overlays, squares
+from robot_dyn.view.series import plots
+from robot_dyn.view.stage import Stage, placement
+from robot_dyn.view.visuals import Drawing, drawing
+
+_FAR = 1e4  # [rad] or [m]; what diverged is not drawn beyond
+
+
+class ReplayError(RobotDynError):
+    """A replay that cannot be made or written."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """A run on its stage.
+
+    Attributes:
+        name: In titles and notes.
+        run: What of it can be drawn.
+        stage: Where its robot stands.
+        keys: Keyframes of its joints.
+        drawing: The look of its robot.
+        problems: What is not shown as it is, in words.
+        notes: What else a reader should know.
+    """
+
+    name: str
+    run: Trajectory
+    stage: Stage
+    keys: Keyframes
+    drawing: Drawing
+    problems: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def document(
+    runs: tuple[Trajectory, ...], package_dirs: Iterable[str | Path], frame: str | None, inertia: bool
+) -> dict[str, Any]:
+    """All that the page is made of; arguments as of `replay`.
+
+    Raises:
+        ReplayError: If a run has no samples.
+        QueryError: If it carries no robot, or no robot has the frame.
+    """
+    package_dirs = tuple(package_dirs)
+    shown = [_shown(number, run, len(runs), package_dirs, inertia) for number, run in enumerate(runs)]
+    if frame is not None and all(frame not in each.stage.linkage.links for each in shown):
+        shown[0].stage.link_path(frame)  # says so, with the nearest names
+    center, radius = _sphere(shown)
+    layers = [_overlays(each, radius, frame, number > 0) for number, each in enumerate(shown)]
+    scale = arrows([(each.stage, each.run, layer) for each, layer in zip(shown, layers, strict=True)], radius)
+    found, tracks, notes, problems = [ground(center, radius)], {}, [], []
+    for number, (each, layer) in enumerate(zip(shown, layers, strict=True)):
+        clear = GHOST if number else 1.0
+        found += each.stage.draw(each.drawing.pieces, clear) + layer.commands
+        tracks |= each.stage.tracks(each.keys) | layer.tracks
+        who = "" if len(shown) == 1 else f"{each.name}: "
+        notes += [who + note for note in (*each.notes, *each.drawing.remarks, *layer.notes)]
+        problems += [who + note for note in (*each.problems, *each.drawing.notes)]
+    return {
+        "title": " and ".join(each.name for each in shown),
+        "outcome": "; ".join(_outcome(each, len(shown)) for each in shown),
+        "duration": max(float(each.run.t[-1]) for each in shown),
+        "problems": problems,
+        "notes": [*notes, *scale, f"the squares on the ground are {squares(radius):g} m wide"],
+        "scene": {"center": center.tolist(), "radius": radius},
+        "plots": plots([each.run for each in shown], [each.stage for each in shown]),
+        "commands": [*found, commands.set_animation(tracks)],
+    }
+
+
+def _overlays(shown: Shown, radius: float, frame: str | None, ghost: bool) -> Overlays:
+    own = frame if frame in shown.stage.linkage.links else None  # a ghost may be another robot
+    return overlays(shown.stage, shown.run, radius, own, ghost)
+
+
+def _outcome(shown: Shown, count: int) -> str:
+    end = shown.run.outcome
+    who = "" if count == 1 else f"{shown.name}: "
+    return f"{who}{end.ending} at t = {end.t:g} s" + (f": {end.advice}" if end.advice else "")
+
+
+def _shown(number: int, run: Trajectory, count: int, package_dirs: tuple[str | Path, ...], inertia: bool) -> Shown:
+    robot = robot_of(run)
+    whole, run = len(run.t), _drawable(run)
+    stage = Stage("run" if number == 0 else f"ghost {number}", robot)
+    if unknown := run.wrenches.keys() - stage.linkage.links.keys():
+        raise QueryError(f"the run has a wrench on {min(unknown)!r}, which is no link of its robot; simulate again")
+    keys = keyframes(run.t, stage.linkage.ties.position(run.q))
+    problems = []
+    if len(run.t) < whole:
+        problems.append(f"the last {whole - len(run.t)} samples are not shown: not finite, or beyond {_FAR:g}")
+    worst = int(keys.error.argmax())
+    joint = stage.linkage.bodies[worst]
+    thinning = (
+        f"{len(keys.t)} keyframes stand for {keys.samples} samples; between them joints are off by at most"
+        f" {keys.error[worst]:.1e} {'rad' if joint.revolute else 'm'} ({joint.joint})"
+    )
+    mark = "" if not number else " (ghost)" if count == 2 else f" (ghost {number})"
+    look = drawing(robot, package_dirs, inertia=inertia)
+    return Shown(robot.name + mark, run, stage, keys, look, tuple(problems), (thinning,))
+
+
+def _drawable(run: Trajectory) -> Trajectory:
+    """The run up to its first sample that cannot be drawn."""
+    good = np.all(np.abs(run.q) < _FAR, axis=1) & np.all(np.isfinite(run.v) & np.isfinite(run.tau), axis=1)
+    end = len(good) if good.all() else int(good.argmin())
+    if not end:
+        raise ReplayError("the run has no samples that can be shown; simulate it again, with a smaller step")
+    cut = {name: getattr(run, name)[:end] for name in ("t", "q", "v", "a", "tau")}
+    wrenches = {link: F[F[:, 0] <= run.t[end - 1]] for link, F in run.wrenches.items()}
+    return replace(run, **cut, wrenches=wrenches, at_stop=None if run.at_stop is None else run.at_stop[:end])
+
+
+def _sphere(shown: list[Shown]) -> tuple[np.ndarray, float]:
+    """Center (3,) and radius in [m] of a sphere about all that is drawn, at a few keyframes."""
+    points = []
+    for each in shown:
+        few = np.unique(np.linspace(0, len(each.keys.t) - 1, 12).round().astype(int))
+        points += _corners(each, each.run.q[np.searchsorted(each.run.t, each.keys.t[few]).clip(0, len(each.run.t) - 1)])
+    all_ = np.concatenate(points)
+    center = (all_.min(axis=0) + all_.max(axis=0)) / 2
+    return center, max(float(np.linalg.norm(all_ - center, axis=1).max()), 1e-3)
+
+
+def _corners(shown: Shown, q: np.ndarray) -> list[np.ndarray]:
+    """Corners of the boxes about all pieces at positions q (k, n), (8 k, 3) each; and the tip."""
+    linkage = shown.stage.linkage
+    at = linkage.at(q).in_base
+    points = []
+    for piece in shown.drawing.pieces:
+        R, p = placement(at, *linkage.links[piece.link][:2])
+        box = np.array(
+            list(product(*zip(piece.mesh.vertices.min(axis=0), piece.mesh.vertices.max(axis=0), strict=True)))
+        )
+        local = box @ piece.pose[:3, :3].T + piece.pose[:3, 3]
+        points.append((np.einsum("...ij,cj->...ci", R, local) + p[..., None, :]).reshape(-1, 3))
+    _, tip = placement(at, *linkage.links[shown.stage.tip][:2])
+    return [*points, np.zeros((1, 3)), tip.reshape(-1, 3)]
