@@ -177,6 +177,17 @@ def apply(A: Array, x: Array) -> Array:
     return (A @ x[..., None])[..., 0]
 
 
+def symmetric(A: Array) -> Array:
+    """A (..., m, m), symmetric but for rounding, with its upper triangle in place of the lower: less to trace.
+
+    Floats are left as they are, for speed.
+    """
+    if A.dtype != object:
+        return A
+    upper = np.triu(np.ones(A.shape[-2:], dtype=bool))
+    return np.where(upper, A, transpose(A))
+
+
 class NotPositiveDefiniteError(Exception):
     """Internal: a pivot of a factorisation is not positive; the caller names the joint of `row`."""
 

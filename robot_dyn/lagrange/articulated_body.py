@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array, apply, transpose
+from robot_dyn.arithmetic import Array, apply, symmetric, transpose
 from robot_dyn.errors import QueryError, SingularError
-from robot_dyn.lagrange.linkage import BASE, Linkage
-from robot_dyn.spatial import adjoint_inverse, bracket
+from robot_dyn.lagrange.linkage import BASE, Linkage, Step
+from robot_dyn.spatial import bracket
 
 
 def articulated_body(linkage: Linkage, q: Array, v: Array, tau: Array) -> Array:
@@ -32,10 +32,9 @@ def articulated_body(linkage: Linkage, q: Array, v: Array, tau: Array) -> Array:
     if linkage.ties.S.shape[0] != linkage.ties.S.shape[1]:
         raise QueryError("the articulated-body algorithm takes no tied joints; use Lagrangian.forward_dynamics")
     S = linkage.ties.S  # at most an exchange of joints
-    at = linkage.at(q)
+    X = linkage.steps(q)
+    batch = np.broadcast_shapes(q.shape[:-1], v.shape[:-1], tau.shape[:-1])
     v, tau = linkage.ties.velocity(v), tau @ S.T
-    batch = np.broadcast_shapes(at.batch, v.shape[:-1], tau.shape[:-1])
-    X = [adjoint_inverse(R, p) for R, p in at.in_parent]  # takes twists from the parent to the body
     coriolis, inertia, force = _outward(linkage, X, v, batch)
 
     U, d, u = {}, {}, {}
@@ -46,16 +45,16 @@ def articulated_body(linkage: Linkage, q: Array, v: Array, tau: Array) -> Array:
             raise SingularError(body.joint, "at this q")
         u[i] = tau[..., i, None] - force[i][..., None, :] @ body.screw
         if body.parent != BASE:
-            left = inertia[i] - U[i][..., :, None] * (U[i] / d[i])[..., None, :]
+            left = symmetric(inertia[i] - U[i][..., :, None] * (U[i] / d[i])[..., None, :])
             pushed = force[i] + apply(left, coriolis[i]) + U[i] * (u[i] / d[i])
-            inertia[body.parent] = inertia[body.parent] + transpose(X[i]) @ left @ X[i]
-            force[body.parent] = force[body.parent] + apply(transpose(X[i]), pushed)
+            inertia[body.parent] = inertia[body.parent] + X[i].inertia(left)
+            force[body.parent] = force[body.parent] + X[i].wrench(pushed)
 
     acceleration: list[Array] = []
     a = np.zeros((*batch, len(linkage.bodies)), dtype=linkage.gravity.dtype)
     free_fall = np.concatenate([-linkage.gravity, np.zeros_like(linkage.gravity)])
     for i, body in enumerate(linkage.bodies):
-        carried = apply(X[i], free_fall if body.parent == BASE else acceleration[body.parent]) + coriolis[i]
+        carried = X[i].twist(free_fall if body.parent == BASE else acceleration[body.parent]) + coriolis[i]
         own = (u[i] - apply(U[i][..., None, :], carried)) / d[i]
         acceleration.append(carried + own * body.screw)
         a[..., i] = own[..., 0]
@@ -63,13 +62,13 @@ def articulated_body(linkage: Linkage, q: Array, v: Array, tau: Array) -> Array:
 
 
 def _outward(
-    linkage: Linkage, X: list[Array], v: Array, batch: tuple[int, ...]
+    linkage: Linkage, X: list[Step], v: Array, batch: tuple[int, ...]
 ) -> tuple[list[Array], list[Array], list[Array]]:
     """For each body c = [V, ξ v], 𝓜, and the bias wrench −ad_Vᵀ 𝓜 V, base to tips."""
     twist, coriolis, inertia, force = [], [], [], []
     for i, body in enumerate(linkage.bodies):
         own = v[..., i, None] * body.screw
-        V = np.broadcast_to(own if body.parent == BASE else apply(X[i], twist[body.parent]) + own, (*batch, 6))
+        V = np.broadcast_to(own if body.parent == BASE else X[i].twist(twist[body.parent]) + own, (*batch, 6))
         twist.append(V)
         coriolis.append(apply(bracket(V), own))
         inertia.append(np.broadcast_to(linkage.inertias[i], (*batch, 6, 6)))

@@ -13,7 +13,7 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Arithmetic, Array, apply, sqrt
+from robot_dyn.arithmetic import Arithmetic, Array, apply, sqrt, symmetric, transpose
 from robot_dyn.model.ties import Ties, resolve
 from robot_dyn.model.tree import Joint, Link, Tree
 from robot_dyn.spatial import adjoint_inverse, rotation, rotation_rpy, spatial_inertia
@@ -57,13 +57,18 @@ class Body:
     @cached_property
     def screw(self) -> Array:
         """ξ, the body twist at unit rate, (6,)."""
-        zero = np.zeros_like(self.axis)
-        return np.concatenate([zero, self.axis] if self.revolute else [self.axis, zero])
+        return np.concatenate((np.zeros_like(self.axis), self.axis)[:: 1 if self.revolute else -1])
 
     @cached_property
     def block(self) -> tuple[Any, ...]:
         """Index of the entries of a matrix (..., N, N) that couple the joints of the path."""
         return (..., *np.ix_(self.path, self.path))
+
+    def step(self, q: Array) -> Step:
+        """The change of frame from the parent at the joint's coordinate q (...,)."""
+        zero, one = np.zeros_like(self.axis), np.eye(3, dtype=self.axis.dtype)
+        motion = (rotation(self.axis, q), zero) if self.revolute else (one, q[..., None] * self.axis)
+        return Step(adjoint_inverse(self.pose.R, self.pose.p), adjoint_inverse(*motion))
 
     def moved(self, q: Array) -> tuple[Array, Array]:
         """(R, p) in the parent's frame at the joint's coordinate q (...,)."""
@@ -71,6 +76,34 @@ class Body:
             return self.pose.R @ rotation(self.axis, q), np.broadcast_to(self.pose.p, (*q.shape, 3))
         slide = self.pose.R @ self.axis
         return np.broadcast_to(self.pose.R, (*q.shape, 3, 3)), self.pose.p + q[..., None] * slide
+
+
+@final
+@dataclass(frozen=True)
+class Step:
+    """The change of frame from a body to the one before it, Ad⁻¹ = Ad_joint⁻¹ Ad_pose⁻¹; in two, for fewer products.
+
+    Attributes:
+        pose: Ad⁻¹ of the joint's constant placement, (6, 6).
+        joint: Ad⁻¹ of the joint's own motion, (..., 6, 6).
+    """
+
+    pose: Array
+    joint: Array
+
+    def twist(self, V: Array) -> Array:
+        """The parent's twist, as the body's: Ad⁻¹ V."""
+        return apply(self.joint, apply(self.pose, V))
+
+    def wrench(self, F: Array) -> Array:
+        """A wrench on the body, as one on the parent: Ad⁻ᵀ F."""
+        return apply(self.pose.T, apply(transpose(self.joint), F))
+
+    def inertia(self, A: Array) -> Array:
+        """A symmetric form on the body's twists, as one on the parent's: Ad⁻ᵀ A Ad⁻¹."""
+        for X in (self.joint, self.pose):
+            A = symmetric(transpose(X) @ (A @ X))
+        return A
 
 
 @final
@@ -100,6 +133,11 @@ class Linkage:
             if body != BASE:
                 total[body] = total[body] + inertia
         return tuple(total)
+
+    def steps(self, q: Array) -> list[Step]:
+        """The change of frame from each body's parent at coordinates q (..., n)."""
+        q = self.ties.position(q)
+        return [body.step(q[..., i]) for i, body in enumerate(self.bodies)]
 
     def at(self, q: Array) -> Configuration:
         """The linkage at coordinates q (..., n)."""

@@ -1,0 +1,58 @@
+"""Conditions: comparisons of symbols, c ∈ {0, 1}, whose truth depends on the state and is decided by who traces."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import Any, final
+
+import casadi as ca
+
+Node = Any  # casadi.SX, 1 × 1
+
+
+def _undecided(condition: Node) -> bool:
+    raise TypeError("the truth of a comparison depends on the state")
+
+
+_decision: ContextVar[Callable[[Node], bool]] = ContextVar("decision", default=_undecided)
+
+
+@contextmanager
+def deciding(decision: Callable[[Node], bool]) -> Iterator[None]:
+    """Conditions asked for their truth within take this decision."""
+    token = _decision.set(decision)
+    try:
+        yield
+    finally:
+        _decision.reset(token)
+
+
+@final
+class Condition:
+    """A comparison whose outcome depends on the state; asked for its truth, it follows the decision in force."""
+
+    __slots__ = ("node",)
+
+    def __init__(self, node: Node) -> None:
+        self.node = node
+
+    def __bool__(self) -> bool:
+        return _decision.get()(self.node)
+
+    def __and__(self, other: Any) -> Condition:
+        return Condition(ca.logic_and(self.node, truth(other)))
+
+    def __or__(self, other: Any) -> Condition:
+        return Condition(ca.logic_or(self.node, truth(other)))
+
+    def __invert__(self) -> Condition:
+        return Condition(ca.logic_not(self.node))
+
+    __rand__, __ror__ = __and__, __or__
+
+
+def truth(condition: Any) -> Node:
+    """0 or 1, of a condition or of what is known to be true or false."""
+    return condition.node if isinstance(condition, Condition) else ca.SX(bool(condition))

@@ -1,0 +1,197 @@
+"""Compiled: a robot's equations as machine code, M(q) a + C(q, v) v + N(q) = τ, behind the Dynamics protocol."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import Any, final
+
+import numpy as np
+from numpy import empty
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.compiled.cache import default_store
+from robot_dyn.compiled.derivatives import forward_dynamics_derivatives
+from robot_dyn.compiled.engine import Engine
+from robot_dyn.compiled.on_first_use import OnFirstUse
+from robot_dyn.compiled.referee import Referee
+from robot_dyn.compiled.right_angles import completed
+from robot_dyn.compiled.threads import thread_count
+from robot_dyn.compiled.trace import ARGUMENTS, Trace
+from robot_dyn.errors import QueryError
+from robot_dyn.model.dynamics import Axes
+from robot_dyn.model.robot import Robot
+
+_DERIVATIVES = "forward_dynamics_derivatives"
+
+
+@final
+@dataclass(frozen=True)
+class CompiledDynamics:
+    """A robot as machine code; each quantity is compiled, and checked against Pinocchio, when first asked for.
+
+    Attributes:
+        original: The robot as given.
+        dtype: "float64" or "float32".
+        threads: For batches; None for all processors.
+        cache: Whether compiled code is kept on disk.
+    """
+
+    original: Robot
+    dtype: str = "float64"
+    threads: int | None = 1
+    cache: bool = True
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.original, Robot):
+            raise QueryError(f"robot: give a Robot, such as rd.load('ur5'), got {self.original!r}")
+        if self.dtype not in ("float64", "float32"):
+            raise QueryError(f"dtype must be 'float64' or 'float32', got {self.dtype!r}")
+        thread_count(self.threads)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return CompiledDynamics, (self.original, self.dtype, self.threads, self.cache)
+
+    @cached_property
+    def _completed(self) -> tuple[Robot, tuple[str, ...]]:
+        return completed(self.original)
+
+    @property
+    def robot(self) -> Robot:
+        """The robot whose equations are compiled: the one given, with its right angles written out in full."""
+        return self._completed[0]
+
+    @property
+    def right_angles(self) -> tuple[str, ...]:
+        """Angles that the file states with too few digits and that were taken as right angles, in words."""
+        return self._completed[1]
+
+    @cached_property
+    def engine(self) -> Engine:
+        """The kernels."""
+        trace, robot = Trace(self.robot), self.robot
+
+        def truth(quantity: str, state: dict[str, np.ndarray]) -> tuple[np.ndarray, Any]:
+            return np.asarray(self._otherwise(quantity)(*(state[name] for name in ARGUMENTS[quantity]))), 0.0
+
+        return Engine(
+            trace.quantity,
+            trace.shape,
+            ARGUMENTS,
+            Referee(robot, "Pinocchio"),
+            truth,
+            self.joint_names,
+            self.dtype,
+            thread_count(self.threads),
+            default_store() if self.cache else None,
+            frozenset(("forward_dynamics", _DERIVATIVES) if robot.joint_without_inertia is not None else ()),
+        )
+
+    @cached_property
+    def _ones(self) -> OnFirstUse:
+        return self.engine.ones
+
+    @cached_property
+    def _like(self) -> np.ndarray:
+        return self.engine.like
+
+    @property
+    def instructions(self) -> dict[str, dict[str, int]]:
+        """Instructions by formulation, of each quantity used so far; the first is the one that won."""
+        return {
+            name: dict(sorted(trace.counts.items(), key=lambda item: item[1]))
+            for name, trace in self.engine.traces.items()
+        }
+
+    def served_by(self, quantity: str) -> str:
+        """The formulation whose machine code answers a quantity, or "Pinocchio" past the size where compiling pays."""
+        if quantity not in ARGUMENTS or not self.engine.pays(quantity):
+            return "Pinocchio"
+        return self.engine.traces[quantity].formulation
+
+    @property
+    def n(self) -> int:
+        """Number of degrees of freedom."""
+        return self.original.n
+
+    @cached_property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the n joints, in the order of q."""
+        return self.original.joint_names
+
+    @cached_property
+    def _vector(self) -> tuple[int, Any]:
+        """What `empty` takes for a result (n,)."""
+        return self.n, np.dtype(self.dtype)
+
+    def M(self, q: Array, *, out: np.ndarray | None = None) -> Any:
+        return self._matrix("M", (q,), out)
+
+    def C(self, q: Array, v: Array, *, out: np.ndarray | None = None) -> Any:
+        return self._matrix("C", (q, v), out)
+
+    def N(self, q: Array, *, out: np.ndarray | None = None) -> Any:
+        return self._torque("N", (q,), out)
+
+    def coriolis_torque(self, q: Array, v: Array, *, out: np.ndarray | None = None) -> Any:
+        return self._torque("coriolis_torque", (q, v), out)
+
+    def coriolis_transpose(self, q: Array, v: Array, *, out: np.ndarray | None = None) -> Any:
+        return self._torque("coriolis_transpose", (q, v), out)
+
+    def inverse_dynamics(self, q: Array, v: Array, a: Array, *, out: np.ndarray | None = None) -> Any:
+        y = empty(*self._vector) if out is None else out
+        if not self._ones["inverse_dynamics"](q, v, a, y, self._like):
+            return y
+        return self._ask("inverse_dynamics", (q, v, a), out)
+
+    def forward_dynamics(self, q: Array, v: Array, tau: Array, *, out: np.ndarray | None = None) -> Any:
+        y = empty(*self._vector) if out is None else out
+        if not self._ones["forward_dynamics"](q, v, tau, y, self._like):
+            return y
+        return self._ask("forward_dynamics", (q, v, tau), out)
+
+    def forward_dynamics_derivatives(self, q: Array, v: Array, tau: Array) -> tuple[Any, Any, Any]:
+        """∂a/∂q, ∂a/∂v, ∂a/∂τ of forward dynamics, each (..., n, n): −M⁻¹ ∂ID/∂q, −M⁻¹ ∂ID/∂v, M⁻¹."""
+        three = self.engine.ask(_DERIVATIVES, (q, v, tau), None, self._otherwise(_DERIVATIVES))
+        return three[..., 0, :, :], three[..., 1, :, :], three[..., 2, :, :]
+
+    def kinetic_energy(self, q: Array, v: Array) -> Any:
+        return self._ask("kinetic_energy", (q, v), None)
+
+    def potential_energy(self, q: Array) -> Any:
+        return self._ask("potential_energy", (q,), None)
+
+    def momentum(self, q: Array, v: Array, *, out: np.ndarray | None = None) -> Any:
+        return self._torque("momentum", (q, v), out)
+
+    def placement(self, q: Array, frame: str) -> Any:
+        return self.robot.placement(q, frame)
+
+    def jacobian(self, q: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED) -> Any:
+        return self.robot.jacobian(q, frame, expressed_in=expressed_in)
+
+    def jacobian_rate(self, q: Array, v: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED) -> Any:
+        return self.robot.jacobian_rate(q, v, frame, expressed_in=expressed_in)
+
+    def _torque(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None) -> Any:
+        return self._fast(quantity, arguments, out, self.n)
+
+    def _matrix(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None) -> Any:
+        return self._fast(quantity, arguments, out, (self.n, self.n))
+
+    def _fast(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None, shape: Any) -> Any:
+        y = empty(shape, self._vector[1]) if out is None else out
+        if not self._ones[quantity](*arguments, y, self._like):
+            return y
+        return self._ask(quantity, arguments, out)
+
+    def _ask(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None) -> Any:
+        return self.engine.ask(quantity, arguments, out, self._otherwise(quantity))
+
+    def _otherwise(self, quantity: str) -> Callable[..., Any]:
+        """Pinocchio's way to a quantity."""
+        if quantity == _DERIVATIVES:
+            return partial(forward_dynamics_derivatives, self.robot)
+        return getattr(self.robot, quantity)

@@ -1,0 +1,235 @@
+"""The engine of a compiled robot or plant: each quantity is traced, compiled and refereed when it is first asked for.
+
+A quantity of one state costs one call of machine code; what that reports, and lists, batches and errors, go the general
+way, `ask`.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.arithmetic import FLOAT64
+from robot_dyn.compiled.emit import emit
+from robot_dyn.compiled.kernel import Kernel, Status
+from robot_dyn.compiled.on_first_use import OnFirstUse
+from robot_dyn.compiled.overload import Store
+from robot_dyn.compiled.referee import STATES, Referee
+from robot_dyn.compiled.threads import thread_count as thread_count
+from robot_dyn.compiled.trace import Traced
+from robot_dyn.errors import QueryError, RobotDynWarning
+from robot_dyn.model.dynamics import check_batches, checked
+
+MOST_INSTRUCTIONS = 20_000  # of code that goes through Numba line by line, as rollouts do: half a minute of compiling
+# Measured on chains: forward dynamics of 64 joints, 48 875 instructions, takes 8 s to compile; a batch is then 13 times
+# as fast as Pinocchio, one state from Python twice. The time grows as the count: above this, a quarter of a minute.
+LARGEST_KERNEL = 100_000
+_FEW = 8  # states of a batch that do not pay a batch kernel
+_DOUBTFUL = 1e10  # of |a|, as Robot: M may be singular
+
+
+class SizeWarning(RobotDynWarning):
+    """Equations too long to be compiled: Pinocchio answers in their place."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Engine:
+    """Kernels by quantity.
+
+    Attributes:
+        traced: Gives the trace of a quantity.
+        shape: Gives the shape of a quantity for one state.
+        arguments: Names of the arguments by quantity; "t" is a time.
+        referee: What kernels must agree with.
+        truth: The referee's answer: (quantity, states) → (STATES, …), and the torque of effects, a term.
+        joint_names: For messages.
+        dtype: "float64" or "float32".
+        threads: For batches.
+        store: Where compiled code is kept, or None.
+        without: Quantities that have no answer, whose errors are for others to word.
+    """
+
+    traced: Callable[[str], Traced]
+    shape: Callable[[str], tuple[int, ...]]
+    arguments: dict[str, tuple[str, ...]]
+    referee: Referee
+    truth: Callable[[str, dict[str, np.ndarray]], tuple[np.ndarray, Any]]
+    joint_names: tuple[str, ...]
+    dtype: str
+    threads: int
+    store: Store | None
+    without: frozenset[str] = frozenset()
+    traces: OnFirstUse = field(init=False, repr=False)
+    paying: OnFirstUse = field(init=False, repr=False)
+    kernels: OnFirstUse = field(init=False, repr=False)
+    ones: OnFirstUse = field(init=False, repr=False)
+    many: OnFirstUse = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        for name, make in (
+            ("traces", self.traced),
+            ("paying", self._pays),
+            ("kernels", self._kernel),
+            ("ones", self._one),
+            ("many", self._many),
+        ):
+            object.__setattr__(self, name, OnFirstUse(make))
+
+    @cached_property
+    def like(self) -> np.ndarray:
+        """An array of the kernels' dtype: the last argument of `ones`."""
+        return np.empty(0, self.dtype)
+
+    def pays(self, quantity: str) -> bool:
+        """Whether a quantity is small enough to be compiled."""
+        return self.paying[quantity]
+
+    def _pays(self, quantity: str) -> bool:
+        """Whether it is, with a SizeWarning if it is not."""
+        if quantity in self.without:
+            return False
+        trace = self.traces[quantity]
+        if (count := trace.counts[trace.formulation]) <= LARGEST_KERNEL:
+            return True
+        warnings.warn(
+            f"{quantity} takes {count} instructions, more than the {LARGEST_KERNEL} that are worth compiling;"
+            f" {self.referee.name} answers, at its own speed",
+            SizeWarning,
+            stacklevel=2,
+        )
+        return False
+
+    def ask(
+        self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None, otherwise: Callable[..., Any]
+    ) -> Any:
+        """A quantity in general: check the arguments, go through the batch, hand doubtful results to `otherwise`.
+
+        Raises:
+            QueryError: If an argument is wrong; and what `otherwise` raises.
+        """
+        if (quick := self._plainly(quantity, arguments, out)) is not None:
+            return quick
+        arrays = {name: self._array(name, x) for name, x in zip(self.arguments[quantity], arguments, strict=True)}
+        batch = check_batches(**arrays)
+        shape = self.shape(quantity)
+        states = int(np.prod(batch, dtype=np.int64))
+        own = out is None or not _direct(out, (*batch, *shape), self.dtype, list(arrays.values()))
+        result: Any = np.empty((*batch, *shape), self.dtype) if own else out
+        status = Status.RESULT
+        if self.pays(quantity):
+            flat = [
+                np.ascontiguousarray(np.broadcast_to(x, (*batch, x.shape[-1])), self.dtype).reshape(states, x.shape[-1])
+                for x in arrays.values()
+            ]
+            status = self._run(quantity, flat, result.reshape(states, -1)) if states else Status.FINE
+        if status is not Status.FINE:
+            result[...] = np.reshape(otherwise(*arguments), result.shape)
+        return _into(out, result[..., 0] if quantity.endswith("energy") else result) if own else out
+
+    def _plainly(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None) -> Any:
+        """The result for arrays (B, n) that the kernel takes as they are, in which it finds nothing; else None."""
+        shape, states = self.shape(quantity), getattr(arguments[-1], "shape", ())[:-1]
+        if len(states) != 1 or states[0] <= _FEW or quantity.endswith("energy"):
+            return None
+        y: Any = np.empty((*states, *shape), self.dtype) if out is None else out
+        try:
+            if y.shape == (*states, *shape) and y.flags.c_contiguous:
+                flat = y if len(shape) == 1 else y.reshape(states[0], -1)
+                if self.many[quantity](arguments, flat, self.threads) is Status.FINE:
+                    return y
+        except (AttributeError, TypeError):  # not such arrays
+            pass
+        return None
+
+    def _array(self, name: str, x: Any) -> np.ndarray:
+        """An argument as an array; that its numbers are finite the kernel sees faster."""
+        if name == "t":
+            return _time(x)
+        plain = x.__class__ is np.ndarray and x.dtype == self.dtype and x.shape[-1:] == (len(self.joint_names),)
+        return x if plain else checked(name, x, self.joint_names)
+
+    def _run(self, quantity: str, inputs: list[np.ndarray], y: np.ndarray) -> Status:
+        if len(y) > _FEW:
+            return self.many[quantity](inputs, y, self.threads)
+        timed = self.kernels[quantity].times
+        results = y.reshape(len(y), *self.shape(quantity))
+        rows = [[float(x[i, 0]) if timed and j == 0 else x[i] for j, x in enumerate(inputs)] for i in range(len(y))]
+        return max(self._single(quantity, *row, results[i]) for i, row in enumerate(rows))
+
+    def _single(self, quantity: str, *arguments: Any) -> Status:
+        status = Status(self.ones[quantity](*arguments, self.like))
+        return self.kernels[quantity].far(*arguments) if status is Status.FAR else status
+
+    def _kernel(self, quantity: str) -> Kernel:
+        doubtful = _DOUBTFUL if quantity == "forward_dynamics" else np.inf
+        times = self.arguments[quantity][0] == "t"
+        source = emit(self.traces[quantity].function)
+        return Kernel(source, self.shape(quantity), self.dtype, times, doubtful, self.store)
+
+    def _one(self, quantity: str) -> Any:
+        """The checked kernel for one state."""
+        if not self.pays(quantity):
+            return _never
+        kernel = self.kernels[quantity]
+        self._judge(quantity, lambda inputs, y: [kernel.call(*row, y[i], self.like) for i, row in enumerate(inputs)])
+        return kernel.call
+
+    def _many(self, quantity: str) -> Any:
+        """The checked kernel for batches."""
+        if not self.pays(quantity):
+            return _never
+        kernel = self.kernels[quantity]
+        length = int(np.prod(kernel.shape))
+
+        def run(rows: list[list[Any]], y: np.ndarray) -> None:
+            columns = [np.array([row[j] for row in rows], self.dtype).reshape(STATES, -1) for j in range(len(rows[0]))]
+            kernel.many(columns, y.reshape(STATES, length), 1)
+
+        self._judge(quantity, run)
+        return kernel.many
+
+    def _judge(self, quantity: str, run: Callable[[list[list[Any]], np.ndarray], object]) -> None:
+        names = self.arguments[quantity]
+        state = {name: x.astype(self.dtype).astype(float) for name, x in self.referee.states().items()}
+        rows = [
+            [float(state[n][i]) if n == "t" else state[n][i].astype(self.dtype) for n in names] for i in range(STATES)
+        ]
+        ours = np.empty((STATES, *self.shape(quantity)), self.dtype)
+        run(rows, ours)
+        theirs, effects = self.truth(quantity, state)
+        self.referee.judge(quantity, ours.reshape(theirs.shape), theirs, self.dtype, effects)
+
+
+def _never(*_: Any) -> int:
+    """In place of a kernel that does not pay: the general way takes over."""
+    return Status.SHAPE
+
+
+def _time(t: Any) -> np.ndarray:
+    try:
+        return FLOAT64.asarray(t)[..., None]
+    except (TypeError, ValueError):
+        raise QueryError(f"t must be a time in seconds, got {t!r}") from None
+
+
+def _direct(out: Any, shape: tuple[int, ...], dtype: str, arrays: list[np.ndarray]) -> bool:
+    """Whether a kernel may write into `out`: an array of that form that shares no memory with the arguments."""
+    if not isinstance(out, np.ndarray) or out.shape != shape or out.dtype != dtype:
+        return False
+    return out.flags.c_contiguous and out.flags.writeable and not any(np.may_share_memory(out, x) for x in arrays)
+
+
+def _into(out: np.ndarray | None, result: np.ndarray) -> Any:
+    if out is None:
+        return result if result.ndim else result[()]
+    if not isinstance(out, np.ndarray) or out.dtype != result.dtype or out.shape != result.shape:
+        got = f"{out.dtype} {out.shape}" if isinstance(out, np.ndarray) else repr(out)
+        raise QueryError(f"out must be an array of {result.dtype} and shape {result.shape}, got {got}")
+    out[...] = result
+    return out

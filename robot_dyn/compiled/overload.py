@@ -1,0 +1,88 @@
+"""Compiled code that survives its process: a Numba overload, taken from a store or compiled and put there.
+
+The key is the SHA-256 of all that the machine code depends on: the straight-line code and its constants, the signature,
+the versions of what made it, and the processor with its features.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+import platform
+from collections.abc import Callable
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any, Protocol
+
+
+class Store(Protocol):
+    """Where payloads are kept by key; see `robot_dyn.compiled.cache`."""
+
+    def load(self, key: str) -> bytes | None: ...
+
+    def save(self, key: str, payload: bytes) -> None: ...
+
+
+def compiled(make: Callable[[], Any], arguments: list[str], store: Store | None, identity: list[str]) -> Any:
+    """A Numba function with one overload, restored from the store if it is there.
+
+    Args:
+        make: Gives the function, not yet compiled.
+        arguments: Numba's types of them; the result is an int64.
+        store: Where to look and keep; None for nowhere.
+        identity: Texts that determine the machine code.
+    """
+    from numba.core import types
+
+    signature, count = types.int64(*arguments), len(arguments)
+    key = digest([str(signature), *identity])
+    payload = store.load(key) if store is not None else None
+    if payload is not None and (restored := _restored(payload, count)) is not None:
+        return restored
+    function = make()
+    function.compile(signature)
+    function.disable_compile()
+    if store is not None:
+        store.save(key, _payload(function))
+    return function
+
+
+def digest(identity: list[str]) -> str:
+    """The key of what these texts, this processor and these versions determine."""
+    import llvmlite.binding as llvm
+
+    versions = [f"{name} {_version(name)}" for name in ("robot-dyn", "numba", "llvmlite", "casadi", "numpy")]
+    machine = [platform.python_version(), llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()]
+    parts = [*identity, *versions, *machine]
+    return hashlib.sha256("\0".join(f"{len(part)} {part}" for part in parts).encode()).hexdigest()
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:  # run from its folder
+        return "unknown"
+
+
+def _payload(function: Any) -> bytes:
+    from numba.core.serialize import dumps
+
+    (overload,) = function.overloads.values()
+    return dumps(overload._reduce())
+
+
+def _restored(payload: bytes, count: int) -> Any:
+    """The function of a payload, or None if this Numba cannot take it."""
+    import numba as nb
+    from numba.core.compiler import CompileResult
+
+    function: Any = nb.njit(eval(f"lambda {', '.join(f'x{i}' for i in range(count))}: None"))  # hung upon, never run
+    context = function.targetctx
+    try:
+        context.refresh()
+        overload = CompileResult._rebuild(context, *pickle.loads(payload))
+    except (pickle.UnpicklingError, ValueError, TypeError, AttributeError, EOFError, RuntimeError):
+        return None
+    context.insert_user_function(overload.entry_point, overload.fndesc, [overload.library])
+    function.add_overload(overload)
+    function.disable_compile()
+    return function

@@ -1,0 +1,219 @@
+"""CompiledPlant: a plant as machine code, M(q) a + C(q, v) v + N(t, q, v) = Υ, effects and bounds in the kernel.
+
+The effects are traced from the lines that the interpreted plant runs; what a plant does not name is not in the kernel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, final
+
+import casadi as ca
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.compiled.cache import default_store
+from robot_dyn.compiled.dynamics import CompiledDynamics
+from robot_dyn.compiled.emit import instructions
+from robot_dyn.compiled.engine import Engine
+from robot_dyn.compiled.referee import Referee
+from robot_dyn.compiled.symbolic import Symbols, TraceError, column, every_branch, inputs
+from robot_dyn.compiled.trace import Trace, Traced
+from robot_dyn.effects.effect import Bound
+from robot_dyn.effects.plant import Plant
+
+_ARGUMENTS = {
+    "N": ("t", "q", "v"),
+    "torque": ("t", "q", "v"),
+    "inverse_dynamics": ("t", "q", "v", "a"),
+    "forward_dynamics": ("t", "q", "v", "u"),
+}
+_TIMES = (float, int, np.float64)  # what machine code takes for a time; others are looked at in general
+
+
+@final
+@dataclass(frozen=True)
+class CompiledPlant:
+    """A plant as machine code; each quantity is compiled, and checked against the interpreted one, on first use.
+
+    Attributes:
+        plant: The plant.
+        dynamics: Its rigid bodies, compiled.
+    """
+
+    plant: Plant
+    dynamics: CompiledDynamics
+
+    @cached_property
+    def interpreted(self) -> Plant:
+        """The plant whose equations are compiled: the one given, with right angles written out in full."""
+        return Plant(self.dynamics.robot, self.plant.effects)
+
+    @cached_property
+    def engine(self) -> Engine:
+        """The kernels."""
+
+        def truth(quantity: str, state: dict[str, np.ndarray]) -> tuple[np.ndarray, Any]:
+            rows = [[state[name][i] for name in _ARGUMENTS[quantity]] for i in range(len(state["t"]))]
+            times = zip(state["t"], state["q"], state["v"], strict=True)
+            effects = np.array(
+                [np.broadcast_to(self.interpreted.torque(*each), state["q"].shape[1:]) for each in times]
+            )
+            method = getattr(self.interpreted, quantity)
+            return np.array([np.broadcast_to(method(*row), state["q"].shape[1:]) for row in rows]), effects
+
+        robot = self.dynamics.robot
+        return Engine(
+            self._traced,
+            lambda quantity: (robot.n,),
+            _ARGUMENTS,
+            Referee(robot, "the interpreted plant"),
+            truth,
+            robot.joint_names,
+            self.dynamics.dtype,
+            self.dynamics.engine.threads,
+            default_store() if self.dynamics.cache else None,
+            frozenset(("forward_dynamics",) if robot.joint_without_inertia is not None else ()),
+        )
+
+    @property
+    def instructions(self) -> dict[str, dict[str, int]]:
+        """Instructions by formulation, of each quantity used so far, effects included; the least first."""
+        return self.dynamics.instructions | {
+            name: dict(sorted(trace.counts.items(), key=lambda item: item[1]))
+            for name, trace in self.engine.traces.items()
+        }
+
+    @property
+    def instructions_by_effect(self) -> dict[str, int]:
+        """Instructions of each effect by itself."""
+        t, q, v, _ = self._inputs
+        counts: dict[str, int] = {}
+        for effect in self.plant.forces:
+            torque = every_branch(lambda effect=effect: self._torque_of(effect))
+            function = ca.Function("f", [t[0], q[0], v[0]], [ca.cse(ca.densify(column(self._wide(torque))))])
+            counts[effect.name] = counts.get(effect.name, 0) + instructions(function)
+        return counts
+
+    @property
+    def n(self) -> int:
+        """Number of degrees of freedom."""
+        return self.dynamics.n
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the n joints, in the order of q."""
+        return self.dynamics.joint_names
+
+    def M(self, q: Array, *, out: np.ndarray | None = None) -> Any:
+        """Mass matrix, (..., n, n)."""
+        return self.dynamics.M(q, out=out)
+
+    def C(self, q: Array, v: Array, *, out: np.ndarray | None = None) -> Any:
+        """Coriolis matrix, (..., n, n)."""
+        return self.dynamics.C(q, v, out=out)
+
+    def N(self, t: Any, q: Array, v: Array, *, out: np.ndarray | None = None) -> Any:
+        """Every force but actuation, as what must be overcome: N = ∂V/∂q − Σ τ_effect, (..., n)."""
+        return self._ask("N", (t, q, v), out)
+
+    def torque(self, t: Any, q: Array, v: Array, *, out: np.ndarray | None = None) -> Any:
+        """Σ τ_effect, (..., n)."""
+        return self._ask("torque", (t, q, v), out)
+
+    def inverse_dynamics(self, t: Any, q: Array, v: Array, a: Array, *, out: np.ndarray | None = None) -> Any:
+        """Actuation Υ = M a + C v + N that gives the acceleration a, (..., n)."""
+        return self._ask("inverse_dynamics", (t, q, v, a), out)
+
+    def forward_dynamics(self, t: Any, q: Array, v: Array, u: Array, *, out: np.ndarray | None = None) -> Any:
+        """Acceleration under the actuation u, (..., n)."""
+        return self._ask("forward_dynamics", (t, q, v, u), out)
+
+    def _ask(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None) -> Any:
+        if arguments[0].__class__ in _TIMES:
+            y = np.empty(self.n, self.dynamics.dtype) if out is None else out
+            if not self.engine.ones[quantity](*arguments, y, self.engine.like):
+                return y
+        return self.engine.ask(quantity, arguments, out, getattr(self.interpreted, quantity))
+
+    # --- the trace
+
+    @cached_property
+    def _inputs(self) -> tuple[Any, ...]:
+        """t, q, v, u as CasADi vectors and arrays of symbols."""
+        return tuple(inputs(name, 1 if name == "t" else self.n) for name in ("t", "q", "v", "u"))
+
+    @cached_property
+    def trace(self) -> Trace:
+        """The rigid bodies in symbols."""
+        return Trace(self.dynamics.robot)
+
+    def _traced(self, quantity: str) -> Traced:
+        t, q, v, u = self._inputs
+        torque = self._effects()
+        if quantity == "torque":
+            function = ca.Function("f", [t[0], q[0], v[0]], [ca.cse(ca.densify(torque))])
+            return Traced(function, "effects", {"effects": instructions(function)})
+        rigid = self.trace.quantity(quantity)
+        given = {"N": (), "inverse_dynamics": (u[0],), "forward_dynamics": (u[0],)}[quantity]
+        if quantity == "forward_dynamics":
+            answer = rigid.function(q[0], v[0], self._actuation() + torque)
+        elif quantity == "inverse_dynamics":
+            answer = rigid.function(q[0], v[0], u[0]) - torque
+        else:
+            answer = rigid.function(q[0]) - torque
+        function = ca.Function("f", [t[0], q[0], v[0], *given], [ca.cse(ca.densify(answer))])
+        return Traced(function, rigid.formulation, {rigid.formulation: instructions(function)})
+
+    def _effects(self) -> Any:
+        """Σ τ_effect as a CasADi column."""
+        total = ca.SX.zeros(self.n)
+        for effect in self.plant.forces:
+            total += column(self._wide(_traced(effect, lambda effect=effect: self._torque_of(effect))))
+        return total
+
+    def _torque_of(self, effect: Any) -> Any:
+        (_, t), (_, q), (_, v), _ = self._inputs
+        return effect.torque(self.trace.lagrangian, t[0], q.view(Symbols), v.view(Symbols))
+
+    def _actuation(self) -> Any:
+        """What the bounds leave of u, as a CasADi column."""
+        left = self._inputs[3][1].view(Symbols)
+        for effect in self.plant.effects:
+            if isinstance(effect, Bound):
+                left = _traced(effect, lambda effect=effect, u=left: effect.actuation(u)).view(Symbols)
+        return column(self._wide(left))
+
+    def _wide(self, torque: Any) -> np.ndarray:
+        return np.broadcast_to(np.asarray(torque, dtype=object), (self.n,))
+
+
+def _traced(effect: Any, function: Callable[[], Any]) -> np.ndarray:
+    try:
+        return every_branch(function)
+    except (TypeError, ValueError, AttributeError) as error:
+        raise TraceError(
+            f"effect {effect.name} cannot be traced ({error}); write it in robot_dyn.arithmetic, or run it interpreted"
+        ) from error
+
+
+def Compiled(
+    robot_or_plant: Any, *, dtype: str = "float64", threads: int | None = 1, cache: bool = True
+) -> CompiledDynamics | CompiledPlant:
+    """A robot or a plant as machine code, for one state (n,) and batches (..., n).
+
+    Args:
+        robot_or_plant: A Robot, or a Plant whose dynamics is one (or the Lagrangian of one).
+        dtype: "float64" or "float32".
+        threads: For batches; None for all processors.
+        cache: Whether compiled code is kept on disk.
+
+    Raises:
+        QueryError: If it is neither, or an option has no meaning.
+    """
+    if not isinstance(robot_or_plant, Plant):
+        return CompiledDynamics(robot_or_plant, str(dtype), threads, cache)
+    robot: Any = getattr(robot_or_plant.dynamics, "robot", robot_or_plant.dynamics)
+    return CompiledPlant(robot_or_plant, CompiledDynamics(robot, str(dtype), threads, cache))

@@ -1,0 +1,52 @@
+"""Work shared out over threads: whoever is free takes the next piece, so that a late thread holds up nobody."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+
+from robot_dyn.errors import QueryError
+
+
+def thread_count(threads: int | None) -> int:
+    """A number of threads; None for all processors.
+
+    Raises:
+        QueryError: If it is not positive.
+    """
+    if threads is None:
+        return os.cpu_count() or 1
+    if not isinstance(threads, int) or threads < 1:
+        raise QueryError(f"threads must be a positive number, or None for all processors, got {threads!r}")
+    return threads
+
+
+def shared(work: Callable[[int, int], int], count: int, piece: int, threads: int) -> int:
+    """The largest result of work(start, stop) over pieces of 0 … count − 1, none shorter than `piece`.
+
+    Args:
+        work: Releases the interpreter's lock while it computes.
+        count: How much there is, `piece` at least.
+        piece: Handed out at a time; a multiple of it starts each.
+        threads: That take part at most, the caller one of them.
+    """
+    pieces = max(1, count // piece)
+    left = iter(range(pieces))  # `next` of it is atomic
+
+    def take() -> int:
+        return max((work(i * piece, count if i == pieces - 1 else (i + 1) * piece) for i in left), default=0)
+
+    others = [_pool(threads).submit(take) for _ in range(min(threads, pieces) - 1)]
+    return max(take(), *(other.result() for other in others)) if others else take()
+
+
+@cache
+def _pool(threads: int) -> ThreadPoolExecutor:
+    """Threads that wait for work; kept, since to start one takes as long as a thousand states."""
+    return ThreadPoolExecutor(threads - 1, "robot_dyn")
+
+
+if hasattr(os, "register_at_fork"):  # a child has no threads but its own
+    os.register_at_fork(after_in_child=_pool.cache_clear)

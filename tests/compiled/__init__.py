@@ -1,0 +1,1 @@
+"""Tests of the compiled engine; kernels are shared by all tests of a session."""

@@ -1,0 +1,174 @@
+"""Kernels by themselves: what arrays they take as they are, and what they leave to the general way."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import subprocess
+import sys
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from robot_dyn.compiled.emit import emit
+from robot_dyn.compiled.kernel import Kernel, Status
+from robot_dyn.compiled.threads import shared
+from tests.compiled.arms import compiled, states
+
+LIKE = np.empty(0)
+
+
+class Own(np.ndarray):
+    """A class of the user's own, whose items may mean anything."""
+
+
+@pytest.fixture(scope="module")
+def double() -> Kernel:
+    """Y = 2 x of three numbers."""
+    x = ca.SX.sym("x", 3)
+    return Kernel(emit(ca.Function("f", [x], [2 * x])), (3,))
+
+
+STRANGE: dict[str, Any] = {
+    "strided": np.ones(6)[::2],
+    "backwards": np.ones(3)[::-1],
+    "byte-swapped": np.ones(3, ">f8"),
+    "integers": np.ones(3, int),
+    "float32": np.ones(3, np.float32),
+    "of a subclass": np.ones(3).view(Own),
+    "too long": np.ones(4),
+    "of two axes": np.ones((1, 3)),
+    "of no axes": np.array(1.0),
+    "misaligned": np.zeros(25, np.int8)[1:].view(float),
+    "a list": [1.0, 1.0, 1.0],
+    "None": None,
+    "a number": 1.0,
+    "a class": np.ndarray,
+}
+
+
+@pytest.mark.parametrize("what", STRANGE)
+def test_what_is_no_plain_array_is_reported(double: Kernel, what: str) -> None:
+    """Each is left to the general way, as an argument and as a result, and nothing is written."""
+    y = np.zeros(3)
+    assert double.call(STRANGE[what], y, LIKE) == Status.SHAPE
+    assert not y.any()
+    assert double.call(np.ones(3), STRANGE[what], LIKE) == Status.SHAPE
+
+
+def test_read_only_arrays_are_read_and_not_written(double: Kernel) -> None:
+    """The writeable flag counts for the result alone."""
+    x, y = np.ones(3), np.zeros(3)
+    x.flags.writeable = False
+    assert double.call(x, y, LIKE) == Status.FINE
+    assert np.array_equal(y, 2 * x)
+    assert double.call(y, x, LIKE) == Status.SHAPE
+    assert np.array_equal(x, np.ones(3))
+
+
+def test_numbers_that_are_not_finite_are_reported(double: Kernel) -> None:
+    """In any place, of one state and of a batch."""
+    for k in range(3):
+        for bad in (np.nan, np.inf, -np.inf, 1e101):
+            x = np.ones((20, 3))
+            x[13, k] = bad
+            assert double.call(x[13], np.empty(3), LIKE) == Status.ARGUMENT
+            assert double.many([x], np.empty((20, 3))) is Status.ARGUMENT
+
+
+def test_numpy_keeps_its_fields_where_they_are_read() -> None:
+    """PyArrayObject: data, nd and flags at the offsets of NumPy's ABI."""
+    x, head = np.ones((2, 3)), object.__basicsize__
+    assert ctypes.c_void_p.from_address(id(x) + head).value == x.ctypes.data
+    assert ctypes.c_int.from_address(id(x) + head + 8).value == 2
+    assert ctypes.c_void_p.from_address(id(x) + head + 40).value == id(x.dtype)
+    assert ctypes.c_int.from_address(id(x) + head + 48).value == x.flags.num
+    assert ctypes.c_void_p.from_address(id(x) + head - 8).value == id(np.ndarray)
+
+
+@pytest.mark.parametrize("width", [1, 2, 7, 8, 9, 15, 17, 36])
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+def test_rows_of_any_width_and_number_are_transposed(width: int, dtype: str) -> None:
+    """Blocks of 8 × 8 with a part of one at the end, overlapping last vectors: y = x − 2 exactly, nothing beside it."""
+    x = ca.SX.sym("x", width)
+    kernel = Kernel(emit(ca.Function("f", [x], [x - 2])), (width,), dtype)
+    for count in (1, 7, 8, 9, 16, 17, 31, 100):
+        data = np.arange(count * width, dtype=dtype).reshape(count, width)
+        around = np.full((count + 2, width), -5, dtype)
+        assert kernel.many([data], around[1:-1]) is Status.FINE
+        assert np.array_equal(around[1:-1], data - 2)
+        assert np.all(around[[0, -1]] == -5)
+
+
+def test_results_over_arguments_are_reported(double: Kernel) -> None:
+    """A batch that would read what it has written is left to the general way, which copies."""
+    block = np.ones((40, 3))
+    assert double.many([block], block) is Status.SHAPE
+    assert double.many([block[:20]], block[19:39]) is Status.SHAPE
+    assert double.many([block[:20]], block[20:]) is Status.FINE
+    engine = compiled("ur5")
+    q, v, tau = states(6, 50)
+    expected = engine.forward_dynamics(q, v, tau)
+    assert engine.forward_dynamics(q, v, tau, out=tau) is tau
+    assert np.array_equal(tau, expected)
+
+
+def test_functions_without_a_vector_instruction_go_lane_by_lane() -> None:
+    """exp, atan2 and powers in a vector: to 2 ulp of NumPy's."""
+    x = ca.SX.sym("x", 2)
+    expressions = [ca.exp(x[0]), ca.atan2(x[0], x[1]), x[0] ** x[1], ca.floor(x[0]), ca.fmod(x[0], x[1]), ca.log(x[1])]
+    kernel = Kernel(emit(ca.Function("f", [x], [ca.vertcat(*expressions)])), (6,))
+    data = np.random.default_rng(2).uniform(0.1, 3, (20, 2))
+    a, b = data.T
+    expected = np.array([np.exp(a), np.arctan2(a, b), a**b, np.floor(a), np.fmod(a, b), np.log(b)]).T
+    y = np.empty((20, 6))
+    assert kernel.many([data], y) is Status.FINE
+    assert np.allclose(y, expected, rtol=5e-16, atol=0)
+    assert kernel.call(data[3], y[0], LIKE) == Status.FINE
+    assert np.allclose(y[0], expected[3], rtol=5e-16, atol=0)
+
+
+@pytest.mark.parametrize("count", [1, 99, 100, 1001])
+def test_shared_work_is_done_once(count: int) -> None:
+    """Every index in one piece, the worst result the answer."""
+    done = np.zeros(count, int)
+
+    def work(start: int, stop: int) -> int:
+        done[start:stop] += 1
+        return start
+
+    worst = shared(work, count, 100, 3)
+    assert np.all(done == 1)
+    assert worst == max(0, count // 100 - 1) * 100
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
+def test_a_forked_child_has_threads_of_its_own() -> None:
+    """Those of the parent are not in the child; to wait for them would take for ever."""
+    code = (
+        "import os; from robot_dyn.compiled.threads import shared\n"
+        "shared(lambda a, b: 0, 100, 1, 2)\n"
+        "child = os.fork()\n"
+        "if not child: shared(lambda a, b: 0, 100, 1, 2); os._exit(0)\n"
+        "assert os.waitpid(child, 0)[1] == 0"
+    )
+    subprocess.run([sys.executable, "-W", "ignore", "-c", code], check=True, timeout=60)
+
+
+def test_a_call_is_restored_from_a_store(double: Kernel) -> None:
+    """In the same machine code, without the function that was compiled."""
+
+    class Memory(dict[str, bytes]):
+        def load(self, key: str) -> bytes | None:
+            return self.get(key)
+
+        def save(self, key: str, payload: bytes) -> None:
+            self[key] = payload
+
+    memory, y = Memory(), np.empty(3)
+    for _ in range(2):
+        assert Kernel(double.source, (3,), store=memory).call(np.arange(3.0), y, LIKE) == Status.FINE
+        assert np.array_equal(y, [0, 2, 4])
+    assert len(memory) == 1
