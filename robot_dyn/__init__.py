@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from robot_dyn.arithmetic import Ball as Ball
     from robot_dyn.arithmetic import midpoint as midpoint
     from robot_dyn.arithmetic import radius as radius
+    from robot_dyn.compiled.plant import Compiled as Compiled
     from robot_dyn.control.cartesian import circle as circle
     from robot_dyn.control.cartesian import line as line
     from robot_dyn.control.computed_torque import ComputedTorque as ComputedTorque
@@ -48,6 +49,8 @@ if TYPE_CHECKING:
     from robot_dyn.model.robot import Robot as Robot
     from robot_dyn.scene.scene import read_scene as read_scene
     from robot_dyn.simulation.linearise import linearise as linearise
+    from robot_dyn.simulation.rollout import rollouts as rollouts
+    from robot_dyn.simulation.rollout_result import Rollouts as Rollouts
     from robot_dyn.simulation.run_file import load_run as load_run
     from robot_dyn.simulation.run_file import save_run as save_run
     from robot_dyn.simulation.setup import Setup as Setup
@@ -63,6 +66,7 @@ _HOME = {
     "Adaptive": "integrate.adaptive",
     "Ball": "arithmetic",
     "Comparison": "accuracy.compare",
+    "Compiled": "compiled.plant",
     "ComputedTorque": "control.computed_torque",
     "Dynamics": "model.dynamics",
     "EffortLimit": "effects.actuator",
@@ -82,6 +86,7 @@ _HOME = {
     "RegularisedCoulombFriction": "effects.friction",
     "Robot": "model.robot",
     "RobotDynError": "errors",
+    "Rollouts": "simulation.rollout_result",
     "STANDARD_GRAVITY": "model.edits",
     "Setup": "simulation.setup",
     "Spring": "effects.spring",
@@ -105,6 +110,7 @@ _HOME = {
     "radius": "arithmetic",
     "read_scene": "scene.scene",
     "replay": "view.replay",
+    "rollouts": "simulation.rollout",
     "save_plot": "view.plots",
     "save_replay": "view.replay",
     "save_run": "simulation.run_file",

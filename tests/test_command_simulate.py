@@ -84,7 +84,7 @@ def test_a_run_that_diverges_says_when_and_what_to_do(scene) -> None:
 
 WATCHED = """
 import signal, sys
-import robot_dyn.simulation.simulate as simulation
+import robot_dyn.simulation.record as simulation
 from robot_dyn.cli import main
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where the suite runs in the background

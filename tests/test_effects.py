@@ -54,9 +54,9 @@ def states(count: int = 200) -> np.ndarray:
 
 
 def every_effect(base: type) -> set[type]:
-    """The concrete forces of the library."""
+    """The concrete forces of the library; what stands for one in a trace is none."""
     below = {each for sub in base.__subclasses__() for each in {sub} | every_effect(sub)}
-    return {each for each in below if each.__module__.startswith("robot_dyn.") and not each.__abstractmethods__}
+    return {each for each in below if each.__module__.startswith("robot_dyn.effects.") and not each.__abstractmethods__}
 
 
 def test_no_effect_escapes_the_contract() -> None:

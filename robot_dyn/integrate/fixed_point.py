@@ -16,8 +16,9 @@ from robot_dyn.arithmetic import Array, midpoint, radius
 from robot_dyn.errors import OverflowedError
 
 MOST_ITERATIONS = 100  # so the iteration must gain a binary digit in two rounds, to end in float64
-_PATIENCE = 2  # rounds: where q' = v and v' = −k q, increments shrink only every second one
-_NOISE = 1e3  # roundings of the largest entry that an increment may keep, as where forces cancel
+PATIENCE = 2  # rounds: where q' = v and v' = −k q, increments shrink only every second one
+NOISE = 1e3  # roundings of the largest entry that an increment may keep, as where forces cancel
+INFLATED_ROUNDING = float(np.finfo(np.float64).eps) ** (2 / 3)  # see below; in float64
 _INFLATION = 1.1  # Rump's ε-inflation: more than the rounding, less than 1 / the rate of contraction
 
 
@@ -36,7 +37,7 @@ def fixed_point(update: Callable[[Array], Array], x: Array, y: Array) -> Array |
     """
     u = _unit_roundoff(x)
     size = _sizes(y)
-    slack = _NOISE * u * max(1.0, size.max())
+    slack = NOISE * u * max(1.0, size.max())
     least, stale = np.full(x.shape[-1], inf), 0
     for _ in range(MOST_ITERATIONS):
         try:
@@ -51,7 +52,7 @@ def fixed_point(update: Callable[[Array], Array], x: Array, y: Array) -> Array |
         stale = 0 if ((increment < least) & (increment > u * own)).any() else stale + 1
         least = np.minimum(increment, least)
         # an increment of some power of u between 1/2 and 1 is rounding of Φ: far below any error that matters
-        if largest == 0 or (stale >= _PATIENCE and (increment <= slack + u ** (2 / 3) * (size + own)).all()):
+        if largest == 0 or (stale >= PATIENCE and (increment <= slack + u ** (2 / 3) * (size + own)).all()):
             return x
     return None
 

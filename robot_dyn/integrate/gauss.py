@@ -78,8 +78,13 @@ class Gauss(Integrator):
             raise QueryError(f"no Gauss method of order {self.order!r}: give 2, 4 or 6")
         object.__setattr__(self, "name", f"gauss_{self.order}")
 
+    @property
+    def tableau(self) -> ButcherTableau:
+        """Its coefficients."""
+        return _TABLEAUS[self.order]
+
     def step(self, system: System, t: Any, y: Array, h: Any) -> Array:
-        kind, a, b, c = _TABLEAUS[self.order].numbers(y)
+        kind, a, b, c = self.tableau.numbers(y)
         h = kind.number(h)
         times = [t + node * h for node in c]
 

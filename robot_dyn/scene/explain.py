@@ -7,6 +7,8 @@ from typing import Any, get_args
 
 import numpy as np
 
+from robot_dyn.effects.plant import Plant
+from robot_dyn.errors import RobotDynError
 from robot_dyn.scene.effects import Acting, Edit
 from robot_dyn.scene.scene import ADAPTIVE, Scene
 from robot_dyn.scene.schema import Part
@@ -62,11 +64,27 @@ def explain(scene: Scene, setup: Setup) -> Iterator[str]:
         yield from _numbers(scene.reference, "  ")
     yield f"\nmethod: {scene.method}, {scene.duration_s:g} s"
     used = ("rtol", "atol") if scene.method in ADAPTIVE else ("step_s",)
-    for key in (*used, "record_period_s", "estimate_error"):
+    for key in (*used, "record_period_s", "estimate_error", "engine"):
         yield f"  {key} = {getattr(scene, key)}  ({_source(scene, key)})"
     yield "start:"
     yield from _numbers(scene.start, "  ")
+    yield from _machine_code(setup.plant)
     yield f"\nthe file of the robot: {setup.plant.dynamics.description.source}"  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def _machine_code(plant: Plant) -> Iterator[str]:
+    """What the compiled right-hand side costs, by effect."""
+    from robot_dyn.compiled.plant import Compiled
+
+    try:
+        compiled: Any = Compiled(plant)
+        by_effect, which = compiled.instructions_by_effect, compiled.engine.traces["forward_dynamics"]
+    except RobotDynError as error:
+        yield f"\nmachine code: none, {error}"
+        return
+    whole = which.counts[which.formulation]
+    parts = ", ".join(f"{name} {count}" for name, count in by_effect.items()) or "none"
+    yield f"\nmachine code of the acceleration, by the {which.formulation}: {whole} instructions; of effects: {parts}"
 
 
 def kinds() -> tuple[str, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from pydantic import ValidationError
 
@@ -41,6 +41,7 @@ class Scene(Part):
     atol: Positive = 1e-12
     record_period_s: NotNegative = 0.01
     estimate_error: bool = True
+    engine: Literal["auto", "interpreted", "compiled"] = "auto"
     start: Start = Start()
     effect: tuple[AnyEffect, ...] = ()
     control: Control | None = None
@@ -62,7 +63,7 @@ class Scene(Part):
         controller = None if self.control is None else self.control.build(described, robot, q0, self.reference)
         return Setup(
             Plant(robot, acting), q0, v0, self.duration_s, controller, self.integrator(),
-            self.step_s, self.record_period_s, self.estimate_error, about,
+            self.step_s, self.record_period_s, self.estimate_error, about, self.engine,
         )  # fmt: skip
 
     def integrator(self) -> Integrator | Adaptive:

@@ -5,7 +5,7 @@ The step itself is the integrator's; here are its ends: ticks, switches, samples
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import final
 
@@ -18,7 +18,7 @@ from robot_dyn.integrate.integrator import IntegrationError, Integrator, System
 from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.setup import Setup, Stretch
 
-_WATCHED = 64  # steps between looks at the energy
+WATCHED = 64  # steps between looks at the energy
 _RUNAWAY = 1e6  # [rad/s] or [m/s]: an adaptive method would follow an exploding state without end
 _SAMPLES = 1000  # of an adaptive run without a record period
 
@@ -67,7 +67,12 @@ class Counter:
         return System(rate, system.n)
 
 
-def march(setup: Setup, motion: Motion, factor: int, counter: Counter) -> Iterator[Sample]:
+Systems = Callable[[Array | None, Stretch], System]
+
+
+def march(
+    setup: Setup, motion: Motion, factor: int, counter: Counter, systems: Systems | None = None
+) -> Iterator[Sample]:
     """The states of a run, at the start of each step and at the end.
 
     Args:
@@ -75,16 +80,17 @@ def march(setup: Setup, motion: Motion, factor: int, counter: Counter) -> Iterat
         motion: Its equation of motion.
         factor: Length of a step, in steps of the setup; tolerances of an adaptive method are multiplied by it.
         counter: Counts what it takes.
+        systems: Gives the equation on a stretch, from what a controller holds; that of the motion unless given.
 
     Raises:
         DivergedError: If it cannot go on.
     """
     y, held = motion.start(setup.q0, setup.v0), None
-    watch = _Watch(setup, motion)
+    watch = Watch(setup, motion)
     for stretch in setup.stretches:
         if stretch.tick:
             y, held = watch.tick(stretch.start, y)
-        system = counter.counted(motion.system(held, stretch.end))
+        system = counter.counted(systems(held, stretch) if systems else motion.system(held, stretch))
         method = setup.integrator
         if isinstance(method, Adaptive):
             y = yield from _adaptively(setup, replace_tolerance(method, factor), system, stretch, y, held, counter)
@@ -101,26 +107,31 @@ def replace_tolerance(method: Adaptive, factor: int) -> Adaptive:
 
 def _by_steps(
     setup: Setup, method: Integrator, system: System, stretch: Stretch, y: Array, held: Array | None,
-    factor: int, counter: Counter, watch: _Watch,
+    factor: int, counter: Counter, watch: Watch,
 ) -> Iterator[Sample]:  # fmt: skip
     count = setup.steps(stretch)
     h = (stretch.end - stretch.start) / count * factor
     for k in range(max(1, count // factor)):
         t = stretch.start + k * h
         yield Sample(t, y, held, shared=k * factor % 4 == 0)
-        before = y
-        try:
-            y = method.step(system, t, y, h)
-        except IntegrationError as error:  # it names its own remedy
-            raise DivergedError(t, str(error)) from None
-        except RobotDynError as error:
-            raise watch.diverged(t, before, str(error)) from None
+        y = one_step(method, system, t, y, h, watch)
         counter.steps += 1
-        if not np.isfinite(y).all():
-            raise watch.diverged(t, before, "a number overflowed")
-        if counter.steps % _WATCHED == 0 and watch.gains(t + h, y):
-            raise watch.diverged(t + h, y, "energy grows without a source")
+        if counter.steps % WATCHED == 0:
+            watch.look(t + h, y)
     return y
+
+
+def one_step(method: Integrator, system: System, t: float, y: Array, h: float, watch: Watch) -> Array:
+    """The state after a step; DivergedError if there is none, or it is not finite."""
+    try:
+        after = method.step(system, t, y, h)
+    except IntegrationError as error:  # it names its own remedy
+        raise DivergedError(t, str(error)) from None
+    except RobotDynError as error:
+        raise watch.diverged(t, y, str(error)) from None
+    if not np.isfinite(after).all():
+        raise watch.diverged(t, y, "a number overflowed")
+    return after
 
 
 def _adaptively(
@@ -149,7 +160,7 @@ def _adaptively(
 
 
 @final
-class _Watch:
+class Watch:
     """Tells when energy grows without a source: the ledger's residual exceeds all there was and came a thousandfold."""
 
     def __init__(self, setup: Setup, motion: Motion) -> None:
@@ -167,7 +178,13 @@ class _Watch:
             raise self.diverged(t, y, "the controller asks for a torque that is not finite")
         return y, held
 
+    def look(self, t: float, y: Array) -> None:
+        """DivergedError if energy grows without a source."""
+        if self.gains(t, y):
+            raise self.diverged(t, y, "energy grows without a source")
+
     def gains(self, t: float, y: Array) -> bool:
+        """Whether the ledger's residual says so."""
         q, v, _, W = self.motion.state(y)
         K, V = self.motion.energy(np.array([t]), q[None], v[None])
         return bool((K + V)[0] - self.energy - W.sum() > 1e3 * (self.scale + np.abs(W).sum()))

@@ -20,6 +20,7 @@ from robot_dyn.effects.effect import Conservative, Force
 from robot_dyn.effects.plant import Plant
 from robot_dyn.integrate.integrator import System
 from robot_dyn.model.dynamics import acceleration
+from robot_dyn.simulation.setup import Stretch
 
 CONTROL = "control"
 
@@ -92,39 +93,49 @@ class Motion:
             y[2 * n : 2 * n + self.memory_size] = self.controller.next_memory(t, q, v, z)
         return y, held
 
-    def system(self, held: Array | None, until: float) -> System:
+    def system(self, held: Array | None, stretch: Stretch) -> System:
         """The equation on one stretch of time.
 
         Args:
             held: The actuation that a sampled controller holds; None if it acts continuously.
-            until: End of the stretch; what switches there acts as before it.
+            stretch: What switches at its ends acts as it does between them.
         """
-        dynamics, controller, forces = self.plant.dynamics, self.controller, self.plant.forces
-        n, last = dynamics.n, np.nextafter(until, -np.inf)
-        works = [not isinstance(force, Conservative) for force in forces]
-        remembers = held is None and controller is not None and self.memory_size > 0
+        first, last = np.nextafter(stretch.start, np.inf), np.nextafter(stretch.end, -np.inf)
 
         def rate(t: float, y: Array) -> Array:
             if y.ndim > 1:  # an implicit method asks for its Jacobian
                 return np.array([rate(t, row) for row in y.reshape(-1, y.shape[-1])]).reshape(y.shape)
-            t = min(t, last)
-            q, v, z, _ = self.state(y)
-            u = self.command(t, q, v, z) if held is None else held
-            torques = [force.torque(dynamics, t, q, v) for force in forces]
-            tau = sum(torques, start=u)
-            result = np.empty_like(y)
-            result[:n] = v
-            if self.canonical:
-                result[n : 2 * n] = tau + dynamics.coriolis_transpose(q, v) - dynamics.N(q)
-            else:
-                result[n : 2 * n] = dynamics.forward_dynamics(q, v, tau)
-            end = 2 * n + self.memory_size
-            result[2 * n : end] = controller.memory_rate(t, q, v, z) if remembers and controller else 0.0
-            result[end] = u @ v
-            result[end + 1 :] = [x @ v for works_, x in zip(works, torques, strict=True) if works_]
-            return result
+            return self.rate(min(max(t, first), last), y, held)[0]
 
-        return System(rate, n)
+        return System(rate, self.plant.dynamics.n)
+
+    def rate(self, t: float, y: Array, held: Array | None) -> tuple[Array, Array]:
+        """f(t, y), and the actuation u; in floats or, for the compiled engine, in symbols.
+
+        Args:
+            t: In [s].
+            y: One state of the motion.
+            held: As of `system`.
+        """
+        dynamics, controller, forces = self.plant.dynamics, self.controller, self.plant.forces
+        n = dynamics.n
+        q, v, z, _ = self.state(y)
+        u = self.command(t, q, v, z) if held is None else held
+        torques = [force.torque(dynamics, t, q, v) for force in forces]
+        tau = sum(torques, start=u)
+        result = np.empty_like(y)
+        result[:n] = v
+        if self.canonical:
+            result[n : 2 * n] = tau + dynamics.coriolis_transpose(q, v) - dynamics.N(q)
+        else:
+            result[n : 2 * n] = dynamics.forward_dynamics(q, v, tau)
+        end = 2 * n + self.memory_size
+        remembers = held is None and controller is not None and self.memory_size > 0
+        result[2 * n : end] = controller.memory_rate(t, q, v, z) if remembers and controller else 0.0
+        result[end] = u @ v
+        working = [x for x, force in zip(torques, forces, strict=True) if not isinstance(force, Conservative)]
+        result[end + 1 :] = [x @ v for x in working]
+        return result, u
 
     def energy(self, t: Array, q: Array, v: Array) -> tuple[Array, Array]:
         """Kinetic energy, and the potential of gravity and of all conservative effects, of samples (m, n)."""

@@ -18,6 +18,8 @@ from robot_dyn.integrate.explicit import RK4
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.model.dynamics import checked
 
+ENGINES = ("auto", "interpreted", "compiled")
+
 
 @final
 @dataclass(frozen=True)
@@ -51,6 +53,8 @@ class Setup:
         record_period_s: Time between samples; 0 for every step.
         estimate_error: Whether companion runs of longer steps are made, which cost 3/4 of the run.
         about: Texts kept with the run.
+        engine: "interpreted"; "compiled", the run in machine code, right angles of the file written out in
+            full; or "auto", which compiles where that pays.
     """
 
     plant: Plant
@@ -63,6 +67,7 @@ class Setup:
     record_period_s: float = 0.0
     estimate_error: bool = True
     about: dict[str, str] = field(default_factory=dict, repr=False)
+    engine: str = "auto"
 
     def __post_init__(self) -> None:
         names = self.plant.dynamics.joint_names
@@ -81,6 +86,8 @@ class Setup:
             if not (real and least <= value < inf):
                 raise QueryError(f"{name} must be a positive number of seconds, got {value!r}")
             object.__setattr__(self, name, float(value))
+        if self.engine not in ENGINES:
+            raise QueryError(f"engine={self.engine!r}; give one of {', '.join(ENGINES)}")
         if not isinstance(self.controller, Controller | None):
             raise QueryError(f"controller: give one, such as rd.PD(…), or None, got {self.controller!r}")
         if self.controller is not None and self.controller.n != len(names):

@@ -8,25 +8,30 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from robot_dyn.control.cartesian import CartesianReference
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.effects.plant import Plant
-from robot_dyn.errors import RobotDynError
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.model.dynamics import Dynamics
+from robot_dyn.simulation.choice import choose
 from robot_dyn.simulation.error import ErrorEstimate, difference, richardson
 from robot_dyn.simulation.ledger import Ledger
 from robot_dyn.simulation.loads import at_stop, wrenches
-from robot_dyn.simulation.march import Counter, DivergedError, Sample, march
 from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.origin import origin
+from robot_dyn.simulation.record import Record, collect
+from robot_dyn.simulation.samples import compiled_rows, rows
 from robot_dyn.simulation.setup import Setup
-from robot_dyn.simulation.trajectory import Ending, Outcome, Statistics, Trajectory
+from robot_dyn.simulation.trajectory import Ending, Statistics, Trajectory
+
+if TYPE_CHECKING:
+    from robot_dyn.simulation.machine.machine import Machine
 
 _SHARED = 2000  # at most about this many times at which companion runs are compared
 
@@ -38,7 +43,7 @@ def simulate(
 
     Args:
         what: What to run.
-        on_progress: Called with the time reached, in [s], at each step.
+        on_progress: Called with the time reached, in [s], at each step; in machine code some ten times a second.
         **options: Attributes of the setup, or those to change.
 
     Raises:
@@ -49,66 +54,47 @@ def simulate(
     else:
         setup = Setup(what if isinstance(what, Plant) else Plant(what), **options)
     motion = Motion(setup.plant, setup.controller, getattr(setup.integrator, "canonical", False))
-    counter, kept, shared = Counter(), [], []
+    machine, engine = choose(setup, motion)
     began = perf_counter()
-    outcome = _collect(setup, motion, 1, counter, kept, shared, on_progress)
+    record = _run(setup, motion, machine, 1, on_progress)
     wall = perf_counter() - began
     error = None
-    if setup.estimate_error and outcome.ending is not Ending.STOPPED:
-        error = _estimate(setup, motion, shared)
+    if setup.estimate_error and record.outcome.ending is not Ending.STOPPED:
+        error = _estimate(setup, motion, machine, record)
     companions = perf_counter() - began - wall if setup.estimate_error else 0.0
     adaptive = isinstance(setup.integrator, Adaptive)
     name = setup.integrator.method if isinstance(setup.integrator, Adaptive) else setup.integrator.name
-    step = 0.0 if adaptive else outcome.t / max(counter.steps, 1)
-    statistics = Statistics(name, step, counter.steps, counter.evaluations, wall, companions)
-    return _trajectory(setup, motion, kept, outcome, statistics, error)
+    step = 0.0 if adaptive else record.outcome.t / max(record.steps, 1)
+    statistics = Statistics(name, step, record.steps, record.evaluations, wall, companions, engine)
+    return _trajectory(setup, motion, machine, record, statistics, error)
 
 
-def _collect(
+def _run(
     setup: Setup,
     motion: Motion,
+    machine: Machine | None,
     factor: int,
-    counter: Counter,
-    kept: list[Sample],
-    shared: list[tuple[float, np.ndarray]],
     on_progress: Callable[[float], object] | None = None,
-) -> Outcome:
-    """March; keep samples at the record period, and positions at the times that companions share."""
-    n, next_record, t = motion.plant.dynamics.n, 0.0, 0.0
+) -> Record:
+    """March in machine code, in the interpreted engine, or in that with its rate in machine code."""
     thin = max(1, sum(map(setup.steps, setup.stretches)) // (4 * _SHARED))
-    seen = 0
-    try:
-        with np.errstate(all="ignore"):  # what overflows ends the march
-            for sample in march(setup, motion, factor, counter):
-                t, last = sample.t, sample.t == setup.duration_s
-                if t >= next_record - 1e-9 * setup.step_s or last:
-                    kept.append(sample)
-                    next_record += setup.record_period_s
-                if sample.shared:
-                    if seen % thin == 0 or last:
-                        shared.append((t, sample.y[:n]))
-                    seen += 1
-                if on_progress is not None:
-                    on_progress(t)
-    except DivergedError as end:
-        return Outcome(Ending.DIVERGED, end.t, str(end))
-    except KeyboardInterrupt:
-        return Outcome(Ending.STOPPED, t, "interrupted; all samples up to here are kept")
-    return Outcome(Ending.FINISHED, t)
+    if machine is None:
+        return collect(setup, motion, factor, thin, None, on_progress)
+    if machine.whole:
+        from robot_dyn.simulation.machine.follow import follow
+
+        return follow(setup, motion, machine, factor, thin, on_progress)
+    return collect(setup, motion, factor, thin, partial(machine.system, setup=setup), on_progress)
 
 
-def _estimate(setup: Setup, motion: Motion, run: list[tuple[float, np.ndarray]]) -> ErrorEstimate:
+def _estimate(setup: Setup, motion: Motion, machine: Machine | None, run: Record) -> ErrorEstimate:
     """Companion runs: of 2 and 4 times the step, or of 10 times the tolerance."""
     adaptive = isinstance(setup.integrator, Adaptive)
     if not adaptive and min(map(setup.steps, setup.stretches)) < 4:
         return ErrorEstimate(np.empty(0), np.empty(0), 0.0, "fewer than 4 steps between ticks, switches or breaks")
-    runs = [run]
-    for factor in (10,) if adaptive else (2, 4):
-        runs.append([])
-        _collect(setup, motion, factor, Counter(), [], runs[-1])
-    reached = min(map(len, runs))
-    t = np.array([t for t, _ in run[:reached]])
-    positions = [np.array([q for _, q in each[:reached]]) for each in runs]
+    runs = [run, *(_run(setup, motion, machine, factor) for factor in ((10,) if adaptive else (2, 4)))]
+    reached = min(len(each.shared_t) for each in runs)
+    t, positions = run.shared_t[:reached], [each.shared_q[:reached] for each in runs]
     if isinstance(setup.integrator, Adaptive):
         return difference(t, *positions)
     return richardson(t, *positions, order=setup.integrator.order)
@@ -117,15 +103,14 @@ def _estimate(setup: Setup, motion: Motion, run: list[tuple[float, np.ndarray]])
 def _trajectory(
     setup: Setup,
     motion: Motion,
-    kept: list[Sample],
-    outcome: Outcome,
+    machine: Machine | None,
+    record: Record,
     statistics: Statistics,
     error: ErrorEstimate | None,
 ) -> Trajectory:
     """The samples with what follows from them."""
-    rows = [_row(setup, motion, sample) for sample in kept]
-    q, v, a, tau, W, P, E = (np.array(column) for column in zip(*rows, strict=True))
-    t = np.array([sample.t for sample in kept])
+    t = record.t
+    q, v, a, tau, W, P, E = rows(motion, record) if machine is None else compiled_rows(motion, machine, record)
     wanted, deviation = _deviation(setup, t, q)
     ledger = Ledger(E[:, 0], E[:, 1], dict(zip(motion.sources, W.T, strict=True)))
     power = dict(zip(motion.sources, P.T, strict=True))
@@ -134,25 +119,9 @@ def _trajectory(
     if isinstance(frame := getattr(setup.controller, "frame", None), str):
         about = {"frame": frame} | about
     return Trajectory(
-        names, t, q, v, a, tau, power, ledger, wanted, deviation, outcome, statistics, error, about,
+        names, t, q, v, a, tau, power, ledger, wanted, deviation, record.outcome, statistics, error, about,
         wrenches(plant, t, q), at_stop(plant, q),
     )  # fmt: skip
-
-
-def _row(setup: Setup, motion: Motion, sample: Sample) -> tuple[Any, ...]:
-    """q, v, a, u, work, power and energies of a sample; nan for what has no value just before a run diverged."""
-    q, v, z, W = motion.state(sample.y)
-    u = a = np.full_like(q, np.nan)
-    power, energy = np.full_like(W, np.nan), np.full(2, np.nan)
-    try:
-        with np.errstate(all="ignore"):
-            energy = np.array(motion.energy(sample.t, q, v))
-            u = motion.command(sample.t, q, v, z) if sample.held is None else sample.held
-            power = motion.powers(sample.t, q, v, u)
-            a = setup.plant.forward_dynamics(sample.t, q, v, u)
-    except RobotDynError:
-        pass
-    return q, v, a, u, W, power, energy
 
 
 def _deviation(setup: Setup, t: np.ndarray, q: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:

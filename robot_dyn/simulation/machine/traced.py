@@ -1,0 +1,180 @@
+"""The motion of a plant in symbols: the lines of `Motion` traced to functions of (t, y), for the compiled engine.
+
+    rate(t, y, p, held, free) = (y', u),   tick = (u, z⁺),   energy = (K, V)
+
+Within a stretch of time a reference is one polynomial, so that p, its coefficients, are inputs; so are what a sampled
+controller holds, and the values that differ from run to run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, final
+
+import casadi as ca
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.compiled.right_angles import completed
+from robot_dyn.compiled.symbolic import Symbolic, Symbols, TraceError, array_of, column, inputs
+from robot_dyn.compiled.trace import ARGUMENTS, Trace
+from robot_dyn.control.controller import Controller
+from robot_dyn.control.reference import PiecewisePolynomial
+from robot_dyn.effects.effect import Bound, Conservative, Effect, Force
+from robot_dyn.effects.plant import Plant
+from robot_dyn.model.description import Description
+from robot_dyn.model.robot import Robot
+from robot_dyn.simulation.machine.parts import (
+    REMEDY,
+    Piece,
+    TracedBound,
+    TracedConservative,
+    TracedController,
+    TracedForce,
+    wide,
+    with_,
+)
+from robot_dyn.simulation.motion import Motion
+
+
+@final
+@dataclass(frozen=True)
+class Equations:
+    """A motion as CasADi Functions of t (1), y (m), p (P), held (n or 0) and free (F).
+
+    Attributes:
+        rate: y', and for one state the actuation u as well: (m,) or (m + n,).
+        energy: K and V, (2,).
+        tick: What a sampled controller holds from now on, and its next memory; None for any other.
+        actuation: u by itself, (n,), if it is asked for; with v, where y has the momentum in its place.
+        sizes: Of the inputs.
+    """
+
+    rate: ca.Function
+    energy: ca.Function
+    tick: ca.Function | None
+    actuation: ca.Function | None
+    sizes: tuple[int, int, int, int, int]
+
+
+@final
+class SymbolicDynamics:
+    """A `Dynamics` of symbols; each quantity from the formulation of fewest instructions."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._trace = Trace(robot)
+        self._functions: dict[str, ca.Function] = {}
+
+    @property
+    def n(self) -> int:
+        """Number of degrees of freedom."""
+        return self._trace.lagrangian.n
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the n joints."""
+        return self._trace.lagrangian.joint_names
+
+    def __getattr__(self, name: str) -> Callable[..., Any]:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        if name == "C" or name not in ARGUMENTS:
+            return getattr(self._trace.lagrangian, name)
+        return lambda *arguments: self._ask(name, arguments)
+
+    def _ask(self, name: str, arguments: tuple[Array, ...]) -> Any:
+        if name not in self._functions:
+            self._functions[name] = self._trace.quantity(name).function
+        value = array_of(self._functions[name](*map(column, arguments)))
+        shape = self._trace.shape(name)
+        return value[0, 0] if shape == (1,) else value.reshape(shape).view(Symbols)
+
+
+def robot_of(dynamics: Any) -> Robot | None:
+    """The robot whose equations a dynamics has, its right angles written out in full; None if there is none."""
+    robot = getattr(dynamics, "robot", dynamics)
+    if not isinstance(getattr(robot, "description", None), Description) or not isinstance(robot, Robot):
+        return None
+    return completed(robot)[0]
+
+
+def degree(controller: Controller | None) -> int | None:
+    """Degree of the polynomials that a controller follows; None without."""
+    reference = getattr(controller, "reference", None)
+    return reference.coefficients.shape[1] - 1 if isinstance(reference, PiecewisePolynomial) else None
+
+
+def trace(
+    motion: Motion, dynamics: Callable[[Any], SymbolicDynamics], free: Mapping[str, int], tile: bool = False
+) -> Equations:
+    """The equations of a motion.
+
+    Args:
+        motion: What to trace.
+        dynamics: Gives the symbols of the plant's and of the controller's rigid bodies.
+        free: Names of values that are inputs, with their lengths: "kp", or "viscous_friction.damping".
+        tile: Whether the actuation is to stand by itself.
+
+    Raises:
+        TraceError: If a part cannot be traced; names it.
+    """
+    reference = getattr(motion.controller, "reference", None)
+    if isinstance(reference, PiecewisePolynomial) and not len(reference.knots) and len(reference.breaks) > 2:
+        raise TraceError(
+            f"a reference that jumps between {len(reference.breaks) - 1} rests cannot be compiled: {REMEDY}"
+        )
+    n, m = motion.plant.dynamics.n, 2 * motion.plant.dynamics.n + motion.memory_size + len(motion.sources)
+    d = degree(motion.controller)
+    sizes = 1, m, 0 if d is None else 1 + (d + 1) * n, n if motion.sampled else 0, sum(free.values())
+    (t, ts), (y, ys), (p, ps), (held, helds), (given, values) = (
+        inputs(name, size) for name, size in zip(("t", "y", "p", "held", "free"), sizes, strict=True)
+    )
+    ends = np.cumsum([0, *free.values()])
+    chosen = {name: values[a:b].view(Symbols) for name, a, b in zip(free, ends, ends[1:], strict=False)}
+    everything, time, state = [t, y, p, held, given], ts[0], ys.view(Symbols)
+    with Symbolic().scope():
+        symbolic = _symbolic(motion, dynamics, ps, chosen)
+        rate, u = symbolic.rate(time, state, helds.view(Symbols) if motion.sampled else None)
+        q, v, z, _ = symbolic.state(state)
+        K, V = symbolic.energy(time, q, v)
+        made = {"rate": rate if tile else np.concatenate([rate, wide(u, n)]), "energy": [K, V]}
+        if tile:
+            made["actuation"] = np.concatenate([wide(u, n), v]) if motion.canonical else wide(u, n)
+        if motion.sampled and symbolic.controller is not None:
+            after = symbolic.controller.next_memory(time, q, v, z) if motion.memory_size else z
+            made["tick"] = np.concatenate([wide(symbolic.command(time, q, v, z), n), after])
+    functions = {name: ca.Function("f", everything, [ca.cse(column(x))]) for name, x in made.items()}
+    return Equations(functions["rate"], functions["energy"], functions.get("tick"), functions.get("actuation"), sizes)
+
+
+def with_values(motion: Motion, free: Mapping[str, Array]) -> Motion:
+    """The same motion with other values of what is free."""
+    effects = [with_(effect, _own(effect, free)) for effect in motion.plant.effects]
+    controller = with_(motion.controller, {name: x for name, x in free.items() if "." not in name})
+    return Motion(Plant(motion.plant.dynamics, effects), controller, motion.canonical)
+
+
+def _own(effect: Effect, free: Mapping[str, Array]) -> dict[str, Array]:
+    return {name.partition(".")[2]: x for name, x in free.items() if name.partition(".")[0] == effect.name}
+
+
+def _symbolic(
+    motion: Motion, dynamics: Callable[[Any], SymbolicDynamics], p: Array, free: Mapping[str, Array]
+) -> Motion:
+    """The same motion with symbols in place of its numbers."""
+    bodies: Any = dynamics(motion.plant.dynamics)
+    effects: list[Effect] = []
+    for effect in motion.plant.effects:
+        own = with_(effect, _own(effect, free))
+        kinds = {Bound: TracedBound, Conservative: TracedConservative, Force: TracedForce}
+        effects.append(next(made for kind, made in kinds.items() if isinstance(effect, kind))(own))
+    controller = None
+    if motion.controller is not None:
+        values = {name: x for name, x in free.items() if "." not in name}
+        if p.size:
+            values["reference"] = Piece(p, motion.plant.dynamics.n)
+        if hasattr(motion.controller, "model"):
+            values["model"] = dynamics(getattr(motion.controller, "model"))  # noqa: B009
+        controller = TracedController(with_(motion.controller, values), motion.controller)
+    return Motion(Plant(bodies, effects), controller, motion.canonical)

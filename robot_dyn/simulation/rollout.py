@@ -1,0 +1,122 @@
+"""Rollouts: one setup from many starts, or with many values of its parameters, at once in machine code.
+
+    q' = v,   v' = M⁻¹ (u + Σ τ − C v − N)   for 64 runs side by side, on all threads
+
+Each run is a lane of a tile, and no lane depends on another: one that diverges leaves the rest as they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from robot_dyn.compiled.threads import thread_count
+from robot_dyn.errors import QueryError, nearest
+from robot_dyn.integrate.integrator import Integrator
+from robot_dyn.model.dynamics import checked
+from robot_dyn.simulation.machine.batch import LANES, Batch
+from robot_dyn.simulation.machine.making import machine
+from robot_dyn.simulation.machine.stages import steps_whole
+from robot_dyn.simulation.motion import Motion
+from robot_dyn.simulation.rollout_result import Rollouts
+from robot_dyn.simulation.setup import Setup
+
+MOST_BYTES = 8 * 2**30  # of all that is recorded, unless said
+RECORDS = ("q", "v", "tau", "energy", "work")
+_SIGNED = ("rest", "wrench", "lower", "upper", "posture")  # coefficients that may be negative
+
+
+def rollouts(
+    setup: Setup,
+    q0: Any = None,
+    v0: Any = None,
+    *,
+    params: Mapping[str, Any] | None = None,
+    record: Iterable[str] = ("q", "v"),
+    threads: int | None = None,
+    most_bytes: int = MOST_BYTES,
+) -> Rollouts:
+    """Run a setup many times at once, in machine code.
+
+    Args:
+        setup: What to run, by an explicit or a Gauss method; it gives plant, controller, duration, steps and samples.
+        q0: Positions at the start, (B, n); those of the setup for all runs unless given.
+        v0: Velocities at the start, (B, n) or (n,).
+        params: Values that differ from run to run, each (B,) or (B, n): a gain of the controller by its name, as
+            {"kp": …}, or a coefficient of an effect, as {"viscous_friction.damping": …}.
+        record: Which of "q", "v", "tau", "energy", "work" to keep at the samples of the setup.
+        threads: Number of threads; None for all processors.
+        most_bytes: Refuse to record more than this.
+
+    Returns:
+        The runs, in the order given.
+
+    Raises:
+        QueryError: If an argument has no meaning or the wrong shape, or the record would exceed `most_bytes`.
+        TraceError: If a part of the setup cannot be compiled; names it.
+    """
+    setup = replace(setup, estimate_error=False)
+    if not steps_whole(setup.integrator):
+        raise QueryError("rollouts take an explicit or a Gauss method, such as rd.method('rk4'); simulate takes any")
+    wanted = tuple(record)
+    if unknown := [name for name in wanted if name not in RECORDS]:
+        raise QueryError(f"record: no {unknown[0]!r}; {nearest(str(unknown[0]), RECORDS)}")
+    q, v, free = _starts(setup, q0, v0, params or {})
+    motion = Motion(setup.plant, setup.controller, getattr(setup.integrator, "canonical", False))
+    assert isinstance(setup.integrator, Integrator)
+    made = machine(
+        motion,
+        setup.integrator,
+        lanes=LANES,
+        free={name: x[0] for name, x in free.items()},
+        tau="tau" in wanted or (motion.canonical and "v" in wanted),
+    )
+    made.check(setup)
+    return Batch(setup, motion, made, q, v, free, wanted, most_bytes).run(thread_count(threads))
+
+
+def _starts(
+    setup: Setup, q0: Any, v0: Any, params: Mapping[str, Any]
+) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:
+    """Starts (B, n) and values (B, n), of one number of runs."""
+    names = setup.plant.dynamics.joint_names
+    n = len(names)
+    q = checked("q0", setup.q0 if q0 is None else q0, names)
+    v = checked("v0", setup.v0 if v0 is None else v0, names)
+    free = {name: _values(setup, name, x) for name, x in params.items()}
+    counts = {len(x) for x in (q, v, *free.values()) if x.ndim > 1} or {1}
+    if len(counts) > 1 or max(q.ndim, v.ndim) > 2 or counts == {0}:
+        shapes = {"q0": q.shape, "v0": v.shape} | {name: x.shape for name, x in free.items()}
+        raise QueryError(f"starts and params must be of one number of runs, (B, {n}), got {shapes}")
+    B = counts.pop()
+    return np.broadcast_to(q, (B, n)), np.broadcast_to(v, (B, n)), free
+
+
+def _values(setup: Setup, name: str, values: Any) -> np.ndarray:
+    """The values of a parameter, (B, n)."""
+    known = {f"{effect.name}.{key}": x for effect in setup.plant.effects for key, x in _numbers(effect)}
+    known |= dict(_numbers(setup.controller))
+    if name not in known:
+        raise QueryError(f"params: no {name!r}; {nearest(name, known)}")
+    n = known[name].size if known[name].ndim else setup.plant.dynamics.n
+    try:
+        array = np.array(values, dtype=float)
+    except (TypeError, ValueError):
+        raise QueryError(f"params: {name} must be numbers, got {values!r}") from None
+    signed = name.rpartition(".")[2] in _SIGNED
+    array = array[:, None] if array.ndim == 1 else array
+    fits = array.ndim == 2 and array.shape[1] in (1, n) and np.isfinite(array).all()
+    if not fits or not (signed or (array >= 0).all()):
+        sign = "" if signed else "not negative, "
+        raise QueryError(f"params: {name} must be finite, {sign}of shape (B,) or (B, {n}), got {np.shape(values)}")
+    return np.ascontiguousarray(np.broadcast_to(array, (len(array), n)))
+
+
+def _numbers(part: Any) -> list[tuple[str, np.ndarray]]:
+    """The coefficients of an effect or controller, by name."""
+    if part is None:
+        return []
+    return [(key, x) for key, x in vars(part).items() if isinstance(x, np.ndarray) and x.ndim < 2]

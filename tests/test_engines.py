@@ -1,0 +1,243 @@
+"""The compiled engine is the interpreted one: same steps, same runs, same ends; and the choice between them is told."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from dataclasses import dataclass, replace
+from typing import final
+
+import numpy as np
+import pytest
+
+import robot_dyn as rd
+from robot_dyn.compiled.right_angles import completed
+from robot_dyn.compiled.symbolic import TraceError
+from robot_dyn.control.controller import Memoryless
+from robot_dyn.effects.effect import Active
+from robot_dyn.errors import QueryError
+from robot_dyn.integrate.methods import METHODS
+from robot_dyn.simulation.choice import choose
+from robot_dyn.simulation.machine.machine import MarchError
+from robot_dyn.simulation.motion import Motion
+
+ARM = rd.load("planar_2r").with_(gravity=(0.0, -9.80665, 0.0))
+UR5 = completed(rd.load("ur5"))[0]  # its file states right angles with too few digits
+Q, V = np.array([0.4, -0.7]), np.array([0.3, 0.5])
+REFERENCE = rd.via_points([0.05, 0.1, 0.2], [Q, Q + 0.3, Q - 0.2], kind="cubic")
+CONTROLLERS = {
+    "none": None,
+    "PD": rd.PD(rd.hold(Q), 40.0, [4.0, 3.0]),
+    "PD, sampled": rd.PD(REFERENCE, 40.0, 4.0, period_s=0.01),
+    "PID": rd.PID(REFERENCE, 40.0, 30.0, 4.0, effort_limit=3.0),
+    "PID, sampled": rd.PID(REFERENCE, 40.0, 30.0, 4.0, effort_limit=[3.0, np.inf], period_s=0.004),
+    "PD and gravity": rd.PDGravity(ARM, REFERENCE, 40.0, 4.0),
+    "feed forward": rd.FeedForward(ARM, REFERENCE, 40.0, 4.0),
+    "computed torque": rd.ComputedTorque(ARM.with_(gravity=(0.0, -9.0, 0.0)), REFERENCE, 40.0, 9.0),
+}
+LINK = ARM.frame_names[-1]
+EFFECTS = {
+    "viscous friction": [rd.ViscousFriction([0.3, 0.1])],
+    "dry friction": [rd.RegularisedCoulombFriction(0.4, 0.1)],
+    "spring": [rd.Spring([3.0, 1.0], 0.2)],
+    "stops": rd.joint_stops([-0.5, -0.75], [0.45, 2.0], 1e3, 1e2),
+    "effort limit": [rd.EffortLimit([2.0, np.inf])],
+    "wrench": [rd.ExternalWrench(LINK, [3, 2, 1, 0.1, 0.2, 0.3], "body", start_s=0.04, end_s=0.13)],
+    "two wrenches": [
+        rd.ExternalWrench(LINK, [3, 2, 1, 0.1, 0.2, 0.3]),
+        rd.ExternalWrench(LINK, [0, 2, 1, 0.1, 0.2, 0.3], "world", start_s=0.1),
+    ],
+}
+WHOLE = [name for name in METHODS if name not in ("linearly_implicit_euler", "sdirk_3")]
+
+
+@pytest.fixture(autouse=True, scope="module")
+def kernels(tmp_path_factory):
+    """A store of this module's own: nothing comes from a run before, all is shared by its tests."""
+    before = os.environ.get("ROBOT_DYN_CACHE")
+    os.environ["ROBOT_DYN_CACHE"] = str(tmp_path_factory.mktemp("kernels") / "store")
+    yield
+    os.environ.pop("ROBOT_DYN_CACHE") if before is None else os.environ.update(ROBOT_DYN_CACHE=before)
+
+
+def both(**options) -> tuple[rd.Trajectory, rd.Trajectory]:
+    """A run in machine code and the same interpreted."""
+    plant = rd.Plant(options.pop("robot", ARM), options.pop("effects", ()))
+    setup = rd.Setup(plant, **{"q0": Q, "v0": V, "duration_s": 0.25, "step_s": 1e-3} | options)
+    return rd.simulate(setup, engine="compiled"), rd.simulate(setup, engine="interpreted")
+
+
+def check_equal(ours: rd.Trajectory, theirs: rd.Trajectory, tolerance: float) -> None:
+    """All that a run tells, each array by its own size."""
+    assert ours.outcome == theirs.outcome
+    assert ours.statistics.steps == theirs.statistics.steps
+    np.testing.assert_array_equal(ours.t, theirs.t)
+    pairs = [(getattr(ours, name), getattr(theirs, name)) for name in ("q", "v", "a", "tau")]
+    pairs += [(ours.ledger.kinetic, theirs.ledger.kinetic), (ours.ledger.potential, theirs.ledger.potential)]
+    assert list(ours.power) == list(theirs.power) and list(ours.ledger.work) == list(theirs.ledger.work)
+    pairs += [(ours.power[name], theirs.power[name]) for name in ours.power]
+    pairs += [(ours.ledger.work[name], theirs.ledger.work[name]) for name in ours.power]
+    for mine, other in pairs:
+        assert mine.shape == other.shape
+        np.testing.assert_allclose(mine, other, rtol=0, atol=tolerance * (1 + np.abs(other).max()))
+    assert (ours.error is None) == (theirs.error is None)
+    if ours.error is not None and theirs.error is not None:
+        assert (ours.error.note, ours.error.resolved_until) == (theirs.error.note, theirs.error.resolved_until)
+        np.testing.assert_array_equal(ours.error.t, theirs.error.t)
+        np.testing.assert_allclose(ours.error.error, theirs.error.error, rtol=1e-3, atol=1e-11)
+
+
+@pytest.mark.parametrize("name", WHOLE)
+def test_each_method_makes_the_interpreted_step(name: str) -> None:
+    """One step from equal states: the machine's own check, 1e-13 of the state's size, and a run of 60 steps."""
+    ours, theirs = both(integrator=rd.method(name), duration_s=0.06, controller=CONTROLLERS["PD"])
+    check_equal(ours, theirs, 1e-12)  # 60 steps of rounding, amplified by the gains
+    assert ours.statistics.engine == "compiled" and ours.summary.endswith(", compiled")
+    assert theirs.statistics.engine == "interpreted"
+    np.testing.assert_allclose(ours.q[1], theirs.q[1], rtol=1e-13)
+
+
+@pytest.mark.parametrize("name", CONTROLLERS)
+def test_each_controller_drives_the_same_run(name: str) -> None:
+    """Memory, ticks and the breaks of a reference included; a cubic spline's acceleration jumps where it ends."""
+    ours, theirs = both(controller=CONTROLLERS[name])
+    check_equal(ours, theirs, 1e-11)
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_each_effect_acts_alike(name: str) -> None:
+    ours, theirs = both(effects=EFFECTS[name], controller=CONTROLLERS["PD"])
+    check_equal(ours, theirs, 1e-11)
+    for link, wrench in theirs.wrenches.items():
+        np.testing.assert_allclose(ours.wrenches[link], wrench, atol=1e-11)
+
+
+@pytest.mark.parametrize("method", ["rk4", "gauss_4"])
+def test_six_joints_under_all_at_once(method: str) -> None:
+    q = np.array([0.3, -0.6, 0.4, -1.2, 0.5, 1.1])
+    effects = [rd.ViscousFriction(0.5), rd.EffortLimit("urdf"), rd.ExternalWrench("tool0", [5, 3, 1, 0.1, 0.2, 0.3])]
+    controller = rd.ComputedTorque(UR5, rd.quintic(q, q + 0.4, 0.1), 100.0, 20.0)
+    options = {"q0": q, "v0": 0 * q, "robot": UR5, "effects": effects, "controller": controller, "duration_s": 0.12}
+    check_equal(*both(integrator=rd.method(method), **options), 1e-11)
+
+
+@pytest.mark.parametrize("period", [0.0, 0.0025, 0.01, 0.07])
+def test_samples_lie_at_the_record_period(period: float) -> None:
+    check_equal(*both(record_period_s=period), 1e-12)
+
+
+@pytest.mark.parametrize("method", [rd.Adaptive(), rd.method("sdirk_3"), rd.method("linearly_implicit_euler")])
+def test_other_methods_take_the_rate_in_machine_code(method) -> None:
+    """Their steps depend on rounding through tolerances and Jacobians by differences."""
+    ours, theirs = both(integrator=method, controller=CONTROLLERS["PID"], duration_s=0.1)
+    assert ours.statistics.engine.startswith("compiled (the equation of motion")
+    np.testing.assert_allclose(ours.q, theirs.q, atol=1e-9)
+    np.testing.assert_allclose(ours.tau, theirs.tau, atol=1e-6)
+    assert ours.outcome == theirs.outcome
+
+
+DIVERGING = {
+    "a number overflows": {"controller": rd.PD(rd.hold(Q), 1e9, 1e7)},
+    "energy grows": {"controller": rd.PD(rd.hold(Q), 3e4, 0.0), "step_s": 0.05, "duration_s": 20.0},
+    "stages are not found": {"controller": rd.PD(rd.hold(Q), 1e7, 0.0), "integrator": rd.method("gauss_2")},
+    "a tick asks for no finite torque": {"controller": rd.PD(rd.hold(Q), 1e9, 1e7, period_s=0.01)},
+}
+
+
+@pytest.mark.parametrize("name", DIVERGING)
+def test_a_run_that_diverges_ends_alike(name: str) -> None:
+    """Up to rounding, which an explosion multiplies: the same ending, within a few steps, and the same advice."""
+    ours, theirs = both(estimate_error=False, **DIVERGING[name])
+    assert ours.outcome.ending == theirs.outcome.ending == "diverged"
+    assert ours.outcome.t == pytest.approx(theirs.outcome.t, abs=0.011)
+    assert ours.outcome.advice.split(";")[-1].split("at t")[0] == theirs.outcome.advice.split(";")[-1].split("at t")[0]
+    assert np.isfinite(ours.q).all() and abs(len(ours.t) - len(theirs.t)) <= 11
+
+
+def test_progress_is_told_and_an_interrupt_keeps_the_samples() -> None:
+    seen: list[float] = []
+
+    def progress(t: float) -> None:
+        seen.append(t)
+        if len(seen) == 2:
+            raise KeyboardInterrupt
+
+    setup = rd.Setup(rd.Plant(ARM), Q, duration_s=400.0, record_period_s=0.1, engine="compiled")
+    run = rd.simulate(setup, on_progress=progress)
+    assert run.outcome.ending == "stopped" and run.error is None
+    assert 0 < run.t[-1] <= run.outcome.t == seen[-1] < 400.0
+    assert len(run.t) == len(np.arange(0, run.t[-1] + 0.05, 0.1))
+    assert np.isfinite(run.q).all()
+
+
+@final
+@dataclass(frozen=True)
+class Elsewhere(Memoryless):
+    """A controller written elsewhere, which traces nonetheless."""
+
+    n: int = 2
+    period_s: float = 0.0
+
+    def torque(self, t, q, v, z):
+        return -4.0 * q if t < 0.05 else 0 * q
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Table(Active):
+    """An effect that looks its torque up, which symbols cannot."""
+
+    def torque(self, dynamics, t, q, v):
+        return np.array([0.1, 0.2])[int(10 * t) % 2] * v
+
+
+def test_a_python_controller_runs_interpreted_unless_it_is_asked_for() -> None:
+    setup = rd.Setup(rd.Plant(ARM), Q, controller=Elsewhere(), duration_s=0.1, estimate_error=False)
+    run = rd.simulate(setup)
+    assert run.statistics.engine == "interpreted (Elsewhere is not the library's own)"
+    assert run.statistics.engine in run.summary
+    check_equal(rd.simulate(setup, engine="compiled"), run, 1e-12)
+
+
+def test_what_cannot_be_compiled_is_named() -> None:
+    with pytest.raises(TraceError, match=r"effect table cannot be compiled .*engine='interpreted'"):
+        rd.simulate(rd.Plant(ARM, [Table()]), q0=Q, engine="compiled")
+    own = rd.OperationalSpace(UR5, "tool0", rd.line([0.4, 0.2, 0.3], [0.5, 0.2, 0.3], 1.0), 1.0, 1.0)
+    with pytest.raises(TraceError, match="controller OperationalSpace"):
+        rd.simulate(rd.Plant(UR5), q0=np.full(6, 0.3), controller=own, engine="compiled")
+    jump = rd.PiecewisePolynomial([0, 0.1, 0.2], [[Q], [Q + 1]])
+    with pytest.raises(TraceError, match="jumps between 2 rests"):
+        rd.simulate(rd.Plant(ARM), q0=Q, controller=rd.PD(jump, 1.0, 1.0), engine="compiled")
+    with pytest.raises(QueryError, match="engine='fast'; give one of auto, interpreted, compiled"):
+        rd.Setup(rd.Plant(ARM), Q, engine="fast")
+
+
+def test_auto_compiles_where_it_pays() -> None:
+    """Evaluations times their cost: a second of motion is short, an hour is not."""
+    setup = rd.Setup(rd.Plant(ARM), Q, duration_s=1.0)
+    assert choose(setup, Motion(setup.plant, None))[1] == "interpreted (short: compiling does not pay)"
+    long = replace(setup, duration_s=3600.0)
+    machine, words = choose(long, Motion(setup.plant, None))
+    assert machine is not None and words == "compiled"
+
+
+def test_a_machine_that_disagrees_is_refused(monkeypatch) -> None:
+    """A referee that cannot refuse is none: the interpreted motion is given another gravity behind its back."""
+    from robot_dyn.simulation.machine import making
+
+    setup = rd.Setup(rd.Plant(ARM), Q)
+    made = making.machine(Motion(setup.plant, None), rd.method("rk4"))
+    made.check(setup)
+    other = replace(made, motion=Motion(rd.Plant(ARM.with_(gravity=(0.0, -9.80664, 0.0))), None))
+    with pytest.raises(MarchError, match=r"differs from the interpreted one by .* allowed: take engine='interpreted'"):
+        other.check(setup)
+
+
+def test_interpreted_runs_import_no_compiler() -> None:
+    code = (
+        "import sys, robot_dyn as rd, numpy as np;"
+        "rd.simulate(rd.Plant(rd.load('planar_2r')), q0=[0.1, 0.2], duration_s=0.05);"
+        "assert not {'numba', 'casadi', 'llvmlite'} & set(sys.modules), 'imported'"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

@@ -1,0 +1,187 @@
+"""Rollouts: each run of a batch is the run that it is by itself, whatever the others do and whoever does it."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import robot_dyn as rd
+from robot_dyn.compiled.symbolic import TraceError
+from robot_dyn.effects.effect import Active
+from robot_dyn.errors import QueryError
+from robot_dyn.simulation.machine import batch
+
+ARM = rd.load("planar_2r").with_(gravity=(0.0, -9.80665, 0.0))
+Q, V = np.array([0.4, -0.7]), np.array([0.3, 0.5])
+REFERENCE = rd.quintic(Q, Q + 0.5, 0.1, start=0.05)
+PLANT = rd.Plant(ARM, [rd.ViscousFriction([0.3, 0.1]), rd.RegularisedCoulombFriction(0.2, 0.1), rd.EffortLimit(30.0)])
+SETUP = rd.Setup(
+    PLANT, Q, V, 0.2, rd.PD(REFERENCE, 40.0, [4.0, 3.0]), step_s=2e-3, record_period_s=0.01, engine="interpreted"
+)
+PID = replace(SETUP, controller=rd.PID(REFERENCE, 40.0, 30.0, 4.0, effort_limit=3.0, period_s=0.004))
+EVERYTHING = ("q", "v", "tau", "energy", "work")
+
+
+@pytest.fixture(autouse=True, scope="module")
+def kernels(tmp_path_factory):
+    """A store of this module's own."""
+    before = os.environ.get("ROBOT_DYN_CACHE")
+    os.environ["ROBOT_DYN_CACHE"] = str(tmp_path_factory.mktemp("kernels") / "store")
+    yield
+    os.environ.pop("ROBOT_DYN_CACHE") if before is None else os.environ.update(ROBOT_DYN_CACHE=before)
+
+
+def starts(count: int, spread: float = 0.3) -> np.ndarray:
+    return Q + spread * np.random.default_rng(3).normal(size=(count, 2))
+
+
+def arrays(runs: rd.Rollouts) -> list[np.ndarray]:
+    """All arrays of numbers of a batch, by run."""
+    given = [runs.q, runs.v, runs.tau, runs.kinetic, runs.potential, *(runs.work or {}).values(), runs.ended]
+    return [x for x in given if x is not None]
+
+
+@pytest.mark.parametrize("setup", [SETUP, PID, replace(SETUP, integrator=rd.method("gauss_2"))])
+def test_each_run_is_that_of_simulate(setup: rd.Setup) -> None:
+    """To rounding: B = 1, B of one tile and a bit more."""
+    for count in (1, 70):
+        q0 = starts(count)
+        runs = rd.rollouts(setup, q0, record=EVERYTHING)
+        assert len(runs) == count and not runs.diverged.any()
+        for i in {0, count // 2, count - 1}:
+            alone = rd.simulate(setup, q0=q0[i], estimate_error=False)
+            np.testing.assert_allclose(runs.t, alone.t, rtol=1e-15)
+            pairs = [(runs.q, alone.q), (runs.v, alone.v), (runs.tau, alone.tau)]
+            pairs += [(runs.kinetic, alone.ledger.kinetic), (runs.potential, alone.ledger.potential)]
+            pairs += [(runs.work[name], work) for name, work in alone.ledger.work.items()]
+            for ours, theirs in pairs:
+                assert ours[i].shape == theirs.shape
+                np.testing.assert_allclose(ours[i], theirs, rtol=0, atol=1e-11 * (1 + np.abs(theirs).max()))
+            assert runs.outcome(i) == alone.outcome
+
+
+def test_threads_change_nothing() -> None:
+    """300 runs are five tiles: bit for bit the same from one thread, from two and from three."""
+    q0 = starts(300)
+    first = rd.rollouts(SETUP, q0, record=EVERYTHING, threads=1)
+    for threads in (2, 3):
+        for x, y in zip(arrays(first), arrays(rd.rollouts(SETUP, q0, record=EVERYTHING, threads=threads)), strict=True):
+            np.testing.assert_array_equal(x, y)
+
+
+@pytest.mark.parametrize("method", ["rk4", "gauss_2"])
+def test_a_run_that_diverges_leaves_the_others_as_they_are(method: str) -> None:
+    """Bit for bit; its own samples are those of simulate up to its end, then nan."""
+    setup = replace(SETUP, integrator=rd.method(method), record_period_s=0.0)
+    q0, v0 = starts(40), np.broadcast_to(V, (40, 2)).copy()
+    wild = [3, 17]
+    quiet = rd.rollouts(setup, q0, v0)
+    v0[wild] = 1e5, 3e7
+    runs = rd.rollouts(setup, q0, v0, record=EVERYTHING)
+    others = np.setdiff1d(np.arange(40), wild)
+    np.testing.assert_array_equal(runs.q[others], quiet.q[others])
+    np.testing.assert_array_equal(runs.v[others], quiet.v[others])
+    assert sorted(np.flatnonzero(runs.diverged)) == wild and not quiet.diverged.any()
+    for i in wild:
+        alone = rd.simulate(setup, q0=q0[i], v0=v0[i], estimate_error=False)
+        assert alone.outcome.ending == runs.outcome(i).ending == "diverged"
+        assert runs.ended[i] == pytest.approx(alone.outcome.t, abs=0.01)
+        later = runs.t > runs.ended[i] + 1e-9
+        assert later.any() and np.isnan(runs.q[i, later]).all() and np.isnan(runs.tau[i, later]).all()
+        assert np.isnan(runs.kinetic[i, later]).all() and np.isfinite(runs.q[i, 0]).all()
+        assert runs.ended[i] < 0.2 and "smaller step" in runs.outcome(i).advice
+    assert "2 diverged" in runs.summary
+
+
+def test_a_run_beyond_the_range_of_a_tile_is_done_by_itself() -> None:
+    """A free joint that starts at 2e5 rad: the tile's sine is no longer exact there, the C library's is."""
+    spinner = replace(SETUP, plant=rd.Plant(ARM), controller=None)
+    q0 = starts(3)
+    q0[1] = 2e5, 0.3
+    runs = rd.rollouts(spinner, q0, record=EVERYTHING)
+    alone = rd.simulate(spinner, q0=q0[1], estimate_error=False)
+    np.testing.assert_allclose(runs.q[1], alone.q, rtol=0, atol=1e-8)  # 1 ulp of 2e5 rad is 3e-11
+    np.testing.assert_allclose(runs.kinetic[1], alone.ledger.kinetic, rtol=0, atol=1e-8)
+
+
+def test_values_that_differ_from_run_to_run() -> None:
+    """Each run with its own gains and friction is the run of a setup with these."""
+    rng = np.random.default_rng(5)
+    params = {"kp": rng.uniform(20, 60, 5), "kd": rng.uniform(2, 5, (5, 2))}
+    params |= {"viscous_friction.damping": rng.uniform(0, 1, (5, 2)), "effort_limit.limit": rng.uniform(5, 30, 5)}
+    runs = rd.rollouts(SETUP, params=params, record=EVERYTHING)
+    for i in range(5):
+        kp, kd, damping, limit = (x[i] for x in params.values())
+        effects = [rd.ViscousFriction(damping), PLANT.effects[1], rd.EffortLimit(limit)]
+        setup = replace(SETUP, plant=rd.Plant(ARM, effects), controller=rd.PD(REFERENCE, kp, kd), estimate_error=False)
+        alone = rd.simulate(setup)
+        np.testing.assert_allclose(runs.q[i], alone.q, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(runs.tau[i], alone.tau, rtol=0, atol=1e-11)
+        for name, work in alone.ledger.work.items():
+            np.testing.assert_allclose(runs.work[name][i], work, rtol=0, atol=1e-11)
+
+
+def test_only_what_is_asked_for_is_recorded() -> None:
+    runs = rd.rollouts(SETUP, starts(2), record=["v"])
+    assert runs.q is None and runs.tau is None and runs.kinetic is None and runs.work is None
+    np.testing.assert_array_equal(runs.v, rd.rollouts(SETUP, starts(2)).v)
+
+
+@pytest.mark.parametrize("period", [0.0, 0.005, 0.03, 0.5])
+def test_samples_lie_where_those_of_simulate_do(period: float) -> None:
+    setup = replace(SETUP, record_period_s=period, estimate_error=False)
+    runs, alone = rd.rollouts(setup, starts(2)), rd.simulate(setup, q0=starts(2)[1])
+    np.testing.assert_allclose(runs.t, alone.t, rtol=1e-15)
+    np.testing.assert_allclose(runs.q[1], alone.q, rtol=0, atol=1e-12)
+
+
+class Table(Active):
+    def torque(self, dynamics, t, q, v):
+        return np.array([0.1, 0.2])[int(10 * t) % 2] * v
+
+
+def test_what_has_no_meaning_is_refused() -> None:
+    bad = starts(4)
+    bad[2, 1] = np.nan
+    for message, options in {
+        "q0 must be finite, got nan for joint": {"q0": bad},
+        r"q0 must have shape \(2,\)": {"q0": np.zeros((4, 3))},
+        "one number of runs": {"q0": starts(4), "v0": np.zeros((3, 2))},
+        "one number of runs, .*'kp'": {"q0": starts(4), "params": {"kp": np.ones(3)}},
+        "params: no 'kq'; nearest: k": {"params": {"kq": np.ones(3)}},
+        "params: no 'viscous_friction.damp'; nearest: viscous_friction.damping": {
+            "params": {"viscous_friction.damp": np.ones(3)}
+        },
+        "params: kp must be finite, not negative": {"params": {"kp": [-1.0]}},
+        "record: no 'torque'": {"record": ("torque",)},
+        "threads must be a positive number": {"threads": 0},
+        "takes 0.0 GiB, more than 0.0: take a longer record_period_s": {"q0": starts(4), "most_bytes": 100},
+    }.items():
+        with pytest.raises(QueryError, match=message):
+            rd.rollouts(SETUP, **options)
+    with pytest.raises(QueryError, match="rollouts take an explicit or a Gauss method"):
+        rd.rollouts(replace(SETUP, integrator=rd.Adaptive()))
+    with pytest.raises(TraceError, match="effect table"):
+        rd.rollouts(replace(SETUP, plant=rd.Plant(ARM, [Table()])))
+
+
+def test_an_interrupt_ends_the_batch_and_keeps_what_there_is(monkeypatch) -> None:
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    setup = replace(SETUP, duration_s=100.0, record_period_s=10.0)
+    rd.rollouts(SETUP, starts(1))  # compiled before
+    wait, calls = batch.wait, []
+
+    def once(*args, **options):
+        calls.append(1)
+        return interrupted() if len(calls) == 1 else wait(*args, **options)
+
+    monkeypatch.setattr(batch, "wait", once)
+    runs = rd.rollouts(setup, starts(200), threads=2)
+    assert runs.stopped.any() and not runs.diverged.any()
+    i = int(np.flatnonzero(runs.stopped)[-1])
+    assert runs.outcome(i).ending == "stopped" and np.isnan(runs.q[i, -1]).all()
