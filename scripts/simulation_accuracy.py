@@ -6,13 +6,12 @@ References are runs of two methods whose distance is printed; MuJoCo's RK4 runs 
 from __future__ import annotations
 
 import argparse
-from copy import deepcopy
 from dataclasses import replace
 from importlib import import_module
 from typing import Any
 
 import numpy as np
-from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
+from benchmarks.mujoco_arm import mujoco_model
 
 import robot_dyn as rd
 
@@ -42,32 +41,13 @@ def references(setup: rd.Setup) -> tuple[np.ndarray, float]:
     return by_tolerance, float(np.abs(by_steps - by_tolerance).max())
 
 
-def mujoco_panda(mujoco: Any) -> Any:
-    """MuJoCo's model of the same file by its own parser: fingers fixed, no limits, no friction, no contacts."""
-    urdf = deepcopy(PANDA.description.element)
-    etree.strip_elements(urdf, "visual", "collision", "limit", "dynamics", "mimic", "safety_controller")
-    for joint in urdf.iter("joint"):
-        if joint.get("type") == "prismatic":
-            joint.set("type", "fixed")  # both fingers, at 0 as in PANDA
-        elif joint.get("type") == "revolute":
-            joint.set("type", "continuous")
-    options = etree.SubElement(urdf, "mujoco")
-    etree.SubElement(options, "compiler", fusestatic="true", balanceinertia="false", boundmass="0", boundinertia="0")
-    model = mujoco.MjModel.from_xml_string(etree.tostring(urdf, encoding="unicode"))
-    model.opt.gravity[:] = rd.STANDARD_GRAVITY
-    model.opt.timestep = 1e-3
-    model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
-    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
-    return model
-
-
 def mujoco_end(duration: float) -> tuple[np.ndarray, float] | None:
     """(q, v) at the end of MuJoCo's run and how far its M is from ours, relative; None where it is not installed."""
     try:
         mujoco: Any = import_module("mujoco")
     except ImportError:
         return None
-    model = mujoco_panda(mujoco)
+    model = mujoco_model(mujoco, PANDA)
     names = tuple(model.joint(i).name for i in range(model.njnt))
     assert names == PANDA.joint_names
     assert not model.dof_damping.any() and not model.dof_frictionloss.any() and not model.dof_armature.any()

@@ -30,7 +30,7 @@ def test_list():
 
 def test_info():
     keys = promised("info")
-    panda = document("info", "panda", "--lock", "panda_joint2=0.25")
+    panda = document("info", "panda", "--lock", "panda_joint2=0.25", "--compiled")
     assert panda.keys() == keys.keys()
     for joint in panda["joints"]:
         assert joint.keys() == names(keys["joints"])

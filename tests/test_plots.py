@@ -3,58 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from time import perf_counter
 
 import numpy as np
 import pytest
-from matplotlib import rcParams
-from matplotlib.colors import to_rgb
 
 import robot_dyn as rd
 from robot_dyn.errors import QueryError
-from robot_dyn.simulation.ledger import Ledger
-from robot_dyn.simulation.trajectory import Ending, Outcome
-from robot_dyn.view.plots import MOST_JOINTS, PLOTS, PlotError, plot, save_plot
+from robot_dyn.view.plots import PlotError, plot, save_plot
+from tests.plotted import cart_pole, cells, lines, ur5
 
 
 @pytest.fixture(scope="module")
 def run():
-    """UR5 under PD, in general position."""
-    arm = rd.load("ur5")
-    q = np.array([0.1, -1.2, 1.8, -2.2, -1.5, 0.3])
-    plan = rd.quintic(q, q + np.array([0.3, -0.2, 0.1, 0.4, -0.3, 0.2]), 0.2)
-    kp, kd = rd.gains_from(np.diag(arm.M(q)), 20.0)
-    controller = rd.PD(plan, kp, kd)
-    return rd.simulate(rd.Plant(arm), q0=q, v0=0 * q, duration_s=0.3, controller=controller, step_s=0.005)
+    return ur5()
 
 
 @pytest.fixture(scope="module")
 def cart():
-    """A joint that slides and one that turns, without a reference."""
-    plant = rd.Plant(rd.load("cart_pole"), [rd.ViscousFriction(0.1)])
-    return rd.simulate(plant, q0=[0.1, 0.4], v0=[0.2, -0.3], duration_s=0.2, step_s=0.01)
-
-
-def cells(figure, symbol: str) -> list:
-    """The axes whose y axis begins with that symbol."""
-    return [axes for axes in figure.axes if axes.get_ylabel().startswith(f"{symbol} ")]
-
-
-def lines(axes, label: str) -> list:
-    return [line for line in axes.lines if line.get_label() == label]
-
-
-def stretched(run, m: int, **changes):
-    """The run with m samples of made-up, smooth motion, whose ledger does not matter."""
-    t = np.linspace(0.0, 5.0, m)
-    q = np.sin(t[:, None] * np.arange(1, len(run.joint_names) + 1))
-    zero = np.zeros(m)
-    made = {"t": t, "q": q, "v": q, "a": q, "tau": q, "wanted": None, "deviation": None, "error": None}
-    return replace(run, **(made | {"ledger": Ledger(zero, zero, {"control": zero})} | changes))
-
-
-def many(run, n: int, m: int = 50):
-    return stretched(replace(run, joint_names=tuple(f"joint_{i:02d}" for i in range(n)), about={}), m)
+    return cart_pole()
 
 
 def test_positions_and_velocities_are_the_runs(run) -> None:
@@ -195,93 +161,3 @@ def test_names_are_drawn_letter_by_letter(run, tmp_path) -> None:
         for text in axes.get_legend().texts
     ]
     assert r"W _$\sum$" in legends
-
-
-@pytest.mark.parametrize(
-    "suffix, opening", [(".png", b"\x89PNG"), (".svg", b"<?xml"), (".PDF", b"%PDF"), ("", b"\x89PNG")]
-)
-def test_the_suffix_says_the_format(cart, tmp_path, suffix: str, opening: bytes) -> None:
-    path = save_plot(cart, tmp_path / f"plot{suffix}", "joints", dpi=40, theme="dark")
-    assert path.read_bytes().startswith(opening) and path.suffix == (suffix or ".png")
-
-
-def test_targets_that_cannot_be_written_are_refused(cart, tmp_path) -> None:
-    with pytest.raises(PlotError, match=r"'.jpeg' is no format.*\.png, \.svg, \.pdf"):
-        save_plot(cart, tmp_path / "plot.jpeg")
-    with pytest.raises(PlotError, match="is a folder"):
-        save_plot(cart, tmp_path)
-    with pytest.raises(PlotError, match="cannot be written"):
-        save_plot(cart, tmp_path / "no folder" / "plot.png", "joints", dpi=40)
-    with pytest.raises(PlotError, match="cannot be drawn at 50000 dpi"):
-        save_plot(cart, tmp_path / "plot.png", "joints", dpi=50_000)
-
-
-def test_a_run_without_samples_is_refused(cart) -> None:
-    with pytest.raises(PlotError, match="no samples"):
-        plot(replace(cart, t=cart.t[:0]))
-
-
-def test_a_run_of_one_sample_is_a_point(cart, tmp_path) -> None:
-    one = stretched(cart, 1)
-    save_plot(one, tmp_path / "one.png", dpi=40)
-    assert {line.get_marker() for axes in cells(plot(one, "joints"), "q") for line in axes.lines} == {"o"}
-
-
-def test_a_diverged_run_shows_how_it_began_and_how_it_ended(cart, tmp_path) -> None:
-    """What is not finite is left out, and the scale has room for 0.1 and 1e200."""
-    growth = np.exp(np.linspace(0, 460, 200))[:, None] * [0.1, -0.1]
-    growth[-3:] = [[np.nan], [np.inf], [np.nan]]
-    energy = Ledger(growth[:, 0], growth[:, 1], {"control": growth[:, 0]})
-    end = Outcome(Ending.DIVERGED, 5.0, "take a smaller step")
-    fast = {"q": growth, "v": growth, "tau": growth, "ledger": energy, "outcome": end}
-    run = stretched(cart, 200, **fast, deviation=growth, wanted=growth)
-    save_plot(run, tmp_path / "diverged.png", dpi=40)
-    figure = plot(run)
-    assert all(np.isfinite([*axes.get_xlim(), *axes.get_ylim()]).all() for axes in figure.axes)
-    assert {axes.get_yscale() for axes in cells(figure, "q")} == {"symlog"}
-    assert any("take a smaller step" in text.get_text() for text in figure.texts)
-    nothing = np.full((200, 2), np.nan)
-    save_plot(stretched(run, 200, q=nothing, v=nothing, tau=nothing), tmp_path / "nan.png", dpi=40)
-
-
-def test_thirty_joints_keep_their_names_and_do_not_overlap(run) -> None:
-    figure = plot(many(run, 30), "joints")
-    figure.draw_without_rendering()
-    assert [axes.get_title(loc="left") for axes in cells(figure, "q")] == [f"joint_{i:02d}" for i in range(30)]
-    boxes = [axes.get_window_extent() for axes in figure.axes]
-    assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
-    page = figure.bbox
-    assert all(page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 and box.y1 <= page.y1 for box in boxes)
-    with pytest.raises(PlotError, match=f"1 to {MOST_JOINTS}; name those to show"):
-        plot(many(run, MOST_JOINTS + 1), "joints")
-
-
-def test_a_long_run_is_thinned_and_keeps_its_peaks(run) -> None:
-    """Of 300 000 samples one is a peak, one a trough; all joints are drawn in seconds."""
-    long = stretched(run, 300_000)
-    tau = long.tau.copy()
-    tau[123_457], tau[222_223] = 50.0, -70.0
-    began = perf_counter()
-    figure = plot(replace(long, tau=tau))
-    assert perf_counter() - began < 10
-    for axes in cells(figure, "τ"):
-        drawn = axes.lines[0].get_ydata()
-        assert len(drawn) < 5000 and (drawn.min(), drawn.max()) == (-70.0, 50.0)
-        assert axes.lines[0].get_xdata()[[0, -1]].tolist() == [0.0, 5.0]
-
-
-def test_themes_differ_in_paper_and_nothing_global_is_set(cart) -> None:
-    before = dict(rcParams)
-    light, dark = (plot(cart, theme=theme) for theme in ("light", "dark"))
-    assert sum(light.get_facecolor()[:3]) > 2.5 and sum(dark.get_facecolor()[:3]) < 0.5
-    dark.draw_without_rendering()
-    for axes in dark.axes:
-        texts = [axes.yaxis.label, axes.title, *axes.get_yticklabels(), *axes.get_xticklabels()]
-        assert all(min(to_rgb(text.get_color())) > 0.7 for text in texts if text.get_text())
-    assert dict(rcParams) == before
-
-
-def test_the_list_of_plots_cannot_be_changed() -> None:
-    assert list(PLOTS) == ["joints", "torques", "energy", "tracking", "phase", "error_growth"]
-    with pytest.raises(TypeError):
-        PLOTS["mine"] = PLOTS["joints"]  # type: ignore[index]

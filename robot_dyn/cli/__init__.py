@@ -6,9 +6,9 @@ import sys
 import warnings
 from typing import Any
 
-from robot_dyn.cli import ask, run, show  # noqa: F401  each adds its commands
+from robot_dyn.cli import ask, keep, run, show  # noqa: F401  each adds its commands
 from robot_dyn.cli.app import app
-from robot_dyn.errors import ModelWarning, RobotDynError
+from robot_dyn.errors import RobotDynError, RobotDynWarning
 
 
 def main() -> None:
@@ -16,7 +16,7 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):  # a terminal without mathematical signs shows ? for them
         stream.reconfigure(errors="replace")  # pyright: ignore[reportAttributeAccessIssue]
     with warnings.catch_warnings():
-        warnings.simplefilter("always", ModelWarning)
+        warnings.simplefilter("always", RobotDynWarning)
         warnings.showwarning = _show_warning
         try:
             app()

@@ -20,12 +20,26 @@ def list_(as_json: Json = False) -> None:
 
 
 @app.command()
-def info(robot: Name, lock: Lock = None, package_dir: PackageDir = None, as_json: Json = False) -> None:
+def info(
+    robot: Name,
+    compiled: Annotated[
+        bool, typer.Option("--compiled", help="Also trace each quantity, and say which formulation is compiled.")
+    ] = False,
+    lock: Lock = None,
+    package_dir: PackageDir = None,
+    as_json: Json = False,
+) -> None:
     """Show a robot: joints, limits, friction, mass, and what is odd about it."""
-    from robot_dyn.cli import report
+    from robot_dyn.cli import kernels, report
 
     loaded = arguments.load(robot, lock, package_dir)
-    print_json(report.info(loaded)) if as_json else say(report.info_tables(loaded))
+    roads = {"compiled": kernels.formulations(loaded)} if compiled else {}
+    if as_json:
+        print_json(report.info(loaded) | roads)
+        return
+    say(report.info_tables(loaded))
+    if compiled:
+        say(kernels.formulation_table(roads["compiled"]))
 
 
 @app.command()
