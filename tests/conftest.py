@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import atexit
+import os
+import shutil
+import tempfile
 from collections.abc import Iterator
 from typing import Any
 
@@ -13,6 +17,10 @@ settings.register_profile(
     "robot_dyn", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow], print_blob=True
 )
 settings.load_profile("robot_dyn")
+
+if "ROBOT_DYN_CACHE" not in os.environ:  # kernels of a test run are its own; workers inherit the folder
+    os.environ["ROBOT_DYN_CACHE"] = tempfile.mkdtemp(prefix="robot_dyn-kernels-")
+    atexit.register(shutil.rmtree, os.environ["ROBOT_DYN_CACHE"], ignore_errors=True)
 
 
 @pytest.fixture(scope="session")

@@ -76,13 +76,16 @@ def draw(found: np.ndarray, picture: Path) -> None:
     axes[0].loglog(n, ours, "o-", label="compiled, batch")
     axes[0].loglog(n, cpp, "s--", label="Pinocchio's C++, abaInParallel")
     axes[0].set(ylabel="µs per state", title="forward dynamics, one thread")
-    axes[0].legend()
+    axes[0].legend(loc="upper left", frameon=False)
+    axes[0].set_ylim(top=100)
     axes[1].loglog(n, count, "o-")
     axes[1].set(ylabel="instructions", title="size of the kernel")
     axes[2].loglog(n, first, "o-")
     axes[2].set(ylabel="s", title="trace, compile and check")
     for each in axes:
         each.set_xlabel("joints of the chain")
+        each.set_xscale("log", base=2)
+        each.set_xticks([2, 4, 8, 16, 32, 64], labels=["2", "4", "8", "16", "32", "64"])
         each.grid(alpha=0.3)
     figure.savefig(picture, dpi=110)
 
