@@ -11,7 +11,7 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 from robot_dyn.model import catalog, description
 from robot_dyn.model.robot import Robot
-from robot_dyn.view.visuals import Drawing, drawing
+from robot_dyn.view.geometry.visuals import Drawing, drawing
 
 pytestmark = pytest.mark.filterwarnings("ignore::robot_dyn.errors.ModelWarning")
 

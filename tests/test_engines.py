@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 from dataclasses import dataclass, replace
@@ -50,15 +49,6 @@ EFFECTS = {
     ],
 }
 WHOLE = [name for name in METHODS if name not in ("linearly_implicit_euler", "sdirk_3")]
-
-
-@pytest.fixture(autouse=True, scope="module")
-def kernels(tmp_path_factory):
-    """A store of this module's own: nothing comes from a run before, all is shared by its tests."""
-    before = os.environ.get("ROBOT_DYN_CACHE")
-    os.environ["ROBOT_DYN_CACHE"] = str(tmp_path_factory.mktemp("kernels") / "store")
-    yield
-    os.environ.pop("ROBOT_DYN_CACHE") if before is None else os.environ.update(ROBOT_DYN_CACHE=before)
 
 
 def both(**options) -> tuple[rd.Trajectory, rd.Trajectory]:

@@ -229,3 +229,10 @@ def test_references_are_copied_and_frozen() -> None:
 def test_references_without_meaning_are_refused(make, message: str) -> None:
     with pytest.raises(ControlError, match=message):
         make()
+
+
+def test_steps_end_where_a_reference_jumps() -> None:
+    """Constants one after the other have knots between them; one constant has none."""
+    stairs = rd.PiecewisePolynomial([0.0, 0.5, 1.0], [[[0.1, 0.2]], [[0.3, -0.2]]])
+    np.testing.assert_array_equal(stairs.knots, [0.0, 0.5, 1.0])
+    assert not len(rd.hold([0.1, 0.2]).knots)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 
 import numpy as np
@@ -23,15 +22,6 @@ SETUP = rd.Setup(
 )
 PID = replace(SETUP, controller=rd.PID(REFERENCE, 40.0, 30.0, 4.0, effort_limit=3.0, period_s=0.004))
 EVERYTHING = ("q", "v", "tau", "energy", "work")
-
-
-@pytest.fixture(autouse=True, scope="module")
-def kernels(tmp_path_factory):
-    """A store of this module's own."""
-    before = os.environ.get("ROBOT_DYN_CACHE")
-    os.environ["ROBOT_DYN_CACHE"] = str(tmp_path_factory.mktemp("kernels") / "store")
-    yield
-    os.environ.pop("ROBOT_DYN_CACHE") if before is None else os.environ.update(ROBOT_DYN_CACHE=before)
 
 
 def starts(count: int, spread: float = 0.3) -> np.ndarray:

@@ -9,7 +9,7 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 import robot_dyn as rd
 from robot_dyn.model import description
 from robot_dyn.model.robot import Robot
-from robot_dyn.view.visuals import drawing
+from robot_dyn.view.geometry.visuals import drawing
 from tests.drawings import WRITTEN_FOR_GAZEBO, Z_UP, box, boxes, stated_boxes
 
 pytestmark = pytest.mark.filterwarnings("ignore::robot_dyn.errors.ModelWarning")

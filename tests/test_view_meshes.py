@@ -11,9 +11,9 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.model import description, solids
 from robot_dyn.model.robot import Robot
-from robot_dyn.view.inertia_boxes import inertia_boxes
-from robot_dyn.view.meshes import MAX_BYTES
-from robot_dyn.view.visuals import drawing
+from robot_dyn.view.geometry.inertia_boxes import inertia_boxes
+from robot_dyn.view.geometry.meshes import MAX_BYTES
+from robot_dyn.view.geometry.visuals import drawing
 from tests.drawings import box, boxes, drawn, mesh_visual, stl, urdf
 
 pytestmark = pytest.mark.filterwarnings("ignore::robot_dyn.errors.ModelWarning")

@@ -51,7 +51,7 @@ class PiecewisePolynomial:
     @property
     def knots(self) -> np.ndarray:
         """Times in [s] at which it passes to another polynomial: its breaks, or none if it rests."""
-        return self.breaks[:0] if self.coefficients.shape[1] == 1 else self.breaks
+        return self.breaks[:0] if self.coefficients.shape[:2] == (1, 1) else self.breaks
 
     @property
     def start(self) -> float:

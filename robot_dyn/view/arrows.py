@@ -6,9 +6,9 @@ import numpy as np
 
 from robot_dyn.simulation.trajectory import Trajectory
 from robot_dyn.view import commands
+from robot_dyn.view.geometry.shapes import arrow
 from robot_dyn.view.keyframes import corners
 from robot_dyn.view.overlays import PART, Overlays, Rgba, along, of_link
-from robot_dyn.view.shapes import arrow
 from robot_dyn.view.stage import Stage
 
 _LONGEST = 0.4  # of the radius of what is seen

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.view.triangles import Mesh
+from robot_dyn.view.geometry.triangles import Mesh
 
 Command = dict[str, Any]
 

@@ -18,11 +18,11 @@ from robot_dyn.simulation.origin import robot_of
 from robot_dyn.simulation.trajectory import Trajectory
 from robot_dyn.view import commands
 from robot_dyn.view.arrows import arrows
+from robot_dyn.view.geometry.visuals import Drawing, drawing
 from robot_dyn.view.keyframes import Keyframes, keyframes
 from robot_dyn.view.overlays import GHOST, Overlays, ground, overlays, squares
 from robot_dyn.view.series import plots
 from robot_dyn.view.stage import Stage, placement
-from robot_dyn.view.visuals import Drawing, drawing
 
 _FAR = 1e4  # [rad] or [m]; what diverged is not drawn beyond
 

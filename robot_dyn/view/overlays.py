@@ -14,10 +14,10 @@ import numpy as np
 from robot_dyn.simulation.trajectory import Trajectory
 from robot_dyn.view import commands
 from robot_dyn.view.commands import Command
+from robot_dyn.view.geometry.shapes import cylinder, sphere
+from robot_dyn.view.geometry.triangles import Mesh
 from robot_dyn.view.keyframes import Keyframes, keyframes
-from robot_dyn.view.shapes import cylinder, sphere
 from robot_dyn.view.stage import Stage, placement
-from robot_dyn.view.triangles import Mesh
 
 Rgba = tuple[float, float, float, float]
 Placements = list[tuple[np.ndarray, np.ndarray]]

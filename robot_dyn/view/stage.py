@@ -19,8 +19,8 @@ from robot_dyn.model.robot import Robot
 from robot_dyn.spatial import homogeneous
 from robot_dyn.view import commands
 from robot_dyn.view.commands import Command
+from robot_dyn.view.geometry.visuals import Piece
 from robot_dyn.view.keyframes import Keyframes
-from robot_dyn.view.visuals import Piece
 
 
 @final

@@ -20,12 +20,12 @@ from robot_dyn.errors import shorten
 from robot_dyn.model.description import parse
 from robot_dyn.model.robot import Robot
 from robot_dyn.spatial import homogeneous, rotation_rpy
-from robot_dyn.view import meshes
-from robot_dyn.view.inertia_boxes import inertia_boxes, inertia_ellipsoid, off_centre
-from robot_dyn.view.mesh_addresses import find_file
-from robot_dyn.view.meshes import WHITE, MeshError, Part, Rgba
-from robot_dyn.view.shapes import PRIMITIVES
-from robot_dyn.view.triangles import Mesh
+from robot_dyn.view.geometry import meshes
+from robot_dyn.view.geometry.addresses import find_file
+from robot_dyn.view.geometry.inertia_boxes import inertia_boxes, inertia_ellipsoid, off_centre
+from robot_dyn.view.geometry.meshes import WHITE, MeshError, Part, Rgba
+from robot_dyn.view.geometry.shapes import PRIMITIVES
+from robot_dyn.view.geometry.triangles import Mesh
 
 GREY: Rgba = (0.7, 0.7, 0.7, 1.0)  # of what has no material; rviz takes red
 _STAND_IN: Rgba = (0.9, 0.6, 0.3, 1.0)  # of what is drawn in place of a visual

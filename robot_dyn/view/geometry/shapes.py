@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy import ndarray
 
-from robot_dyn.view.triangles import Mesh, welded
+from robot_dyn.view.geometry.triangles import Mesh, welded
 
 _SEGMENTS = 48  # of a circle
 

@@ -10,7 +10,7 @@ from urllib.parse import unquote
 
 from robot_dyn.errors import CatalogError, shorten
 from robot_dyn.model import catalog
-from robot_dyn.view.meshes import MeshError
+from robot_dyn.view.geometry.meshes import MeshError
 
 
 def find_file(address: str | None, source: Path, package_dirs: tuple[str | Path, ...]) -> Path:

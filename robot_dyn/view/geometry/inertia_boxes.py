@@ -16,8 +16,8 @@ from numpy import ndarray
 from robot_dyn.model.inertia import implausibility
 from robot_dyn.model.robot import Robot
 from robot_dyn.spatial import homogeneous
-from robot_dyn.view.shapes import box, ellipsoid
-from robot_dyn.view.triangles import Mesh
+from robot_dyn.view.geometry.shapes import box, ellipsoid
+from robot_dyn.view.geometry.triangles import Mesh
 
 _THIN = 1e-3  # of the longest edge: what an edge of length 0 is drawn with
 _SMALL = 0.01  # [m], edge drawn for a mass in one point

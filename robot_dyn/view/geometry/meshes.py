@@ -21,7 +21,7 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 from numpy import ndarray
 
 from robot_dyn.errors import RobotDynError, shorten
-from robot_dyn.view.triangles import Mesh, welded
+from robot_dyn.view.geometry.triangles import Mesh, welded
 
 MAX_BYTES = 64 * 2**20  # of one mesh or texture; the largest of example-robot-data has 28 MiB
 MAX_NODES = 20_000  # of a scene when every instance is counted
