@@ -233,6 +233,6 @@ def test_references_without_meaning_are_refused(make, message: str) -> None:
 
 def test_steps_end_where_a_reference_jumps() -> None:
     """Constants one after the other have knots between them; one constant has none."""
-    stairs = rd.PiecewisePolynomial([0.0, 0.5, 1.0], [[[0.1, 0.2]], [[0.3, -0.2]]])
+    stairs = PiecewisePolynomial([0.0, 0.5, 1.0], [[[0.1, 0.2]], [[0.3, -0.2]]])
     np.testing.assert_array_equal(stairs.knots, [0.0, 0.5, 1.0])
-    assert not len(rd.hold([0.1, 0.2]).knots)
+    assert not len(hold([0.1, 0.2]).knots)
