@@ -163,8 +163,10 @@ sin, cos, sqrt, tanh = np.sin, np.cos, np.sqrt, np.tanh
 
 
 def positive_part(x: Array) -> Array:
-    """max(x, 0) as (x + |x|) / 2, which every kind of number has."""
-    return (x + np.abs(x)) / 2
+    """max(x, 0), exactly; of balls (x + |x|) / 2, for the larger of two that overlap is not known."""
+    if type(x) is np.ndarray and x.dtype == object:
+        return (x + np.abs(x)) / 2
+    return np.maximum(x, 0.0)
 
 
 def transpose(x: Array) -> Array:

@@ -99,7 +99,7 @@ class Setup:
     def stretches(self) -> tuple[Stretch, ...]:
         """The run cut at the ticks of the controller, the breaks of its reference and the switches of effects."""
         period = self.controller.period_s if self.controller else 0.0
-        ticks = {k * period for k in range(ceil(self.duration_s / period - 1e-9))} if period > 0 else {0.0}
+        ticks = {k * period for k in range(max(1, ceil(self.duration_s / period - 1e-9)))} if period > 0 else {0.0}
         switches = {t for effect in self.plant.effects for t in effect.switches}
         switches |= set(self.controller.knots if self.controller else ())
         least = 1e-9 * self.duration_s  # cuts nearer than this differ by rounding alone
