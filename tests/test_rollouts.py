@@ -21,6 +21,8 @@ SETUP = rd.Setup(
     PLANT, Q, V, 0.2, rd.PD(REFERENCE, 40.0, [4.0, 3.0]), step_s=2e-3, record_period_s=0.01, engine="interpreted"
 )
 PID = replace(SETUP, controller=rd.PID(REFERENCE, 40.0, 30.0, 4.0, effort_limit=3.0, period_s=0.004))
+ARM_TIP, INERTIA = "tip", ((0.01, 0.0, 0.0), (0.0, 0.02, 0.001), (0.0, 0.001, 0.03))
+NOMINAL = ARM.with_(payload=rd.Payload(ARM_TIP, 1.0))
 EVERYTHING = ("q", "v", "tau", "energy", "work")
 
 
@@ -114,6 +116,40 @@ def test_values_that_differ_from_run_to_run() -> None:
             np.testing.assert_allclose(runs.work[name][i], work, rtol=0, atol=1e-11)
 
 
+@pytest.mark.parametrize("model", [False, True])
+def test_masses_of_payloads_that_differ_from_run_to_run(model: bool) -> None:
+    """Each run is that of a plant whose robot carries this mass; the controller's model keeps what it was given."""
+
+    def setup(mass: float) -> rd.Setup:
+        loaded = ARM.with_(payload=rd.Payload(ARM_TIP, mass, (0.05, 0.02, 0.0), INERTIA))
+        controller = rd.PDGravity(NOMINAL, REFERENCE, 40.0, 4.0) if model else SETUP.controller
+        return replace(SETUP, plant=rd.Plant(loaded, PLANT.effects), controller=controller, estimate_error=False)
+
+    rng = np.random.default_rng(6)
+    params = {f"payload_mass:{ARM_TIP}": rng.uniform(0, 3, 70), "viscous_friction.damping": rng.uniform(0, 1, 70)}
+    runs = rd.rollouts(setup(1.0), params=params, record=EVERYTHING)
+    for i in (0, 40, 69):
+        mass, damping = (x[i] for x in params.values())
+        alone = setup(mass)
+        plant = rd.Plant(alone.plant.dynamics, [rd.ViscousFriction(damping), *PLANT.effects[1:]])
+        alone = rd.simulate(replace(alone, plant=plant))
+        for ours, theirs in ((runs.q, alone.q), (runs.tau, alone.tau), (runs.potential, alone.ledger.potential)):
+            np.testing.assert_allclose(ours[i], theirs, rtol=0, atol=1e-11 * (1 + np.abs(theirs).max()))
+
+
+def test_a_mass_beyond_the_range_of_the_tile() -> None:
+    """A run that turns too far for the sine of a tile is run by itself, with the mass that is its own."""
+    loaded = ARM.with_(payload=rd.Payload(ARM_TIP, 1.0))
+    q0, masses = starts(3), np.array([0.5, 1.5, 2.5])
+    q0[1, 0] += 2 * np.pi * 40_000
+    free = replace(SETUP, plant=rd.Plant(loaded), controller=None, estimate_error=False)
+    runs = rd.rollouts(free, q0, params={f"payload_mass:{ARM_TIP}": masses})
+    for i in range(3):
+        own = rd.Plant(ARM.with_(payload=rd.Payload(ARM_TIP, masses[i])))
+        alone = rd.simulate(replace(free, plant=own), q0=q0[i])
+        np.testing.assert_allclose(runs.q[i], alone.q, rtol=0, atol=1e-8)  # 1 ulp of 2e5 rad is 3e-11
+
+
 def test_only_what_is_asked_for_is_recorded() -> None:
     runs = rd.rollouts(SETUP, starts(2), record=["v"])
     assert runs.q is None and runs.tau is None and runs.kinetic is None and runs.work is None
@@ -146,6 +182,7 @@ def test_what_has_no_meaning_is_refused() -> None:
             "params": {"viscous_friction.damp": np.ones(3)}
         },
         "params: kp must be finite, not negative": {"params": {"kp": [-1.0]}},
+        "params: no 'payload_mass:elbow'": {"params": {"payload_mass:elbow": np.ones(3)}},
         "record: no 'torque'": {"record": ("torque",)},
         "threads must be a positive number": {"threads": 0},
         "takes 0.0 GiB, more than 0.0: take a longer record_period_s": {"q0": starts(4), "most_bytes": 100},

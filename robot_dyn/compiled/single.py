@@ -117,7 +117,8 @@ def state_of(source: Source, dtype: str, limit: float) -> Any:
             data = _data(context, builder, y, args[1], kind)
             for k, value in enumerate(results):
                 builder.store(value, builder.gep(data, [ir.Constant(_I64, k)]))
-            sizes = total, writer.size(results, writer.constant(0))
+            distinct = [writer.values[name] for name in dict.fromkeys(source.results)]  # of M half
+            sizes = total, writer.size(distinct, writer.constant(0))
             return context.make_tuple(builder, signature.return_type, [*sizes, far])
 
         return types.Tuple((number, number, types.boolean))(arrays, y), code

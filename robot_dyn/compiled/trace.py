@@ -16,12 +16,15 @@ import casadi as ca
 import numpy as np
 
 from robot_dyn.arithmetic import Array, in_arithmetic
+from robot_dyn.compiled.base_parameters import regrouped
 from robot_dyn.compiled.condition import Node
 from robot_dyn.compiled.emit import instructions
+from robot_dyn.compiled.origins import slid
 from robot_dyn.compiled.symbol import symbol
 from robot_dyn.compiled.symbolic import Symbolic, array_of, column, inputs
 from robot_dyn.lagrange.articulated_body import articulated_body
 from robot_dyn.lagrange.composite_body import composite_body
+from robot_dyn.lagrange.linkage import Linkage
 from robot_dyn.lagrange.manipulator import Lagrangian, christoffel
 from robot_dyn.lagrange.newton_euler import kinetic_energy, newton_euler
 from robot_dyn.model.dynamics import acceleration
@@ -40,7 +43,8 @@ ARGUMENTS = {
     "momentum": ("q", "v"),
     "forward_dynamics_derivatives": ("q", "v", "tau"),
 }
-_SOLVED_MOST = 6  # joints one after the other; with more, to solve M a = τ − … outnumbers articulated bodies everywhere
+_SOLVED_MOST = 8  # joints one after the other; with more, to solve M a = τ − … outnumbers articulated bodies
+_DERIVED_MOST = 6  # joints; with more, to derive C v from K is longer yet, and takes as long to trace as all the rest
 _CLOSED_FORM_MOST = 4  # joints; with more its O(n³) terms outnumber the recursions' everywhere, except of C
 
 
@@ -67,19 +71,32 @@ class Trace:
 
     Attributes:
         robot: The robot; its file, edits and order of joints are used.
+        parameters: Inputs that its numbers are made of, CasADi symbols: one vector, the last argument of each function.
     """
 
     robot: Described
+    parameters: tuple[Node, ...] = ()
 
     @cached_property
     def lagrangian(self) -> Lagrangian:
         """The closed form, a `Dynamics` of symbols: what effects are traced with."""
         return Lagrangian(self.robot, Symbolic())
 
+    @cached_property
+    @in_arithmetic
+    def linkage(self) -> Linkage:
+        """The bodies that the recursions run on: other frames and fewer numbers, the same M, C and N."""
+        return regrouped(slid(self.lagrangian.linkage))
+
     @property
     def arithmetic(self) -> Symbolic:
         """The numbers it runs in."""
         return Symbolic()
+
+    @property
+    def given(self) -> tuple[Node, ...]:
+        """The vector of the parameters; nothing without."""
+        return (ca.vertcat(*self.parameters),) if self.parameters else ()
 
     @cached_property
     def symbols(self) -> dict[str, tuple[Node, Array]]:
@@ -97,7 +114,7 @@ class Trace:
     @in_arithmetic
     def quantity(self, name: str) -> Traced:
         """A quantity of the `Dynamics` protocol, or "forward_dynamics_derivatives": ∂a/∂q, ∂a/∂v, ∂a/∂τ."""
-        arguments = [self.symbols[argument][0] for argument in ARGUMENTS[name]]
+        arguments = [*(self.symbols[argument][0] for argument in ARGUMENTS[name]), *self.given]
         functions = {
             formulation: ca.Function("f", arguments, [ca.cse(ca.densify(make()))])
             for formulation, make in self._roads(name)
@@ -114,14 +131,16 @@ class Trace:
             yield "closed form", lambda: column(getattr(own, name)(*arrays))
         if name == "forward_dynamics" and not tied:
             yield "articulated body", lambda: self._forward
-            if max(len(body.path) for body in own.linkage.bodies) > _SOLVED_MOST:
-                return
+            depth = max(len(body.path) for body in own.linkage.bodies)
+            yield from self._of_recursion(name) if depth <= _SOLVED_MOST else ()
+            yield from self._of_energies(name) if depth <= _DERIVED_MOST else ()
+            return
         yield from self._of_recursion(name)
         yield from self._of_energies(name)
 
     def _of_recursion(self, name: str) -> Iterator[tuple[str, Callable[[], Node]]]:
         (_, q), (_, v), (_, a), (_, tau) = self.symbols.values()
-        linkage = self.lagrangian.linkage
+        linkage = self.linkage
         zero = self.arithmetic.array(np.zeros(len(q)))
         made: dict[str, Callable[[], Any]] = {
             "M": lambda: self._mass,
@@ -167,7 +186,7 @@ class Trace:
 
     @cached_property
     def _mass(self) -> Array:
-        return composite_body(self.lagrangian.linkage, self.symbols["q"][1])
+        return composite_body(self.linkage, self.symbols["q"][1])
 
     @cached_property
     def _mass_derivative(self) -> Array:
@@ -177,7 +196,7 @@ class Trace:
 
     @cached_property
     def _kinetic(self) -> Any:
-        return kinetic_energy(self.lagrangian.linkage, self.symbols["q"][1], self.symbols["v"][1])
+        return kinetic_energy(self.linkage, self.symbols["q"][1], self.symbols["v"][1])
 
     @cached_property
     def _potential(self) -> Any:
@@ -186,15 +205,15 @@ class Trace:
     @cached_property
     def _forward(self) -> Node:
         (_, q), (_, v), _, (_, tau) = self.symbols.values()
-        return column(articulated_body(self.lagrangian.linkage, q, v, tau))
+        return column(articulated_body(self.linkage, q, v, tau))
 
     def _derivatives(self) -> Node:
         """∂a/∂x = −M⁻¹ ∂ID/∂x at a = FD(q, v, τ), and ∂a/∂τ = M⁻¹."""
         (q, qs), (v, vs), (a, as_), _ = self.symbols.values()
         n, names = len(qs), self.lagrangian.joint_names
         forward = self.quantity("forward_dynamics").function
-        ID = column(newton_euler(self.lagrangian.linkage, qs, vs, as_))
+        ID = column(newton_euler(self.linkage, qs, vs, as_))
         columns = ca.horzcat(-ca.jacobian(ID, q), -ca.jacobian(ID, v), ca.DM.eye(n))
         solved = acceleration(self._mass, array_of(ca.densify(columns).T), names)  # row i: the derivative by xᵢ
         answer = column(np.stack([solved[i * n : (i + 1) * n].T for i in range(3)]))
-        return ca.substitute(answer, a, forward(q, v, self.symbols["tau"][0]))
+        return ca.substitute(answer, a, forward(q, v, self.symbols["tau"][0], *self.given))

@@ -73,7 +73,8 @@ def _group(writer: Writer, source: Source, data: list[Any], at: Any, seen: list[
         writer.line(line)
     results = [writer.values[name] for name in source.results]
     _store(writer, data[-1], at, results)
-    for place, vectors in ((seen[0], [x for each in columns for x in each]), (seen[1], results)):
+    distinct = [writer.values[name] for name in dict.fromkeys(source.results)]  # of M half
+    for place, vectors in ((seen[0], [x for each in columns for x in each]), (seen[1], distinct)):
         builder.store(writer.size(vectors, builder.load(place)), place)
     far = builder.load(seen[2])
     for line in source.lines:

@@ -19,6 +19,7 @@ from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.model.dynamics import checked
 from robot_dyn.simulation.machine.batch import LANES, Batch
 from robot_dyn.simulation.machine.making import machine
+from robot_dyn.simulation.machine.payloads import masses
 from robot_dyn.simulation.machine.stages import steps_whole
 from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.rollout_result import Rollouts
@@ -46,7 +47,8 @@ def rollouts(
         q0: Positions at the start, (B, n); those of the setup for all runs unless given.
         v0: Velocities at the start, (B, n) or (n,).
         params: Values that differ from run to run, each (B,) or (B, n): a gain of the controller by its name, as
-            {"kp": …}, or a coefficient of an effect, as {"viscous_friction.damping": …}.
+            {"kp": …}, a coefficient of an effect, as {"viscous_friction.damping": …}, or the mass in [kg] of the
+            payload that a link of the plant carries, as {"payload_mass:tool0": …}; models of controllers keep theirs.
         record: Which of "q", "v", "tau", "energy", "work" to keep at the samples of the setup.
         threads: Number of threads; None for all processors.
         most_bytes: Refuse to record more than this.
@@ -98,7 +100,7 @@ def _starts(
 def _values(setup: Setup, name: str, values: Any) -> np.ndarray:
     """The values of a parameter, (B, n)."""
     known = {f"{effect.name}.{key}": x for effect in setup.plant.effects for key, x in _numbers(effect)}
-    known |= dict(_numbers(setup.controller))
+    known |= dict(_numbers(setup.controller)) | masses(setup.plant.dynamics)
     if name not in known:
         raise QueryError(f"params: no {name!r}; {nearest(name, known)}")
     n = known[name].size if known[name].ndim else setup.plant.dynamics.n

@@ -17,7 +17,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.compiled.right_angles import completed
-from robot_dyn.compiled.symbolic import Symbolic, Symbols, TraceError, array_of, column, inputs
+from robot_dyn.compiled.symbolic import Symbolic, Symbols, array_of, column, inputs
 from robot_dyn.compiled.trace import ARGUMENTS, Trace
 from robot_dyn.control.controller import Controller
 from robot_dyn.control.reference import PiecewisePolynomial
@@ -25,8 +25,8 @@ from robot_dyn.effects.effect import Bound, Conservative, Effect, Force
 from robot_dyn.effects.plant import Plant
 from robot_dyn.model.description import Description
 from robot_dyn.model.robot import Robot
+from robot_dyn.model.tree import Described
 from robot_dyn.simulation.machine.parts import (
-    REMEDY,
     Piece,
     TracedBound,
     TracedConservative,
@@ -35,6 +35,7 @@ from robot_dyn.simulation.machine.parts import (
     wide,
     with_,
 )
+from robot_dyn.simulation.machine.payloads import carrying, of_links, others
 from robot_dyn.simulation.motion import Motion
 
 
@@ -62,9 +63,15 @@ class Equations:
 class SymbolicDynamics:
     """A `Dynamics` of symbols; each quantity from the formulation of fewest instructions."""
 
-    def __init__(self, robot: Robot) -> None:
-        self._trace = Trace(robot)
+    def __init__(self, robot: Described, parameters: tuple[Any, ...] = ()) -> None:
+        self._trace = Trace(robot, parameters)
         self._functions: dict[str, ca.Function] = {}
+
+    def carrying(self, masses: Mapping[str, Any]) -> SymbolicDynamics:
+        """The same with masses of payloads, by link, that are inputs."""
+        if not masses:
+            return self
+        return SymbolicDynamics(carrying(self._trace.robot, masses), tuple(m.expression for m in masses.values()))
 
     @property
     def n(self) -> int:
@@ -86,7 +93,7 @@ class SymbolicDynamics:
     def _ask(self, name: str, arguments: tuple[Array, ...]) -> Any:
         if name not in self._functions:
             self._functions[name] = self._trace.quantity(name).function
-        value = array_of(self._functions[name](*map(column, arguments)))
+        value = array_of(self._functions[name](*map(column, arguments), *self._trace.given))
         shape = self._trace.shape(name)
         return value[0, 0] if shape == (1,) else value.reshape(shape).view(Symbols)
 
@@ -113,17 +120,13 @@ def trace(
     Args:
         motion: What to trace.
         dynamics: Gives the symbols of the plant's and of the controller's rigid bodies.
-        free: Names of values that are inputs, with their lengths: "kp", or "viscous_friction.damping".
+        free: Names of values that are inputs, with their lengths: "kp", "viscous_friction.damping", or
+            "payload_mass:tool0".
         tile: Whether the actuation is to stand by itself.
 
     Raises:
         TraceError: If a part cannot be traced; names it.
     """
-    reference = getattr(motion.controller, "reference", None)
-    if isinstance(reference, PiecewisePolynomial) and not len(reference.knots) and len(reference.breaks) > 2:
-        raise TraceError(
-            f"a reference that jumps between {len(reference.breaks) - 1} rests cannot be compiled: {REMEDY}"
-        )
     n, m = motion.plant.dynamics.n, 2 * motion.plant.dynamics.n + motion.memory_size + len(motion.sources)
     d = degree(motion.controller)
     sizes = 1, m, 0 if d is None else 1 + (d + 1) * n, n if motion.sampled else 0, sum(free.values())
@@ -151,19 +154,25 @@ def trace(
 def with_values(motion: Motion, free: Mapping[str, Array]) -> Motion:
     """The same motion with other values of what is free."""
     effects = [with_(effect, _own(effect, free)) for effect in motion.plant.effects]
-    controller = with_(motion.controller, {name: x for name, x in free.items() if "." not in name})
-    return Motion(Plant(motion.plant.dynamics, effects), controller, motion.canonical)
+    dynamics: Any = motion.plant.dynamics
+    if loads := {link: float(mass) for link, mass in of_links(free).items()}:
+        dynamics = Robot(dynamics.description, carrying(dynamics, loads).edits)
+    return Motion(Plant(dynamics, effects), with_(motion.controller, _gains(free)), motion.canonical)
 
 
 def _own(effect: Effect, free: Mapping[str, Array]) -> dict[str, Array]:
-    return {name.partition(".")[2]: x for name, x in free.items() if name.partition(".")[0] == effect.name}
+    return {name.partition(".")[2]: x for name, x in others(free).items() if name.partition(".")[0] == effect.name}
+
+
+def _gains(free: Mapping[str, Array]) -> dict[str, Array]:
+    return {name: x for name, x in others(free).items() if "." not in name}
 
 
 def _symbolic(
     motion: Motion, dynamics: Callable[[Any], SymbolicDynamics], p: Array, free: Mapping[str, Array]
 ) -> Motion:
     """The same motion with symbols in place of its numbers."""
-    bodies: Any = dynamics(motion.plant.dynamics)
+    bodies: Any = dynamics(motion.plant.dynamics).carrying(of_links(free))  # a controller's model does not know them
     effects: list[Effect] = []
     for effect in motion.plant.effects:
         own = with_(effect, _own(effect, free))
@@ -171,7 +180,7 @@ def _symbolic(
         effects.append(next(made for kind, made in kinds.items() if isinstance(effect, kind))(own))
     controller = None
     if motion.controller is not None:
-        values = {name: x for name, x in free.items() if "." not in name}
+        values = _gains(free)
         if p.size:
             values["reference"] = Piece(p, motion.plant.dynamics.n)
         if hasattr(motion.controller, "model"):
