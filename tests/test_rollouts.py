@@ -212,3 +212,15 @@ def test_an_interrupt_ends_the_batch_and_keeps_what_there_is(monkeypatch) -> Non
     assert runs.stopped.any() and not runs.diverged.any()
     i = int(np.flatnonzero(runs.stopped)[-1])
     assert runs.outcome(i).ending == "stopped" and np.isnan(runs.q[i, -1]).all()
+
+
+def test_params_are_held_to_what_their_effect_takes() -> None:
+    """A coefficient that the effect itself refuses, or one of two effects alike, is refused before anything runs."""
+    with pytest.raises(rd.RobotDynError, match="velocity_scale"):
+        rd.rollouts(SETUP, starts(2), params={"regularised_coulomb_friction.velocity_scale": np.zeros(2)})
+    two = replace(SETUP, plant=rd.Plant(ARM, [rd.ViscousFriction(0.3), rd.ViscousFriction(0.1)]))
+    with pytest.raises(QueryError, match="several effects"):
+        rd.rollouts(two, starts(2), params={"viscous_friction.damping": np.ones(2)})
+    for params in ([1], {3: np.ones(2)}):
+        with pytest.raises(QueryError, match="params must give values by name"):
+            rd.rollouts(SETUP, starts(2), params=params)

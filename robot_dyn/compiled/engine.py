@@ -14,7 +14,7 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import FLOAT64
+from robot_dyn.compiled.arguments import into, may_write, time_of
 from robot_dyn.compiled.emit import emit
 from robot_dyn.compiled.kernel import Kernel, Status
 from robot_dyn.compiled.on_first_use import OnFirstUse
@@ -22,7 +22,7 @@ from robot_dyn.compiled.overload import Store
 from robot_dyn.compiled.referee import STATES, Referee
 from robot_dyn.compiled.threads import thread_count as thread_count
 from robot_dyn.compiled.trace import Traced
-from robot_dyn.errors import QueryError, RobotDynWarning
+from robot_dyn.errors import RobotDynWarning
 from robot_dyn.model.dynamics import check_batches, checked
 
 MOST_INSTRUCTIONS = 20_000  # of code that goes through Numba line by line, as rollouts do: half a minute of compiling
@@ -119,7 +119,7 @@ class Engine:
         batch = check_batches(**arrays)
         shape = self.shape(quantity)
         states = int(np.prod(batch, dtype=np.int64))
-        own = out is None or not _direct(out, (*batch, *shape), self.dtype, list(arrays.values()))
+        own = out is None or not may_write(out, (*batch, *shape), self.dtype, list(arrays.values()))
         result: Any = np.empty((*batch, *shape), self.dtype) if own else out
         status = Status.RESULT
         if self.pays(quantity):
@@ -129,17 +129,36 @@ class Engine:
             ]
             status = self._run(quantity, flat, result.reshape(states, -1)) if states else Status.FINE
         if status is not Status.FINE:
-            result[...] = np.reshape(otherwise(*arguments), result.shape)
-        return _into(out, result[..., 0] if quantity.endswith("energy") else result) if own else out
+            result[...] = np.reshape(self._interpreted(quantity, arguments, arrays, otherwise), result.shape)
+        return into(out, result[..., 0] if quantity.endswith("energy") else result) if own else out
+
+    def _interpreted(
+        self, quantity: str, arguments: tuple[Any, ...], arrays: dict[str, np.ndarray], otherwise: Callable[..., Any]
+    ) -> Any:
+        """What `otherwise` says: a robot takes batches; a plant, whose effects may ask for the time, state by state."""
+        if self.arguments[quantity][0] != "t":
+            return otherwise(*arguments)
+        for name, x in arrays.items():
+            if name != "t":
+                checked(name, x, self.joint_names)
+        batch = check_batches(**arrays)
+        rows = [np.broadcast_to(x, (*batch, x.shape[-1])).reshape(-1, x.shape[-1]) for x in arrays.values()]
+        n = len(self.joint_names)
+        return [np.broadcast_to(otherwise(float(t[0]), *state), (n,)) for t, *state in zip(*rows, strict=True)]
 
     def _plainly(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None) -> Any:
         """The result for arrays (B, n) that the kernel takes as they are, in which it finds nothing; else None."""
         shape, states = self.shape(quantity), getattr(arguments[-1], "shape", ())[:-1]
         if len(states) != 1 or states[0] <= _FEW or quantity.endswith("energy"):
             return None
+        if self.arguments[quantity][0] == "t":
+            if np.shape(arguments[0]) != states:
+                return None
+            arguments = (np.asarray(arguments[0], self.dtype)[:, None], *arguments[1:])
         y: Any = np.empty((*states, *shape), self.dtype) if out is None else out
         try:
-            if y.shape == (*states, *shape) and y.flags.c_contiguous:
+            plain = all(type(x) is np.ndarray and x.flags.aligned for x in (*arguments, y))
+            if plain and y.shape == (*states, *shape) and y.flags.c_contiguous and y.flags.writeable:
                 flat = y if len(shape) == 1 else y.reshape(states[0], -1)
                 if self.many[quantity](arguments, flat, self.threads) is Status.FINE:
                     return y
@@ -150,7 +169,7 @@ class Engine:
     def _array(self, name: str, x: Any) -> np.ndarray:
         """An argument as an array; that its numbers are finite the kernel sees faster."""
         if name == "t":
-            return _time(x)
+            return time_of(x)
         plain = x.__class__ is np.ndarray and x.dtype == self.dtype and x.shape[-1:] == (len(self.joint_names),)
         return x if plain else checked(name, x, self.joint_names)
 
@@ -170,7 +189,8 @@ class Engine:
         doubtful = _DOUBTFUL if quantity == "forward_dynamics" else np.inf
         times = self.arguments[quantity][0] == "t"
         source = emit(self.traces[quantity].function)
-        return Kernel(source, self.shape(quantity), self.dtype, times, doubtful, self.store)
+        about = f"{self.referee.dynamics.name}: {quantity}, {self.dtype}"
+        return Kernel(source, self.shape(quantity), self.dtype, times, doubtful, self.store, about)
 
     def _one(self, quantity: str) -> Any:
         """The checked kernel for one state."""
@@ -209,27 +229,3 @@ class Engine:
 def _never(*_: Any) -> int:
     """In place of a kernel that does not pay: the general way takes over."""
     return Status.SHAPE
-
-
-def _time(t: Any) -> np.ndarray:
-    try:
-        return FLOAT64.asarray(t)[..., None]
-    except (TypeError, ValueError):
-        raise QueryError(f"t must be a time in seconds, got {t!r}") from None
-
-
-def _direct(out: Any, shape: tuple[int, ...], dtype: str, arrays: list[np.ndarray]) -> bool:
-    """Whether a kernel may write into `out`: an array of that form that shares no memory with the arguments."""
-    if not isinstance(out, np.ndarray) or out.shape != shape or out.dtype != dtype:
-        return False
-    return out.flags.c_contiguous and out.flags.writeable and not any(np.may_share_memory(out, x) for x in arrays)
-
-
-def _into(out: np.ndarray | None, result: np.ndarray) -> Any:
-    if out is None:
-        return result if result.ndim else result[()]
-    if not isinstance(out, np.ndarray) or out.dtype != result.dtype or out.shape != result.shape:
-        got = f"{out.dtype} {out.shape}" if isinstance(out, np.ndarray) else repr(out)
-        raise QueryError(f"out must be an array of {result.dtype} and shape {result.shape}, got {got}")
-    out[...] = result
-    return out

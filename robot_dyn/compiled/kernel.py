@@ -42,6 +42,7 @@ class Kernel:
         times: Whether the first input is a time: a number in `one`, (B, 1) in `many`.
         doubtful: Results whose absolute values sum to more are reported.
         store: Where compiled code is kept, or None.
+        about: What it is of, for a reader of the store.
     """
 
     source: Source
@@ -50,6 +51,7 @@ class Kernel:
     times: bool = False
     doubtful: float = np.inf
     store: Store | None = None
+    about: str = ""
     _lock: Any = field(default_factory=threading.RLock, init=False, repr=False)
 
     @cached_property
@@ -134,7 +136,8 @@ class Kernel:
         return _fresh(self, "batch", batch_text(self.source))[1](self._batch.signatures[0])
 
     def _compiled(self, name: str, text: str, arguments: list[Any]) -> Any:
-        return compiled(lambda: _fresh(self, name, text)[0], arguments, self.store, [text, *self._identity])
+        about = f"{self.about}, {'batch' if name == 'batch' else 'one state'}"
+        return compiled(lambda: _fresh(self, name, text)[0], arguments, self.store, [text, *self._identity], about)
 
     @cached_property
     def _identity(self) -> tuple[str, ...]:
@@ -156,6 +159,10 @@ def _writers() -> str:
     return sha256(b"".join(Path(__file__).with_name(f"{name}.py").read_bytes() for name in modules)).hexdigest()
 
 
+def _state(kernel: Kernel) -> Any:
+    return state_of(kernel.source, kernel.dtype, RANGE, _LARGEST[kernel.dtype], kernel.doubtful)
+
+
 def _array(dtype: str, axes: int, readonly: bool = False) -> Any:
     """Numba's type of a C-contiguous array, or of a number; what is read may be read-only or not."""
     from numba.core import types
@@ -171,7 +178,7 @@ def _fresh(kernel: Kernel, name: str, text: str) -> tuple[Any, Callable[[Any], s
     number = np.dtype(kernel.dtype).type
     namespace = kernel.source.namespace(kernel.dtype)
     namespace |= {"np": np, "dtype": np.dtype(kernel.dtype), "number": number}
-    namespace |= {"is_array": is_array, "has_form": has_form, "single": state_of(kernel.source, kernel.dtype, RANGE)}
+    namespace |= {"is_array": is_array, "has_form": has_form, "single": _state(kernel)}
     namespace |= {
         "vectors": batch_of(kernel.source, kernel.dtype),
         "most": number(_LARGEST[kernel.dtype]),

@@ -19,10 +19,12 @@ class Store(Protocol):
 
     def load(self, key: str) -> bytes | None: ...
 
-    def save(self, key: str, payload: bytes) -> None: ...
+    def save(self, key: str, payload: bytes, about: str = "") -> None: ...
 
 
-def compiled(make: Callable[[], Any], arguments: list[str], store: Store | None, identity: list[str]) -> Any:
+def compiled(
+    make: Callable[[], Any], arguments: list[str], store: Store | None, identity: list[str], about: str = ""
+) -> Any:
     """A Numba function with one overload, restored from the store if it is there.
 
     Args:
@@ -30,6 +32,7 @@ def compiled(make: Callable[[], Any], arguments: list[str], store: Store | None,
         arguments: Numba's types of them; the result is an int64.
         store: Where to look and keep; None for nowhere.
         identity: Texts that determine the machine code.
+        about: What it is of, for a reader of the store.
     """
     from numba.core import types
 
@@ -42,7 +45,7 @@ def compiled(make: Callable[[], Any], arguments: list[str], store: Store | None,
     function.compile(signature)
     function.disable_compile()
     if store is not None:
-        store.save(key, _payload(function))
+        store.save(key, _payload(function), about)
     return function
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, final
+from typing import Any, final, overload
 
 import casadi as ca
 import numpy as np
@@ -23,6 +23,7 @@ from robot_dyn.compiled.symbolic import Symbols, TraceError, column, every_branc
 from robot_dyn.compiled.trace import Trace, Traced
 from robot_dyn.effects.effect import Bound
 from robot_dyn.effects.plant import Plant
+from robot_dyn.model.robot import Robot
 
 _ARGUMENTS = {
     "N": ("t", "q", "v"),
@@ -45,6 +46,9 @@ class CompiledPlant:
 
     plant: Plant
     dynamics: CompiledDynamics
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return CompiledPlant, (self.plant, self.dynamics)
 
     @cached_property
     def interpreted(self) -> Plant:
@@ -134,8 +138,11 @@ class CompiledPlant:
     def _ask(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None) -> Any:
         if arguments[0].__class__ in _TIMES:
             y = np.empty(self.n, self.dynamics.dtype) if out is None else out
-            if not self.engine.ones[quantity](*arguments, y, self.engine.like):
-                return y
+            try:
+                if not self.engine.ones[quantity](*arguments, y, self.engine.like):
+                    return y
+            except TypeError:  # an int too large for a float
+                pass
         return self.engine.ask(quantity, arguments, out, getattr(self.interpreted, quantity))
 
     # --- the trace
@@ -171,7 +178,7 @@ class CompiledPlant:
         """Σ τ_effect as a CasADi column."""
         total = ca.SX.zeros(self.n)
         for effect in self.plant.forces:
-            total += column(self._wide(_traced(effect, lambda effect=effect: self._torque_of(effect))))
+            total += column(_traced(effect, lambda effect=effect: self._wide(self._torque_of(effect))))
         return total
 
     def _torque_of(self, effect: Any) -> Any:
@@ -183,8 +190,8 @@ class CompiledPlant:
         left = self._inputs[3][1].view(Symbols)
         for effect in self.plant.effects:
             if isinstance(effect, Bound):
-                left = _traced(effect, lambda effect=effect, u=left: effect.actuation(u)).view(Symbols)
-        return column(self._wide(left))
+                left = _traced(effect, lambda effect=effect, u=left: self._wide(effect.actuation(u))).view(Symbols)
+        return column(left)
 
     def _wide(self, torque: Any) -> np.ndarray:
         return np.broadcast_to(np.asarray(torque, dtype=object), (self.n,))
@@ -192,13 +199,23 @@ class CompiledPlant:
 
 def _traced(effect: Any, function: Callable[[], Any]) -> np.ndarray:
     try:
-        return every_branch(function)
-    except (TypeError, ValueError, AttributeError) as error:
+        made = every_branch(function)
+        column(made)  # of what is no number it says so
+        return made
+    except (TypeError, ValueError, AttributeError, IndexError, TraceError) as error:
         raise TraceError(
             f"effect {effect.name} cannot be traced ({error}); write it in robot_dyn.arithmetic, or run it interpreted"
         ) from error
 
 
+@overload
+def Compiled(
+    robot_or_plant: Robot, *, dtype: str = ..., threads: int | None = ..., cache: bool = ...
+) -> CompiledDynamics: ...
+@overload
+def Compiled(
+    robot_or_plant: Plant, *, dtype: str = ..., threads: int | None = ..., cache: bool = ...
+) -> CompiledPlant: ...
 def Compiled(
     robot_or_plant: Any, *, dtype: str = "float64", threads: int | None = 1, cache: bool = True
 ) -> CompiledDynamics | CompiledPlant:

@@ -91,10 +91,11 @@ def has_form(typingctx: Any, value: Any, like: Any, shape: Any, writeable: Any) 
     return types.boolean(value, like, shape, writeable), code
 
 
-def state_of(source: Source, dtype: str, limit: float) -> Any:
+def state_of(source: Source, dtype: str, limit: float, most: float, doubtful: float) -> Any:
     """The intrinsic (x₀, …), y → (Σ |x|, Σ |y|, whether an angle is beyond `limit`) at one state.
 
-    Arguments are Numba's arrays, objects known to be such arrays, or a number; y may be an argument.
+    Arguments are Numba's arrays, objects known to be such arrays, or a number; y may be an argument;
+    it is written if Σ |x| < most, Σ |y| < doubtful and no angle is beyond.
     """
     kind = F32 if dtype == "float32" else F64
 
@@ -115,10 +116,14 @@ def state_of(source: Source, dtype: str, limit: float) -> Any:
             far = _straight(writer, source, columns, limit)
             results = [writer.values[name] for name in source.results]
             data = _data(context, builder, y, args[1], kind)
-            for k, value in enumerate(results):
-                builder.store(value, builder.gep(data, [ir.Constant(_I64, k)]))
             distinct = [writer.values[name] for name in dict.fromkeys(source.results)]  # of M half
             sizes = total, writer.size(distinct, writer.constant(0))
+            fine = builder.not_(far)
+            for size, bound in zip(sizes, (most, doubtful), strict=True):
+                fine = builder.and_(fine, builder.fcmp_ordered("<", size, ir.Constant(kind, bound)))
+            with builder.if_then(fine, likely=True):  # else arguments that `y` lies in are still to be read
+                for k, value in enumerate(results):
+                    builder.store(value, builder.gep(data, [ir.Constant(_I64, k)]))
             return context.make_tuple(builder, signature.return_type, [*sizes, far])
 
         return types.Tuple((number, number, types.boolean))(arrays, y), code

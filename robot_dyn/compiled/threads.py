@@ -18,7 +18,7 @@ def thread_count(threads: int | None) -> int:
     """
     if threads is None:
         return os.cpu_count() or 1
-    if not isinstance(threads, int) or threads < 1:
+    if not isinstance(threads, int) or isinstance(threads, bool) or threads < 1:
         raise QueryError(f"threads must be a positive number, or None for all processors, got {threads!r}")
     return threads
 

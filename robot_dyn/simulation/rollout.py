@@ -54,7 +54,7 @@ def rollouts(
         most_bytes: Refuse to record more than this.
 
     Returns:
-        The runs, in the order given.
+        The runs, in the order given. Ctrl-C while they march ends them, and keeps what there is.
 
     Raises:
         QueryError: If an argument has no meaning or the wrong shape, or the record would exceed `most_bytes`.
@@ -63,6 +63,8 @@ def rollouts(
     setup = replace(setup, estimate_error=False)
     if not steps_whole(setup.integrator):
         raise QueryError("rollouts take an explicit or a Gauss method, such as rd.method('rk4'); simulate takes any")
+    if params is not None and not (isinstance(params, Mapping) and all(isinstance(name, str) for name in params)):
+        raise QueryError(f"params must give values by name, such as {{'kp': …}}, got {params!r}")
     wanted = tuple(record)
     if unknown := [name for name in wanted if name not in RECORDS]:
         raise QueryError(f"record: no {unknown[0]!r}; {nearest(str(unknown[0]), RECORDS)}")
@@ -99,7 +101,10 @@ def _starts(
 
 def _values(setup: Setup, name: str, values: Any) -> np.ndarray:
     """The values of a parameter, (B, n)."""
-    known = {f"{effect.name}.{key}": x for effect in setup.plant.effects for key, x in _numbers(effect)}
+    named = [(f"{effect.name}.{key}", x) for effect in setup.plant.effects for key, x in _numbers(effect)]
+    known = dict(named)
+    if sum(each == name for each, _ in named) > 1:
+        raise QueryError(f"params: {name} names a coefficient of several effects of the plant; make them one effect")
     known |= dict(_numbers(setup.controller)) | masses(setup.plant.dynamics)
     if name not in known:
         raise QueryError(f"params: no {name!r}; {nearest(name, known)}")
@@ -114,7 +119,12 @@ def _values(setup: Setup, name: str, values: Any) -> np.ndarray:
     if not fits or not (signed or (array >= 0).all()):
         sign = "" if signed else "not negative, "
         raise QueryError(f"params: {name} must be finite, {sign}of shape (B,) or (B, {n}), got {np.shape(values)}")
-    return np.ascontiguousarray(np.broadcast_to(array, (len(array), n)))
+    rows = np.ascontiguousarray(np.broadcast_to(array, (len(array), n)))
+    part, _, key = name.rpartition(".")
+    for effect in (effect for effect in setup.plant.effects if part and effect.name == part):
+        for row in np.unique(rows, axis=0):
+            replace(effect, **{key: row})  # pyright: ignore[reportArgumentType]  refuses what has no meaning
+    return rows
 
 
 def _numbers(part: Any) -> list[tuple[str, np.ndarray]]:

@@ -62,7 +62,7 @@ def test_machine_code_is_restored_from_a_store() -> None:
         def load(self, key: str) -> bytes | None:
             return self.get(key)
 
-        def save(self, key: str, payload: bytes) -> None:
+        def save(self, key: str, payload: bytes, about: str = "") -> None:
             self[key] = payload
 
     memory, source = Memory(), emit(sample())

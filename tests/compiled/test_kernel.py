@@ -164,7 +164,7 @@ def test_a_call_is_restored_from_a_store(double: Kernel) -> None:
         def load(self, key: str) -> bytes | None:
             return self.get(key)
 
-        def save(self, key: str, payload: bytes) -> None:
+        def save(self, key: str, payload: bytes, about: str = "") -> None:
             self[key] = payload
 
     memory, y = Memory(), np.empty(3)

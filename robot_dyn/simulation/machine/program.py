@@ -79,7 +79,7 @@ class Program:
     @cached_property
     def march(self) -> Callable[..., int]:
         """The machine code; see the module."""
-        return compiled(self._fresh, self._types, self.store, self._identity)
+        return compiled(self._fresh, self._types, self.store, self._identity, "the march of a run")
 
     @property
     def known(self) -> bool:
@@ -109,7 +109,7 @@ class Program:
         constants = repr(self.sources[name].constants)
         return compiled(
             lambda: self._function(name), [number, array, array, array], self.store,
-            [self.text.function(name), constants],
+            [self.text.function(name), constants], f"the {name} of a run",
         )  # fmt: skip
 
     @cached_property
