@@ -63,6 +63,11 @@ def spatial_inertia(mass: Array, com: Array, inertia: Array) -> Array:
     return result
 
 
+def first_moment(inertia: Array) -> Array:
+    """M c of 𝓜 (6, 6), whose lower left block is m ĉ; (3,)."""
+    return np.stack([inertia[5, 1], inertia[3, 2], inertia[4, 0]])
+
+
 def homogeneous(R: Array, p: Array) -> Array:
     """The matrix [[R, p], [0, 1]] of g, shape (..., 4, 4)."""
     result = np.zeros((*p.shape[:-1], 4, 4), dtype=p.dtype)

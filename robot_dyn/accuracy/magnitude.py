@@ -17,6 +17,7 @@ import numpy as np
 from robot_dyn.arithmetic import apply
 from robot_dyn.lagrange.linkage import BASE, Body, Linkage
 from robot_dyn.model.ties import Ties
+from robot_dyn.spatial import first_moment
 
 
 @final
@@ -59,7 +60,7 @@ def magnitudes(linkage: Linkage, q: np.ndarray) -> Magnitudes:
     g = float(np.linalg.norm(linkage.gravity))
     columns = [_columns(linkage.bodies, body, steps) for body in linkage.bodies]
     for body, inertia, (lin, ang) in zip(linkage.bodies, linkage.inertias, columns, strict=True):
-        m, mc = inertia[0, 0], float(np.linalg.norm([inertia[5, 1], inertia[3, 2], inertia[4, 0]]))
+        m, mc = inertia[0, 0], float(np.linalg.norm(first_moment(inertia)))
         block = np.array([[m, mc], [mc, np.linalg.norm(inertia[3:, 3:], 2)]])
         J = np.stack([lin, ang])
         M[np.ix_(body.path, body.path)] += J.T @ block @ J

@@ -14,7 +14,7 @@ import numpy as np
 from robot_dyn.arithmetic import Array, sqrt, symmetric
 from robot_dyn.compiled.origins import of_bodies
 from robot_dyn.lagrange.linkage import BASE, Body, Linkage
-from robot_dyn.spatial import adjoint_inverse, hat
+from robot_dyn.spatial import adjoint_inverse, first_moment, hat
 
 
 def regrouped(linkage: Linkage) -> Linkage:
@@ -38,12 +38,7 @@ def _unchanged(body: Body, inertia: Array) -> Array:
     # The lesser of two moments: what is left is not negative, so that sums over bodies do not cancel. The greater one
     # costs Kinova's M a factor of ten in accuracy.
     J = min(across @ moments @ across for across in _across(a))
-    return _parts(inertia[0, 0], a * (a @ _moment(inertia)), J * (np.eye(3, dtype=a.dtype) - np.outer(a, a)))
-
-
-def _moment(inertia: Array) -> Array:
-    """First moment m c of a generalised inertia, whose lower left block is m ĉ."""
-    return np.array([inertia[5, 1], inertia[3, 2], inertia[4, 0]])
+    return _parts(inertia[0, 0], a * (a @ first_moment(inertia)), J * (np.eye(3, dtype=a.dtype) - np.outer(a, a)))
 
 
 def _parts(mass: Array, moment: Array, rotational: Array) -> Array:

@@ -27,7 +27,7 @@ from robot_dyn.lagrange.linkage import BASE, Configuration, Linkage, linkage
 from robot_dyn.model.description import Description
 from robot_dyn.model.dynamics import Axes, acceleration, check_batches, checked, entry
 from robot_dyn.model.tree import Described, tree
-from robot_dyn.spatial import adjoint, adjoint_inverse, block_diagonal, bracket, hat, homogeneous
+from robot_dyn.spatial import adjoint, adjoint_inverse, block_diagonal, bracket, first_moment, hat, homogeneous
 
 
 @final
@@ -132,8 +132,7 @@ class Lagrangian:
         at, g = self.linkage.at(q), self.linkage.gravity
         V = 0
         for inertia, (R, p) in zip(self.linkage.inertias, at.in_base, strict=True):
-            mc = np.stack([inertia[5, 1], inertia[3, 2], inertia[4, 0]])  # 𝓜 holds m ĉ in its lower left block
-            V = V - (inertia[0, 0] * p + R @ mc) @ g
+            V = V - (inertia[0, 0] * p + R @ first_moment(inertia)) @ g
         return V
 
     @in_arithmetic

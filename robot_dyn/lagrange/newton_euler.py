@@ -15,7 +15,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array, apply
 from robot_dyn.lagrange.linkage import BASE, Body, Linkage, Step
-from robot_dyn.spatial import hat
+from robot_dyn.spatial import first_moment, hat
 
 _Rates = tuple[Array, Array, Array]  # p̈ of the frame's origin, ω, α
 
@@ -63,8 +63,8 @@ def _moved(body: Body, X: Step, before: _Rates, q: Any, v: Any, a: Any) -> _Rate
 
 def _wrench(inertia: Array, acceleration: Array, omega: Array, alpha: Array) -> Array:
     """F = m p̈ + U (m c) and m c × p̈ + I α + ω × I ω, about the origin of the body's frame."""
+    mc = first_moment(inertia)
     mass, moment, inertia = inertia[0, 0], inertia[3:, :3], inertia[3:, 3:]
-    mc = np.array([moment[2, 1], moment[0, 2], moment[1, 0]])
     F = mass * acceleration + apply(_spread(omega, alpha), mc)
     return np.concatenate(
         [F, apply(moment, acceleration) + apply(inertia, alpha) + apply(hat(omega), apply(inertia, omega))]

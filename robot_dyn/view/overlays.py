@@ -12,6 +12,7 @@ from typing import final
 import numpy as np
 
 from robot_dyn.simulation.trajectory import Trajectory
+from robot_dyn.spatial import first_moment
 from robot_dyn.view import commands
 from robot_dyn.view.commands import Command
 from robot_dyn.view.geometry.shapes import cylinder, sphere
@@ -124,8 +125,7 @@ def centre_of_mass(stage: Stage, at: Placements) -> np.ndarray:
     """Centre of mass of the bodies that move, (m, 3), where they are placed at (R, p) each."""
     total, mass = np.zeros_like(at[0][1]), 0.0
     for inertia, (R, p) in zip(stage.linkage.inertias, at, strict=True):
-        mc = np.stack([inertia[5, 1], inertia[3, 2], inertia[4, 0]])  # 𝓜 holds m ĉ in its lower left block
-        total, mass = total + inertia[0, 0] * p + R @ mc, mass + inertia[0, 0]
+        total, mass = total + inertia[0, 0] * p + R @ first_moment(inertia), mass + inertia[0, 0]
     return total / mass if mass > 0 else total
 
 
