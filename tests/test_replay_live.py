@@ -87,6 +87,17 @@ def test_a_port_in_use_is_told_with_the_remedy(swing) -> None:
             rd.replay(swing, port=port)
 
 
+def test_a_bridge_that_cannot_start_is_told_and_does_not_hang(swing, monkeypatch) -> None:
+    from robot_dyn.view import server
+
+    def refuse(*_: object) -> None:
+        raise OSError("no sockets left")
+
+    monkeypatch.setattr(server.ZMQWebSocketBridge, "setup_zmq", refuse)
+    with pytest.raises(rd.RobotDynError, match=r"cannot start: no sockets left; write a file"):
+        rd.replay(swing)
+
+
 def test_two_replays_stand_side_by_side(swing) -> None:
     with rd.replay(swing) as one, rd.replay(swing) as two:
         assert one.url != two.url

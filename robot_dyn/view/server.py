@@ -113,15 +113,24 @@ class Server:
             why = os.strerror(error.errno) if isinstance(error, OSError) and error.errno else error
             raise ServerError(f"port {port}: {why}; choose another, or none for a free one") from None
         listening.setblocking(False)
-        ready = threading.Event()
+        ready, self._failure = threading.Event(), None
         self._thread = threading.Thread(target=self._serve, args=(page, commands, listening, ready), daemon=True)
         self._thread.start()
         ready.wait()
+        if self._failure is not None:
+            raise ServerError(f"the live replay cannot start: {self._failure}; write a file with save_replay instead")
 
     def _serve(self, page: str, commands: list[Command], listening: socket, ready: threading.Event) -> None:
         self._loop = asyncio.new_event_loop()
         asyncio.set_event_loop(self._loop)
-        bridge = _Bridge(page, listening)
+        try:
+            bridge = _Bridge(page, listening)
+        except Exception as error:  # of sockets, or of meshcat: for the caller, who waits
+            self._failure = error
+            listening.close()
+            self._loop.close()
+            ready.set()
+            return
         for command in commands:
             _keep(bridge, command)
         self.url, self.zmq_url = str(bridge.web_url), bridge.zmq_url
