@@ -20,12 +20,10 @@ from robot_dyn.compiled.kernel import Kernel, Status
 from robot_dyn.compiled.on_first_use import OnFirstUse
 from robot_dyn.compiled.overload import Store
 from robot_dyn.compiled.referee import STATES, Referee
-from robot_dyn.compiled.threads import thread_count as thread_count
 from robot_dyn.compiled.trace import Traced
 from robot_dyn.errors import RobotDynWarning
 from robot_dyn.model.dynamics import check_batches, checked
 
-MOST_INSTRUCTIONS = 20_000  # of code that goes through Numba line by line, as rollouts do: half a minute of compiling
 # Measured on chains: forward dynamics of 64 joints, 48 875 instructions, takes 8 s to compile; a batch is then 13 times
 # as fast as Pinocchio, one state from Python twice. The time grows as the count: above this, a quarter of a minute.
 LARGEST_KERNEL = 100_000

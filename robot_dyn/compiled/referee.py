@@ -30,7 +30,6 @@ class Referee:
     Attributes:
         dynamics: Rigid bodies in gravity: Pinocchio's Robot.
         name: What it is called in a report.
-        times: Whether states have a time, as those of a plant.
     """
 
     dynamics: Any
@@ -101,7 +100,7 @@ def _scaled(quantity: str, x: np.ndarray, d: np.ndarray) -> np.ndarray:
     """Values in the units of the joints, d (STATES, n)."""
     if quantity in ("M", "C"):
         return x / (d[:, :, None] * d[:, None, :])
-    if quantity in ("forward_dynamics",):
+    if quantity == "forward_dynamics":
         return x * d
     if quantity in ("kinetic_energy", "potential_energy", "forward_dynamics_derivatives"):
         return x

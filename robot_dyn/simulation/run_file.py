@@ -78,8 +78,6 @@ def load_run(path: str | Path) -> Trajectory:
         return _consistent(_trajectory(arrays, about))
     except FileNotFoundError:
         raise RunFileError(f"{path}: there is no such file; write one with robot-dyn simulate … -o {path}") from None
-    except RunFileError:
-        raise
     except _DAMAGE as error:
         raise RunFileError(f"{path}: is no whole run file ({type(error).__name__}); simulate again") from None
     except _InconsistentError as error:

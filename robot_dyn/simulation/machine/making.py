@@ -12,7 +12,6 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.compiled.cache import default_store
-from robot_dyn.compiled.engine import MOST_INSTRUCTIONS
 from robot_dyn.compiled.symbolic import TraceError
 from robot_dyn.effects.plant import Plant
 from robot_dyn.integrate.integrator import Integrator
@@ -21,6 +20,9 @@ from robot_dyn.simulation.machine.machine import Machine
 from robot_dyn.simulation.machine.program import Program
 from robot_dyn.simulation.machine.traced import SymbolicDynamics, robot_of, trace, with_values
 from robot_dyn.simulation.motion import Motion
+
+# Of a march, which goes through Numba line by line: about a minute of compiling, by estimate.
+_MOST_INSTRUCTIONS = 40_000
 
 
 @final
@@ -90,9 +92,10 @@ def machine(
         Same(motion.plant.dynamics), tuple(map(Same, motion.plant.effects)), Same(motion.controller), motion.canonical,
         method, lanes, tuple((name, len(x)) for name, x in values.items()), tau,
     )  # fmt: skip
-    if program.instructions > 2 * MOST_INSTRUCTIONS:
+    if program.instructions > _MOST_INSTRUCTIONS:
         raise TraceError(
-            f"{program.instructions} instructions are too many for the compiler to take well: engine='interpreted'"
+            f"the run takes {program.instructions} instructions, more than the {_MOST_INSTRUCTIONS} worth compiling;"
+            " simulate it with engine='interpreted'"
         )
     return Machine(
         with_values(made, values), program, method is not None, np.concatenate([*values.values(), np.zeros(0)])
