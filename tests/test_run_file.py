@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import csv
+import functools
+import json
 import os
-from dataclasses import fields
+import tracemalloc
+import zipfile
+from dataclasses import fields, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import robot_dyn as rd
 from robot_dyn.scene.starters import starter
-from robot_dyn.simulation.run_file import RunFileError, export_csv
+from robot_dyn.simulation import archive
+from robot_dyn.simulation.run_file import RunFileError
+from robot_dyn.simulation.table import export_csv
+from robot_dyn.simulation.trajectory import Ending, Outcome
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +56,7 @@ def test_a_truncated_file_is_refused(run, tmp_path, keep: float) -> None:
     path = rd.save_run(run, tmp_path / "run.npz")
     whole = path.read_bytes()
     path.write_bytes(whole[: int(keep * len(whole))])
-    with pytest.raises(RunFileError, match="no whole run file"):
+    with pytest.raises(RunFileError, match="is not a whole run file"):
         rd.load_run(path)
 
 
@@ -56,10 +64,10 @@ def test_other_files_are_refused(tmp_path) -> None:
     with pytest.raises(RunFileError, match="no such file"):
         rd.load_run(tmp_path / "none.npz")
     np.savez(tmp_path / "other.npz", x=np.ones(3))
-    with pytest.raises(RunFileError, match="no whole run file"):
+    with pytest.raises(RunFileError, match="is not a whole run file"):
         rd.load_run(tmp_path / "other.npz")
     (tmp_path / "text.npz").write_text("hello")
-    with pytest.raises(RunFileError, match="no whole run file"):
+    with pytest.raises(RunFileError, match="is not a whole run file"):
         rd.load_run(tmp_path / "text.npz")
 
 
@@ -107,28 +115,148 @@ def test_a_folder_is_no_target(run, tmp_path) -> None:
         rd.save_run(run, tmp_path)
 
 
+def resaved(run, path, *, digest: bool = True, **changes):
+    """A run file with members changed, or left out if None; the digest is that of what it holds, or of the run."""
+    with np.load(rd.save_run(run, path)) as file:
+        arrays = dict(file)
+    for name, change in changes.items():
+        x = change(arrays.get(name, np.zeros(0)))
+        arrays = {key: y for key, y in (arrays | {name: x}).items() if y is not None}
+    if digest:
+        del arrays["sha256"]
+        with path.open("wb") as stream:
+            archive.write(stream, arrays)
+    else:
+        np.savez(path, **arrays)
+    return path
+
+
+def said(text: np.ndarray, **changes) -> np.ndarray:
+    """The text of a run file with other entries; paths are separated by two underscores."""
+    about = json.loads(str(text))
+    for path, value in changes.items():
+        *tables, key = path.split("__")
+        functools.reduce(dict.__getitem__, tables, about)[key] = value
+    return np.array(json.dumps(about))
+
+
 @pytest.mark.parametrize(
-    ("name", "change", "said"),
+    ("name", "change", "message"),
     [
-        ("t", lambda t: t[:5], "not float64"),
-        ("t", lambda t: t[::-1].copy(), "its times"),
-        ("t", lambda t: np.where(t > 0.1, np.nan, t), "its times"),
-        ("q", lambda q: q[:, :1], "q holds"),
-        ("q", lambda q: q.astype(complex), "complex128"),
-        ("q", lambda q: q.astype(str), "q holds"),
-        ("kinetic", lambda K: K[:5], "kinetic holds"),
-        ("wanted", lambda _: np.zeros(3), "wanted holds"),
-        ("deviation", lambda _: np.zeros((2, 2)), "deviation holds"),
-        ("at_stop", lambda _: np.zeros((10, 2), bool), "at_stop holds"),
-        ("wrench/tip", lambda _: np.full((3, 7), np.nan), "its times"),
-        ("wrench/tip", lambda _: np.zeros((3, 6)), "wrench on tip holds"),
-        ("about", lambda text: np.array(str(text).replace('"urdf": "', '"urdf": 3, "x": "')), "no text"),
-        ("about", lambda text: np.array(str(text).replace('"format": 2', '"format": "2"')), "has format '2'"),
+        ("t", lambda t: t[:5], r"member '\w+' holds float64 .*m = 5"),
+        ("t", lambda t: t[::-1].copy(), "the times of member 't'"),
+        ("t", lambda t: np.where(t > 0.1, np.nan, t), "member 't' .*nan"),
+        ("t", lambda _: None, "'t' is missing"),
+        ("q", lambda q: q[:, :1], "member 'q' holds"),
+        ("q", lambda q: q.astype(complex), "member 'q' is not an array"),
+        ("q", lambda q: q.astype(str), "member 'q' holds str"),
+        ("q", lambda q: q.astype(np.float32), "member 'q' holds float32"),
+        ("q", lambda q: np.where(q > 0, np.inf, q), "member 'q' of a run that did not diverge holds nan or inf"),
+        ("ledger/kinetic", lambda K: K[:5], "member 'ledger/kinetic' holds"),
+        ("power/control", lambda _: None, "have different names"),
+        ("wanted", lambda _: np.zeros(3), "member 'wanted' holds"),
+        ("deviation", lambda _: np.zeros((2, 2)), "member 'deviation' holds"),
+        ("at_stop", lambda _: np.zeros((10, 2), bool), "member 'at_stop' holds"),
+        ("wrenches/tip", lambda _: np.full((3, 7), np.nan), "member 'wrenches/tip' .*nan"),
+        ("wrenches/tip", lambda _: np.zeros((3, 6)), "member 'wrenches/tip' holds"),
+        ("novelty", lambda _: np.zeros(3), "'novelty' is not known to this version"),
+        ("error/error", lambda _: None, "'error/error' is missing"),
+        ("about", lambda _: None, "'about' is missing"),
+        ("about", lambda text: np.array("[" * 100_000), "'about' is not the JSON"),
+        ("about", lambda text: np.array([str(text)]), "'about' holds .*not one text"),
+        ("about", lambda text: said(text, format=2), "it has format 2, this version reads 3; simulate again"),
+        ("about", lambda text: said(text, format="3"), "it has format '3'"),
+        ("about", lambda text: said(text, novelty=3), "'novelty' is not known to this version"),
+        ("about", lambda text: said(text, about__urdf=3), "'about/urdf' holds 3, not str"),
+        ("about", lambda text: said(text, about__urdf="\ud800"), "'about/urdf' holds half a character"),
+        ("about", lambda text: said(text, joint_names="ab"), "member 'q' holds"),
+        ("about", lambda text: said(text, joint_names=[1, 2]), "'joint_names/0' holds 1, not str"),
+        (
+            "about",
+            lambda text: said(text, outcome__ending="done"),
+            "'outcome/ending' holds 'done', not finished or diverged",
+        ),
+        ("about", lambda text: said(text, outcome__t=float("nan")), "'outcome/t' holds nan, not a time"),
+        ("about", lambda text: said(text, outcome=None), "'outcome' holds None, not a table"),
+        ("about", lambda text: said(text, statistics__steps=1.5), "'statistics/steps' holds 1.5, not int"),
+        ("about", lambda text: said(text, statistics__wall_s=10**400), "'statistics/wall_s' holds 1"),
+        ("about", lambda text: said(text, statistics__wall_s=True), "'statistics/wall_s' holds True, not float"),
     ],
 )
-def test_arrays_that_do_not_fit_together_are_refused(run, tmp_path, name: str, change, said: str) -> None:
-    with np.load(rd.save_run(run, tmp_path / "run.npz")) as file:
-        arrays = dict(file)
-    np.savez(tmp_path / "bent.npz", **arrays | {name: change(arrays.get(name, np.zeros(0)))})
-    with pytest.raises(RunFileError, match=said):
-        rd.load_run(tmp_path / "bent.npz")
+def test_members_that_do_not_fit_together_are_refused_by_name(run, tmp_path, name: str, change, message: str) -> None:
+    """Also where the digest is right: it finds damage, not a program that writes nonsense."""
+    path = resaved(run, tmp_path / "run.npz", **{name: change})
+    with pytest.raises(RunFileError, match=f"is not a whole run file: .*{message}"):
+        rd.load_run(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("q", lambda q: q[:, ::-1].copy()),
+        ("t", lambda t: t * 2),
+        ("tau", lambda u: u + 1e-300),
+        ("about", lambda text: said(text, statistics__steps=7)),
+        ("at_stop", lambda _: np.zeros((21, 2), bool)),
+    ],
+)
+def test_a_changed_member_that_fits_is_told_by_the_digest(run, tmp_path, name: str, change) -> None:
+    path = resaved(run, tmp_path / "run.npz", digest=False, **{name: change})
+    with pytest.raises(RunFileError, match="SHA-256 is not that of its contents"):
+        rd.load_run(path)
+
+
+def test_exchanged_members_are_told_by_the_digest(run, tmp_path) -> None:
+    path = resaved(run, tmp_path / "run.npz", digest=False, q=lambda _: run.v, v=lambda _: run.q)
+    with pytest.raises(RunFileError, match="SHA-256 is not that of its contents"):
+        rd.load_run(path)
+
+
+def test_a_run_that_diverged_keeps_its_nans(run, tmp_path) -> None:
+    """What a diverged run ends with may be anything; so a run that NumPy wrote again by itself still loads."""
+    end = replace(run, outcome=Outcome(Ending.DIVERGED, 0.2, "smaller step"), q=np.where(run.q > 0, np.nan, run.q))
+    path = rd.save_run(end, tmp_path / "run.npz")
+    np.testing.assert_array_equal(rd.load_run(path).q, end.q)
+    with np.load(path) as file:
+        np.savez(tmp_path / "again.npz", **dict(file))
+    np.testing.assert_array_equal(rd.load_run(tmp_path / "again.npz").q, end.q)
+
+
+@pytest.mark.parametrize("change", [{"q": np.zeros(3)}, {"power": {}}, {"joint_names": ("a", "\ud800")}, {"t": [0.0]}])
+def test_what_would_not_be_read_is_not_written(run, tmp_path, change) -> None:
+    with pytest.raises(RunFileError, match="cannot be written"):
+        rd.save_run(replace(run, **change), tmp_path / "run.npz")
+    with pytest.raises(RunFileError, match=r"takes the Trajectory of rd\.simulate, got dict"):
+        rd.save_run({}, tmp_path / "run.npz")  # type: ignore[arg-type]
+    assert not list(tmp_path.iterdir())
+
+
+def test_sizes_are_known_before_anything_is_inflated(run, tmp_path) -> None:
+    """8 GiB of zeros are 8 MiB in a file; a member that says less than it holds is read no further than it says."""
+    path = rd.save_run(run, tmp_path / "run.npz")
+    with pytest.raises(RunFileError, match=r"holds .* GiB, more than .* raise max_bytes"):
+        rd.load_run(path, max_bytes=1000)
+    data = np.lib.format.header_data_from_array_1_0(np.zeros(0)) | {"shape": (2**20 // 8,)}
+    with zipfile.ZipFile(path, "a", zipfile.ZIP_DEFLATED) as file, file.open("power/bomb.npy", "w") as member:
+        np.lib.format.write_array_header_1_0(member, data)
+        for _ in range(64):
+            member.write(bytes(2**20))
+    tracemalloc.start()
+    with pytest.raises(RunFileError, match="'power/bomb' is not an array"):
+        rd.load_run(path)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 8 * 2**20
+
+
+@pytest.mark.parametrize("kind", ["folder", "pipe", "/dev/zero", "/dev/null"])
+def test_only_regular_files_are_read(tmp_path, kind: str) -> None:
+    path = tmp_path / "run.npz"
+    if kind == "folder":
+        path.mkdir()
+    elif kind == "pipe":
+        os.mkfifo(path)
+    else:
+        path = Path(kind)
+    with pytest.raises(RunFileError, match="is a folder" if kind == "folder" else "is not a regular file"):
+        rd.load_run(path)

@@ -20,7 +20,7 @@ def simulate(
 ) -> None:
     """Run a scene; exit code 1 if it diverges. Ctrl-C ends the run and keeps its samples."""
     from robot_dyn.cli import report
-    from robot_dyn.simulation.run_file import export_csv
+    from robot_dyn.simulation.table import export_csv
 
     setup = rd.read_scene(scene)
     with bar(setup.duration_s) as advance:
