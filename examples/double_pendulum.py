@@ -13,11 +13,9 @@ import numpy as np
 
 import robot_dyn as rd
 
-g = -rd.STANDARD_GRAVITY[2]  # [m/s²]
 apart = 1e-6  # between the neighbours at the start, in [rad]
 
-# The joints of urdf/planar_2r.urdf turn about z, so gravity has to point along −y to lie in the plane of motion.
-arm = rd.load("planar_2r").with_(gravity=(0.0, -g, 0.0))
+arm = rd.load("planar_2r")
 
 
 def fall(q0):

@@ -15,7 +15,6 @@ import numpy as np
 
 import robot_dyn as rd
 
-g = -rd.STANDARD_GRAVITY[2]  # [m/s²]
 start = np.array([-np.pi / 2, 0.0])  # hangs down, in [rad]
 target = np.array([0.6, 0.8])  # [rad]
 kp = np.array([300.0, 100.0])  # [N m/rad]
@@ -37,7 +36,7 @@ def move(arm):
     )
 
 
-for name, gravity in (("zero gravity", (0.0, 0.0, 0.0)), ("gravity along -y", (0.0, -g, 0.0))):
+for name, gravity in (("zero gravity", (0.0, 0.0, 0.0)), ("standard gravity", rd.STANDARD_GRAVITY)):
     arm = rd.load("planar_2r").with_(gravity=gravity)
     trajectory = move(arm)
     print(f"--- {name}\n{trajectory.summary}")

@@ -15,11 +15,10 @@ from benchmarks.mujoco_arm import mujoco_model
 
 import robot_dyn as rd
 
-G = -rd.STANDARD_GRAVITY[2]
 TIGHT = rd.Adaptive(rtol=1e-13, atol=1e-14)
 PANDA = rd.load("panda").with_(lock={"panda_finger_joint1": 0.0})
 READY = np.array([0.3, 0.6, -0.4, -1.2, 0.5, 1.1, 0.2])
-DOUBLE = rd.load("planar_2r").with_(gravity=(0.0, -G, 0.0))
+DOUBLE = rd.load("planar_2r")
 
 
 def free_swing(duration: float) -> rd.Setup:

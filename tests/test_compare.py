@@ -61,7 +61,7 @@ def test_edited_robots_agree(name: str) -> None:
     [
         (
             "gravity",
-            lambda g: g + np.array([0, 1e-10, 0]),
+            lambda g: g + np.array([0, 0, 1e-10]),
             {"N", "inverse_dynamics", "potential_energy", "M a + C v + N = ID"},
         ),
         ("armature", lambda a: a + 1e-11, {"M", "momentum", "kinetic_energy"}),
@@ -69,7 +69,7 @@ def test_edited_robots_agree(name: str) -> None:
 )
 def test_a_road_that_errs_by_1e_11_is_caught(monkeypatch, member: str, change, quantities: set[str]) -> None:
     """One number of the own road moved by 1e-11 of its size: the quantities that depend on it are named, no others."""
-    robot = rd.load("planar_2r").with_(gravity=(0.3, -9.0, 0.5))
+    robot = rd.load("planar_2r").with_(gravity=(0.3, 0.5, -9.0))
     whole = Lagrangian.linkage.func  # pyright: ignore[reportFunctionMemberAccess]
 
     def wrong(self: Lagrangian) -> Linkage:
@@ -85,7 +85,7 @@ def test_a_road_that_errs_by_1e_11_is_caught(monkeypatch, member: str, change, q
 
 def test_a_disagreement_names_its_state_and_entry(monkeypatch) -> None:
     """N of the second joint moved by 1e-9 N m: the worst entry is that joint, at a state that reproduces it."""
-    robot, original = rd.load("planar_2r").with_(gravity=(0.0, -9.81, 0.0)), Lagrangian.N
+    robot, original = rd.load("planar_2r").with_(gravity=(0.0, 0.0, -9.81)), Lagrangian.N
     monkeypatch.setattr(Lagrangian, "N", lambda self, q: original(self, q) + np.array([0.0, 1e-9]))
     result = compare(robot, samples=4)
     assert not result.ok

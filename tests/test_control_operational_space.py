@@ -23,7 +23,7 @@ CASES = {
     "panda position": (PANDA, "panda_hand_tcp", POSITION),
     "ur5 pose": (UR5, "tool0", POSE),
     "ur5 height and yaw": (UR5, "tool0", (2, 5)),
-    "planar_2r": (PLANAR, "tip", (0, 1)),
+    "planar_2r": (PLANAR, "tip", (0, 2)),
 }
 EXACT = 1e-12  # a threshold that no regular state reaches
 
@@ -164,7 +164,7 @@ def test_position_task_follows_a_circle_and_the_posture_takes_the_rest() -> None
     [
         (UR5, "tool0", POSE, [0.3, -0.9, 0.0, 0.6, 0.0, 0.2], [0, 0, 1, 0, 1, 0]),  # elbow and wrist at once
         (UR5, "wrist_1_link", POSITION, [0.3, -0.9, 0.0, 0.6, 0.5, 0.2], [0, 0, 1, 0, 0, 0]),
-        (PLANAR, "tip", (0, 1), [0.4, 0.0], [0, 1]),
+        (PLANAR, "tip", (0, 2), [0.4, 0.0], [0, 1]),
     ],
     ids=["ur5 pose", "ur5 wrist", "planar_2r"],
 )

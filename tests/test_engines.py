@@ -21,7 +21,7 @@ from robot_dyn.simulation.choice import choose
 from robot_dyn.simulation.machine.machine import MarchError
 from robot_dyn.simulation.motion import Motion
 
-ARM = rd.load("planar_2r").with_(gravity=(0.0, -9.80665, 0.0))
+ARM = rd.load("planar_2r")
 UR5 = completed(rd.load("ur5"))[0]  # its file states right angles with too few digits
 Q, V = np.array([0.4, -0.7]), np.array([0.3, 0.5])
 REFERENCE = rd.via_points([0.05, 0.1, 0.2], [Q, Q + 0.3, Q - 0.2], kind="cubic")

@@ -7,7 +7,7 @@ import pytest
 
 import robot_dyn as rd
 
-DOUBLE = rd.load("planar_2r").with_(gravity=(0.0, -9.80665, 0.0))
+DOUBLE = rd.load("planar_2r")
 PANDA = rd.load("panda").with_(lock={"panda_finger_joint1": 0.0})
 READY = np.array([0.3, 0.6, -0.4, -1.2, 0.5, 1.1, 0.2])
 REACH = rd.quintic(READY, READY + np.array([0.4, -0.3, 0.5, 0.2, -0.6, 0.3, 0.4]), 0.5)

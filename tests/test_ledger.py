@@ -7,9 +7,9 @@ import pytest
 
 import robot_dyn as rd
 
-DOUBLE = rd.load("planar_2r").with_(gravity=(0.0, -9.80665, 0.0))
+DOUBLE = rd.load("planar_2r")
 SKEW, CART_POLE = rd.load("skew_tree"), rd.load("cart_pole")
-FORCE = [3.0, -2.0, 0.7, 0.3, 0.5, -4.0]
+FORCE = [3.0, -0.7, -2.0, 0.3, 4.0, 0.5]
 FRICTION, SPRING = rd.ViscousFriction([0.4, 0.2]), rd.Spring([8.0, 5.0], [0.2, -0.3])
 DRY = rd.RegularisedCoulombFriction([0.5, 0.2], 0.5)  # smooth on the scale of a step
 WINDOW = rd.ExternalWrench("tip", FORCE, start_s=0.12, end_s=0.24)

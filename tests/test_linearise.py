@@ -11,7 +11,7 @@ from robot_dyn.errors import QueryError
 
 G = 9.80665
 PENDULUM = rd.load("pendulum")  # I = 1/3 kg m², m g l/2 = G/2
-DOUBLE = rd.load("planar_2r").with_(gravity=(0.0, -G, 0.0))
+DOUBLE = rd.load("planar_2r")
 PANDA = rd.load("panda").with_(lock={"panda_finger_joint1": 0.0})
 
 
@@ -98,7 +98,7 @@ def test_a_small_deviation_moves_as_the_linearisation_says(size: float) -> None:
 def test_effects_and_time_are_taken_into_account() -> None:
     """A wrench that has ended adds nothing; while it acts, its torque Jᵀ F turns with the arm."""
     q, v, u = np.random.default_rng(6).normal(size=(3, 2))
-    plant = rd.Plant(DOUBLE, [rd.ExternalWrench("tip", [5.0, -9.0, 0.0, 0.0, 0.0, 2.0], end_s=1.0)])
+    plant = rd.Plant(DOUBLE, [rd.ExternalWrench("tip", [5.0, 0.0, -9.0, 0.0, -2.0, 0.0], end_s=1.0)])
     bare, _ = rd.linearise(rd.Plant(DOUBLE), q, v, u)
     after, _ = rd.linearise(plant, q, v, u, t=1.0)
     during, _ = rd.linearise(plant, q, v, u, t=0.5)

@@ -13,7 +13,7 @@ from robot_dyn.effects.effect import Active
 from robot_dyn.errors import QueryError
 from robot_dyn.simulation.machine import batch
 
-ARM = rd.load("planar_2r").with_(gravity=(0.0, -9.80665, 0.0))
+ARM = rd.load("planar_2r")
 Q, V = np.array([0.4, -0.7]), np.array([0.3, 0.5])
 REFERENCE = rd.quintic(Q, Q + 0.5, 0.1, start=0.05)
 PLANT = rd.Plant(ARM, [rd.ViscousFriction([0.3, 0.1]), rd.RegularisedCoulombFriction(0.2, 0.1), rd.EffortLimit(30.0)])

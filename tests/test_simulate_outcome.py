@@ -14,7 +14,7 @@ from robot_dyn.control.controller import Memoryless
 from robot_dyn.effects.effect import Active
 from robot_dyn.errors import QueryError
 
-DOUBLE = rd.load("planar_2r").with_(gravity=(0.0, -9.80665, 0.0))
+DOUBLE = rd.load("planar_2r")
 UR5 = rd.load("ur5")
 START = {"q0": [0.4, -0.7], "v0": [0.3, 0.5]}
 METHODS = [rd.method(name) for name in ("rk4", "gauss_4", "sdirk_3")] + [rd.Adaptive()]

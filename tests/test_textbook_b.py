@@ -199,7 +199,7 @@ def test_b5_planar_2r_arm_from_its_energies_is_the_closed_form_and_the_urdf() ->
     rng = np.random.default_rng(5)
     q, v = rng.uniform(-3, 3, (2, COUNT, 2))
     (q1, q2), (v1, v2) = q.T, v.T
-    robot = rd.load("planar_2r").with_(gravity=(0.0, -GRAVITY, 0.0))
+    robot = rd.load("planar_2r").with_(gravity=(0.0, 0.0, -GRAVITY))
     for bars in (uniform_bars(rng), uniform_bars(rng), uniform_bars(None)):
         (m1, m2), (r1, r2), l1, (I1, I2) = bars
         M12 = m2 * (r2**2 + l1 * r2 * np.cos(q2)) + I2
@@ -236,7 +236,7 @@ def test_b6_inertia_coriolis_vector_and_gravity_make_up_the_torque() -> None:
     """
     rng = np.random.default_rng(6)
     q, v, a = rng.uniform(-3, 3, (3, COUNT, 2))
-    arm, robot = planar_2r(*uniform_bars(None)), rd.load("planar_2r").with_(gravity=(0.0, -GRAVITY, 0.0))
+    arm, robot = planar_2r(*uniform_bars(None)), rd.load("planar_2r").with_(gravity=(0.0, 0.0, -GRAVITY))
     tau, rest = arm.inverse_dynamics(0.0, q, v, a), 0 * v
     B = arm.M(0.0, q, v)
     vector, G = np.matvec(arm.C(0.0, q, v), v), arm.inverse_dynamics(0.0, q, rest, rest)

@@ -15,6 +15,7 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import QueryError, nearest
 from robot_dyn.lagrange.breakdown import torque_breakdown
 from robot_dyn.lagrange.manipulator import Lagrangian
+from robot_dyn.model.gravity import gravity_acts, no_torque
 from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.trajectory import Trajectory
 
@@ -37,6 +38,7 @@ def info(robot: Robot) -> Document:
         "n": robot.n,
         "total_mass": robot.total_mass,
         "gravity": list(robot.edits.gravity),
+        "gravity_acts": gravity_acts(robot),
         "joints": joints,
         "ties": _ties(robot),
         "locked": dict(robot.edits.lock),
@@ -57,6 +59,8 @@ def query(robot: Robot, effects: str, q: np.ndarray, v: np.ndarray, a: np.ndarra
     state = {"q": q, "v": v, "a": a, "tau": tau}
     return {
         "robot": robot.name,
+        "gravity": list(robot.edits.gravity),
+        "gravity_acts": gravity_acts(robot),
         "joints": list(robot.joint_names),
         **{name: array.tolist() for name, array in (state | terms).items()},
         "effects": acting,
@@ -137,6 +141,8 @@ def info_tables(robot: Robot) -> Iterator[Any]:
     document = info(robot)
     yield f"{robot.name}: {robot.n} joints, {robot.total_mass:.4g} kg, gravity {robot.edits.gravity} m/s²"
     yield document["source"]
+    if not document["gravity_acts"]:
+        yield no_torque(robot.edits.gravity)
     table = _table("joint", "kind", "lower", "upper", "effort", "velocity", "damping", "dry friction", "armature")
     for joint in document["joints"]:
         name, kind, *numbers = joint.values()
@@ -160,6 +166,8 @@ def query_tables(answer: Document) -> Iterator[Any]:
         yield f"\n{name}, {meaning}:"
         rows = answer[name] if name != "N" else [[x] for x in answer[name]]
         yield from (f"  {_row(row)}  {joint}" for row, joint in zip(rows, joints, strict=True))
+    if not answer["gravity_acts"]:
+        yield f"\n{no_torque(tuple(answer['gravity']))} without effects"
     if "why" in answer:
         yield from _why_tables(answer["why"])
 

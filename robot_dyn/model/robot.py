@@ -6,6 +6,7 @@ after checks that cost a fraction of a microsecond; lists, batches and tied join
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -15,11 +16,12 @@ import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy import ndarray
 
-from robot_dyn.errors import OverflowedError, SingularError
+from robot_dyn.errors import ModelWarning, OverflowedError, SingularError
 from robot_dyn.model import kernels, pinocchio_model
 from robot_dyn.model.description import Description
 from robot_dyn.model.dynamics import Array, Axes, acceleration, check_batches, checked, entry
 from robot_dyn.model.edits import Changes, Edits
+from robot_dyn.model.gravity import gravity_acts, no_torque
 from robot_dyn.model.kernels import Kernel, Scratch, ask, frozen, is_moderate, is_state
 from robot_dyn.model.ties import Ties
 
@@ -54,8 +56,16 @@ class Robot:
 
         Raises:
             EditError: If a name is unknown or a value has no meaning.
+
+        Warns:
+            ModelWarning: If the new gravity is not zero and has no torque on any joint.
         """
-        return Robot(self.description, self.edits.with_(self.joint_names, **changes))
+        robot = Robot(self.description, self.edits.with_(self.joint_names, **changes))
+        gravity = robot.edits.gravity
+        if gravity != self.edits.gravity and any(gravity) and not gravity_acts(robot):
+            remedy = "give its direction in base axes, or (0, 0, 0)"
+            warnings.warn(f"{robot.name}: {no_torque(gravity)}; {remedy}", ModelWarning, stacklevel=2)
+        return robot
 
     @property
     def name(self) -> str:

@@ -15,7 +15,7 @@ from robot_dyn.errors import QueryError
 ARM = rd.load("planar_2r")
 FAST = rd.Compiled(ARM)
 PUSHED = rd.Plant(
-    ARM, [rd.ViscousFriction(0.3), rd.ExternalWrench("tip", [1.0, 2, 0, 0, 0, 0.5], start_s=0.2, end_s=0.6)]
+    ARM, [rd.ViscousFriction(0.3), rd.ExternalWrench("tip", [1.0, 0, 2, 0, -0.5, 0], start_s=0.2, end_s=0.6)]
 )
 PLANT = rd.Compiled(PUSHED)
 FAR = 2 * np.pi * 40_000
