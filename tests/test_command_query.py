@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from pathlib import Path
 
@@ -66,10 +65,18 @@ def test_names_with_markup_are_shown_as_they_are(name: str, tmp_path: Path):
         assert name in said(command[0], tmp_path / "odd.urdf", *command[1:])
 
 
-def test_odd_bodies_are_a_warning_on_stderr():
-    done = run("info", "massless_tip", "--json")
-    assert done.returncode == 0 and json.loads(done.stdout)["findings"]
-    assert re.fullmatch(r"robot-dyn: warning: massless_tip: link 'pointer' moves but has no mass; .*\n", done.stderr)
+def test_findings_are_listed_by_info_and_warned_of_in_one_line_by_other_commands():
+    with pytest.warns(rd.ModelWarning):
+        findings = rd.load("iris").findings
+    assert len(findings) == 3
+    assert document("info", "iris")["findings"] == list(findings)
+    shown = said("info", "iris")
+    assert [line for line in shown.splitlines() if line.startswith("finding: ")] == [f"finding: {x}" for x in findings]
+    done = run("query", "iris", "--json")
+    assert done.returncode == 0
+    assert re.fullmatch(
+        r"robot-dyn: warning: iris: link .* \(the first of 3 findings; .*robot-dyn info\)\n", done.stderr
+    )
 
 
 # --- query

@@ -32,7 +32,7 @@ def info(
     """Show a robot: joints, limits, friction, mass, and what is odd about it."""
     from robot_dyn.cli import kernels, report
 
-    loaded = arguments.load(robot, lock, package_dir)
+    loaded = arguments.load(robot, lock, package_dir, quiet=True)  # the findings are shown below
     roads = {"compiled": kernels.formulations(loaded)} if compiled else {}
     if as_json:
         print_json(report.info(loaded) | roads)

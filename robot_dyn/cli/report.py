@@ -154,7 +154,7 @@ def info_tables(robot: Robot) -> Iterator[Any]:
     for name, value in document["locked"].items():
         yield f"locked: {name} = {value:g}"
     for finding in robot.findings:
-        yield f"odd: {finding}"
+        yield f"finding: {finding}"
 
 
 def query_tables(answer: Document) -> Iterator[Any]:

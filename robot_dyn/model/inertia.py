@@ -17,7 +17,7 @@ from robot_dyn.errors import QueryError
 from robot_dyn.spatial import hat, spatial_inertia
 
 _SLACK = 1e-9  # of the largest moment: printed digits
-_LEVER_SLACK = 1e-12  # of m c²: rounding left behind by merging bodies
+_LEVER_SLACK = 1e-12  # of m c², and of m (1 m)²: rounding left behind by merging bodies
 _ROTATION_SLACK = 1e-6  # of RᵀR − 1: what integrating R leaves behind
 
 
@@ -139,7 +139,7 @@ def implausibility(mass: float, com: Any, inertia: Any) -> str | None:
         inertia: Symmetric, shape (3, 3), in [kg m²].
     """
     I1, I2, I3 = np.linalg.eigvalsh(inertia)
-    slack = _SLACK * max(abs(I1), abs(I3)) + _LEVER_SLACK * abs(mass) * np.dot(com, com)
+    slack = _SLACK * max(abs(I1), abs(I3)) + _LEVER_SLACK * abs(mass) * max(1.0, np.dot(com, com))
     moments = f"principal moments {I1:.3g}, {I2:.3g}, {I3:.3g} kg m²"
     if mass < 0:
         return f"its mass is {mass:.3g} kg"

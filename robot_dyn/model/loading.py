@@ -24,9 +24,10 @@ def load(name_or_path: str | Path, *, package_dirs: Iterable[str | Path] = ()) -
         DescriptionError: If the file is refused.
 
     Warns:
-        ModelWarning: For each body that cannot exist as described; the robot loads all the same.
+        ModelWarning: Once, if there are findings about the description; the robot loads all the same.
     """
     robot = Robot(read(catalog.find(name_or_path, package_dirs)))
-    for finding in robot.findings:
-        warnings.warn(f"{robot.name}: {finding}", ModelWarning, stacklevel=2)
+    if found := robot.findings:
+        more = f" (the first of {len(found)} findings; all of them: Robot.findings, robot-dyn info)"
+        warnings.warn(f"{robot.name}: {found[0]}{more if len(found) > 1 else ''}", ModelWarning, stacklevel=2)
     return robot

@@ -1,4 +1,4 @@
-"""A `pinocchio.Model` of a description and its edits, and what of its bodies cannot exist."""
+"""A `pinocchio.Model` of a description and its edits."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.errors import DescriptionError, EditError, nearest
 from robot_dyn.model.description import Description
 from robot_dyn.model.edits import Edits
-from robot_dyn.model.inertia import implausibility
+from robot_dyn.model.structure import stated_mimics
 from robot_dyn.model.ties import Mimic, Ties, resolve
 from robot_dyn.model.urdf import UNBOUNDED
 
@@ -28,11 +28,7 @@ def build(description: Description, edits: Edits) -> tuple[Any, Ties, tuple[str,
         EditError: If a payload's frame is unknown, or no joint is left to move.
     """
     robot = description.element
-    mimics = {
-        joint.get("name"): Mimic(mimic.get("joint"), mimic.get("multiplier"), mimic.get("offset"))
-        for joint in robot.iterfind("joint")
-        if (mimic := joint.find("mimic")) is not None
-    }
+    mimics = stated_mimics(robot)
     for joint in robot.iterfind("joint"):
         joint.set("name", _MARK + joint.get("name"))
         if joint.get("type") == "continuous":
@@ -123,16 +119,3 @@ def per_joint(model: Any, joint_names: tuple[str, ...], full: np.ndarray) -> np.
     values[np.abs(values) >= float(UNBOUNDED)] *= np.inf
     values.setflags(write=False)
     return values
-
-
-def findings(model: Any) -> tuple[str, ...]:
-    """What is wrong with the merged bodies that move, each named by the link its joint carries."""
-    found = []
-    for joint in range(1, model.njoints):
-        body = model.inertias[joint]
-        link = next(f.name for f in model.frames if f.parentJoint == joint and f.type == pin.FrameType.BODY)
-        if body.mass == 0 and not body.inertia.any():
-            found.append(f"link {link!r} moves but has no mass; give it an <inertial>, or make its joint fixed")
-        elif why := implausibility(body.mass, body.lever, body.inertia):
-            found.append(f"link {link!r}: with what is fixed to it, {why}; correct the inertia of these links")
-    return tuple(found)

@@ -17,12 +17,13 @@ import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy import ndarray
 
 from robot_dyn.errors import ModelWarning, OverflowedError, SingularError
-from robot_dyn.model import kernels, pinocchio_model
+from robot_dyn.model import doctor, kernels, pinocchio_model
 from robot_dyn.model.description import Description
 from robot_dyn.model.dynamics import Array, Axes, acceleration, check_batches, checked, entry
 from robot_dyn.model.edits import Changes, Edits
 from robot_dyn.model.gravity import gravity_acts, no_torque
 from robot_dyn.model.kernels import Kernel, Scratch, ask, frozen, is_moderate, is_state
+from robot_dyn.model.structure import structure
 from robot_dyn.model.ties import Ties
 
 _DOUBTFUL = 1e10  # of ‖a‖: M may be singular at this q, which rounding hides
@@ -143,8 +144,8 @@ class Robot:
 
     @cached_property
     def findings(self) -> tuple[str, ...]:
-        """Bodies that cannot exist as described, in words."""
-        return pinocchio_model.findings(self.model)
+        """What is doubtful in the description and its edits, in words, each with its remedy; see docs/findings.md."""
+        return doctor.findings(structure(self.description, self.edits), self.joint_without_inertia)
 
     def M(self, q: Array) -> ndarray:
         if is_state(q, self._shape) and is_moderate(q):

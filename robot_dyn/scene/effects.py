@@ -5,10 +5,11 @@ from __future__ import annotations
 from math import inf
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import Field
 
-from robot_dyn.effects.actuator import EffortLimit
-from robot_dyn.effects.effect import Effect
+from robot_dyn.effects.actuator import EffortLimit, stated_efforts
+from robot_dyn.effects.effect import URDF, Effect
 from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFriction
 from robot_dyn.effects.joint_limit import joint_stops
 from robot_dyn.effects.spring import Spring
@@ -147,7 +148,12 @@ class Effort(Part):
 
     def build(self, robot: Robot) -> tuple[Effect, ...]:
         """The bound."""
-        return (EffortLimit(per_joint("limit", self.limit_N_m, robot, robot.effort_limit, elsewhere=inf)),)
+        return (EffortLimit(efforts(self.limit_N_m, robot)),)
+
+
+def efforts(limit: Stated, robot: Robot) -> np.ndarray:
+    """Effort limits (n,) of a scene, inf where none is given; those of the file must not be 0."""
+    return stated_efforts(robot) if limit == URDF else per_joint("limit", limit, robot, elsewhere=inf)
 
 
 Edit = Gravity | Lock | Load | Armature

@@ -68,7 +68,11 @@ KINDS = [
         ("chain of mimics", "correct"),
     ),
     Kind("multipliers whose product vanishes", following(("1e-200", "1e-200"))),
-    Kind("the largest multiplier and offset", mimicking('<mimic joint="shoulder" multiplier="1e12" offset="1e12"/>')),
+    Kind(
+        "the largest multiplier and offset",
+        mimicking('<mimic joint="shoulder" multiplier="1e12" offset="1e12"/>'),
+        warned=("joint 'elbow': moves 1e+12 times as far as 'shoulder'", "correct the multiplier"),
+    ),
     Kind("a multiplier of 0", mimicking('<mimic joint="shoulder" multiplier="0"/>')),
     Kind("a mimic on a fixed joint", text(welded("weld", '<mimic joint="nobody"/>')), upper=(1, 2)),
 ]

@@ -80,8 +80,18 @@ KINDS = [
     ),
     Kind("the widest turn", altered(RPY, 'rpy="1e12 -1e12 1e12"'), upper=(1, 2)),
     Kind("the widest limits", altered(LIMIT, '<limit upper="1e300" effort="1e308"/>'), upper=(1e300, 2)),
-    Kind("a mass of 1e-320", altered(MASS, '<mass value="1e-320"/>'), upper=(1, 2)),
+    Kind(
+        "a mass of 1e-320",
+        altered(MASS, '<mass value="1e-320"/>'),
+        warned=("link 'upper': its mass of 9.99989e-321 kg is below 1e-12 kg", "correct it"),
+        upper=(1, 2),
+    ),
     Kind("numbers in odd but sound spelling", altered(MASS, '<mass value=" +01.50E+0 "/>'), upper=(1, 2)),
     Kind("an axis over several lines", altered(AXIS, '<axis xyz="\n0\t0\n1 "/>'), upper=(1, 2)),
-    Kind("every number the largest", text(LARGEST), upper=(1, 2)),
+    Kind(
+        "every number the largest",
+        text(LARGEST),
+        warned=("origin lies 1.73205e+12 m away, beyond 10000 m, which costs digits", "correct it"),
+        upper=(1, 2),
+    ),
 ]

@@ -37,6 +37,7 @@ KINDS = [
     Kind(
         "a point mass on the axis at the tip",
         text(inside(f'<link name="tip">{POINT}</link>' + joint("wrist", "fore", "tip"))),
+        warned=("joint 'wrist'", "no inertia about its axis", "give its link moments of inertia"),
         stuck=STUCK,
     ),
     Kind(

@@ -1,0 +1,217 @@
+"""Findings: what a file hardly means is named with its place, its value and a remedy, and nothing else is."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import robot_dyn as rd
+from robot_dyn.errors import EffectError, ModelWarning
+from robot_dyn.scene.schema import SceneError
+from tests.hostile.kinds import BODY, LIMIT, MOMENTS, POINT, inside, joint
+from tests.hostile.kinds import arm as altered
+
+# What of the catalog stands, rolls or flies, by the knowledge of these machines. Upper bodies on a pelvis, hands,
+# arms and test stands of one finger do not.
+MOBILE = {
+    "a1", "alexander", "anymal_b", "anymal_b_kinova", "anymal_c", "b1", "b1_z1", "bolt", "borinot_flying_arm_2",
+    "centauro", "g1_29dof_rev_1_0", "g1_29dof_with_hand_rev_1_0", "go1", "go2", "hextilt_flying_arm_5", "human",
+    "hyq_no_sensors", "icub", "icub_reduced", "iris", "laikago", "pr2", "quadruped", "romeo", "romeo_laas_small",
+    "romeo_small", "simple_humanoid", "simple_humanoid_classical", "solo", "solo12", "talos_full_v2",
+    "talos_full_v2_box", "talos_reduced", "talos_reduced_box", "talos_reduced_corrected", "tiago", "tiago_dual",
+    "tiago_no_hand", "tiago_pro",
+}  # fmt: skip
+REFUSED = {"alex_psyonic_hands", "hector", "iris_simple", "ur3_empty"}
+NO_LIMITS = {"double_pendulum", "double_pendulum_continuous", "double_pendulum_simple", "iris", "romeo"}
+
+
+def findings(text: str, tmp_path: Path, **changes) -> tuple[str, ...]:
+    path = tmp_path / "arm.urdf"
+    path.write_text(text)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ModelWarning)
+        return rd.load(path).with_(**changes).findings
+
+
+@pytest.fixture(scope="module")
+def catalog() -> dict[str, tuple[str, ...]]:
+    """The findings about each robot of the catalog."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ModelWarning)
+        return {name: rd.load(name).findings for name in rd.list_robots() if name not in REFUSED}
+
+
+def holds(catalog: dict[str, tuple[str, ...]], words: str) -> set[str]:
+    return {name for name, found in catalog.items() if any(words in each for each in found)}
+
+
+def test_the_mobile_robots_of_the_catalog_and_no_others_are_told_to_be_welded(catalog) -> None:
+    assert holds(catalog, "floating base is not simulated") == MOBILE
+
+
+def test_limits_of_zero_in_the_catalog(catalog) -> None:
+    assert holds(catalog, "the effort limit is 0") == holds(catalog, "the velocity limit is 0") == NO_LIMITS
+    assert holds(catalog, "the lower limit is the upper one") == {"double_pendulum", "double_pendulum_simple"}
+
+
+def test_impossible_inertias_of_the_catalog_are_found_before_links_are_merged(catalog) -> None:
+    """Merged with the links they are fixed to, the sensor mount of the PR2 and the feet of the HyQ look sound."""
+    moving = {"allegro_left_hand", "allegro_right_hand", "hyq_no_sensors", "pr2", "romeo_laas_small", "romeo_small"}
+    idle = {"anymal_b", "anymal_b_kinova", "anymal_c", "b1", "b1_z1", "go1", "tiago", "tiago_dual", "tiago_no_hand"}
+    assert holds(catalog, "correct the inertia of this link") == moving | idle
+    assert holds(catalog, "no effect while it is fixed to the world") == idle | {"hyq_no_sensors", "romeo_laas_small"}
+    assert sum("'sensor_mount_link'" in each for each in catalog["pr2"]) == 1
+
+
+@pytest.mark.parametrize("name", ["ur5", "panda", "kinova", "xarm7", "cart_pole", "skew_tree", "light_tip"])
+def test_a_sound_arm_has_no_findings(catalog, name: str) -> None:
+    assert catalog[name] == ()
+
+
+WELDED = '<link name="hand"><inertial><mass value="{}"/><inertia {}/></inertial></link>' + joint(
+    "wrist", "fore", "hand", kind="fixed"
+)
+FLAT = 'ixx="0.001" ixy="0" ixz="0" iyy="0.001" iyz="0" izz="0.01"'
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (
+            inside(WELDED.format(1, FLAT)),
+            "link 'hand': its inertia breaks the triangle inequality (principal moments 0.001, 0.001, 0.01 kg m²);"
+            " correct the inertia of this link",
+        ),
+        (
+            inside(WELDED.format(1e-15, 'ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"')),
+            "link 'hand': its mass of 1e-15 kg is below 1e-12 kg; correct it, or its unit",
+        ),
+        (
+            altered(('xyz="0.4 0 0"', 'xyz="3e4 4e4 0"')),
+            "joint 'elbow': its origin lies 50000 m away, beyond 10000 m, which costs digits; correct it, or its unit",
+        ),
+        (
+            altered(('xyz="0 0 0.1"', 'xyz="0 -2e5 0"')),
+            "link 'upper': its centre of mass lies 200000 m away, beyond 10000 m, which costs digits; correct it, or"
+            " its unit",
+        ),
+        (
+            inside(
+                f'<link name="a">{POINT}</link><link name="b">{POINT}</link>'
+                + joint("first", "fore", "a", '<origin xyz="1 1 1"/><mimic joint="elbow" multiplier="-200"/>')
+                + joint("second", "fore", "b", '<origin xyz="1 1 1"/><mimic joint="first" multiplier="100"/>')
+            ),
+            "joint 'second': moves -20000 times as far as 'elbow', beyond 10000, which costs digits; correct the"
+            " multiplier of its <mimic>",
+        ),
+        (
+            altered((LIMIT, LIMIT.replace('effort="9"', 'effort="0"'))),
+            "joint 'shoulder': the effort limit is 0, which allows no effort at all; write the limit in N m or N, or"
+            " leave effort out for none",
+        ),
+        (
+            altered(('velocity="3"', 'velocity="0"')),
+            "joint 'elbow': the velocity limit is 0, which allows no velocity at all; write the limit in rad/s or m/s,"
+            " or leave velocity out for none",
+        ),
+        (
+            altered((LIMIT, LIMIT.replace('"-1"', '"1"'))),
+            "joint 'shoulder': the lower limit is the upper one; correct them, or make the joint fixed",
+        ),
+        (
+            inside(f'<link name="tip">{POINT}</link>' + joint("wrist", "fore", "tip")),
+            "joint 'wrist': what it moves has mass but no inertia about its axis, so M is singular; give its link"
+            " moments of inertia, or give the joint armature",
+        ),
+    ],
+    ids=lambda value: value[:30] if value.startswith(("link", "joint")) else "",
+)
+def test_each_finding_names_place_value_and_remedy(text: str, expected: str, tmp_path: Path) -> None:
+    assert findings(text, tmp_path) == (expected,)
+
+
+@pytest.mark.parametrize("far", ['xyz="9.9e3 0 0"', 'xyz="-5e3 -5e3 0"'])
+def test_what_lies_within_the_bounds_is_no_finding(far: str, tmp_path: Path) -> None:
+    light = inside(WELDED.format(2e-12, 'ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"'))
+    assert findings(light.replace('xyz="0.4 0 0"', far), tmp_path) == ()
+
+
+def test_moments_that_rounding_left_behind_are_those_of_a_point(tmp_path: Path) -> None:
+    """1e-20 kg m² at 1.5 kg is a radius of gyration of 1e-10 m: a sign there says nothing."""
+    rounding = 'ixx="-1e-20" ixy="0" ixz="0" iyy="1e-20" iyz="0" izz="3e-20"'
+    assert findings(altered((MOMENTS, rounding)), tmp_path) == ()
+    assert "indefinite" in findings(altered((MOMENTS, rounding.replace("e-20", "e-5"))), tmp_path)[0]
+
+
+def test_edits_cure_what_they_can(tmp_path: Path) -> None:
+    tip = inside(f'<link name="tip">{POINT}</link>' + joint("wrist", "fore", "tip"))
+    massless = inside('<link name="tip"/>' + joint("wrist", "fore", "tip"))
+    ball = rd.Payload("tip", 0.1, inertia=np.eye(3) * 1e-4)
+    for text in (tip, massless):
+        assert len(findings(text, tmp_path)) == 1
+        for changes in ({"lock": {"wrist": 0.2}}, {"payload": ball}, {"armature": {"wrist": 0.01}}):
+            assert findings(text, tmp_path, **changes) == (), changes
+    idle = altered((LIMIT, LIMIT.replace('effort="9"', 'effort="0"')))
+    assert findings(idle, tmp_path, lock={"shoulder": 0.1}) == ()
+
+
+LEG = "<link name='{0}'>" + BODY + "</link>"
+
+
+@pytest.mark.parametrize(
+    ("root", "ends", "welded"),
+    [
+        ("base", ("left_foot", "right_foot"), True),
+        ("base", ("UPPER_LEG_L", "UPPER_LEG_R"), True),
+        ("base", ("wheel1", "wheel2", "caster"), True),
+        ("base", ("rotor_0", "rotor_1"), True),
+        ("base_footprint", ("hand",), True),
+        ("base", ("one_foot",), False),  # a leg on a test stand
+        ("world", ("left_foot", "right_foot"), False),  # the file itself fixes it
+        ("palm", ("allegro_finger_1", "allegro_finger_2"), False),
+        ("base", ("elegant_hand", "telegripper"), False),
+    ],
+)
+def test_names_of_legs_wheels_and_rotors_on_two_branches_tell_a_mobile_base(
+    root: str, ends: tuple[str, ...], welded: bool, tmp_path: Path
+) -> None:
+    links = "".join(LEG.format(end) for end in ends)
+    joints = "".join(joint(f"j{i}", root, end) for i, end in enumerate(ends))
+    text = f"<robot name='r'><link name='{root}'/>{links}{joints}</robot>"
+    found = findings(text, tmp_path)
+    assert [each.split(":")[0] for each in found] == ([f"link '{root}'"] if welded else [])
+    assert all("legs, wheels or rotors" in each for each in found)
+
+
+# --- an effort limit of 0
+
+
+def no_effort(tmp_path: Path) -> rd.Robot:
+    (tmp_path / "arm.urdf").write_text(altered((LIMIT, LIMIT.replace('effort="9"', 'effort="0"'))))
+    with pytest.warns(ModelWarning, match="the effort limit is 0"):
+        return rd.load(tmp_path / "arm.urdf")
+
+
+def test_an_effort_limit_of_zero_in_the_file_never_drops_the_arm_in_silence(tmp_path: Path) -> None:
+    robot = no_effort(tmp_path)
+    with pytest.raises(EffectError, match=r"an effort limit of 0 for 'shoulder', .* give limits by joint"):
+        rd.Plant(robot, [rd.EffortLimit("urdf")])
+    stated = rd.Plant(robot, [rd.EffortLimit({"shoulder": 5.0, "elbow": 8.0})])
+    assert stated.actuation(np.array([7.0, 9.0])).tolist() == [5.0, 8.0]
+    meant = rd.Plant(robot, [rd.EffortLimit([0.0, 8.0])])  # a drive that is off, said so by the user
+    assert meant.actuation(np.array([7.0, 9.0])).tolist() == [0.0, 8.0]
+    held = robot.with_(lock={"shoulder": 0.3})
+    assert rd.Plant(held, [rd.EffortLimit("urdf")]).actuation(np.array([9.0])).tolist() == [8.0]
+
+
+@pytest.mark.filterwarnings("ignore::robot_dyn.errors.ModelWarning")
+@pytest.mark.parametrize("more", ["", 'limit_N_m = "urdf"'])
+def test_a_scene_says_so_too(more: str, tmp_path: Path) -> None:
+    no_effort(tmp_path)
+    scene = f'robot = "arm.urdf"\nduration_s = 1.0\n[[effect]]\nkind = "effort_limit"\n{more}\n'
+    (tmp_path / "scene.toml").write_text(scene)
+    with pytest.raises(SceneError, match="an effort limit of 0 for 'shoulder'"):
+        rd.read_scene(tmp_path / "scene.toml")
