@@ -94,7 +94,8 @@ def test_continuous_joints_are_one_number_without_limits():
 
 
 def test_revolute_joints_without_stated_bounds_are_unlimited():
-    robot = rd.load("centauro")
+    with pytest.warns(rd.ModelWarning, match="legs, wheels or rotors"):
+        robot = rd.load("centauro")
     wheels = [i for i, name in enumerate(robot.joint_names) if name.startswith("j_wheel")]
     assert len(wheels) == 4
     assert_array_equal(robot.lower[wheels], -np.inf)
