@@ -21,7 +21,7 @@ every_robot = pytest.mark.parametrize("name", ("pendulum", "ur5", "panda", "skew
 # --- what Pinocchio says
 
 
-def test_untied_robot_says_what_pinocchio_says_bit_for_bit():
+def test_untied_robot_says_what_pinocchio_says():
     robot = rd.load("ur5")
     model = robot.model
     data = model.createData()
@@ -29,7 +29,7 @@ def test_untied_robot_says_what_pinocchio_says_bit_for_bit():
         q, v, x = general(robot, seed)
         M, C = pin.crba(model, data, q), pin.computeCoriolisMatrix(model, data, q, v)
         assert_array_equal(robot.M(q), M)
-        assert_array_equal(robot.C(q, v), C)
+        assert_allclose(robot.C(q, v), C, rtol=0, atol=1e-14 * np.abs(C).max())  # by another algorithm
         assert_array_equal(robot.N(q), pin.computeGeneralizedGravity(model, data, q))
         assert_array_equal(robot.inverse_dynamics(q, v, x), pin.rnea(model, data, q, v, x))
         assert_array_equal(robot.forward_dynamics(q, v, x), pin.aba(model, data, q, v, x))
@@ -37,16 +37,18 @@ def test_untied_robot_says_what_pinocchio_says_bit_for_bit():
             (robot.momentum(q, v), M),
             (robot.coriolis_torque(q, v), C),
             (robot.coriolis_transpose(q, v), C.T),
-        ):  # 1e-15 of the terms added: the order of the sum is free
-            assert np.all(np.abs(product - A @ v) <= 1e-15 * (np.abs(A) @ np.abs(v)))
+        ):  # of the terms added, by other algorithms
+            assert np.all(np.abs(product - A @ v) <= 1e-14 * np.max(np.abs(A) @ np.abs(v)))
         assert_allclose(robot.kinetic_energy(q, v), pin.computeKineticEnergy(model, data, q, v), rtol=1e-15)
         assert_allclose(robot.potential_energy(q), pin.computePotentialEnergy(model, data, q), rtol=1e-15)
 
 
-def test_frames_are_those_of_pinocchio_bit_for_bit():
+def test_frames_are_those_of_pinocchio():
+    """Turned to the base's axes by the robot itself, and so to 1e-15 of the largest entry."""
     robot = rd.load("ur5")
     model, data = robot.model, robot.model.createData()
     q, v, _ = general(robot, 1)
+    turn = np.abs(v).sum()
     references = {"world_aligned": pin.LOCAL_WORLD_ALIGNED, "body": pin.LOCAL, "world": pin.WORLD}
     for name in robot.frame_names:
         frame = model.getFrameId(name, pin.FrameType.BODY)
@@ -54,10 +56,10 @@ def test_frames_are_those_of_pinocchio_bit_for_bit():
         assert_array_equal(robot.placement(q, name), data.oMf[frame].homogeneous)
         for axes, reference in references.items():
             J = pin.computeFrameJacobian(model, data, q, frame, reference)
-            assert_array_equal(robot.jacobian(q, name, expressed_in=axes), J)
+            assert_allclose(robot.jacobian(q, name, expressed_in=axes), J, rtol=0, atol=1e-15)
             pin.computeJointJacobiansTimeVariation(model, data, q, v)
             dJ = pin.getFrameJacobianTimeVariation(model, data, frame, reference)
-            assert_array_equal(robot.jacobian_rate(q, v, name, expressed_in=axes), dJ)
+            assert_allclose(robot.jacobian_rate(q, v, name, expressed_in=axes), dJ, rtol=0, atol=1e-15 * turn)
 
 
 @pytest.mark.parametrize("name", ROBOTS)

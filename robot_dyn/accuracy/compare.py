@@ -3,7 +3,8 @@
     |x_Pinocchio − x_own| ≤ 1e-12 · (Σ of the absolute values of the terms added into x)
 
 M_ij is held to √(M_ii M_jj), and forward dynamics to max(1e-12, 8 n u κ) of its terms M⁻¹τ, M⁻¹C v, M⁻¹N in the norm of
-M, with κ the condition number of M scaled to a unit diagonal.
+M, or of the terms of τ, C v and N if these are more, with κ the condition number of M scaled to a unit diagonal. An
+entry that has no terms is held to the largest scale in its row and column.
 """
 
 from __future__ import annotations
@@ -14,9 +15,9 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.accuracy.magnitude import Magnitudes, magnitudes, mass_norm, scaled
-from robot_dyn.errors import QueryError
+from robot_dyn.errors import QueryError, SingularError
 from robot_dyn.lagrange.articulated_body import articulated_body
+from robot_dyn.lagrange.magnitude import Magnitudes, floored, magnitudes, mass_norm, scaled
 from robot_dyn.lagrange.manipulator import Lagrangian
 from robot_dyn.model.dynamics import Axes
 from robot_dyn.model.robot import Robot
@@ -94,7 +95,7 @@ class _Pair:
     frame: str = ""
 
     def worst(self, state: dict[str, np.ndarray]) -> Agreement:
-        errors = scaled(np.asarray(self.pinocchio) - self.own, self.scale)
+        errors = scaled(np.asarray(self.pinocchio) - self.own, floored(np.asarray(self.scale)))
         errors = np.where(np.isnan(errors), np.inf, errors)
         index = np.unravel_index(np.argmax(errors), errors.shape)
         names = [axis[i] for axis, i in zip(self.axes, index, strict=False)]
@@ -133,17 +134,23 @@ def compare(
         raise QueryError(f"samples must be at least 1, got {samples}")
     own, rng = Lagrangian(robot), np.random.default_rng(seed)
     worst: dict[str, Agreement] = {}
+    unsolved = 0
     for sample in range(samples):
         state = random_state(robot, rng)
         frames = robot.frame_names[sample % len(robot.frame_names) :: samples] or robot.frame_names[:1]
-        for pair in _pairs(robot, own, state, frames, tolerance):
+        pairs = list(_pairs(robot, own, state, frames, tolerance))
+        if robot.joint_without_inertia is None:
+            forward = _forward_pairs(robot, own, state, tolerance)
+            unsolved += not forward
+            pairs += forward
+        for pair in pairs:
             found = pair.worst(state)
             known = worst.get(pair.quantity)
             if known is None or found.error / found.tolerance > known.error / known.tolerance:
                 worst[pair.quantity] = found
         if on_sample is not None:
             on_sample()
-    return Comparison(robot.name, samples, tuple(worst.values()), _notes(robot))
+    return Comparison(robot.name, samples, tuple(worst.values()), _notes(robot, unsolved, samples))
 
 
 def random_state(robot: Robot, rng: np.random.Generator) -> dict[str, np.ndarray]:
@@ -157,7 +164,7 @@ def random_state(robot: Robot, rng: np.random.Generator) -> dict[str, np.ndarray
 def _pairs(
     robot: Robot, own: Lagrangian, state: dict[str, np.ndarray], frames: tuple[str, ...], tolerance: float
 ) -> Iterator[_Pair]:
-    q, v, a, tau = (state[name] for name in ("q", "v", "a", "tau"))
+    q, v, a = (state[name] for name in ("q", "v", "a"))
     one, two = (robot.joint_names,), (robot.joint_names,) * 2
     size = magnitudes(own.linkage, q)
     M, C, N, dM = own.M(q), own.C(q, v), own.N(q), own.mass_matrix_derivative(q)
@@ -180,8 +187,6 @@ def _pairs(
     yield _Pair("M a + C v + N = ID", ID, M @ a + C @ v + N, size.inverse_dynamics(v, a), tolerance, one)
     for frame in frames:
         yield from _frame_pairs(robot, own, q, v, frame, size, tolerance)
-    if robot.joint_without_inertia is None:
-        yield from _forward_pairs(robot, own, q, v, tau, size, tolerance)
 
 
 def _frame_pairs(
@@ -206,28 +211,33 @@ def _frame_pairs(
         yield _Pair("jacobian_rate", one, two, rate, tolerance, names, where)
 
 
-def _forward_pairs(
-    robot: Robot, own: Lagrangian, q: np.ndarray, v: np.ndarray, tau: np.ndarray, size: Magnitudes, tolerance: float
-) -> Iterator[_Pair]:
-    """Forward dynamics by three algorithms, and there and back."""
+def _forward_pairs(robot: Robot, own: Lagrangian, state: dict[str, np.ndarray], tolerance: float) -> list[_Pair]:
+    """Forward dynamics by three algorithms, and there and back; nothing where M is not positive definite."""
+    q, v, tau = (state[name] for name in ("q", "v", "tau"))
+    size, pairs = magnitudes(own.linkage, q), []
+    try:
+        roads = {"forward_dynamics": own.forward_dynamics(q, v, tau)}
+        if robot.ties.trivial:
+            roads["forward_dynamics (articulated body)"] = articulated_body(own.linkage, q, v, tau)
+    except SingularError:
+        return []
     M = own.M(q)
     tolerance = max(tolerance, 8 * robot.n * _U * unit_diagonal_condition(M))
     a, C, N = robot.forward_dynamics(q, v, tau), own.C(q, v), own.N(q)
     terms = sum(mass_norm(M, np.linalg.solve(M, term)) for term in (tau, C @ v, N))
-    roads = {"forward_dynamics": own.forward_dynamics(q, v, tau)}
-    if robot.ties.trivial:
-        roads["forward_dynamics (articulated body)"] = articulated_body(own.linkage, q, v, tau)
+    # of the sums C v and N only their terms keep the digits
+    rounded = (size.inverse_dynamics(v, np.zeros(robot.n)) + np.abs(tau)) / np.sqrt(np.diagonal(M))
+    terms = max(terms, float(np.linalg.norm(rounded)))
     for quantity, b in roads.items():
         weight = np.abs(a - b) * np.sqrt(np.diagonal(M))
         joint = int(np.argmax(weight))  # names the joint; the error is that of the whole vector, in the norm of M
         error = mass_norm(M, a - b)
         scale = terms * np.abs(a - b)[joint] / error if error else 1.0
-        yield _Pair(
-            quantity, a[joint : joint + 1], b[joint : joint + 1], scale, tolerance, ((robot.joint_names[joint],),)
-        )
+        where = ((robot.joint_names[joint],),)
+        pairs.append(_Pair(quantity, a[joint : joint + 1], b[joint : joint + 1], scale, tolerance, where))
     there_and_back = robot.inverse_dynamics(q, v, a)
     scale = size.inverse_dynamics(v, a) + np.abs(tau)
-    yield _Pair("ID(FD(τ)) = τ", there_and_back, tau, scale, tolerance, (robot.joint_names,))
+    return [*pairs, _Pair("ID(FD(τ)) = τ", there_and_back, tau, scale, tolerance, (robot.joint_names,))]
 
 
 def unit_diagonal_condition(M: np.ndarray) -> float:
@@ -236,8 +246,12 @@ def unit_diagonal_condition(M: np.ndarray) -> float:
     return float(np.linalg.cond(M * np.outer(scale, scale)))
 
 
-def _notes(robot: Robot) -> tuple[str, ...]:
+def _notes(robot: Robot, unsolved: int, samples: int) -> tuple[str, ...]:
     notes = []
+    if unsolved:
+        notes.append(
+            f"forward dynamics not compared at {unsolved} of {samples} states: M is not positive definite there"
+        )
     if robot.joint_without_inertia is not None:
         notes.append(f"no forward dynamics: joint {robot.joint_without_inertia!r} carries no inertia")
     return (*notes, *robot.findings)

@@ -205,23 +205,24 @@ class Engine:
         kernel = self.kernels[quantity]
         length = int(np.prod(kernel.shape))
 
-        def run(rows: list[list[Any]], y: np.ndarray) -> None:
+        def run(rows: list[list[Any]], y: np.ndarray) -> Status:
             columns = [np.array([row[j] for row in rows], self.dtype).reshape(STATES, -1) for j in range(len(rows[0]))]
-            kernel.many(columns, y.reshape(STATES, length), 1)
+            return kernel.many(columns, y.reshape(STATES, length), 1)
 
         self._judge(quantity, run)
         return kernel.many
 
-    def _judge(self, quantity: str, run: Callable[[list[list[Any]], np.ndarray], object]) -> None:
+    def _judge(self, quantity: str, run: Callable[[list[list[Any]], np.ndarray], Any]) -> None:
+        """Hold what `run` writes, and reports by one Status or one a state, to the referee."""
         names = self.arguments[quantity]
         state = {name: x.astype(self.dtype).astype(float) for name, x in self.referee.states().items()}
         rows = [
             [float(state[n][i]) if n == "t" else state[n][i].astype(self.dtype) for n in names] for i in range(STATES)
         ]
-        ours = np.empty((STATES, *self.shape(quantity)), self.dtype)
-        run(rows, ours)
+        ours = np.full((STATES, *self.shape(quantity)), np.nan, self.dtype)  # a state in doubt is not written
+        answered = np.broadcast_to(np.equal(run(rows, ours), Status.FINE), STATES)
         theirs, effects = self.truth(quantity, state)
-        self.referee.judge(quantity, ours.reshape(theirs.shape), theirs, self.dtype, effects)
+        self.referee.judge(quantity, ours.reshape(theirs.shape), theirs, self.dtype, effects, answered)
 
 
 def _never(*_: Any) -> int:

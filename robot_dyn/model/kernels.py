@@ -15,12 +15,14 @@ import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy import ndarray
 
 from robot_dyn.errors import OverflowedError
+from robot_dyn.model.coriolis import Bodies
+from robot_dyn.model.coriolis import jacobian_rate as rate_of
 from robot_dyn.model.dynamics import Array, Axes, check_batches, checked
 from robot_dyn.model.ties import Ties
+from robot_dyn.spatial import block_diagonal, hat
 
-Kernel = Callable[..., Any]  # (model, data, q, …) → a fresh array, or a number
+Kernel = Callable[..., Any]  # (model or Bodies, data, q, …) → a fresh array, or a number
 _F8 = np.dtype(np.float64)
-_REFERENCE = {Axes.WORLD_ALIGNED: pin.LOCAL_WORLD_ALIGNED, Axes.BODY: pin.LOCAL, Axes.WORLD: pin.WORLD}
 
 
 class Scratch(threading.local):
@@ -46,14 +48,19 @@ def frozen(x: ndarray) -> ndarray:
     return x
 
 
-def coriolis_torque(model: Any, data: Any, q: ndarray, v: ndarray) -> ndarray:
-    """C v."""
-    return pin.computeCoriolisMatrix(model, data, q, v) @ v
+def coriolis_matrix(bodies: Bodies, data: Any, q: ndarray, v: ndarray) -> ndarray:
+    """C."""
+    return bodies.coriolis_matrix(data, q, v)
 
 
-def coriolis_transpose(model: Any, data: Any, q: ndarray, v: ndarray) -> ndarray:
+def coriolis_transpose(bodies: Bodies, data: Any, q: ndarray, v: ndarray) -> ndarray:
     """Cᵀ v."""
-    return v @ pin.computeCoriolisMatrix(model, data, q, v)
+    return v @ bodies.coriolis_matrix(data, q, v)
+
+
+def coriolis_torque(weightless: Any, data: Any, q: ndarray, v: ndarray) -> ndarray:
+    """C v, by a model without gravity: less its gravity torque, the torque at a = 0 would keep the digits of N."""
+    return pin.rnea(weightless, data, q, v, np.zeros_like(v))
 
 
 def momentum(model: Any, data: Any, q: ndarray, v: ndarray) -> ndarray:
@@ -77,10 +84,19 @@ def placement(frame: int) -> Kernel:
 
 
 def jacobian(frame: int, axes: Axes) -> Kernel:
-    """Jacobian of a frame; Pinocchio gives a flat one if there is one joint."""
+    """Jacobian of a frame; Pinocchio gives a flat one if there is one joint.
+
+    Turned from the body's axes to the world's here: Pinocchio's own would lose the digits of the distance to the base.
+    """
 
     def kernel(model: Any, data: Any, q: ndarray) -> ndarray:
-        return pin.computeFrameJacobian(model, data, q, frame, _REFERENCE[axes]).reshape(6, -1)
+        if axes is Axes.WORLD:
+            return pin.computeFrameJacobian(model, data, q, frame, pin.WORLD).reshape(6, -1)
+        J = pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL).reshape(6, -1)
+        if axes is Axes.BODY:
+            return J
+        pin.framesForwardKinematics(model, data, q)
+        return _turned(data, frame, J)
 
     return kernel
 
@@ -89,10 +105,23 @@ def jacobian_rate(frame: int, axes: Axes) -> Kernel:
     """Its time derivative."""
 
     def kernel(model: Any, data: Any, q: ndarray, v: ndarray) -> ndarray:
-        pin.computeJointJacobiansTimeVariation(model, data, q, v)
-        return pin.getFrameJacobianTimeVariation(model, data, frame, _REFERENCE[axes]).reshape(6, -1)
+        if axes is Axes.WORLD:
+            pin.computeJointJacobiansTimeVariation(model, data, q, v)
+            return pin.getFrameJacobianTimeVariation(model, data, frame, pin.WORLD).reshape(6, -1)
+        J = pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL).reshape(6, -1)
+        rate, twist = rate_of(J, v)
+        if axes is Axes.BODY:
+            return rate
+        # d/dt diag(R, R) = diag(R, R) diag(ω̂, ω̂)
+        pin.framesForwardKinematics(model, data, q)
+        return _turned(data, frame, rate + block_diagonal(hat(twist[3:])) @ J)
 
     return kernel
+
+
+def _turned(data: Any, frame: int, J: ndarray) -> ndarray:
+    """diag(R, R) J, from a frame's axes to the base's."""
+    return block_diagonal(data.oMf[frame].rotation) @ J
 
 
 def ask(
@@ -109,7 +138,7 @@ def ask(
     Args:
         kernel: The call of Pinocchio for one state of all joints.
         reduce: How its result is tied, or None if it has no axis of joints.
-        model: The model of all joints.
+        model: The model of all joints, or what else the kernel takes.
         data: Its scratch memory.
         ties: How all joints follow q.
         joint_names: Names of the independent ones.
@@ -120,13 +149,14 @@ def ask(
         OverflowedError: If the result is not finite.
     """
     arrays = {name: checked(name, x, joint_names) for name, x in state.items()}
+    N = len(ties.s0)
     batch = check_batches(**arrays)
     with np.errstate(all="ignore"):  # what overflows is told below
         full = [ties.position(x) if name == "q" else ties.velocity(x) for name, x in arrays.items()]
-        rows = [np.broadcast_to(x, (*batch, model.nv)).reshape(-1, model.nv) for x in full]
+        rows = [np.broadcast_to(x, (*batch, N)).reshape(-1, N) for x in full]
         answers = [kernel(model, data, *row) for row in zip(*rows, strict=True)]
         if not answers:  # an empty batch has a shape all the same
-            answers = np.empty((0, *np.shape(kernel(model, data, *np.zeros((len(rows), model.nv))))))
+            answers = np.empty((0, *np.shape(kernel(model, data, *np.zeros((len(rows), N))))))
         answer = np.array(answers)
         answer = answer.reshape(batch + answer.shape[1:])
         if reduce is not None:

@@ -1,7 +1,8 @@
 """Robot: a URDF arm behind the Dynamics protocol, M(q) a + C(q, v) v + N(q) = τ, computed by Pinocchio.
 
-A thin layer over CRBA, RNEA and ABA [Featherstone 2008, ch. 5–7]. One state of float64 goes straight to Pinocchio,
-after checks that cost a fraction of a microsecond; lists, batches and tied joints take the general way, `ask`.
+A thin layer over CRBA, RNEA and ABA [Featherstone 2008, ch. 5–7], and C by `coriolis`. One state of float64 goes
+straight to Pinocchio, after checks that cost a fraction of a microsecond; lists, batches and tied joints take the
+general way, `ask`.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from numpy import ndarray
 
 from robot_dyn.errors import ModelWarning, OverflowedError, SingularError
 from robot_dyn.model import doctor, kernels, pinocchio_model
+from robot_dyn.model.coriolis import Bodies
 from robot_dyn.model.description import Description
 from robot_dyn.model.dynamics import Array, Axes, acceleration, check_batches, checked, entry
 from robot_dyn.model.edits import Changes, Edits
@@ -88,6 +90,11 @@ class Robot:
         """How the joints of `model` follow q."""
         return self._built[1]
 
+    @cached_property
+    def bodies(self) -> Bodies:
+        """The bodies of `model`, each in its own axes."""
+        return Bodies.of(self.model)
+
     @property
     def joint_names(self) -> tuple[str, ...]:
         """Names of the n joints, in the order of q."""
@@ -155,8 +162,8 @@ class Robot:
     def C(self, q: Array, v: Array) -> ndarray:
         shape = self._shape
         if is_state(q, shape) and is_state(v, shape) and is_moderate(q) and is_moderate(v):
-            return pin.computeCoriolisMatrix(self.model, self._scratch.data, q, v)
-        return self._ask(pin.computeCoriolisMatrix, self.ties.matrix, q=q, v=v)
+            return kernels.coriolis_matrix(self.bodies, self._scratch.data, q, v)
+        return self._ask(kernels.coriolis_matrix, self.ties.matrix, self.bodies, q=q, v=v)
 
     def N(self, q: Array) -> ndarray:
         if is_state(q, self._shape) and is_moderate(q):
@@ -164,13 +171,16 @@ class Robot:
         return self._ask(pin.computeGeneralizedGravity, self.ties.torque, q=q)
 
     def coriolis_torque(self, q: Array, v: Array) -> ndarray:
-        return self._ask(kernels.coriolis_torque, self.ties.torque, q=q, v=v)
+        shape = self._shape
+        if is_state(q, shape) and is_state(v, shape) and is_moderate(q) and is_moderate(v):
+            return kernels.coriolis_torque(self._weightless, self._scratch.data, q, v)
+        return self._ask(kernels.coriolis_torque, self.ties.torque, self._weightless, q=q, v=v)
 
     def coriolis_transpose(self, q: Array, v: Array) -> ndarray:
         shape = self._shape
         if is_state(q, shape) and is_state(v, shape) and is_moderate(q) and is_moderate(v):
-            return kernels.coriolis_transpose(self.model, self._scratch.data, q, v)
-        return self._ask(kernels.coriolis_transpose, self.ties.torque, q=q, v=v)
+            return kernels.coriolis_transpose(self.bodies, self._scratch.data, q, v)
+        return self._ask(kernels.coriolis_transpose, self.ties.torque, self.bodies, q=q, v=v)
 
     def inverse_dynamics(self, q: Array, v: Array, a: Array) -> ndarray:
         shape = self._shape
@@ -213,6 +223,13 @@ class Robot:
         return pinocchio_model.build(self.description, self.edits)
 
     @cached_property
+    def _weightless(self) -> Any:
+        """The model without gravity."""
+        model = self.model.copy()
+        model.gravity = pin.Motion.Zero()
+        return model
+
+    @cached_property
     def _scratch(self) -> Scratch:
         return Scratch(self.model)
 
@@ -231,8 +248,8 @@ class Robot:
             return error.joint
         return None
 
-    def _ask(self, kernel: Kernel, reduce: Callable[[Any], Any] | None, **state: Array) -> Any:
-        return ask(kernel, reduce, self.model, self._scratch.data, self.ties, self.joint_names, state)
+    def _ask(self, kernel: Kernel, reduce: Callable[[Any], Any] | None, of: Any = None, **state: Array) -> Any:
+        return ask(kernel, reduce, of or self.model, self._scratch.data, self.ties, self.joint_names, state)
 
     def _forward_dynamics(self, q: Array, v: Array, tau: Array) -> ndarray:
         """Forward dynamics in general: tied joints by the factorisation of M, which also tells where M is singular."""

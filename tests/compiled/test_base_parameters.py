@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import robot_dyn as rd
-from robot_dyn.accuracy.magnitude import magnitudes
 from robot_dyn.compiled.base_parameters import regrouped
 from robot_dyn.compiled.origins import slid
 from robot_dyn.compiled.right_angles import completed
@@ -16,6 +15,7 @@ from robot_dyn.compiled.trace import Trace
 from robot_dyn.lagrange.articulated_body import articulated_body
 from robot_dyn.lagrange.composite_body import composite_body
 from robot_dyn.lagrange.linkage import Linkage
+from robot_dyn.lagrange.magnitude import magnitudes
 from robot_dyn.lagrange.newton_euler import kinetic_energy, newton_euler
 from tests.random_trees import RandomTree, trees
 

@@ -13,13 +13,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import robot_dyn as rd
-from robot_dyn.accuracy.magnitude import magnitudes
 from robot_dyn.compiled.dynamics import CompiledDynamics
 from robot_dyn.compiled.engine import SizeWarning
 from robot_dyn.compiled.kernel import Kernel
 from robot_dyn.compiled.referee import RefereeError
 from robot_dyn.compiled.trace import ARGUMENTS, Trace
 from robot_dyn.errors import OverflowedError, QueryError, SingularError
+from robot_dyn.lagrange.magnitude import magnitudes
 from tests.compiled.arms import ARMS, compiled, states
 from tests.random_trees import RandomTree, trees
 

@@ -2,7 +2,8 @@
 
 Rounding in an entry is proportional to its terms, not to their sum, so this is the scale on which two roads must agree,
 and u times this the size of a rounding error. A term is bounded by the lengths of its vectors: in body b the column of
-joint i turns at rate aᵢ ≤ 1 and moves the frame at lᵢ ≤ the lever from i to b.
+joint i turns at rate aᵢ ≤ 1 and moves the frame at lᵢ ≤ the lever from i to b. Links that are fixed to each other are
+terms of their own: where they balance, m c is what rounding leaves of their sum.
 
     ‖Jᵢᵀ 𝓜 Jⱼ‖ ≤ m lᵢ lⱼ + m c (lᵢ aⱼ + aᵢ lⱼ) + I aᵢ aⱼ       ‖[Jⱼ, J_k]‖: l = aⱼ l_k + lⱼ a_k, a = aⱼ a_k
 """
@@ -59,13 +60,12 @@ def magnitudes(linkage: Linkage, q: np.ndarray) -> Magnitudes:
     M, dM, gravity, V = np.diag(linkage.armature), np.zeros((N, N, N)), np.zeros(N), 0.0
     g = float(np.linalg.norm(linkage.gravity))
     columns = [_columns(linkage.bodies, body, steps) for body in linkage.bodies]
-    for body, inertia, (lin, ang) in zip(linkage.bodies, linkage.inertias, columns, strict=True):
-        m, mc = inertia[0, 0], float(np.linalg.norm(first_moment(inertia)))
-        block = np.array([[m, mc], [mc, np.linalg.norm(inertia[3:, 3:], 2)]])
+    for body, block, (lin, ang) in zip(linkage.bodies, _blocks(linkage), columns, strict=True):
+        m, mc = block[0]
         J = np.stack([lin, ang])
         M[np.ix_(body.path, body.path)] += J.T @ block @ J
         dJ = np.stack([np.outer(ang, lin) + np.outer(lin, ang), np.outer(ang, ang)])  # [:, j, k]
-        half = np.einsum("ajk,ab,bi->jik", dJ, block, J)
+        half = np.tensordot(block @ J, dJ, axes=(0, 0))  # [i, j, k]
         dM[np.ix_(body.path, body.path, body.path)] += half + half.swapaxes(0, 1)
         gravity[list(body.path)] += g * (block[0] @ J)
         V += g * (m * _reach(linkage.bodies, body, steps) + mc)
@@ -79,6 +79,17 @@ def magnitudes(linkage: Linkage, q: np.ndarray) -> Magnitudes:
             reach[name] += _reach(linkage.bodies, body, steps)
         lever[name] = ties.torque(lever[name])
     return Magnitudes(ties.matrix(M), ties.cube(dM), ties.torque(gravity), V, lever, reach)
+
+
+def _blocks(linkage: Linkage) -> np.ndarray:
+    """[[m, m c], [m c, I]] of each body, summed over its links in absolute values; (N, 2, 2)."""
+    blocks = np.zeros((len(linkage.bodies), 2, 2))
+    for body, pose, inertia in linkage.links.values():
+        if body != BASE:
+            m, offset = abs(inertia[0, 0]), float(np.linalg.norm(pose.p))
+            mc = float(np.linalg.norm(first_moment(inertia) - inertia[0, 0] * pose.p)) + m * offset
+            blocks[body] += [[m, mc], [mc, np.linalg.norm(inertia[3:, 3:], 2)]]
+    return blocks
 
 
 def _step(body: Body, steps: np.ndarray) -> float:
@@ -103,6 +114,18 @@ def scaled(error: np.ndarray, scale: np.ndarray) -> np.ndarray:
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.abs(error) / scale
     return np.where(np.asarray(error) == 0, 0.0, ratio)
+
+
+def floored(scale: np.ndarray) -> np.ndarray:
+    """The scale of each entry, (n,), (m, n) or a number; of one without terms, the largest in its row and column.
+
+    Where no term is, rounding of its neighbours is all that an algorithm can leave there.
+    """
+    if scale.ndim != 2:
+        return np.where(scale == 0, np.max(scale, initial=0.0), scale)
+    near = np.maximum(scale.max(axis=0)[None, :], scale.max(axis=1)[:, None])
+    near = np.where(near == 0, scale.max(), near)
+    return np.where(scale == 0, near, scale)
 
 
 def mass_norm(M: np.ndarray, x: np.ndarray) -> float:

@@ -1,0 +1,92 @@
+"""The Coriolis matrix in the axes of each body: C = Σ J_bᵀ (𝓜_b J̇_b + 𝓖_b J_b), 𝓖 linear in the angular velocity ω_b.
+
+A point r of a body moves by ∂ṙ/∂v_j along joint j, and Christoffel's symbols of points are
+C_ij = ∫ ∂ṙ/∂v_i · d/dt(∂ṙ/∂v_j) dm. In the body's axes ∂ṙ/∂v = (1, −r̂) J and d/dt adds ω̂, so that
+
+    𝓖 = ∫ (1, −r̂)ᵀ ω̂ (1, −r̂) dm = [[m ω̂, −m ω̂ ĉ], [m ĉ ω̂, (Σ ω)^]],   Σ = ∫ r rᵀ dm = ½ tr(I) 1 − I,
+
+a skew matrix: Ṁ = C + Cᵀ. [Echeandia, Wensing 2021, of which this is the factorisation in a body's own axes]
+
+Pinocchio's own Coriolis matrix works in the axes of the world; its error grows with the square of the distance from
+the world's origin. Here no distance occurs but that from a joint to the bodies it moves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, final
+
+import numpy as np
+import pinocchio as pin  # pyright: ignore[reportMissingImports]
+from numpy import ndarray
+
+from robot_dyn.spatial import bracket, first_moment, hat
+
+# ad_X is linear in X: its 36 entries, (6, 36)
+_AD = bracket(np.eye(6)).reshape(6, 36)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Bodies:
+    """The n bodies that move in a Pinocchio model, each in the frame of its joint.
+
+    Attributes:
+        model: The `pinocchio.Model`; every joint has one degree of freedom.
+        inertia: 𝓜, (n, 6, 6).
+        gyroscopic: The 36 entries of 𝓖 by the components of ω, (n, 36, 3).
+    """
+
+    model: Any
+    inertia: ndarray
+    gyroscopic: ndarray
+
+    @classmethod
+    def of(cls, model: Any) -> Bodies:
+        """The bodies of a model."""
+        inertia = np.array([body.matrix() for body in model.inertias[1:]])
+        axes = np.eye(3)
+        return cls(model, inertia, np.array([[_gyroscopic(A, axis).ravel() for axis in axes] for A in inertia]).mT)
+
+    def jacobians(self, data: Any, q: ndarray) -> ndarray:
+        """J_b of each body at its frame, in its axes, (n, 6, n); a column is 0 where the joint does not move it."""
+        n = len(self.inertia)
+        return np.array([pin.computeJointJacobian(self.model, data, q, i + 1) for i in range(n)]).reshape(n, 6, n)
+
+    def coriolis_matrix(self, data: Any, q: ndarray, v: ndarray) -> ndarray:
+        """C of the Christoffel symbols at one state, (n, n)."""
+        J = self.jacobians(data, q)
+        rate, twist = jacobian_rate(J, v)
+        G = (self.gyroscopic @ twist[:, 3:, None]).reshape(self.inertia.shape)
+        return (J.mT @ (self.inertia @ rate + G @ J)).sum(axis=0)
+
+
+def jacobian_rate(J: ndarray, v: ndarray) -> tuple[ndarray, ndarray]:
+    """J̇ of body Jacobians J (..., 6, n) along v (n,), and the body twist J v (..., 6).
+
+    ∂J_j/∂q_k = [J_j, J_k] for joint j before joint k, and 0 otherwise: J̇_j = [J_j, Σ_{k after j} J_k v_k].
+    """
+    parts = J * v
+    return columnwise_bracket(J, parts @ np.tri(len(v), k=-1)), parts.sum(axis=-1)
+
+
+def columnwise_bracket(X: ndarray, Y: ndarray) -> ndarray:
+    """[X_j, Y_j] of the columns of X and Y, (..., 6, n)."""
+    return (_ad(X) @ Y.mT[..., None])[..., 0].mT
+
+
+def columnwise_dual(X: ndarray, F: ndarray) -> ndarray:
+    """ad_{X_j}ᵀ F of the columns of X (..., 6, n) and one wrench F (..., 6), (..., 6, n)."""
+    return (_ad(X).mT @ F[..., None, :, None])[..., 0].mT
+
+
+def _ad(X: ndarray) -> ndarray:
+    """Ad of each column of X (..., 6, n), (..., n, 6, 6)."""
+    return (X.mT @ _AD).reshape(*X.mT.shape, 6)
+
+
+def _gyroscopic(inertia: ndarray, omega: ndarray) -> ndarray:
+    """𝓖 of a body of generalised inertia 𝓜 (6, 6) at angular velocity ω (3,); (6, 6)."""
+    mass, mc, moments, spin = inertia[0, 0], hat(first_moment(inertia)), inertia[3:, 3:], hat(omega)
+    second_moment = np.trace(moments) / 2 * np.eye(3) - moments
+    return np.block([[mass * spin, -spin @ mc], [mc @ spin, hat(second_moment @ omega)]])
