@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import warnings
+from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 
 
@@ -52,6 +53,14 @@ class RobotDynWarning(UserWarning):
 
 class ModelWarning(RobotDynWarning):
     """A robot that loads although some of its bodies cannot exist, or cannot be drawn, as described."""
+
+
+def announce(robot: str, findings: Sequence[str]) -> None:
+    """One ModelWarning of findings about a robot, if there are any, at the line that called the caller."""
+    if findings:
+        more = f" (the first of {len(findings)} findings; all of them: Robot.findings, robot-dyn info)"
+        text = f"{robot}: {findings[0]}{more if len(findings) > 1 else ''}"
+        warnings.warn(text, ModelWarning, stacklevel=3)
 
 
 _COMPARED = 48  # characters of a name: likeness costs the square of it

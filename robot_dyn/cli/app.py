@@ -28,6 +28,13 @@ Lock = Annotated[
 PackageDir = Annotated[
     list[str] | None, typer.Option(help="Folder in which ROS packages are searched; may be repeated.")
 ]
+Xacro = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="NAME=VALUE",
+        help="Expand a xacro file, which runs its expressions, with this argument; may be repeated; '' for none.",
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, as documented in docs/json.md.")]
 
 

@@ -13,14 +13,21 @@ if TYPE_CHECKING:
     from robot_dyn.model.robot import Robot
 
 
-def load(name: str, lock: list[str] | None, package_dirs: list[str] | None, quiet: bool = False) -> Robot:
+def load(
+    name: str,
+    lock: list[str] | None,
+    package_dirs: list[str] | None,
+    xacro: list[str] | None = None,
+    quiet: bool = False,
+) -> Robot:
     """The robot of a name or path, with joints locked; `quiet` keeps its warnings to itself."""
     import robot_dyn as rd
 
     with warnings.catch_warnings():
         if quiet:
             warnings.simplefilter("ignore", ModelWarning)
-        robot = rd.load(name, package_dirs=package_dirs or ())
+        expansion = None if xacro is None else dict(_name_and_value("--xacro", text) for text in xacro if text)
+        robot = rd.load(name, package_dirs=package_dirs or (), xacro=expansion)
     return robot.with_(lock=assignments("--lock", lock)) if lock else robot
 
 
@@ -35,10 +42,15 @@ def assignments(option: str, texts: list[str]) -> dict[str, float]:
 
 def assignment(option: str, text: str) -> tuple[str, float]:
     """Name and value of joint=value."""
+    name, value = _name_and_value(option, text, "JOINT")
+    return name, number(option, value)
+
+
+def _name_and_value(option: str, text: str, what: str = "NAME") -> tuple[str, str]:
     name, equals, value = text.partition("=")
     if not equals:
-        raise QueryError(f"{option} must be JOINT=VALUE, got {text!r}")
-    return name.strip(), number(option, value)
+        raise QueryError(f"{option} must be {what}=VALUE, got {text!r}")
+    return name.strip(), value
 
 
 def number(option: str, text: str) -> float:

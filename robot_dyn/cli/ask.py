@@ -8,7 +8,7 @@ import typer
 
 import robot_dyn as rd
 from robot_dyn.cli import arguments
-from robot_dyn.cli.app import Json, Lock, Name, PackageDir, app, print_json, progress, say
+from robot_dyn.cli.app import Json, Lock, Name, PackageDir, Xacro, app, print_json, progress, say
 from robot_dyn.errors import QueryError, RobotDynError
 
 
@@ -27,12 +27,13 @@ def info(
     ] = False,
     lock: Lock = None,
     package_dir: PackageDir = None,
+    xacro: Xacro = None,
     as_json: Json = False,
 ) -> None:
     """Show a robot: joints, limits, friction, mass, and what is odd about it."""
     from robot_dyn.cli import kernels, report
 
-    loaded = arguments.load(robot, lock, package_dir, quiet=True)  # the findings are shown below
+    loaded = arguments.load(robot, lock, package_dir, xacro, quiet=True)  # the findings are shown below
     roads = {"compiled": kernels.formulations(loaded)} if compiled else {}
     if as_json:
         print_json(report.info(loaded) | roads)
@@ -55,12 +56,13 @@ def query(
     effects: Annotated[str | None, typer.Option(help='"urdf" adds the friction that the file states.')] = None,
     lock: Lock = None,
     package_dir: PackageDir = None,
+    xacro: Xacro = None,
     as_json: Json = False,
 ) -> None:
     """Ask for M, C, N at a state, and for the torque of an acceleration or the acceleration of a torque."""
     from robot_dyn.cli import report
 
-    loaded = arguments.load(robot, lock, package_dir)
+    loaded = arguments.load(robot, lock, package_dir, xacro)
     if a is not None and tau is not None:
         raise QueryError("give --a or --tau, not both: one follows from the other")
     state = {name: arguments.vector(f"--{name}", text, loaded.joint_names) for name, text in (("q", q), ("v", v))}
@@ -79,6 +81,7 @@ def compare(
     seed: Annotated[int, typer.Option(help="Of the random states.")] = 0,
     lock: Lock = None,
     package_dir: PackageDir = None,
+    xacro: Xacro = None,
     as_json: Json = False,
 ) -> None:
     """Cross-check Pinocchio against the library's own Lagrangian; exit code 1 if they disagree."""
@@ -90,7 +93,10 @@ def compare(
     for name in progress(rd.list_robots() if every else robots or (), "comparing"):
         try:
             results.append(
-                (name, rd.compare(arguments.load(name, lock, package_dir, quiet=every), samples=samples, seed=seed))
+                (
+                    name,
+                    rd.compare(arguments.load(name, lock, package_dir, xacro, quiet=every), samples=samples, seed=seed),
+                )
             )
         except RobotDynError as error:
             if not every:

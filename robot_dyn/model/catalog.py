@@ -5,13 +5,13 @@ Names are those of the files of `urdf/` and of every URDF of the installed examp
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Iterator
 from functools import cache
 from importlib import metadata
 from pathlib import Path
 
 from robot_dyn.errors import CatalogError, nearest
+from robot_dyn.model.packages import environment_folders, package_folders
 
 # Files whose own stem is shared, or says nothing.
 _RENAMED = {
@@ -35,6 +35,9 @@ def find(name_or_path: str | Path, package_dirs: Iterable[str | Path] = ()) -> P
     Raises:
         CatalogError: If there is none; names the nearest robots or the places tried.
     """
+    start = name_or_path.decode(errors="replace") if isinstance(name_or_path, bytes) else name_or_path
+    if isinstance(start, str) and start.lstrip("\ufeff \t\r\n").startswith("<"):
+        raise CatalogError("this is the text of a URDF, not its name or path; give it to Robot.from_text")
     if not isinstance(name_or_path, str | Path) or not str(name_or_path).strip():
         raise CatalogError(f"give the name of a robot or the path of a URDF file, got {name_or_path!r}")
     text = str(name_or_path)
@@ -57,28 +60,37 @@ def find(name_or_path: str | Path, package_dirs: Iterable[str | Path] = ()) -> P
 def resolve(address: str, urdf: Path, package_dirs: Iterable[str | Path] = ()) -> Path:
     """The file of a package://package/path address that stands in `urdf`.
 
-    A package is a folder of that name: searched in `package_dirs`, then upwards from the file, then in
-    ROS_PACKAGE_PATH.
-
     Raises:
-        CatalogError: If it is in none of these; lists the places tried.
+        CatalogError: If no package of that name holds it, see `packages`; lists the places tried.
     """
-    inside = Path(address.removeprefix("package://").lstrip("/"))  # a third slash is common, and no root
-    tried = []
-    for folder in _package_folders(urdf, package_dirs):
+    name, _, inside = address.removeprefix("package://").lstrip("/").partition("/")  # a third slash is common
+    package_dirs = tuple(package_dirs)
+    for folder in package_folders(name, urdf, package_dirs) if name and inside else ():
         if (folder / inside).is_file():
             return folder / inside
-        tried.append(str(folder))
-    raise CatalogError(
-        f"no file for {address}; tried in {', '.join(dict.fromkeys(tried))}; name the folder that holds"
-        f" {inside.parts[0] if inside.parts else 'the package'!r} in package_dirs or ROS_PACKAGE_PATH"
+    raise CatalogError(f"no file for {address}; {_remedy(name, urdf, package_dirs)}")
+
+
+def package(name: str, urdf: Path, package_dirs: Iterable[str | Path] = ()) -> Path:
+    """The folder of a package that `urdf` names.
+
+    Raises:
+        CatalogError: If there is none; lists the places tried.
+    """
+    package_dirs = tuple(package_dirs)
+    for folder in package_folders(name, urdf, package_dirs):
+        if folder.is_dir():
+            return folder
+    raise CatalogError(f"no package {name!r}; {_remedy(name, urdf, package_dirs)}")
+
+
+def _remedy(name: str, urdf: Path, package_dirs: Iterable[str | Path]) -> str:
+    named = (Path(folder).expanduser() for folder in package_dirs)
+    tried = dict.fromkeys(map(str, (*named, *urdf.absolute().parents, *environment_folders())))
+    return (
+        f"tried in {', '.join(tried)}; name the folder that holds {name or 'the package'!r} in package_dirs"
+        " or ROS_PACKAGE_PATH"
     )
-
-
-def _package_folders(urdf: Path, package_dirs: Iterable[str | Path]) -> Iterator[Path]:
-    yield from (Path(folder).expanduser() for folder in package_dirs)
-    yield from urdf.absolute().parents
-    yield from (Path(folder) for folder in os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep) if folder)
 
 
 @cache

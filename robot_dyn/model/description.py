@@ -7,7 +7,8 @@ not need (meshes, materials, simulator extensions) is left out.
 
 from __future__ import annotations
 
-import re
+from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from stat import S_ISDIR, S_ISREG
@@ -15,11 +16,12 @@ from typing import final
 
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
-from robot_dyn.errors import DescriptionError, shorten
+from robot_dyn.errors import DescriptionError
 from robot_dyn.model import urdf
+from robot_dyn.model.markup import parse
 
 MAX_BYTES = 16 * 2**20  # the largest robot of example-robot-data has 0.2 MiB
-MAX_DEPTH = 32  # of nested elements; a URDF needs 6
+_MARK = "\ufeff".encode()  # outweighs the encoding that a text declares, which is that of its file
 
 
 @final
@@ -30,19 +32,21 @@ class Description:
     Attributes:
         name: The robot's name in the file.
         source: Where it was read from, as shown in messages.
-        text: The bytes of the file.
+        text: The bytes of the file, in UTF-8.
         xml: The checked bytes: a minimal URDF with the same literals.
+        findings: What was assumed where the file departs from the format, in words.
     """
 
     name: str
     source: str
     text: bytes = field(repr=False)
     xml: bytes = field(repr=False)
+    findings: tuple[str, ...] = ()
 
     @property
     def element(self) -> etree._Element:
         """The checked bytes as a fresh XML element."""
-        return parse(self.xml, self.source)
+        return parse(self.xml, self.source)[0]
 
 
 def read(path: str | Path) -> Description:
@@ -66,75 +70,29 @@ def read(path: str | Path) -> Description:
     return check(text, source=str(path))
 
 
-def check(text: bytes, source: str) -> Description:
-    """Check the bytes of a URDF; `source` names them in messages.
+def check(text: bytes | str, source: str, findings: Iterable[str] = ()) -> Description:
+    """Check the text of a URDF; `source` names it in messages, `findings` are those that were made before.
 
     Raises:
         DescriptionError: As `read`.
     """
+    if not isinstance(text, str | bytes):
+        raise DescriptionError(f"{source}: must be a text or bytes, got {type(text).__name__}")
+    if isinstance(text, str):
+        try:
+            text = (_MARK if "<?xml" in text else b"") + text.encode()
+        except UnicodeEncodeError:
+            raise DescriptionError(f"{source}: holds characters that are not text; read it as UTF-8") from None
     if len(text) > MAX_BYTES:
         raise DescriptionError(
             f"{source}: is larger than {MAX_BYTES >> 20} MiB, the limit for a robot description;"
             " keep meshes in files of their own"
         )
-    checked = urdf.checked_robot(parse(text, source), source)
-    return Description(checked.get("name", ""), source, text, etree.tostring(checked))
-
-
-def parse(text: bytes, source: str) -> etree._Element:
-    """The root of an XML text, read without entities, DTD, network, recovery, or unbounded nesting.
-
-    Raises:
-        DescriptionError: If it is none, or uses one of these; `source` names it.
-    """
-    if not text.strip():
-        raise DescriptionError(f"{source}: is empty; give a URDF file")
-    parser = etree.XMLPullParser(
-        events=("start", "end"),
-        resolve_entities=False,
-        load_dtd=False,
-        no_network=True,
-        recover=False,
-        huge_tree=False,
-        remove_comments=True,
-        remove_pis=True,
-    )
-    depth = 0
-    try:
-        for start in range(0, len(text), 2**16):
-            parser.feed(text[start : start + 2**16])
-            for event, element in parser.read_events():
-                depth += 1 if event == "start" else -1
-                _refuse_document_type(element, source)
-                if depth > MAX_DEPTH:
-                    raise DescriptionError(
-                        f"{source}: line {element.sourceline}: elements are nested deeper than {MAX_DEPTH};"
-                        " a URDF needs 6 levels at most: remove the others"
-                    )
-        root = parser.close()
-    except etree.XMLSyntaxError as error:
-        raise DescriptionError(f"{source}: {_syntax(error, parser)}") from None
-    _refuse_document_type(root, source)
-    return root
-
-
-def _syntax(error: etree.XMLSyntaxError, parser: etree.XMLPullParser) -> str:
-    """What is wrong with the XML, from the first complaint of the parser, and what to do."""
-    log = parser.feed_error_log
-    message, line = (log[0].message, log[0].line) if len(log) else (str(error.msg), error.lineno or 1)
-    why = shorten(" ".join(message.split()), 200)
-    if entity := re.search(r"Entity '(.*?)' not defined", why):
-        return f"line {line}: uses the entity &{entity[1]};, which is not declared; write its text instead"
-    if "XML_PARSE_HUGE" in why or "mplification" in why:
-        return f"line {line}: a text, the nesting or an entity exceeds the limits of the parser; remove it"
-    if "xacro" in why:
-        return f"line {line}: holds xacro macros; expand the file first: xacro robot.xacro > robot.urdf"
-    return f"is not well-formed XML: line {line}: {why}; correct the file"
-
-
-def _refuse_document_type(element: etree._Element, source: str) -> None:
-    if element.getroottree().docinfo.internalDTD is not None:
-        raise DescriptionError(
-            f"{source}: declares a document type (<!DOCTYPE …>), through which a file can grow without bound or read"
-            " other files; remove the declaration"
-        )
+    root, of_markup = parse(text, source)
+    checked, of_robot = urdf.checked_robot(root, source)
+    encoding = root.getroottree().docinfo.encoding or "UTF-8"
+    if encoding.upper() not in ("UTF-8", "US-ASCII"):
+        with suppress(LookupError, UnicodeError):  # one that only the parser knows
+            text = _MARK + text.decode(encoding).encode()
+    findings = (*findings, *of_markup, *of_robot)
+    return Description(checked.get("name", ""), source, text, etree.tostring(checked), findings)

@@ -2,32 +2,46 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from robot_dyn.errors import ModelWarning
+from robot_dyn.errors import announce
 from robot_dyn.model import catalog
-from robot_dyn.model.description import read
+from robot_dyn.model.description import check, read
 from robot_dyn.model.robot import Robot
 
 
-def load(name_or_path: str | Path, *, package_dirs: Iterable[str | Path] = ()) -> Robot:
+def load(
+    name_or_path: str | Path,
+    *,
+    package_dirs: Iterable[str | Path] = (),
+    xacro: Mapping[str, str | float | bool] | None = None,
+) -> Robot:
     """A robot in standard gravity, by its name in the catalog, its path, or its package:// address.
 
     Args:
-        name_or_path: One of `list_robots()`, or a URDF file.
-        package_dirs: Folders in which packages are searched first; then those above the file and ROS_PACKAGE_PATH.
+        name_or_path: One of `list_robots()`, or a URDF file. `Robot.from_text` takes the text of one.
+        package_dirs: Folders in which packages are searched first; then those above the file, those beside its package,
+            ROS_PACKAGE_PATH and AMENT_PREFIX_PATH.
+        xacro: Expand the file by xacro, with these values of its arguments; {} for their defaults. A xacro file is a
+            program: expand none that you would not run. Needs `pip install robot-dyn[xacro]`.
 
     Raises:
         CatalogError: If there is no such robot or file.
-        DescriptionError: If the file is refused.
+        DescriptionError: If the file is refused, or cannot be expanded.
 
     Warns:
         ModelWarning: Once, if there are findings about the description; the robot loads all the same.
     """
-    robot = Robot(read(catalog.find(name_or_path, package_dirs)))
-    if found := robot.findings:
-        more = f" (the first of {len(found)} findings; all of them: Robot.findings, robot-dyn info)"
-        warnings.warn(f"{robot.name}: {found[0]}{more if len(found) > 1 else ''}", ModelWarning, stacklevel=2)
+    package_dirs = tuple(package_dirs)
+    path = catalog.find(name_or_path, package_dirs)
+    if xacro is None:
+        description = read(path)
+    else:
+        from robot_dyn.model.xacro import expand
+
+        text, said = expand(path, xacro, package_dirs)
+        description = check(text, source=str(path), findings=said)
+    robot = Robot(description)
+    announce(robot.name, robot.findings)
     return robot

@@ -17,10 +17,10 @@ import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy import ndarray
 
-from robot_dyn.errors import ModelWarning, OverflowedError, SingularError
+from robot_dyn.errors import ModelWarning, OverflowedError, SingularError, announce
 from robot_dyn.model import doctor, kernels, pinocchio_model
 from robot_dyn.model.coriolis import Bodies
-from robot_dyn.model.description import Description
+from robot_dyn.model.description import Description, check
 from robot_dyn.model.dynamics import Array, Axes, acceleration, check_batches, checked, entry
 from robot_dyn.model.edits import Changes, Edits
 from robot_dyn.model.gravity import gravity_acts, no_torque
@@ -46,6 +46,38 @@ class Robot:
 
     def __post_init__(self) -> None:
         _ = self._built  # so that what is wrong is said now, not at the first query
+
+    @staticmethod
+    def from_text(urdf: str | bytes, *, source: str = "the text of the URDF") -> Robot:
+        """A robot in standard gravity, from the text of a URDF; warns as `load` does.
+
+        Args:
+            urdf: The text, or the bytes of a file.
+            source: What messages call it; meshes with relative paths are searched in its folder, if it is a path.
+
+        Raises:
+            DescriptionError: If the text is refused.
+        """
+        robot = Robot(check(urdf, source))
+        announce(robot.name, robot.findings)
+        return robot
+
+    @staticmethod
+    def from_pinocchio(model: Any) -> Robot:
+        """A robot of a `pinocchio.Model` that was built elsewhere, with its gravity and armature; warns as `load` does.
+
+        A URDF is written of it and read as any other (`model/from_pinocchio.py`), so that `Lagrangian` and `Compiled`
+        take it too; the model itself is neither kept nor changed. An unbounded joint becomes one angle. Where branches
+        come in another order than in the model, a warning says so.
+
+        Raises:
+            DescriptionError: If it is not a `pinocchio.Model`, or has joints that are not revolute or prismatic.
+        """
+        from robot_dyn.model.from_pinocchio import robot_of
+
+        robot = robot_of(model)
+        announce(robot.name, robot.findings)
+        return robot
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Robot, (self.description, self.edits)
@@ -152,7 +184,8 @@ class Robot:
     @cached_property
     def findings(self) -> tuple[str, ...]:
         """What is doubtful in the description and its edits, in words, each with its remedy; see docs/findings.md."""
-        return doctor.findings(structure(self.description, self.edits), self.joint_without_inertia)
+        of_body = doctor.findings(structure(self.description, self.edits), self.joint_without_inertia)
+        return (*self.description.findings, *of_body)
 
     def M(self, q: Array) -> ndarray:
         if is_state(q, self._shape) and is_moderate(q):

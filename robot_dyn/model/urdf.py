@@ -7,23 +7,28 @@ from __future__ import annotations
 
 import re
 from math import hypot, inf, isfinite
+from typing import NoReturn
 
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 from robot_dyn.errors import DescriptionError, nearest, shorten
+from robot_dyn.model import connections
+from robot_dyn.model.connections import LARGEST
 
 MAX_JOINTS = 1000  # Pinocchio crashes the process on chains of some thousands
 MOVING = ("revolute", "continuous", "prismatic")
 UNBOUNDED = "1e308"  # stands for a limit that is not stated; urdfdom refuses "inf"
 
-LARGEST = 1e12  # of a length, a mass, a moment, a ratio: beyond it the equations of motion overflow
 _LITERAL = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,4})?")
 _MAX_NAME, _MAX_LITERAL = 256, 64
+_XACRO = re.compile(r"(\{[^}]*xacro[^}]*\}|xacro:)")
+_EXPRESSION = re.compile(r"\$[{(]")
+EXPAND = "expand the file: xacro={} of load, --xacro on the command line, or xacro robot.xacro > robot.urdf"
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
-def checked_robot(robot: etree._Element, source: str) -> etree._Element:
-    """A canonical copy of a `<robot>` element.
+def checked_robot(robot: etree._Element, source: str) -> tuple[etree._Element, tuple[str, ...]]:
+    """A canonical copy of a `<robot>` element, and what was assumed where it departs from the format.
 
     Raises:
         DescriptionError: If anything in it has no meaning, or more than one.
@@ -33,8 +38,7 @@ def checked_robot(robot: etree._Element, source: str) -> etree._Element:
         check.refuse(
             f"line {robot.sourceline}", f"it begins with <{shorten(robot.tag)}>, not <robot>; give a URDF file"
         )
-    if any("xacro" in str(element.tag) for element in robot.iter()):
-        check.refuse("robot", "holds xacro macros; expand the file first: xacro robot.xacro > robot.urdf")
+    check.no_macros(robot)
     out = etree.Element("robot", name=check.name(robot, "robot"))
     for tag, most in (("joint", MAX_JOINTS), ("link", MAX_JOINTS + 1)):
         count = len(robot.findall(tag))
@@ -47,15 +51,15 @@ def checked_robot(robot: etree._Element, source: str) -> etree._Element:
     names = frozenset(links)
     joints = [check.joint(joint, out, names) for joint in robot.iterfind("joint")]
     check.distinct("joint", joints)
-    check.one_tree(links, out)
-    check.mimics(out)
-    return out
+    links += check.implicit_root(links, out)
+    connections.one_tree(links, out, check.refuse)
+    connections.mimics(out, check.refuse)
+    return out, tuple(check.findings)
 
 
-def _loop(names: list[str]) -> str:
-    """Names along a loop, the first again at the end; long ones cut in between."""
-    shown = names if len(names) <= 8 else [*names[:6], "…", names[-1]]
-    return " → ".join(shorten(name) for name in shown)
+def _texts(element: etree._Element) -> tuple[str, ...]:
+    """All texts of an element: its attributes, and what stands in and after it."""
+    return *map(str, element.attrib.values()), element.text or "", element.tail or ""
 
 
 class _Check:
@@ -63,9 +67,39 @@ class _Check:
 
     def __init__(self, source: str) -> None:
         self.source = source
+        self.findings: list[str] = []
+        self.undefined: dict[str, str] = {}  # parent links, and where they are named first
 
-    def refuse(self, where: str, why: str) -> None:
+    def refuse(self, where: str, why: str) -> NoReturn:
         raise DescriptionError(f"{self.source}: {where}: {why}")
+
+    def no_macros(self, robot: etree._Element) -> None:
+        """Refuse a file whose text is still to be computed; xacro elements that compute nothing are left out."""
+        left = [element for element in robot.iter() if _XACRO.match(str(element.tag))]
+        if not left:
+            return
+        computed = next((each for each in robot.iter() if any(map(_EXPRESSION.search, _texts(each)))), None)
+        if computed is not None:
+            self.refuse(f"line {computed.sourceline}", f"holds xacro macros; {EXPAND}")
+        names = dict.fromkeys(_XACRO.sub("xacro:", element.tag) for element in left)
+        listed = ", ".join(shorten(name) for name in [*names][:6])
+        elements = f"{len(left)} xacro element{'s' * (len(left) > 1)} ({listed})"
+        self.findings.append(
+            f"line {left[0].sourceline}: {elements} left out with all that they would add to the robot; {EXPAND}"
+        )
+
+    def implicit_root(self, links: list[str], robot: etree._Element) -> list[str]:
+        """The link that joints name as their parent and the file does not define, where it can only be the root."""
+        children = {child.get("link") for child in robot.iterfind("joint/child")}
+        for link, where in self.undefined.items():
+            sensible = len(link) <= _MAX_NAME and link.isprintable()
+            if len(self.undefined) > 1 or not sensible or not children.issuperset(links):
+                self.refuse(where, f"its parent link {shorten(link)!r} is not defined; {nearest(link, sorted(links))}")
+            etree.SubElement(robot, "link", name=link)
+            self.findings.append(
+                f"{where}: its parent link {link!r} is not defined; taken as the root; add <link name=…>"
+            )
+        return list(self.undefined)
 
     def name(self, element: etree._Element, where: str) -> str:
         name = (element.get("name") or "").strip()
@@ -161,7 +195,9 @@ class _Check:
             link = "" if end is None else (end.get("link") or "").strip()
             if not link:
                 self.refuse(where, f'has no {role} link; add <{role} link="…"/>')
-            if link not in links:
+            if link not in links and role == "parent":
+                self.undefined.setdefault(link, where)
+            elif link not in links:
                 self.refuse(where, f"its {role} link {shorten(link)!r} is not defined; {nearest(link, sorted(links))}")
             etree.SubElement(out, role, link=link)
         if kind != "fixed":
@@ -188,63 +224,23 @@ class _Check:
     def limit(self, joint: etree._Element, out: etree._Element, where: str) -> None:
         """Limits as stated; where none is stated, `UNBOUNDED`, since urdfdom insists on all four."""
         limit = self.one(joint, "limit", where)
-        bounds = {"lower": "-" + UNBOUNDED, "upper": UNBOUNDED, "effort": UNBOUNDED, "velocity": UNBOUNDED}
+        unbounded = {"lower": "-" + UNBOUNDED, "upper": UNBOUNDED}
+        bounds = unbounded | {"effort": UNBOUNDED, "velocity": UNBOUNDED}
         if limit is not None:
             stated = [key for key in bounds if limit.get(key) is not None]
             for key in stated:
-                minimum = 0.0 if key in ("effort", "velocity") else None
-                bounds[key] = self.number(limit, key, where, minimum=minimum, largest=inf)
+                value = self.number(limit, key, where, largest=inf)
+                if key in ("effort", "velocity") and float(value) < 0:
+                    self.findings.append(f"{where}: its {key} limit {value} is negative; none is taken; correct it")
+                else:
+                    bounds[key] = value
             # the URDF reference: lower and upper default to 0 where the other one is stated
             for key in {"lower", "upper"} - set(stated) if {"lower", "upper"} & set(stated) else ():
                 bounds[key] = "0"
         if joint.get("type") == "continuous":
-            bounds["lower"], bounds["upper"] = "-" + UNBOUNDED, UNBOUNDED
+            bounds |= unbounded
         if float(bounds["lower"]) > float(bounds["upper"]):
-            self.refuse(where, f"its lower limit {bounds['lower']} is above its upper {bounds['upper']}; exchange them")
+            crossed = f"its lower limit {bounds['lower']} is above its upper {bounds['upper']}"
+            self.findings.append(f"{where}: {crossed}; none is taken; exchange them")
+            bounds |= unbounded
         etree.SubElement(out, "limit", bounds)
-
-    def one_tree(self, links: list[str], robot: etree._Element) -> None:
-        """One root, one parent each, no cycle."""
-        parent_of: dict[str, str] = {}
-        for joint in robot.iterfind("joint"):
-            parent, child = joint.find("parent").get("link"), joint.find("child").get("link")
-            if child in parent_of:
-                self.refuse(
-                    f"link {child!r}", f"has two parents, {parent_of[child]!r} and {parent!r}; remove one joint"
-                )
-            parent_of[child] = parent
-        roots = [link for link in links if link not in parent_of]
-        if len(roots) > 1:
-            listed = ", ".join(repr(root) for root in roots[:5])
-            self.refuse("robot", f"has {len(roots)} roots: {listed}; join them to one root by joints")
-        reached = set(roots)
-        for link in links:
-            path: list[str] = []
-            while link not in reached:
-                if link in path:
-                    loop = _loop([*path[path.index(link) :], link])
-                    self.refuse(f"link {link!r}", f"is its own ancestor: {loop}; remove one joint of the loop")
-                path.append(link)
-                link = parent_of[link]
-            reached.update(path)
-
-    def mimics(self, robot: etree._Element) -> None:
-        """Every mimic follows a joint that moves, none follows itself, and no chain of them grows without bound."""
-        kinds = {joint.get("name"): joint.get("type") for joint in robot.iterfind("joint")}
-        ties = {joint.get("name"): joint.find("mimic") for joint in robot.iterfind("joint[mimic]")}
-        for follower, tie in ties.items():
-            where, source = f"joint {follower!r}", tie.get("joint")
-            if source not in kinds:
-                self.refuse(where, f"mimics {shorten(source)!r}, which is not defined; {nearest(source, kinds)}")
-            if kinds[source] == "fixed":
-                self.refuse(where, f"mimics {source!r}, which is fixed and never moves; make {follower!r} fixed too")
-        for follower in ties:
-            where, chain, ratio = f"joint {follower!r}", {follower: None}, 1.0  # a dict: ordered, quick to look up
-            while (name := next(reversed(chain))) in ties:
-                ratio *= float(ties[name].get("multiplier"))
-                source = ties[name].get("joint")
-                if source in chain:
-                    self.refuse(where, f"mimics itself: {_loop([*chain, source])}; remove one <mimic>")
-                if abs(ratio) > LARGEST:
-                    self.refuse(where, f"its chain of mimics multiplies by {ratio:g}; correct a multiplier")
-                chain[source] = None

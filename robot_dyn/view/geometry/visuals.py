@@ -17,7 +17,7 @@ import numpy as np
 from numpy import ndarray
 
 from robot_dyn.errors import shorten
-from robot_dyn.model.description import parse
+from robot_dyn.model.markup import parse
 from robot_dyn.model.robot import Robot
 from robot_dyn.spatial import homogeneous, rotation_rpy
 from robot_dyn.view.geometry import meshes
@@ -96,7 +96,7 @@ class _Artist:
 
     def __init__(self, robot: Robot, package_dirs: Iterable[str | Path]) -> None:
         self.name, self.source = robot.name, Path(robot.description.source)
-        self.element = parse(robot.description.text, robot.description.source)
+        self.element, _ = parse(robot.description.text, robot.description.source)
         self.checked = {link.get("name"): link for link in robot.description.element.iterfind("link")}
         self.file = partial(find_file, source=self.source, package_dirs=tuple(package_dirs))
         self.notes, self.remarks = list[str](), list[str]()

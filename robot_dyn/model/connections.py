@@ -1,0 +1,66 @@
+"""How links and joints connect: one tree from one root, and mimics that end at a joint that moves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NoReturn
+
+from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
+
+from robot_dyn.errors import nearest, shorten
+
+LARGEST = 1e12  # of a length, a mass, a moment, a ratio: beyond it the equations of motion overflow
+
+Refuse = Callable[[str, str], NoReturn]  # where and why
+
+
+def one_tree(links: list[str], robot: etree._Element, refuse: Refuse) -> None:
+    """One root, one parent each, no cycle."""
+    parent_of: dict[str, str] = {}
+    for joint in robot.iterfind("joint"):
+        parent, child = joint.find("parent").get("link"), joint.find("child").get("link")
+        if child in parent_of:
+            refuse(f"link {child!r}", f"has two parents, {parent_of[child]!r} and {parent!r}; remove one joint")
+        parent_of[child] = parent
+    roots = [link for link in links if link not in parent_of]
+    if len(roots) > 1:
+        listed = ", ".join(repr(root) for root in roots[:5])
+        refuse("robot", f"has {len(roots)} roots: {listed}; join them to one root by joints")
+    reached = set(roots)
+    for link in links:
+        path: list[str] = []
+        while link not in reached:
+            if link in path:
+                loop = _loop([*path[path.index(link) :], link])
+                refuse(f"link {link!r}", f"is its own ancestor: {loop}; remove one joint of the loop")
+            path.append(link)
+            link = parent_of[link]
+        reached.update(path)
+
+
+def mimics(robot: etree._Element, refuse: Refuse) -> None:
+    """Every mimic follows a joint that moves, none follows itself, and no chain of them grows without bound."""
+    kinds = {joint.get("name"): joint.get("type") for joint in robot.iterfind("joint")}
+    ties = {joint.get("name"): joint.find("mimic") for joint in robot.iterfind("joint[mimic]")}
+    for follower, tie in ties.items():
+        where, source = f"joint {follower!r}", tie.get("joint")
+        if source not in kinds:
+            refuse(where, f"mimics {shorten(source)!r}, which is not defined; {nearest(source, kinds)}")
+        if kinds[source] == "fixed":
+            refuse(where, f"mimics {source!r}, which is fixed and never moves; make {follower!r} fixed too")
+    for follower in ties:
+        where, chain, ratio = f"joint {follower!r}", {follower: None}, 1.0  # a dict: ordered, quick to look up
+        while (name := next(reversed(chain))) in ties:
+            ratio *= float(ties[name].get("multiplier"))
+            source = ties[name].get("joint")
+            if source in chain:
+                refuse(where, f"mimics itself: {_loop([*chain, source])}; remove one <mimic>")
+            if abs(ratio) > LARGEST:
+                refuse(where, f"its chain of mimics multiplies by {ratio:g}; correct a multiplier")
+            chain[source] = None
+
+
+def _loop(names: list[str]) -> str:
+    """Names along a loop, the first again at the end; long ones cut in between."""
+    shown = names if len(names) <= 8 else [*names[:6], "…", names[-1]]
+    return " → ".join(shorten(name) for name in shown)

@@ -1,0 +1,114 @@
+"""The XML of a robot description, read without entities, DTD, network, mended structure or unbounded nesting.
+
+Three departures from XML that the world's files show are taken, each with a finding that says how: a declaration that
+does not stand first, one of a version that does not exist, and prefixes that are not declared.
+"""
+
+from __future__ import annotations
+
+import re
+
+from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
+
+from robot_dyn.errors import DescriptionError, shorten
+
+MAX_DEPTH = 32  # of nested elements; a URDF needs 6
+
+# Atomic groups: a text of many blanks or comments is read once, not tried in all partitions.
+_LATE_DECLARATION = re.compile(rb"(\xef\xbb\xbf)?((?>\s++|<!--(?>.*?-->))*+)(<\?xml\s[^>]*\?>)", re.DOTALL)
+_VERSION = re.compile(rb"(\sversion\s*=\s*[\"'])([0-9.]{1,16})(?=[\"'])")
+_PREFIX = re.compile(r"Namespace prefix (\S+) ")
+
+
+def parse(text: bytes, source: str) -> tuple[etree._Element, tuple[str, ...]]:
+    """The root of an XML text, and what was assumed to read it.
+
+    Raises:
+        DescriptionError: If it is not XML, or uses what is not read; `source` names it.
+    """
+    if not text.strip():
+        raise DescriptionError(f"{source}: is empty; give a URDF file")
+    text, findings = _declared_first(text)
+    root, errors = _fed(text, source, recover=False)
+    if root is not None:
+        return root, findings
+    root, _ = _fed(text, source, recover=True)  # which passes over these errors alone: there are no others
+    prefixes = dict.fromkeys(match[1] for error in errors if (match := _PREFIX.search(error.message)))
+    prefixes.pop("xacro", None)  # of which the read of the robot speaks
+    if not prefixes:
+        return root, findings
+    listed = ", ".join(shorten(prefix, 40) for prefix in [*prefixes][:5])
+    return root, (
+        *findings,
+        f"line {errors[0].line}: uses prefixes that are not declared ({listed}); what bears them is left out; declare"
+        ' each: <robot xmlns:PREFIX="…">',
+    )
+
+
+def _declared_first(text: bytes) -> tuple[bytes, tuple[str, ...]]:
+    """The text with its XML declaration at the start and of a version that exists; line numbers stay."""
+    match = _LATE_DECLARATION.match(text)
+    if not match:
+        return text, ()
+    mark, before, declaration, findings = match[1] or b"", match[2], match[3], []
+    if before:
+        findings.append("the XML declaration <?xml …?> does not stand first; read as if it did; remove what is before")
+    version = _VERSION.search(declaration)
+    if version and not re.fullmatch(rb"1\.[0-9]+", version[2]):
+        declaration = declaration[: version.start(2)] + b"1.0" + declaration[version.end(2) :]
+        findings.append(f'XML version "{version[2].decode()}" does not exist; read as 1.0; write version="1.0"')
+    return mark + declaration + before + text[match.end() :], tuple(findings)
+
+
+def _fed(text: bytes, source: str, recover: bool) -> tuple[etree._Element | None, list[etree._LogEntry]]:
+    """The root; or None with the errors of the parser, if all of them are prefixes that are not declared."""
+    parser = etree.XMLPullParser(
+        events=("start", "end"),
+        resolve_entities=False,
+        load_dtd=False,
+        no_network=True,
+        recover=recover,
+        huge_tree=False,
+        remove_comments=True,
+        remove_pis=True,
+    )
+    depth = 0
+    try:
+        for start in range(0, len(text), 2**16):
+            parser.feed(text[start : start + 2**16])
+            for event, element in parser.read_events():
+                depth += 1 if event == "start" else -1
+                _refuse_document_type(element, source)
+                if depth > MAX_DEPTH:
+                    raise DescriptionError(
+                        f"{source}: line {element.sourceline}: elements are nested deeper than {MAX_DEPTH};"
+                        " a URDF needs 6 levels at most: remove the others"
+                    )
+        root = parser.close()
+    except etree.XMLSyntaxError as error:
+        errors = [entry for entry in parser.feed_error_log if entry.level > etree.ErrorLevels.WARNING]
+        serious = [entry for entry in errors if entry.type != etree.ErrorTypes.NS_ERR_UNDEFINED_NAMESPACE]
+        if errors and not serious:
+            return None, errors
+        message, line = (serious[0].message, serious[0].line) if serious else (str(error.msg), error.lineno or 1)
+        raise DescriptionError(f"{source}: {_syntax(message, line)}") from None
+    _refuse_document_type(root, source)
+    return root, []
+
+
+def _syntax(message: str, line: int) -> str:
+    """What is wrong with the XML, from the first complaint of the parser, and what to do."""
+    why = shorten(" ".join(message.split()), 200)
+    if entity := re.search(r"Entity '(.*?)' not defined", why):
+        return f"line {line}: uses the entity &{entity[1]};, which is not declared; write its text instead"
+    if "XML_PARSE_HUGE" in why or "mplification" in why:
+        return f"line {line}: a text, the nesting or an entity exceeds the limits of the parser; remove it"
+    return f"is not well-formed XML: line {line}: {why}; correct the file"
+
+
+def _refuse_document_type(element: etree._Element, source: str) -> None:
+    if element.getroottree().docinfo.internalDTD is not None:
+        raise DescriptionError(
+            f"{source}: declares a document type (<!DOCTYPE …>), through which a file can grow without bound or read"
+            " other files; remove the declaration"
+        )
