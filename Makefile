@@ -6,7 +6,7 @@ BIN := .venv/bin
 .PHONY: demo test check clean
 
 demo: .venv/installed
-	$(BIN)/robot-dyn demo
+	$(BIN)/robot-dyn demo --force
 
 test: .venv/installed
 	$(BIN)/python -m pytest -n auto

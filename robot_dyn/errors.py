@@ -5,10 +5,22 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
+from unicodedata import category
+
+
+def escaped(text: str) -> str:
+    r"""The text in one line, its control and invisible characters written as Python writes them: \x1b, \n, \u202e."""
+    if text.isprintable():
+        return text
+    kept = (each if each.isprintable() or category(each) == "Zs" else repr(each)[1:-1] for each in text)
+    return "".join(kept)
 
 
 class RobotDynError(Exception):
-    """Base of every error this library raises."""
+    """Base of every error this library raises; its message has no control characters of the file that it is about."""
+
+    def __str__(self) -> str:
+        return escaped(super().__str__())
 
 
 class CatalogError(RobotDynError):
@@ -48,7 +60,10 @@ class SingularError(RobotDynError):
 
 
 class RobotDynWarning(UserWarning):
-    """Base of the warnings of this library."""
+    """Base of the warnings of this library; messages as of the errors."""
+
+    def __str__(self) -> str:
+        return escaped(super().__str__())
 
 
 class ModelWarning(RobotDynWarning):

@@ -1,81 +1,174 @@
-"""Files: read within bounds, and only regular ones; written whole or not at all."""
+"""Files written whole or not at all, and only over files of their kind.
+
+A file is written beside its target, synchronised and renamed: a reader, or a machine that loses its power, sees the old
+file or the new one. Links are written through, permissions are kept, and what writers that were killed left is removed.
+"""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+import re
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
-from secrets import token_hex
-from stat import S_ISDIR, S_ISREG
-from typing import BinaryIO
+from stat import S_IMODE
+from time import time
+from typing import Any, BinaryIO, final
 
 from robot_dyn.errors import RobotDynError
+from robot_dyn.reading import READ, read_start, why
+
+_NEW_S = 10.0  # a younger file may be open and not yet locked
+# Locks tell a file that is being written from an abandoned one. Windows, where no open file can be removed, needs none.
+_locks: Any = import_module("fcntl") if os.name == "posix" else None
+_NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
 
 
-def target(path: str | Path, suffix: str, error: type[RobotDynError]) -> Path:
-    """The path of a file to write, with the suffix if it has none; `error` if it names no file."""
-    path = Path(path)
-    if not path.name or path.is_dir():
-        raise error(f"{path}: is a folder; give the name of a file in it, such as {path / ('run' + suffix)}")
-    return path if path.suffix else path.with_suffix(suffix)
+@final
+@dataclass(frozen=True)
+class Kind:
+    """A kind of file: what it is called, the end of its name, and the first bytes that all files of the kind share."""
+
+    name: str
+    suffix: str
+    start: bytes = b""
 
 
-def save(path: Path, write: Callable[[BinaryIO], object], error: type[RobotDynError]) -> Path:
-    """Write beside the target and rename: a reader sees the old file or the new one, never half of it.
+def target(
+    path: str | Path,
+    kinds: Kind | tuple[Kind, ...],
+    error: type[RobotDynError],
+    inputs: Iterable[str | Path] = (),
+) -> Path:
+    """The path of a file to write, with the suffix of the first kind if it has none: checked before the work is done.
 
     Raises:
-        RobotDynError: Of the kind `error`, if it cannot be written.
+        RobotDynError: Of the kind `error`, if it has another suffix; if its folder is missing or closed; if there is
+            something other than a file of its kind under its name; or if it is one of `inputs`, also by a link.
     """
+    kinds = kinds if isinstance(kinds, tuple) else (kinds,)
     try:
-        beside = path.with_name(f".{path.name[:200]}.{token_hex(8)}")  # a tempfile would be its owner's alone
-        try:
-            with beside.open("xb") as stream:
-                write(stream)
-            beside.replace(path)
-        except BaseException:
-            beside.unlink(missing_ok=True)
-            raise
-    except OSError as cause:
-        raise error(f"{path}: cannot be written ({cause.strerror}); give a path in a folder that is writable") from None
+        path = Path(path)
+        if not path.name or path.is_dir():
+            raise error(
+                f"{path}: is a folder; give the name of a file in it, such as {path / ('run' + kinds[0].suffix)}"
+            )
+        path = path if path.suffix else path.with_suffix(kinds[0].suffix)
+        kind = next((kind for kind in kinds if kind.suffix == path.suffix.lower()), None)
+        if kind is None:
+            suffixes = ", ".join(kind.suffix for kind in kinds)
+            raise error(f"{path}: {path.suffix!r} is not the suffix of {kinds[0].name}; end the name with {suffixes}")
+        _check(path, Path(os.path.realpath(path)), kind, error, inputs)
+    except (OSError, TypeError, ValueError) as cause:  # ValueError: a NUL in the path
+        raise error(f"{path}: cannot be written ({why(cause)}); give another path") from None
     return path
 
 
-@contextmanager
-def reading(path: str | Path, error: type[RobotDynError], remedy: str) -> Iterator[BinaryIO]:
-    """A regular file, open for reading; a device, pipe or folder is refused at once.
+def _check(path: Path, real: Path, kind: Kind, error: type[RobotDynError], inputs: Iterable[str | Path]) -> None:
+    """That nothing but a file of its kind is replaced, and that there can be one."""
+    if not real.parent.is_dir():
+        raise error(f"{path}: there is no folder {real.parent}; make it first, or give another path")
+    if real.is_symlink():
+        raise error(f"{path}: is a link to itself; remove it, or give another path")
+    for other in map(Path, inputs):
+        if os.path.realpath(other) == str(real) or (real.exists() and other.exists() and real.samefile(other)):
+            raise error(f"{path}: is the same file as {other}, which would be lost; give another path")
+    if not real.exists():
+        if not os.access(real.parent, os.W_OK | os.X_OK):
+            raise error(f"{path}: the folder {real.parent} is not writable; give a path in another one")
+        return
+    start = read_start(path, len(kind.start), error, "give another path")
+    if not os.access(real, os.W_OK):
+        raise error(f"{path}: is write-protected; change its permissions, or give another path")
+    if start and start != kind.start:
+        raise error(f"{path}: is not {kind.name}, so it is not replaced; remove it, or give another path")
+
+
+def save(path: Path, write: Callable[[BinaryIO], object], error: type[RobotDynError]) -> Path:
+    """Write a file that a reader sees whole or not at all; `path` is one that `target` gave.
 
     Raises:
-        RobotDynError: Of the kind `error`, with the remedy, if it cannot be read.
+        RobotDynError: Of the kind `error`, if it cannot be written; then the old file, if there was one, is unchanged.
     """
-    with _opened(path, error, remedy) as stream:
-        yield stream
-
-
-def _opened(path: str | Path, error: type[RobotDynError], remedy: str) -> BinaryIO:
+    real = Path(os.path.realpath(path))
     try:
-        path = Path(path)
-        _refuse_irregular(path, path.stat().st_mode, error, remedy)
-        # Opening a pipe would wait for its writer; Windows has no O_NONBLOCK, POSIX no O_BINARY.
-        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
-        stream = os.fdopen(handle, "rb")
-        _refuse_irregular(path, os.fstat(handle).st_mode, error, remedy)  # it may be another by now
-        return stream
-    except FileNotFoundError:
-        raise error(f"{path}: there is no such file; {remedy}") from None
-    except (OSError, ValueError, TypeError) as cause:  # ValueError: a NUL in the path
-        raise error(f"{path}: cannot be read ({getattr(cause, 'strerror', None) or cause}); {remedy}") from None
+        _remove_abandoned(real)
+        old = real.stat() if real.exists() else None
+        with _unfinished(real, 0o600 if old else 0o666) as (beside, stream):
+            write(stream)
+            stream.flush()
+            if old:
+                _as_before(beside, old)
+            os.fsync(stream.fileno())
+            if not _locks:
+                stream.close()  # Windows renames no open file; elsewhere it stays locked until it has its name
+            os.replace(beside, real)
+        _synchronise(real.parent)
+    except MemoryError:
+        raise error(f"{path}: cannot be written (not enough memory); free some, or save less") from None
+    except OSError as cause:
+        raise error(f"{path}: cannot be written ({why(cause)}); make room, or give another path") from None
+    return path
 
 
-def read(path: str | Path, most: int, error: type[RobotDynError], remedy: str) -> bytes:
-    """The bytes of a regular file of at most `most`; errors as of `reading`."""
-    with reading(path, error, remedy) as stream:
-        data = stream.read(most + 1)
-    if len(data) > most:
-        raise error(f"{path}: is larger than {most} bytes; {remedy}")
-    return data
+def _as_before(beside: Path, old: os.stat_result) -> None:
+    """Owner and permissions of the file that is replaced."""
+    if hasattr(os, "chown"):
+        with suppress(OSError):  # only root may give a file away
+            os.chown(beside, old.st_uid, old.st_gid)
+    os.chmod(beside, S_IMODE(old.st_mode))
 
 
-def _refuse_irregular(path: str | Path, mode: int, error: type[RobotDynError], remedy: str) -> None:
-    if not S_ISREG(mode):
-        raise error(f"{path}: is {'a folder' if S_ISDIR(mode) else 'not a regular file'}; {remedy}")
+@contextmanager
+def _unfinished(real: Path, mode: int) -> Iterator[tuple[Path, BinaryIO]]:
+    """A new file beside the target, open and locked; removed if anything fails."""
+    beside = real.with_name(f"{_prefix(real)}{os.urandom(8).hex()}.unfinished")
+    handle = os.open(beside, _NEW, mode)
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            _lock(handle)
+            yield beside, stream
+    except BaseException:
+        with suppress(OSError):
+            beside.unlink()
+        raise
+
+
+def _lock(handle: int, only_if_free: bool = False) -> None:
+    """Lock a file until it is closed; a file system without locks has none that are held, either."""
+    if _locks and only_if_free:
+        _locks.flock(handle, _locks.LOCK_EX | _locks.LOCK_NB)
+    elif _locks:
+        with suppress(OSError):
+            _locks.flock(handle, _locks.LOCK_EX)
+
+
+def _remove_abandoned(real: Path) -> None:
+    """Remove what writers of this file left when they were killed: files beside it, not new, that nobody has locked."""
+    name = re.compile(re.escape(_prefix(real)) + r"[0-9a-f]{16}\.unfinished")
+    for each in [path for path in real.parent.iterdir() if name.fullmatch(path.name)]:
+        with suppress(OSError):  # locked, removed meanwhile, or another user's
+            if time() - each.lstat().st_mtime < _NEW_S:
+                continue
+            handle = os.open(each, READ)
+            try:
+                _lock(handle, only_if_free=True)
+                each.unlink()
+            finally:
+                os.close(handle)
+
+
+def _prefix(real: Path) -> str:
+    return f".{os.fsencode(real.name)[:180].decode('utf-8', 'ignore')}."
+
+
+def _synchronise(folder: Path) -> None:
+    """Make a rename last through a loss of power, where the system can: to every reader it has happened."""
+    with suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)

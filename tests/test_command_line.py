@@ -133,6 +133,31 @@ def test_head_takes_the_first_line():
     assert done.returncode in (0, 1, 141)
 
 
+@pytest.mark.skipif(os.name != "posix", reason="/dev/full and descriptors of POSIX")
+@pytest.mark.parametrize("redirection", ["> /dev/full", ">&-"])
+@pytest.mark.parametrize("args", ["list", "info pendulum", "query pendulum --json", "--help", "scene pendulum"])
+def test_output_that_cannot_be_written_is_an_error_of_one_line(args: str, redirection: str):
+    command = f'"{sys.executable}" -c "{MAIN}" {args} {redirection}'
+    done = subprocess.run(["bash", "-c", command], capture_output=True, encoding="utf-8", timeout=30)
+    assert done.returncode == 2
+    assert re.fullmatch(r"robot-dyn: error: standard output cannot be written \(.*\); redirect .*\n", done.stderr)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="/dev/full and descriptors of POSIX")
+@pytest.mark.parametrize("redirection", ["2> /dev/full", "2>&-", ">&- 2>&-", "<&- >&- 2>&-"])
+def test_an_error_that_cannot_be_told_has_its_exit_code(redirection: str):
+    command = f'"{sys.executable}" -c "{MAIN}" info ur6 {redirection}'
+    assert subprocess.run(["bash", "-c", command], capture_output=True, timeout=30).returncode == 2
+
+
+@pytest.mark.skipif(os.name != "posix", reason="descriptors of POSIX")
+def test_a_closed_stream_is_not_replaced_by_a_file_that_is_opened_later(tmp_path: Path):
+    """Else what a library writes to descriptor 1 would go into that file."""
+    code = "import os; os.close(1); os.close(2)\nfrom robot_dyn.cli.terminal import open_streams; open_streams()\n"
+    code += "import sys; stream = open(sys.argv[1], 'w'); os.write(1, b'x') if 0 else None; sys.exit(stream.fileno())"
+    assert spawn(tmp_path / "x", code=code).returncode > 2
+
+
 @pytest.mark.parametrize("encoding", ["ascii", "cp1252", "utf-16"])
 @pytest.mark.parametrize(
     ("args", "code", "shown"),

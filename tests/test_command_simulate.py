@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import signal
 import subprocess
@@ -13,6 +14,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.scene.starters import starter, starters
+from tests.command import refusal
 
 COMMAND = [sys.executable, "-c", "from robot_dyn.cli import main; main()"]
 DOCUMENT = (Path(__file__).parents[1] / "docs" / "json.md").read_text(encoding="utf-8")
@@ -36,6 +38,64 @@ def test_simulate_prints_a_summary_and_keeps_the_run(scene, tmp_path) -> None:
         assert said in done.stdout
     assert rd.load_run(tmp_path / "run.npz").summary in done.stdout
     assert (tmp_path / "run.csv").is_file()
+
+
+@pytest.mark.parametrize(
+    ("outputs", "message"),
+    [
+        (["-o", "scene.toml"], r"scene\.toml: '\.toml' is not the suffix of a run file; end the name with \.npz"),
+        (["-o", "run.txt"], r"run\.txt: '\.txt' is not the suffix of a run file.*"),
+        (["-o", "run.npz", "--csv", "run.npz"], r"run\.npz: '\.npz' is not the suffix of a table.*"),
+        (["-o", "link.npz", "--force"], r"link\.npz: is the same file as .*scene\.toml, which would be lost.*"),
+        (["-o", "run.npz", "--csv", "to_run.csv"], r"to_run\.csv: is the same file as run\.npz.*"),
+        (["-o", "none/run.npz"], r"none/run\.npz: there is no folder .*/none; make it first.*"),
+        (["-o", "old.npz"], r"old\.npz: exists; add --force to replace it.*"),
+        (["--csv", "old.npz.csv"], r"old\.npz\.csv: exists; add --force.*"),
+        (["--csv", "other.csv", "--force"], r"other\.csv: is not a table of a run, so it is not replaced.*"),
+        (["-o", "pipe.npz", "--force"], r"pipe\.npz: is not a regular file.*"),
+        (["-o", "."], r"\.: is a folder.*"),
+    ],
+)
+def test_an_output_that_would_destroy_something_is_refused_before_the_run(
+    scene, tmp_path, monkeypatch, outputs: list[str], message: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(rd, "simulate", None)
+    (tmp_path / "link.npz").symlink_to(scene)
+    (tmp_path / "to_run.csv").symlink_to("run.npz")
+    (tmp_path / "old.npz").write_bytes(b"")
+    (tmp_path / "old.npz.csv").write_bytes(b"")
+    (tmp_path / "other.csv").write_text("x,y")
+    os.mkfifo(tmp_path / "pipe.npz")
+
+    def state() -> dict[str, tuple[int, ...]]:
+        status = {path.name: path.lstat() for path in tmp_path.iterdir()}
+        return {name: (each.st_mode, each.st_ino, each.st_size, each.st_mtime_ns) for name, each in status.items()}
+
+    before = state()
+    assert re.fullmatch(message, refusal(["simulate", scene, *outputs]))
+    assert state() == before
+
+
+def test_force_replaces(scene, tmp_path) -> None:
+    for name in ("run.npz", "run.csv"):
+        (tmp_path / name).touch()
+    done = run("simulate", scene, "-o", tmp_path / "run.npz", "--csv", tmp_path / "run.csv", "--force")
+    assert done.returncode == 0, done.stderr
+    assert rd.load_run(tmp_path / "run.npz").t[-1] == 0.2 and (tmp_path / "run.csv").stat().st_size > 1000
+
+
+@pytest.mark.skipif(os.name != "posix", reason="/dev/full, pipes and descriptors of POSIX")
+@pytest.mark.parametrize(("redirection", "code"), [("| head -0", 0), ("> /dev/full", 2), (">&-", 2)])
+def test_a_run_is_written_whatever_becomes_of_the_output(scene, tmp_path, redirection: str, code: int) -> None:
+    """The files come first; what cannot be printed is said in one line."""
+    command = (
+        f'set -o pipefail; "{COMMAND[0]}" -c "{COMMAND[2]}" simulate {scene} -o {tmp_path / "run.npz"} {redirection}'
+    )
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == code
+    assert rd.load_run(tmp_path / "run.npz").t[-1] == 0.2
+    assert done.stderr.count("\n") == 1 and ("standard output cannot be written" in done.stderr) == (code == 2)
 
 
 def test_document_has_the_keys_that_are_promised(scene) -> None:

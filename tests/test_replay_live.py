@@ -127,7 +127,7 @@ def test_bad_input_is_told_in_one_line(swing, tmp_path) -> None:
     cases = {
         (str(half),): "not a whole run file",
         (str(tmp_path / "none.npz"),): "there is no such file",
-        (str(file), "--html", str(tmp_path / "no" / "out.html")): "cannot be written",
+        (str(file), "--html", str(tmp_path / "no" / "out.html")): "there is no folder",
         (str(file), "--html", str(tmp_path)): "is a folder",
         (str(file), "--html", str(tmp_path / "a.html"), "--frame", "hnd"): "no link 'hnd'",
         (str(file), "--html", "a.html", "--port", "8000"): "not both",

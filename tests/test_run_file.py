@@ -71,24 +71,6 @@ def test_other_files_are_refused(tmp_path) -> None:
         rd.load_run(tmp_path / "text.npz")
 
 
-def test_a_file_that_cannot_be_written_leaves_the_old_one(run, tmp_path, monkeypatch) -> None:
-    """The file is replaced in one move: what fails before it leaves the old file and no litter."""
-    path = rd.save_run(run, tmp_path / "run.npz")
-    whole = path.read_bytes()
-
-    def fails(*_, **__):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(os, "replace", fails)
-    with pytest.raises(RunFileError, match="No space left"):
-        rd.save_run(run, path)
-    assert path.read_bytes() == whole
-    assert [file.name for file in tmp_path.iterdir()] == ["run.npz"]
-    monkeypatch.undo()
-    with pytest.raises(RunFileError, match="cannot be written"):
-        rd.save_run(run, tmp_path / "no folder" / "run.npz")
-
-
 def test_a_table_has_names_units_and_all_samples(run, tmp_path) -> None:
     rows = list(csv.reader(export_csv(run, tmp_path / "run.csv").read_text(encoding="utf-8").splitlines()))
     assert rows[0][:2] == ["t [s]", "q slide [rad or m]"]

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from threading import Event
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -35,17 +34,8 @@ Xacro = Annotated[
         help="Expand a xacro file, which runs its expressions, with this argument; may be repeated; '' for none.",
     ),
 ]
+Force = Annotated[bool, typer.Option("--force", help="Replace files that are there already.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, as documented in docs/json.md.")]
-
-
-def say(renderables: Iterable[Any]) -> None:
-    """Print texts and tables."""
-    from rich.console import Console
-
-    watched = sys.stdout.isatty()
-    console = Console(highlight=False, markup=False, emoji=False, width=None if watched else 1000)  # a pipe has no edge
-    for each in renderables:
-        print(each) if isinstance(each, str) else console.print(each)
 
 
 def progress(items: Iterable[str], description: str) -> Iterator[str]:
@@ -68,11 +58,6 @@ def bar(duration_s: float) -> Iterator[Callable[[float], object]]:
     with Progress(console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty()) as progress:
         task = progress.add_task("simulating", total=duration_s)
         yield lambda t: progress.update(task, completed=t)
-
-
-def print_json(value: Any) -> None:
-    """Print a document as JSON."""
-    print(json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False))
 
 
 def noticed_interrupts() -> Event:

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from robot_dyn.errors import ModelWarning, QueryError, nearest
+from robot_dyn.errors import ModelWarning, QueryError, RobotDynError, nearest
+from robot_dyn.files import Kind, target
 
 if TYPE_CHECKING:
     import numpy as np
@@ -76,3 +79,17 @@ def vector(option: str, text: str | None, joint_names: tuple[str, ...]) -> np.nd
     if len(words) != len(joint_names):
         raise QueryError(f"{option} needs {len(joint_names)} numbers, got {len(words)}: {', '.join(joint_names)}")
     return np.array([number(option, word) for word in words])
+
+
+def output(
+    path: str | Path,
+    kinds: Kind | tuple[Kind, ...],
+    error: type[RobotDynError],
+    inputs: Iterable[str | Path],
+    force: bool,
+) -> Path:
+    """The path of a file to write, checked before the work is done as `files.target`; one that exists needs force."""
+    path = target(path, kinds, error, inputs)
+    if path.exists() and not force:
+        raise error(f"{path}: exists; add --force to replace it, or give another path")
+    return path

@@ -8,7 +8,8 @@ import typer
 
 import robot_dyn as rd
 from robot_dyn.cli import arguments
-from robot_dyn.cli.app import Json, Lock, Name, PackageDir, Xacro, app, print_json, progress, say
+from robot_dyn.cli.app import Json, Lock, Name, PackageDir, Xacro, app, progress
+from robot_dyn.cli.terminal import say, say_json
 from robot_dyn.errors import QueryError, RobotDynError
 
 
@@ -16,7 +17,7 @@ from robot_dyn.errors import QueryError, RobotDynError
 def list_(as_json: Json = False) -> None:
     """List the robots that can be named."""
     names = rd.list_robots()
-    print_json({"robots": names}) if as_json else print("\n".join(names))
+    say_json({"robots": names}) if as_json else say(*names)
 
 
 @app.command()
@@ -36,11 +37,11 @@ def info(
     loaded = arguments.load(robot, lock, package_dir, xacro, quiet=True)  # the findings are shown below
     roads = {"compiled": kernels.formulations(loaded)} if compiled else {}
     if as_json:
-        print_json(report.info(loaded) | roads)
+        say_json(report.info(loaded) | roads)
         return
-    say(report.info_tables(loaded))
+    say(*report.info_tables(loaded))
     if compiled:
-        say(kernels.formulation_table(roads["compiled"]))
+        say(*kernels.formulation_table(roads["compiled"]))
 
 
 @app.command()
@@ -70,7 +71,7 @@ def query(
     answer = report.query(loaded, effects or "", **state, a=arguments.vector("--a", a, loaded.joint_names), tau=given)
     if why is not None:
         answer |= report.why(loaded, answer, why)
-    print_json(answer) if as_json else say(report.query_tables(answer))
+    say_json(answer) if as_json else say(*report.query_tables(answer))
 
 
 @app.command()
@@ -102,6 +103,6 @@ def compare(
             if not every:
                 raise
             refused[name] = str(error)
-    print_json(report.comparison(results, refused)) if as_json else say(report.comparison_tables(results, refused))
+    say_json(report.comparison(results, refused)) if as_json else say(*report.comparison_tables(results, refused))
     if not all(result.ok for _, result in results):
         raise typer.Exit(1)

@@ -6,7 +6,8 @@ from typing import Annotated
 
 import typer
 
-from robot_dyn.cli.app import Json, app, print_json, say
+from robot_dyn.cli.app import Json, app
+from robot_dyn.cli.terminal import say, say_json
 
 
 @app.command()
@@ -21,4 +22,4 @@ def cache(
     store = default_store()
     removed = store.clear() if store and clear else 0
     answer = kernels.cache(store, removed)
-    print_json(answer) if as_json else say(kernels.cache_tables(answer))
+    say_json(answer) if as_json else say(*kernels.cache_tables(answer))

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 from typing import Annotated
 
 import typer
 
 import robot_dyn as rd
-from robot_dyn.cli.app import Json, app, bar, print_json
+from robot_dyn.cli import arguments
+from robot_dyn.cli.app import Force, Json, app, bar
+from robot_dyn.cli.terminal import put, say, say_json, tell
 
 
 @app.command()
@@ -16,19 +17,26 @@ def simulate(
     scene: Annotated[str, typer.Argument(metavar="SCENE.toml", help="A scene file; `robot-dyn scene` prints some.")],
     output: Annotated[str | None, typer.Option("-o", "--output", metavar="RUN.npz", help="Keep the run.")] = None,
     csv: Annotated[str | None, typer.Option(metavar="TABLE.csv", help="Write the samples as a table.")] = None,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Run a scene; exit code 1 if it diverges. Ctrl-C ends the run and keeps its samples."""
     from robot_dyn.cli import report
-    from robot_dyn.simulation.table import export_csv
+    from robot_dyn.simulation.run_file import RUN, RunFileError
+    from robot_dyn.simulation.table import TABLE, export_csv
 
     setup = rd.read_scene(scene)
+    inputs = [scene, setup.plant.dynamics.description.source]  # pyright: ignore[reportAttributeAccessIssue]
+    kept = output and arguments.output(output, RUN, RunFileError, inputs, force)
+    table = csv and arguments.output(csv, TABLE, RunFileError, [*inputs, *([kept] if kept else [])], force)
     with bar(setup.duration_s) as advance:
         run = rd.simulate(setup, on_progress=advance)
-    print_json(report.run(run)) if as_json else print(run.summary)
-    for path in (output and rd.save_run(run, output), csv and export_csv(run, csv)):
-        if path:
-            print(f"written: {path}", file=sys.stderr)
+    try:  # the files first: a terminal or pipe may be gone
+        written = [path for path in (kept and rd.save_run(run, kept), table and export_csv(run, table)) if path]
+    finally:
+        say_json(report.run(run)) if as_json else say(run.summary)
+    for path in written:
+        tell(f"written: {path}")
     if run.outcome.ending != "finished":
         raise typer.Exit(130 if run.outcome.ending == "stopped" else 1)
 
@@ -39,7 +47,7 @@ def explain(scene: Annotated[str, typer.Argument(metavar="SCENE.toml", help="A s
     from robot_dyn.scene.explain import explain as lines
     from robot_dyn.scene.scene import read_both
 
-    print("\n".join(lines(*read_both(scene))))
+    say(*lines(*read_both(scene)))
 
 
 @app.command()
@@ -49,4 +57,4 @@ def scene(
     """Print a scene file to start from."""
     from robot_dyn.scene.starters import starter, starters
 
-    print(starter(name) if name else "\n".join(starters()), end="" if name else "\n")
+    put(starter(name)) if name else say(*starters())

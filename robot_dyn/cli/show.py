@@ -8,7 +8,9 @@ from typing import Annotated
 import typer
 
 import robot_dyn as rd
-from robot_dyn.cli.app import PackageDir, app, noticed_interrupts, say
+from robot_dyn.cli.app import Force, PackageDir, app, noticed_interrupts
+from robot_dyn.cli.arguments import output as checked_output
+from robot_dyn.cli.terminal import say
 from robot_dyn.errors import QueryError
 
 
@@ -26,21 +28,25 @@ def replay(
     inertia: Annotated[bool, typer.Option("--inertia", help="Draw each link's equivalent inertia box.")] = False,
     port: Annotated[int | None, typer.Option(min=1, max=65535, help="Where to listen; a free one if none.")] = None,
     browse: Annotated[bool, typer.Option("--open", help="Open the page in your browser.")] = False,
+    force: Force = False,
     package_dir: PackageDir = None,
 ) -> None:
     """Replay runs in the browser, live on this machine until Ctrl-C, or as one HTML file."""
+    from robot_dyn.view.replay import PAGE, ReplayError
+
     interrupted = noticed_interrupts()
     if html is not None and port is not None:
         raise QueryError("give --html or --port, not both: a file needs no server")
+    page = None if html is None else checked_output(html, PAGE, ReplayError, runs, force)
     trajectories = [rd.load_run(path) for path in runs]
     options = {"frame": frame, "inertia": inertia, "package_dirs": package_dir or ()}
-    if html is not None:
-        file = rd.save_replay(trajectories[0], html, *trajectories[1:], **options)
-        print(f"written: {file} ({file.stat().st_size / 1e6:.1f} MB)")
+    if page is not None:
+        file = rd.save_replay(trajectories[0], page, *trajectories[1:], **options)
+        say(f"written: {file} ({file.stat().st_size / 1e6:.1f} MB)")
         _open(file.absolute().as_uri(), browse)
         return
     with rd.replay(*trajectories, port=port, **options) as server:
-        print(f"{server.url} shows the run; Ctrl-C ends it", flush=True)
+        say(f"{server.url} shows the run; Ctrl-C ends it")
         _open(server.url, browse)
         server.wait(interrupted)
 
@@ -61,39 +67,53 @@ def plot(
     ] = None,
     joint: Annotated[list[str] | None, typer.Option(metavar="JOINT", help="Show this joint; may be repeated.")] = None,
     dark: Annotated[bool, typer.Option("--dark", help="For dark screens.")] = False,
+    force: Force = False,
 ) -> None:
     """Draw a run: joints, torques against limits, energy ledger, tracking error, phase portrait, error."""
-    path = output or Path(run).with_suffix(".png")
+    from robot_dyn.view.plots import PICTURES, PlotError
+
+    path = checked_output(output or Path(run).with_suffix(".png"), PICTURES, PlotError, [run], force)
     theme = "dark" if dark else "light"
     file = rd.save_plot(rd.load_run(run), path, *(only or ()), only=joint or None, theme=theme)
-    print(f"written: {file}")
+    say(f"written: {file}")
 
 
 @app.command()
 def demo(
     output: Annotated[str, typer.Option("-o", "--output", metavar="FOLDER", help="Where its files go.")] = "demo",
+    force: Force = False,
 ) -> None:
     """Load a real arm, cross-check the two roads, simulate it, and write a replay and a plot of the run."""
     from robot_dyn.cli import report
+    from robot_dyn.files import save
+    from robot_dyn.scene.scene import SCENE, SceneError
     from robot_dyn.scene.starters import starter
+    from robot_dyn.simulation.run_file import RUN, RunFileError
+    from robot_dyn.view.plots import PICTURES, PlotError
+    from robot_dyn.view.replay import PAGE, ReplayError
 
     folder = Path(output)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / "panda.toml").write_text(starter("panda_computed_torque"), encoding="utf-8")
     except OSError as error:
         raise QueryError(f"--output {output}: {error.strerror}; name a folder that can be written") from None
+    kinds = (("toml", SCENE, SceneError), ("html", PAGE, ReplayError), ("png", PICTURES, PlotError))
+    kinds += (("npz", RUN, RunFileError),)
+    files = {end: checked_output(folder / f"panda.{end}", kind, error, (), force) for end, kind, error in kinds}
+    save(files["toml"], lambda stream: stream.write(starter("panda_computed_torque").encode()), SceneError)
     panda = rd.load("panda").with_(lock={"panda_finger_joint1": 0.0})
-    say(report.demo_tables(panda))
-    print("\nThe same arm under computed torque, its model 20 % too heavy\n")
-    run = rd.simulate(rd.read_scene(folder / "panda.toml"))
-    print(run.summary)
-    print(f"""
+    say(*report.demo_tables(panda), "\nThe same arm under computed torque, its model 20 % too heavy\n")
+    run = rd.simulate(rd.read_scene(files["toml"]))
+    rd.save_run(run, files["npz"])
+    rd.save_replay(run, files["html"])
+    rd.save_plot(run, files["png"])
+    say(run.summary)
+    say(f"""
 Now look:
-  {rd.save_replay(run, folder / "panda.html")}  the replay: open it in a browser
-  {rd.save_plot(run, folder / "panda.png")}   its plots
-  {rd.save_run(run, folder / "panda.npz")}   the run itself
-  {folder / "panda.toml"}  its scene: change it, then robot-dyn simulate {folder / "panda.toml"}""")
+  {files["html"]}  the replay: open it in a browser
+  {files["png"]}   its plots
+  {files["npz"]}   the run itself
+  {files["toml"]}  its scene: change it, then robot-dyn simulate {files["toml"]}""")
 
 
 def _open(address: str, wanted: bool) -> None:

@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import RobotDynError, nearest, shorten
+from robot_dyn.files import Kind
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.integrate.methods import METHODS, method
@@ -20,6 +21,7 @@ from robot_dyn.scene.effects import Acting, AnyEffect, Edit
 from robot_dyn.scene.schema import NotNegative, Part, PerJoint, Positive, SceneError, per_joint
 from robot_dyn.simulation.setup import Setup
 
+SCENE = Kind("a scene", ".toml")
 ADAPTIVE = ("DOP853", "Radau")
 
 

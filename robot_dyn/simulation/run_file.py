@@ -13,13 +13,15 @@ from typing import Any
 import numpy as np
 
 from robot_dyn.errors import RobotDynError, shorten
-from robot_dyn.files import reading, save, target
+from robot_dyn.files import Kind, save, target
+from robot_dyn.reading import reading
 from robot_dyn.simulation.archive import Archive, ArchiveError, Header, write
 from robot_dyn.simulation.members import check_headers, member
 from robot_dyn.simulation.serialise import Arrays, SerialError, build, take_apart
 from robot_dyn.simulation.trajectory import Ending, Trajectory
 
 FORMAT = 3
+RUN = Kind("a run file", ".npz", b"PK\x03\x04")
 MAX_BYTES = 4 * 2**30  # of the arrays of a run that is read without being asked for more
 _MAX_TEXT = 2**28  # bytes of `about`, 4 a character; the largest URDF that loads has 2^24
 
@@ -31,12 +33,14 @@ class RunFileError(RobotDynError):
 def save_run(trajectory: Trajectory, path: str | Path) -> Path:
     """Write a trajectory to `path` (.npz is added if it has no suffix), whole or not at all.
 
+    Another run file under that name is replaced; a file of another kind is not.
+
     Raises:
         RunFileError: If it cannot be written.
     """
     if not isinstance(trajectory, Trajectory):
         raise RunFileError(f"save_run takes the Trajectory of rd.simulate, got {type(trajectory).__name__}")
-    path = target(path, ".npz", RunFileError)
+    path = target(path, RUN, RunFileError)
     arrays, plain = take_apart(trajectory)
     try:
         text = json.dumps({"format": FORMAT} | plain)

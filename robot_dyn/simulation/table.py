@@ -8,17 +8,22 @@ from pathlib import Path
 
 import numpy as np
 
-from robot_dyn.files import save, target
+from robot_dyn.files import Kind, save, target
 from robot_dyn.simulation.run_file import RunFileError
 from robot_dyn.simulation.trajectory import Trajectory
 
+TABLE = Kind("a table of a run", ".csv", b"t [s]")
+
 
 def export_csv(trajectory: Trajectory, path: str | Path) -> Path:
-    """Write the samples as a table, a row each, with names and units in the heading.
+    """Write the samples to `path` (.csv is added if it has no suffix), whole or not at all.
+
+    Another table of a run under that name is replaced; a file of another kind is not.
 
     Raises:
         RunFileError: If it cannot be written.
     """
+    path = target(path, TABLE, RunFileError)
     names = trajectory.joint_names
     heading = ["t [s]"]
     for key, unit in (("q", "rad or m"), ("v", "rad/s or m/s"), ("a", "rad/s² or m/s²"), ("tau", "N m or N")):
@@ -30,6 +35,4 @@ def export_csv(trajectory: Trajectory, path: str | Path) -> Path:
 
     table = io.StringIO()
     csv.writer(table).writerows([heading, *np.hstack(columns).tolist()])
-    return save(
-        target(path, ".csv", RunFileError), lambda stream: stream.write(table.getvalue().encode()), RunFileError
-    )
+    return save(path, lambda stream: stream.write(table.getvalue().encode()), RunFileError)

@@ -24,7 +24,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MOST_JOINTS = 64  # that one figure shows
-_FORMATS = (".png", ".svg", ".pdf")
+PICTURES = (
+    files.Kind("a plot", ".png", b"\x89PNG"),
+    files.Kind("a plot", ".svg", b"<?xml"),
+    files.Kind("a plot", ".pdf", b"%PDF"),
+)
 _FORCE = {"rad": "N m", "m": "N", "rad or m": "N m or N"}
 
 
@@ -189,6 +193,8 @@ def plot(
 def save_plot(run: Trajectory, path: str | Path, *names: str, dpi: float = 150, **options: Any) -> Path:
     """Write a figure of a run as PNG, SVG or PDF by the suffix of `path` (.png is added if it has none).
 
+    Another picture of that format under that name is replaced; a file of another kind is not.
+
     Args:
         run: As `plot`.
         path: Where to.
@@ -199,9 +205,7 @@ def save_plot(run: Trajectory, path: str | Path, *names: str, dpi: float = 150, 
     Raises:
         PlotError: If it cannot be written; else as `plot`.
     """
-    path = files.target(path, ".png", PlotError)
-    if path.suffix.lower() not in _FORMATS:
-        raise PlotError(f"{path}: {path.suffix!r} is no format of plots; end the name with {', '.join(_FORMATS)}")
+    path = files.target(path, PICTURES, PlotError)
     picture = io.BytesIO()
     figure = plot(run, *names, **options)
     try:

@@ -8,13 +8,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robot_dyn.errors import ModelWarning
-from robot_dyn.files import save, target
+from robot_dyn.files import Kind, save, target
 from robot_dyn.simulation.trajectory import Trajectory
 from robot_dyn.view.document import ReplayError, document
 from robot_dyn.view.page import page
 
 if TYPE_CHECKING:
     from robot_dyn.view.server import Server
+
+PAGE = Kind("a page", ".html", b"<!DOCTYPE html>")
 
 
 def replay(
@@ -57,12 +59,14 @@ def save_replay(
 ) -> Path:
     """Write a replay as one HTML file that needs neither server nor network; arguments as of `replay`.
 
+    Another page under that name is replaced; a file of another kind is not.
+
     Raises:
         ReplayError: If a run has no samples.
         QueryError: If it carries no robot, or `frame` is no link of it.
         ReplayError: If the file cannot be written.
     """
-    file = target(path, ".html", ReplayError)
+    file = target(path, PAGE, ReplayError)
     text = page(_told((run, *ghosts), package_dirs, frame, inertia) | {"live": False}).encode()
     return save(file, lambda stream: stream.write(text), ReplayError)
 

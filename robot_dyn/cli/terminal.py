@@ -1,0 +1,109 @@
+"""What the command says, and where it goes: no control character of a file, no traceback of a pipe or full disk."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import sys
+from collections.abc import Iterable
+from typing import Any
+
+from robot_dyn.errors import RobotDynError, escaped
+
+_MOST = 4000  # characters of a message
+
+
+class OutputError(RobotDynError):
+    """Standard output that cannot be written."""
+
+
+def open_streams() -> None:
+    """Give the process the three streams that it may have been started without; unknown characters become ?."""
+    while (handle := os.open(os.devnull, os.O_RDWR)) <= 2:  # else a file opened later would take the place of one
+        pass
+    os.close(handle)
+    if sys.stdout is None:  # closed: what is written to it fails, as it does on /dev/full
+        sys.stdout = os.fdopen(os.open(os.devnull, os.O_RDONLY), "w", encoding="utf-8")
+    if sys.stderr is None:
+        sys.stderr = os.fdopen(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8")
+    for stream in (sys.stdout, sys.stderr):
+        stream.reconfigure(errors="replace")  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def say(*renderables: Any) -> None:
+    """Print texts, whose lines stay lines, and tables.
+
+    A reader of a pipe that has seen enough is no error: the rest is dropped.
+
+    Raises:
+        OutputError: If standard output cannot be written.
+    """
+    from rich.console import Console
+    from rich.segment import Segment
+
+    class Safe(Console):
+        def render(self, *args: Any, **options: Any) -> Iterable[Segment]:
+            for segment in super().render(*args, **options):
+                yield segment if segment.control else segment._replace(text=_lines(segment.text))
+
+    watched = sys.stdout.isatty()
+    console = Safe(highlight=False, markup=False, emoji=False, width=None if watched else 1000)  # a pipe has no edge
+    for each in renderables:
+        put(f"{_lines(each)}\n") if isinstance(each, str) else _guarded(lambda each=each: console.print(each))
+
+
+def put(text: str) -> None:
+    """Write a text that ends its own lines; errors as of `say`."""
+    _guarded(lambda: (sys.stdout.write(text), sys.stdout.flush()))
+
+
+def say_json(value: Any) -> None:
+    """Print a document as JSON; errors as of `say`."""
+    text = json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False)
+    put(re.sub(r"[^\n\x20-\x7e]", lambda match: _json_escaped(match[0]), text) + "\n")
+
+
+def tell(text: str) -> None:
+    """Write one line to standard error, if there is one."""
+    line = escaped(text)
+    try:
+        print(line if len(line) <= _MOST else line[: _MOST - 1] + "…", file=sys.stderr, flush=True)
+    except OSError:
+        _drop(sys.stderr)
+
+
+def finish() -> None:
+    """Write what is left in the buffers, before the interpreter does; errors as of `say`."""
+    _guarded(sys.stdout.flush)
+
+
+def _guarded(write: Any) -> None:
+    try:
+        write()
+    except BrokenPipeError:
+        _drop(sys.stdout)
+    except OSError as error:
+        raise failed(error) from None
+
+
+def failed(error: OSError) -> OutputError:
+    """What to raise where standard output cannot be written; what is still in its buffer is dropped."""
+    _drop(sys.stdout)
+    return OutputError(f"standard output cannot be written ({error.strerror}); redirect it elsewhere")
+
+
+def _drop(stream: Any) -> None:
+    """Let all that is written to a stream from now on, and what it still has in its buffer, go nowhere."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, stream.fileno())
+    os.close(nowhere)
+
+
+def _lines(text: str) -> str:
+    return "\n".join(map(escaped, text.split("\n")))
+
+
+def _json_escaped(letter: str) -> str:
+    """The letter, or its JSON escape if it is a control character."""
+    return letter if escaped(letter) == letter else json.dumps(letter)[1:-1] if ord(letter) != 127 else "\\u007f"
