@@ -216,7 +216,7 @@ def test_friction_of_tied_joints_counts_by_virtual_work() -> None:
         (lambda: rd.ExternalWrench("pole", WRENCH, start_s=2.0, end_s=1.0), "end_s must lie after"),
         (lambda: rd.EffortLimit(-1.0), "limit must not be negative"),
         (lambda: Plant(ROBOT, "friction"), "give effects, or 'urdf'"),
-        (lambda: Plant(ROBOT, [3]), "3 is no Effect"),
+        (lambda: Plant(ROBOT, [3]), "3 is neither a Force nor a Bound"),
         (lambda: Plant(object(), "urdf"), "needs a robot with a URDF"),
     ],
 )

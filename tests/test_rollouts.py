@@ -190,7 +190,7 @@ def test_what_has_no_meaning_is_refused() -> None:
         with pytest.raises(QueryError, match=message):
             rd.rollouts(SETUP, **options)
     with pytest.raises(QueryError, match="rollouts take an explicit or a Gauss method"):
-        rd.rollouts(replace(SETUP, integrator=rd.Adaptive()))
+        rd.rollouts(replace(SETUP, integrator=rd.Adaptive(), step_s=1e-3))
     with pytest.raises(TraceError, match="effect table"):
         rd.rollouts(replace(SETUP, plant=rd.Plant(ARM, [Table()])))
 

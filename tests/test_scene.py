@@ -134,7 +134,10 @@ MISTAKES = {
     "unknown robot": (SCENE.replace("planar_2r", "planar_3r"), ["planar_3r", "nearest: planar_2r"]),
     "unknown method": ('method = "rk5"' + SCENE, ["method", "rk5", "rk4"]),
     "unknown effect": (SCENE + '[[effect]]\nkind = "viscous"', ["effect[0]", "viscous"]),
-    "unknown frame": (SCENE + '[[effect]]\nkind = "external_wrench"\nframe = "tipp"', ["tipp", "nearest: tip"]),
+    "unknown frame": (
+        SCENE + '[[effect]]\nkind = "external_wrench"\nframe = "tipp"\nforce_N = [1, 0, 0]',
+        ["tipp", "nearest: tip"],
+    ),
     "missing gain": (SCENE + '[control]\nkind = "pd"', ["control.frequency_rad_per_s", "required"]),
     "reference alone": (SCENE + PD.split("[reference]")[1].join(["[reference]", ""]), ["reference", "[control]"]),
     "times and points": (

@@ -30,6 +30,11 @@ def controllers(period: float) -> list:
     return laws
 
 
+def stepped(method, step: float) -> dict:
+    """A method and its step; an adaptive one has none."""
+    return {"integrator": method} | ({} if isinstance(method, rd.Adaptive) else {"step_s": step})
+
+
 def name(each) -> str:
     return getattr(each, "name", type(each).__name__)
 
@@ -39,9 +44,8 @@ def test_torque_of_a_sampled_controller_is_held_between_its_ticks(method) -> Non
     """At a tick it is the law's, of the state there; up to the next one, the same to the last bit."""
     period, count = 0.012, 20
     law = rd.PDGravity(DOUBLE, GOAL, [80.0, 20.0], [9.0, 2.0], period_s=period)
-    run = rd.simulate(
-        PLANT, **START, duration_s=period * count, controller=law, integrator=method, step_s=2e-3, record_period_s=1e-4
-    )
+    common = {**START, "duration_s": period * count, "controller": law, "record_period_s": 1e-4}
+    run = rd.simulate(PLANT, **common, **stepped(method, 2e-3))
     ticks = np.searchsorted(run.t, period * np.arange(count + 1) - 1e-12)
     np.testing.assert_allclose(run.t[ticks], period * np.arange(count + 1), atol=1e-14)  # steps end there
     for tick, following in pairwise(ticks):
@@ -58,7 +62,7 @@ def test_torque_of_a_sampled_controller_is_held_between_its_ticks(method) -> Non
 def test_memory_of_a_sampled_pid_advances_once_a_tick(method, step: float) -> None:
     """z⁺ = z + period · ż at the tick, z = 0 at the first: τ at each tick is that of the recursion, to rounding."""
     law = rd.PID(GOAL, [80.0, 20.0], [900.0, 400.0], [9.0, 2.0], effort_limit=[25.0, 8.0], period_s=0.012)
-    run = rd.simulate(PLANT, **START, duration_s=0.24, controller=law, integrator=method, step_s=step)
+    run = rd.simulate(PLANT, **START, duration_s=0.24, controller=law, **stepped(method, step))
     assert run.outcome.ending == "finished", run.outcome.advice
     ticks = np.searchsorted(run.t, 0.012 * np.arange(21) - 1e-12)
     z = np.zeros(2)

@@ -84,8 +84,10 @@ class PID(Controller):
             acts = (kd > 0) & (ki > 0)
             time = np.sqrt((kd[acts] / ki[acts]).max()) if acts.any() else 1.0  # without ki nothing winds up
         else:
-            time = self.tracking_time_s
-        object.__setattr__(self, "tracking_time_s", positive("tracking_time_s", time))
+            time = positive("tracking_time_s", self.tracking_time_s)
+            if np.isinf(self.effort_limit).all():
+                raise ControlError("tracking_time_s has no effect without an effort_limit; give one, or leave it out")
+        object.__setattr__(self, "tracking_time_s", float(time))
 
     @property
     def n(self) -> int:

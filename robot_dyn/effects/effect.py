@@ -24,7 +24,10 @@ _STATED = {"limit": "effort_limit"}  # the attribute of a Robot, where it is not
 
 
 class Effect:
-    """Something that acts on the joints. Subclass one of the four kinds below."""
+    """Something that acts on the joints: a `Force` or a `Bound`; a plant refuses anything else.
+
+    Subclass one of the four kinds below.
+    """
 
     @property
     def name(self) -> str:
@@ -109,13 +112,19 @@ def number(name: str, values: Any, infinite: bool = False) -> np.ndarray:
 
 
 def _of(dynamics: Any, key: str, values: Any) -> np.ndarray:
-    """The (n,) array of values by joint name, or of what the file states."""
+    """The (n,) array of values by joint name, or of what the file states, which must not be nothing."""
     names = dynamics.joint_names
     if values is URDF:
         try:
-            return getattr(dynamics, _STATED.get(key, key))
+            stated = getattr(dynamics, _STATED.get(key, key))
         except AttributeError:
             raise EffectError(f"{key}='urdf' needs a Robot, got {type(dynamics).__name__}") from None
+        if np.all(stated == _ELSEWHERE.get(key, 0.0)):
+            raise EffectError(
+                f"{key}='urdf' has no effect: the file of {dynamics.name} states no {key} for any joint; give numbers,"
+                " or leave the effect out"
+            )
+        return stated
     for name in values.keys() - set(names):
         raise EffectError(f"{key}: no joint {name!r}; {nearest(str(name), names)}")
     return np.array([values.get(name, _ELSEWHERE.get(key, 0.0)) for name in names])

@@ -43,8 +43,11 @@ class Plant:
         except TypeError:
             raise EffectError(f"effects must be several, such as [rd.ViscousFriction(0.1)], got {effects!r}") from None
         for effect in effects:
-            if not isinstance(effect, Effect):
-                raise EffectError(f"{effect!r} is no Effect; subclass Conservative, Dissipative, Active or Bound")
+            if not isinstance(effect, Force | Bound):
+                raise EffectError(
+                    f"{effect!r} is neither a Force nor a Bound, so nothing would evaluate it; subclass Conservative,"
+                    " Dissipative, Active or Bound"
+                )
         object.__setattr__(self, "effects", tuple(effect.on(dynamics) for effect in effects))
 
     @cached_property

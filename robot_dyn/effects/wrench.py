@@ -12,7 +12,7 @@ import numpy as np
 from robot_dyn.arithmetic import Array, transpose
 from robot_dyn.arithmetic import apply as times
 from robot_dyn.effects.effect import Active, number
-from robot_dyn.errors import EffectError
+from robot_dyn.errors import EffectError, QueryError
 from robot_dyn.model.dynamics import Axes, Dynamics
 
 
@@ -48,6 +48,13 @@ class ExternalWrench(Active):
             raise EffectError(f"end_s must lie after start_s, got {self.start_s} and {self.end_s}")
         object.__setattr__(self, "wrench", wrench)
         object.__setattr__(self, "expressed_in", Axes.of(self.expressed_in))
+
+    def on(self, dynamics: Any) -> ExternalWrench:
+        try:
+            dynamics.placement(np.zeros(dynamics.n), self.frame)  # so that an unknown link is told now
+        except QueryError as error:
+            raise EffectError(f"external_wrench: {error}") from None
+        return self
 
     @property
     def switches(self) -> tuple[float, ...]:

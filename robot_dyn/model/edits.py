@@ -79,23 +79,30 @@ class Edits:
 
     def with_(self, joint_names: tuple[str, ...], **changes: Unpack[Changes]) -> Edits:
         """These edits and more, as `Robot.with_`; `joint_names` are the joints that can be named."""
+        for name in changes.keys() - Changes.__annotations__.keys():
+            raise EditError(f"no edit {name!r}; {nearest(name, Changes.__annotations__)}")
         new = self
-        if (gravity := changes.get("gravity")) is not None:
+        if "gravity" in changes:
+            gravity = changes["gravity"]
             new = replace(new, gravity=tuple(_numbers("gravity", gravity, (3,)).tolist()))
-        if (armature := changes.get("armature")) is not None:
+        if "armature" in changes:
+            armature = changes["armature"]
             new = replace(new, armature=tuple(by_joint("armature", armature, joint_names).items()))
-        if (lock := changes.get("lock")) is not None:
+        if "lock" in changes:
+            lock = changes["lock"]
             if not isinstance(lock, Mapping):
                 raise EditError(
                     f"lock must give values by joint name, such as {{{joint_names[0]!r}: 0.0}}, got {lock!r}"
                 )
             new = replace(new, lock=new.lock + tuple(by_joint("lock", lock, joint_names).items()))
-        if (payload := changes.get("payload")) is not None:
+        if "payload" in changes:
+            payload = changes["payload"]
             more = tuple(payload) if isinstance(payload, Iterable) else (payload,)
             if not all(isinstance(each, Payload) for each in more):
                 raise EditError(f"payload must be a Payload or several, got {payload!r}")
             new = replace(new, payloads=new.payloads + more)
-        if (mass_scale := changes.get("mass_scale")) is not None:
+        if "mass_scale" in changes:
+            mass_scale = changes["mass_scale"]
             factor = float(_numbers("mass_scale", mass_scale, ()))
             if factor <= 0:
                 raise EditError(f"mass_scale must be positive, got {factor:g}")

@@ -13,9 +13,22 @@ from robot_dyn.control.controller import Controller
 from robot_dyn.control.independent_joint import PD, PID, gains_from
 from robot_dyn.control.operational_space import OperationalSpace
 from robot_dyn.control.reference import PiecewisePolynomial, hold, quintic, via_points
+from robot_dyn.effects.actuator import stated_efforts
+from robot_dyn.effects.effect import URDF
 from robot_dyn.model.robot import Robot
 from robot_dyn.scene.effects import Edit
-from robot_dyn.scene.schema import NotNegative, Number, Part, PerJoint, Positive, SceneError, Vector3, per_joint
+from robot_dyn.scene.schema import (
+    NotNegative,
+    Number,
+    Part,
+    PerJoint,
+    Positive,
+    SceneError,
+    Stated,
+    Truth,
+    Vector3,
+    per_joint,
+)
 
 
 class Hold(Part):
@@ -63,7 +76,7 @@ class Line(Part):
     by_m: Vector3
     duration_s: Positive
     start_s: NotNegative = 0.0
-    hold_orientation: bool = True
+    hold_orientation: Truth = True
 
     def build(self, robot: Robot, q0: np.ndarray, frame: str | None) -> CartesianReference:
         """The reference."""
@@ -81,7 +94,7 @@ class Circle(Part):
     normal: Vector3 = (0.0, 0.0, 1.0)
     to_centre: Vector3 = (0.0, 1.0, 0.0)
     turns: Positive = 1.0
-    hold_orientation: bool = True
+    hold_orientation: Truth = True
 
     def build(self, robot: Robot, q0: np.ndarray, frame: str | None) -> CartesianReference:
         """The reference."""
@@ -120,14 +133,15 @@ class Control(Part):
     """A controller; gains follow from the closed loop's frequency ω and damping ratio ζ.
 
     kp = ω², kd = 2 ζ ω, times the diagonal of M at the start for joint controllers without a model in the loop. PID has
-    ki = integral_rate kp and is cut at the effort limits of the file. Operational space holds the posture of the start
-    with a tenth of the stiffness.
+    ki = integral_rate kp and is cut at effort_limit_N_m, unless given the limits of the file. Operational space holds
+    the posture of the start with a tenth of the stiffness.
     """
 
     kind: Literal["pd", "pid", "pd_gravity", "feed_forward", "computed_torque", "operational_space"]
     frequency_rad_per_s: PerJoint
     damping_ratio: PerJoint = 1.0
     integral_rate_per_s: Positive = 1.0
+    effort_limit_N_m: Stated = "urdf"
     period_s: NotNegative = 0.0
     frame: str | None = None
     model: Model = Model()
@@ -138,6 +152,9 @@ class Control(Part):
         Raises:
             SceneError: If the reference is none of its kind.
         """
+        for key, kinds in _OF_ONE_KIND.items():
+            if key in self.model_fields_set and self.kind not in kinds:
+                raise SceneError(f"control.{key}: has no effect on {self.kind}, only on {', '.join(kinds)}; remove it")
         model, wanted = self.model.build(described, robot), reference.build(robot, q0, self.frame)
         cartesian = isinstance(wanted, CartesianReference)
         if cartesian != (self.kind == "operational_space"):
@@ -156,10 +173,16 @@ class Control(Part):
         if self.kind == "computed_torque":
             return ComputedTorque(model, wanted, kp, kd, self.period_s)
         if self.kind == "pid":
-            return PID(wanted, kp, kp * self.integral_rate_per_s, kd, robot.effort_limit, period_s=self.period_s)
+            limit = per_joint("effort_limit_N_m", self.effort_limit_N_m, robot, elsewhere=np.inf)
+            limit = stated_efforts(robot) if limit is URDF else limit
+            return PID(wanted, kp, kp * self.integral_rate_per_s, kd, limit, period_s=self.period_s)
         if self.kind == "pd":
             return PD(wanted, kp, kd, self.period_s)
         return (PDGravity if self.kind == "pd_gravity" else FeedForward)(model, wanted, kp, kd, self.period_s)
+
+
+# keys that other kinds of control do not read
+_OF_ONE_KIND = {"integral_rate_per_s": ("pid",), "effort_limit_N_m": ("pid",), "frame": ("operational_space",)}
 
 
 def _frame(frame: str | None) -> str:

@@ -5,18 +5,17 @@ from __future__ import annotations
 from math import inf
 from typing import Annotated, Literal
 
-import numpy as np
 from pydantic import Field
 
-from robot_dyn.effects.actuator import EffortLimit, stated_efforts
-from robot_dyn.effects.effect import URDF, Effect
+from robot_dyn.effects.actuator import EffortLimit
+from robot_dyn.effects.effect import Effect
 from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFriction
 from robot_dyn.effects.joint_limit import joint_stops
 from robot_dyn.effects.spring import Spring
 from robot_dyn.effects.wrench import ExternalWrench
 from robot_dyn.model.edits import STANDARD_GRAVITY, Payload
 from robot_dyn.model.robot import Robot
-from robot_dyn.scene.schema import NotNegative, Number, Part, PerJoint, Positive, Stated, Vector3, per_joint
+from robot_dyn.scene.schema import NotNegative, Number, Part, PerJoint, Positive, SceneError, Stated, Vector3, per_joint
 
 
 class Gravity(Part):
@@ -74,7 +73,7 @@ class Viscous(Part):
 
     def build(self, robot: Robot) -> tuple[Effect, ...]:
         """The effect."""
-        return (ViscousFriction(per_joint("damping", self.damping_N_m_s_per_rad, robot, robot.damping)),)
+        return (ViscousFriction(per_joint("damping", self.damping_N_m_s_per_rad, robot)),)
 
 
 class RegularisedCoulomb(Part):
@@ -86,7 +85,7 @@ class RegularisedCoulomb(Part):
 
     def build(self, robot: Robot) -> tuple[Effect, ...]:
         """The effect."""
-        friction = per_joint("friction", self.friction_N_m, robot, robot.friction)
+        friction = per_joint("friction", self.friction_N_m, robot)
         return (RegularisedCoulombFriction(friction, self.velocity_scale_rad_per_s),)
 
 
@@ -115,8 +114,8 @@ class JointStops(Part):
     def build(self, robot: Robot) -> tuple[Effect, ...]:
         """The elastic and the dissipative part."""
         return joint_stops(
-            per_joint("lower", self.lower_rad, robot, robot.lower, elsewhere=-1e9),
-            per_joint("upper", self.upper_rad, robot, robot.upper, elsewhere=1e9),
+            per_joint("lower", self.lower_rad, robot, elsewhere=-1e9),
+            per_joint("upper", self.upper_rad, robot, elsewhere=1e9),
             per_joint("stiffness", self.stiffness_N_m_per_rad, robot),
             per_joint("damping", self.damping_N_m_s_per_rad2, robot),
         )
@@ -134,8 +133,9 @@ class Wrench(Part):
     end_s: Positive | None = None
 
     def build(self, robot: Robot) -> tuple[Effect, ...]:
-        """The effect; an unknown link is told now."""
-        robot.jacobian([0.0] * robot.n, self.frame)
+        """The effect."""
+        if not any((*self.force_N, *self.torque_N_m)):
+            raise SceneError(f"external_wrench on {self.frame!r}: has no effect; give force_N or torque_N_m")
         end = inf if self.end_s is None else self.end_s
         return (ExternalWrench(self.frame, [*self.force_N, *self.torque_N_m], self.expressed_in, self.start_s, end),)
 
@@ -148,12 +148,7 @@ class Effort(Part):
 
     def build(self, robot: Robot) -> tuple[Effect, ...]:
         """The bound."""
-        return (EffortLimit(efforts(self.limit_N_m, robot)),)
-
-
-def efforts(limit: Stated, robot: Robot) -> np.ndarray:
-    """Effort limits (n,) of a scene, inf where none is given; those of the file must not be 0."""
-    return stated_efforts(robot) if limit == URDF else per_joint("limit", limit, robot, elsewhere=inf)
+        return (EffortLimit(per_joint("limit", self.limit_N_m, robot, elsewhere=inf)),)
 
 
 Edit = Gravity | Lock | Load | Armature

@@ -18,7 +18,7 @@ from robot_dyn.model.loading import load
 from robot_dyn.model.robot import Robot
 from robot_dyn.scene.control import AnyReference, Control, Hold
 from robot_dyn.scene.effects import Acting, AnyEffect, Edit
-from robot_dyn.scene.schema import NotNegative, Part, PerJoint, Positive, SceneError, per_joint
+from robot_dyn.scene.schema import NotNegative, Part, PerJoint, Positive, SceneError, Truth, per_joint
 from robot_dyn.simulation.setup import Setup
 
 SCENE = Kind("a scene", ".toml")
@@ -42,7 +42,7 @@ class Scene(Part):
     rtol: Positive = 1e-10
     atol: Positive = 1e-12
     record_period_s: NotNegative = 0.01
-    estimate_error: bool = True
+    estimate_error: Truth = True
     engine: Literal["auto", "interpreted", "compiled"] = "auto"
     start: Start = Start()
     effect: tuple[AnyEffect, ...] = ()
@@ -114,7 +114,24 @@ def parse_scene(text: str, source: str) -> Scene:
     if scene.method not in (*METHODS, *ADAPTIVE):
         names = nearest(scene.method, (*METHODS, *ADAPTIVE))
         raise SceneError(f"{source}: method: no method {shorten(scene.method)!r}; {names}")
+    if why := _without_effect(scene):
+        raise SceneError(f"{source}: {why}")
     return scene
+
+
+def _without_effect(scene: Scene) -> str:
+    """What a scene states and no run would heed, or nothing."""
+    own = ("step_s",) if scene.method in ADAPTIVE else ("rtol", "atol")
+    if unused := [key for key in own if key in scene.model_fields_set]:
+        kind = "chooses its own step" if scene.method in ADAPTIVE else "has a fixed step"
+        return f"{unused[0]}: has no effect, since {scene.method} {kind}; remove it, or name another method"
+    models = [] if scene.control is None else [("control.model.effects", scene.control.model.effects or ())]
+    for where, effects in (("effect", scene.effect), *models):
+        kinds = [effect.kind for effect in effects]
+        for kind in ("gravity", "armature"):
+            if kinds.count(kind) > 1:
+                return f"{where}: {kind} is named {kinds.count(kind)} times, and only the last would act; keep one"
+    return ""
 
 
 def _text(path: Path) -> str:

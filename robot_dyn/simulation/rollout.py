@@ -44,6 +44,7 @@ def rollouts(
 
     Args:
         setup: What to run, by an explicit or a Gauss method; it gives plant, controller, duration, steps and samples.
+            Its engine has no say here, and no errors are estimated: `simulate` one of the runs for that.
         q0: Positions at the start, (B, n); those of the setup for all runs unless given.
         v0: Velocities at the start, (B, n) or (n,).
         params: Values that differ from run to run, each (B,) or (B, n): a gain of the controller by its name, as

@@ -49,7 +49,8 @@ class Setup:
         duration_s: In [s].
         controller: What drives it, or None.
         integrator: A method of fixed step, or an `Adaptive` one.
-        step_s: Fixed step; made a little smaller where ticks, switches and the end ask for it.
+        step_s: Fixed step; made a little smaller where ticks, switches and the end ask for it. Not to be given
+            for an Adaptive method.
         record_period_s: Time between samples; 0 for every step.
         estimate_error: Whether companion runs of longer steps are made, which cost 3/4 of the run.
         about: Texts kept with the run.
@@ -86,14 +87,31 @@ class Setup:
             if not (real and least <= value < inf):
                 raise QueryError(f"{name} must be a positive number of seconds, got {value!r}")
             object.__setattr__(self, name, float(value))
+        if isinstance(self.integrator, Adaptive) and self.step_s != Setup.step_s:
+            raise QueryError("step_s has no effect on an Adaptive method; leave it out, or give Adaptive(max_step=…)")
         if self.engine not in ENGINES:
             raise QueryError(f"engine={self.engine!r}; give one of {', '.join(ENGINES)}")
         if not isinstance(self.controller, Controller | None):
             raise QueryError(f"controller: give one, such as rd.PD(…), or None, got {self.controller!r}")
         if self.controller is not None and self.controller.n != len(names):
             raise QueryError(f"the controller drives {self.controller.n} joints, the plant has {len(names)}")
+        self._check_model()
         self.plant.torque(0.0, self.q0, self.v0)  # so that an effect that does not fit is told now
         self.plant.actuation(np.zeros(len(names)))
+
+    def _check_model(self) -> None:
+        """That the controller means the joints and links of the plant; a file with other names all over may fit too."""
+        plant, model = self.plant.dynamics, getattr(self.controller, "model", None)
+        pairs = tuple(zip(getattr(model, "joint_names", ()), plant.joint_names, strict=False))
+        if any(own in plant.joint_names for own, _ in pairs):
+            for own, name in pairs:
+                if own != name:
+                    raise QueryError(
+                        f"the controller's model has the joint {own!r} where the plant has {name!r}; lock the same"
+                        " joints of both"
+                    )
+        if isinstance(frame := getattr(self.controller, "frame", None), str):
+            plant.placement(self.q0, frame)  # so that an unknown link is told now
 
     @property
     def stretches(self) -> tuple[Stretch, ...]:

@@ -17,6 +17,7 @@ import numpy as np
 from robot_dyn.control.cartesian import CartesianReference
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.effects.plant import Plant
+from robot_dyn.errors import QueryError, nearest
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.simulation.choice import choose
@@ -49,6 +50,10 @@ def simulate(
     Raises:
         QueryError: If the setup has no meaning. Whatever happens later is told by the trajectory's outcome.
     """
+    for name in options.keys() - Setup.__dataclass_fields__.keys():
+        raise QueryError(f"simulate: no option {name!r}; {nearest(name, Setup.__dataclass_fields__)}")
+    if isinstance(options.get("integrator"), Adaptive):
+        options = {"step_s": Setup.step_s} | options  # a step that was given for another method means nothing to it
     if isinstance(what, Setup):
         setup = replace(what, **options)
     else:
