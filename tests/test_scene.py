@@ -39,13 +39,23 @@ def write(tmp_path):
     return file
 
 
+def test_payload_starter_keeps_its_sampled_damping_below_one_reversal(write) -> None:
+    """All along: the largest eigenvalue of M⁻¹ kd T is below 1, from where on torque would reverse at every tick."""
+    setup = rd.read_scene(write(starter("panda_payload")))
+    run, control = rd.simulate(setup, estimate_error=False), setup.controller
+    worst = np.linalg.eigvals(np.linalg.solve(setup.plant.M(run.q), np.diag(control.kd))).real.max()
+    assert worst * control.period_s < 0.7
+    assert run.remarks == ()
+
+
 @pytest.mark.parametrize("name", starters())
 def test_starter_runs_and_closes_its_ledger(write, name: str) -> None:
-    """At its own settings, cut to half a second: residual ≤ 1e-9 of the energy exchanged."""
+    """At its own settings, cut to half a second: residual ≤ 1e-9 of the energy exchanged, and nothing to remark."""
     setup = rd.read_scene(write(starter(name)))
     run = rd.simulate(setup, duration_s=min(setup.duration_s, 0.5), estimate_error=False)
     assert run.outcome.ending == "finished"
     assert run.ledger.closure <= 1e-9
+    assert run.remarks == ()
 
 
 def test_what_a_scene_does_not_name_does_not_act(write) -> None:

@@ -129,7 +129,19 @@ def run(trajectory: Trajectory) -> Document:
         "error": None if error is None else _finite(error.final),
         "error_resolved_until": None if error is None else error.resolved_until,
         "tracking_error": trajectory.tracking_error,
+        "remarks": [asdict(remark) for remark in trajectory.remarks],
+        "extremes": _extremes(trajectory),
         "statistics": asdict(trajectory.statistics),
+    }
+
+
+def _extremes(trajectory: Trajectory) -> Document | None:
+    """The least and the largest of each quantity over all steps, by joint."""
+    if trajectory.extremes is None:
+        return None
+    return {
+        name: {"least": [_finite(x) for x in least], "largest": [_finite(x) for x in largest]}
+        for name, (least, largest) in zip(("q", "v", "tau"), trajectory.extremes, strict=True)
     }
 
 

@@ -13,9 +13,10 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.errors import RobotDynError
-from robot_dyn.integrate.adaptive import Adaptive, Status
+from robot_dyn.integrate.adaptive import Adaptive, Solution, Status
 from robot_dyn.integrate.integrator import IntegrationError, Integrator, System
 from robot_dyn.simulation.motion import Motion
+from robot_dyn.simulation.observer import Observer
 from robot_dyn.simulation.setup import Setup, Stretch
 
 WATCHED = 64  # steps between looks at the energy
@@ -51,11 +52,12 @@ class DivergedError(Exception):
 
 @final
 class Counter:
-    """Counts the steps and evaluations of a march."""
+    """Counts the steps and evaluations of a march, and shows each step to an observer."""
 
-    def __init__(self) -> None:
+    def __init__(self, observer: Observer | None = None) -> None:
         self.steps = 0
         self.evaluations = 0
+        self.observer = observer
 
     def counted(self, system: System) -> System:
         """The same system, its evaluations counted."""
@@ -93,7 +95,8 @@ def march(
         system = counter.counted(systems(held, stretch) if systems else motion.system(held, stretch))
         method = setup.integrator
         if isinstance(method, Adaptive):
-            y = yield from _adaptively(setup, replace_tolerance(method, factor), system, stretch, y, held, counter)
+            method = replace_tolerance(method, factor)
+            y = yield from _adaptively(setup, method, system, stretch, y, held, counter, motion)
         else:
             y = yield from _by_steps(setup, method, system, stretch, y, held, factor, counter, watch)
     y, held = watch.tick(setup.duration_s, y)
@@ -116,6 +119,8 @@ def _by_steps(
         yield Sample(t, y, held, shared=k * factor % 4 == 0)
         y = one_step(method, system, t, y, h, watch)
         counter.steps += 1
+        if counter.observer is not None:
+            counter.observer.step(t + h, y, held, held is None or (stretch.tick and k == 0))
         if counter.steps % WATCHED == 0:
             watch.look(t + h, y)
     return y
@@ -135,8 +140,9 @@ def one_step(method: Integrator, system: System, t: float, y: Array, h: float, w
 
 
 def _adaptively(
-    setup: Setup, method: Adaptive, system: System, stretch: Stretch, y: Array, held: Array | None, counter: Counter
-) -> Iterator[Sample]:
+    setup: Setup, method: Adaptive, system: System, stretch: Stretch, y: Array, held: Array | None, counter: Counter,
+    motion: Motion,
+) -> Iterator[Sample]:  # fmt: skip
     n = system.n
 
     def sane(_: float, y: Array) -> float:
@@ -144,6 +150,7 @@ def _adaptively(
 
     solution = method.solve(system, stretch.start, y, stretch.end, stop=sane)
     counter.steps += len(solution.times) - 1
+    _observe(counter.observer, motion, solution, held, stretch.tick)
     reached = float(solution.times[-1])
     period = setup.record_period_s or setup.duration_s / _SAMPLES
     first = max(0.0, np.ceil(stretch.start / period - 1e-9))
@@ -157,6 +164,20 @@ def _adaptively(
     if solution.status is Status.STOPPED:
         raise DivergedError(reached, f"a joint moves faster than {_RUNAWAY:g} rad/s: the control is unstable")
     return solution.states[-1]
+
+
+def _observe(observer: Observer | None, motion: Motion, solution: Solution, held: Array | None, tick: bool) -> None:
+    """Show the steps of a solution; the actuation of continuous control is that at their ends."""
+    if observer is None:
+        return
+    for k, (t, y) in enumerate(zip(solution.times[1:], solution.states[1:], strict=True)):
+        if held is None:
+            q, v, z, _ = motion.state(y)
+            try:
+                observer.seen[len(q) :] = motion.command(float(t), q, v, z)
+            except RobotDynError:  # y may be far off where a run fails
+                continue
+        observer.step(float(t), y, held, held is not None and tick and k == 0)
 
 
 @final

@@ -45,6 +45,7 @@ MEMBERS: Mapping[str, Member] = MappingProxyType(
         "deviation": Member(("m", ("n", 3))),
         "at_stop": Member(("m", "n"), "bool"),
         "wrenches/*": Member((None, 7)),
+        "extremes": Member((3, 2, "n"), finite=False),
         "error/t": Member(("k",)),
         "error/error": Member(("k",), finite=False),
     }

@@ -93,21 +93,26 @@ class Motion:
             y[2 * n : 2 * n + self.memory_size] = self.controller.next_memory(t, q, v, z)
         return y, held
 
-    def system(self, held: Array | None, stretch: Stretch) -> System:
+    def system(self, held: Array | None, stretch: Stretch, seen: Array | None = None) -> System:
         """The equation on one stretch of time.
 
         Args:
             held: The actuation that a sampled controller holds; None if it acts continuously.
             stretch: What switches at its ends acts as it does between them.
+            seen: Where the velocity and the actuation of each evaluation are written, (2n,).
         """
+        n = self.plant.dynamics.n
         first, last = np.nextafter(stretch.start, np.inf), np.nextafter(stretch.end, -np.inf)
 
         def rate(t: float, y: Array) -> Array:
             if y.ndim > 1:  # an implicit method asks for its Jacobian
                 return np.array([rate(t, row) for row in y.reshape(-1, y.shape[-1])]).reshape(y.shape)
-            return self.rate(min(max(t, first), last), y, held)[0]
+            made, u = self.rate(min(max(t, first), last), y, held)
+            if seen is not None:
+                seen[:n], seen[n:] = made[:n], u
+            return made
 
-        return System(rate, self.plant.dynamics.n)
+        return System(rate, n)
 
     def rate(self, t: float, y: Array, held: Array | None) -> tuple[Array, Array]:
         """f(t, y), and the actuation u; in floats or, for the compiled engine, in symbols.

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import final
 
 import numpy as np
 
 from robot_dyn.simulation.march import Counter, DivergedError, Sample, Systems, march
 from robot_dyn.simulation.motion import Motion
+from robot_dyn.simulation.observer import Observer
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.trajectory import Ending, Outcome
 
@@ -47,6 +49,7 @@ def collect(
     thin: int,
     systems: Systems | None = None,
     on_progress: Callable[[float], object] | None = None,
+    observer: Observer | None = None,
 ) -> Record:
     """March in Python; keep samples at the record period, and positions at the times that companions share.
 
@@ -57,8 +60,11 @@ def collect(
         thin: Shared states between those that are kept.
         systems: As of `march`.
         on_progress: Called with the time reached at each step.
+        observer: Sees each step.
     """
-    counter, kept, shared = Counter(), list[Sample](), list[Sample]()
+    counter, kept, shared = Counter(observer), list[Sample](), list[Sample]()
+    if observer is not None:
+        systems = partial(systems or motion.system, seen=observer.seen)
     next_record, t, seen = 0.0, 0.0, 0
     try:
         with np.errstate(all="ignore"):  # what overflows ends the march

@@ -54,6 +54,8 @@ def rollouts(
         threads: Number of threads; None for all processors.
         most_bytes: Refuse to record more than this.
 
+    Runs are not watched at every step, as those of `simulate` are: they carry no remarks.
+
     Returns:
         The runs, in the order given. Ctrl-C while they march ends them, and keeps what there is.
 

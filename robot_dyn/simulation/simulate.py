@@ -25,6 +25,8 @@ from robot_dyn.simulation.error import ErrorEstimate, difference, richardson
 from robot_dyn.simulation.ledger import Ledger
 from robot_dyn.simulation.loads import at_stop, wrenches
 from robot_dyn.simulation.motion import Motion
+from robot_dyn.simulation.observed import observer_of, remarks
+from robot_dyn.simulation.observer import Observer
 from robot_dyn.simulation.origin import origin
 from robot_dyn.simulation.record import Record, collect
 from robot_dyn.simulation.samples import compiled_rows, rows
@@ -61,7 +63,8 @@ def simulate(
     motion = Motion(setup.plant, setup.controller, getattr(setup.integrator, "canonical", False))
     machine, engine = choose(setup, motion)
     began = perf_counter()
-    record = _run(setup, motion, machine, 1, on_progress)
+    observer = observer_of(setup, motion)
+    record = _run(setup, motion, machine, 1, on_progress, observer)
     wall = perf_counter() - began
     error = None
     if setup.estimate_error and record.outcome.ending is not Ending.STOPPED:
@@ -71,7 +74,8 @@ def simulate(
     name = setup.integrator.method if isinstance(setup.integrator, Adaptive) else setup.integrator.name
     step = 0.0 if adaptive else record.outcome.t / max(record.steps, 1)
     statistics = Statistics(name, step, record.steps, record.evaluations, wall, companions, engine)
-    return _trajectory(setup, motion, machine, record, statistics, error)
+    observer.close()
+    return _trajectory(setup, motion, machine, record, statistics, error, observer)
 
 
 def _run(
@@ -80,16 +84,17 @@ def _run(
     machine: Machine | None,
     factor: int,
     on_progress: Callable[[float], object] | None = None,
+    observer: Observer | None = None,
 ) -> Record:
     """March in machine code, in the interpreted engine, or in that with its rate in machine code."""
     thin = max(1, sum(map(setup.steps, setup.stretches)) // (4 * _SHARED))
     if machine is None:
-        return collect(setup, motion, factor, thin, None, on_progress)
+        return collect(setup, motion, factor, thin, None, on_progress, observer)
     if machine.whole:
         from robot_dyn.simulation.machine.follow import follow
 
-        return follow(setup, motion, machine, factor, thin, on_progress)
-    return collect(setup, motion, factor, thin, partial(machine.system, setup=setup), on_progress)
+        return follow(setup, motion, machine, factor, thin, on_progress, observer)
+    return collect(setup, motion, factor, thin, partial(machine.system, setup=setup), on_progress, observer)
 
 
 def _estimate(setup: Setup, motion: Motion, machine: Machine | None, run: Record) -> ErrorEstimate:
@@ -112,6 +117,7 @@ def _trajectory(
     record: Record,
     statistics: Statistics,
     error: ErrorEstimate | None,
+    observer: Observer,
 ) -> Trajectory:
     """The samples with what follows from them."""
     t = record.t
@@ -126,6 +132,7 @@ def _trajectory(
     return Trajectory(
         names, t, q, v, a, tau, power, ledger, wanted, deviation, record.outcome, statistics, error, about,
         wrenches(plant, t, q), at_stop(plant, q),
+        remarks(setup, observer, t, np.hstack([q, v, tau])), observer.extremes,
     )  # fmt: skip
 
 

@@ -10,6 +10,8 @@ import numpy as np
 
 from robot_dyn.simulation.error import ErrorEstimate
 from robot_dyn.simulation.ledger import Ledger
+from robot_dyn.simulation.remarks import Remark
+from robot_dyn.simulation.remarks import lines as said
 
 _OPEN = 1e-3  # part of the energy exchanged beyond which a residual is no rounding and no small error
 
@@ -78,6 +80,8 @@ class Trajectory:
         wrenches: External wrench by link, rows (t, force, torque), (k, 7), in base axes at its frame, in SI units:
             at the samples and at both sides of each switch.
         at_stop: Whether each joint bears on a stop, (m, n); None without stops.
+        remarks: What was seen at every step that the samples need not show.
+        extremes: The least and the largest of q, v and tau over all steps, (3, 2, n); None if it was not watched.
     """
 
     joint_names: tuple[str, ...]
@@ -96,6 +100,8 @@ class Trajectory:
     about: dict[str, str] = field(default_factory=dict, repr=False)
     wrenches: dict[str, np.ndarray] = field(default_factory=dict)
     at_stop: np.ndarray | None = None
+    remarks: tuple[Remark, ...] = ()
+    extremes: np.ndarray | None = None
 
     @property
     def tracking_error(self) -> float | None:
@@ -115,6 +121,8 @@ class Trajectory:
             f"energy ledger: {residual}" + _after(leak),
             f"error of q: {self.error or 'not estimated (companion runs are off)'}",
         ]
+        lines += ["between samples: not watched"] if self.extremes is None else []
+        lines += said(self.remarks)
         if self.tracking_error is not None:
             what = "the frame, m" if self.wanted is None else "q"
             lines.append(f"tracking error of {what}: {self.tracking_error:.3e} rms")

@@ -15,6 +15,7 @@ import numpy as np
 
 from robot_dyn.errors import QueryError, RobotDynError
 from robot_dyn.simulation.origin import robot_of
+from robot_dyn.simulation.remarks import lines
 from robot_dyn.simulation.trajectory import Trajectory
 from robot_dyn.view import commands
 from robot_dyn.view.arrows import arrows
@@ -71,7 +72,7 @@ def document(
     center, radius = _sphere(shown)
     layers = [_overlays(each, radius, frame, number > 0) for number, each in enumerate(shown)]
     scale = arrows([(each.stage, each.run, layer) for each, layer in zip(shown, layers, strict=True)], radius)
-    found, tracks, notes, problems = [ground(center, radius)], {}, [], []
+    found, tracks, notes, problems, remarks = [ground(center, radius)], {}, [], [], []
     for number, (each, layer) in enumerate(zip(shown, layers, strict=True)):
         clear = GHOST if number else 1.0
         found += each.stage.draw(each.drawing.pieces, clear) + layer.commands
@@ -79,10 +80,12 @@ def document(
         who = "" if len(shown) == 1 else f"{each.name}: "
         notes += [who + note for note in (*each.notes, *each.drawing.remarks, *layer.notes)]
         problems += [who + note for note in (*each.problems, *each.drawing.notes)]
+        remarks += [who + line for line in lines(each.run.remarks)]
     return {
         "title": " and ".join(each.name for each in shown),
         "outcome": "; ".join(_outcome(each, len(shown)) for each in shown),
         "duration": max(float(each.run.t[-1]) for each in shown),
+        "remarks": remarks,
         "problems": problems,
         "notes": [*notes, *scale, f"the squares on the ground are {squares(radius):g} m wide"],
         "scene": {"center": center.tolist(), "radius": radius},

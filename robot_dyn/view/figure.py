@@ -7,16 +7,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
+from robot_dyn.simulation.remarks import lines
 from robot_dyn.simulation.trajectory import Ending, Trajectory
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _WILD = 1e3  # times its usual size: what grew beyond it while a run diverged needs a logarithm
+_LINE, _WIDE = 0.15, 160  # height of a line of text in [inch], its letters
 _ACROSS = 6  # entries of a legend beside each other
 NEAR = 0.2  # of its effort limit: a torque that stays below is drawn without it
 _PIXELS = 1000  # across a cell; of the samples that fall on one, the least and the largest are drawn
@@ -72,15 +75,21 @@ def draw(panels: list[Panel], run: Trajectory, theme: Mapping[str, Any]) -> Figu
 
     width, left, right, head = 11.0, 0.9, 0.2, 0.5
     end = run.outcome
-    tall = (0.6 if end.advice else 0.45) + sum(
-        head + sum(p.height + _above(row) + _below(row) for row in p.rows) for p in panels
+    said = f"{run.about.get('robot', 'run')}: {end.ending} at t = {end.t:g} s, {run.statistics.method}"
+    remarks = [part for line in lines(run.remarks) for part in wrap(line, _WIDE)]
+    opening = [(line, theme["ink"]) for line in (said, end.advice) if line]
+    opening += [(line, theme["lines"][1]) for line in remarks]
+    tall = (
+        0.3
+        + _LINE * len(opening)
+        + sum(head + sum(p.height + _above(row) + _below(row) for row in p.rows) for p in panels)
     )
     figure = Figure(figsize=(width, tall), facecolor=theme["paper"])
     ink = {"color": theme["ink"], "parse_math": False}
-    y = tall - (0.45 if end.advice else 0.3)
-    said = f"{run.about.get('robot', 'run')}: {end.ending} at t = {end.t:g} s, {run.statistics.method}"
-    for k, line in enumerate(filter(None, (end.advice, said))):
-        figure.text(0.15 / width, (y + 0.15 * k) / tall, _drawable(_short(line, 160)), fontsize=9, **ink)
+    y = tall - 0.15 - _LINE * len(opening)
+    for k, (line, colour) in enumerate(opening, start=1):
+        at = 0.15 / width, (tall - 0.15 - _LINE * k) / tall
+        figure.text(*at, _drawable(_short(line, _WIDE)), fontsize=9, **ink | {"color": colour})
     for panel in panels:
         y -= head
         top = y / tall + 0.15 / tall

@@ -66,11 +66,12 @@ def joints(view: View) -> Panel:
 
 
 def torques(view: View) -> Panel:
-    """Actuation of each joint against ± its effort limit, with the part of the limit that was used."""
+    """Actuation of each joint against ± its effort limit, with the part of it that was used, between samples too."""
     cells = []
     for i, name in zip(view.joints, view.names, strict=True):
         tau, limit = view.run.tau[:, i], float(view.limits[i])
-        peak = float(np.max(np.abs(tau), where=np.isfinite(tau), initial=0.0))
+        every = tau if view.run.extremes is None else np.append(tau, view.run.extremes[2, :, i])
+        peak = float(np.max(np.abs(every), where=np.isfinite(every), initial=0.0))
         used = f"{peak / limit:.0%}" if peak < 10 * limit else "over 1000%"
         note = f", {used} used" if np.isfinite(limit) else ""
         curves, unit = (Curve("τ", view.run.t, tau),), _FORCE[view.units[i]]

@@ -18,6 +18,7 @@ from robot_dyn.simulation.machine.places import WATCHED, Ended, Now
 from robot_dyn.simulation.machine.timetable import Timetable, timetable
 from robot_dyn.simulation.march import DivergedError, Watch, one_step
 from robot_dyn.simulation.motion import Motion
+from robot_dyn.simulation.observer import CHUNK, Observer
 from robot_dyn.simulation.record import Record
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.trajectory import Ending, Outcome
@@ -33,6 +34,7 @@ def follow(
     factor: int,
     thin: int,
     on_progress: Callable[[float], object] | None = None,
+    observer: Observer | None = None,
 ) -> Record:
     """Run a setup in machine code.
 
@@ -43,16 +45,19 @@ def follow(
         factor: Length of a step, in steps of the setup; 1 keeps samples.
         thin: Shared states between those that are kept.
         on_progress: Called with the time reached now and then.
+        observer: Sees each step.
     """
-    return _Run(setup, motion, machine, factor, thin).record(on_progress)
+    return _Run(setup, motion, machine, factor, thin, observer).record(on_progress)
 
 
 @final
 class _Run:
     """A run on its way."""
 
-    def __init__(self, setup: Setup, motion: Motion, machine: Machine, factor: int, thin: int) -> None:
-        self.setup, self.motion, self.machine = setup, motion, machine
+    def __init__(
+        self, setup: Setup, motion: Motion, machine: Machine, factor: int, thin: int, observer: Observer | None
+    ) -> None:
+        self.setup, self.motion, self.machine, self.observer = setup, motion, machine, observer
         self.table, self.watch = timetable(setup, factor), Watch(setup, motion)
         self.work = machine.work(motion.start(setup.q0, setup.v0))
         places, n, counts = machine.program.places, machine.program.n, self.table.counts
@@ -74,6 +79,8 @@ class _Run:
             "clock": np.array([0.0 if factor == 1 else np.inf, setup.record_period_s, 1e-9 * setup.step_s]),
             "now": self.now,
         }
+        if observer is not None:
+            self.arrays["columns"] = observer.columns
 
     @property
     def time(self) -> float:
@@ -106,8 +113,8 @@ class _Run:
     def _march(self, on_progress: Callable[[float], object] | None) -> None:
         budget = _FIRST
         while True:
-            self.now[Now.BUDGET], began = budget, perf_counter()
-            ended = self.machine.run(self.work, self.table, **self.arrays)
+            began = perf_counter()
+            ended = self._go(budget)
             if ended is Ended.DONE:
                 return
             if ended is Ended.PAUSED:
@@ -117,6 +124,21 @@ class _Run:
                     on_progress(self.time)
             else:
                 self._judge(ended)
+
+    def _go(self, budget: int) -> Ended:
+        """So many steps, or fewer, with a rest whenever the observer has all columns to look at."""
+        observer = self.observer
+        while True:
+            self.now[Now.BUDGET] = steps = budget if observer is None else min(budget, CHUNK - observer.filled)
+            if observer is not None:
+                self.now[Now.COLUMN] = observer.filled
+            ended = self.machine.run(self.work, self.table, **self.arrays)
+            if observer is not None:
+                observer.filled = int(self.now[Now.COLUMN])
+                observer.look()
+            budget -= steps
+            if ended is not Ended.PAUSED or budget <= 0:
+                return ended
 
     def _judge(self, ended: Ended) -> None:
         """Do a doubtful step, tick or look at the energy in the interpreted engine; DivergedError ends the run."""
@@ -128,8 +150,12 @@ class _Run:
         elif ended is Ended.DOUBTFUL:
             h, method = float(self.table.lengths[stretch]), self.setup.integrator
             assert isinstance(method, Integrator)
-            system = self.motion.system(self.held, self.setup.stretches[stretch])
+            seen = None if self.observer is None else self.observer.seen
+            system = self.motion.system(self.held, self.setup.stretches[stretch], seen)
             y = one_step(method, system, t, y, h, self.watch)
+            if self.observer is not None:
+                acted = self.held is None or (self.now[Now.STEP] == 0 and self.setup.stretches[stretch].tick)
+                self.observer.step(t + h, y, self.held, bool(acted))
             self.now[Now.STEP] += 1
             self.now[Now.STEPS] += 1
             if self.now[Now.STEPS] % WATCHED == 0:

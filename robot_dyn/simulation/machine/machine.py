@@ -70,9 +70,21 @@ class Machine:
             "lanes": np.zeros((len(Lane), lanes)), "alive": np.ones(lanes, np.int64), "given": empty((0, 0)),
             "which": empty(0, np.int64), "out_step": empty((0, 2), np.int64), "out_y": empty((0, 0, lanes)),
             "out_u": empty((0, 0, 0)), "out_e": empty((0, 2, lanes)), "out_shared": empty((0, n + 2)),
-            "clock": np.array([np.inf, 0.0, 0.0]), "stop": np.zeros(1, np.int64),
+            "columns": empty((0, 0)), "clock": np.array([np.inf, 0.0, 0.0]), "stop": np.zeros(1, np.int64),
         } | arrays  # fmt: skip
-        order = ("given", "which", "out_step", "out_y", "out_u", "out_e", "out_shared", "now", "clock", "stop")
+        order = (
+            "given",
+            "which",
+            "out_step",
+            "out_y",
+            "out_u",
+            "out_e",
+            "out_shared",
+            "columns",
+            "now",
+            "clock",
+            "stop",
+        )
         return Ended(
             self.program.march(work, given["lanes"], given["alive"], *table.arrays, *(given[name] for name in order))
         )
@@ -101,21 +113,23 @@ class Machine:
         )  # fmt: skip
         return made, energies
 
-    def system(self, held: np.ndarray | None, stretch: Stretch, setup: Setup) -> System:
+    def system(self, held: np.ndarray | None, stretch: Stretch, setup: Setup, seen: np.ndarray | None = None) -> System:
         """The equation on one stretch, as `Motion.system`, its rate in machine code."""
         part = pieces(setup.controller, np.array([stretch.start]), np.array([stretch.end]))[0]
         work, rate, m = self.work(np.zeros(self.program.places.state)), self.program.rate, self.program.places.state
         self.hold(work, held)
-        made, last = np.empty(self.program.places.made), np.nextafter(stretch.end, -np.inf)
+        made, last, n = np.empty(self.program.places.made), np.nextafter(stretch.end, -np.inf), self.program.n
 
         def one(t: float, y: np.ndarray) -> np.ndarray:
             if y.ndim > 1:
                 return np.array([one(t, row) for row in y.reshape(-1, m)]).reshape(y.shape)
             work[m : 2 * m] = y
             rate(min(float(t), last), work, part, made)
+            if seen is not None:
+                seen[:n], seen[n:] = made[:n], made[m : m + n]
             return made[:m].copy()
 
-        return System(one, self.program.n)
+        return System(one, n)
 
     def check(self, setup: Setup) -> None:
         """Hold one step from random states to the interpreted engine.

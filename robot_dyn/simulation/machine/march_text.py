@@ -88,7 +88,7 @@ class MarchText:
             "            continue",
             *indented(step, 2),
             *(indented(self._sample(), 2) if self.lanes == 1 else []),
-            *indented(watch_lines(self.places, self.n, self.memory, self._leave), 2),
+            *indented(watch_lines(self.places, self.n, self.memory, self._show(), self._leave), 2),
             "        k += 1",
             "        if left <= 0 or stop[0] != 0:",
             *indented(self._leave(Ended.PAUSED), 3),
@@ -181,6 +181,23 @@ class MarchText:
             f"        for e in range({self.sources[function].outputs}):",
             f"            for b in range({W}):",
             f"                {array}[row, e, base + b] = made[e * {W} + b] if alive[b] == 1 else np.nan",
+        ]
+
+    def _show(self) -> list[str]:
+        """A column for the observer, as of `Observer.step`; there is one while Python leaves room for it."""
+        places, n = self.places, self.n
+        sampled, canonical = "tick" in self.sources, self.method is not None and self.method.canonical
+        acted = "one if k == 0 and ticks[s] == 1 else zero" if sampled else "one"
+        v = places.k if canonical else n
+        u = places.x + places.state if sampled else places.k + places.state
+        return [
+            "if columns.shape[1] > 0:",
+            "    c = now[13]",
+            "    now[13] = c + 1",
+            f"    columns[0, c], columns[1, c] = t + h, {acted}",
+            f"    for e in range({n}):",
+            f"        columns[2 + e, c], columns[{2 + n} + e, c] = work[e], work[{v} + e]",
+            f"        columns[{2 + 2 * n} + e, c] = work[{u} + e]",
         ]
 
     def _sample(self) -> list[str]:

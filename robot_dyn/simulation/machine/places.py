@@ -41,6 +41,7 @@ class Now(IntEnum):
     BASE = 10  # first lane of the record
     FINAL = 11  # 1: the last stretch is the end itself
     EVALUATIONS = 12  # of the rate, in all
+    COLUMN = 13  # of what an observer sees, next
 
 
 class Lane(IntEnum):
@@ -55,7 +56,7 @@ class Lane(IntEnum):
 
 ARGUMENTS = (
     "work", "lanes", "alive", "starts", "lengths", "lasts", "counts", "ticks", "pieces", "at_ticks", "given",
-    "which", "out_step", "out_y", "out_u", "out_e", "out_shared", "now", "clock", "stop",
+    "which", "out_step", "out_y", "out_u", "out_e", "out_shared", "columns", "now", "clock", "stop",
 )  # fmt: skip
 
 

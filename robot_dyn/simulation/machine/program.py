@@ -117,7 +117,7 @@ class Program:
         from numba.core import types
 
         axes = {"lanes": 2, "pieces": 2, "at_ticks": 2, "given": 2, "out_y": 3, "out_u": 3, "out_e": 3}
-        axes |= {"out_step": 2, "out_shared": 2}
+        axes |= {"out_step": 2, "out_shared": 2, "columns": 2}
         whole = {"alive", "counts", "ticks", "which", "out_step", "now", "stop"}
         return [
             types.Array(types.int64 if name in whole else types.float64, axes.get(name, 1), "C") for name in ARGUMENTS

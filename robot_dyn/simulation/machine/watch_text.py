@@ -11,13 +11,14 @@ from robot_dyn.simulation.machine.places import DOUBTFUL, LARGEST, RUNAWAY, WATC
 from robot_dyn.simulation.machine.stages import indented
 
 
-def watch_lines(places: Places, n: int, memory: int, leave: Callable[[Ended], list[str]]) -> list[str]:
+def watch_lines(places: Places, n: int, memory: int, show: list[str], leave: Callable[[Ended], list[str]]) -> list[str]:
     """Lines that take y⁺ from x, unless it is no number, and look at the energy now and then.
 
     Args:
         places: Where rows stand.
         n: Number of joints.
         memory: Number of states of the controller.
+        show: Lines that show the step to an observer, of a single run.
         leave: Gives the lines that go back to Python.
     """
     W, works = places.lanes, range(2 * n + memory, places.state)
@@ -28,7 +29,7 @@ def watch_lines(places: Places, n: int, memory: int, leave: Callable[[Ended], li
         f"    came, moved = energies[b] + energies[{W} + b] - lanes[2, b], lanes[3, b]",
         *(f"    came, moved = came - work[{w * W} + b], moved + abs(work[{w * W} + b])" for w in works),
     ]
-    return _one(places, take, gained, leave) if W == 1 else _tile(places, n, take, gained)
+    return _one(places, [*take, *show], gained, leave) if W == 1 else _tile(places, n, take, gained)
 
 
 def _one(places: Places, take: list[str], gained: list[str], leave: Callable[[Ended], list[str]]) -> list[str]:

@@ -134,7 +134,7 @@ async function main() {
   const data = await unpack(JSON.parse(element("data").textContent));
   element("title").textContent = data.title;
   element("outcome").textContent = data.outcome;
-  for (const [list, notes] of [["problems", data.problems], ["notes", data.notes]]) {
+  for (const [list, notes] of [["remarks", data.remarks], ["problems", data.problems], ["notes", data.notes]]) {
     element(list).append(...notes.map((note) => Object.assign(document.createElement("li"), { textContent: note })));
   }
   element("trouble").hidden = !data.problems.length;

@@ -1,0 +1,160 @@
+"""What an observer saw, as remarks: in words, with times, values and what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+
+from robot_dyn.errors import RobotDynError
+from robot_dyn.integrate.adaptive import Adaptive
+from robot_dyn.model.robot import Robot
+from robot_dyn.simulation.levels import Level, levels
+from robot_dyn.simulation.motion import Motion
+from robot_dyn.simulation.observer import Observer, Visit
+from robot_dyn.simulation.remarks import Kind, Remark
+from robot_dyn.simulation.setup import Setup
+
+QUANTITIES = ("q", "v", "tau")
+_HIDDEN = 0.1  # of the range of a quantity: what the samples beside a window leave out
+_ROUNDING = 1e-9  # of a quantity: a smaller range is noise
+
+
+def observer_of(setup: Setup, motion: Motion) -> Observer:
+    """An observer of a run that has not begun."""
+    u = np.full(len(setup.q0), np.nan)
+    if not motion.sampled:
+        with suppress(RobotDynError):  # the run will tell
+            u = motion.command(0.0, setup.q0, setup.v0, np.zeros(motion.memory_size))
+    start = np.concatenate([setup.q0, setup.v0, u])
+    return Observer(start, levels(setup.plant, setup.controller), motion.canonical)
+
+
+def remarks(setup: Setup, observer: Observer, t: np.ndarray, samples: np.ndarray) -> tuple[Remark, ...]:
+    """All remarks on a run, chatter first.
+
+    Args:
+        setup: What ran.
+        observer: Closed, at the end of the run.
+        t: Times of its samples, (m,), in [s].
+        samples: q, v and tau beside each other, (m, 3n).
+    """
+    units = _units(setup)
+    found = [*_chatter(setup, observer, t, samples, units)]
+    for kind in (Kind.EFFORT_REACHED, Kind.STOP_REACHED, Kind.BEYOND):
+        visits = {level: visit for level, visit in observer.visits.items() if level.kind is kind}
+        found += _passed(setup, visits, units)
+    return (*found, *_coarse(setup, observer, t, samples, units))
+
+
+def _units(setup: Setup) -> list[tuple[str, str, str]]:
+    """Units of q, v and tau of each joint."""
+    dynamics = setup.plant.dynamics
+    robot: Any = getattr(dynamics, "robot", dynamics)
+    if not isinstance(robot, Robot):
+        return [("", "", "")] * dynamics.n
+    kinds = {joint.get("name"): joint.get("type") for joint in robot.description.element.iterfind("joint")}
+    slides = [kinds[name] == "prismatic" for name in dynamics.joint_names]
+    return [("m", "m/s", "N") if each else ("rad", "rad/s", "N m") for each in slides]
+
+
+def _passed(setup: Setup, visits: dict[Level, Visit], units: list[tuple[str, str, str]]) -> Iterator[Remark]:
+    """Levels passed, both sides of a limit as one."""
+    n, names = len(units), setup.plant.dynamics.joint_names
+    rows: dict[int, list[tuple[Level, Visit]]] = {}
+    for level, visit in sorted(visits.items(), key=lambda each: each[1].start):
+        rows.setdefault(level.row, []).append((level, visit))
+    for row, both in rows.items():
+        quantity, joint = divmod(row, n)
+        level, most = max(both, key=lambda each: abs(each[1].value - each[0].limit))
+        start, duration = min(x.start for _, x in both), sum(x.duration for _, x in both)
+        unit = f" {units[joint][quantity]}".rstrip()
+        if level.kind is Kind.BEYOND:
+            text = f"{names[joint]} {most.value:.4g} of {level.limit:.4g}{unit} at {most.at:.4g} s"
+        else:
+            text = f"{names[joint]} for {duration:.3g} s from {start:.4g} s ({_size(level):.4g}{unit})"
+        yield Remark(
+            level.kind, names[joint], QUANTITIES[quantity], start, duration, most.at, most.value, level.limit, text,
+            "nothing in the plant enforces them" if level.kind is Kind.BEYOND else "",
+        )  # fmt: skip
+
+
+def _size(level: Level) -> float:
+    """The limit; without the sign of its side, if it is one of efforts."""
+    return abs(level.limit) if level.kind is Kind.EFFORT_REACHED else level.limit
+
+
+def _chatter(
+    setup: Setup, observer: Observer, t: np.ndarray, samples: np.ndarray, units: list[tuple[str, str, str]]
+) -> Iterator[Remark]:
+    period, names = setup.controller.period_s if setup.controller else 0.0, setup.plant.dynamics.joint_names
+    remedy = "the step is too long for the gains: take a smaller one"
+    for joint, episode in sorted(observer.chatter.episodes.items(), key=lambda each: -each[1].amplitude):
+        if period:
+            near = samples[np.clip(np.searchsorted(t, episode.start), 0, len(t) - 1)]
+            remedy = _remedy(setup, episode.start, near[: len(names)], period)
+        unit = f" {units[joint][2]}".rstrip()
+        text = f"{names[joint]} ±{episode.amplitude:.3g}{unit} from {episode.start:.4g} s for {episode.duration:.3g} s"
+        yield Remark(
+            Kind.CHATTER, names[joint], "tau", episode.start, episode.duration, episode.start, episode.amplitude,
+            None, text, remedy,
+        )  # fmt: skip
+
+
+def _remedy(setup: Setup, t: float, q: np.ndarray, period: float) -> str:
+    """What to do about a chatter, with the largest kd T/M: the eigenvalue of −M⁻¹ ∂u/∂v times the period."""
+    general = "take a shorter period_s or less damping: it reverses where an eigenvalue of M⁻¹ kd period_s is above 1"
+    controller, n = setup.controller, len(q)
+    assert controller is not None
+    z, v = np.zeros(controller.memory_size), np.zeros(n)
+    try:
+        with np.errstate(all="ignore"):
+            u = [controller.torque(t, q, v + side * dv, z) for dv in 1e-6 * np.eye(n) for side in (1, -1)]
+            slope = np.array([(plus - minus) / 2e-6 for plus, minus in zip(u[::2], u[1::2], strict=True)]).T
+            ratio = float(np.abs(np.linalg.eigvals(np.linalg.solve(setup.plant.M(q), -slope))).max()) * period
+    except (RobotDynError, np.linalg.LinAlgError):
+        return general
+    if not 1 < ratio < np.inf:
+        return general
+    return (
+        f"kd period_s / M is {ratio:.3g}, and above 1 it reverses, above 2 it grows: take period_s below "
+        f"{period / ratio:.2g} s, or less damping"
+    )
+
+
+def _coarse(
+    setup: Setup, observer: Observer, t: np.ndarray, samples: np.ndarray, units: list[tuple[str, str, str]]
+) -> Iterator[Remark]:
+    """Where q, v or u left the hull of the samples around it by a good part of its range; the worst for each joint."""
+    edges, low, high = observer.windows
+    every = not setup.record_period_s and not isinstance(setup.integrator, Adaptive)
+    if every or not len(low) or not len(t):
+        return
+    spacing = 1e-9 * (t[-1] - t[0])
+    first = np.clip(np.searchsorted(t, edges[:-1] + spacing, "right") - 1, 0, None)
+    last = np.maximum(np.clip(np.searchsorted(t, edges[1:] - spacing), 0, len(t) - 1), first) + 1
+    padded, pairs = np.vstack([samples, samples[-1:]]), np.column_stack([first, last]).ravel()
+    with np.errstate(all="ignore"):
+        least, largest = (extreme.reduceat(padded, pairs)[::2] for extreme in (np.minimum, np.maximum))
+        above, below = high - largest, least - low
+        bottom, top = low.min(axis=0), high.max(axis=0)
+        noise = _ROUNDING * np.maximum(1.0, np.maximum(np.abs(bottom), np.abs(top)))
+        part = np.where(top - bottom > noise, np.maximum(above, below) / (top - bottom), 0.0)
+    part = np.nan_to_num(part)
+    n, names = len(units), setup.plant.dynamics.joint_names
+    worst = part.max(axis=0).reshape(3, n)
+    for joint in np.flatnonzero(worst.max(axis=0) > _HIDDEN):
+        row = int(worst[:, joint].argmax()) * n + int(joint)
+        window = int(part[:, row].argmax())
+        up = above[window, row] > below[window, row]
+        value, shown = (high, largest) if up else (low, least)
+        start, end, quantity = float(edges[window]), float(edges[window + 1]), QUANTITIES[row // n]
+        seen, unit = float(shown[window, row]), f" {units[joint][row // n]}".rstrip()
+        at = (start + end) / 2
+        text = f"{quantity} of {names[joint]} {value[window, row]:.4g}{unit} near {at:.4g} s (sampled: {seen:.4g})"
+        yield Remark(
+            Kind.COARSE, names[joint], quantity, start, end - start, at, float(value[window, row]), seen, text,
+            "take a shorter record_period_s",
+        )  # fmt: skip

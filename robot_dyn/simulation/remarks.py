@@ -1,0 +1,77 @@
+"""Remarks on a run: what its samples need not show, seen at the end of every step.
+
+chatter · an effort limit or a stop reached · beyond a limit that the file states · a record coarser than the motion
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import final
+
+_NAMED = 3  # joints in a line
+
+
+class Kind(StrEnum):
+    """What a remark is about."""
+
+    CHATTER = "chatter"
+    EFFORT_REACHED = "effort_limit_reached"
+    STOP_REACHED = "joint_stop_reached"
+    BEYOND = "beyond_limit_of_file"
+    COARSE = "record_too_coarse"
+
+
+_HEADINGS = {
+    Kind.CHATTER: "actuation reverses at every tick",
+    Kind.EFFORT_REACHED: "effort limit reached",
+    Kind.STOP_REACHED: "joint stop reached",
+    Kind.BEYOND: "beyond the file's limits",
+    Kind.COARSE: "record too coarse",
+}
+
+
+@final
+@dataclass(frozen=True)
+class Remark:
+    """One thing about one joint.
+
+    Attributes:
+        kind: What it is about.
+        joint: Name of the joint.
+        quantity: "q", "v" or "tau", of which value and limit are.
+        start: When it began, in [s].
+        duration: How long it lasted in all, in [s].
+        at: When the value was reached, in [s].
+        value: The extreme; the amplitude of a chatter, half of what the actuation changes between two ticks.
+        limit: What it compares with: a limit, or the extreme that the samples show; None for a chatter.
+        text: Joint, value and time in words.
+        remedy: What to do about it; alike for all remarks of a kind in a run.
+    """
+
+    kind: Kind
+    joint: str
+    quantity: str
+    start: float
+    duration: float
+    at: float
+    value: float
+    limit: float | None
+    text: str
+    remedy: str = ""
+
+
+def lines(remarks: Iterable[Remark]) -> list[str]:
+    """A line for each kind: its joints, and what to do."""
+    said: dict[Kind, list[Remark]] = {}
+    for remark in remarks:
+        said.setdefault(remark.kind, []).append(remark)
+    return [_line(kind, each) for kind, each in said.items()]
+
+
+def _line(kind: Kind, remarks: list[Remark]) -> str:
+    texts = [remark.text for remark in remarks[:_NAMED]]
+    more = f", and {len(remarks) - _NAMED} more" if len(remarks) > _NAMED else ""
+    remedy = f"; {remarks[0].remedy}" if remarks[0].remedy else ""
+    return f"{_HEADINGS[kind]}: {', '.join(texts)}{more}{remedy}"
