@@ -93,7 +93,7 @@ def test_a_bridge_that_cannot_start_is_told_and_does_not_hang(swing, monkeypatch
     def refuse(*_: object) -> None:
         raise OSError("no sockets left")
 
-    monkeypatch.setattr(server.ZMQWebSocketBridge, "setup_zmq", refuse)
+    monkeypatch.setattr(server, "Bridge", refuse)
     with pytest.raises(rd.RobotDynError, match=r"cannot start: no sockets left; write a file"):
         rd.replay(swing)
 

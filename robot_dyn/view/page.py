@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import html
 import json
+import re
+from base64 import b64encode
+from collections.abc import Iterable, Iterator
+from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path
 from string import Template
@@ -11,24 +15,43 @@ from typing import Any
 
 from robot_dyn.view.commands import as_text
 
-# Nothing is loaded from anywhere: code and style stand in the page, pictures are data; only the live page has a socket.
-_POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
+# Nothing is loaded from anywhere, and only what stands here runs; pictures are data; only the live page has a socket.
+_POLICY = "default-src 'none'; base-uri 'none'; form-action 'none'; script-src {}; style-src {}; img-src data: blob:"
+_LIVE = "; connect-src 'self' ws://127.0.0.1:* ws://localhost:*"
+_PANEL = re.compile(r'\}\("(\.dg ul\{(?:[^"\\]|\\.)*)"\)')  # the style that meshcat's panel, dat.gui, gives itself
 
 
 def page(document: dict[str, Any]) -> str:
     """The HTML text of a document: title, outcome, notes, duration, scene, plots, and commands unless it is `live`."""
     own = Path(__file__).parent / "web"
-    text = json.dumps(as_text(document))  # base64 has no character that HTML would read
+    meshcat = _inline(_read(_meshcat() / "viewer" / "dist" / "main.min.js"))
+    scripts = {
+        "meshcat": meshcat,
+        "uplot": _inline(_read(own / "uplot" / "uPlot.iife.min.js")),
+        "script": _inline(_read(own / "replay.js")),
+    }
+    styles = {"uplot_style": _read(own / "uplot" / "uPlot.min.css"), "style": _read(own / "replay.css")}
+    policy = _POLICY.format(_hashes(scripts.values()), _hashes([*styles.values(), *_own_styles(meshcat)]))
     return Template(_read(own / "replay.html")).substitute(
-        policy=_POLICY + ("; connect-src 'self' ws://127.0.0.1:* ws://localhost:*" if document["live"] else ""),
+        policy=policy + (_LIVE if document["live"] else ""),
         title=html.escape(document["title"]),
-        uplot_style=_read(own / "uplot" / "uPlot.min.css"),
-        style=_read(own / "replay.css"),
-        meshcat=_inline(_read(_meshcat() / "viewer" / "dist" / "main.min.js")),
-        uplot=_inline(_read(own / "uplot" / "uPlot.iife.min.js")),
-        data=text,
-        script=_inline(_read(own / "replay.js")),
+        data=json.dumps(as_text(document)),  # base64 has no character that HTML would read
+        **scripts,
+        **styles,
     )
+
+
+def _hashes(texts: Iterable[str]) -> str:
+    """The sources of a content policy that are these texts and no others [CSP 3, §2.3.1]."""
+    digests = (sha256(text.encode()).digest() for text in texts)
+    return " ".join(f"'sha256-{b64encode(digest).decode()}'" for digest in digests)
+
+
+def _own_styles(meshcat: str) -> Iterator[str]:
+    """The styles that meshcat puts into its page: an empty one, filled later, and that of its panel."""
+    yield ""
+    for text in _PANEL.findall(meshcat):
+        yield json.loads(f'"{text}"')
 
 
 def _meshcat() -> Path:

@@ -1,4 +1,4 @@
-"""The live server: meshcat's bridge on 127.0.0.1 alone, with the replay's page in place of meshcat's.
+"""The live server: the page on 127.0.0.1 alone, and the bridge by which meshcat programs draw into it.
 
 Other meshcat programs may draw into the scene, by `meshcat.Visualizer(zmq_url)`.
 """
@@ -6,43 +6,33 @@ Other meshcat programs may draw into the scene, by `meshcat.Visualizer(zmq_url)`
 from __future__ import annotations
 
 import asyncio
-import json
+import logging
 import os
 import threading
-import warnings
 from contextlib import suppress
 from socket import create_server, socket
 from typing import Any
 
-import zmq
 from tornado.httpserver import HTTPServer
 from tornado.web import Application, HTTPError, RequestHandler
+from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
 from robot_dyn.errors import RobotDynError
-from robot_dyn.view.commands import Command, as_message
-
-with warnings.catch_warnings(action="ignore", category=DeprecationWarning):  # meshcat imports a module zmq gave up
-    from meshcat.servers.tree import find_node
-    from meshcat.servers.zmqserver import WebSocketHandler, ZMQWebSocketBridge
+from robot_dyn.view.bridge import Bridge
+from robot_dyn.view.commands import Command
 
 _HOST = "127.0.0.1"
+_MAX_PICTURE = 2**26  # [bytes], of a message from a browser
+_HEADERS = {
+    "Cache-Control": "no-store",
+    "Content-Security-Policy": "frame-ancestors 'none'",  # the page's own policy stands in the page
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+}
 
 
 class ServerError(RobotDynError):
     """A live server that cannot start."""
-
-
-class _Loopback(Application):
-    """An application that listens on the socket it is given, whatever it is asked."""
-
-    def __init__(self, listening: socket, handlers: list[Any]) -> None:
-        super().__init__(handlers)
-        self._listening = listening
-
-    def listen(self, port: int, *_: Any, **__: Any) -> HTTPServer:
-        server = HTTPServer(self)
-        server.add_sockets([self._listening])
-        return server
 
 
 class _Local(RequestHandler):
@@ -60,37 +50,41 @@ class _Page(_Local):
         self._page = page
 
     def get(self) -> None:
-        self.set_header("Cache-Control", "no-store")
+        for name, value in _HEADERS.items():
+            self.set_header(name, value)
         self.finish(self._page)
 
 
 class _Socket(_Local, WebSocketHandler):
-    """meshcat's web socket, silent."""
+    """The web socket of a browser; whoever asks for a page in its place is sent to it."""
+
+    def initialize(self, bridge: Bridge) -> None:
+        self._bridge = bridge
+
+    async def get(self, *args: Any, **kwargs: Any) -> None:
+        if self.request.headers.get("Upgrade", "").lower() == "websocket":
+            await super().get(*args, **kwargs)
+        else:
+            self.redirect("/static/")
 
     def open(self, *_: str, **__: str) -> None:
-        self.bridge.websocket_pool.add(self)
-        self.bridge.send_scene(self)
+        self._bridge.join(self)
+
+    def hang_up(self) -> None:
+        """End the connection, whatever its other end does."""
+        if self.ws_connection is not None:
+            self.ws_connection.stream.close()  # pyright: ignore[reportAttributeAccessIssue]
 
     def on_close(self) -> None:
-        self.bridge.websocket_pool.discard(self)
+        self._bridge.leave(self)
 
     def on_message(self, message: str | bytes) -> None:
-        with suppress(ValueError, KeyError, TypeError):  # what is no picture that was asked for
-            self.bridge.send_image(json.loads(message)["data"])
+        self._bridge.answered(self, message)
 
-
-class _Bridge(ZMQWebSocketBridge):
-    """meshcat's bridge, which would listen on every interface, on a socket of this machine alone."""
-
-    def __init__(self, page: str, listening: socket) -> None:
-        self._page, self._listening = page, listening
-        super().__init__(zmq_url=f"tcp://{_HOST}:*", host=_HOST, port=listening.getsockname()[1])
-        self.zmq_url = self.zmq_socket.getsockopt_string(zmq.LAST_ENDPOINT)
-
-    def make_app(self) -> Application:
-        page = {"page": self._page}
-        handlers = [(r"/static/", _Page, page), (r"/", _Socket, {"bridge": self})]
-        return _Loopback(self._listening, handlers)
+    def send(self, message: bytes) -> None:
+        with suppress(WebSocketClosedError):
+            sent = self.write_message(message, binary=True)
+            sent.add_done_callback(lambda done: done.cancelled() or done.exception())  # a browser may leave any time
 
 
 class Server:
@@ -113,39 +107,47 @@ class Server:
             why = os.strerror(error.errno) if isinstance(error, OSError) and error.errno else error
             raise ServerError(f"port {port}: {why}; choose another, or none for a free one") from None
         listening.setblocking(False)
-        ready, self._failure = threading.Event(), None
-        self._thread = threading.Thread(target=self._serve, args=(page, commands, listening, ready), daemon=True)
+        logging.getLogger("tornado").addHandler(logging.NullHandler())  # not on the terminal of whoever looks
+        self.url = f"http://{_HOST}:{listening.getsockname()[1]}/static/"
+        self._ready, self._failure = threading.Event(), None
+        serving = self._serve(page, commands, listening)
+        self._thread = threading.Thread(target=asyncio.run, args=(serving,), daemon=True)
         self._thread.start()
-        ready.wait()
+        self._ready.wait()
         if self._failure is not None:
             raise ServerError(f"the live replay cannot start: {self._failure}; write a file with save_replay instead")
 
-    def _serve(self, page: str, commands: list[Command], listening: socket, ready: threading.Event) -> None:
-        self._loop = asyncio.new_event_loop()
-        asyncio.set_event_loop(self._loop)
+    async def _serve(self, page: str, commands: list[Command], listening: socket) -> None:
+        self._loop, self._closed = asyncio.get_running_loop(), asyncio.Event()
+        self._loop.set_exception_handler(lambda *_: None)  # of sockets whose other end behaves as it likes
         try:
-            bridge = _Bridge(page, listening)
-        except Exception as error:  # of sockets, or of meshcat: for the caller, who waits
+            bridge = Bridge(commands, self.url)
+            self.zmq_url = bridge.url
+            handlers: list[Any] = [(r"/static/", _Page, {"page": page}), (r"/", _Socket, {"bridge": bridge})]
+            quiet: Any = {"log_function": lambda _: None, "websocket_max_message_size": _MAX_PICTURE}
+            server = HTTPServer(Application(handlers, **quiet), max_body_size=0)
+            server.add_sockets([listening])
+        except Exception as error:  # of sockets: for the caller, who waits
             self._failure = error
             listening.close()
-            self._loop.close()
-            ready.set()
             return
-        for command in commands:
-            _keep(bridge, command)
-        self.url, self.zmq_url = str(bridge.web_url), bridge.zmq_url
-        ready.set()
-        try:
-            self._loop.run_forever()
         finally:
-            bridge.zmq_stream.close()
-            listening.close()
-            self._loop.close()
+            self._ready.set()
+        answering = asyncio.create_task(bridge.serve())
+        await self._closed.wait()
+        server.stop()
+        await server.close_all_connections()
+        for browser in bridge.browsers:
+            browser.hang_up()
+        answering.cancel()
+        with suppress(asyncio.CancelledError):
+            await answering
 
     def close(self) -> None:
         """End the server."""
         if self._thread.is_alive():
-            self._loop.call_soon_threadsafe(self._loop.stop)
+            with suppress(RuntimeError):  # it ends at this moment
+                self._loop.call_soon_threadsafe(self._closed.set)
             self._thread.join()
 
     def wait(self, interrupted: threading.Event | None = None) -> None:
@@ -163,18 +165,3 @@ class Server:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-
-def _keep(bridge: _Bridge, command: Command) -> None:
-    """Put a command into the bridge's tree, from which each browser that comes is served."""
-    node = find_node(bridge.tree, [part for part in command["path"].split("/") if part])
-    message = as_message(command)
-    match command["type"]:
-        case "set_object":
-            node.object = message
-        case "set_transform":
-            node.transform = message
-        case "set_property":
-            node.properties.append(message)
-        case "set_animation":
-            node.animation = message  # pyright: ignore[reportAttributeAccessIssue]
