@@ -29,6 +29,11 @@ def list_robots() -> tuple[str, ...]:
     return tuple(sorted(_files()))
 
 
+def files() -> frozenset[Path]:
+    """The URDF files of these robots."""
+    return frozenset(_files().values())
+
+
 def find(name_or_path: str | Path, package_dirs: Iterable[str | Path] = ()) -> Path:
     """The URDF file of a name, a path or a package:// address.
 

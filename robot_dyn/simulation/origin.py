@@ -1,15 +1,20 @@
 """The origin of a run: the texts from which its robot is built again, wherever the file is read.
 
 A run file carries the URDF, the edits, the scene and the versions, so that a replay needs nothing else but meshes.
+These are found from the path of the URDF, which a file holds in a form that tells nothing of the machine.
 """
 
 from __future__ import annotations
 
 import json
+import os
+from contextlib import suppress
 from importlib.metadata import version
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robot_dyn.errors import QueryError
+from robot_dyn.model import catalog
 from robot_dyn.model.description import check
 from robot_dyn.model.edits import Payload
 from robot_dyn.model.robot import Robot
@@ -27,6 +32,38 @@ def origin(dynamics: Any) -> dict[str, str]:
         texts |= {"robot": robot.name, "source": robot.description.source}
         texts |= {"urdf": urdf, "edits": robot.edits.as_json()}
     return texts
+
+
+def packed(about: dict[str, str], folder: Path) -> dict[str, str]:
+    """The texts of a run as a file in `folder` keeps them."""
+    return about | {"source": _portable(about["source"], folder)} if "source" in about else about
+
+
+def unpacked(about: dict[str, str], folder: Path) -> dict[str, str]:
+    """The texts of a run whose file is in `folder`."""
+    if "source" not in about:
+        return about
+    path = Path(about["source"])
+    with suppress(RuntimeError):  # no such home
+        path = path.expanduser()
+    return about | {"source": os.path.normpath(folder.absolute() / path)}
+
+
+def _portable(source: str, folder: Path) -> str:
+    """The path of a URDF from the folder of a run, or from the user's own folder (~); else its name alone.
+
+    A robot of the catalog needs no more than its name: its meshes are found in the installed package.
+    """
+    path, folder, home = Path(source).resolve(), folder.resolve(), Path(os.path.expanduser("~")).resolve()
+    if path in catalog.files():
+        return path.name
+    with suppress(ValueError):  # on another drive
+        shared = Path(os.path.commonpath([path.parent, folder]))
+        if shared.name and shared not in home.parents:
+            return Path(os.path.relpath(path, folder)).as_posix()
+    if home.name and path.is_relative_to(home):
+        return (Path("~") / path.relative_to(home)).as_posix()
+    return path.name
 
 
 def robot_of(run: Trajectory) -> Robot:

@@ -7,6 +7,7 @@ URDF, edits, scene, versions) is one JSON text, `about`. A SHA-256 covers all of
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from robot_dyn.files import Kind, save, target
 from robot_dyn.reading import reading
 from robot_dyn.simulation.archive import Archive, ArchiveError, Header, write
 from robot_dyn.simulation.members import check_headers, member
+from robot_dyn.simulation.origin import packed, unpacked
 from robot_dyn.simulation.serialise import Arrays, SerialError, build, take_apart
 from robot_dyn.simulation.trajectory import Ending, Trajectory
 
@@ -41,8 +43,8 @@ def save_run(trajectory: Trajectory, path: str | Path) -> Path:
     if not isinstance(trajectory, Trajectory):
         raise RunFileError(f"save_run takes the Trajectory of rd.simulate, got {type(trajectory).__name__}")
     path = target(path, RUN, RunFileError)
-    arrays, plain = take_apart(trajectory)
     try:
+        arrays, plain = take_apart(replace(trajectory, about=packed(trajectory.about, path.parent)))
         text = json.dumps({"format": FORMAT} | plain)
         _checked(dict(arrays), json.loads(text))
         return save(path, lambda stream: write(stream, arrays | {"about": np.array(text)}), RunFileError)
@@ -70,7 +72,8 @@ def load_run(path: str | Path, *, max_bytes: int = MAX_BYTES) -> Trajectory:
                 raise RunFileError(f"{path}: holds {held}; if you trust it, raise max_bytes of load_run")
             arrays = archive.arrays()
             del arrays["about"]
-            return _checked(arrays, about)
+            run = _checked(arrays, about)
+            return replace(run, about=unpacked(run.about, Path(path).parent))
         except (ArchiveError, SerialError) as error:
             raise RunFileError(f"{path}: is not a whole run file: {error}; simulate again") from None
 

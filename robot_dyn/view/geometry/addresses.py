@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import suppress
 from itertools import islice
@@ -13,6 +14,13 @@ from robot_dyn.model import catalog
 from robot_dyn.view.geometry.meshes import MeshError
 
 
+def shown(address: str | None) -> str:
+    """An address as a page shows it: without the folders of a machine, which are nobody else's concern."""
+    address = (address or "").strip()
+    rooted = address.startswith(("file:", "/", "\\", "~")) or address[1:2] == ":"
+    return shorten(re.split(r"[/\\]", address)[-1] if rooted else address)
+
+
 def find_file(address: str | None, source: Path, package_dirs: tuple[str | Path, ...]) -> Path:
     """The file of an address that stands in the URDF `source`; whether it exists is for its reader to say.
 
@@ -22,13 +30,13 @@ def find_file(address: str | None, source: Path, package_dirs: tuple[str | Path,
     address = (address or "").strip()
     kind = address.partition("://")[0] if "://" in address else ""
     if not address or kind not in ("", "file", "package"):
-        raise MeshError(f"the address {shorten(address)!r} names no file on this machine; write the file's")
+        raise MeshError(f"the address {shown(address)!r} names no file on this machine; write the file's")
     if kind != "package":
         return source.absolute().parent / (unquote(address.removeprefix("file://")) if kind else address)
     for folders in (package_dirs, _installed()):
         with suppress(CatalogError, OSError, ValueError):
             return catalog.resolve(address, source, folders).resolve()
-    raise MeshError(f"no file for {address}; name the folder of the package in package_dirs or ROS_PACKAGE_PATH")
+    raise MeshError(f"no file for {shown(address)}; name the folder of the package in package_dirs or ROS_PACKAGE_PATH")
 
 
 def _installed() -> Iterator[Path]:

@@ -12,7 +12,7 @@ import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from stat import S_ISREG
 from typing import Any, final
 
@@ -180,7 +180,7 @@ def _beside(folder: Path, missing: list[str]) -> Any:
             try:
                 return bounded(folder / name.strip().removeprefix("file://").replace("\\", "/"))
             except MeshError as error:
-                missing.append(f"{shorten(name)} {error}")
+                missing.append(f"{shorten(PureWindowsPath(name).name)} {error}")  # folders are nobody's business
                 raise
 
     return Beside(str(folder), allow_anywhere=True)  # textures often stand in ../textures

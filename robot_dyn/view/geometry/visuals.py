@@ -21,7 +21,7 @@ from robot_dyn.model.markup import parse
 from robot_dyn.model.robot import Robot
 from robot_dyn.spatial import homogeneous, rotation_rpy
 from robot_dyn.view.geometry import meshes
-from robot_dyn.view.geometry.addresses import find_file
+from robot_dyn.view.geometry.addresses import find_file, shown
 from robot_dyn.view.geometry.inertia_boxes import inertia_boxes, inertia_ellipsoid, off_centre
 from robot_dyn.view.geometry.meshes import WHITE, MeshError, Part, Rgba
 from robot_dyn.view.geometry.shapes import PRIMITIVES
@@ -196,12 +196,13 @@ class _Artist:
         return (Part(self._primitive(shape.tag, lengths)),)
 
     def mesh(self, element: Any) -> tuple[Part, ...]:
-        path, scale = self.file(element.get("filename")), _numbers(element, "scale", 3, "1 1 1")
+        address = element.get("filename")
+        path, scale = self.file(address), _numbers(element, "scale", 3, "1 1 1")
         try:
             parts, complaints = self._read(path, scale)
         except MeshError as error:
-            raise MeshError(f"mesh {path}: {error}") from None
-        self.notes += [f"mesh {path}: {complaint}; drawn without it" for complaint in complaints]
+            raise MeshError(f"mesh {shown(address)}: {error}") from None
+        self.notes += [f"mesh {shown(address)}: {complaint}; drawn without it" for complaint in complaints]
         return parts
 
     def pose(self, element: Any, where: str) -> ndarray:
@@ -228,7 +229,7 @@ class _Artist:
                 r, g, b, a = (min(max(x, 0.0), 1.0) for x in _numbers(color, "rgba", 4))
                 return (r, g, b, a), None
         except MeshError as error:
-            what = f"texture {shorten(address)}" if address else "material"
+            what = f"texture {shown(address)}" if address else "material"
             self.notes.append(f"{where}: {what}: {error}; drawn without it")
         return None, None
 
