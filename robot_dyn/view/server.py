@@ -73,7 +73,7 @@ class _Socket(_Local, WebSocketHandler):
     def hang_up(self) -> None:
         """End the connection, whatever its other end does."""
         if self.ws_connection is not None:
-            self.ws_connection.stream.close()  # pyright: ignore[reportAttributeAccessIssue]
+            self.ws_connection.stream.close()  # pyright: ignore[reportOptionalMemberAccess]
 
     def on_close(self) -> None:
         self._bridge.leave(self)
