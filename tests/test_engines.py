@@ -33,7 +33,7 @@ CONTROLLERS = {
     "PID, sampled": rd.PID(REFERENCE, 40.0, 30.0, 4.0, effort_limit=[3.0, np.inf], period_s=0.004),
     "PD and gravity": rd.PDGravity(ARM, REFERENCE, 40.0, 4.0),
     "feed forward": rd.FeedForward(ARM, REFERENCE, 40.0, 4.0),
-    "computed torque": rd.ComputedTorque(ARM.with_(gravity=(0.0, -9.0, 0.0)), REFERENCE, 40.0, 9.0),
+    "computed torque": rd.ComputedTorque(ARM.with_(gravity=(0.0, 0.0, -9.0)), REFERENCE, 40.0, 9.0),
 }
 LINK = ARM.frame_names[-1]
 EFFECTS = {

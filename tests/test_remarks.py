@@ -28,7 +28,9 @@ def joint():
 def damped(joint, ratio: float, **options) -> rd.Setup:
     """Sampled damping with kd T/M = ratio, disturbed by a little stiffness; a sample every 10 ticks."""
     control = rd.PD(rd.hold([0.3]), kp=0.05, kd=ratio * INERTIA / PERIOD, period_s=PERIOD)
-    given = {"duration_s": 0.5, "step_s": PERIOD / 4, "record_period_s": 10 * PERIOD, "engine": "interpreted"}
+    given = {"duration_s": 0.5, "record_period_s": 10 * PERIOD, "engine": "interpreted"}
+    if not isinstance(options.get("integrator"), rd.Adaptive):
+        given["step_s"] = PERIOD / 4
     plant = rd.Plant(joint, [rd.EffortLimit(LIMIT)])
     return rd.Setup(plant, [0.2], [0.02], controller=control, estimate_error=False, **given | options)
 
