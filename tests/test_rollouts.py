@@ -185,7 +185,7 @@ def test_what_has_no_meaning_is_refused() -> None:
         "params: no 'payload_mass:elbow'": {"params": {"payload_mass:elbow": np.ones(3)}},
         "record: no 'torque'": {"record": ("torque",)},
         "threads must be a positive number": {"threads": 0},
-        "takes 0.0 GiB, more than 0.0: take a longer record_period_s": {"q0": starts(4), "most_bytes": 100},
+        "takes 0.0 GiB, more than 0.0 GiB: take a longer record_period_s": {"q0": starts(4), "most_bytes": 100},
     }.items():
         with pytest.raises(QueryError, match=message):
             rd.rollouts(SETUP, **options)

@@ -11,8 +11,10 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.control.controller import Memoryless
-from robot_dyn.effects.effect import Active
+from robot_dyn.effects.effect import Active, Conservative
 from robot_dyn.errors import QueryError
+from robot_dyn.simulation import record
+from robot_dyn.simulation.machine.machine import Machine
 
 DOUBLE = rd.load("planar_2r")
 UR5 = rd.load("ur5")
@@ -198,3 +200,78 @@ def test_an_effect_that_does_not_fit_the_robot_is_refused(method, effect, messag
     law = rd.PD(rd.hold([0.1, 0.2]), 3.0, 1.0)
     with pytest.raises(rd.RobotDynError, match=message):
         rd.simulate(rd.Plant(DOUBLE, [effect]), **GOOD, controller=law, integrator=method)
+
+
+def test_a_companion_whose_energy_overflows_is_no_end_of_the_run() -> None:
+    """RK4 is stable at ω h = 2.5; at 4 h a step multiplies q by 400, and in 64 steps ½ k q² overflows, q does not."""
+    cart = rd.load("cart_pole").with_(lock={"hinge": 0.3})
+    k = float(cart.M([0.0])[0, 0]) * 2.5e3**2
+    run = rd.simulate(rd.Plant(cart, [rd.Spring(k)]), q0=[0.4], duration_s=1.0, engine="interpreted")
+    assert run.outcome.ending == "finished"
+    assert run.error is not None and "step" in run.error.note
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class WithoutEnergy(Conservative):
+    """A potential that has no value after 50 ms."""
+
+    def torque(self, dynamics, t, q, v):
+        return 0 * v
+
+    def potential(self, dynamics, t, q):
+        if np.max(t) > 0.05:
+            raise rd.RobotDynError("the potential has no value")
+        return 0 * q[..., 0]
+
+
+@pytest.mark.parametrize("engine", ["interpreted", "auto"])
+def test_a_look_at_the_energy_that_fails_ends_the_run(engine: str) -> None:
+    run = rd.simulate(rd.Plant(DOUBLE, [WithoutEnergy()]), **START, duration_s=0.2, engine=engine)
+    assert run.outcome.ending == "diverged"
+    assert 0.05 < run.outcome.t < 0.05 + 64e-3
+    assert "the potential has no value" in run.outcome.advice
+
+
+@pytest.mark.parametrize("method", [rd.method("rk4"), rd.Adaptive()], ids=name)
+def test_an_interrupt_in_a_companion_run_ends_the_estimate_and_keeps_the_run(method, monkeypatch) -> None:
+    """All samples are there, no other companion starts, and the outcome says where the interrupt came."""
+    ran = []
+
+    def interrupted(*arguments):
+        ran.append(arguments[2])
+        if len(ran) == 2:
+            raise KeyboardInterrupt
+        return march(*arguments)
+
+    march = record.march
+    monkeypatch.setattr(record, "march", interrupted)
+    run = rd.simulate(rd.Plant(DOUBLE), **START, duration_s=0.2, integrator=method, engine="interpreted")
+    assert len(ran) == 2
+    assert (run.outcome.ending, run.outcome.t) == ("stopped", 0.2)
+    assert "in its error estimate" in run.outcome.advice
+    assert run.t[-1] == 0.2
+    assert run.error is not None and "interrupted" in str(run.error)
+
+
+@pytest.mark.parametrize("engine", ["interpreted", "compiled"])
+@pytest.mark.parametrize("period", [0.0, 0.01])
+def test_an_interrupt_before_the_first_step_leaves_the_start(engine: str, period: float, monkeypatch) -> None:
+    """One sample, the state at 0 s; what a controller would have held is not known."""
+    law = rd.PD(rd.hold([0.1, 0.2]), 3.0, 1.0, period_s=period)
+    setup = rd.Setup(rd.Plant(DOUBLE), **START, duration_s=0.2, controller=law, engine=engine)
+    rd.simulate(setup)  # compiled, and looked at, before
+
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(record, "march", interrupted)
+    monkeypatch.setattr(Machine, "run", interrupted)
+    monkeypatch.setattr(Machine, "check", lambda *_: None)
+    look = Machine.look
+    monkeypatch.setattr(Machine, "look", lambda self, *given: (monkeypatch.undo(), look(self, *given))[1])
+    run = rd.simulate(setup)
+    assert (run.outcome.ending, run.outcome.t) == ("stopped", 0.0)
+    np.testing.assert_array_equal(run.t, [0.0])
+    np.testing.assert_array_equal(run.q, [START["q0"]])
+    assert run.summary.startswith("stopped at t = 0 s, 1 samples")

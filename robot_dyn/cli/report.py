@@ -17,6 +17,7 @@ from robot_dyn.lagrange.breakdown import torque_breakdown
 from robot_dyn.lagrange.manipulator import Lagrangian
 from robot_dyn.model.gravity import gravity_acts, no_torque
 from robot_dyn.model.robot import Robot
+from robot_dyn.simulation.ledger import largest
 from robot_dyn.simulation.trajectory import Trajectory
 
 Document = dict[str, Any]
@@ -121,11 +122,11 @@ def run(trajectory: Trajectory) -> Document:
         "advice": outcome.advice,
         "samples": len(trajectory.t),
         "joints": list(trajectory.joint_names),
-        "q": trajectory.q[-1].tolist(),
-        "v": trajectory.v[-1].tolist(),
-        "work": {name: float(work[-1]) for name, work in trajectory.ledger.work.items()},
-        "ledger_residual": float(np.nanmax(np.abs(trajectory.ledger.residual))),
-        "ledger_closure": trajectory.ledger.closure,
+        "q": [_finite(x) for x in trajectory.q[-1].tolist()],
+        "v": [_finite(x) for x in trajectory.v[-1].tolist()],
+        "work": {name: _finite(float(work[-1])) for name, work in trajectory.ledger.work.items()},
+        "ledger_residual": _finite(largest(np.abs(trajectory.ledger.residual))),
+        "ledger_closure": _finite(trajectory.ledger.closure),
         "error": None if error is None else _finite(error.final),
         "error_resolved_until": None if error is None else error.resolved_until,
         "tracking_error": trajectory.tracking_error,

@@ -10,6 +10,7 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -50,6 +51,14 @@ class Effect:
     def switches(self) -> tuple[float, ...]:
         """Times in [s] at which it starts or stops: a step of integration ends there."""
         return ()
+
+    @property
+    def widths(self) -> tuple[Any, Any]:
+        """Changes of q and of v over which its torque bends, each a scalar or (n,); inf where it is smooth.
+
+        An implicit method takes its Jacobian from differences inside them.
+        """
+        return inf, inf
 
 
 class Force(Effect, ABC):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from typing import Any, final
 
 import numpy as np
@@ -51,6 +52,10 @@ class RegularisedCoulombFriction(Dissipative):
         object.__setattr__(self, "velocity_scale", coefficient("velocity_scale", self.velocity_scale))
         if isinstance(self.velocity_scale, np.ndarray) and not (self.velocity_scale > 0).all():
             raise EffectError(f"velocity_scale must be positive, got {self.velocity_scale}")
+
+    @property
+    def widths(self) -> tuple[Any, Any]:
+        return inf, self.velocity_scale
 
     def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
         return -self.friction * tanh(v / self.velocity_scale)

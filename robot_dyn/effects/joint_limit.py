@@ -7,6 +7,7 @@ overrun by about v √(M/k); rigid ones are set-valued and no part of these.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from typing import Any, final
 
 import numpy as np
@@ -36,6 +37,10 @@ class JointStopSpring(Conservative):
         _check_stops(self)
         object.__setattr__(self, "stiffness", coefficient("stiffness", self.stiffness))
 
+    @property
+    def widths(self) -> tuple[Any, Any]:
+        return _depth(self.stiffness), inf
+
     def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
         return self.stiffness * (positive_part(self.lower - q) - positive_part(q - self.upper))
 
@@ -63,6 +68,10 @@ class JointStopDamper(Dissipative):
         _check_stops(self)
         object.__setattr__(self, "damping", coefficient("damping", self.damping))
 
+    @property
+    def widths(self) -> tuple[Any, Any]:
+        return _depth(self.damping), inf
+
     def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
         return -self.damping * (positive_part(self.lower - q) + positive_part(q - self.upper)) * v
 
@@ -72,6 +81,12 @@ def joint_stops(
 ) -> tuple[JointStopSpring, JointStopDamper]:
     """Both parts of joint stops; the limits of a robot are `robot.lower` and `robot.upper`."""
     return JointStopSpring(lower, upper, stiffness), JointStopDamper(lower, upper, damping)
+
+
+def _depth(coefficient: Any) -> Any:
+    """The depth at which a stop holds 1 N m or 1 N: a load that matters lies deeper than a small part of it."""
+    with np.errstate(divide="ignore"):
+        return np.divide(1.0, coefficient)
 
 
 def _check_stops(stops: Any) -> None:

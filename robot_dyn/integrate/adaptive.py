@@ -6,8 +6,8 @@ II, 2nd ed., 1996, IV.8]
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from math import inf
 from typing import Any, cast, final
@@ -127,13 +127,27 @@ class Adaptive:
         Raises:
             QueryError: If y0, t0 or t1 is unfit.
         """
+        steps = self.steps(system, t0, y0, t1, stop)
+        times, states, pieces = [steps.t], [steps.y], []
+        try:
+            for t, y, piece in steps:
+                times.append(t)
+                states.append(y)
+                pieces.append(piece)
+        except KeyboardInterrupt:
+            steps.status, steps.message = Status.INTERRUPTED, f"interrupted at t = {times[-1]}"
+        return Solution(
+            np.array(times), np.array(states), steps.evaluations, steps.status, steps.message, tuple(pieces)
+        )
+
+    def steps(
+        self, system: System, t0: float, y0: Array, t1: float, stop: Callable[[float, Array], float] | None = None
+    ) -> Steps:
+        """The steps from t0 to t1, one at a time; arguments and errors as of `solve`."""
         y0 = _initial_state(y0)
         if not (np.isfinite([t0, t1]).all() and t0 != t1):
             raise QueryError(f"t0 and t1 must be finite and differ, got {t0!r} and {t1!r}")
-        run = _Run(system, stop, float(t0), y0)
-        with np.errstate(all="ignore"):  # overflow in a trial step shortens it, or ends the run with a status
-            status, message = run.to(self, float(t1))
-        return Solution(np.array(run.times), np.array(run.states), run.evaluations, status, message, tuple(run.pieces))
+        return Steps(self, system, stop, float(t0), y0, float(t1))
 
 
 class _NotFiniteError(Exception):
@@ -141,13 +155,24 @@ class _NotFiniteError(Exception):
 
 
 @final
-class _Run:
-    """The steps made so far."""
+class Steps:
+    """The steps of a run as they are made: an iterator over (t, y, piece), the end of each and y between its ends.
 
-    def __init__(self, system: System, stop: Callable[[float, Array], float] | None, t0: float, y0: Array) -> None:
-        self.system, self.stop = System(self._rate, system.n), stop
-        self._counted, self.evaluations = system.rate, 0
-        self.times, self.states, self.pieces = [t0], [y0], []
+    Attributes:
+        t, y: Where the run is.
+        evaluations: Of the rate so far.
+        status: How the run ended, once the steps are spent.
+        message: The same in words, with time and remedy if it failed.
+    """
+
+    def __init__(
+        self, options: Adaptive, system: System, stop: Callable[[float, Array], float] | None,
+        t0: float, y0: Array, t1: float,
+    ) -> None:  # fmt: skip
+        self.t, self.y, self.evaluations = t0, y0, 0
+        self.status, self.message = Status.FINISHED, ""
+        self._options, self._end, self._stop, self._counted = options, t1, stop, system.rate
+        self._system = replace(system, rate=self._rate)
 
     def _rate(self, t: Any, y: Array) -> Array:
         self.evaluations += y.size // y.shape[-1]
@@ -157,62 +182,68 @@ class _Run:
             return np.full_like(y, np.nan)
 
     def _jacobian(self, t: Any, y: Array) -> Array:
-        J = jacobian(self.system, t, y)
+        J = jacobian(self._system, t, y)
         if not np.isfinite(J).all():
             raise _NotFiniteError
         return J
 
-    def to(self, options: Adaptive, t1: float) -> tuple[Status, str]:
-        """Step until t1, a stop or a failure."""
+    def __iter__(self) -> Iterator[tuple[float, Array, Any]]:
+        solver = None
+        try:
+            while solver is None or solver.status == "running":
+                with np.errstate(all="ignore"):  # overflow in a trial step shortens it, or ends the run with a status
+                    solver = solver or self._solver()
+                    if not np.isfinite(solver.f).all():
+                        raise _NotFiniteError
+                    solver.step()
+                    if solver.status == "failed":
+                        self._failed("the step became smaller than the spacing of floats")
+                        return
+                    stopped, piece = self._take(solver)
+                yield self.t, self.y, piece
+                if stopped:
+                    self.status, self.message = Status.STOPPED, f"stopped at t = {self.t}"
+                    return
+        except _NotFiniteError:
+            self._failed("the rate is not finite")
+        except RobotDynError as error:
+            self.status, self.message = Status.FAILED, f"{error}, at t = {self.t}"
+        else:
+            self.message = f"finished at t = {self.t}"
+
+    def _solver(self) -> Any:
         from scipy.integrate import DOP853, Radau
 
+        options = self._options
         settings: dict[str, Any] = {"rtol": options.rtol, "atol": options.atol, "max_step": options.max_step}
         if options.method == "Radau":
             settings["jac"] = self._jacobian
         make: Any = {"DOP853": DOP853, "Radau": Radau}[options.method]
-        try:
-            solver = make(self.system.rate, self.times[0], self.states[0], t1, **settings)
-            while solver.status == "running":
-                if not np.isfinite(solver.f).all():
-                    raise _NotFiniteError
-                solver.step()
-                if solver.status == "failed":
-                    return self._failed("the step became smaller than the spacing of floats")
-                if self._add(solver):
-                    return Status.STOPPED, f"stopped at t = {self.times[-1]}"
-        except _NotFiniteError:
-            return self._failed("the rate is not finite")
-        except RobotDynError as error:
-            return Status.FAILED, f"{error}, at t = {self.times[-1]}"
-        except KeyboardInterrupt:
-            return Status.INTERRUPTED, f"interrupted at t = {self.times[-1]}"
-        return Status.FINISHED, f"finished at t = {self.times[-1]}"
+        return make(self._rate, self.t, self.y, self._end, **settings)
 
-    def _failed(self, what: str) -> tuple[Status, str]:
-        where = f"{what} at t = {self.times[-1]}, max |y| = {np.abs(self.states[-1]).max():.3g}"
-        return Status.FAILED, f"{where}: y grows without bound, or tolerances are too tight"
+    def _failed(self, what: str) -> None:
+        where = f"{what} at t = {self.t}, max |y| = {np.abs(self.y).max():.3g}"
+        self.status, self.message = Status.FAILED, f"{where}: y grows without bound, or tolerances are too tight"
 
-    def _add(self, solver: Any) -> bool:
-        """Keep the step just made, up to where `stop` changes sign; tell whether it does."""
+    def _take(self, solver: Any) -> tuple[bool, Any]:
+        """Take the step just made, up to where `stop` changes sign; tell whether it does, and give y between."""
         piece, t, y = solver.dense_output(), float(solver.t), solver.y
-        self.pieces.append(piece)
         stopped = False
-        if self.stop is not None:
-            before, after = self.stop(self.times[-1], self.states[-1]), self.stop(t, y)
+        if self._stop is not None:
+            before, after = self._stop(self.t, self.y), self._stop(t, y)
             stopped = bool(before * after < 0 or (after == 0 and before != 0))
             if stopped and after != 0:
-                t = self._crossing(piece, self.times[-1], t)
+                t = self._crossing(piece, self.t, t)
                 y = piece(t)
-        self.times.append(t)
-        self.states.append(y.copy())
-        return stopped
+        self.t, self.y = t, y.copy()
+        return stopped, piece
 
     def _crossing(self, piece: Any, t0: float, t1: float) -> float:
         from scipy.optimize import brentq
 
-        stop, root = cast(Any, self.stop), cast(Any, brentq)
+        stop, root = cast(Any, self._stop), cast(Any, brentq)
         # the ends are states, which interpolation meets up to rounding: the sign must not depend on that
-        ends = {t0: stop(t0, self.states[-1]), t1: -stop(t0, self.states[-1])}
+        ends = {t0: stop(t0, self.y), t1: -stop(t0, self.y)}
         t = float(root(lambda t: ends.get(t) or stop(t, piece(t)), t0, t1, xtol=4e-16 * max(1, abs(t1))))
         return t if t != t0 else float(np.nextafter(t0, t1))  # times ascend
 

@@ -19,6 +19,9 @@ from robot_dyn.integrate.fixed_point import MOST_ITERATIONS, fixed_point
 from robot_dyn.integrate.integrator import IntegrationError, Integrator, System, arithmetic_like
 from robot_dyn.integrate.tableau import ButcherTableau, Row, combine
 
+_INSIDE = 0.01  # of a width: a central difference of tanh is then off by 3e-5, which Newton's iteration corrects
+_LEAST = 64  # units in the last place of an entry that a difference spans at least
+
 
 def jacobian(system: System, t: Any, y: Array) -> Array:
     """J = ∂f/∂y by central differences, from 2 m evaluations in one batch; quadratures are entries like the others.
@@ -26,7 +29,8 @@ def jacobian(system: System, t: Any, y: Array) -> Array:
     Args:
         system: The equation y' = f(t, y).
         t: Time.
-        y: State, shape (..., m), float32 or float64. Entries are taken to vary on a scale of max(1, |y|).
+        y: State, shape (..., m), float32 or float64. Entries are taken to vary on a scale of max(1, |y|), or on that
+            of `system.widths` where it is narrower.
 
     Returns:
         Shape (..., m, m), in error by some u^(2/3), of both truncation and rounding.
@@ -35,7 +39,11 @@ def jacobian(system: System, t: Any, y: Array) -> Array:
     """
     m = y.shape[-1]
     unit = np.eye(m, dtype=y.dtype).reshape(m, *(1,) * (y.ndim - 1), m)  # axis 0: the entry that is moved
-    shift = unit * (np.cbrt(np.finfo(y.dtype).eps) * np.maximum(1, np.abs(y)))
+    u, size = np.finfo(y.dtype).eps, np.maximum(1, np.abs(y))
+    span = np.cbrt(u) * size
+    if system.widths is not None:
+        span = np.maximum(np.minimum(span, _INSIDE * system.widths), _LEAST * u * np.abs(y)).astype(y.dtype)
+    shift = unit * span
     both = np.stack([y + shift, y - shift])
     width = (both[0] - both[1]).sum(axis=-1, keepdims=True)  # as rounded, not 2 × shift; all other entries are 0
     up, down = system.rate(t, both)
@@ -108,7 +116,7 @@ class SinglyDiagonallyImplicit(Integrator):
                 if z is None:
                     raise IntegrationError(
                         f"{self.name}: Newton's iteration for the step {float(h)} at t = {float(t)} does not converge "
-                        f"in {MOST_ITERATIONS} rounds: take a smaller step",
+                        f"in {MOST_ITERATIONS} rounds: take a smaller step, or Radau",
                         t,
                     )
                 k.append((z - known) / h_gamma)  # not f(y + z): a stiff f would magnify the rounding of z

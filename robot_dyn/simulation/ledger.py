@@ -40,9 +40,15 @@ class Ledger:
     def exchanged(self) -> float:
         """Energy that changed hands: max K + Σ ∫ |P_k|, the integrals over the samples."""
         moved = sum(float(np.nansum(np.abs(np.diff(work)))) for work in self.work.values())
-        return float(np.nanmax(self.kinetic)) + moved
+        return largest(self.kinetic) + moved
 
     @property
     def closure(self) -> float:
         """Largest residual, as a part of the energy exchanged; 0 if nothing moved."""
-        return float(np.nanmax(np.abs(self.residual))) / self.exchanged if self.exchanged > 0 else 0.0
+        return largest(np.abs(self.residual)) / self.exchanged if self.exchanged > 0 else 0.0
+
+
+def largest(values: np.ndarray) -> float:
+    """The largest that is known; nan if none is, as in a run that ended before its first step."""
+    known = values[~np.isnan(values)]
+    return float(known.max()) if len(known) else float("nan")

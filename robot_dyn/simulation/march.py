@@ -7,13 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import final
+from math import ceil
+from typing import TypeVar, final
 
 import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.errors import RobotDynError
-from robot_dyn.integrate.adaptive import Adaptive, Solution, Status
+from robot_dyn.integrate.adaptive import Adaptive, Status
 from robot_dyn.integrate.integrator import IntegrationError, Integrator, System
 from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.observer import Observer
@@ -22,6 +23,11 @@ from robot_dyn.simulation.setup import Setup, Stretch
 WATCHED = 64  # steps between looks at the energy
 _RUNAWAY = 1e6  # [rad/s] or [m/s]: an adaptive method would follow an exploding state without end
 _SAMPLES = 1000  # of an adaptive run without a record period
+_PACED = 2000  # steps between looks at the pace of an adaptive method
+_MOST_AHEAD = 1e7  # steps that such a run may have before it at the pace it has: about an hour
+_STEEP = 1e-3  # of q or v: an effect that bends within less makes a system stiff
+
+T = TypeVar("T")
 
 
 @final
@@ -66,7 +72,7 @@ class Counter:
             self.evaluations += 1
             return system.rate(t, y)
 
-        return System(rate, system.n)
+        return replace(system, rate=rate)
 
 
 Systems = Callable[[Array | None, Stretch], System]
@@ -96,7 +102,7 @@ def march(
         method = setup.integrator
         if isinstance(method, Adaptive):
             method = replace_tolerance(method, factor)
-            y = yield from _adaptively(setup, method, system, stretch, y, held, counter, motion)
+            y = yield from _adaptively(setup, method, system, stretch, y, held, counter, watch)
         else:
             y = yield from _by_steps(setup, method, system, stretch, y, held, factor, counter, watch)
     y, held = watch.tick(setup.duration_s, y)
@@ -128,56 +134,51 @@ def _by_steps(
 
 def one_step(method: Integrator, system: System, t: float, y: Array, h: float, watch: Watch) -> Array:
     """The state after a step; DivergedError if there is none, or it is not finite."""
-    try:
-        after = method.step(system, t, y, h)
-    except IntegrationError as error:  # it names its own remedy
-        raise DivergedError(t, str(error)) from None
-    except RobotDynError as error:
-        raise watch.diverged(t, y, str(error)) from None
+    after = watch.answer(t, y, lambda: method.step(system, t, y, h))
     if not np.isfinite(after).all():
         raise watch.diverged(t, y, "a number overflowed")
     return after
 
 
 def _adaptively(
-    setup: Setup, method: Adaptive, system: System, stretch: Stretch, y: Array, held: Array | None, counter: Counter,
-    motion: Motion,
+    setup: Setup, method: Adaptive, system: System, stretch: Stretch, y: Array, held: Array | None,
+    counter: Counter, watch: Watch,
 ) -> Iterator[Sample]:  # fmt: skip
-    n = system.n
+    n, period = system.n, setup.record_period_s or setup.duration_s / _SAMPLES
 
     def sane(_: float, y: Array) -> float:
         return 1.0 if np.abs(y[n : 2 * n]).max() < _RUNAWAY else -1.0
 
-    solution = method.solve(system, stretch.start, y, stretch.end, stop=sane)
-    counter.steps += len(solution.times) - 1
-    _observe(counter.observer, motion, solution, held, stretch.tick)
-    reached = float(solution.times[-1])
-    period = setup.record_period_s or setup.duration_s / _SAMPLES
-    first = max(0.0, np.ceil(stretch.start / period - 1e-9))
-    times = np.clip(period * np.arange(first, np.ceil(stretch.end / period - 1e-9)), stretch.start, stretch.end)
-    for t in np.unique(np.append(times[times <= reached], stretch.start)):
-        yield Sample(float(t), solution(float(t)), held, shared=True)
-    if solution.status is Status.INTERRUPTED:
-        raise KeyboardInterrupt
-    if solution.status is Status.FAILED:
-        raise DivergedError(reached, solution.message)
-    if solution.status is Status.STOPPED:
-        raise DivergedError(reached, f"a joint moves faster than {_RUNAWAY:g} rad/s: the control is unstable")
-    return solution.states[-1]
+    yield Sample(stretch.start, y, held, shared=True)
+    due, end = ceil(stretch.start / period + 1e-9), ceil(stretch.end / period - 1e-9)  # multiples of the period inside
+    steps = method.steps(system, stretch.start, y, stretch.end, stop=sane)
+    ticked = stretch.tick and held is not None
+    for t, y, piece in steps:
+        counter.steps += 1
+        _observe(counter.observer, watch.motion, t, y, held, ticked)
+        ticked = False
+        while due < end and due * period <= t:
+            yield Sample(due * period, piece(due * period), held, shared=True)
+            due += 1
+        watch.pace(t, counter.steps)
+    if steps.status is Status.FAILED:
+        raise DivergedError(steps.t, steps.message)
+    if steps.status is Status.STOPPED:
+        raise DivergedError(steps.t, f"a joint moves faster than {_RUNAWAY:g} rad/s: the control is unstable")
+    return steps.y
 
 
-def _observe(observer: Observer | None, motion: Motion, solution: Solution, held: Array | None, tick: bool) -> None:
-    """Show the steps of a solution; the actuation of continuous control is that at their ends."""
+def _observe(observer: Observer | None, motion: Motion, t: float, y: Array, held: Array | None, ticked: bool) -> None:
+    """Show a step; the actuation of continuous control is that at its end."""
     if observer is None:
         return
-    for k, (t, y) in enumerate(zip(solution.times[1:], solution.states[1:], strict=True)):
-        if held is None:
+    if held is None:
+        try:
             q, v, z, _ = motion.state(y)
-            try:
-                observer.seen[len(q) :] = motion.command(float(t), q, v, z)
-            except RobotDynError:  # y may be far off where a run fails
-                continue
-        observer.step(float(t), y, held, held is not None and tick and k == 0)
+            observer.seen[len(q) :] = motion.command(t, q, v, z)
+        except RobotDynError:  # y may be far off where a run fails
+            return
+    observer.step(t, y, held, ticked)
 
 
 @final
@@ -188,21 +189,53 @@ class Watch:
         self.setup, self.motion = setup, motion
         K, V = (float(x[0]) for x in motion.energy(np.zeros(1), setup.q0[None], setup.v0[None]))
         self.energy, self.scale = K + V, 1.0 + abs(K) + abs(V)
+        self.paced = 0.0
 
     def tick(self, t: float, y: Array) -> tuple[Array, Array | None]:
         """A tick of the controller; DivergedError if it fails, or asks for no finite torque."""
-        try:
-            y, held = self.motion.tick(t, y)
-        except RobotDynError as error:
-            raise self.diverged(t, y, str(error)) from None
+        y, held = self.answer(t, y, lambda: self.motion.tick(t, y))
         if held is not None and not np.isfinite(held).all():
             raise self.diverged(t, y, "the controller asks for a torque that is not finite")
         return y, held
 
     def look(self, t: float, y: Array) -> None:
         """DivergedError if energy grows without a source."""
-        if self.gains(t, y):
+        if self.answer(t, y, lambda: self.gains(t, y)):
             raise self.diverged(t, y, "energy grows without a source")
+
+    def answer(self, t: float, y: Array, ask: Callable[[], T]) -> T:
+        """What the equations answer; DivergedError if they have no answer."""
+        try:
+            return ask()
+        except IntegrationError as error:  # it names its own remedy
+            raise DivergedError(t, str(error) + self._steepest()) from None
+        except RobotDynError as error:
+            raise self.diverged(t, y, str(error)) from None
+
+    def pace(self, t: float, steps: int) -> None:
+        """DivergedError if the steps of an adaptive method have become so short that the run would not end."""
+        if steps % _PACED:
+            return
+        made, self.paced = t - self.paced, t
+        ahead = (self.setup.duration_s - t) / max(made, 1e-300) * _PACED
+        if ahead > _MOST_AHEAD:
+            radau = "" if getattr(self.setup.integrator, "method", "") == "Radau" else "Radau, "
+            raise DivergedError(
+                t, f"the last {_PACED} steps led {made:.1e} s on, at which pace {ahead:.0e} more are left: the system "
+                f"is stiff; take {radau}softer effects or a larger tolerance{self._steepest()}"
+            )  # fmt: skip
+
+    def _steepest(self) -> str:
+        """Words for the effect that bends within the least change of q or v, if that is small."""
+        names, found = self.motion.plant.dynamics.joint_names, (_STEEP, "")
+        for effect in self.motion.plant.effects:
+            for width, unit in zip(effect.widths, ("rad or m", "rad/s or m/s"), strict=True):
+                at = np.broadcast_to(width, (len(names),))
+                i = int(np.argmin(at))
+                found = min(
+                    found, (float(at[i]), f"{effect.name} of joint {names[i]!r} bends within {at[i]:.1e} {unit}")
+                )
+        return found[1] and f" ({found[1]})"
 
     def gains(self, t: float, y: Array) -> bool:
         """Whether the ledger's residual says so."""

@@ -59,6 +59,16 @@ class Motion:
         """Number of states of the controller."""
         return self.controller.memory_size if self.controller else 0
 
+    @cached_property
+    def widths(self) -> np.ndarray:
+        """Change of each entry of y over which the rate bends, (m,): the least of the effects, inf where none says."""
+        n = self.plant.dynamics.n
+        widths = np.full(2 * n + self.memory_size + len(self.sources), np.inf)
+        for effect in self.plant.effects:
+            for part, width in zip((slice(0, n), slice(n, 2 * n)), effect.widths, strict=True):
+                widths[part] = np.minimum(widths[part], width)
+        return widths
+
     def start(self, q: Array, v: Array) -> Array:
         """Y at the start: no work done, no memory."""
         second = self.plant.dynamics.momentum(q, v) if self.canonical else v
@@ -112,7 +122,7 @@ class Motion:
                 seen[:n], seen[n:] = made[:n], u
             return made
 
-        return System(rate, n)
+        return System(rate, n, self.widths)
 
     def rate(self, t: float, y: Array, held: Array | None) -> tuple[Array, Array]:
         """f(t, y), and the actuation u; in floats or, for the compiled engine, in symbols.

@@ -24,8 +24,8 @@ from robot_dyn.simulation.machine.stages import steps_whole
 from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.rollout_result import Rollouts
 from robot_dyn.simulation.setup import Setup
+from robot_dyn.simulation.size import MOST_BYTES
 
-MOST_BYTES = 8 * 2**30  # of all that is recorded, unless said
 RECORDS = ("q", "v", "tau", "energy", "work")
 _SIGNED = ("rest", "wrench", "lower", "upper", "posture")  # coefficients that may be negative
 

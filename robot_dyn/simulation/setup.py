@@ -17,6 +17,7 @@ from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.integrate.explicit import RK4
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.model.dynamics import checked
+from robot_dyn.simulation.size import check_segments
 
 ENGINES = ("auto", "interpreted", "compiled")
 
@@ -96,6 +97,7 @@ class Setup:
         if self.controller is not None and self.controller.n != len(names):
             raise QueryError(f"the controller drives {self.controller.n} joints, the plant has {len(names)}")
         self._check_model()
+        check_segments(self)
         self.plant.torque(0.0, self.q0, self.v0)  # so that an effect that does not fit is told now
         self.plant.actuation(np.zeros(len(names)))
 

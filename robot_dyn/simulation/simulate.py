@@ -29,9 +29,10 @@ from robot_dyn.simulation.observed import observer_of, remarks
 from robot_dyn.simulation.observer import Observer
 from robot_dyn.simulation.origin import origin
 from robot_dyn.simulation.record import Record, collect
-from robot_dyn.simulation.samples import compiled_rows, rows
+from robot_dyn.simulation.samples import columns, compiled_rows
 from robot_dyn.simulation.setup import Setup
-from robot_dyn.simulation.trajectory import Ending, Statistics, Trajectory
+from robot_dyn.simulation.size import check_record
+from robot_dyn.simulation.trajectory import Ending, Outcome, Statistics, Trajectory
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.machine.machine import Machine
@@ -50,7 +51,8 @@ def simulate(
         **options: Attributes of the setup, or those to change.
 
     Raises:
-        QueryError: If the setup has no meaning. Whatever happens later is told by the trajectory's outcome.
+        QueryError: If the setup has no meaning, or its record would not fit into memory. Whatever happens later is
+            told by the trajectory's outcome.
     """
     for name in options.keys() - Setup.__dataclass_fields__.keys():
         raise QueryError(f"simulate: no option {name!r}; {nearest(name, Setup.__dataclass_fields__)}")
@@ -61,6 +63,7 @@ def simulate(
     else:
         setup = Setup(what if isinstance(what, Plant) else Plant(what), **options)
     motion = Motion(setup.plant, setup.controller, getattr(setup.integrator, "canonical", False))
+    check_record(setup, motion)
     machine, engine = choose(setup, motion)
     began = perf_counter()
     observer = observer_of(setup, motion)
@@ -68,7 +71,13 @@ def simulate(
     wall = perf_counter() - began
     error = None
     if setup.estimate_error and record.outcome.ending is not Ending.STOPPED:
-        error = _estimate(setup, motion, machine, record)
+        try:
+            error = _estimate(setup, motion, machine, record)
+        except KeyboardInterrupt:
+            error = ErrorEstimate(np.empty(0), np.empty(0), 0.0, "its companion runs were interrupted")
+            if record.outcome.ending is Ending.FINISHED:
+                outcome = Outcome(Ending.STOPPED, record.outcome.t, "interrupted after the run, in its error estimate")
+                record = replace(record, outcome=outcome)
     companions = perf_counter() - began - wall if setup.estimate_error else 0.0
     adaptive = isinstance(setup.integrator, Adaptive)
     name = setup.integrator.method if isinstance(setup.integrator, Adaptive) else setup.integrator.name
@@ -88,13 +97,16 @@ def _run(
 ) -> Record:
     """March in machine code, in the interpreted engine, or in that with its rate in machine code."""
     thin = max(1, sum(map(setup.steps, setup.stretches)) // (4 * _SHARED))
-    if machine is None:
-        return collect(setup, motion, factor, thin, None, on_progress, observer)
-    if machine.whole:
+    if machine is not None and machine.whole:
         from robot_dyn.simulation.machine.follow import follow
 
-        return follow(setup, motion, machine, factor, thin, on_progress, observer)
-    return collect(setup, motion, factor, thin, partial(machine.system, setup=setup), on_progress, observer)
+        record = follow(setup, motion, machine, factor, thin, on_progress, observer)
+    else:
+        systems = partial(machine.system, setup=setup) if machine is not None else None
+        record = collect(setup, motion, factor, thin, systems, on_progress, observer)
+    if factor != 1 and record.outcome.ending is Ending.STOPPED:
+        raise KeyboardInterrupt
+    return record
 
 
 def _estimate(setup: Setup, motion: Motion, machine: Machine | None, run: Record) -> ErrorEstimate:
@@ -121,7 +133,11 @@ def _trajectory(
 ) -> Trajectory:
     """The samples with what follows from them."""
     t = record.t
-    q, v, a, tau, W, P, E = rows(motion, record) if machine is None else compiled_rows(motion, machine, record)
+    if record.rows is not None:
+        q, v, a, tau, W, P, E = columns(motion, record.rows)
+    else:
+        assert machine is not None
+        q, v, a, tau, W, P, E = compiled_rows(motion, machine, record)
     wanted, deviation = _deviation(setup, t, q)
     ledger = Ledger(E[:, 0], E[:, 1], dict(zip(motion.sources, W.T, strict=True)))
     power = dict(zip(motion.sources, P.T, strict=True))

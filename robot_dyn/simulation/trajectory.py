@@ -9,7 +9,7 @@ from typing import final
 import numpy as np
 
 from robot_dyn.simulation.error import ErrorEstimate
-from robot_dyn.simulation.ledger import Ledger
+from robot_dyn.simulation.ledger import Ledger, largest
 from robot_dyn.simulation.remarks import Remark
 from robot_dyn.simulation.remarks import lines as said
 
@@ -113,7 +113,7 @@ class Trajectory:
         """A few lines: outcome, ledger, error, tracking, cost."""
         s, ledger = self.statistics, self.ledger
         opening = f"{self.outcome.ending} at t = {self.outcome.t:g} s, {len(self.t)} samples"
-        residual = f"residual {np.nanmax(np.abs(ledger.residual)):.2e} J, {ledger.closure:.1e} of exchanged"
+        residual = f"residual {largest(np.abs(ledger.residual)):.2e} J, {ledger.closure:.1e} of exchanged"
         leak = "it does not close: take a smaller step" if ledger.closure > _OPEN else ""
         lines = [
             opening + _after(self.outcome.advice),

@@ -12,7 +12,6 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.errors import QueryError
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.simulation.machine.follow import follow
 from robot_dyn.simulation.machine.machine import Machine
@@ -22,6 +21,7 @@ from robot_dyn.simulation.machine.timetable import Timetable, timetable
 from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.rollout_result import Rollouts
 from robot_dyn.simulation.setup import Setup
+from robot_dyn.simulation.size import samples, too_large
 from robot_dyn.simulation.trajectory import Ending
 
 LANES = 64  # runs in a tile: with 8, 16 or 32 a step of RK4 took 1.5, 1.1 and 1.05 times as long
@@ -41,23 +41,23 @@ class Batch:
             y = np.stack([nominal.start(*each) for each in zip(q0, v0, strict=True)])
         self.setup, self.machine, self.y, self.wanted, self.values = setup, made, y, wanted, free
         self.nominal, self.q0, self.v0 = nominal, q0, v0
-        self.table = timetable(setup, end=True)
         self.free = np.column_stack([*free.values(), np.zeros((len(y), 0))])
         n, tiles = made.program.n, -(-len(y) // LANES)
-        self.rows = _samples(setup, self.table)
         self.columns = [*range(n)] * ("q" in wanted)
         if "v" in wanted and not nominal.canonical:
             self.columns += range(n, 2 * n)
         if "work" in wanted:
             self.columns += range(2 * n + made.motion.memory_size, made.program.places.state)
-        m, width = len(self.rows), tiles * LANES
+        width = tiles * LANES
         counts = (len(self.columns), made.program.actuations, 2 * ("energy" in wanted))
-        size = 8 * m * width * sum(counts)
+        size = 8 * samples(setup) * width * sum(counts)
         if size > most:
-            raise QueryError(
-                f"recording {m} samples of {len(y)} runs takes {size / 2**30:.1f} GiB, more than {most / 2**30:.1f}: "
-                "take a longer record_period_s, fewer runs, or record less"
+            raise too_large(
+                f"{samples(setup):.3g} samples of {len(y)} runs", size, most, ", fewer runs, or record less"
             )
+        self.table = timetable(setup, end=True)
+        self.rows = _samples(setup, self.table)
+        m = len(self.rows)
         self.out_y = np.empty((m, counts[0], width))
         self.out_u = np.empty((m if counts[1] else 0, counts[1], width))
         self.out_e = np.empty((m if counts[2] else 0, 2, width))
@@ -158,17 +158,24 @@ class Batch:
 
 
 def _samples(setup: Setup, table: Timetable) -> np.ndarray:
-    """Stretch and step of each sample, (m, 2), by the rule of `collect`; the last is the end."""
-    stretch = np.repeat(np.arange(len(table.counts)), table.counts)
-    step = np.arange(len(stretch)) - np.repeat(np.cumsum(table.counts) - table.counts, table.counts)
-    all_of_them = np.column_stack([stretch, step])
-    if not setup.record_period_s:
-        return all_of_them
-    t, slack = table.starts[stretch] + step * table.lengths[stretch], 1e-9 * setup.step_s
-    kept, due = [], 0.0
-    at = 0
-    while at < len(t) - 1:
-        kept.append(at)
-        due += setup.record_period_s
-        at = max(at + 1, int(np.searchsorted(t, due - slack)))
-    return all_of_them[[*kept, len(t) - 1]]
+    """Stretch and step of each sample, (m, 2), by the rule of `collect`; the last is the end.
+
+    At most as long as what is recorded: a long run of few samples has more steps than memory holds.
+    """
+    before, total = np.cumsum(table.counts) - table.counts, int(table.counts.sum())
+    period = setup.record_period_s
+    if not period:
+        at = np.arange(total)
+    else:
+        count = min(total, int(setup.duration_s / period) + 2)
+        due = np.cumsum(np.append(0.0, np.full(count, period))) - 1e-9 * setup.step_s  # as the march adds it up
+        stretch = np.maximum(np.searchsorted(table.starts, due, side="right") - 1, 0)
+        start, length = table.starts[stretch], table.lengths[stretch]
+        step = np.maximum(np.floor((due - start) / np.where(length > 0, length, 1.0)) - 1, 0)
+        for _ in range(3):  # the first step that is not before its time, whatever the quotient rounds to
+            step += start + step * length < due
+        number = np.arange(count + 1)
+        at = np.maximum.accumulate((before[stretch] + step).astype(np.int64) - number) + number
+        at = np.append(at[at < total - 1], total - 1)
+    stretch = np.searchsorted(before, at, side="right") - 1
+    return np.column_stack([stretch, at - before[stretch]])

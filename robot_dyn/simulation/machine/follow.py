@@ -59,7 +59,8 @@ class _Run:
     ) -> None:
         self.setup, self.motion, self.machine, self.observer = setup, motion, machine, observer
         self.table, self.watch = timetable(setup, factor), Watch(setup, motion)
-        self.work = machine.work(motion.start(setup.q0, setup.v0))
+        self.start = motion.start(setup.q0, setup.v0)
+        self.work = machine.work(self.start)
         places, n, counts = machine.program.places, machine.program.n, self.table.counts
         self.m, self.held_at = places.state, slice(places.x + places.state, places.x + places.state + places.held)
         self.now = np.zeros(len(Now), dtype=np.int64)
@@ -175,13 +176,16 @@ class _Run:
         y, seen = self.arrays["out_y"][:rows, :, 0], int(self.now[Now.SHARED])
         shared, n = self.arrays["out_shared"][:seen], self.machine.program.n
         shared_t, shared_q = self._times(shared[:, n:].astype(np.int64)), shared[:, :n]
-        if last is not None:
+        if last is None and not rows:  # interrupted, or without a tick, at once
+            t = np.zeros(1)
+            y = np.concatenate([self.start, np.full(len(self.arrays["which"]) - m, np.nan)])[None]
+        elif last is not None:
             t = np.append(t, last[0])
             y = np.vstack([y, np.concatenate([last[1], [] if last[2] is None else last[2]])])
             shared_t, shared_q = np.append(shared_t, last[0]), np.vstack([shared_q, last[1][:n]])
         held = y[:, m:] if self.motion.sampled else None
         return Record(
-            outcome, t, y[:, :m], held, shared_t, shared_q,
+            outcome, t, y[:, :m], held, None, shared_t, shared_q,
             int(self.now[Now.STEPS]), int(self.now[Now.EVALUATIONS]),
         )  # fmt: skip
 

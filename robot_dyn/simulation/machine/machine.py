@@ -129,7 +129,7 @@ class Machine:
                 seen[:n], seen[n:] = made[:n], made[m : m + n]
             return made[:m].copy()
 
-        return System(one, n)
+        return System(one, n, self.motion.widths)
 
     def check(self, setup: Setup) -> None:
         """Hold one step from random states to the interpreted engine.
