@@ -27,7 +27,7 @@ REFERENCES = {
 
 @pytest.mark.parametrize("reference", REFERENCES.values(), ids=REFERENCES)
 def test_velocity_and_acceleration_are_derivatives(reference: PiecewisePolynomial) -> None:
-    """Central differences, h = 1e-5 s: h² q⁗ / 6 and ε q / h are below 1e-8 for motions of this size.
+    """Central differences, h = 1e-5 s: h² q⁗ / 6 and ε q / h are below 1e-7 for motions of this size.
 
     Times keep 1e-3 s from the breaks: there only the lower derivatives are continuous.
     """

@@ -44,7 +44,7 @@ def test_a_compiled_plant_is_the_interpreted_one(name: str) -> None:
             rest = (9 * u,) if method == "forward_dynamics" else ()
             ours = [getattr(compiled, method)(t, *row) for row in zip(q, v, *rest, strict=True)]
             theirs = getattr(compiled.interpreted, method)(t, q, v, *rest)
-            assert np.max(np.abs(ours - theirs)) <= 1e-11 * np.max(np.abs(theirs))
+            assert np.max(np.abs(ours - theirs)) <= 1e-12 * np.max(np.abs(theirs))
 
 
 def test_a_batch_of_a_plant_is_its_states_one_by_one() -> None:

@@ -79,7 +79,7 @@ def test_tanh_in_a_batch_kernel_errs_by_less_than_two_ulp(dtype: str, allowed: f
     values = values.astype(dtype)[:, None]
     y = np.empty_like(values)
     assert made.many([values], y) is Status.FINE
-    assert not re.search(r"\btanhf?\b", made.assembly())  # no call of the C library
+    assert not re.search(r"\b_?tanhf?\b", made.assembly())  # no call of the C library
     precision, ctx.prec = ctx.prec, 160
     try:
         exact = [arb(float(value)).tanh() for value in values[:, 0]]
