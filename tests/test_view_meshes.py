@@ -13,7 +13,7 @@ import robot_dyn as rd
 from robot_dyn.model import description, solids
 from robot_dyn.model.robot import Robot
 from robot_dyn.view.geometry.inertia_boxes import inertia_boxes
-from robot_dyn.view.geometry.meshes import MAX_BYTES
+from robot_dyn.view.geometry.mesh_files import MAX_BYTES
 from robot_dyn.view.geometry.visuals import drawing
 from tests.drawings import box, boxes, drawn, mesh_visual, stl, urdf
 
@@ -74,6 +74,12 @@ BROKEN = {
     "late.dae": b"<!--" + b" " * 10000 + b'--><!DOCTYPE a [<!ENTITY x "y">]><COLLADA a="&x;"/>',
     "utf16.dae": '<?xml version="1.0" encoding="utf-16"?><!DOCTYPE a [<!ENTITY x "y">]><COLLADA/>'.encode("utf-16"),
     "bad.glb": b"glTF\2\0\0\0",
+    "cut.stl": b"solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nendloop\nendfacet\nendsolid x\n",
+    "words.stl": b"solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 z\nvertex 1 0 0\nvertex 0 1 0\nendloop",
+    "no_buffer.gltf": b'{"asset":{"version":"2.0"},"buffers":[{"uri":"none.bin","byteLength":9}],"accessors":[]}',
+    "claims.gltf": b'{"asset":{"version":"2.0"},"accessors":[{"count":9999999999,"type":"SCALAR"}]}',
+    "crowd.gltf": b'{"asset":{"version":"2.0"},"nodes":[' + b"{}," * 20_000 + b"{}]}",
+    "deep.gltf": b"[" * 100_000,
     "claims.glb": b"glTF\2\0\0\0\xff\0\0\0" + struct.pack("<I", 35) + b'JSON{"accessors":[{"count":9999999999}]}',
     "odd.mesh": b"[MeshSerializer_v1.8]",
 }
@@ -133,7 +139,7 @@ def test_instances_of_instances_are_counted_before_they_are_drawn(tmp_path: Path
         ("<visual/>", "<geometry> is empty"),
         (mesh_visual(""), "names no file"),
         (mesh_visual("http://[example/a.stl"), "names no file on this machine"),
-        (mesh_visual("package://nowhere/a.stl"), "package_dirs"),
+        (mesh_visual("package://nowhere/b.stl"), "package_dirs"),
         (mesh_visual("a.stl", 'scale="1 1 x"'), "scale must be 3"),
         (mesh_visual("a.stl", 'scale="0 0 1"'), "no triangles"),
     ],

@@ -11,7 +11,9 @@ from urllib.parse import unquote
 
 from robot_dyn.errors import CatalogError, shorten
 from robot_dyn.model import catalog
-from robot_dyn.view.geometry.meshes import MeshError
+from robot_dyn.view.geometry.mesh_files import MeshError
+
+_LEVELS = 4  # of folders above a URDF that may be its package, as in package/robots/arm/urdf
 
 
 def shown(address: str | None) -> str:
@@ -21,8 +23,13 @@ def shown(address: str | None) -> str:
     return shorten(re.split(r"[/\\]", address)[-1] if rooted else address)
 
 
-def find_file(address: str | None, source: Path, package_dirs: tuple[str | Path, ...]) -> Path:
+def find_file(
+    address: str | None, source: Path, package_dirs: tuple[str | Path, ...], remarks: list[str] | None = None
+) -> Path:
     """The file of an address that stands in the URDF `source`; whether it exists is for its reader to say.
+
+    Where a package is not found, its file is taken from a folder above the URDF that has one at the same place; a
+    remark says so.
 
     Raises:
         MeshError: If the address names none.
@@ -36,7 +43,20 @@ def find_file(address: str | None, source: Path, package_dirs: tuple[str | Path,
     for folders in (package_dirs, _installed()):
         with suppress(CatalogError, OSError, ValueError):
             return catalog.resolve(address, source, folders).resolve()
+    with suppress(OSError, ValueError):
+        name, _, inside = address.removeprefix("package://").lstrip("/").partition("/")
+        if folder := _above(inside, source):
+            remark = f"package {shorten(name)!r} is not found; its files are taken from {folder.name!r} above the URDF"
+            if remarks is not None and remark not in remarks:
+                remarks.append(remark)
+            return (folder / inside).resolve()
     raise MeshError(f"no file for {shown(address)}; name the folder of the package in package_dirs or ROS_PACKAGE_PATH")
+
+
+def _above(inside: str, source: Path) -> Path | None:
+    """The folder above the URDF that holds this file: of packages that were renamed, or are not there."""
+    folders = source.absolute().parents[:_LEVELS] if inside and ".." not in Path(inside).parts else ()
+    return next((folder for folder in folders if (folder / inside).is_file()), None)
 
 
 def _installed() -> Iterator[Path]:

@@ -7,33 +7,28 @@ Coordinates are read as rviz and coal read them: the nodes of a scene are applie
 from __future__ import annotations
 
 import io
-import json
+import logging
 import warnings
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
-from pathlib import Path, PureWindowsPath
-from stat import S_ISREG
+from pathlib import Path
 from typing import Any, final
 
 import numpy as np
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 from numpy import ndarray
 
-from robot_dyn.errors import RobotDynError, shorten
+from robot_dyn.errors import shorten
+from robot_dyn.view.geometry.mesh_files import MeshError, beside, bounded, check_gltf, checked_collada
+from robot_dyn.view.geometry.stl import read_stl
 from robot_dyn.view.geometry.triangles import Mesh, welded
 
-MAX_BYTES = 64 * 2**20  # of one mesh or texture; the largest of example-robot-data has 28 MiB
-MAX_NODES = 20_000  # of a scene when every instance is counted
 MAX_PIXELS = 1024  # of a texture's longer side in the page
-FORMATS = ("stl", "dae", "obj", "ply", "glb")
+FORMATS = ("stl", "dae", "obj", "ply", "glb", "gltf")
 
 Rgba = tuple[float, float, float, float]
 WHITE: Rgba = (1.0, 1.0, 1.0, 1.0)
-
-
-class MeshError(RobotDynError):
-    """A shape or texture that cannot be drawn; the message says why, and follows the name of its file or link."""
 
 
 @final
@@ -63,13 +58,19 @@ def read(path: Path, scale: Any = (1.0, 1.0, 1.0)) -> tuple[tuple[Part, ...], tu
     Raises:
         MeshError: If there is no such file, or it is too large, damaged, empty or of another format.
     """
-    data, kind, missing = bounded(path), path.suffix.lower().removeprefix("."), []
+    kind, missing, factors = path.suffix.lower().removeprefix("."), [], np.array(scale, dtype=float)
+    data = bounded(path)
     if kind not in FORMATS:
         raise MeshError(f"its format {path.suffix!r} is not read; convert it to {', '.join(FORMATS)}")
     try:
-        with warnings.catch_warnings(action="ignore"):  # of numpy and Pillow, on what is refused below
-            scene, unit, y_up = _scene(data, kind, path.parent, missing)
-            parts = tuple(_parts(scene, unit * np.array(scale, dtype=float), missing, kind != "stl", y_up))
+        with warnings.catch_warnings(action="ignore"), _heard(missing):  # of numpy and Pillow, on what is refused below
+            if kind == "stl":
+                corners = read_stl(data, missing)
+                del data  # of 1 GB that a large file would take, this is the part that is not needed
+                parts = _uncoloured(corners, factors)
+            else:
+                scene, unit, y_up = _scene(data, kind, path.parent, missing)
+                parts = tuple(_parts(scene, unit * factors, missing, y_up))
     except MeshError:
         raise
     except Exception as error:  # a damaged file makes the readers raise anything
@@ -79,17 +80,26 @@ def read(path: Path, scale: Any = (1.0, 1.0, 1.0)) -> tuple[tuple[Part, ...], tu
     return parts, tuple(dict.fromkeys(missing))
 
 
-def bounded(path: Path) -> bytes:
-    """The bytes of a regular file of at most `MAX_BYTES`; MeshError if it is none."""
+@contextmanager
+def _heard(missing: list[str]) -> Iterator[None]:
+    """Take what trimesh logs, which would go to stderr with its traceback, as something that cannot be read."""
+    logger = logging.getLogger("trimesh")
+    handler = logging.Handler(logging.WARNING)
+    handler.emit = lambda record: missing.append(f"its reader says: {shorten(record.getMessage(), 120)}")
+    logger.addHandler(handler)
+    propagate, logger.propagate = logger.propagate, False
     try:
-        status = path.stat()
-        if not S_ISREG(status.st_mode):
-            raise MeshError("is no regular file")
-        if status.st_size > MAX_BYTES:
-            raise MeshError(f"has {status.st_size / 2**20:.0f} MiB, the limit is {MAX_BYTES >> 20}; simplify it")
-        return path.read_bytes()
-    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        raise MeshError(f"cannot be read ({getattr(error, 'strerror', error)})") from None
+        yield
+    finally:
+        logger.propagate = propagate
+        logger.removeHandler(handler)
+
+
+def _uncoloured(corners: ndarray, scale: ndarray) -> tuple[Part, ...]:
+    """The part of triangles without material, their corners scaled in place."""
+    np.multiply(corners, scale, out=corners, casting="unsafe")
+    mesh = welded(corners[:, ::-1] if np.prod(scale) < 0 else corners)
+    return () if mesh is None else (Part(mesh),)
 
 
 def png(picture: Any) -> bytes:
@@ -115,12 +125,13 @@ def _scene(data: bytes, kind: str, folder: Path, missing: list[str]) -> tuple[An
     """What trimesh reads, nothing merged; the unit of its lengths in [m]; and whether it says that y is up."""
     import trimesh
 
-    choices = {"file_type": kind, "resolver": _beside(folder, missing), "process": False}
-    if kind == "glb":
-        _check_gltf(data)
+    named = beside(folder, missing, anywhere=kind not in ("glb", "gltf"))  # textures often stand in ../textures
+    choices = {"file_type": kind, "resolver": named, "process": False}
+    if kind in ("glb", "gltf"):
+        check_gltf(data, named)
     if kind != "dae":
         return trimesh.load_scene(io.BytesIO(data), **choices), 1.0, False
-    root = _checked_collada(data)
+    root = checked_collada(data)
     unit = root.find("{*}asset/{*}unit")
     try:
         metres = float("1" if unit is None else unit.get("meter", "1"))
@@ -136,57 +147,7 @@ def _scene(data: bytes, kind: str, folder: Path, missing: list[str]) -> tuple[An
     return scene, metres if 0 < metres < np.inf else 1.0, root.findtext("{*}asset/{*}up_axis", "").strip() == "Y_UP"
 
 
-def _checked_collada(data: bytes) -> etree._Element:
-    """The document, if it has no DTD, and no instances of instances beyond number."""
-    first, prolog = None, etree.XMLPullParser(events=("start",), resolve_entities=False, no_network=True)
-    for start in range(0, len(data), 2**12):
-        prolog.feed(data[start : start + 2**12])
-        if first := next(iter(prolog.read_events()), None):
-            break
-    if first and first[1].getroottree().docinfo.internalDTD is not None:
-        raise MeshError("declares a document type (<!DOCTYPE …>), through which it can read other files; remove it")
-    # geometry exceeds the limits on texts; they are lifted where no entity can be declared any more
-    root = etree.fromstring(data, etree.XMLParser(resolve_entities=False, no_network=True, huge_tree=True))
-    named = {f"#{node.get('id')}": node for node in root.iterfind(".//{*}node[@id]")}
-
-    @cache
-    def size(url: str) -> int:
-        return count(named[url]) if url in named else 0
-
-    def count(node: etree._Element) -> int:
-        return 1 + sum(
-            size(child.get("url", "")) if child.tag.endswith("}instance_node") else count(child)
-            for child in node.iterchildren("{*}node", "{*}instance_node", "{*}instance_geometry")
-        )
-
-    if sum(count(scene) for scene in root.iterfind("{*}library_visual_scenes/{*}visual_scene")) > MAX_NODES:
-        raise MeshError(f"draws more than {MAX_NODES} nodes when its instances are counted; simplify it")
-    return root
-
-
-def _check_gltf(data: bytes) -> None:
-    """Refuse accessors that claim more than the file holds: the reader would make arrays of zeros of that size."""
-    head = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")])
-    if sum(each["count"] for each in head.get("accessors", ())) > len(data):
-        raise MeshError("claims more vertices than it has bytes; export it anew")
-
-
-def _beside(folder: Path, missing: list[str]) -> Any:
-    """What a mesh may open by name: regular files of bounded size, found from its folder; the others are noted."""
-    from trimesh.resolvers import FilePathResolver
-
-    class Beside(FilePathResolver):
-        def get(self, name: str) -> bytes:
-            try:
-                return bounded(folder / name.strip().removeprefix("file://").replace("\\", "/"))
-            except MeshError as error:
-                missing.append(f"{shorten(PureWindowsPath(name).name)} {error}")  # folders are nobody's business
-                raise
-
-    return Beside(str(folder), allow_anywhere=True)  # textures often stand in ../textures
-
-
-def _parts(scene: Any, scale: ndarray, missing: list[str], coloured: bool, y_up: bool) -> Iterator[Part]:
+def _parts(scene: Any, scale: ndarray, missing: list[str], y_up: bool) -> Iterator[Part]:
     """One part for each material, from all nodes of the scene that wear it."""
     groups: dict[tuple[Any, ...], list[tuple[Any, ...]]] = {}
     images: dict[int, bytes | None] = {}
@@ -196,7 +157,7 @@ def _parts(scene: Any, scale: ndarray, missing: list[str], coloured: bool, y_up:
         if not len(getattr(geometry, "faces", ())):
             continue  # lines and points
         corners, normals = _placed(geometry, scale[:, None] * transform[:3])
-        rgba, picture, *columns = _look(geometry) if coloured else (None,) * 4
+        rgba, picture, *columns = _look(geometry)
         if picture is not None and id(picture) not in images:
             try:
                 images[id(picture)] = png(picture)

@@ -59,15 +59,16 @@ def welded(
         kept = np.isfinite(corners).all(axis=(1, 2)) & np.isfinite(area).all(axis=1) & area.any(axis=1)
     if not kept.any():
         return None
-    corners, area = corners[kept], area[kept]
-    columns: Any = [None if array is None else np.asarray(array)[kept] for array in (normals, uv, colors)]
-    normals, uv, colors = columns
-    face_normals = area / np.linalg.norm(area, axis=1, keepdims=True)
+    columns: Any = (corners, area, normals, uv, colors)
+    if not kept.all():
+        columns = [None if array is None else np.asarray(array)[kept] for array in columns]
+    corners, area, normals, uv, colors = columns
+    face_normals = np.divide(area, np.linalg.norm(area, axis=1, keepdims=True), out=area)
     kept_normals = _sane(normals, face_normals)
-    smooth: Any = _creased(corners, face_normals) if kept_normals is None else kept_normals
-    parts = [corners, np.rint(127 * smooth).astype("f4") + np.float32(0)]
-    parts += [] if uv is None else [uv.astype("f4") + np.float32(0)]
-    parts += [] if colors is None else [colors.astype("f4")]
+    smooth: Any = (_creased(corners, face_normals) if kept_normals is None else kept_normals).astype("f4")
+    parts = [corners, np.rint(127 * smooth) + np.float32(0)]
+    parts += [] if uv is None else [np.asarray(uv).astype("f4") + np.float32(0)]
+    parts += [] if colors is None else [np.asarray(colors).astype("f4")]
     first, faces = _distinct(np.concatenate(parts, axis=2).reshape(3 * len(corners), -1))
     columns = (None if array is None else array.reshape(-1, array.shape[2])[first] for array in (uv, colors))
     return Mesh(corners.reshape(-1, 3)[first], smooth.reshape(-1, 3)[first], faces.reshape(-1, 3), *columns)
@@ -75,11 +76,14 @@ def welded(
 
 def _distinct(rows: ndarray) -> tuple[ndarray, ndarray]:
     """Index of the first of each kind of row of float32, in order; and for each row the number of its kind."""
-    words = np.ascontiguousarray(rows).view(np.uint32).astype(np.uint64)
+    words = np.ascontiguousarray(rows).view(np.uint32)
     odd = np.random.default_rng(0).integers(2**63, size=words.shape[1], dtype=np.uint64) * 2 + 1
-    mixed = ((words + odd) * odd ^ (words * odd >> np.uint64(29))).sum(axis=1, dtype=np.uint64)
+    mixed = np.zeros(len(words), np.uint64)
+    for column, factor in zip(words.T, odd, strict=True):  # column by column, in a sixth of the memory
+        wide = column.astype(np.uint64)
+        mixed += (wide + factor) * factor ^ (wide * factor >> np.uint64(29))
     _, first, kind = np.unique(mixed, return_index=True, return_inverse=True)  # 20 times faster than by axis
-    if not np.array_equal(words[first][kind], words):  # two rows of one hash
+    if not all(np.array_equal(column[first][kind], column) for column in words.T):  # two rows of one hash
         _, first, kind = np.unique(words, axis=0, return_index=True, return_inverse=True)
     order = np.argsort(first)
     rank = np.empty_like(order)
@@ -107,20 +111,25 @@ def _creased(corners: ndarray, face_normals: ndarray) -> ndarray:
 
     Source: Thürmer and Wüthrich, Computing vertex normals from polygonal facets, 1998.
     """
-    edges = np.roll(corners, -1, axis=1).astype(float) - corners
-    edges /= np.maximum(np.linalg.norm(edges, axis=2, keepdims=True), 1e-300)
-    angle = np.arccos(np.clip(-np.einsum("fci,fci->fc", edges, np.roll(edges, 1, axis=1)), -1, 1)).reshape(-1)
+    angle = np.concatenate([_angles(block) for block in np.array_split(corners, 1 + len(corners) // 2**16)]).reshape(-1)
     _, vertex = _distinct(corners.reshape(-1, 3))
     order = np.argsort(vertex, kind="stable")
     degree = np.bincount(vertex)
     start = np.cumsum(degree) - degree
-    normals = np.repeat(face_normals, 3, axis=0)
-    out = normals.copy()
+    out = np.repeat(face_normals.astype("f4"), 3, axis=0)
     for d in np.unique(degree):
         if 1 < d <= _CROWD:
             at_vertices = order[start[degree == d, None] + np.arange(d)]
             for block in np.array_split(at_vertices, 1 + len(at_vertices) * d * d // 2**20):
-                n = normals[block]
+                n = face_normals[block // 3]
                 near = (np.einsum("vai,vbi->vab", n, n) > CREASE) * angle[block][:, None]
                 out[block] = np.einsum("vab,vbi->vai", near, n) + 1e-9 * n
-    return (out / np.linalg.norm(out, axis=1, keepdims=True)).reshape(-1, 3, 3)
+    out /= np.linalg.norm(out, axis=1, keepdims=True)
+    return out.reshape(-1, 3, 3)
+
+
+def _angles(corners: ndarray) -> ndarray:
+    """Angle of each corner, (m, 3)."""
+    edges = np.roll(corners, -1, axis=1).astype(float) - corners
+    edges /= np.maximum(np.linalg.norm(edges, axis=2, keepdims=True), 1e-300)
+    return np.arccos(np.clip(-np.einsum("fci,fci->fc", edges, np.roll(edges, 1, axis=1)), -1, 1)).astype("f4")

@@ -20,10 +20,11 @@ from robot_dyn.errors import shorten
 from robot_dyn.model.markup import parse
 from robot_dyn.model.robot import Robot
 from robot_dyn.spatial import homogeneous, rotation_rpy
-from robot_dyn.view.geometry import meshes
+from robot_dyn.view.geometry import mesh_files, meshes
 from robot_dyn.view.geometry.addresses import find_file, shown
 from robot_dyn.view.geometry.inertia_boxes import inertia_boxes, inertia_ellipsoid, off_centre
-from robot_dyn.view.geometry.meshes import WHITE, MeshError, Part, Rgba
+from robot_dyn.view.geometry.mesh_files import MeshError
+from robot_dyn.view.geometry.meshes import WHITE, Part, Rgba
 from robot_dyn.view.geometry.shapes import PRIMITIVES
 from robot_dyn.view.geometry.triangles import Mesh
 
@@ -98,12 +99,12 @@ class _Artist:
         self.name, self.source = robot.name, Path(robot.description.source)
         self.element, _ = parse(robot.description.text, robot.description.source)
         self.checked = {link.get("name"): link for link in robot.description.element.iterfind("link")}
-        self.file = partial(find_file, source=self.source, package_dirs=tuple(package_dirs))
         self.notes, self.remarks = list[str](), list[str]()
+        self.file = partial(find_file, source=self.source, package_dirs=tuple(package_dirs), remarks=self.remarks)
         self._turn, self._y_up = np.eye(4), []  # of what says that y is up: link, pose and mesh
         self._read = cache(meshes.read)  # so that pieces of one file share their meshes
         self._primitive = cache(lambda tag, lengths: PRIMITIVES[tag][0](*lengths))
-        self._texture = cache(lambda path: meshes.png(meshes.bounded(path)))
+        self._texture = cache(lambda path: meshes.png(mesh_files.bounded(path)))
         # As in urdfdom: a name means its first definition, those of the top level before those of the links.
         self._materials: dict[str, Any] = {}
         for material in (*self.element.iterfind("material"), *self.element.iterfind("link/visual/material")):

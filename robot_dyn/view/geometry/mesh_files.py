@@ -1,0 +1,110 @@
+"""What a mesh file may open, and checks of its text before a reader of its format sees it."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path, PureWindowsPath
+from stat import S_ISREG
+from typing import Any
+from urllib.parse import unquote
+
+from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
+
+from robot_dyn.errors import RobotDynError, shorten
+
+MAX_BYTES = 64 * 2**20  # of one mesh or texture; the largest of example-robot-data has 28 MiB
+MAX_NODES = 20_000  # of a scene when every instance is counted
+_UNSEEN = ("library_lights", "library_cameras", "library_animations", "instance_light", "instance_camera")
+
+
+class MeshError(RobotDynError):
+    """A shape or texture that cannot be drawn; the message says why, and follows the name of its file or link."""
+
+
+def bounded(path: Path) -> bytes:
+    """The bytes of a regular file of at most `MAX_BYTES`; MeshError if it is none."""
+    try:
+        status = path.stat()
+        if not S_ISREG(status.st_mode):
+            raise MeshError("is no regular file")
+        if status.st_size > MAX_BYTES:
+            raise MeshError(f"has {status.st_size / 2**20:.0f} MiB, the limit is {MAX_BYTES >> 20}; simplify it")
+        return path.read_bytes()
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
+        raise MeshError(f"cannot be read ({getattr(error, 'strerror', error)})") from None
+
+
+def beside(folder: Path, missing: list[str], anywhere: bool) -> Any:
+    """What a mesh may open by name: regular files, `MAX_BYTES` in all, from its folder; the others are noted."""
+    from trimesh.resolvers import FilePathResolver
+
+    class Beside(FilePathResolver):
+        def get(self, name: str) -> bytes:
+            try:
+                return readbeside(name)
+            except MeshError as error:
+                missing.append(f"{shorten(PureWindowsPath(name).name)} {error}")  # folders are nobody's business
+                raise
+
+    left = MAX_BYTES
+
+    @cache
+    def readbeside(name: str) -> bytes:
+        nonlocal left
+        path = Path(name.strip().removeprefix("file://").replace("\\", "/"))
+        if not anywhere:
+            path = Path(unquote(name))  # an address of glTF
+            if path.is_absolute() or ".." in path.parts or "://" in name:
+                raise MeshError("is not beside the mesh, nor below it; put it there")
+        data = bounded(folder / path)
+        left -= len(data)
+        if left < 0:
+            raise MeshError(f"is one file too many: together they have more than {MAX_BYTES >> 20} MiB; simplify it")
+        return data
+
+    return Beside(str(folder), allow_anywhere=True)
+
+
+def checked_collada(data: bytes) -> etree._Element:
+    """The document, if it has no DTD, and no instances of instances beyond number."""
+    first, prolog = None, etree.XMLPullParser(events=("start",), resolve_entities=False, no_network=True)
+    for start in range(0, len(data), 2**12):
+        prolog.feed(data[start : start + 2**12])
+        if first := next(iter(prolog.read_events()), None):
+            break
+    if first and first[1].getroottree().docinfo.internalDTD is not None:
+        raise MeshError("declares a document type (<!DOCTYPE …>), through which it can read other files; remove it")
+    # geometry exceeds the limits on texts; they are lifted where no entity can be declared any more
+    safe = {"resolve_entities": False, "no_network": True, "remove_comments": True, "remove_pis": True}
+    root = etree.fromstring(data, etree.XMLParser(**safe, huge_tree=True))
+    for tag in _UNSEEN:  # pycollada refuses the scene for a light that is not defined
+        for element in root.findall(f".//{{*}}{tag}"):
+            element.getparent().remove(element)
+    named = {f"#{node.get('id')}": node for node in root.iterfind(".//{*}node[@id]")}
+
+    @cache
+    def size(url: str) -> int:
+        return count(named[url]) if url in named else 0
+
+    def count(node: etree._Element) -> int:
+        return 1 + sum(
+            size(child.get("url", "")) if child.tag.endswith("}instance_node") else count(child)
+            for child in node.iterchildren("{*}node", "{*}instance_node", "{*}instance_geometry")
+        )
+
+    if sum(count(scene) for scene in root.iterfind("{*}library_visual_scenes/{*}visual_scene")) > MAX_NODES:
+        raise MeshError(f"draws more than {MAX_NODES} nodes when its instances are counted; simplify it")
+    return root
+
+
+def check_gltf(data: bytes, named: Any) -> None:
+    """Refuse accessors that claim more than there is: the reader would make arrays of zeros of that size."""
+    binary = data[:4] == b"glTF"
+    head = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")] if binary else data)
+    addresses = [each.get("uri", "") for each in head.get("buffers", ())]
+    room = len(data) + sum(len(named[uri]) for uri in addresses if uri and not uri.startswith("data:"))
+    if sum(each["count"] for each in head.get("accessors", ())) > room:
+        raise MeshError("claims more vertices than it has bytes; export it anew")
+    if len(head.get("nodes", ())) > MAX_NODES:
+        raise MeshError(f"has more than {MAX_NODES} nodes; simplify it")

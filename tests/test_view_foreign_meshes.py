@@ -1,0 +1,259 @@
+"""Meshes as others keep them: STL of odd writers, glTF with buffers beside it, Collada with remains, lost packages."""
+
+from __future__ import annotations
+
+import base64
+import json
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robot_dyn.view.geometry import meshes
+from tests.drawings import box, boxes, drawn, mesh_visual, stl, urdf
+
+pytestmark = pytest.mark.filterwarnings("ignore::robot_dyn.errors.ModelWarning")
+
+CORNERS = np.array([[0, 0, 0], [0.3, 0, 0], [0, 0.2, 0], [0, 0, 0.1]], dtype="f4")
+FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], dtype="<u2")
+
+# --- STL
+
+
+def facets(normal: str = "0 0 0", vertex: str = "vertex") -> str:
+    lines = ["solid some name"]
+    for face in FACES:
+        corners = "\n".join(f"      {vertex} {x:.9g}\t{y:.9g} {z:.9e}" for x, y, z in CORNERS[face].tolist())
+        lines.append(f"  facet normal {normal}\n    outer loop\n{corners}\n    endloop\n  endfacet")
+    return "\n".join([*lines, "endsolid some name", ""])
+
+
+@pytest.mark.parametrize(
+    "text", [facets(), facets("nan nan nan"), facets("-1E-3 +.5 0.7"), facets(vertex="VERTEX").upper(),
+             "\n\n" + facets().replace("\n", "\r\n")]
+)  # fmt: skip
+def test_ascii_stl_is_that_of_the_same_corners_in_binary(text: str, tmp_path: Path) -> None:
+    stl(tmp_path / "binary.stl")
+    (tmp_path / "ascii.stl").write_text(text)
+    (expected,), _ = meshes.read(tmp_path / "binary.stl")
+    (part,), missing = meshes.read(tmp_path / "ascii.stl")
+    assert missing == ()
+    for name in ("vertices", "faces", "normals"):
+        assert np.array_equal(getattr(part.mesh, name), getattr(expected.mesh, name)), name
+
+
+@pytest.mark.parametrize("more", [b"", b"made by hand"])
+def test_binary_stl_that_begins_as_an_ascii_one_or_goes_on_after_its_end(more: bytes, tmp_path: Path) -> None:
+    stl(tmp_path / "a.stl")
+    data = (tmp_path / "a.stl").read_bytes()
+    (tmp_path / "b.stl").write_bytes((b"     " if more else b"solid") + data[5:] + more)
+    (expected,), _ = meshes.read(tmp_path / "a.stl")
+    (part,), _ = meshes.read(tmp_path / "b.stl")
+    assert np.array_equal(part.mesh.vertices, expected.mesh.vertices)
+
+
+def test_normal_that_is_no_number_is_noted_with_its_mesh_and_nothing_reaches_stderr(tmp_path: Path, capfd) -> None:
+    (tmp_path / "a.stl").write_text(facets("0 0 zz"))
+    here = drawn(urdf(mesh_visual("a.stl")), tmp_path)
+    assert here.notes == ("mesh a.stl: a normal is not three numbers; drawn without it",)
+    assert np.array_equal(box(here.pieces[0].mesh.vertices), box(CORNERS))
+    assert capfd.readouterr() == ("", "")
+
+
+def test_what_the_reader_of_a_format_logs_is_noted_and_does_not_reach_stderr(tmp_path: Path, capfd) -> None:
+    (tmp_path / "a.gltf").write_text(json.dumps(gltf() | {"meshes": [{"primitives": [
+        {"attributes": {"POSITION": 0}, "indices": 1, "extensions": {"KHR_draco_mesh_compression": {"bufferView": 0}}}
+    ]}]}))  # fmt: skip
+    here = drawn(urdf(mesh_visual("a.gltf")), tmp_path)
+    assert "its reader says: " in here.notes[0]
+    assert capfd.readouterr() == ("", "")
+
+
+def test_stl_is_read_in_memory_of_a_few_times_its_size(tmp_path: Path) -> None:
+    """Counted by NumPy's own allocations, 20 bytes for each of the file's: the whole is then ten files or less."""
+    import tracemalloc
+
+    k = 150
+    u, v = np.meshgrid(np.linspace(0, 1, k + 1), np.linspace(0, 1, k + 1))
+    grid = np.stack([u, v, np.sin(9 * u) * np.cos(7 * v)], axis=2).astype("f4")
+    a, b, c = grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:]
+    record = np.zeros(k * k, dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+    record["corners"] = np.stack([a, b, c], axis=2).reshape(-1, 3, 3)
+    data = b" " * 80 + struct.pack("<I", k * k) + record.tobytes()
+    (tmp_path / "a.stl").write_bytes(data)
+    meshes.read(tmp_path / "a.stl")  # imports
+    tracemalloc.start()
+    try:
+        meshes.read(tmp_path / "a.stl")
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 12 * len(data)
+
+
+# --- glTF
+
+
+def gltf(uri: str | None = None) -> dict:
+    """A red tetrahedron; its buffer in the file itself, or at an address."""
+    data = CORNERS.tobytes() + FACES.tobytes()
+    inside = "data:application/octet-stream;base64," + base64.b64encode(data).decode()
+    return {
+        "asset": {"version": "2.0"},
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "material": 0}]}],
+        "materials": [{"pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 1]}}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"},
+            {"bufferView": 1, "componentType": 5123, "count": 12, "type": "SCALAR"},
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteLength": CORNERS.nbytes},
+            {"buffer": 0, "byteOffset": CORNERS.nbytes, "byteLength": FACES.nbytes},
+        ],
+        "buffers": [{"byteLength": len(data), "uri": uri or inside}],
+    }
+
+
+@pytest.mark.parametrize(
+    ("uri", "file"), [(None, None), ("a.bin", "a.bin"), ("parts/my%20arm.bin", "parts/my arm.bin")]
+)
+def test_gltf_is_read_with_its_buffers(uri: str | None, file: str | None, tmp_path: Path) -> None:
+    (tmp_path / "a.gltf").write_text(json.dumps(gltf(uri)))
+    if file:
+        (tmp_path / file).parent.mkdir(exist_ok=True)
+        (tmp_path / file).write_bytes(CORNERS.tobytes() + FACES.tobytes())
+    here = drawn(urdf(mesh_visual("a.gltf")), tmp_path)
+    assert here.notes == ()
+    (piece,) = here.pieces
+    assert piece.rgba == (1, 0, 0, 1)
+    assert np.array_equal(box(piece.mesh.vertices), box(CORNERS))
+
+
+@pytest.mark.parametrize(
+    "uri", ["../a.bin", "{folder}/a.bin", "file://{folder}/a.bin", "parts/../../a.bin", "%2e%2e/a.bin"]
+)
+def test_gltf_reads_no_buffer_that_is_not_beside_or_below_it(uri: str, tmp_path: Path) -> None:
+    (tmp_path / "a.bin").write_bytes(CORNERS.tobytes() + FACES.tobytes())
+    (tmp_path / "meshes" / "parts").mkdir(parents=True)
+    (tmp_path / "meshes" / "a.gltf").write_text(json.dumps(gltf(uri.format(folder=tmp_path))))
+    here = drawn(urdf(mesh_visual("meshes/a.gltf")), tmp_path)
+    assert "is not beside the mesh, nor below it" in here.notes[0]
+
+
+def test_gltf_may_not_open_more_than_the_limit_in_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from robot_dyn.view.geometry import mesh_files
+
+    description = gltf("a.bin")
+    description["buffers"] += [{"byteLength": 96, "uri": f"{i}.bin"} for i in range(5)]
+    (tmp_path / "a.gltf").write_text(json.dumps(description))
+    for name in ("a", *range(5)):
+        (tmp_path / f"{name}.bin").write_bytes(CORNERS.tobytes() + FACES.tobytes() + b" " * 3000)
+    monkeypatch.setattr(mesh_files, "MAX_BYTES", 10_000)
+    here = drawn(urdf(mesh_visual("a.gltf")), tmp_path)
+    assert "is one file too many" in here.notes[0]
+
+
+# --- Collada
+
+COLLADA = """<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><unit meter="1"/><up_axis>Z_UP</up_axis></asset>{libraries}
+<library_effects><effect id="e"><profile_COMMON><technique sid="t"><phong><diffuse><color>{color}</color></diffuse>
+  </phong></technique></profile_COMMON></effect></library_effects>
+<library_materials><material id="m"><instance_effect url="#e"/></material></library_materials>
+<library_geometries><geometry id="g"><mesh><source id="p"><float_array id="pa" count="12">{floats}</float_array>
+  <technique_common><accessor source="#pa" count="4" stride="3"><param name="X" type="float"/>
+  <param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source>
+  <vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+  <triangles count="4" material="s"><input semantic="VERTEX" source="#v" offset="0"/><p>{faces}</p></triangles>
+</mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="s">{nodes}<node><instance_geometry url="#g"><bind_material><technique_common>
+  <instance_material symbol="s" target="#m"/></technique_common></bind_material></instance_geometry></node>
+</visual_scene></library_visual_scenes><scene><instance_visual_scene url="#s"/></scene></COLLADA>"""
+SOUND = {
+    "libraries": "",
+    "color": "1 0 0 1",
+    "nodes": "",
+    "floats": " ".join(f"{x:.9g}" for x in CORNERS.ravel()),
+    "faces": " ".join(map(str, FACES.ravel())),
+}
+REMAINS = {
+    "nothing": {},
+    "a light that is not defined": {"nodes": '<node><instance_light url="#Lamp"/></node>'},
+    "a camera that is not defined": {"nodes": '<node><instance_camera url="#Camera"/></node>'},
+    "a light without technique": {"libraries": '<library_lights><light id="l"/></library_lights>'},
+    "an animation of nothing": {
+        "libraries": '<library_animations><animation id="a"><channel source="#x" target="y"/></animation>'
+        "</library_animations>"
+    },
+    "a comment between numbers": {"floats": SOUND["floats"].replace(" ", " <!-- x --> ", 3)},
+    "a comment in a colour": {"color": "1 0 <!-- green -->0 1"},
+    "a comment between faces": {"faces": SOUND["faces"].replace(" ", "<!-- 1 --> ", 2)},
+    "comments between elements": {"libraries": "<!-- a -->", "nodes": "<!-- b --><?pi?>"},
+}
+
+
+@pytest.mark.parametrize("remains", REMAINS)
+def test_collada_keeps_its_shape_and_colour_beside_what_is_not_drawn(remains: str, tmp_path: Path) -> None:
+    (tmp_path / "a.dae").write_text(COLLADA.format(**SOUND | REMAINS[remains]))
+    here = drawn(urdf(mesh_visual("a.dae")), tmp_path)
+    assert here.notes == ()
+    (piece,) = here.pieces
+    assert piece.rgba == (1, 0, 0, 1)
+    assert len(piece.mesh.faces) == 4
+    assert np.array_equal(box(piece.mesh.vertices), box(CORNERS))
+
+
+# --- packages
+
+
+def named(folder: Path, name: str) -> Path:
+    folder.mkdir(parents=True)
+    (folder / "package.xml").write_text(f'<?xml version="1.0"?><package format="2">\n <name>{name}</name></package>')
+    return folder
+
+
+@pytest.mark.parametrize("place", ["src/own", "src/other", "src/stack/other", "src/stack/deep/other"])
+def test_package_is_found_by_the_name_in_its_package_xml(place: str, tmp_path: Path) -> None:
+    """Above the file, beside its package, and one folder below that: what a checkout of several repositories has."""
+    robot = named(tmp_path / "src" / "own", "arm_description" if place == "src/own" else "arm_robots") / "urdf"
+    robot.mkdir()
+    holder = robot.parent if place == "src/own" else named(tmp_path / place, "arm_description")
+    (holder / "meshes").mkdir()
+    stl(holder / "meshes" / "a.stl")
+    here = drawn(urdf(mesh_visual("package://arm_description/meshes/a.stl")), robot)
+    assert here.notes == ()
+    assert np.array_equal(boxes(here)["arm"], box(CORNERS))
+
+
+def test_package_dirs_are_searched_below_and_come_first(tmp_path: Path) -> None:
+    from robot_dyn.view.geometry.addresses import find_file
+
+    for place in ("first/repository/x", "above/y"):
+        stl(named(tmp_path / place, "arm") / "a.stl")
+    (tmp_path / "first" / "repository" / "x" / "inner").mkdir()  # a package holds no other one
+    source = tmp_path / "above" / "y" / "arm.urdf"
+    assert find_file("package://arm/a.stl", source, (tmp_path / "first",)) == tmp_path / "first/repository/x/a.stl"
+    assert find_file("package://arm/a.stl", source, ()) == tmp_path / "above/y/a.stl"
+
+
+def test_file_of_a_lost_package_is_found_above_the_urdf(tmp_path: Path) -> None:
+    """A folder that was renamed, or taken out of its package."""
+    (tmp_path / "meshes").mkdir()
+    (tmp_path / "urdf" / "arms").mkdir(parents=True)
+    stl(tmp_path / "meshes" / "a.stl")
+    here = drawn(urdf(2 * mesh_visual("package://lost/meshes/a.stl")), tmp_path / "urdf" / "arms")
+    assert (here.notes, len(here.pieces)) == ((), 2)
+    assert here.remarks == (f"package 'lost' is not found; its files are taken from {tmp_path.name!r} above the URDF",)
+    here = drawn(urdf(mesh_visual("package://lost/../meshes/a.stl")), tmp_path / "urdf")
+    assert "package_dirs" in here.notes[0]
+
+
+def test_package_in_the_share_folder_of_ros_2(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "install/arm/share/arm").mkdir(parents=True)
+    (tmp_path / "elsewhere").mkdir()
+    stl(tmp_path / "install/arm/share/arm/a.stl")
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "install/arm"))
+    assert drawn(urdf(mesh_visual("package://arm/a.stl")), tmp_path / "elsewhere").notes == ()
