@@ -86,25 +86,25 @@ FLAT = 'ixx="0.001" ixy="0" ixz="0" iyy="0.001" iyz="0" izz="0.01"'
             " correct the inertia of this link",
         ),
         (
-            inside(WELDED.format(1e-15, 'ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"')),
-            "link 'hand': its mass of 1e-15 kg is below 1e-12 kg; correct it, or its unit",
+            inside(WELDED.format(9e-13, 'ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"')),
+            "link 'hand': its mass of 9e-13 kg is below 1e-12 kg; correct it, or its unit",
         ),
         (
-            altered(('xyz="0.4 0 0"', 'xyz="3e4 4e4 0"')),
-            "joint 'elbow': its origin lies 50000 m away, beyond 10000 m, which costs digits; correct it, or its unit",
+            altered(('xyz="0.4 0 0"', 'xyz="6.06e3 8.08e3 0"')),
+            "joint 'elbow': its origin lies 10100 m away, beyond 10000 m, which costs digits; correct it, or its unit",
         ),
         (
-            altered(('xyz="0 0 0.1"', 'xyz="0 -2e5 0"')),
-            "link 'upper': its centre of mass lies 200000 m away, beyond 10000 m, which costs digits; correct it, or"
+            altered(('xyz="0 0 0.1"', 'xyz="0 -1.01e4 0"')),
+            "link 'upper': its centre of mass lies 10100 m away, beyond 10000 m, which costs digits; correct it, or"
             " its unit",
         ),
         (
             inside(
                 f'<link name="a">{POINT}</link><link name="b">{POINT}</link>'
-                + joint("first", "fore", "a", '<origin xyz="1 1 1"/><mimic joint="elbow" multiplier="-200"/>')
+                + joint("first", "fore", "a", '<origin xyz="1 1 1"/><mimic joint="elbow" multiplier="-101"/>')
                 + joint("second", "fore", "b", '<origin xyz="1 1 1"/><mimic joint="first" multiplier="100"/>')
             ),
-            "joint 'second': moves -20000 times as far as 'elbow', beyond 10000, which costs digits; correct the"
+            "joint 'second': moves -10100 times as far as 'elbow', beyond 10000, which costs digits; correct the"
             " multiplier of its <mimic>",
         ),
         (
