@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
 
+TYPE_CHECKING = False  # as of typing, whose import takes longer than all of this
 if TYPE_CHECKING:
+    from typing import Any
+
     from robot_dyn.accuracy.compare import Comparison as Comparison
     from robot_dyn.accuracy.compare import compare as compare
     from robot_dyn.arithmetic import Ball as Ball

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Iterable
@@ -29,12 +30,15 @@ def run(*args: str | Path) -> Done[str]:
 
     argv = ["-c", *map(str, args)]
     out, err = (io.TextIOWrapper(io.BytesIO(), "utf-8", write_through=True) for _ in range(2))
+    handler = signal.getsignal(signal.SIGINT)  # the command leaves it ignored, as the last act of a process
     with mock.patch.multiple(sys, argv=argv, stdout=out, stderr=err):
         try:
             main()
             code = 0
         except SystemExit as end:
             code = end.code or 0
+        finally:
+            signal.signal(signal.SIGINT, handler)
     return Done(argv, code, *(stream.buffer.getvalue().decode() for stream in (out, err)))  # type: ignore[attr-defined]
 
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from threading import Event
 from typing import Annotated
 
 import typer
@@ -58,15 +56,3 @@ def bar(duration_s: float) -> Iterator[Callable[[float], object]]:
     with Progress(console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty()) as progress:
         task = progress.add_task("simulating", total=duration_s)
         yield lambda t: progress.update(task, completed=t)
-
-
-def noticed_interrupts() -> Event:
-    """An event that Ctrl-C sets as well: packages that guard their own imports against everything swallow the other."""
-    noticed = Event()
-
-    def notice(*_: object) -> None:
-        noticed.set()
-        raise KeyboardInterrupt
-
-    signal.signal(signal.SIGINT, notice)
-    return noticed

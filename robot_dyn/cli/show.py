@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 import robot_dyn as rd
-from robot_dyn.cli.app import Force, PackageDir, app, noticed_interrupts
+from robot_dyn.cli.app import Force, PackageDir, app
 from robot_dyn.cli.arguments import output as checked_output
 from robot_dyn.cli.terminal import say
 from robot_dyn.errors import QueryError
@@ -34,7 +34,6 @@ def replay(
     """Replay runs in the browser, live on this machine until Ctrl-C, or as one HTML file."""
     from robot_dyn.view.replay import PAGE, ReplayError
 
-    interrupted = noticed_interrupts()
     if html is not None and port is not None:
         raise QueryError("give --html or --port, not both: a file needs no server")
     page = None if html is None else checked_output(html, PAGE, ReplayError, runs, force)
@@ -48,7 +47,7 @@ def replay(
     with rd.replay(*trajectories, port=port, **options) as server:
         say(f"{server.url} shows the run; Ctrl-C ends it")
         _open(server.url, browse)
-        server.wait(interrupted)
+        server.wait()
 
 
 @app.command()
@@ -104,6 +103,9 @@ def demo(
     panda = rd.load("panda").with_(lock={"panda_finger_joint1": 0.0})
     say(*report.demo_tables(panda), "\nThe same arm under computed torque, its model 20 % too heavy\n")
     run = rd.simulate(rd.read_scene(files["toml"]))
+    if run.outcome.ending == "stopped":
+        say(run.summary)
+        raise typer.Exit(130)
     rd.save_run(run, files["npz"])
     rd.save_replay(run, files["html"])
     rd.save_plot(run, files["png"])

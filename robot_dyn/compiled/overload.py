@@ -13,6 +13,8 @@ from collections.abc import Callable
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, Protocol
 
+from robot_dyn.compiled.interrupts import interrupts_later
+
 
 class Store(Protocol):
     """Where payloads are kept by key; see `robot_dyn.compiled.cache`."""
@@ -42,7 +44,8 @@ def compiled(
     if payload is not None and (restored := _restored(payload, count)) is not None:
         return restored
     function = make()
-    function.compile(signature)
+    with interrupts_later():
+        function.compile(signature)
     function.disable_compile()
     if store is not None:
         store.save(key, _payload(function), about)

@@ -150,10 +150,10 @@ class Server:
                 self._loop.call_soon_threadsafe(self._closed.set)
             self._thread.join()
 
-    def wait(self, interrupted: threading.Event | None = None) -> None:
-        """Serve until interrupted (Ctrl-C), or until `interrupted` is set, then end."""
+    def wait(self) -> None:
+        """Serve until interrupted (Ctrl-C), then end."""
         try:
-            while self._thread.is_alive() and not (interrupted and interrupted.is_set()):
+            while self._thread.is_alive():
                 self._thread.join(0.2)
         except KeyboardInterrupt:
             pass

@@ -118,7 +118,8 @@ class Batch:
         lanes = np.moveaxis(self.lanes, 1, 0).reshape(len(Lane), -1)[:, :B]
         stopped = np.repeat(self.unfinished, LANES)[:B] & (lanes[Lane.REASON] == 0)
         for run in np.flatnonzero((lanes[Lane.FASTEST] > _FAR) & (lanes[Lane.REASON] == 0) & ~stopped):
-            self._again(int(run))
+            stopped[run] = self.stop[0] != 0 or self._again(int(run)) is Ending.STOPPED
+            self.stop[0] |= stopped[run]
 
         def part(name: str, first: int, count: int) -> np.ndarray | None:
             return np.moveaxis(self.out_y[:, first : first + count, :B], -1, 0) if name in self.wanted else None
@@ -135,8 +136,8 @@ class Batch:
             ended, reasons > 0, stopped, reasons,
         )  # fmt: skip
 
-    def _again(self, run: int) -> None:
-        """A run that turned beyond the range of a tile's sine, by itself, in the march of one state."""
+    def _again(self, run: int) -> Ending:
+        """A run that turned beyond the range of a tile's sine, by itself, in the march of one state; how it ended."""
         n = self.machine.program.n
         setup = replace(self.setup, q0=self.q0[run], v0=self.v0[run])
         assert isinstance(setup.integrator, Integrator)
@@ -154,7 +155,8 @@ class Batch:
             self.out_e[:k, :, run] = energy
         tile, lane = divmod(run, LANES)
         self.lanes[tile, Lane.ENDED, lane] = record.outcome.t
-        self.lanes[tile, Lane.REASON, lane] = record.outcome.ending is not Ending.FINISHED
+        self.lanes[tile, Lane.REASON, lane] = record.outcome.ending is Ending.DIVERGED
+        return record.outcome.ending
 
 
 def _samples(setup: Setup, table: Timetable) -> np.ndarray:

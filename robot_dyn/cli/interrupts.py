@@ -1,0 +1,31 @@
+"""Ctrl-C as the command line takes it: after an import, never inside, where packages swallow or half obey it."""
+
+from __future__ import annotations
+
+import signal
+from threading import Timer
+from types import FrameType
+
+_AGAIN_S = 0.02
+
+
+def guard() -> None:
+    """From now on Ctrl-C raises KeyboardInterrupt, after the import that it may fall into; unless it is ignored."""
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:  # as a shell asks of what it runs in the background
+        signal.signal(signal.SIGINT, _interrupt)
+
+
+def ignore() -> None:
+    """From now on Ctrl-C does nothing: the command has ended, and the interpreter only tidies up."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    while frame is not None:
+        if frame.f_code.co_filename.startswith("<frozen importlib"):
+            later = Timer(_AGAIN_S, signal.raise_signal, (number,))
+            later.daemon = True
+            later.start()
+            return
+        frame = frame.f_back
+    raise KeyboardInterrupt
