@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -44,7 +45,7 @@ def replay(
         say(f"written: {file} ({file.stat().st_size / 1e6:.1f} MB)")
         _open(file.absolute().as_uri(), browse)
         return
-    with rd.replay(*trajectories, port=port, **options) as server:
+    with rd.replay(*trajectories, port=port, **options) as server, suppress(KeyboardInterrupt):
         say(f"{server.url} shows the run; Ctrl-C ends it")
         _open(server.url, browse)
         server.wait()
