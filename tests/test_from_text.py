@@ -162,3 +162,9 @@ WRONG = {
 def test_what_a_urdf_cannot_state_is_refused_by_name(why: str) -> None:
     with pytest.raises(DescriptionError, match=why):
         rd.Robot.from_pinocchio(WRONG[why]())
+
+
+@pytest.mark.parametrize("wrong", [pin.Model(), "ur5", None, b"<robot/>"])
+def test_what_is_no_description_makes_no_robot(wrong: object) -> None:
+    with pytest.raises(DescriptionError, match=r"made of a Description, got .*; use rd\.load, Robot\.from_text"):
+        rd.Robot(wrong)  # pyright: ignore[reportArgumentType]

@@ -16,7 +16,7 @@ _MAX_BYTES = 2**16  # of a package.xml
 _MAX_FOLDERS = 5000  # looked into below one folder
 _DEPTH = 3  # of packages below a folder that is searched, as in src/repository/package
 _COMMENT = re.compile(rb"<!--.*?(-->|\Z)", re.DOTALL)
-_NAME = re.compile(rb"<name[^>]*>\s*([^<\s]+)\s*</name>")
+_NAME = re.compile(rb"<name[^<>]*>\s*([^<\s]+)\s*</name>")
 
 
 def package_folders(name: str, file: Path, package_dirs: Iterable[str | Path] = ()) -> Iterator[Path]:

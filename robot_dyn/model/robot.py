@@ -17,7 +17,7 @@ import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy import ndarray
 
-from robot_dyn.errors import ModelWarning, OverflowedError, SingularError, announce
+from robot_dyn.errors import DescriptionError, ModelWarning, OverflowedError, SingularError, announce
 from robot_dyn.model import doctor, kernels, pinocchio_model
 from robot_dyn.model.coriolis import Bodies
 from robot_dyn.model.description import Description, check
@@ -45,6 +45,11 @@ class Robot:
     edits: Edits = field(default_factory=Edits)
 
     def __post_init__(self) -> None:
+        if not isinstance(self.description, Description):
+            given = type(self.description).__name__
+            raise DescriptionError(
+                f"a Robot is made of a Description, got {given}; use rd.load, Robot.from_text or Robot.from_pinocchio"
+            )
         _ = self._built  # so that what is wrong is said now, not at the first query
 
     @staticmethod
