@@ -8,7 +8,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.control.controller import ControlError
 from robot_dyn.effects.effect import Active, Effect
-from robot_dyn.errors import EditError, EffectError, QueryError
+from robot_dyn.errors import CatalogError, EditError, EffectError, QueryError
 from robot_dyn.scene.schema import SceneError
 
 ARM = rd.load("planar_2r")
@@ -71,6 +71,17 @@ def test_an_edit_of_none_is_refused(name: str) -> None:
     """gravity=None does not mean that there is none."""
     with pytest.raises(EditError, match=rf"{name} must"):
         ARM.with_(**{name: None})
+
+
+# --- files
+
+
+def test_folders_of_packages_that_are_none_are_refused(tmp_path) -> None:
+    with pytest.raises(CatalogError, match=r"package_dirs must be several folders, such as \['/opt/arms'\]"):
+        rd.load("ur5", package_dirs="/opt/arms")
+    with pytest.raises(CatalogError, match=r"package_dirs: there is no folder .*/arm; correct it"):
+        rd.load("ur5", package_dirs=[tmp_path, tmp_path / "arm"])
+    assert rd.load("ur5", package_dirs=[tmp_path]).n == 6
 
 
 # --- runs

@@ -8,6 +8,7 @@ from pathlib import Path
 from robot_dyn.errors import announce
 from robot_dyn.model import catalog
 from robot_dyn.model.description import check, read
+from robot_dyn.model.packages import searched
 from robot_dyn.model.robot import Robot
 
 
@@ -27,13 +28,13 @@ def load(
             program: expand none that you would not run. Needs `pip install robot-dyn[xacro]`.
 
     Raises:
-        CatalogError: If there is no such robot or file.
+        CatalogError: If there is no such robot or file, or `package_dirs` names what is not a folder.
         DescriptionError: If the file is refused, or cannot be expanded.
 
     Warns:
         ModelWarning: Once, if there are findings about the description; the robot loads all the same.
     """
-    package_dirs = tuple(package_dirs)
+    package_dirs = searched(package_dirs)
     path = catalog.find(name_or_path, package_dirs)
     if xacro is None:
         description = read(path)

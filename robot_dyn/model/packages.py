@@ -12,11 +12,28 @@ from contextlib import suppress
 from itertools import islice
 from pathlib import Path
 
+from robot_dyn.errors import CatalogError
+
 _MAX_BYTES = 2**16  # of a package.xml
 _MAX_FOLDERS = 5000  # looked into below one folder
 _DEPTH = 3  # of packages below a folder that is searched, as in src/repository/package
 _COMMENT = re.compile(rb"<!--.*?(-->|\Z)", re.DOTALL)
 _NAME = re.compile(rb"<name[^<>]*>\s*([^<\s]+)\s*</name>")
+
+
+def searched(package_dirs: Iterable[str | Path]) -> tuple[Path, ...]:
+    """The folders that a user gives to search packages in.
+
+    Raises:
+        CatalogError: If one is not a folder; a single path counts as several of one letter and is refused, too.
+    """
+    if isinstance(package_dirs, str | Path):
+        raise CatalogError(f"package_dirs must be several folders, such as [{str(package_dirs)!r}], got one path")
+    folders = tuple(Path(folder).expanduser() for folder in package_dirs)
+    for folder in folders:
+        if not folder.is_dir():
+            raise CatalogError(f"package_dirs: there is no folder {folder}; correct it, or leave it out")
+    return folders
 
 
 def package_folders(name: str, file: Path, package_dirs: Iterable[str | Path] = ()) -> Iterator[Path]:

@@ -14,6 +14,7 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.errors import QueryError, RobotDynError
+from robot_dyn.model.packages import searched
 from robot_dyn.simulation.origin import robot_of
 from robot_dyn.simulation.remarks import lines
 from robot_dyn.simulation.trajectory import Trajectory
@@ -65,7 +66,7 @@ def document(
         ReplayError: If a run has no samples.
         QueryError: If it carries no robot, or no robot has the frame.
     """
-    package_dirs = tuple(package_dirs)
+    package_dirs = searched(package_dirs)
     shown = [_shown(number, run, len(runs), package_dirs, inertia) for number, run in enumerate(runs)]
     if frame is not None and all(frame not in each.stage.linkage.links for each in shown):
         shown[0].stage.link_path(frame)  # says so, with the nearest names
@@ -105,7 +106,7 @@ def _outcome(shown: Shown, count: int) -> str:
     return f"{who}{end.ending} at t = {end.t:g} s" + (f": {end.advice}" if end.advice else "")
 
 
-def _shown(number: int, run: Trajectory, count: int, package_dirs: tuple[str | Path, ...], inertia: bool) -> Shown:
+def _shown(number: int, run: Trajectory, count: int, package_dirs: tuple[Path, ...], inertia: bool) -> Shown:
     robot = robot_of(run)
     whole, run = len(run.t), _drawable(run)
     stage = Stage("run" if number == 0 else f"ghost {number}", robot)
