@@ -14,7 +14,7 @@ from robot_dyn.arithmetic import Array
 from robot_dyn.simulation.chatter import Chatter
 from robot_dyn.simulation.levels import Level
 
-CHUNK = 4096  # columns looked at together: with fewer, the calls of NumPy cost more than what they do
+CHUNK = 16384  # columns looked at together: with fewer, the calls of NumPy cost more than what they do
 _PAD = 8  # so that the rows of a column lie in different sets of the processor's cache
 _WINDOW = 64  # columns whose extremes are kept as one, at first
 _WINDOWS = 256  # at most so many are kept: beyond, two become one, and the next are twice as wide
@@ -53,16 +53,22 @@ class Observer:
 
     def __init__(self, start: Array, levels: tuple[Level, ...] = (), canonical: bool = False) -> None:
         self.n, self.canonical = len(start) // 3, canonical
-        self.columns, self.filled = np.empty((2 + 3 * self.n, CHUNK + _PAD)), 0
+        self.columns, self.filled, self._chunk = np.empty((2 + 3 * self.n, CHUNK + _PAD)), 0, CHUNK
         self.seen = np.zeros(2 * self.n)
         self.visits: dict[Level, Visit] = {}
         self.chatter = Chatter(self.n)
         self._t, self._levels = 0.0, levels
-        self._edges, self._extremes, self._width = [0.0], list[np.ndarray](), _WINDOW
+        self._edges, self._width = np.zeros(1), _WINDOW
+        self._low, self._high = (np.empty((0, 3 * self.n)) for _ in range(2))
         self._start = start
         for level in levels:
             if level.side * (start[level.row] - level.bound) > 0:
                 self.visits[level] = Visit(0.0, 0.0, 0.0, float(start[level.row]))
+
+    @property
+    def room(self) -> int:
+        """Columns that can still be written."""
+        return self._chunk - self.filled
 
     def step(self, t: float, y: Array, held: Array | None, acted: bool) -> None:
         """One step to the state y at t; the controller `acted` at its start, and holds `held` if it is sampled."""
@@ -81,16 +87,16 @@ class Observer:
 
     def look(self, end: bool = False) -> None:
         """Look at the columns if there is no room for more, or at the end of the run."""
-        if self.filled < CHUNK and not (end and self.filled):
+        if self.room and not (end and self.filled):
             return
         t, x = self.columns[0, : self.filled], self.columns[2:, : self.filled]
-        acted = np.flatnonzero(self.columns[1, : self.filled])
+        acted = self.columns[1, : self.filled] > 0
         began = np.append(self._t, t[:-1])
         with np.errstate(all="ignore"):
             low, high = self._windows(t, x)
             self._visit(began, t, x, low, high)
             u, largest = x[2 * self.n :], np.maximum(high, -low)[2 * self.n :]
-            if len(acted) < len(t):
+            if not acted.all():
                 began, u = began[acted], u[:, acted]
             self.chatter.take(began, u, largest)
         self._t, self.filled = float(t[-1]), 0
@@ -98,14 +104,13 @@ class Observer:
     @property
     def windows(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Edges (w + 1,) in [s] of windows of time, and the least and the largest (w, 3n) of q, v, u in each."""
-        extremes = np.array(self._extremes).reshape(-1, 2, 3 * self.n)
-        return np.array(self._edges), extremes[:, 0], extremes[:, 1]
+        return self._edges, self._low, self._high
 
     @property
     def extremes(self) -> np.ndarray:
         """The least and the largest of q, v and u over all steps, (3, 2, n)."""
-        _, low, high = self.windows
-        low, high = np.fmin.reduce([self._start, *low]), np.fmax.reduce([self._start, *high])
+        low = np.fmin.reduce(np.vstack([self._start, self._low]))
+        high = np.fmax.reduce(np.vstack([self._start, self._high]))
         return np.stack([low.reshape(3, -1), high.reshape(3, -1)], axis=1)
 
     def _windows(self, t: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -119,18 +124,18 @@ class Observer:
             low = np.column_stack([low, x[:, whole:].min(axis=1)])
             high = np.column_stack([high, x[:, whole:].max(axis=1)])
             ends = np.append(ends, t[-1])
-        self._edges += ends.tolist()
-        self._extremes += list(np.stack([low.T, high.T], axis=1))
-        while len(self._extremes) > _WINDOWS:
+        self._edges = np.concatenate([self._edges, ends])
+        self._low, self._high = np.vstack([self._low, low.T]), np.vstack([self._high, high.T])
+        while len(self._low) > _WINDOWS:
             self._halve()
         return low.min(axis=1), high.max(axis=1)
 
     def _halve(self) -> None:
         """Two windows become one; from now on each is twice as wide, up to a whole chunk."""
-        pairs = [self._extremes[i : i + 2] for i in range(0, len(self._extremes), 2)]
-        self._extremes = [np.stack([np.fmin.reduce(p)[0], np.fmax.reduce(p)[1]]) for p in pairs]
-        self._edges = [self._edges[0], *self._edges[2::2], *self._edges[-1:][: len(self._edges) % 2 == 0]]
-        self._width = min(2 * self._width, CHUNK)
+        pairs = np.arange(0, len(self._low), 2)
+        self._low, self._high = np.minimum.reduceat(self._low, pairs), np.maximum.reduceat(self._high, pairs)
+        self._edges = np.append(self._edges[pairs], self._edges[-1])
+        self._width = min(2 * self._width, self._chunk)
 
     def _visit(self, began: np.ndarray, t: np.ndarray, x: np.ndarray, low: np.ndarray, high: np.ndarray) -> None:
         """Add to the time beyond each level that any column is beyond of."""

@@ -18,7 +18,7 @@ from robot_dyn.simulation.machine.places import WATCHED, Ended, Now
 from robot_dyn.simulation.machine.timetable import Timetable, timetable
 from robot_dyn.simulation.march import DivergedError, Watch, one_step
 from robot_dyn.simulation.motion import Motion
-from robot_dyn.simulation.observer import CHUNK, Observer
+from robot_dyn.simulation.observer import Observer
 from robot_dyn.simulation.record import Record
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.trajectory import Ending, Outcome
@@ -130,7 +130,7 @@ class _Run:
         """So many steps, or fewer, with a rest whenever the observer has all columns to look at."""
         observer = self.observer
         while True:
-            self.now[Now.BUDGET] = steps = budget if observer is None else min(budget, CHUNK - observer.filled)
+            self.now[Now.BUDGET] = steps = budget if observer is None else min(budget, observer.room)
             if observer is not None:
                 self.now[Now.COLUMN] = observer.filled
             ended = self.machine.run(self.work, self.table, **self.arrays)
