@@ -62,6 +62,8 @@ if TYPE_CHECKING:
     from robot_dyn.view.plots import save_plot as save_plot
     from robot_dyn.view.replay import replay as replay
     from robot_dyn.view.replay import save_replay as save_replay
+    from robot_dyn.view.replay import save_show as save_show
+    from robot_dyn.view.replay import show as show
 
 # Public names and where they live; imported when first used, so that `import robot_dyn` stays light (PEP 562).
 _HOME = {
@@ -116,6 +118,8 @@ _HOME = {
     "save_plot": "view.plots",
     "save_replay": "view.replay",
     "save_run": "simulation.run_file",
+    "save_show": "view.replay",
+    "show": "view.replay",
     "simulate": "simulation.simulate",
     "task_dynamics": "control.operational_space",
     "via_points": "control.reference",

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from itertools import product
 from pathlib import Path
 from typing import Any, final
 
@@ -18,13 +17,15 @@ from robot_dyn.model.packages import searched
 from robot_dyn.simulation.origin import robot_of
 from robot_dyn.simulation.remarks import lines
 from robot_dyn.simulation.trajectory import Trajectory
+from robot_dyn.spatial import homogeneous
 from robot_dyn.view import commands
 from robot_dyn.view.arrows import arrows
 from robot_dyn.view.geometry.visuals import Drawing, drawing
 from robot_dyn.view.keyframes import Keyframes, keyframes
-from robot_dyn.view.overlays import GHOST, Overlays, ground, overlays, squares
+from robot_dyn.view.overlays import GHOST, Overlays, overlays
+from robot_dyn.view.scenery import gravity_arrow, gravity_label, ground, scenery, turned, upright
 from robot_dyn.view.series import plots
-from robot_dyn.view.stage import Stage, placement
+from robot_dyn.view.stage import Stage
 
 _FAR = 1e4  # [rad] or [m]; what diverged is not drawn beyond
 
@@ -70,12 +71,16 @@ def document(
     shown = [_shown(number, run, len(runs), package_dirs, inertia) for number, run in enumerate(runs)]
     if frame is not None and all(frame not in each.stage.linkage.links for each in shown):
         shown[0].stage.link_path(frame)  # says so, with the nearest names
-    center, radius = _sphere(shown)
+    gravity = shown[0].stage.robot.edits.gravity
+    turn = upright(gravity)
+    seen = scenery(np.concatenate([_corners(each) for each in shown]) @ turn.T)
+    radius = seen.radius
     layers = [_overlays(each, radius, frame, number > 0) for number, each in enumerate(shown)]
     scale = arrows([(each.stage, each.run, layer) for each, layer in zip(shown, layers, strict=True)], radius)
-    found, tracks, notes, problems, remarks = [ground(center, radius)], {}, [], [], []
+    found, tracks, notes, problems, remarks = [ground(seen), *gravity_arrow(seen, gravity)], {}, [], [], []
     for number, (each, layer) in enumerate(zip(shown, layers, strict=True)):
         clear = GHOST if number else 1.0
+        found.append(commands.set_transform(each.stage.root, homogeneous(turn, np.zeros(3))))
         found += each.stage.draw(each.drawing.pieces, clear) + layer.commands
         tracks |= each.stage.tracks(each.keys) | layer.tracks
         who = "" if len(shown) == 1 else f"{each.name}: "
@@ -88,8 +93,9 @@ def document(
         "duration": max(float(each.run.t[-1]) for each in shown),
         "remarks": remarks,
         "problems": problems,
-        "notes": [*notes, *scale, f"the squares on the ground are {squares(radius):g} m wide"],
-        "scene": {"center": center.tolist(), "radius": radius},
+        "gravity": _labels(shown),
+        "notes": [*notes, *scale, *turned(gravity), f"the squares on the floor are {seen.square:g} m wide"],
+        "scene": seen.as_json(),
         "plots": plots([each.run for each in shown], [each.stage for each in shown]),
         "commands": [*found, commands.set_animation(tracks)],
     }
@@ -138,28 +144,20 @@ def _drawable(run: Trajectory) -> Trajectory:
     return replace(run, **cut, wrenches=wrenches, at_stop=None if run.at_stop is None else run.at_stop[:end])
 
 
-def _sphere(shown: list[Shown]) -> tuple[np.ndarray, float]:
-    """Center (3,) and radius in [m] of a sphere about all that is drawn, at a few keyframes."""
-    points = []
-    for each in shown:
-        few = np.unique(np.linspace(0, len(each.keys.t) - 1, 12).round().astype(int))
-        points += _corners(each, each.run.q[np.searchsorted(each.run.t, each.keys.t[few]).clip(0, len(each.run.t) - 1)])
-    all_ = np.concatenate(points)
-    center = (all_.min(axis=0) + all_.max(axis=0)) / 2
-    return center, max(float(np.linalg.norm(all_ - center, axis=1).max()), 1e-3)
+def _corners(shown: Shown) -> np.ndarray:
+    """Corners (k, 3) in the base of what is drawn, at a few keyframes."""
+    few = np.unique(np.linspace(0, len(shown.keys.t) - 1, 12).round().astype(int))
+    at = np.searchsorted(shown.run.t, shown.keys.t[few]).clip(0, len(shown.run.t) - 1)
+    return shown.stage.corners(shown.drawing.pieces, shown.run.q[at])
 
 
-def _corners(shown: Shown, q: np.ndarray) -> list[np.ndarray]:
-    """Corners of the boxes about all pieces at positions q (k, n), (8 k, 3) each; and the tip."""
-    linkage = shown.stage.linkage
-    at = linkage.at(q).in_base
-    points = []
-    for piece in shown.drawing.pieces:
-        R, p = placement(at, *linkage.links[piece.link][:2])
-        box = np.array(
-            list(product(*zip(piece.mesh.vertices.min(axis=0), piece.mesh.vertices.max(axis=0), strict=True)))
-        )
-        local = box @ piece.pose[:3, :3].T + piece.pose[:3, 3]
-        points.append((np.einsum("...ij,cj->...ci", R, local) + p[..., None, :]).reshape(-1, 3))
-    _, tip = placement(at, *linkage.links[shown.stage.tip][:2])
-    return [*points, np.zeros((1, 3)), tip.reshape(-1, 3)]
+def _labels(shown: list[Shown]) -> str:
+    """Gravity of the first run, and of others where it differs."""
+    first = shown[0].stage.robot
+    labels = [gravity_label(first)]
+    labels += [
+        f"{each.name}: {each.stage.robot.edits.gravity} m/s²"
+        for each in shown[1:]
+        if each.stage.robot.edits.gravity != first.edits.gravity
+    ]
+    return "; ".join(labels)

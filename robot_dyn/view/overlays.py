@@ -1,4 +1,4 @@
-"""Overlays of a replay: what a run recorded, drawn into it: p_com = Σ mᵢ pᵢ / Σ mᵢ, a trace, stops, the ground.
+"""Overlays of a replay: what a run recorded, drawn into it: p_com = Σ mᵢ pᵢ / Σ mᵢ, a trace, stops.
 
 Paths are thinned like joints: a straight line replaces the samples between keyframes, to a part of what is seen.
 """
@@ -23,7 +23,6 @@ from robot_dyn.view.stage import Stage, placement
 Rgba = tuple[float, float, float, float]
 Placements = list[tuple[np.ndarray, np.ndarray]]
 
-_GROUND: Rgba = (0.7, 0.73, 0.77, 1.0)
 _COM: Rgba = (0.94, 0.89, 0.26, 1.0)
 _TRACE: Rgba = (0.0, 0.62, 0.45, 1.0)
 _STOP: Rgba = (0.9, 0.05, 0.05, 0.75)
@@ -101,24 +100,6 @@ def of_link(stage: Stage, q: np.ndarray, link: str) -> np.ndarray:
     body, pose, _ = stage.linkage.links[link]
     shape = (-1, 3)
     return over(stage, q, lambda at: np.broadcast_to(placement(at, body, pose)[1], (len(at[0][1]), 3)).reshape(shape))
-
-
-def squares(reach: float) -> float:
-    """Edge of the ground's squares, in [m]."""
-    return 10.0 ** np.round(np.log10(reach)) / 5
-
-
-def ground(center: np.ndarray, reach: float) -> Command:
-    """Squares at z = 0 about what is seen, each edge a line of its own: viewers drop lines that pass behind the eye."""
-    edge = squares(reach)
-    middle, count = np.round(center[:2] / edge), int(np.ceil(4 * reach / edge))
-    ticks = np.arange(-count, count + 1)
-    x, y = np.meshgrid(ticks, ticks[:-1], indexing="ij")
-    along = np.stack([np.stack([x, y], axis=-1), np.stack([x, y + 1], axis=-1)], axis=-2).reshape(-1, 2)
-    flat = (np.vstack([along, along[:, ::-1]]) + middle) * edge
-    points = np.column_stack([flat, np.zeros(len(flat))])
-    look = commands.material(_GROUND, line=True)
-    return commands.set_object("ground", commands.polyline(points), look, kind="LineSegments")
 
 
 def centre_of_mass(stage: Stage, at: Placements) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Replay: runs of arms in a browser, live or as one file; between keyframes each joint turns as q(t) ≈ its chord."""
+"""Runs of arms, or an arm at rest, in a browser, live or as one file; between keyframes q(t) ≈ its chord."""
 
 from __future__ import annotations
 
@@ -9,9 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from robot_dyn.errors import ModelWarning
 from robot_dyn.files import Kind, save, target
+from robot_dyn.model.dynamics import Array
+from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.trajectory import Trajectory
 from robot_dyn.view.document import ReplayError, document
 from robot_dyn.view.page import page
+from robot_dyn.view.still import still
 
 if TYPE_CHECKING:
     from robot_dyn.view.server import Server
@@ -42,11 +45,7 @@ def replay(
         QueryError: If it carries no robot, or `frame` is no link of it.
         ServerError: If the port is taken.
     """
-    from robot_dyn.view.server import Server  # takes meshcat and tornado along
-
-    document = _told((run, *ghosts), package_dirs, frame, inertia)
-    drawn = document.pop("commands")
-    return Server(page(document | {"live": True}), drawn, port)
+    return _served(document((run, *ghosts), package_dirs, frame, inertia), port)
 
 
 def save_replay(
@@ -67,14 +66,69 @@ def save_replay(
         ReplayError: If the file cannot be written.
     """
     file = target(path, PAGE, ReplayError)
-    text = page(_told((run, *ghosts), package_dirs, frame, inertia) | {"live": False}).encode()
+    return _written(document((run, *ghosts), package_dirs, frame, inertia), file)
+
+
+def show(
+    robot: Robot,
+    q: Array | None = None,
+    *,
+    package_dirs: Iterable[str | Path] = (),
+    inertia: bool = False,
+    port: int | None = None,
+) -> Server:
+    """Show a robot in the browser, at the `url` of the server that is returned, on this machine alone.
+
+    Args:
+        robot: What is shown.
+        q: Its configuration, (n,), in [rad] or [m]; 0 if not given.
+        package_dirs: Folders in which the packages of meshes are searched first.
+        inertia: Whether each link's equivalent box, of the same mass and inertia, is drawn.
+        port: Where to listen; any free one if not given.
+
+    Raises:
+        QueryError: If q is not one configuration of the robot.
+        ServerError: If the port is taken.
+    """
+    return _served(still(robot, q, package_dirs, inertia), port)
+
+
+def save_show(
+    robot: Robot,
+    path: str | Path,
+    q: Array | None = None,
+    *,
+    package_dirs: Iterable[str | Path] = (),
+    inertia: bool = False,
+) -> Path:
+    """Write the page of `show` as one HTML file that needs neither server nor network; arguments as of `show`.
+
+    Another page under that name is replaced; a file of another kind is not.
+
+    Raises:
+        QueryError: If q is not one configuration of the robot.
+        ReplayError: If the file cannot be written.
+    """
+    file = target(path, PAGE, ReplayError)
+    return _written(still(robot, q, package_dirs, inertia), file)
+
+
+def _served(made: dict[str, Any], port: int | None) -> Server:
+    from robot_dyn.view.server import Server  # takes zmq and tornado along
+
+    _tell(made)
+    drawn = made.pop("commands")
+    return Server(page(made | {"live": True}), drawn, port)
+
+
+def _written(made: dict[str, Any], file: Path) -> Path:
+    _tell(made)
+    text = page(made | {"live": False}).encode()
     return save(file, lambda stream: stream.write(text), ReplayError)
 
 
-def _told(*arguments: Any) -> dict[str, Any]:
-    """The document; what is not drawn as described is told once, here too."""
-    made = document(*arguments)
+def _tell(made: dict[str, Any]) -> None:
+    """Warn, once, of what is not drawn as described."""
     if problems := made["problems"]:
         rest = f"; and {len(problems) - 1} more, listed on the page" if len(problems) > 1 else ""
-        warnings.warn(f"not shown as described: {problems[0]}{rest}", ModelWarning, stacklevel=3)
-    return made
+        warnings.warn(f"not shown as described: {problems[0]}{rest}", ModelWarning, stacklevel=4)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 from typing import final
 
 import numpy as np
@@ -80,6 +81,17 @@ class Stage:
             path: _tracks(body, keys.t, keys.q[:, index])
             for index, (path, body) in enumerate(zip(self.paths, self.linkage.bodies, strict=True))
         }
+
+    def corners(self, pieces: tuple[Piece, ...], q: np.ndarray) -> np.ndarray:
+        """Corners of the boxes about all pieces at positions q (k, n), and the base and the tip, (m, 3)."""
+        at, points = self.linkage.at(q).in_base, [np.zeros((1, 3))]
+        for piece in pieces:
+            R, p = placement(at, *self.linkage.links[piece.link][:2])
+            edges = zip(piece.mesh.vertices.min(axis=0), piece.mesh.vertices.max(axis=0), strict=True)
+            local = np.array(list(product(*edges))) @ piece.pose[:3, :3].T + piece.pose[:3, 3]
+            points.append((np.einsum("...ij,cj->...ci", R, local) + p[..., None, :]).reshape(-1, 3))
+        points.append(placement(at, *self.linkage.links[self.tip][:2])[1].reshape(-1, 3))
+        return np.concatenate(points)
 
     @cached_property
     def tip(self) -> str:

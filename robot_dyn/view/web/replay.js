@@ -71,10 +71,11 @@ function makeViewer(scene) {
   const fit = () => {
     const { clientWidth: width, clientHeight: height } = element("stage");
     viewer.set_3d_pane_size(width, height);
-    const up = viewer.camera.fov * Math.PI / 360, narrow = Math.min(up, Math.atan(Math.tan(up) * width / height));
+    const half = viewer.camera.fov * Math.PI / 360, narrow = Math.min(half, Math.atan(Math.tan(half) * width / height));
     const distance = away / Math.sin(narrow);  // from which a sphere about all that is drawn fills the view
     if (stood) return;  // the user's view stays
-    viewer.camera.position.set(x + 0.67 * distance, z + 0.32 * distance, -y + 0.67 * distance);
+    const [right, deep, up] = scene.camera;
+    viewer.camera.position.set(x + right * distance, z + up * distance, -y - deep * distance);
     stood = distance;
   };
   new ResizeObserver(fit).observe(element("stage"));
@@ -134,6 +135,8 @@ async function main() {
   const data = await unpack(JSON.parse(element("data").textContent));
   element("title").textContent = data.title;
   element("outcome").textContent = data.outcome;
+  element("gravity").textContent = data.gravity;
+  document.body.classList.toggle("still", !data.plots.length);
   for (const [list, notes] of [["remarks", data.remarks], ["problems", data.problems], ["notes", data.notes]]) {
     element(list).append(...notes.map((note) => Object.assign(document.createElement("li"), { textContent: note })));
   }

@@ -1,0 +1,122 @@
+"""What surrounds the robots of a page: down is where gravity points, the floor lies below all, the camera looks at all.
+
+R g/‖g‖ = −z    the scene is the base turned by the least rotation R that does this
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from robot_dyn.model.gravity import gravity_acts
+from robot_dyn.model.robot import Robot
+from robot_dyn.spatial import hat, homogeneous
+from robot_dyn.view import commands
+from robot_dyn.view.commands import Command
+from robot_dyn.view.geometry.shapes import arrow
+
+_GROUND = (0.7, 0.73, 0.77, 1.0)
+_GRAVITY = (0.42, 0.24, 0.6, 1.0)  # violet
+_CORNER = np.array([0.67, -0.67, 0.32])  # where the camera stands by custom, from the middle of what is seen
+_POINT = 1e-9  # [m], below which nothing has a size
+_FRONTAL = 1.2  # how far it moves to the front of what is flat
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Scenery:
+    """What is seen.
+
+    Attributes:
+        center: Of a sphere about it, (3,), in [m].
+        radius: Of the sphere, in [m].
+        floor: The lowest z, in [m].
+        camera: Unit vector from the center to the camera, (3,).
+    """
+
+    center: np.ndarray
+    radius: float
+    floor: float
+    camera: np.ndarray
+
+    @property
+    def square(self) -> float:
+        """Edge of the squares on the floor, in [m]."""
+        return 10.0 ** np.round(np.log10(self.radius)) / 5
+
+    def as_json(self) -> dict[str, object]:
+        """What the page needs for its camera."""
+        return {"center": self.center.tolist(), "radius": self.radius, "camera": self.camera.tolist()}
+
+
+def scenery(points: np.ndarray) -> Scenery:
+    """About points (k, 3); what is flat is seen more from its front than what is not."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    center = (low + high) / 2
+    radius = float(np.linalg.norm(points - center, axis=1).max())
+    radius = radius if radius > _POINT else 1e-3
+    variances, axes = np.linalg.eigh(np.cov(points.T))
+    spread = np.sqrt(np.maximum(variances, 0.0))
+    normal = axes[:, 0] * (1.0 if axes[:, 0] @ _CORNER >= 0 else -1.0)
+    flat = (spread[1] - spread[0]) / spread[2] if spread[2] > 0 else 0.0
+    camera = _CORNER / np.linalg.norm(_CORNER) + _FRONTAL * flat * normal
+    return Scenery(center, radius, float(low[2]), camera / np.linalg.norm(camera))
+
+
+def upright(gravity: tuple[float, float, float]) -> np.ndarray:
+    """The least rotation (3, 3) that turns gravity down, to −z; the identity without gravity."""
+    size = float(np.linalg.norm(gravity))
+    if size == 0:
+        return np.eye(3)
+    x, y, z = np.array(gravity) / size
+    level = x**2 + y**2
+    if z > 0 and level == 0:  # straight up: about x
+        return np.diag([1.0, -1.0, -1.0])
+    axis = hat(np.array([-y, x, 0.0]))  # of (x, y, z) × (0, 0, −1), times the sine
+    return np.eye(3) + axis + axis @ axis * ((1 + z) / level if z > 0 else 1 / (1 - z))
+
+
+def ground(seen: Scenery) -> Command:
+    """Squares on the floor, each edge a line of its own: viewers drop lines that pass behind the eye."""
+    middle, count = np.round(seen.center[:2] / seen.square), int(np.ceil(4 * seen.radius / seen.square))
+    ticks = np.arange(-count, count + 1)
+    x, y = np.meshgrid(ticks, ticks[:-1], indexing="ij")
+    along = np.stack([np.stack([x, y], axis=-1), np.stack([x, y + 1], axis=-1)], axis=-2).reshape(-1, 2)
+    flat = (np.vstack([along, along[:, ::-1]]) + middle) * seen.square
+    points = np.column_stack([flat, np.full(len(flat), seen.floor)])
+    look = commands.material(_GROUND, line=True)
+    return commands.set_object("ground", commands.polyline(points), look, kind="LineSegments")
+
+
+def gravity_arrow(seen: Scenery, gravity: tuple[float, float, float]) -> list[Command]:
+    """An arrow down, at the left of what is seen; none without gravity."""
+    if not any(gravity):
+        return []
+    left = np.cross(seen.camera, [0.0, 0.0, 1.0])
+    if (length := np.linalg.norm(left)) < 1e-6:  # seen from above
+        left, length = np.array([-1.0, 0.0, 0.0]), 1.0
+    place = seen.center + seen.radius * (0.9 * left / length + [0.0, 0.0, 0.3])
+    down = np.diag([1.0, -1.0, -1.0])
+    look = commands.material(_GRAVITY)
+    drawn = commands.set_object("gravity", commands.triangles(arrow(0.35 * seen.radius)), look)
+    return [drawn, commands.set_transform("gravity", homogeneous(down, place))]
+
+
+def gravity_label(robot: Robot) -> str:
+    """What the picture says of gravity."""
+    gravity = robot.edits.gravity
+    if not any(gravity):
+        return "no gravity"
+    acts = "" if gravity_acts(robot) else ", without torque on any joint"
+    return f"↓ gravity {np.linalg.norm(gravity):.4g} m/s²{acts}"
+
+
+def turned(gravity: tuple[float, float, float]) -> list[str]:
+    """A note on how the scene stands, if it does not stand as the base does with gravity along −z."""
+    if not any(gravity):
+        return ["there is no gravity; up is z of the base"]
+    if np.array_equal(upright(gravity), np.eye(3)):
+        return []
+    return [f"the scene is turned so that gravity, {gravity} m/s² in axes of the base, points down"]
