@@ -225,7 +225,7 @@ def test_a_machine_that_disagrees_is_refused(monkeypatch) -> None:
     setup = rd.Setup(rd.Plant(ARM), Q)
     made = making.machine(Motion(setup.plant, None), rd.method("rk4"))
     made.check(setup)
-    other = replace(made, motion=Motion(rd.Plant(ARM.with_(gravity=(0.0, -9.80664, 0.0))), None))
+    other = replace(made, motion=Motion(rd.Plant(ARM.with_(gravity=(0.0, 0.0, -9.80664))), None))
     with pytest.raises(MarchError, match=r"differs from the interpreted one by .* allowed: take engine='interpreted'"):
         other.check(setup)
 
