@@ -129,10 +129,14 @@ __all__ = sorted(_HOME)  # pyright: ignore[reportUnsupportedDunderAll]
 
 
 def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("robot-dyn")
     if name not in _HOME:
         raise AttributeError(f"module 'robot_dyn' has no attribute {name!r}")
     return getattr(import_module(f"robot_dyn.{_HOME[name]}"), name)
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *_HOME])
+    return [*__all__, "__version__"]

@@ -47,6 +47,10 @@ class OverflowedError(QueryError):
     """Arguments so large that the result is not a finite number."""
 
 
+class SceneError(RobotDynError):
+    """A scene that cannot be read; names file, line, key and value."""
+
+
 class SingularError(RobotDynError):
     """Forward dynamics that has no answer: M is singular.
 

@@ -7,6 +7,7 @@ import re
 import signal
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -176,6 +177,32 @@ def test_output_in_an_encoding_without_mathematical_signs(encoding: str, args: l
 
 LOADED = "import sys; print(*sorted({name.partition('.')[0] for name in sys.modules}))"
 HEAVY = {"pinocchio", "yourdfpy", "trimesh", "scipy", "flint", "lxml", "numpy"}
+
+
+@pytest.mark.parametrize(
+    ("line", "completed"),
+    [
+        ("info planar_2", ["planar_2r"]),
+        ("compare pendulum double_pend", ["double_pendulum"]),
+        ("query planar_2r --why joint", ["joint_1", "joint_2"]),
+        ("info planar_2r --lock joint_2", ["joint_2="]),
+        ("scene pendu", ["pendulum"]),
+    ],
+)
+def test_the_shell_completes_robots_scenes_and_joints(line: str, completed: list[str]):
+    """Nothing that takes time is imported for it."""
+    words = ["robot-dyn", *line.split()]
+    environment = {"COMP_WORDS": " ".join(words), "COMP_CWORD": str(len(words) - 1)}
+    code = f"import sys; sys.argv[0] = 'robot-dyn'\ntry:\n    {MAIN}\nfinally:\n    {LOADED}"
+    done = spawn(code=code, _ROBOT_DYN_COMPLETE="complete_bash", **environment)
+    *names, loaded = done.stdout.decode().splitlines()
+    assert names == completed and done.stderr == b""
+    assert not set(loaded.split()) & (HEAVY | {"pydantic", "rich"})
+
+
+def test_version_and_public_names():
+    assert said("--version") == f"robot-dyn {rd.__version__}\n" == f"robot-dyn {version('robot-dyn')}\n"
+    assert set(dir(rd)) == {*rd.__all__, "__version__"}
 
 
 def test_import_is_light():

@@ -9,6 +9,9 @@ from typing import Annotated
 
 import typer
 
+from robot_dyn.cli import completion
+from robot_dyn.cli.terminal import put
+
 app = typer.Typer(
     name="robot-dyn",
     help="Dynamics of robot arms from a URDF: M(q) a + C(q, v) v + N(t, q, v) = τ.",
@@ -18,9 +21,19 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-Name = Annotated[str, typer.Argument(metavar="ROBOT", help="A name of `robot-dyn list`, or the path of a URDF file.")]
+Name = Annotated[
+    str,
+    typer.Argument(
+        metavar="ROBOT",
+        help="A name of `robot-dyn list`, or the path of a URDF file.",
+        autocompletion=completion.robots,
+    ),
+]
 Lock = Annotated[
-    list[str] | None, typer.Option(metavar="JOINT=VALUE", help="Hold a joint at a value; may be repeated.")
+    list[str] | None,
+    typer.Option(
+        metavar="JOINT=VALUE", help="Hold a joint at a value; may be repeated.", autocompletion=completion.locks
+    ),
 ]
 PackageDir = Annotated[
     list[str] | None, typer.Option(help="Folder in which ROS packages are searched; may be repeated.")
@@ -34,6 +47,23 @@ Xacro = Annotated[
 ]
 Force = Annotated[bool, typer.Option("--force", help="Replace files that are there already.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, as documented in docs/json.md.")]
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        import robot_dyn
+
+        put(f"robot-dyn {robot_dyn.__version__}\n")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version, and end.")
+    ] = False,
+) -> None:
+    """Dynamics of robot arms from a URDF: M(q) a + C(q, v) v + N(t, q, v) = τ."""
 
 
 def progress(items: Iterable[str], description: str) -> Iterator[str]:

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 import robot_dyn as rd
-from robot_dyn.cli import arguments
+from robot_dyn.cli import arguments, completion
 from robot_dyn.cli.app import Json, Lock, Name, PackageDir, Xacro, app, progress
 from robot_dyn.cli.terminal import say, say_json
 from robot_dyn.errors import QueryError, RobotDynError
@@ -52,7 +52,10 @@ def query(
     a: Annotated[str | None, typer.Option(help="Accelerations: the torque is computed.")] = None,
     tau: Annotated[str | None, typer.Option(help="Torques: the acceleration is computed.")] = None,
     why: Annotated[
-        str | None, typer.Option(metavar="JOINT", help="Split this joint's torque by link and cause.")
+        str | None,
+        typer.Option(
+            metavar="JOINT", help="Split this joint's torque by link and cause.", autocompletion=completion.joints
+        ),
     ] = None,
     effects: Annotated[str | None, typer.Option(help='"urdf" adds the friction that the file states.')] = None,
     lock: Lock = None,
@@ -76,7 +79,9 @@ def query(
 
 @app.command()
 def compare(
-    robots: Annotated[list[str] | None, typer.Argument(metavar="ROBOT...", help="Names or paths.")] = None,
+    robots: Annotated[
+        list[str] | None, typer.Argument(metavar="ROBOT...", help="Names or paths.", autocompletion=completion.robots)
+    ] = None,
     every: Annotated[bool, typer.Option("--all", help="All robots of `robot-dyn list` that load.")] = False,
     samples: Annotated[int, typer.Option(min=1, help="Random states for each robot.")] = 20,
     seed: Annotated[int, typer.Option(help="Of the random states.")] = 0,

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 import robot_dyn as rd
-from robot_dyn.cli import arguments
+from robot_dyn.cli import arguments, completion
 from robot_dyn.cli.app import Force, Json, app, bar
 from robot_dyn.cli.terminal import put, say, say_json, tell
 
@@ -52,7 +52,10 @@ def explain(scene: Annotated[str, typer.Argument(metavar="SCENE.toml", help="A s
 
 @app.command()
 def scene(
-    name: Annotated[str | None, typer.Argument(metavar="NAME", help="Name of a starter; none lists them.")] = None,
+    name: Annotated[
+        str | None,
+        typer.Argument(metavar="NAME", help="Name of a starter; none lists them.", autocompletion=completion.scenes),
+    ] = None,
 ) -> None:
     """Print a scene file to start from."""
     from robot_dyn.scene.starters import starter, starters

@@ -10,7 +10,7 @@ from functools import cache
 from importlib import metadata
 from pathlib import Path
 
-from robot_dyn.errors import CatalogError, nearest
+from robot_dyn.errors import CatalogError, nearest, shorten
 from robot_dyn.model.packages import environment_folders, package_folders
 
 # Files whose own stem is shared, or says nothing.
@@ -44,7 +44,7 @@ def find(name_or_path: str | Path, package_dirs: Iterable[str | Path] = ()) -> P
     if isinstance(start, str) and start.lstrip("\ufeff \t\r\n").startswith("<"):
         raise CatalogError("this is the text of a URDF, not its name or path; give it to Robot.from_text")
     if not isinstance(name_or_path, str | Path) or not str(name_or_path).strip():
-        raise CatalogError(f"give the name of a robot or the path of a URDF file, got {name_or_path!r}")
+        raise CatalogError(f"give the name of a robot or the path of a URDF file, got {shorten(repr(name_or_path))}")
     text = str(name_or_path)
     if text in _files():
         return _files()[text]
@@ -55,11 +55,11 @@ def find(name_or_path: str | Path, package_dirs: Iterable[str | Path] = ()) -> P
         if path.exists():
             return path
         if path.suffix or len(path.parts) > 1:
-            raise CatalogError(f"no file {text}; looked for {path.absolute()}")
+            raise CatalogError(f"no file {shorten(text, 200)}; looked for {shorten(path.absolute(), 300)}")
     except (OSError, RuntimeError, ValueError) as error:  # too long, not to be searched, no such user, a NUL
         why = getattr(error, "strerror", error)
-        raise CatalogError(f"no file {text!r}: {why}; give the path of a URDF file") from None
-    raise CatalogError(f"no robot {text!r}; {nearest(text, list_robots())}; or give the path of a URDF file")
+        raise CatalogError(f"no file {shorten(text)!r}: {why}; give the path of a URDF file") from None
+    raise CatalogError(f"no robot {shorten(text)!r}; {nearest(text, list_robots())}; or give the path of a URDF file")
 
 
 def resolve(address: str, urdf: Path, package_dirs: Iterable[str | Path] = ()) -> Path:
@@ -73,7 +73,7 @@ def resolve(address: str, urdf: Path, package_dirs: Iterable[str | Path] = ()) -
     for folder in package_folders(name, urdf, package_dirs) if name and inside else ():
         if (folder / inside).is_file():
             return folder / inside
-    raise CatalogError(f"no file for {address}; {_remedy(name, urdf, package_dirs)}")
+    raise CatalogError(f"no file for {shorten(address, 200)}; {_remedy(name, urdf, package_dirs)}")
 
 
 def package(name: str, urdf: Path, package_dirs: Iterable[str | Path] = ()) -> Path:

@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
+import os
+import re
 import tomllib
 from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import ValidationError
 
+from robot_dyn.effects.effect import Effect
 from robot_dyn.effects.plant import Plant
-from robot_dyn.errors import RobotDynError, nearest, shorten
+from robot_dyn.errors import RobotDynError, SceneError, nearest, shorten
 from robot_dyn.files import Kind
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.integrate.methods import METHODS, method
 from robot_dyn.model.loading import load
 from robot_dyn.model.robot import Robot
+from robot_dyn.reading import read
+from robot_dyn.scene.complaint import complaint, located, where
 from robot_dyn.scene.control import AnyReference, Control, Hold
 from robot_dyn.scene.effects import Acting, AnyEffect, Edit
-from robot_dyn.scene.schema import NotNegative, Part, PerJoint, Positive, SceneError, Truth, per_joint
+from robot_dyn.scene.schema import NotNegative, Part, PerJoint, PlacedError, Positive, Truth, per_joint, placed
 from robot_dyn.simulation.setup import Setup
 
+MAX_BYTES = 2**20
 SCENE = Kind("a scene", ".toml")
 ADAPTIVE = ("DOP853", "Radau")
 
@@ -52,17 +58,25 @@ class Scene(Part):
     def described(self, folder: Path) -> Robot:
         """The robot as its file says, without gravity."""
         beside = folder / self.robot
-        return load(beside if beside.is_file() else self.robot).with_(gravity=(0.0, 0.0, 0.0))
+        with placed("robot"):
+            return load(beside if os.path.isfile(beside) else self.robot).with_(gravity=(0.0, 0.0, 0.0))
 
     def setup(self, folder: Path, about: dict[str, str]) -> Setup:
         """The setup it describes; paths are relative to `folder`."""
         described = robot = self.described(folder)
-        for effect in self.effect:
+        for k, effect in enumerate(self.effect):
             if isinstance(effect, Edit):
-                robot = effect.edit(robot)
-        acting = [part for effect in self.effect if isinstance(effect, Acting) for part in effect.build(robot)]
-        q0, v0 = (per_joint(name, value, robot) for name, value in (("q", self.start.q), ("v", self.start.v)))
-        controller = None if self.control is None else self.control.build(described, robot, q0, self.reference)
+                with placed("effect", k):
+                    robot = effect.edit(robot)
+        acting: list[Effect] = []
+        for k, effect in enumerate(self.effect):
+            if isinstance(effect, Acting):
+                with placed("effect", k):
+                    acting += effect.build(robot)
+        with placed("start"):
+            q0, v0 = (per_joint(name, value, robot) for name, value in (("q", self.start.q), ("v", self.start.v)))
+        with placed("control"):
+            controller = None if self.control is None else self.control.build(described, robot, q0, self.reference)
         return Setup(
             Plant(robot, acting), q0, v0, self.duration_s, controller, self.integrator(),
             self.step_s, self.record_period_s, self.estimate_error, about, self.engine,
@@ -86,11 +100,17 @@ def read_scene(path: str | Path) -> Setup:
 
 def read_both(path: str | Path) -> tuple[Scene, Setup]:
     """A scene file as it is written, and the setup it describes; SceneError as `read_scene`."""
-    path = Path(path)
-    text = _text(path)
-    scene = parse_scene(text, str(path))
+    data = read(path, MAX_BYTES, SceneError, "see robot-dyn scene for one to start from")
     try:
-        return scene, scene.setup(path.parent, {"scene": text})
+        text = data.decode("utf-8")
+    except UnicodeDecodeError:
+        raise SceneError(f"{path}: is not UTF-8 text; save it as TOML in UTF-8") from None
+    scene, table = _parsed(text, str(path))
+    try:
+        return scene, scene.setup(Path(path).parent, {"scene": text})
+    except PlacedError as error:
+        named = f"{where(table, error.path)}: {error}" if error.path[0] in ("effect", "start") else str(error)
+        raise SceneError(f"{path}: {located(text, error.path, named)}") from None
     except RobotDynError as error:
         raise SceneError(f"{path}: {error}") from None
 
@@ -99,24 +119,30 @@ def parse_scene(text: str, source: str) -> Scene:
     """A scene of its text; `source` names it in messages.
 
     Raises:
-        SceneError: If it is no TOML, or a key or value has no meaning.
+        SceneError: If it is not TOML, or a key or value has no meaning.
     """
+    return _parsed(text, source)[0]
+
+
+def _parsed(text: str, source: str) -> tuple[Scene, dict[str, Any]]:
     try:
         table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise SceneError(f"{source}: is no TOML: {error}; correct the file") from None
+    except (ValueError, RecursionError) as error:
+        raise SceneError(f"{source}: {_syntax(error)}; correct the file") from None
     try:
         scene = Scene.model_validate(table)
     except ValidationError as error:
-        raise SceneError(f"{source}: {_first(error)}") from None
+        raise SceneError(f"{source}: {complaint(error, table, text, Scene)}") from None
     if scene.control is None and "reference" in scene.model_fields_set:
-        raise SceneError(f"{source}: reference: nothing follows it; add a [control]")
+        message = located(text, ["reference"], "reference: nothing follows it; add a [control]")
+        raise SceneError(f"{source}: {message}")
     if scene.method not in (*METHODS, *ADAPTIVE):
         names = nearest(scene.method, (*METHODS, *ADAPTIVE))
-        raise SceneError(f"{source}: method: no method {shorten(scene.method)!r}; {names}")
+        message = located(text, ["method"], f"method: no method {shorten(scene.method)!r}; {names}")
+        raise SceneError(f"{source}: {message}")
     if why := _without_effect(scene):
-        raise SceneError(f"{source}: {why}")
-    return scene
+        raise SceneError(f"{source}: {located(text, why.partition(':')[0].split('.'), why)}")
+    return scene, table
 
 
 def _without_effect(scene: Scene) -> str:
@@ -134,32 +160,11 @@ def _without_effect(scene: Scene) -> str:
     return ""
 
 
-def _text(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise SceneError(
-            f"{path}: cannot be read ({error.strerror}); see robot-dyn scene for one to start from"
-        ) from None
-    except UnicodeDecodeError:
-        raise SceneError(f"{path}: is no UTF-8 text; save it as TOML") from None
-
-
-def _keys(part: type[Part]) -> set[str]:
-    """All keys that a scene can have."""
-    below = (key for sub in part.__subclasses__() for key in _keys(sub))
-    return {*part.model_fields, *below}
-
-
-def _first(error: ValidationError) -> str:
-    """The first thing that is wrong: key path, what, value, and the keys there are."""
-    found = error.errors(include_url=False)
-    unknown = [each for each in found if each["type"] == "extra_forbidden"]
-    first = (unknown or found)[0]
-    tags = {"float", "list[float]", "dict[str,float]", "literal['urdf']"}
-    where = [str(part) for part in first["loc"] if not (isinstance(part, str) and part in tags)]
-    path = "".join(f"[{part}]" if part.isdigit() else f".{part}" for part in where).lstrip(".")
-    value: Any = first.get("input")
-    if first["type"] == "extra_forbidden":
-        return f"{path}: unknown key with value {shorten(repr(value))}; {nearest(where[-1], _keys(Part))}"
-    return f"{path}: {first['msg'].lower()}, got {shorten(repr(value))}"
+def _syntax(error: Exception) -> str:
+    """What TOML does not allow, after its place."""
+    if isinstance(error, RecursionError):
+        return "is not TOML that can be read: its lists or tables are nested too deeply"
+    message = shorten(error, 200)
+    if place := re.fullmatch(r"(.*) \(at (line \d+, column \d+)\)", message):
+        return f"{place[2]}: is not TOML: {place[1]}"
+    return f"is not TOML: {message}"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -13,8 +15,21 @@ from robot_dyn.model.edits import by_joint
 from robot_dyn.model.robot import Robot
 
 
-class SceneError(RobotDynError):
-    """A scene that cannot be read; names file, key path and value."""
+class PlacedError(RobotDynError):
+    """An error of a part of a scene, at the `path` of its keys."""
+
+    def __init__(self, message: str, path: tuple[str | int, ...]) -> None:
+        super().__init__(message)
+        self.path = path
+
+
+@contextmanager
+def placed(*path: str | int) -> Iterator[None]:
+    """Whatever is refused here is refused at the path of a scene."""
+    try:
+        yield
+    except RobotDynError as error:
+        raise PlacedError(str(error), path) from None
 
 
 class Part(BaseModel):

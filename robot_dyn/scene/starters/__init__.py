@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from importlib.resources import files
 
-from robot_dyn.errors import nearest
-from robot_dyn.scene.schema import SceneError
+from robot_dyn.errors import SceneError, nearest
 
 
 def starters() -> tuple[str, ...]:

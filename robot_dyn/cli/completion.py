@@ -1,0 +1,49 @@
+"""What the shell completes: names of robots, starter scenes and joints, without anything that takes time to import."""
+
+from __future__ import annotations
+
+import os
+import re
+from contextlib import suppress
+
+from robot_dyn.errors import RobotDynError
+from robot_dyn.model.catalog import find, list_robots
+from robot_dyn.reading import read_start
+
+_READ = 2**22  # bytes of a URDF in which joints are sought
+_MOVES = re.compile(
+    rb"""<joint\b(?=[^>]*\btype\s*=\s*["'](?:revolute|continuous|prismatic))[^>]*\bname\s*=\s*["']([^"']+)"""
+)
+
+
+def robots(incomplete: str) -> list[str]:
+    """Names of the catalog."""
+    return [name for name in list_robots() if name.startswith(incomplete)]
+
+
+def scenes(incomplete: str) -> list[str]:
+    """Names of starter scenes."""
+    from robot_dyn.scene.starters import starters
+
+    return [name for name in starters() if name.startswith(incomplete)]
+
+
+def joints(incomplete: str) -> list[str]:
+    """Joints that move, of the robot that the line names."""
+    return [name for name in _joints() if name.startswith(incomplete)]
+
+
+def locks(incomplete: str) -> list[str]:
+    """JOINT= of these."""
+    return [f"{name}=" for name in joints(incomplete)]
+
+
+def _joints() -> list[str]:
+    """Of the first robot in the line, which shells hand over in their environment."""
+    line = os.environ.get("COMP_WORDS") or os.environ.get("_TYPER_COMPLETE_ARGS") or ""
+    for word in line.split()[2:]:
+        with suppress(RobotDynError):
+            text = read_start(find(word), _READ, RobotDynError, "")
+            names = [found.decode("utf-8", "replace") for found in _MOVES.findall(text)]
+            return [name for name in names if name.isprintable()]
+    return []
