@@ -146,3 +146,46 @@ MISTAKES = {
     "wrong shape": (SCENE.replace("[0.3, -0.4]", "[0.3]"), ["q must be", "(2,)"]),
     "unknown robot": (SCENE.replace("planar_2r", "planar_3r"), ["planar_3r", "nearest: planar_2r"]),
     "unknown method": ('method = "rk5"' + SCENE, ["method", "rk5", "rk4"]),
+    "unknown effect": (
+        SCENE + '[[effect]]\nkind = "viscous"',
+        ["effect 1", "no kind 'viscous'; nearest: viscous_friction"],
+    ),
+    "unknown frame": (
+        SCENE + '[[effect]]\nkind = "external_wrench"\nframe = "tipp"\nforce_N = [1, 0, 0]',
+        ["tipp", "nearest: tip"],
+    ),
+    "missing gain": (SCENE + '[control]\nkind = "pd"', ["line 7", "control: frequency_rad_per_s: is missing"]),
+    "reference alone": (SCENE + PD.split("[reference]")[1].join(["[reference]", ""]), ["reference", "[control]"]),
+    "times and points": (
+        SCENE
+        + PD.split("[reference]")[0]
+        + '[reference]\nkind = "via_points"\ntimes_s = [0.1, 0.2]\npoints = [[1, 2]]',
+        ["2 times_s for 1 points"],
+    ),
+    "wrong reference": (
+        SCENE + PD.replace('"pd"', '"operational_space"\nframe = "tip"'),
+        ["reference.kind", "line or circle", "quintic"],
+    ),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_is_told_by_file_key_and_value(write, mistake: str) -> None:
+    text, fragments = MISTAKES[mistake]
+    with pytest.raises(SceneError) as caught:
+        rd.read_scene(write(text))
+    for fragment in ["scene.toml", *fragments]:
+        assert fragment in str(caught.value)
+
+
+def test_a_missing_scene_is_told(tmp_path) -> None:
+    with pytest.raises(SceneError, match="there is no such file; see robot-dyn scene"):
+        rd.read_scene(tmp_path / "none.toml")
+    (tmp_path / "latin.toml").write_bytes(b'robot = "\xe9"')
+    with pytest.raises(SceneError, match="is not UTF-8 text"):
+        rd.read_scene(tmp_path / "latin.toml")
+
+
+def test_a_scene_is_checked_before_its_robot_is_loaded() -> None:
+    with pytest.raises(SceneError, match="line 3: 'x' is not a key of a scene"):
+        parse_scene('robot = "none"\nduration_s = 1.0\nx = 1', "here")

@@ -13,9 +13,10 @@ from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFricti
 from robot_dyn.effects.joint_limit import joint_stops
 from robot_dyn.effects.spring import Spring
 from robot_dyn.effects.wrench import ExternalWrench
+from robot_dyn.errors import SceneError
 from robot_dyn.model.edits import STANDARD_GRAVITY, Payload
 from robot_dyn.model.robot import Robot
-from robot_dyn.scene.schema import NotNegative, Number, Part, PerJoint, Positive, SceneError, Stated, Vector3, per_joint
+from robot_dyn.scene.schema import NotNegative, Number, Part, PerJoint, Positive, Stated, Vector3, per_joint
 
 
 class Gravity(Part):

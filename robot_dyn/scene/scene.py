@@ -152,11 +152,11 @@ def _without_effect(scene: Scene) -> str:
         kind = "chooses its own step" if scene.method in ADAPTIVE else "has a fixed step"
         return f"{unused[0]}: has no effect, since {scene.method} {kind}; remove it, or name another method"
     models = [] if scene.control is None else [("control.model.effects", scene.control.model.effects or ())]
-    for where, effects in (("effect", scene.effect), *models):
+    for place, effects in (("effect", scene.effect), *models):
         kinds = [effect.kind for effect in effects]
         for kind in ("gravity", "armature"):
             if kinds.count(kind) > 1:
-                return f"{where}: {kind} is named {kinds.count(kind)} times, and only the last would act; keep one"
+                return f"{place}: {kind} is named {kinds.count(kind)} times, and only the last would act; keep one"
     return ""
 
 

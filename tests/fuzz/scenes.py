@@ -1,0 +1,57 @@
+"""Scenes: the starters with keys, values and tables changed, and with damaged text. What is accepted is not run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+import robot_dyn as rd
+from robot_dyn.scene.starters import starter, starters
+from tests.fuzz.bytes import damage, damage_text
+
+# Parts that no starter has; `double_pendulum` is left out of none, so that every kind meets a small robot too.
+MORE = """robot = "cart_pole"
+duration_s = 0.1
+method = "rk4"
+start = {q = {hinge = 0.3}, v = [0.1, 0.2]}
+[[effect]]
+kind = "lock"
+joints = {slide = 0.1}
+[[effect]]
+kind = "armature"
+inertia_kg_m2 = 0.1
+[[effect]]
+kind = "joint_stops"
+lower_rad = -1.0
+upper_rad = 1.0
+[control]
+kind = "pid"
+frequency_rad_per_s = 10.0
+[control.model]
+mass_scale = 1.1
+[[control.model.effects]]
+kind = "gravity"
+[reference]
+kind = "via_points"
+times_s = [0.05, 0.1]
+points = [[0.1], [0.2]]
+"""
+
+
+def seeds(folder: Path) -> list[str]:
+    """The starters, on small robots, and one with the parts that they lack."""
+    return [*(starter(name) for name in starters()), MORE, MORE]
+
+
+def mutate(rng: np.random.Generator, seed: str) -> bytes:
+    """A damaged scene."""
+    return damage(rng, seed.encode()) if rng.random() < 0.2 else damage_text(rng, seed).encode("utf-8", "surrogatepass")
+
+
+def attempt(mutant: bytes, folder: Path) -> str:
+    """Read it."""
+    path = folder / "mutant.toml"
+    path.write_bytes(mutant)
+    rd.read_scene(path)
+    return "accepted"
