@@ -10,7 +10,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.errors import EffectError, ModelWarning
-from robot_dyn.scene.schema import SceneError
+from robot_dyn.scene.scene import SceneError
 from tests.hostile.kinds import BODY, LIMIT, MOMENTS, POINT, inside, joint
 from tests.hostile.kinds import arm as altered
 

@@ -9,7 +9,7 @@ import robot_dyn as rd
 from robot_dyn.control.controller import ControlError
 from robot_dyn.effects.effect import Active, Effect
 from robot_dyn.errors import CatalogError, EditError, EffectError, QueryError
-from robot_dyn.scene.schema import SceneError
+from robot_dyn.scene.scene import SceneError
 
 ARM = rd.load("planar_2r")
 UR5 = rd.load("ur5")
@@ -165,7 +165,7 @@ CONTROL = '[control]\nkind = "{}"\nfrequency_rad_per_s = 10.0\n'
         (SCENE.replace("0.1", "true"), "duration_s: .*, got True"),
         (SCENE.replace("0.1", '"0.1"'), "duration_s: .*, got '0.1'"),
         (SCENE + "estimate_error = 0\n", "estimate_error: .*, got 0"),
-        (SCENE + "[start]\nq = [true, 0.1]\n", r"start.q.*, got \[True, 0.1\]"),
+        (SCENE + "[start]\nq = [true, 0.1]\n", r"start: q 1: must be a number, got True"),
     ],
 )
 def test_what_a_scene_states_and_no_run_would_heed_is_refused(text: str, message: str, tmp_path) -> None:
