@@ -17,7 +17,13 @@ def escaped(text: str) -> str:
 
 
 class RobotDynError(Exception):
-    """Base of every error this library raises; its message has no control characters of the file that it is about."""
+    """Base of every error this library raises; its message has no control characters of the file that it is about.
+
+    Attributes:
+        row: Index of the state that has no answer in a batch, None where there is no batch.
+    """
+
+    row: tuple[int, ...] | None = None
 
     def __str__(self) -> str:
         return escaped(super().__str__())
@@ -41,6 +47,10 @@ class EffectError(RobotDynError):
 
 class QueryError(RobotDynError):
     """An argument of a query with the wrong shape, a value that is not finite, or an unknown name."""
+
+
+class NotFiniteError(QueryError):
+    """An argument of a query with a value that is NaN or infinite."""
 
 
 class OverflowedError(QueryError):

@@ -1,4 +1,4 @@
-"""Arguments and results of a query on its general way: times, and the array `out` that a kernel may write into."""
+"""Arguments and results of a query on its general way: times, and the array `out` that takes the result."""
 
 from __future__ import annotations
 
@@ -16,13 +16,6 @@ def time_of(t: Any) -> np.ndarray:
         return FLOAT64.asarray(t)[..., None]
     except (TypeError, ValueError, OverflowError):
         raise QueryError(f"t must be a time in seconds, got {t!r}") from None
-
-
-def may_write(out: Any, shape: tuple[int, ...], dtype: str, arrays: list[np.ndarray]) -> bool:
-    """Whether a kernel may write into `out`: an array of that form that shares no memory with the arguments."""
-    if type(out) is not np.ndarray or out.shape != shape or out.dtype != dtype:
-        return False
-    return out.flags.carray and not any(np.may_share_memory(out, x) for x in arrays)
 
 
 def into(out: np.ndarray | None, result: np.ndarray) -> Any:

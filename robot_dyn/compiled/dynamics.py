@@ -31,6 +31,8 @@ _DERIVATIVES = "forward_dynamics_derivatives"
 class CompiledDynamics:
     """A robot as machine code; each quantity is compiled, and checked against Pinocchio, when first asked for.
 
+    With out= the answer goes into that array, which is left as it was if the query is refused.
+
     Attributes:
         original: The robot as given.
         dtype: "float64" or "float32".
@@ -125,70 +127,78 @@ class CompiledDynamics:
         """What `empty` takes for a result (n,)."""
         return self.n, np.dtype(self.dtype)
 
-    def M(self, q: Array, *, out: np.ndarray | None = None) -> Any:
-        return self._matrix("M", (q,), out)
+    def M(self, q: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
+        return self._matrix("M", (q,), out, errors)
 
-    def C(self, q: Array, v: Array, *, out: np.ndarray | None = None) -> Any:
-        return self._matrix("C", (q, v), out)
+    def C(self, q: Array, v: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
+        return self._matrix("C", (q, v), out, errors)
 
-    def N(self, q: Array, *, out: np.ndarray | None = None) -> Any:
-        return self._torque("N", (q,), out)
+    def N(self, q: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
+        return self._torque("N", (q,), out, errors)
 
-    def coriolis_torque(self, q: Array, v: Array, *, out: np.ndarray | None = None) -> Any:
-        return self._torque("coriolis_torque", (q, v), out)
+    def coriolis_torque(self, q: Array, v: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
+        return self._torque("coriolis_torque", (q, v), out, errors)
 
-    def coriolis_transpose(self, q: Array, v: Array, *, out: np.ndarray | None = None) -> Any:
-        return self._torque("coriolis_transpose", (q, v), out)
+    def coriolis_transpose(self, q: Array, v: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
+        return self._torque("coriolis_transpose", (q, v), out, errors)
 
-    def inverse_dynamics(self, q: Array, v: Array, a: Array, *, out: np.ndarray | None = None) -> Any:
+    def inverse_dynamics(
+        self, q: Array, v: Array, a: Array, *, out: np.ndarray | None = None, errors: str = "raise"
+    ) -> Any:
         y = empty(*self._vector) if out is None else out
         if not self._ones["inverse_dynamics"](q, v, a, y, self._like):
             return y
-        return self._ask("inverse_dynamics", (q, v, a), out)
+        return self._ask("inverse_dynamics", (q, v, a), out, errors)
 
-    def forward_dynamics(self, q: Array, v: Array, tau: Array, *, out: np.ndarray | None = None) -> Any:
+    def forward_dynamics(
+        self, q: Array, v: Array, tau: Array, *, out: np.ndarray | None = None, errors: str = "raise"
+    ) -> Any:
         y = empty(*self._vector) if out is None else out
         if not self._ones["forward_dynamics"](q, v, tau, y, self._like):
             return y
-        return self._ask("forward_dynamics", (q, v, tau), out)
+        return self._ask("forward_dynamics", (q, v, tau), out, errors)
 
-    def forward_dynamics_derivatives(self, q: Array, v: Array, tau: Array) -> tuple[Any, Any, Any]:
+    def forward_dynamics_derivatives(
+        self, q: Array, v: Array, tau: Array, *, errors: str = "raise"
+    ) -> tuple[Any, Any, Any]:
         """∂a/∂q, ∂a/∂v, ∂a/∂τ of forward dynamics, each (..., n, n): −M⁻¹ ∂ID/∂q, −M⁻¹ ∂ID/∂v, M⁻¹."""
-        three = self.engine.ask(_DERIVATIVES, (q, v, tau), None, self._otherwise(_DERIVATIVES))
+        three = self.engine.ask(_DERIVATIVES, (q, v, tau), None, errors, self._otherwise(_DERIVATIVES))
         return three[..., 0, :, :], three[..., 1, :, :], three[..., 2, :, :]
 
-    def kinetic_energy(self, q: Array, v: Array) -> Any:
-        return self._ask("kinetic_energy", (q, v), None)
+    def kinetic_energy(self, q: Array, v: Array, *, errors: str = "raise") -> Any:
+        return self._ask("kinetic_energy", (q, v), None, errors)
 
-    def potential_energy(self, q: Array) -> Any:
-        return self._ask("potential_energy", (q,), None)
+    def potential_energy(self, q: Array, *, errors: str = "raise") -> Any:
+        return self._ask("potential_energy", (q,), None, errors)
 
-    def momentum(self, q: Array, v: Array, *, out: np.ndarray | None = None) -> Any:
-        return self._torque("momentum", (q, v), out)
+    def momentum(self, q: Array, v: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
+        return self._torque("momentum", (q, v), out, errors)
 
-    def placement(self, q: Array, frame: str) -> Any:
-        return self.robot.placement(q, frame)
+    def placement(self, q: Array, frame: str, *, errors: str = "raise") -> Any:
+        return self.robot.placement(q, frame, errors=errors)
 
-    def jacobian(self, q: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED) -> Any:
-        return self.robot.jacobian(q, frame, expressed_in=expressed_in)
+    def jacobian(self, q: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, errors: str = "raise") -> Any:
+        return self.robot.jacobian(q, frame, expressed_in=expressed_in, errors=errors)
 
-    def jacobian_rate(self, q: Array, v: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED) -> Any:
-        return self.robot.jacobian_rate(q, v, frame, expressed_in=expressed_in)
+    def jacobian_rate(
+        self, q: Array, v: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, errors: str = "raise"
+    ) -> Any:
+        return self.robot.jacobian_rate(q, v, frame, expressed_in=expressed_in, errors=errors)
 
-    def _torque(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None) -> Any:
-        return self._fast(quantity, arguments, out, self.n)
+    def _torque(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None, errors: str) -> Any:
+        return self._fast(quantity, arguments, out, errors, self.n)
 
-    def _matrix(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None) -> Any:
-        return self._fast(quantity, arguments, out, (self.n, self.n))
+    def _matrix(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None, errors: str) -> Any:
+        return self._fast(quantity, arguments, out, errors, (self.n, self.n))
 
-    def _fast(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None, shape: Any) -> Any:
+    def _fast(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None, errors: str, shape: Any) -> Any:
         y = empty(shape, self._vector[1]) if out is None else out
         if not self._ones[quantity](*arguments, y, self._like):
             return y
-        return self._ask(quantity, arguments, out)
+        return self._ask(quantity, arguments, out, errors)
 
-    def _ask(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None) -> Any:
-        return self.engine.ask(quantity, arguments, out, self._otherwise(quantity))
+    def _ask(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None, errors: str) -> Any:
+        return self.engine.ask(quantity, arguments, out, errors, self._otherwise(quantity))
 
     def _otherwise(self, quantity: str) -> Callable[..., Any]:
         """Pinocchio's way to a quantity."""

@@ -14,7 +14,8 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.compiled.arguments import into, may_write, time_of
+from robot_dyn.arithmetic import Float
+from robot_dyn.compiled.arguments import into, time_of
 from robot_dyn.compiled.emit import emit
 from robot_dyn.compiled.kernel import Kernel, Status
 from robot_dyn.compiled.on_first_use import OnFirstUse
@@ -22,7 +23,8 @@ from robot_dyn.compiled.overload import Store
 from robot_dyn.compiled.referee import STATES, Referee
 from robot_dyn.compiled.trace import Traced
 from robot_dyn.errors import RobotDynWarning
-from robot_dyn.model.dynamics import check_batches, checked
+from robot_dyn.model.batch import DoubtError, answered
+from robot_dyn.model.dynamics import shaped
 
 # Measured on chains: forward dynamics of 64 joints, 48 875 instructions, takes 8 s to compile; a batch is then 13 times
 # as fast as Pinocchio, one state from Python twice. The time grows as the count: above this, a quarter of a minute.
@@ -104,45 +106,49 @@ class Engine:
         return False
 
     def ask(
-        self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None, otherwise: Callable[..., Any]
+        self,
+        quantity: str,
+        arguments: tuple[Any, ...],
+        out: np.ndarray | None,
+        errors: str,
+        otherwise: Callable[..., Any],
     ) -> Any:
-        """A quantity in general: check the arguments, go through the batch, hand doubtful results to `otherwise`.
+        """A quantity in general: check the arguments, go through the batch, hand doubtful states to `otherwise`.
 
         Raises:
-            QueryError: If an argument is wrong; and what `otherwise` raises.
+            QueryError: If an argument is wrong; and what `otherwise` raises. Then `out` is left as it was.
         """
         if (quick := self._plainly(quantity, arguments, out)) is not None:
             return quick
         arrays = {name: self._array(name, x) for name, x in zip(self.arguments[quantity], arguments, strict=True)}
-        batch = check_batches(**arrays)
-        shape = self.shape(quantity)
-        states = int(np.prod(batch, dtype=np.int64))
-        own = out is None or not may_write(out, (*batch, *shape), self.dtype, list(arrays.values()))
-        result: Any = np.empty((*batch, *shape), self.dtype) if own else out
-        status = Status.RESULT
-        if self.pays(quantity):
-            flat = [
-                np.ascontiguousarray(np.broadcast_to(x, (*batch, x.shape[-1])), self.dtype).reshape(states, x.shape[-1])
-                for x in arrays.values()
-            ]
-            status = self._run(quantity, flat, result.reshape(states, -1)) if states else Status.FINE
-        if status is not Status.FINE:
-            result[...] = np.reshape(self._interpreted(quantity, arguments, arrays, otherwise), result.shape)
-        return into(out, result[..., 0] if quantity.endswith("energy") else result) if own else out
+        shape, timed = self.shape(quantity), self.arguments[quantity][0] == "t"
 
-    def _interpreted(
-        self, quantity: str, arguments: tuple[Any, ...], arrays: dict[str, np.ndarray], otherwise: Callable[..., Any]
-    ) -> Any:
-        """What `otherwise` says: a robot takes batches; a plant, whose effects may ask for the time, state by state."""
-        if self.arguments[quantity][0] != "t":
-            return otherwise(*arguments)
-        for name, x in arrays.items():
-            if name != "t":
-                checked(name, x, self.joint_names)
-        batch = check_batches(**arrays)
-        rows = [np.broadcast_to(x, (*batch, x.shape[-1])).reshape(-1, x.shape[-1]) for x in arrays.values()]
-        n = len(self.joint_names)
-        return [np.broadcast_to(otherwise(float(t[0]), *state), (n,)) for t, *state in zip(*rows, strict=True)]
+        def equation(*given: np.ndarray) -> np.ndarray:
+            batch = np.broadcast_shapes(*(x.shape[:-1] for x in given))
+            alone = not batch
+            if self.pays(quantity):
+                y = self._computed(quantity, given, batch)
+                if y is not None:
+                    return y
+                if not alone:
+                    raise DoubtError
+            elif timed and not alone:
+                raise DoubtError  # effects may take one time only
+            if timed:
+                given = (float(given[0][0]), *given[1:])
+            return np.broadcast_to(np.asarray(otherwise(*given), self.dtype), (*batch, *shape))
+
+        answer = answered(equation, arrays, shape, self.joint_names, errors, Float(np.dtype(self.dtype)))
+        return into(out, answer[..., 0] if quantity.endswith("energy") else answer)
+
+    def _computed(self, quantity: str, given: tuple[np.ndarray, ...], batch: tuple[int, ...]) -> np.ndarray | None:
+        """The kernel's results for a batch of states, or None if it reports a doubt."""
+        flat = [
+            np.ascontiguousarray(np.broadcast_to(x, (*batch, x.shape[-1])), self.dtype).reshape(-1, x.shape[-1])
+            for x in given
+        ]
+        y = np.empty((*batch, *self.shape(quantity)), self.dtype)
+        return y if self._run(quantity, flat, y.reshape(len(flat[0]), -1)) is Status.FINE else None
 
     def _plainly(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None) -> Any:
         """The result for arrays (B, n) that the kernel takes as they are, in which it finds nothing; else None."""
@@ -153,13 +159,13 @@ class Engine:
             if np.shape(arguments[0]) != states:
                 return None
             arguments = (np.asarray(arguments[0], self.dtype)[:, None], *arguments[1:])
-        y: Any = np.empty((*states, *shape), self.dtype) if out is None else out
         try:
-            plain = all(type(x) is np.ndarray and x.flags.aligned for x in (*arguments, y))
-            if plain and y.shape == (*states, *shape) and y.flags.c_contiguous and y.flags.writeable:
-                flat = y if len(shape) == 1 else y.reshape(states[0], -1)
-                if self.many[quantity](arguments, flat, self.threads) is Status.FINE:
-                    return y
+            if all(type(x) is np.ndarray and x.flags.aligned for x in arguments):
+                y = np.empty(
+                    (states[0], int(np.prod(shape))), self.dtype
+                )  # not `out`: a doubt may come after some rows
+                if self.many[quantity](arguments, y, self.threads) is Status.FINE:
+                    return into(out, y.reshape(*states, *shape))
         except (AttributeError, TypeError):  # not such arrays
             pass
         return None
@@ -169,7 +175,7 @@ class Engine:
         if name == "t":
             return time_of(x)
         plain = x.__class__ is np.ndarray and x.dtype == self.dtype and x.shape[-1:] == (len(self.joint_names),)
-        return x if plain else checked(name, x, self.joint_names)
+        return x if plain else shaped(name, x, self.joint_names)
 
     def _run(self, quantity: str, inputs: list[np.ndarray], y: np.ndarray) -> Status:
         if len(y) > _FEW:

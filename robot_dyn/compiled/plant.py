@@ -111,31 +111,35 @@ class CompiledPlant:
         """Names of the n joints, in the order of q."""
         return self.dynamics.joint_names
 
-    def M(self, q: Array, *, out: np.ndarray | None = None) -> Any:
+    def M(self, q: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
         """Mass matrix, (..., n, n)."""
-        return self.dynamics.M(q, out=out)
+        return self.dynamics.M(q, out=out, errors=errors)
 
-    def C(self, q: Array, v: Array, *, out: np.ndarray | None = None) -> Any:
+    def C(self, q: Array, v: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
         """Coriolis matrix, (..., n, n)."""
-        return self.dynamics.C(q, v, out=out)
+        return self.dynamics.C(q, v, out=out, errors=errors)
 
-    def N(self, t: Any, q: Array, v: Array, *, out: np.ndarray | None = None) -> Any:
+    def N(self, t: Any, q: Array, v: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
         """Every force but actuation, as what must be overcome: N = ∂V/∂q − Σ τ_effect, (..., n)."""
-        return self._ask("N", (t, q, v), out)
+        return self._ask("N", (t, q, v), out, errors)
 
-    def torque(self, t: Any, q: Array, v: Array, *, out: np.ndarray | None = None) -> Any:
+    def torque(self, t: Any, q: Array, v: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
         """Σ τ_effect, (..., n)."""
-        return self._ask("torque", (t, q, v), out)
+        return self._ask("torque", (t, q, v), out, errors)
 
-    def inverse_dynamics(self, t: Any, q: Array, v: Array, a: Array, *, out: np.ndarray | None = None) -> Any:
+    def inverse_dynamics(
+        self, t: Any, q: Array, v: Array, a: Array, *, out: np.ndarray | None = None, errors: str = "raise"
+    ) -> Any:
         """Actuation Υ = M a + C v + N that gives the acceleration a, (..., n)."""
-        return self._ask("inverse_dynamics", (t, q, v, a), out)
+        return self._ask("inverse_dynamics", (t, q, v, a), out, errors)
 
-    def forward_dynamics(self, t: Any, q: Array, v: Array, u: Array, *, out: np.ndarray | None = None) -> Any:
+    def forward_dynamics(
+        self, t: Any, q: Array, v: Array, u: Array, *, out: np.ndarray | None = None, errors: str = "raise"
+    ) -> Any:
         """Acceleration under the actuation u, (..., n)."""
-        return self._ask("forward_dynamics", (t, q, v, u), out)
+        return self._ask("forward_dynamics", (t, q, v, u), out, errors)
 
-    def _ask(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None) -> Any:
+    def _ask(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None, errors: str) -> Any:
         if arguments[0].__class__ in _TIMES:
             y = np.empty(self.n, self.dynamics.dtype) if out is None else out
             try:
@@ -143,7 +147,7 @@ class CompiledPlant:
                     return y
             except TypeError:  # an int too large for a float
                 pass
-        return self.engine.ask(quantity, arguments, out, getattr(self.interpreted, quantity))
+        return self.engine.ask(quantity, arguments, out, errors, getattr(self.interpreted, quantity))
 
     # --- the trace
 

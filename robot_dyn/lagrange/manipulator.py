@@ -8,6 +8,7 @@ Columns of a body Jacobian obey ∂J_j/∂q_k = [J_j, J_k] for joint j before jo
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, final
@@ -24,8 +25,9 @@ from robot_dyn.arithmetic import (
 )
 from robot_dyn.errors import QueryError
 from robot_dyn.lagrange.linkage import BASE, Configuration, Linkage, linkage
+from robot_dyn.model.batch import answered
 from robot_dyn.model.description import Description
-from robot_dyn.model.dynamics import Axes, acceleration, check_batches, checked, entry
+from robot_dyn.model.dynamics import Axes, acceleration, entry, shape_of, shaped
 from robot_dyn.model.tree import Described, tree
 from robot_dyn.spatial import adjoint, adjoint_inverse, block_diagonal, bracket, first_moment, hat, homogeneous
 
@@ -72,96 +74,86 @@ class Lagrangian:
         """Number of degrees of freedom."""
         return len(self.joint_names)
 
-    @in_arithmetic
-    def M(self, q: Array) -> Array:
-        (q,) = self._numbers(q=q)
-        return self._M(self.linkage.at(q))
+    def M(self, q: Array, *, errors: str = "raise") -> Array:
+        return self._answer("M", errors, lambda q: self._M(self.linkage.at(q)), q=q)
 
-    @in_arithmetic
-    def C(self, q: Array, v: Array) -> Array:
-        q, v = self._numbers(q=q, v=v)
-        return self._C(self.linkage.at(q), v)
+    def C(self, q: Array, v: Array, *, errors: str = "raise") -> Array:
+        return self._answer("C", errors, lambda q, v: self._C(self.linkage.at(q), v), q=q, v=v)
 
-    @in_arithmetic
-    def N(self, q: Array) -> Array:
-        (q,) = self._numbers(q=q)
-        return self._N(self.linkage.at(q))
+    def N(self, q: Array, *, errors: str = "raise") -> Array:
+        return self._answer("N", errors, lambda q: self._N(self.linkage.at(q)), q=q)
 
-    @in_arithmetic
-    def mass_matrix_derivative(self, q: Array) -> Array:
+    def mass_matrix_derivative(self, q: Array, *, errors: str = "raise") -> Array:
         """∂M_ij/∂q_k at index [..., i, j, k], exact; shape (..., n, n, n)."""
-        (q,) = self._numbers(q=q)
-        at = self.linkage.at(q)
-        total = self._zeros(at, 3)
-        for body, inertia, J in at.bodies():
-            block = (..., *np.ix_(body.path, body.path, body.path))
-            total[block] = total[block] + inertia_derivative(J, inertia)
-        return self.linkage.ties.cube(total)
+        return self._answer("mass_matrix_derivative", errors, lambda q: self._dM(self.linkage.at(q)), q=q)
 
-    @in_arithmetic
-    def coriolis_torque(self, q: Array, v: Array) -> Array:
-        q, v = self._numbers(q=q, v=v)
-        return apply(self._C(self.linkage.at(q), v), v)
+    def coriolis_torque(self, q: Array, v: Array, *, errors: str = "raise") -> Array:
+        return self._answer("coriolis_torque", errors, lambda q, v: apply(self._C(self.linkage.at(q), v), v), q=q, v=v)
 
-    @in_arithmetic
-    def coriolis_transpose(self, q: Array, v: Array) -> Array:
-        q, v = self._numbers(q=q, v=v)
-        return apply(transpose(self._C(self.linkage.at(q), v)), v)
+    def coriolis_transpose(self, q: Array, v: Array, *, errors: str = "raise") -> Array:
+        def equation(q: Array, v: Array) -> Array:
+            return apply(transpose(self._C(self.linkage.at(q), v)), v)
 
-    @in_arithmetic
-    def inverse_dynamics(self, q: Array, v: Array, a: Array) -> Array:
-        q, v, a = self._numbers(q=q, v=v, a=a)
-        at = self.linkage.at(q)
-        return apply(self._M(at), a) + apply(self._C(at, v), v) + self._N(at)
+        return self._answer("coriolis_transpose", errors, equation, q=q, v=v)
 
-    @in_arithmetic
-    def forward_dynamics(self, q: Array, v: Array, tau: Array) -> Array:
-        q, v, tau = self._numbers(q=q, v=v, tau=tau)
-        at = self.linkage.at(q)
-        rest = tau - apply(self._C(at, v), v) - self._N(at)
-        return acceleration(self._M(at), rest, self.joint_names)
+    def inverse_dynamics(self, q: Array, v: Array, a: Array, *, errors: str = "raise") -> Array:
+        def equation(q: Array, v: Array, a: Array) -> Array:
+            at = self.linkage.at(q)
+            return apply(self._M(at), a) + apply(self._C(at, v), v) + self._N(at)
 
-    @in_arithmetic
-    def kinetic_energy(self, q: Array, v: Array) -> Array:
-        q, v = self._numbers(q=q, v=v)
-        return (v * apply(self._M(self.linkage.at(q)), v)).sum(axis=-1) / 2
+        return self._answer("inverse_dynamics", errors, equation, q=q, v=v, a=a)
 
-    @in_arithmetic
-    def potential_energy(self, q: Array) -> Array:
-        (q,) = self._numbers(q=q)
-        at, g = self.linkage.at(q), self.linkage.gravity
-        V = 0
-        for inertia, (R, p) in zip(self.linkage.inertias, at.in_base, strict=True):
-            V = V - (inertia[0, 0] * p + R @ first_moment(inertia)) @ g
-        return V
+    def forward_dynamics(self, q: Array, v: Array, tau: Array, *, errors: str = "raise") -> Array:
+        def equation(q: Array, v: Array, tau: Array) -> Array:
+            at = self.linkage.at(q)
+            rest = tau - apply(self._C(at, v), v) - self._N(at)
+            return acceleration(self._M(at), rest, self.joint_names)
 
-    @in_arithmetic
-    def momentum(self, q: Array, v: Array) -> Array:
-        q, v = self._numbers(q=q, v=v)
-        return apply(self._M(self.linkage.at(q)), v)
+        return self._answer("forward_dynamics", errors, equation, q=q, v=v, tau=tau)
 
-    @in_arithmetic
-    def placement(self, q: Array, frame: str) -> Array:
-        (q,) = self._numbers(q=q)
-        return homogeneous(*self._placement(self.linkage.at(q), frame))
+    def kinetic_energy(self, q: Array, v: Array, *, errors: str = "raise") -> Array:
+        def equation(q: Array, v: Array) -> Array:
+            return (v * apply(self._M(self.linkage.at(q)), v)).sum(axis=-1) / 2
 
-    @in_arithmetic
-    def jacobian(self, q: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED) -> Array:
-        (q,) = self._numbers(q=q)
-        at = self.linkage.at(q)
-        return self.linkage.ties.columns(self._change(at, frame, expressed_in) @ self._body_jacobian(at, frame))
+        return self._answer("kinetic_energy", errors, equation, q=q, v=v)
 
-    @in_arithmetic
-    def jacobian_rate(self, q: Array, v: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED) -> Array:
-        q, v = self._numbers(q=q, v=v)
-        at, v = self.linkage.at(q), self.linkage.ties.velocity(v)
-        J, rate = self._body_jacobian(at, frame), self._body_jacobian(at, frame, v)
-        V = apply(J, v)
-        if expressed_in == Axes.WORLD_ALIGNED:  # d/dt diag(R, R) = diag(R, R) diag(ω̂, ω̂)
-            rate = rate + block_diagonal(hat(V[..., 3:])) @ J
-        elif expressed_in == Axes.WORLD:  # d/dt Ad_g = Ad_g ad_V
-            rate = rate + bracket(V) @ J
-        return self.linkage.ties.columns(self._change(at, frame, expressed_in) @ rate)
+    def potential_energy(self, q: Array, *, errors: str = "raise") -> Array:
+        return self._answer("potential_energy", errors, lambda q: self._V(self.linkage.at(q)), q=q)
+
+    def momentum(self, q: Array, v: Array, *, errors: str = "raise") -> Array:
+        return self._answer("momentum", errors, lambda q, v: apply(self._M(self.linkage.at(q)), v), q=q, v=v)
+
+    def placement(self, q: Array, frame: str, *, errors: str = "raise") -> Array:
+        entry(self.linkage.links, frame)
+        return self._answer(
+            "placement", errors, lambda q: homogeneous(*self._placement(self.linkage.at(q), frame)), q=q
+        )
+
+    def jacobian(self, q: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, errors: str = "raise") -> Array:
+        entry(self.linkage.links, frame)
+
+        def equation(q: Array) -> Array:
+            at = self.linkage.at(q)
+            return self.linkage.ties.columns(self._change(at, frame, expressed_in) @ self._body_jacobian(at, frame))
+
+        return self._answer("jacobian", errors, equation, q=q)
+
+    def jacobian_rate(
+        self, q: Array, v: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, errors: str = "raise"
+    ) -> Array:
+        entry(self.linkage.links, frame)
+
+        def equation(q: Array, v: Array) -> Array:
+            at, v = self.linkage.at(q), self.linkage.ties.velocity(v)
+            J, rate = self._body_jacobian(at, frame), self._body_jacobian(at, frame, v)
+            V = apply(J, v)
+            if expressed_in == Axes.WORLD_ALIGNED:  # d/dt diag(R, R) = diag(R, R) diag(ω̂, ω̂)
+                rate = rate + block_diagonal(hat(V[..., 3:])) @ J
+            elif expressed_in == Axes.WORLD:  # d/dt Ad_g = Ad_g ad_V
+                rate = rate + bracket(V) @ J
+            return self.linkage.ties.columns(self._change(at, frame, expressed_in) @ rate)
+
+        return self._answer("jacobian_rate", errors, equation, q=q, v=v)
 
     # --- the equations, at a configuration
 
@@ -185,6 +177,19 @@ class Lagrangian:
             weight = (self.linkage.gravity @ R) @ transpose(inertia[:, :3])  # 𝓜 (Rᵀ g, 0)
             N[..., body.path] = N[..., body.path] - apply(transpose(J), weight)
         return self.linkage.ties.torque(N)
+
+    def _V(self, at: Configuration) -> Array:
+        V, g = 0, self.linkage.gravity
+        for inertia, (R, p) in zip(self.linkage.inertias, at.in_base, strict=True):
+            V = V - (inertia[0, 0] * p + R @ first_moment(inertia)) @ g
+        return V
+
+    def _dM(self, at: Configuration) -> Array:
+        total = self._zeros(at, 3)
+        for body, inertia, J in at.bodies():
+            block = (..., *np.ix_(body.path, body.path, body.path))
+            total[block] = total[block] + inertia_derivative(J, inertia)
+        return self.linkage.ties.cube(total)
 
     # --- frames
 
@@ -218,10 +223,10 @@ class Lagrangian:
 
     # --- arguments
 
-    def _numbers(self, **arguments: Array) -> list[Array]:
-        arrays = {name: checked(name, x, self.joint_names, self.arithmetic) for name, x in arguments.items()}
-        check_batches(**arrays)
-        return list(arrays.values())
+    @in_arithmetic
+    def _answer(self, quantity: str, errors: str, equation: Callable[..., Array], **state: Array) -> Array:
+        arrays = {name: shaped(name, x, self.joint_names, self.arithmetic) for name, x in state.items()}
+        return answered(equation, arrays, shape_of(quantity, self.n), self.joint_names, errors, self.arithmetic)
 
     def _zeros(self, at: Configuration, axes: int) -> Array:
         return np.zeros((*at.batch, *(len(self.linkage.bodies),) * axes), dtype=self.arithmetic.dtype)

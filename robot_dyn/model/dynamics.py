@@ -9,7 +9,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 
 from robot_dyn.arithmetic import FLOAT64, Arithmetic, Array, NotPositiveDefiniteError, cholesky_solve
-from robot_dyn.errors import QueryError, SingularError, nearest
+from robot_dyn.errors import NotFiniteError, QueryError, SingularError, nearest
 
 T = TypeVar("T")
 
@@ -40,7 +40,9 @@ class Dynamics(Protocol):
 
     `q`, `v`, `a`, `tau` have shape (n,), or (..., n) in a batch, in [rad], [rad/s], [rad/s²], [N m] for a revolute
     joint and [m], [m/s], [m/s²], [N] for a prismatic one. Twists are (linear, angular). Every method raises
-    QueryError for a wrong shape, a value that is not finite or an unknown frame.
+    QueryError for a wrong shape, a value that is not finite or an unknown frame, and OverflowedError where the answer
+    would not be finite; in a batch the message and the error's `row` say at which state. With errors="nan" the states
+    of a batch that have no answer get NaN, and the others theirs.
     """
 
     @property
@@ -53,55 +55,57 @@ class Dynamics(Protocol):
         """Names of the n joints, in the order of q."""
         ...
 
-    def M(self, q: Array) -> Array:
+    def M(self, q: Array, *, errors: str = "raise") -> Array:
         """Mass matrix of K = ½ vᵀ M v, symmetric positive definite, shape (..., n, n)."""
         ...
 
-    def C(self, q: Array, v: Array) -> Array:
+    def C(self, q: Array, v: Array, *, errors: str = "raise") -> Array:
         """Coriolis matrix of the Christoffel symbols, so that Ṁ = C + Cᵀ, shape (..., n, n)."""
         ...
 
-    def N(self, q: Array) -> Array:
+    def N(self, q: Array, *, errors: str = "raise") -> Array:
         """Gravity torque ∂V/∂q, shape (..., n)."""
         ...
 
-    def coriolis_torque(self, q: Array, v: Array) -> Array:
+    def coriolis_torque(self, q: Array, v: Array, *, errors: str = "raise") -> Array:
         """Coriolis and centrifugal torque C(q, v) v, shape (..., n)."""
         ...
 
-    def coriolis_transpose(self, q: Array, v: Array) -> Array:
+    def coriolis_transpose(self, q: Array, v: Array, *, errors: str = "raise") -> Array:
         """Cᵀ(q, v) v = ∂K/∂q, for momentum observers: d(M v)/dt = τ + Cᵀ v − N; shape (..., n)."""
         ...
 
-    def inverse_dynamics(self, q: Array, v: Array, a: Array) -> Array:
+    def inverse_dynamics(self, q: Array, v: Array, a: Array, *, errors: str = "raise") -> Array:
         """Torque τ = M a + C v + N, shape (..., n)."""
         ...
 
-    def forward_dynamics(self, q: Array, v: Array, tau: Array) -> Array:
+    def forward_dynamics(self, q: Array, v: Array, tau: Array, *, errors: str = "raise") -> Array:
         """Acceleration a = M⁻¹ (τ − C v − N), shape (..., n); SingularError if M is singular."""
         ...
 
-    def kinetic_energy(self, q: Array, v: Array) -> Array:
+    def kinetic_energy(self, q: Array, v: Array, *, errors: str = "raise") -> Array:
         """K = ½ vᵀ M v in [J], shape (...)."""
         ...
 
-    def potential_energy(self, q: Array) -> Array:
+    def potential_energy(self, q: Array, *, errors: str = "raise") -> Array:
         """V = −Σ mᵢ gᵀ pᵢ of the bodies that move, in [J], shape (...)."""
         ...
 
-    def momentum(self, q: Array, v: Array) -> Array:
+    def momentum(self, q: Array, v: Array, *, errors: str = "raise") -> Array:
         """Generalised momentum p = ∂K/∂v = M v, shape (..., n)."""
         ...
 
-    def placement(self, q: Array, frame: str) -> Array:
+    def placement(self, q: Array, frame: str, *, errors: str = "raise") -> Array:
         """Homogeneous matrix [[R, p], [0, 1]] of a link's frame in the base, shape (..., 4, 4)."""
         ...
 
-    def jacobian(self, q: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED) -> Array:
+    def jacobian(self, q: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, errors: str = "raise") -> Array:
         """J with twist = J v of a link's frame, rows (linear, angular), shape (..., 6, n)."""
         ...
 
-    def jacobian_rate(self, q: Array, v: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED) -> Array:
+    def jacobian_rate(
+        self, q: Array, v: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, errors: str = "raise"
+    ) -> Array:
         """dJ/dt along v, of the same J, shape (..., 6, n)."""
         ...
 
@@ -112,6 +116,17 @@ def checked(name: str, values: Array, joint_names: tuple[str, ...], arithmetic: 
     Raises:
         QueryError: If they are not numbers, have another shape, or are not finite; names the joint.
     """
+    array = shaped(name, values, joint_names, arithmetic)
+    check_finite(name, array, joint_names, arithmetic)
+    return array
+
+
+def shaped(name: str, values: Array, joint_names: tuple[str, ...], arithmetic: Arithmetic = FLOAT64) -> Array:
+    """`values` as numbers of the arithmetic, finite or not, shape (..., n).
+
+    Raises:
+        QueryError: If they are not numbers, or have another shape.
+    """
     n = len(joint_names)
     try:
         array = arithmetic.asarray(values)
@@ -119,11 +134,31 @@ def checked(name: str, values: Array, joint_names: tuple[str, ...], arithmetic: 
         raise QueryError(f"{name} must be an array of {n} numbers, got {values!r}") from None
     if array.ndim == 0 or array.shape[-1] != n:
         raise QueryError(f"{name} must have shape ({n},) or (..., {n}), got {array.shape}")
+    return array
+
+
+def check_finite(name: str, array: Array, joint_names: tuple[str, ...], arithmetic: Arithmetic = FLOAT64) -> None:
+    """Raise NotFiniteError, which names the joint, unless every number of an argument (..., n) is finite."""
     finite = arithmetic.finite(array)
     if not finite.all():
         index = tuple(np.argwhere(~finite)[0])
-        raise QueryError(f"{name} must be finite, got {array[index]} for joint {joint_names[index[-1]]!r}")
-    return array
+        joint = "" if name == "t" else f" for joint {joint_names[index[-1]]!r}"
+        raise NotFiniteError(f"{name} must be finite, got {array[index]}{joint}")
+
+
+def shape_of(quantity: str, n: int) -> tuple[int, ...]:
+    """Shape of a quantity of the protocol for one state."""
+    if quantity in ("kinetic_energy", "potential_energy"):
+        return ()
+    special = {
+        "mass_matrix_derivative": (n, n, n),
+        "M": (n, n),
+        "C": (n, n),
+        "placement": (4, 4),
+        "jacobian": (6, n),
+        "jacobian_rate": (6, n),
+    }
+    return special.get(quantity, (n,))
 
 
 def acceleration(M: Array, tau: Array, joint_names: tuple[str, ...]) -> Array:

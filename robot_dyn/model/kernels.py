@@ -1,4 +1,4 @@
-"""Kernels: calls of Pinocchio for one state of all joints, and how they are asked in general.
+"""Kernels: calls of Pinocchio for one state of all joints, and how they are asked for a batch of tied ones.
 
 x = reduce(kernel(S q + s₀, S v, …))  for each state of a batch
 """
@@ -14,10 +14,9 @@ import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy import ndarray
 
-from robot_dyn.errors import OverflowedError
 from robot_dyn.model.coriolis import Bodies
 from robot_dyn.model.coriolis import jacobian_rate as rate_of
-from robot_dyn.model.dynamics import Array, Axes, check_batches, checked
+from robot_dyn.model.dynamics import Axes
 from robot_dyn.model.ties import Ties
 from robot_dyn.spatial import block_diagonal, hat
 
@@ -124,16 +123,10 @@ def _turned(data: Any, frame: int, J: ndarray) -> ndarray:
     return block_diagonal(data.oMf[frame].rotation) @ J
 
 
-def ask(
-    kernel: Kernel,
-    reduce: Callable[[Any], Any] | None,
-    model: Any,
-    data: Any,
-    ties: Ties,
-    joint_names: tuple[str, ...],
-    state: dict[str, Array],
-) -> Any:
-    """Check the arguments, untie the joints, go through the batch, tie again.
+def by_state(
+    kernel: Kernel, reduce: Callable[[Any], Any] | None, model: Any, data: Any, ties: Ties
+) -> Callable[..., ndarray]:
+    """The equation (q, …) → answers of a kernel, which goes through a batch state by state: untied, asked, tied again.
 
     Args:
         kernel: The call of Pinocchio for one state of all joints.
@@ -141,26 +134,14 @@ def ask(
         model: The model of all joints, or what else the kernel takes.
         data: Its scratch memory.
         ties: How all joints follow q.
-        joint_names: Names of the independent ones.
-        state: q, and v, a or tau, in the kernel's order.
-
-    Raises:
-        QueryError: If an argument is wrong.
-        OverflowedError: If the result is not finite.
     """
-    arrays = {name: checked(name, x, joint_names) for name, x in state.items()}
-    N = len(ties.s0)
-    batch = check_batches(**arrays)
-    with np.errstate(all="ignore"):  # what overflows is told below
-        full = [ties.position(x) if name == "q" else ties.velocity(x) for name, x in arrays.items()]
-        rows = [np.broadcast_to(x, (*batch, N)).reshape(-1, N) for x in full]
-        answers = [kernel(model, data, *row) for row in zip(*rows, strict=True)]
-        if not answers:  # an empty batch has a shape all the same
-            answers = np.empty((0, *np.shape(kernel(model, data, *np.zeros((len(rows), N))))))
-        answer = np.array(answers)
-        answer = answer.reshape(batch + answer.shape[1:])
-        if reduce is not None:
-            answer = reduce(answer)
-    if not np.isfinite(answer).all():
-        raise OverflowedError(f"{', '.join(state)} are so large that the result overflows")
-    return answer if answer.ndim else float(answer)
+
+    def equation(q: ndarray, *rates: ndarray) -> ndarray:
+        full = [ties.position(q), *(ties.velocity(x) for x in rates)]
+        batch = np.broadcast_shapes(*(x.shape[:-1] for x in full))
+        rows = [np.broadcast_to(x, (*batch, x.shape[-1])).reshape(-1, x.shape[-1]) for x in full]
+        answers = np.array([kernel(model, data, *row) for row in zip(*rows, strict=True)])
+        answers = answers.reshape(batch + answers.shape[1:])
+        return answers if reduce is None else reduce(answers)
+
+    return equation

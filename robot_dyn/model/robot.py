@@ -2,7 +2,7 @@
 
 A thin layer over CRBA, RNEA and ABA [Featherstone 2008, ch. 5–7], and C by `coriolis`. One state of float64 goes
 straight to Pinocchio, after checks that cost a fraction of a microsecond; lists, batches and tied joints take the
-general way, `ask`.
+general way, `answered`.
 """
 
 from __future__ import annotations
@@ -17,14 +17,15 @@ import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy import ndarray
 
-from robot_dyn.errors import DescriptionError, ModelWarning, OverflowedError, SingularError, announce
+from robot_dyn.errors import DescriptionError, ModelWarning, SingularError, announce
 from robot_dyn.model import doctor, kernels, pinocchio_model
+from robot_dyn.model.batch import answered
 from robot_dyn.model.coriolis import Bodies
 from robot_dyn.model.description import Description, check
-from robot_dyn.model.dynamics import Array, Axes, acceleration, check_batches, checked, entry
+from robot_dyn.model.dynamics import Array, Axes, acceleration, entry, shape_of, shaped
 from robot_dyn.model.edits import Changes, Edits
 from robot_dyn.model.gravity import gravity_acts, no_torque
-from robot_dyn.model.kernels import Kernel, Scratch, ask, frozen, is_moderate, is_state
+from robot_dyn.model.kernels import Kernel, Scratch, frozen, is_moderate, is_state
 from robot_dyn.model.structure import structure
 from robot_dyn.model.ties import Ties
 
@@ -192,69 +193,77 @@ class Robot:
         of_body = doctor.findings(structure(self.description, self.edits), self.joint_without_inertia)
         return (*self.description.findings, *of_body)
 
-    def M(self, q: Array) -> ndarray:
+    def M(self, q: Array, *, errors: str = "raise") -> ndarray:
         if is_state(q, self._shape) and is_moderate(q):
             return pin.crba(self.model, self._scratch.data, q)
-        return self._ask(pin.crba, self.ties.matrix, q=q)
+        return self._ask("M", errors, pin.crba, self.ties.matrix, q=q)
 
-    def C(self, q: Array, v: Array) -> ndarray:
+    def C(self, q: Array, v: Array, *, errors: str = "raise") -> ndarray:
         shape = self._shape
         if is_state(q, shape) and is_state(v, shape) and is_moderate(q) and is_moderate(v):
             return kernels.coriolis_matrix(self.bodies, self._scratch.data, q, v)
-        return self._ask(kernels.coriolis_matrix, self.ties.matrix, self.bodies, q=q, v=v)
+        return self._ask("C", errors, kernels.coriolis_matrix, self.ties.matrix, self.bodies, q=q, v=v)
 
-    def N(self, q: Array) -> ndarray:
+    def N(self, q: Array, *, errors: str = "raise") -> ndarray:
         if is_state(q, self._shape) and is_moderate(q):
             return pin.computeGeneralizedGravity(self.model, self._scratch.data, q)
-        return self._ask(pin.computeGeneralizedGravity, self.ties.torque, q=q)
+        return self._ask("N", errors, pin.computeGeneralizedGravity, self.ties.torque, q=q)
 
-    def coriolis_torque(self, q: Array, v: Array) -> ndarray:
+    def coriolis_torque(self, q: Array, v: Array, *, errors: str = "raise") -> ndarray:
         shape = self._shape
         if is_state(q, shape) and is_state(v, shape) and is_moderate(q) and is_moderate(v):
             return kernels.coriolis_torque(self._weightless, self._scratch.data, q, v)
-        return self._ask(kernels.coriolis_torque, self.ties.torque, self._weightless, q=q, v=v)
+        return self._ask(
+            "coriolis_torque", errors, kernels.coriolis_torque, self.ties.torque, self._weightless, q=q, v=v
+        )
 
-    def coriolis_transpose(self, q: Array, v: Array) -> ndarray:
+    def coriolis_transpose(self, q: Array, v: Array, *, errors: str = "raise") -> ndarray:
         shape = self._shape
         if is_state(q, shape) and is_state(v, shape) and is_moderate(q) and is_moderate(v):
             return kernels.coriolis_transpose(self.bodies, self._scratch.data, q, v)
-        return self._ask(kernels.coriolis_transpose, self.ties.torque, self.bodies, q=q, v=v)
+        return self._ask(
+            "coriolis_transpose", errors, kernels.coriolis_transpose, self.ties.torque, self.bodies, q=q, v=v
+        )
 
-    def inverse_dynamics(self, q: Array, v: Array, a: Array) -> ndarray:
+    def inverse_dynamics(self, q: Array, v: Array, a: Array, *, errors: str = "raise") -> ndarray:
         shape = self._shape
         if is_state(q, shape) and is_state(v, shape) and is_state(a, shape):
             tau = pin.rnea(self.model, self._scratch.data, q, v, a)
             if is_moderate(tau):  # NaN and inf, in any argument, show in tau
                 return tau
-        return self._ask(pin.rnea, self.ties.torque, q=q, v=v, a=a)
+        return self._ask("inverse_dynamics", errors, pin.rnea, self.ties.torque, q=q, v=v, a=a)
 
-    def forward_dynamics(self, q: Array, v: Array, tau: Array) -> ndarray:
+    def forward_dynamics(self, q: Array, v: Array, tau: Array, *, errors: str = "raise") -> ndarray:
         shape = self._shape if self.joint_without_inertia is None else None
         if is_state(q, shape) and is_state(v, shape) and is_state(tau, shape):
             a = pin.aba(self.model, self._scratch.data, q, v, tau)
             if is_moderate(a, _DOUBTFUL):
                 return a
-        return self._forward_dynamics(q, v, tau)
+        return self._forward_dynamics(errors, q, v, tau)
 
-    def kinetic_energy(self, q: Array, v: Array) -> Any:
-        return self._ask(kernels.kinetic_energy, None, q=q, v=v)
+    def kinetic_energy(self, q: Array, v: Array, *, errors: str = "raise") -> Any:
+        return self._ask("kinetic_energy", errors, kernels.kinetic_energy, None, q=q, v=v)
 
-    def potential_energy(self, q: Array) -> Any:
-        return self._ask(pin.computePotentialEnergy, None, q=q)
+    def potential_energy(self, q: Array, *, errors: str = "raise") -> Any:
+        return self._ask("potential_energy", errors, pin.computePotentialEnergy, None, q=q)
 
-    def momentum(self, q: Array, v: Array) -> ndarray:
-        return self._ask(kernels.momentum, self.ties.torque, q=q, v=v)
+    def momentum(self, q: Array, v: Array, *, errors: str = "raise") -> ndarray:
+        return self._ask("momentum", errors, kernels.momentum, self.ties.torque, q=q, v=v)
 
-    def placement(self, q: Array, frame: str) -> ndarray:
-        return self._ask(kernels.placement(entry(self._frames, frame)), None, q=q)
+    def placement(self, q: Array, frame: str, *, errors: str = "raise") -> ndarray:
+        return self._ask("placement", errors, kernels.placement(entry(self._frames, frame)), None, q=q)
 
-    def jacobian(self, q: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED) -> ndarray:
+    def jacobian(
+        self, q: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, errors: str = "raise"
+    ) -> ndarray:
         kernel = kernels.jacobian(entry(self._frames, frame), Axes.of(expressed_in))
-        return self._ask(kernel, self.ties.columns, q=q)
+        return self._ask("jacobian", errors, kernel, self.ties.columns, q=q)
 
-    def jacobian_rate(self, q: Array, v: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED) -> ndarray:
+    def jacobian_rate(
+        self, q: Array, v: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, errors: str = "raise"
+    ) -> ndarray:
         kernel = kernels.jacobian_rate(entry(self._frames, frame), Axes.of(expressed_in))
-        return self._ask(kernel, self.ties.columns, q=q, v=v)
+        return self._ask("jacobian_rate", errors, kernel, self.ties.columns, q=q, v=v)
 
     @cached_property
     def _built(self) -> tuple[Any, Ties, tuple[str, ...]]:
@@ -286,28 +295,40 @@ class Robot:
             return error.joint
         return None
 
-    def _ask(self, kernel: Kernel, reduce: Callable[[Any], Any] | None, of: Any = None, **state: Array) -> Any:
-        return ask(kernel, reduce, of or self.model, self._scratch.data, self.ties, self.joint_names, state)
+    def _ask(
+        self,
+        quantity: str,
+        errors: str,
+        kernel: Kernel,
+        reduce: Callable[[Any], Any] | None,
+        of: Any = None,
+        **state: Array,
+    ) -> Any:
+        return self._answered(quantity, errors, self._equation(kernel, reduce, of), state)
 
-    def _forward_dynamics(self, q: Array, v: Array, tau: Array) -> ndarray:
+    def _equation(self, kernel: Kernel, reduce: Callable[[Any], Any] | None, of: Any = None) -> Callable[..., ndarray]:
+        return kernels.by_state(kernel, reduce, self.model if of is None else of, self._scratch.data, self.ties)
+
+    def _answered(self, quantity: str, errors: str, equation: Callable[..., ndarray], state: dict[str, Array]) -> Any:
+        arrays = {name: shaped(name, x, self.joint_names) for name, x in state.items()}
+        answer = answered(equation, arrays, shape_of(quantity, self.n), self.joint_names, errors)
+        return answer if answer.ndim else float(answer)
+
+    def _forward_dynamics(self, errors: str, q: Array, v: Array, tau: Array) -> ndarray:
         """Forward dynamics in general: tied joints by the factorisation of M, which also tells where M is singular."""
         if self.joint_without_inertia is not None:
             raise SingularError(self.joint_without_inertia, "at any q; give its link a mass, or lock it")
-        state = {name: checked(name, x, self.joint_names) for name, x in (("q", q), ("v", v), ("tau", tau))}
-        check_batches(**state)
-        try:
-            if self.ties.trivial:
-                a = self._ask(pin.aba, None, **state)
-            else:
-                rest = state["tau"] - self.inverse_dynamics(state["q"], state["v"], np.zeros(self.n))
-                a = acceleration(self.M(state["q"]), rest, self.joint_names)
-        except OverflowedError:
-            a = None
-        if a is None or np.any(np.abs(a) > _DOUBTFUL):
-            acceleration(self.M(state["q"]), state["tau"], self.joint_names)  # tells if M is singular at this q
-        if a is None:
-            raise OverflowedError("q, v, tau are so large that the result overflows")
-        return a
+        M = self._equation(pin.crba, self.ties.matrix)
+        bias = self._equation(pin.nonLinearEffects, self.ties.torque)
+        solved = self._equation(pin.aba, None)
+
+        def equation(q: ndarray, v: ndarray, tau: ndarray) -> ndarray:
+            a = solved(q, v, tau) if self.ties.trivial else acceleration(M(q), tau - bias(q, v), self.joint_names)
+            if not np.all(np.abs(a) <= _DOUBTFUL) and np.isfinite(here := M(q)).all():
+                acceleration(here, tau, self.joint_names)  # tells if M is singular at this q
+            return a
+
+        return self._answered("forward_dynamics", errors, equation, {"q": q, "v": v, "tau": tau})
 
     def _per_joint(self, full: ndarray) -> ndarray:
         return pinocchio_model.per_joint(self.model, self.joint_names, full)

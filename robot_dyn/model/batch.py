@@ -1,0 +1,94 @@
+"""Batches: a query answers every state, or names the first that has no answer; errors="nan" answers the others.
+
+A batch is asked for as a whole. Only if it is refused is it halved until the states without an answer stand alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from robot_dyn.arithmetic import FLOAT64, Arithmetic, Array
+from robot_dyn.errors import NotFiniteError, OverflowedError, QueryError, RobotDynError, SingularError
+from robot_dyn.model.dynamics import check_batches, check_finite
+
+_REFUSALS = (NotFiniteError, OverflowedError, SingularError)  # of a state; all else is wrong with the query
+
+
+class DoubtError(RobotDynError):
+    """Internal: some state of a batch needs to be asked by itself."""
+
+
+def answered(
+    equation: Callable[..., Array],
+    arrays: Mapping[str, Array],
+    shape: tuple[int, ...],
+    joint_names: tuple[str, ...],
+    errors: str = "raise",
+    arithmetic: Arithmetic = FLOAT64,
+) -> Array:
+    """The answers to a batch of states, (..., *shape).
+
+    Args:
+        equation: (x₁, x₂, …) → answers, for one state (n,) or a batch; may raise SingularError or OverflowedError.
+        arrays: Its arguments by name, each (..., n), or (..., 1) for the time t.
+        shape: Of the answer for one state.
+        joint_names: For messages.
+        errors: "raise", or "nan" to answer NaN where a state has no answer.
+        arithmetic: Of arguments and answers.
+
+    Raises:
+        QueryError: If the batch axes do not match, or `errors` is neither; NotFiniteError if an argument is not finite.
+        OverflowedError: If the answer of a state is not finite.
+        SingularError: Where forward dynamics has no answer. In a batch each names the row.
+    """
+    if errors not in ("raise", "nan"):
+        raise QueryError(f"errors must be 'raise' or 'nan', got {errors!r}")
+    batch = check_batches(**arrays)
+
+    def attempt(*given: Array) -> Array:
+        for name, x in zip(arrays, given, strict=True):
+            check_finite(name, x, joint_names, arithmetic)
+        answer = equation(*given)
+        if not arithmetic.finite(answer).all():
+            raise OverflowedError(f"{', '.join(arrays)} are so large that the result overflows")
+        return answer
+
+    if 0 in batch:
+        return np.zeros((*batch, *shape), dtype=arithmetic.dtype)
+    with np.errstate(all="ignore"):  # what overflows is told in words
+        try:
+            return attempt(*arrays.values())
+        except (*_REFUSALS, DoubtError):
+            if not batch and errors == "raise":
+                raise
+        rows = [np.broadcast_to(x, (*batch, x.shape[-1])).reshape(-1, x.shape[-1]) for x in arrays.values()]
+        result = np.full((len(rows[0]), *shape), arithmetic.number("nan"), dtype=arithmetic.dtype)
+        _halved(attempt, rows, result, 0, len(result), batch, errors)
+    return result.reshape(*batch, *shape)
+
+
+def _halved(
+    attempt: Callable[..., Array],
+    rows: list[Array],
+    result: Array,
+    start: int,
+    stop: int,
+    batch: tuple[int, ...],
+    errors: str,
+) -> None:
+    """Answer the states start … stop − 1; with errors="nan" those without an answer stay as they are."""
+    alone = stop - start == 1
+    try:
+        result[start:stop] = attempt(*(x[start] if alone else x[start:stop] for x in rows))
+    except (*_REFUSALS, DoubtError) as error:
+        if not alone:
+            middle = (start + stop) // 2
+            _halved(attempt, rows, result, start, middle, batch, errors)
+            _halved(attempt, rows, result, middle, stop, batch, errors)
+        elif errors == "raise":
+            error.row = tuple(int(i) for i in np.unravel_index(start, batch))
+            where = error.row[0] if len(batch) == 1 else error.row
+            error.args = (f"{error} in row {where} of the batch",)
+            raise
