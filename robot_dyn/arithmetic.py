@@ -191,11 +191,23 @@ def symmetric(A: Array) -> Array:
 
 
 class NotPositiveDefiniteError(Exception):
-    """Internal: a pivot of a factorisation is not positive; the caller names the joint of `row`."""
+    """Internal: a pivot of a factorisation is not positive; the caller names the joint of `row`.
 
-    def __init__(self, row: int) -> None:
+    `decided` says whether that is certain, or its sign is lost in rounding.
+    """
+
+    def __init__(self, row: int, decided: bool) -> None:
         super().__init__(f"pivot {row} is not positive")
-        self.row = row
+        self.row, self.decided = row, decided
+
+
+def rounding(x: Array) -> str:
+    """What numbers of an array are rounded to, in words."""
+    if x.dtype.kind == "f":
+        return x.dtype.name
+    from flint import ctx
+
+    return f"balls of {ctx.prec} bits"
 
 
 def _lapack_solve(M: Array, b: Array) -> Array | None:
@@ -234,8 +246,10 @@ def cholesky_solve(M: Array, b: Array) -> Array:
     for j in range(n):
         LD = L[..., j, :j] * np.diagonal(L, axis1=-2, axis2=-1)[..., :j]
         L[..., j, j] = L[..., j, j] - (L[..., j, :j] * LD).sum(axis=-1)
-        if not np.all((L[..., j, j] > least * M[..., j, j]) & (M[..., j, j] > 0)):
-            raise NotPositiveDefiniteError(j)
+        pivot, whole = L[..., j, j], M[..., j, j]
+        if not np.all((pivot > least * whole) & (whole > 0)):
+            # of floats the rounding of M itself may turn a pivot's sign; only a diagonal without inertia is certain
+            raise NotPositiveDefiniteError(j, decided=bool(np.any(whole <= 0) or (not least and np.any(pivot <= 0))))
         below = L[..., j + 1 :, j] - (L[..., j + 1 :, :j] * LD[..., None, :]).sum(axis=-1)
         L[..., j + 1 :, j] = below / L[..., j, j, None]
         x[..., j] = x[..., j] - (L[..., j, :j] * x[..., :j]).sum(axis=-1)

@@ -73,6 +73,18 @@ class SingularError(RobotDynError):
         self.joint = joint
 
 
+class UndecidedError(SingularError):
+    """Forward dynamics that is not decided: whether M is singular is lost in the rounding of an arithmetic."""
+
+    def __init__(self, joint: str, where: str, arithmetic: str) -> None:
+        RobotDynError.__init__(
+            self,
+            f"forward dynamics not decided: whether joint {joint!r} carries inertia {where} is lost in the rounding of"
+            f" {arithmetic}; ask rd.Lagrangian(robot, rd.Ball(bits)) with enough bits",
+        )
+        self.joint = joint
+
+
 class RobotDynWarning(UserWarning):
     """Base of the warnings of this library; messages as of the errors."""
 

@@ -134,9 +134,8 @@ class Engine:
                     raise DoubtError
             elif timed and not alone:
                 raise DoubtError  # effects may take one time only
-            if timed:
-                given = (float(given[0][0]), *given[1:])
-            return np.broadcast_to(np.asarray(otherwise(*given), self.dtype), (*batch, *shape))
+            state = (float(given[0][0]), *given[1:]) if timed else given
+            return np.broadcast_to(np.asarray(otherwise(*state), self.dtype), (*batch, *shape))
 
         answer = answered(equation, arrays, shape, self.joint_names, errors, Float(np.dtype(self.dtype)))
         return into(out, answer[..., 0] if quantity.endswith("energy") else answer)

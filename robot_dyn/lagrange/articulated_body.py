@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array, apply, symmetric, transpose
-from robot_dyn.errors import QueryError, SingularError
+from robot_dyn.arithmetic import Array, apply, rounding, symmetric, transpose
+from robot_dyn.errors import QueryError, SingularError, UndecidedError
 from robot_dyn.lagrange.linkage import BASE, Linkage, Step
 from robot_dyn.spatial import bracket
 
@@ -27,7 +27,7 @@ def articulated_body(linkage: Linkage, q: Array, v: Array, tau: Array) -> Array:
 
     Raises:
         QueryError: If joints are tied.
-        SingularError: If a joint carries no inertia.
+        SingularError: If a joint carries no inertia; UndecidedError if rounding hides whether it does.
     """
     if linkage.ties.S.shape[0] != linkage.ties.S.shape[1]:
         raise QueryError("the articulated-body algorithm takes no tied joints; use Lagrangian.forward_dynamics")
@@ -42,7 +42,9 @@ def articulated_body(linkage: Linkage, q: Array, v: Array, tau: Array) -> Array:
         U[i] = apply(inertia[i], np.broadcast_to(body.screw, (*batch, 6)))
         d[i] = U[i][..., None, :] @ body.screw + linkage.armature[i]
         if not np.all(d[i] > 0):
-            raise SingularError(body.joint, "at this q")
+            if np.any(d[i] < 0) or np.all(U[i] == 0):
+                raise SingularError(body.joint, "at this q")
+            raise UndecidedError(body.joint, "at this q", rounding(d[i]))
         u[i] = tau[..., i, None] - force[i][..., None, :] @ body.screw
         if body.parent != BASE:
             left = symmetric(inertia[i] - U[i][..., :, None] * (U[i] / d[i])[..., None, :])

@@ -8,8 +8,8 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
-from robot_dyn.arithmetic import FLOAT64, Arithmetic, Array, NotPositiveDefiniteError, cholesky_solve
-from robot_dyn.errors import NotFiniteError, QueryError, SingularError, nearest
+from robot_dyn.arithmetic import FLOAT64, Arithmetic, Array, NotPositiveDefiniteError, cholesky_solve, rounding
+from robot_dyn.errors import NotFiniteError, OverflowedError, QueryError, SingularError, UndecidedError, nearest
 
 T = TypeVar("T")
 
@@ -165,14 +165,19 @@ def acceleration(M: Array, tau: Array, joint_names: tuple[str, ...]) -> Array:
     """Solve M a = τ for M (..., n, n) and what is left of the torque, τ (..., n).
 
     Raises:
-        SingularError: If M is not positive definite; names the joint.
+        SingularError: If M is not positive definite; names the joint. UndecidedError if rounding hides whether it is.
     """
     n = len(joint_names)
     batch = np.broadcast_shapes(M.shape[:-2], tau.shape[:-1])
     try:
         return cholesky_solve(np.broadcast_to(M, (*batch, n, n)), np.broadcast_to(tau, (*batch, n)))
     except NotPositiveDefiniteError as error:
-        raise SingularError(joint_names[error.row], "at this q") from None
+        if M.dtype.kind == "f" and not np.isfinite(M).all():
+            raise OverflowedError("q is so large that M overflows") from None
+        joint = joint_names[error.row]
+        if error.decided:
+            raise SingularError(joint, "at this q") from None
+        raise UndecidedError(joint, "at this q", rounding(M)) from None
 
 
 def entry(table: Mapping[str, T], frame: str) -> T:

@@ -11,6 +11,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.errors import EditError, nearest
+from robot_dyn.model.urdf import LARGEST
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.80665)  # [m/s²], CGPM 1901
 
@@ -140,4 +141,6 @@ def _numbers(what: str, values: Any, shape: tuple[int, ...]) -> np.ndarray:
         raise EditError(f"{what} must be numbers of shape {shape}, got {values!r}") from None
     if array.shape != shape or not np.isfinite(array).all():
         raise EditError(f"{what} must be finite numbers of shape {shape}, got {values!r}")
+    if (np.abs(array) > LARGEST).any():
+        raise EditError(f"{what} is beyond ±{LARGEST:g} in SI units, got {values!r}; correct it")
     return array

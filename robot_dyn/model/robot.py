@@ -10,14 +10,14 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, Unpack, final
 
 import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy import ndarray
 
-from robot_dyn.errors import DescriptionError, ModelWarning, SingularError, announce
+from robot_dyn.errors import DescriptionError, ModelWarning, SingularError, UndecidedError, announce
 from robot_dyn.model import doctor, kernels, pinocchio_model
 from robot_dyn.model.batch import answered
 from robot_dyn.model.coriolis import Bodies
@@ -234,7 +234,7 @@ class Robot:
         return self._ask("inverse_dynamics", errors, pin.rnea, self.ties.torque, q=q, v=v, a=a)
 
     def forward_dynamics(self, q: Array, v: Array, tau: Array, *, errors: str = "raise") -> ndarray:
-        shape = self._shape if self.joint_without_inertia is None else None
+        shape = self._shape if self._singular is None else None
         if is_state(q, shape) and is_state(v, shape) and is_state(tau, shape):
             a = pin.aba(self.model, self._scratch.data, q, v, tau)
             if is_moderate(a, _DOUBTFUL):
@@ -285,14 +285,21 @@ class Robot:
         """Shape of a state that goes straight to Pinocchio; None if joints are tied."""
         return (self.n,) if self.ties.trivial else None
 
-    @cached_property
+    @property
     def joint_without_inertia(self) -> str | None:
         """The joint at which M is singular at every configuration, or None: then forward dynamics has no answer."""
+        return None if self._singular is None else self._singular().joint
+
+    @cached_property
+    def _singular(self) -> Callable[[], SingularError] | None:
+        """Makes the error of a robot without forward dynamics."""
         q = np.linspace(0.3, 0.9, self.n)  # a configuration without symmetries
         try:
             acceleration(self.M(q), q, self.joint_names)
+        except UndecidedError as error:
+            return partial(UndecidedError, error.joint, "at any q", "float64")
         except SingularError as error:
-            return error.joint
+            return partial(SingularError, error.joint, "at any q; give its link a mass, or lock it")
         return None
 
     def _ask(
@@ -316,8 +323,8 @@ class Robot:
 
     def _forward_dynamics(self, errors: str, q: Array, v: Array, tau: Array) -> ndarray:
         """Forward dynamics in general: tied joints by the factorisation of M, which also tells where M is singular."""
-        if self.joint_without_inertia is not None:
-            raise SingularError(self.joint_without_inertia, "at any q; give its link a mass, or lock it")
+        if self._singular is not None:
+            raise self._singular()
         M = self._equation(pin.crba, self.ties.matrix)
         bias = self._equation(pin.nonLinearEffects, self.ties.torque)
         solved = self._equation(pin.aba, None)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import pairwise
 from math import ceil, inf
@@ -12,7 +13,7 @@ import numpy as np
 from robot_dyn.arithmetic import Array
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.plant import Plant
-from robot_dyn.errors import QueryError
+from robot_dyn.errors import OverflowedError, QueryError
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.integrate.explicit import RK4
 from robot_dyn.integrate.integrator import Integrator
@@ -100,6 +101,8 @@ class Setup:
         check_segments(self)
         self.plant.torque(0.0, self.q0, self.v0)  # so that an effect that does not fit is told now
         self.plant.actuation(np.zeros(len(names)))
+        with suppress(OverflowedError):  # a start so far out is the outcome of a run
+            self.plant.forward_dynamics(0.0, self.q0, self.v0, np.zeros(len(names)))  # a singular M is told at once
 
     def _check_model(self) -> None:
         """That the controller means the joints and links of the plant; a file with other names all over may fit too."""
