@@ -76,7 +76,7 @@ def test_M_that_is_singular_where_the_arm_is_straight(tmp_path: Path, l1: float,
     v, tau = np.array([0.3, -0.4]), np.array([0.6, 0.7])
     q = np.array([0.2, 0.9])
     assert_allclose(robot.inverse_dynamics(q, v, robot.forward_dynamics(q, v, tau)), tau, rtol=1e-10)
-    with pytest.raises(SingularError, match=r"no forward dynamics: joint '(shoulder|elbow)'"):
+    with pytest.raises(SingularError, match=r"forward dynamics.* joint '(shoulder|elbow)' carries"):
         robot.forward_dynamics(np.array([0.2, 0.0]), v, tau)
 
 
