@@ -11,7 +11,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.accuracy.compare import random_state
-from robot_dyn.lagrange.magnitude import magnitudes
+from robot_dyn.lagrange.magnitude import floored, magnitudes, scaled
 from robot_dyn.model.description import check
 from tests.queries import ARGUMENTS, FRAMED, general
 
@@ -106,3 +106,52 @@ def test_kernels_of_a_chain_from_a_kilometre_to_a_micrometre_pass_their_check() 
     tau = robot.inverse_dynamics(q, v, a)
     back = robot.inverse_dynamics(q, v, fast.forward_dynamics(q, v, tau))
     assert np.all(np.abs(back - tau) <= 1e-13 * size.inverse_dynamics(v, a))
+
+
+def light(moment: str) -> rd.Robot:
+    """planar_2r with a last link of that moment about its axis and next to no mass."""
+    joint = '<joint name="j{}" type="continuous"><origin xyz="{} 0 0"/><axis xyz="0 0 1"/>'
+    inertia = '<inertial><mass value="{}"/><inertia ixx="{m}" iyy="{m}" izz="{m}" ixy="0" ixz="0" iyz="0"/></inertial>'
+    text = (
+        f'<link name="a"/><link name="b">{inertia.format(2, m="0.1")}</link>'
+        f'<link name="c">{inertia.format("1e-6", m=moment)}</link>'
+        f'{joint.format(1, 0)}<parent link="a"/><child link="b"/></joint>'
+        f'{joint.format(2, 1)}<parent link="b"/><child link="c"/></joint>'
+    )
+    return rd.Robot(check(f'<robot name="light">{text}</robot>'.encode(), "light"))
+
+
+@pytest.mark.parametrize("moment", ["1e-10", "1e-13"])
+def test_a_kernel_of_a_very_light_tip_is_checked_where_it_answers(moment: str) -> None:
+    """Torques of 1 N m would turn such a tip at more than 1e10 rad/s², which a kernel declines and does not write."""
+    robot = light(moment)
+    fast = rd.Compiled(robot, cache=False)
+    q, v, a = np.random.default_rng(6).normal(size=(3, 20, 2))
+    tau = robot.inverse_dynamics(q, v, a)
+    for rows in (slice(0, 1), slice(0, 20)):
+        answer = fast.forward_dynamics(q[rows], v[rows], tau[rows])
+        np.testing.assert_allclose(answer, robot.forward_dynamics(q[rows], v[rows], tau[rows]), rtol=1e-9, atol=1e-6)
+
+
+def test_an_entry_without_terms_is_held_to_its_neighbours() -> None:
+    """1e-22 beside a scale of 1e-4 is rounding of the neighbour; beside nothing at all there is no such excuse."""
+    scale = np.array([[1e-4, 0.0], [0.0, 0.0]])
+    error = np.array([[0.0, 1e-22], [0.0, 1e-22]])
+    assert np.all(scaled(error, floored(scale)) <= 1e-17)
+    assert scaled(error, floored(np.zeros((2, 2))))[0, 1] == np.inf
+    np.testing.assert_array_equal(floored(np.array([3.0, 0.0, 2.0])), [3.0, 3.0, 2.0])
+
+
+@pytest.mark.filterwarnings("ignore::robot_dyn.errors.ModelWarning")
+def test_compare_says_what_it_cannot_compare() -> None:
+    """Products of inertia of 1e6 make M indefinite at most states; all but forward dynamics is compared."""
+    text = (
+        '<link name="a"/><link name="b"/><link name="c"><inertial><mass value="2.5"/>'
+        '<inertia ixx="0.0003" ixy="1e6" ixz="0" iyy="0.03" iyz="0" izz="0.03"/></inertial></link>'
+        '<joint name="j1" type="continuous"><axis xyz="0 1 0"/><parent link="a"/><child link="b"/></joint>'
+        '<joint name="j2" type="continuous"><axis xyz="0 0 1"/><parent link="b"/><child link="c"/></joint>'
+    )
+    robot = rd.Robot(check(f'<robot name="indefinite">{text}</robot>'.encode(), "indefinite"))
+    result = rd.compare(robot, samples=6)
+    assert result.notes[0] == "forward dynamics not compared at 4 of 6 states: M is not positive definite there"
+    assert result.ok
