@@ -106,7 +106,7 @@ def test_stated_friction_acts_with_effects_urdf():
     robot = rd.load("cart_pole")
     state = ("--q", "-0.2,0.7", "--v", "0.3,-0.4", "--a", "0.5,0.6")
     plain, rubbed = document("query", "cart_pole", *state), document("query", "cart_pole", *state, "--effects", "urdf")
-    assert plain["effects"] == {} and set(rubbed["effects"]) == {"ViscousFriction", "RegularisedCoulombFriction"}
+    assert plain["effects"] == {} and set(rubbed["effects"]) == {"viscous_friction", "regularised_coulomb_friction"}
     torque = sum(np.array(each) for each in rubbed["effects"].values())
     v = np.array([0.3, -0.4])
     expected = -robot.damping * v - robot.friction * np.tanh(v / 0.01)

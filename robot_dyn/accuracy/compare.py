@@ -154,9 +154,8 @@ def compare(
 
 
 def random_state(robot: Robot, rng: np.random.Generator) -> dict[str, np.ndarray]:
-    """A general state: q within its limits, or a turn or a metre where there are none; v, a and tau without zeros."""
-    lower, upper = np.clip(robot.lower, -np.pi, np.pi), np.clip(robot.upper, -np.pi, np.pi)
-    q = rng.uniform(lower, np.maximum(upper, lower))
+    """A general state: q of `random_configuration`; v, a and tau without zeros."""
+    q = robot.random_configuration(rng)
     v, a, tau = rng.normal(size=(3, robot.n))
     return {"q": q, "v": v, "a": a, "tau": tau * (1 + np.abs(robot.N(q)))}
 

@@ -26,12 +26,11 @@ _WORDS = {"joint", "kind", "from", "quantity", "robot", "where"}  # columns of w
 
 def info(robot: Robot) -> Document:
     """A robot's joints, ties, mass and findings."""
-    kinds = {joint.get("name"): joint.get("type") for joint in robot.description.element.iterfind("joint")}
     columns = ("lower", "upper", "effort_limit", "velocity_limit", "damping", "friction", "armature")
     values = np.column_stack([getattr(robot, column) for column in columns])
     joints = [
-        {"name": name, "kind": kinds[name]} | {key: _finite(x) for key, x in zip(columns, row, strict=True)}
-        for name, row in zip(robot.joint_names, values, strict=True)
+        {"name": name, "kind": kind} | {key: _finite(x) for key, x in zip(columns, row, strict=True)}
+        for name, kind, row in zip(robot.joint_names, robot.joint_types, values, strict=True)
     ]
     return {
         "robot": robot.name,
@@ -55,7 +54,7 @@ def query(robot: Robot, effects: str, q: np.ndarray, v: np.ndarray, a: np.ndarra
         tau = plant.inverse_dynamics(0.0, q, v, a)
     else:
         a = plant.forward_dynamics(0.0, q, v, tau)
-    acting = {type(e).__name__: e.torque(robot, 0.0, q, v).tolist() for e in plant.forces}
+    acting = {effect.name: effect.torque(robot, 0.0, q, v).tolist() for effect in plant.forces}
     terms = {"M": plant.M(q), "C": plant.C(q, v), "N": plant.N(0.0, q, v)}
     state = {"q": q, "v": v, "a": a, "tau": tau}
     return {

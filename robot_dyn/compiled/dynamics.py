@@ -20,7 +20,7 @@ from robot_dyn.compiled.right_angles import completed
 from robot_dyn.compiled.threads import thread_count
 from robot_dyn.compiled.trace import ARGUMENTS, Trace
 from robot_dyn.errors import QueryError
-from robot_dyn.model.dynamics import Axes
+from robot_dyn.model.dynamics import Axes, Dynamics
 from robot_dyn.model.robot import Robot
 
 _DERIVATIVES = "forward_dynamics_derivatives"
@@ -28,7 +28,7 @@ _DERIVATIVES = "forward_dynamics_derivatives"
 
 @final
 @dataclass(frozen=True)
-class CompiledDynamics:
+class CompiledDynamics(Dynamics):
     """A robot as machine code; each quantity is compiled, and checked against Pinocchio, when first asked for.
 
     With out= the answer goes into that array, which is left as it was if the query is refused.

@@ -19,9 +19,13 @@ from robot_dyn.compiled.interrupts import interrupts_later
 class Store(Protocol):
     """Where payloads are kept by key; see `robot_dyn.compiled.cache`."""
 
-    def load(self, key: str) -> bytes | None: ...
+    def load(self, key: str) -> bytes | None:
+        """The payload of a key; None if there is no such key."""
+        ...
 
-    def save(self, key: str, payload: bytes, about: str = "") -> None: ...
+    def save(self, key: str, payload: bytes, about: str = "") -> None:
+        """Keep a payload, with a text about it."""
+        ...
 
 
 def compiled(

@@ -27,14 +27,14 @@ from robot_dyn.errors import QueryError
 from robot_dyn.lagrange.linkage import BASE, Configuration, Linkage, linkage
 from robot_dyn.model.batch import answered
 from robot_dyn.model.description import Description
-from robot_dyn.model.dynamics import Axes, acceleration, entry, shape_of, shaped
+from robot_dyn.model.dynamics import Axes, Dynamics, acceleration, entry, shape_of, shaped
 from robot_dyn.model.tree import Described, tree
 from robot_dyn.spatial import adjoint, adjoint_inverse, block_diagonal, bracket, first_moment, hat, homogeneous
 
 
 @final
 @dataclass(frozen=True)
-class Lagrangian:
+class Lagrangian(Dynamics):
     """The own road to a robot's dynamics; shares neither parser nor algorithm with Pinocchio.
 
     Attributes:
@@ -124,34 +124,34 @@ class Lagrangian:
         return self._answer("momentum", errors, lambda q, v: apply(self._M(self.linkage.at(q)), v), q=q, v=v)
 
     def placement(self, q: Array, frame: str, *, errors: str = "raise") -> Array:
-        entry(self.linkage.links, frame)
+        frame = self._link(frame)
         return self._answer(
             "placement", errors, lambda q: homogeneous(*self._placement(self.linkage.at(q), frame)), q=q
         )
 
     def jacobian(self, q: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, errors: str = "raise") -> Array:
-        entry(self.linkage.links, frame)
+        frame, axes = self._link(frame), Axes.of(expressed_in)
 
         def equation(q: Array) -> Array:
             at = self.linkage.at(q)
-            return self.linkage.ties.columns(self._change(at, frame, expressed_in) @ self._body_jacobian(at, frame))
+            return self.linkage.ties.columns(self._change(at, frame, axes) @ self._body_jacobian(at, frame))
 
         return self._answer("jacobian", errors, equation, q=q)
 
     def jacobian_rate(
         self, q: Array, v: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, errors: str = "raise"
     ) -> Array:
-        entry(self.linkage.links, frame)
+        frame, axes = self._link(frame), Axes.of(expressed_in)
 
         def equation(q: Array, v: Array) -> Array:
             at, v = self.linkage.at(q), self.linkage.ties.velocity(v)
             J, rate = self._body_jacobian(at, frame), self._body_jacobian(at, frame, v)
             V = apply(J, v)
-            if expressed_in == Axes.WORLD_ALIGNED:  # d/dt diag(R, R) = diag(R, R) diag(ω̂, ω̂)
+            if axes is Axes.WORLD_ALIGNED:  # d/dt diag(R, R) = diag(R, R) diag(ω̂, ω̂)
                 rate = rate + block_diagonal(hat(V[..., 3:])) @ J
-            elif expressed_in == Axes.WORLD:  # d/dt Ad_g = Ad_g ad_V
+            elif axes is Axes.WORLD:  # d/dt Ad_g = Ad_g ad_V
                 rate = rate + bracket(V) @ J
-            return self.linkage.ties.columns(self._change(at, frame, expressed_in) @ rate)
+            return self.linkage.ties.columns(self._change(at, frame, axes) @ rate)
 
         return self._answer("jacobian_rate", errors, equation, q=q, v=v)
 
@@ -193,8 +193,14 @@ class Lagrangian:
 
     # --- frames
 
+    def _link(self, frame: str) -> str:
+        """The link of a frame, which may be called by its joint; raises QueryError if there is no such frame."""
+        joints = self.robot.description.joint_frames
+        entry(self.linkage.links | joints, frame)
+        return joints.get(frame, frame)
+
     def _placement(self, at: Configuration, frame: str) -> tuple[Array, Array]:
-        body, pose, _ = entry(self.linkage.links, frame)
+        body, pose, _ = self.linkage.links[frame]
         if body == BASE:
             return np.broadcast_to(pose.R, (*at.batch, 3, 3)), np.broadcast_to(pose.p, (*at.batch, 3))
         R, p = at.in_base[body]
@@ -202,7 +208,7 @@ class Lagrangian:
 
     def _body_jacobian(self, at: Configuration, frame: str, v: Array | None = None) -> Array:
         """Body Jacobian of a frame over all N joints, or its rate along the full velocity v."""
-        body, pose, _ = entry(self.linkage.links, frame)
+        body, pose, _ = self.linkage.links[frame]
         J = self._zeros(at, 1)[..., None, :] + np.zeros((6, 1), dtype=self.arithmetic.dtype)
         if body == BASE:
             return J
@@ -213,10 +219,9 @@ class Lagrangian:
         J[..., path] = adjoint_inverse(pose.R, pose.p) @ columns
         return J
 
-    def _change(self, at: Configuration, frame: str, expressed_in: str) -> Array:
+    def _change(self, at: Configuration, frame: str, axes: Axes) -> Array:
         """Matrix that takes a body twist to the axes asked for."""
         R, p = self._placement(at, frame)
-        axes = Axes.of(expressed_in)
         if axes is Axes.WORLD:
             return adjoint(R, p)
         return block_diagonal(R) if axes is Axes.WORLD_ALIGNED else np.eye(6, dtype=R.dtype)

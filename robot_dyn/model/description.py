@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from stat import S_ISDIR, S_ISREG
 from typing import final
@@ -47,6 +48,19 @@ class Description:
     def element(self) -> etree._Element:
         """The checked bytes as a fresh XML element."""
         return parse(self.xml, self.source)[0]
+
+    @cached_property
+    def joint_kinds(self) -> dict[str, str]:
+        """Type by joint: "revolute", "continuous", "prismatic" or "fixed"."""
+        return {joint.get("name"): joint.get("type") for joint in self.element.iterfind("joint")}
+
+    @cached_property
+    def joint_frames(self) -> dict[str, str]:
+        """The child link, whose frame is that of the joint, by joint; without joints that share a link's name."""
+        file = self.element
+        links = {link.get("name") for link in file.iterfind("link")}
+        children = {joint.get("name"): joint.find("child").get("link") for joint in file.iterfind("joint")}
+        return {joint: link for joint, link in children.items() if joint not in links}
 
 
 def read(path: str | Path) -> Description:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from enum import StrEnum
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
@@ -17,9 +17,11 @@ T = TypeVar("T")
 class Axes(StrEnum):
     """The axes and reference point of a twist of a frame.
 
-    WORLD_ALIGNED: at the frame's origin, along the base's axes: its linear part is ṗ.
-    BODY: at the frame's origin, along the frame's axes: the body twist g⁻¹ġ.
-    WORLD: at the base's origin, along the base's axes: the spatial twist ġg⁻¹.
+    WORLD_ALIGNED: at the frame's origin, along the base's axes: its linear part is ṗ. Pinocchio's LOCAL_WORLD_ALIGNED.
+    BODY: at the frame's origin, along the frame's axes: the body twist g⁻¹ġ. Pinocchio's LOCAL.
+    WORLD: at the base's origin, along the base's axes: the spatial twist ġg⁻¹. Pinocchio's WORLD.
+
+    Pinocchio's names are taken too, as texts or as `pinocchio.ReferenceFrame`.
     """
 
     WORLD_ALIGNED = "world_aligned"
@@ -27,16 +29,21 @@ class Axes(StrEnum):
     WORLD = "world"
 
     @classmethod
-    def of(cls, name: str) -> Axes:
-        """The axes of that name; QueryError if there are none."""
+    def of(cls, name: Any) -> Axes:
+        """The axes of that name; raises QueryError for any other."""
+        text = str(name)  # of Pinocchio's enumeration its name
         try:
-            return cls(name)
+            return cls(_OF_PINOCCHIO.get(text, text))
         except ValueError:
-            raise QueryError(f"expressed_in={name!r}; {nearest(str(name), list(cls))}") from None
+            raise QueryError(f"expressed_in={name!r}; {nearest(text, list(cls))}") from None
+
+
+_OF_PINOCCHIO = {"LOCAL": "body", "LOCAL_WORLD_ALIGNED": "world_aligned", "WORLD": "world"}
+_OF_PINOCCHIO |= {name.lower(): axes for name, axes in _OF_PINOCCHIO.items()}
 
 
 class Dynamics(Protocol):
-    """Rigid bodies in gravity.
+    """Rigid bodies in gravity: M(q) a + C(q, v) v + N(q) = τ.
 
     `q`, `v`, `a`, `tau` have shape (n,), or (..., n) in a batch, in [rad], [rad/s], [rad/s²], [N m] for a revolute
     joint and [m], [m/s], [m/s²], [N] for a prismatic one. Twists are (linear, angular). Every method raises
@@ -56,57 +63,249 @@ class Dynamics(Protocol):
         ...
 
     def M(self, q: Array, *, errors: str = "raise") -> Array:
-        """Mass matrix of K = ½ vᵀ M v, symmetric positive definite, shape (..., n, n)."""
+        """Mass matrix of the kinetic energy K = ½ vᵀ M v.
+
+        Args:
+            q: Positions, shape (..., n), in [rad] or [m] by joint.
+            errors: "raise", or "nan" for NaN in place of the states of a batch that have no answer.
+
+        Returns:
+            Symmetric positive definite matrix, shape (..., n, n), in [kg m²], [kg m] or [kg].
+
+        Raises:
+            QueryError: If q has the wrong shape or is not finite.
+            OverflowedError: If the answer would not be finite.
+        """
         ...
 
     def C(self, q: Array, v: Array, *, errors: str = "raise") -> Array:
-        """Coriolis matrix of the Christoffel symbols, so that Ṁ = C + Cᵀ, shape (..., n, n)."""
+        """Coriolis matrix of the Christoffel symbols, so that Ṁ = C + Cᵀ.
+
+        Args:
+            q: Positions, shape (..., n), in [rad] or [m] by joint.
+            v: Velocities, shape (..., n), in [rad/s] or [m/s].
+            errors: "raise", or "nan" for NaN in place of the states of a batch that have no answer.
+
+        Returns:
+            Matrix, shape (..., n, n); C v is in [N m] or [N].
+
+        Raises:
+            QueryError: If an argument has the wrong shape or is not finite.
+            OverflowedError: If the answer would not be finite.
+        """
         ...
 
     def N(self, q: Array, *, errors: str = "raise") -> Array:
-        """Gravity torque ∂V/∂q, shape (..., n)."""
+        """Gravity torque ∂V/∂q: the torque that holds the robot at rest.
+
+        Args:
+            q: Positions, shape (..., n), in [rad] or [m] by joint.
+            errors: "raise", or "nan" for NaN in place of the states of a batch that have no answer.
+
+        Returns:
+            Torques, shape (..., n), in [N m] or [N].
+
+        Raises:
+            QueryError: If q has the wrong shape or is not finite.
+            OverflowedError: If the answer would not be finite.
+        """
         ...
 
     def coriolis_torque(self, q: Array, v: Array, *, errors: str = "raise") -> Array:
-        """Coriolis and centrifugal torque C(q, v) v, shape (..., n)."""
+        """Coriolis and centrifugal torque C(q, v) v.
+
+        Args:
+            q: Positions, shape (..., n), in [rad] or [m] by joint.
+            v: Velocities, shape (..., n), in [rad/s] or [m/s].
+            errors: "raise", or "nan" for NaN in place of the states of a batch that have no answer.
+
+        Returns:
+            Torques, shape (..., n), in [N m] or [N].
+
+        Raises:
+            QueryError: If an argument has the wrong shape or is not finite.
+            OverflowedError: If the answer would not be finite.
+        """
         ...
 
     def coriolis_transpose(self, q: Array, v: Array, *, errors: str = "raise") -> Array:
-        """Cᵀ(q, v) v = ∂K/∂q, for momentum observers: d(M v)/dt = τ + Cᵀ v − N; shape (..., n)."""
+        """Cᵀ(q, v) v = ∂K/∂q, as momentum observers use it: d(M v)/dt = τ + Cᵀ v − N.
+
+        Args:
+            q: Positions, shape (..., n), in [rad] or [m] by joint.
+            v: Velocities, shape (..., n), in [rad/s] or [m/s].
+            errors: "raise", or "nan" for NaN in place of the states of a batch that have no answer.
+
+        Returns:
+            Torques, shape (..., n), in [N m] or [N].
+
+        Raises:
+            QueryError: If an argument has the wrong shape or is not finite.
+            OverflowedError: If the answer would not be finite.
+        """
         ...
 
     def inverse_dynamics(self, q: Array, v: Array, a: Array, *, errors: str = "raise") -> Array:
-        """Torque τ = M a + C v + N, shape (..., n)."""
+        """Torque of an acceleration: τ = M a + C v + N.
+
+        Args:
+            q: Positions, shape (..., n), in [rad] or [m] by joint.
+            v: Velocities, shape (..., n), in [rad/s] or [m/s].
+            a: Accelerations, shape (..., n), in [rad/s²] or [m/s²].
+            errors: "raise", or "nan" for NaN in place of the states of a batch that have no answer.
+
+        Returns:
+            Torques, shape (..., n), in [N m] or [N].
+
+        Raises:
+            QueryError: If an argument has the wrong shape or is not finite.
+            OverflowedError: If the answer would not be finite.
+        """
         ...
 
     def forward_dynamics(self, q: Array, v: Array, tau: Array, *, errors: str = "raise") -> Array:
-        """Acceleration a = M⁻¹ (τ − C v − N), shape (..., n); SingularError if M is singular."""
+        """Acceleration of a torque: a = M⁻¹ (τ − C v − N).
+
+        Args:
+            q: Positions, shape (..., n), in [rad] or [m] by joint.
+            v: Velocities, shape (..., n), in [rad/s] or [m/s].
+            tau: Torques, shape (..., n), in [N m] or [N].
+            errors: "raise", or "nan" for NaN in place of the states of a batch that have no answer.
+
+        Returns:
+            Accelerations, shape (..., n), in [rad/s²] or [m/s²].
+
+        Raises:
+            QueryError: If an argument has the wrong shape or is not finite.
+            OverflowedError: If the answer would not be finite.
+            SingularError: If M is singular.
+        """
         ...
 
     def kinetic_energy(self, q: Array, v: Array, *, errors: str = "raise") -> Array:
-        """K = ½ vᵀ M v in [J], shape (...)."""
+        """Kinetic energy K = ½ vᵀ M v.
+
+        Args:
+            q: Positions, shape (..., n), in [rad] or [m] by joint.
+            v: Velocities, shape (..., n), in [rad/s] or [m/s].
+            errors: "raise", or "nan" for NaN in place of the states of a batch that have no answer.
+
+        Returns:
+            Energy, shape (...), in [J].
+
+        Raises:
+            QueryError: If an argument has the wrong shape or is not finite.
+            OverflowedError: If the answer would not be finite.
+        """
         ...
 
     def potential_energy(self, q: Array, *, errors: str = "raise") -> Array:
-        """V = −Σ mᵢ gᵀ pᵢ of the bodies that move, in [J], shape (...)."""
+        """Potential energy of gravity V = −Σ mᵢ gᵀ pᵢ of the bodies that move, 0 at the origin of the base.
+
+        Args:
+            q: Positions, shape (..., n), in [rad] or [m] by joint.
+            errors: "raise", or "nan" for NaN in place of the states of a batch that have no answer.
+
+        Returns:
+            Energy, shape (...), in [J].
+
+        Raises:
+            QueryError: If q has the wrong shape or is not finite.
+            OverflowedError: If the answer would not be finite.
+        """
         ...
 
+    def total_energy(self, q: Array, v: Array, *, errors: str = "raise") -> Array:
+        """Total energy E = K + V, constant where nothing but gravity acts.
+
+        Args:
+            q: Positions, shape (..., n), in [rad] or [m] by joint.
+            v: Velocities, shape (..., n), in [rad/s] or [m/s].
+            errors: "raise", or "nan" for NaN in place of the states of a batch that have no answer.
+
+        Returns:
+            Energy, shape (...), in [J].
+
+        Raises:
+            QueryError: If an argument has the wrong shape or is not finite.
+            OverflowedError: If the answer would not be finite.
+        """
+        return self.kinetic_energy(q, v, errors=errors) + self.potential_energy(q, errors=errors)
+
     def momentum(self, q: Array, v: Array, *, errors: str = "raise") -> Array:
-        """Generalised momentum p = ∂K/∂v = M v, shape (..., n)."""
+        """Generalised momentum p = ∂K/∂v = M v.
+
+        Args:
+            q: Positions, shape (..., n), in [rad] or [m] by joint.
+            v: Velocities, shape (..., n), in [rad/s] or [m/s].
+            errors: "raise", or "nan" for NaN in place of the states of a batch that have no answer.
+
+        Returns:
+            Momenta, shape (..., n), in [kg m²/s] or [kg m/s].
+
+        Raises:
+            QueryError: If an argument has the wrong shape or is not finite.
+            OverflowedError: If the answer would not be finite.
+        """
         ...
 
     def placement(self, q: Array, frame: str, *, errors: str = "raise") -> Array:
-        """Homogeneous matrix [[R, p], [0, 1]] of a link's frame in the base, shape (..., 4, 4)."""
+        """Placement of a frame in the base: the homogeneous matrix [[R, p], [0, 1]].
+
+        Args:
+            q: Positions, shape (..., n), in [rad] or [m] by joint.
+            frame: Name of a link, or of a joint: the frame of a joint is that of its child link. A name that a link
+                and a joint share is the link's.
+            errors: "raise", or "nan" for NaN in place of the states of a batch that have no answer.
+
+        Returns:
+            Matrix, shape (..., 4, 4); p in [m].
+
+        Raises:
+            QueryError: If q has the wrong shape or is not finite, or the frame is unknown.
+            OverflowedError: If the answer would not be finite.
+        """
         ...
 
     def jacobian(self, q: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, errors: str = "raise") -> Array:
-        """J with twist = J v of a link's frame, rows (linear, angular), shape (..., 6, n)."""
+        """Jacobian J(q) of a frame: twist = J v.
+
+        Args:
+            q: Positions, shape (..., n), in [rad] or [m] by joint.
+            frame: Name of a link or joint, as of `placement`.
+            expressed_in: Axes and point of the twist, "world_aligned" (at the frame's origin, along the base's axes),
+                "body" (along the frame's own axes) or "world" (at the base's origin); or as Pinocchio calls them:
+                "local_world_aligned", "local", "world".
+            errors: "raise", or "nan" for NaN in place of the states of a batch that have no answer.
+
+        Returns:
+            Matrix with rows (linear, angular), shape (..., 6, n); the twist is in [m/s] and [rad/s].
+
+        Raises:
+            QueryError: If q has the wrong shape or is not finite, or the frame or axes are unknown.
+            OverflowedError: If the answer would not be finite.
+        """
         ...
 
     def jacobian_rate(
         self, q: Array, v: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, errors: str = "raise"
     ) -> Array:
-        """dJ/dt along v, of the same J, shape (..., 6, n)."""
+        """Rate of change dJ/dt of the Jacobian of a frame, along v.
+
+        Args:
+            q: Positions, shape (..., n), in [rad] or [m] by joint.
+            v: Velocities, shape (..., n), in [rad/s] or [m/s].
+            frame: Name of a link or joint, as of `placement`.
+            expressed_in: Axes and point of the twist, as of `jacobian`.
+            errors: "raise", or "nan" for NaN in place of the states of a batch that have no answer.
+
+        Returns:
+            Matrix with rows (linear, angular), shape (..., 6, n); dJ/dt v is in [m/s²] and [rad/s²].
+
+        Raises:
+            QueryError: If an argument has the wrong shape or is not finite, or the frame or axes are unknown.
+            OverflowedError: If the answer would not be finite.
+        """
         ...
 
 

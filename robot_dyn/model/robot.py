@@ -17,12 +17,12 @@ import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy import ndarray
 
-from robot_dyn.errors import DescriptionError, ModelWarning, SingularError, UndecidedError, announce
+from robot_dyn.errors import DescriptionError, ModelWarning, QueryError, SingularError, UndecidedError, announce
 from robot_dyn.model import doctor, kernels, pinocchio_model
 from robot_dyn.model.batch import answered
 from robot_dyn.model.coriolis import Bodies
 from robot_dyn.model.description import Description, check
-from robot_dyn.model.dynamics import Array, Axes, acceleration, entry, shape_of, shaped
+from robot_dyn.model.dynamics import Array, Axes, Dynamics, acceleration, entry, shape_of, shaped
 from robot_dyn.model.edits import Changes, Edits
 from robot_dyn.model.gravity import gravity_acts, no_torque
 from robot_dyn.model.kernels import Kernel, Scratch, frozen, is_moderate, is_state
@@ -34,7 +34,7 @@ _DOUBTFUL = 1e10  # of ‖a‖: M may be singular at this q, which rounding hide
 
 @final
 @dataclass(frozen=True)
-class Robot:
+class Robot(Dynamics):
     """A robot: its description and what was changed of it. Immutable; may be shared between threads and pickled.
 
     Attributes:
@@ -141,11 +141,23 @@ class Robot:
     @property
     def frame_names(self) -> tuple[str, ...]:
         """Names of the links; each can be asked for its placement and Jacobian."""
-        return tuple(self._frames)
+        return tuple(pinocchio_model.link_frames(self.model))
 
     @cached_property
     def _frames(self) -> dict[str, int]:
-        return pinocchio_model.link_frames(self.model)
+        """Index of each frame, by the name of its link and of its joint."""
+        links = pinocchio_model.link_frames(self.model)
+        return links | {joint: links[child] for joint, child in self.description.joint_frames.items()}
+
+    @property
+    def joint_types(self) -> tuple[str, ...]:
+        """Types of the n joints: "revolute", "continuous" (revolute without limits) or "prismatic"."""
+        return tuple(self.description.joint_kinds[name] for name in self.joint_names)
+
+    @property
+    def gravity(self) -> ndarray:
+        """Acceleration of free fall, (3,) in base axes, in [m/s²]; `with_(gravity=…)` changes it."""
+        return frozen(np.array(self.edits.gravity))
 
     @property
     def lower(self) -> ndarray:
@@ -192,6 +204,30 @@ class Robot:
         """What is doubtful in the description and its edits, in words, each with its remedy; see docs/findings.md."""
         of_body = doctor.findings(structure(self.description, self.edits), self.joint_without_inertia)
         return (*self.description.findings, *of_body)
+
+    def random_configuration(self, rng: np.random.Generator) -> ndarray:
+        """A position within the joint limits, uniformly distributed.
+
+        A revolute joint that has no limits, or more than one turn between them, is drawn from one turn, as near to 0 as
+        its limits allow; a prismatic one without limits from −1 m to 1 m.
+
+        Args:
+            rng: Source of random numbers, such as numpy.random.default_rng(0).
+
+        Returns:
+            Positions, shape (n,), in [rad] or [m] by joint.
+
+        Raises:
+            QueryError: If rng is not a numpy.random.Generator.
+        """
+        if not isinstance(rng, np.random.Generator):
+            raise QueryError(f"rng must be a numpy.random.Generator, such as numpy.random.default_rng(0), got {rng!r}")
+        slides = np.array([each == "prismatic" for each in self.joint_types])
+        lower, upper = self.lower, self.upper
+        half = (upper - lower) / 2
+        half = np.where(np.isfinite(half) & slides, half, np.minimum(half, np.where(slides, 1.0, np.pi)))
+        middle = np.clip(0.0, lower + half, upper - half)
+        return rng.uniform(np.maximum(lower, middle - half), np.minimum(upper, middle + half))
 
     def M(self, q: Array, *, errors: str = "raise") -> ndarray:
         if is_state(q, self._shape) and is_moderate(q):

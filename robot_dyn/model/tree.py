@@ -21,13 +21,19 @@ class Described(Protocol):
     """What the own road takes of a robot: its file, its edits and the order of q. None of its numbers."""
 
     @property
-    def description(self) -> Description: ...
+    def description(self) -> Description:
+        """The checked file."""
+        ...
 
     @property
-    def edits(self) -> Edits: ...
+    def edits(self) -> Edits:
+        """Gravity, locks, payloads, armature."""
+        ...
 
     @property
-    def joint_names(self) -> tuple[str, ...]: ...
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the n joints, in the order of q."""
+        ...
 
 
 Literal = Any  # the text of a decimal number, or a number that a user gave

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from robot_dyn.effects.joint_limit import JointStopSpring
 from robot_dyn.effects.plant import Plant
 from robot_dyn.effects.wrench import ExternalWrench
+from robot_dyn.model.robot import Robot
 
 _FAR = 1e9  # a run that diverged has samples beyond any placement
 _BEFORE = 2.0**-22  # of its time, a switch's own past: apart from it in single precision too, which viewers keep
@@ -25,8 +28,9 @@ def wrenches(plant: Plant, t: np.ndarray, q: np.ndarray) -> dict[str, np.ndarray
     """
     effects = [effect for effect in plant.effects if isinstance(effect, ExternalWrench)]
     total: dict[str, np.ndarray] = {}
-    for link in dict.fromkeys(effect.frame for effect in effects):
-        mine = [effect for effect in effects if effect.frame == link]
+    links = {effect.frame: link_of(plant.dynamics, effect.frame) for effect in effects}
+    for link in dict.fromkeys(links.values()):
+        mine = [effect for effect in effects if links[effect.frame] == link]
         switches = np.array([s for effect in mine for s in effect.switches if t[0] < s <= t[-1]])
         times = np.unique(np.concatenate([t, switches, switches * (1 - _BEFORE)]))
         at = np.stack([np.interp(times, t, np.clip(np.nan_to_num(column), -_FAR, _FAR)) for column in q.T], axis=1)
@@ -34,6 +38,12 @@ def wrenches(plant: Plant, t: np.ndarray, q: np.ndarray) -> dict[str, np.ndarray
         F = sum(np.where(effect.acts(times)[:, None], effect.at(placement), 0.0) for effect in mine)
         total[link] = np.column_stack([times, F])
     return total
+
+
+def link_of(dynamics: Any, frame: str) -> str:
+    """The link of a frame, which may be called by its joint."""
+    robot = getattr(dynamics, "robot", dynamics)
+    return robot.description.joint_frames.get(frame, frame) if isinstance(robot, Robot) else frame
 
 
 def at_stop(plant: Plant, q: np.ndarray) -> np.ndarray | None:

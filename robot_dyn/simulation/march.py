@@ -244,6 +244,7 @@ class Watch:
         return bool((K + V)[0] - self.energy - W.sum() > 1e3 * (self.scale + np.abs(W).sum()))
 
     def diverged(self, t: float, y: Array, why: str) -> DivergedError:
+        """The end of a run at time t and state y, with the fastest joint and the remedy."""
         names = self.motion.plant.dynamics.joint_names
         fastest = names[int(np.argmax(np.abs(y[len(names) : 2 * len(names)])))]
         remedy = f"take a smaller step than {self.setup.step_s:g} s, or an implicit method"

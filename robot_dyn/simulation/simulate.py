@@ -23,7 +23,7 @@ from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.simulation.choice import choose
 from robot_dyn.simulation.error import ErrorEstimate, difference, richardson
 from robot_dyn.simulation.ledger import Ledger
-from robot_dyn.simulation.loads import at_stop, wrenches
+from robot_dyn.simulation.loads import at_stop, link_of, wrenches
 from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.observed import observer_of, remarks
 from robot_dyn.simulation.observer import Observer
@@ -144,7 +144,7 @@ def _trajectory(
     plant = setup.plant
     names, about = plant.dynamics.joint_names, origin(plant.dynamics) | setup.about
     if isinstance(frame := getattr(setup.controller, "frame", None), str):
-        about = {"frame": frame} | about
+        about = {"frame": link_of(plant.dynamics, frame)} | about
     return Trajectory(
         names, t, q, v, a, tau, power, ledger, wanted, deviation, record.outcome, statistics, error, about,
         wrenches(plant, t, q), at_stop(plant, q),

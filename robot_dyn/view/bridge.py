@@ -33,9 +33,13 @@ class _RequestError(Exception):
 class Browser(Protocol):
     """Whoever shows the scene: takes messages; what it sends is handed to `Bridge.answered`."""
 
-    def send(self, message: bytes) -> None: ...
+    def send(self, message: bytes) -> None:
+        """Take a message."""
+        ...
 
-    def hang_up(self) -> None: ...
+    def hang_up(self) -> None:
+        """End the connection."""
+        ...
 
 
 class Scene:

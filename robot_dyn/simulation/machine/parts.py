@@ -105,10 +105,12 @@ class TracedController(Controller):
 
     @cached_property
     def n(self) -> int:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Number of joints."""
         return self.original.n
 
     @cached_property
     def memory_size(self) -> int:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Number of states of the controller."""
         return self.original.memory_size
 
     def torque(self, t: Any, q: Array, v: Array, z: Array) -> Array:
