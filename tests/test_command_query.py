@@ -130,9 +130,21 @@ def test_why_adds_up(given: str):
 
 def test_query_and_why_as_text():
     text = said("query", "ur5", "--q", Q, "--why", "elbow_joint", "--effects", "urdf")
-    for part in ("M, mass matrix:", "C, Coriolis matrix:", "N, gravity and effects:", "why elbow_joint needs"):
+    for part in (
+        "M, mass matrix [kg m²]:",
+        "C, Coriolis matrix [N m s/rad]:",
+        "N, gravity and effects [N m]:",
+    ):
         assert part in text
     assert re.search(r"^sum ", text, re.M)
+    assert re.search(r"^why elbow_joint needs \S+ N m:$", text, re.M)
+
+
+def test_units_are_those_of_the_joints():
+    """cart_pole slides and turns, ur5 only turns."""
+    assert "[rad/s]" in said("query", "ur5") and "[m, rad]" in said("query", "cart_pole")
+    why = said("query", "cart_pole", "--why", "slide", "--effects", "urdf")
+    assert "why slide needs 0 N:" in why and "viscous_friction" in why
 
 
 def test_query_without_forward_dynamics_names_the_joint():

@@ -7,6 +7,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.errors import EffectError
+from robot_dyn.scene.explain import kinds
 
 ROBOT = rd.load("cart_pole")
 
@@ -54,3 +55,41 @@ def test_an_effect_given_by_name_is_left_as_it_was() -> None:
 def test_names_and_values_are_checked_when_the_joints_are_known(make, message: str) -> None:
     with pytest.raises(EffectError, match=message):
         make()
+
+
+def test_an_effect_has_one_name_in_python_scene_ledger_and_rollouts() -> None:
+    """The kinds of a scene are the names of the effects they build; those that work have them in the ledger."""
+    robot = rd.load("planar_2r")
+    built = {
+        "viscous_friction": [rd.ViscousFriction(0.3)],
+        "regularised_coulomb_friction": [rd.RegularisedCoulombFriction(0.2)],
+        "spring": [rd.Spring(2.0)],
+        "joint_stops": rd.joint_stops(-1.0, 1.0),
+        "external_wrench": [rd.ExternalWrench("tip", [1.0, 0, 0, 0, 0, 0])],
+        "effort_limit": [rd.EffortLimit(5.0)],
+    }
+    assert [kind for kind in kinds() if kind in built] == list(built)
+    assert set(kinds()) - set(built) == {"gravity", "lock", "payload", "armature"}
+    for kind, effects in built.items():
+        assert {effect.name for effect in effects} == {kind}
+    plant = rd.Plant(robot, [effect for effects in built.values() for effect in effects])
+    run = rd.simulate(plant, q0=[0.3, 0.4], duration_s=0.01, estimate_error=False)
+    assert list(run.power) == [
+        "control", "viscous_friction", "regularised_coulomb_friction", "joint_stops", "external_wrench",
+    ]  # fmt: skip
+
+
+def test_a_stop_that_differs_from_run_to_run_moves_both_of_its_parts() -> None:
+    """Each run as simulated by itself with its stop, 1e-12; the joint reaches both stops."""
+    robot = rd.load("pendulum").with_(gravity=(0.0, 0.0, 0.0))
+    upper = np.array([0.3, 0.4])
+
+    def stops(at: float) -> rd.Setup:
+        plant = rd.Plant(robot, rd.joint_stops([-1.0], [at], 1e3, 1e2))
+        return rd.Setup(plant, [0.2], [2.0], duration_s=0.2, record_period_s=0.1, estimate_error=False)
+
+    runs = rd.rollouts(stops(0.5), params={"joint_stops.upper": upper})
+    for k, at in enumerate(upper):
+        alone = rd.simulate(stops(at))
+        assert alone.q[:, 0].max() > at
+        np.testing.assert_allclose(runs.q[k], alone.q, atol=1e-12)

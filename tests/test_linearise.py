@@ -25,6 +25,23 @@ def test_pendulum_with_friction_and_spring(q: float) -> None:
     np.testing.assert_allclose(B, [[0.0], [3.0]], atol=1e-10)
 
 
+@pytest.mark.parametrize("q", [0.7, 2.9])
+def test_a_robot_by_itself_is_linearised_at_rest_in_equilibrium(q: float) -> None:
+    """I δ'' = δu − (m g l/2) cos q δ: the actuation that holds the rod takes no part in it; differences leave 1e-10."""
+    A, B = rd.linearise(PENDULUM, [q])
+    np.testing.assert_allclose(A, [[0.0, 1.0], [-3 * G / 2 * np.cos(q), 0.0]], atol=1e-10)
+    np.testing.assert_allclose(B, [[0.0], [3.0]], atol=1e-10)
+
+
+def test_defaults_are_rest_and_the_actuation_without_acceleration() -> None:
+    q, v = np.random.default_rng(8).normal(size=(2, 2))
+    plant = rd.Plant(DOUBLE, [rd.ViscousFriction(0.3), rd.Spring(2.0)])
+    for given, held in (((q,), (q, 0 * q)), ((q, v), (q, v))):
+        u = plant.inverse_dynamics(0.0, *held, np.zeros(2))
+        for one, two in zip(rd.linearise(plant, *given), rd.linearise(plant, *held, u), strict=True):
+            np.testing.assert_array_equal(one, two)
+
+
 @pytest.mark.parametrize("robot", [DOUBLE, PANDA, rd.load("skew_tree")], ids=lambda each: each.name)
 def test_B_is_the_inverse_of_M_and_A_starts_with_what_is_kinematics(robot) -> None:
     """A is linear in u, so B has no truncation: rounding of a over the step of 1e-3, 1e-10 of the largest entry."""

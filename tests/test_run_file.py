@@ -84,7 +84,7 @@ def test_other_files_are_refused(tmp_path) -> None:
 
 def test_a_table_has_names_units_and_all_samples(run, tmp_path) -> None:
     rows = list(csv.reader(export_csv(run, tmp_path / "run.csv").read_text(encoding="utf-8").splitlines()))
-    assert rows[0][:2] == ["t [s]", "q slide [rad or m]"]
+    assert rows[0][:2] == ["t [s]", "q slide [m]"]
     assert len(rows) == 1 + len(run.t)
     assert [float(row[0]) for row in rows[1:]] == run.t.tolist()
     assert [float(row[2]) for row in rows[1:]] == run.q[:, 1].tolist()

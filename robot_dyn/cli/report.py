@@ -17,6 +17,7 @@ from robot_dyn.lagrange.breakdown import torque_breakdown
 from robot_dyn.lagrange.manipulator import Lagrangian
 from robot_dyn.model.gravity import gravity_acts, no_torque
 from robot_dyn.model.robot import Robot
+from robot_dyn.model.units import unit, units
 from robot_dyn.simulation.ledger import largest
 from robot_dyn.simulation.trajectory import Trajectory
 
@@ -62,6 +63,7 @@ def query(robot: Robot, effects: str, q: np.ndarray, v: np.ndarray, a: np.ndarra
         "gravity": list(robot.edits.gravity),
         "gravity_acts": gravity_acts(robot),
         "joints": list(robot.joint_names),
+        "types": list(robot.joint_types),
         **{name: array.tolist() for name, array in (state | terms).items()},
         "effects": acting,
     }
@@ -84,7 +86,8 @@ def why(robot: Robot, answer: Document, joint: str) -> Document:
         for share in torque_breakdown(Lagrangian(robot), *state)
     ]
     effects = {name: -torque[i] for name, torque in answer["effects"].items()}
-    return {"why": {"joint": joint, "tau": answer["tau"][i], "shares": shares, "effects": effects}}
+    share = {"joint": joint, "tau": answer["tau"][i], "unit": unit("tau", answer["types"][i])}
+    return {"why": share | {"shares": shares, "effects": effects}}
 
 
 def comparison(results: Sequence[tuple[str, Comparison]], refused: dict[str, str]) -> Document:
@@ -172,10 +175,14 @@ def info_tables(robot: Robot) -> Iterator[Any]:
 def query_tables(answer: Document) -> Iterator[Any]:
     """`query` and `why` as text."""
     joints = answer["joints"]
-    for name, unit in (("q", "rad, m"), ("v", "rad/s, m/s"), ("a", "rad/s², m/s²"), ("tau", "N m, N")):
-        yield f"{name:4}{_row(answer[name])}  [{unit}]"
-    for name, meaning in (("M", "mass matrix"), ("C", "Coriolis matrix"), ("N", "gravity and effects")):
-        yield f"\n{name}, {meaning}:"
+    for name in ("q", "v", "a", "tau"):
+        yield f"{name:4}{_row(answer[name])}  [{units(name, answer['types'])}]"
+    force = units("tau", answer["types"])
+    of_M = {"N m": "kg m²", "N": "kg"}.get(force, "kg m², kg m, kg")
+    of_C = {"N m": "N m s/rad", "N": "N s/m"}.get(force, "rows times v: N m, N")
+    meanings = (("M", "mass matrix", of_M), ("C", "Coriolis matrix", of_C), ("N", "gravity and effects", force))
+    for name, meaning, of_entries in meanings:
+        yield f"\n{name}, {meaning} [{of_entries}]:"
         rows = answer[name] if name != "N" else [[x] for x in answer[name]]
         yield from (f"  {_row(row)}  {joint}" for row, joint in zip(rows, joints, strict=True))
     if not answer["gravity_acts"]:
@@ -185,7 +192,7 @@ def query_tables(answer: Document) -> Iterator[Any]:
 
 
 def _why_tables(why: Document) -> Iterator[Any]:
-    yield f"\nwhy {why['joint']} needs {why['tau']:.6g}:"
+    yield f"\nwhy {why['joint']} needs {why['tau']:.6g} {why['unit']}:"
     table = _table("from", "inertia", "Coriolis", "gravity", "effect", "sum")
     rows = [(s["source"], s["inertia"], s["coriolis"], s["gravity"], 0.0) for s in why["shares"]]
     rows += [(effect, 0.0, 0.0, 0.0, torque) for effect, torque in why["effects"].items()]

@@ -118,7 +118,7 @@ class CompiledDynamics(Dynamics):
         return self.original.n
 
     @cached_property
-    def joint_names(self) -> tuple[str, ...]:
+    def joint_names(self) -> tuple[str, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Names of the n joints, in the order of q."""
         return self.original.joint_names
 

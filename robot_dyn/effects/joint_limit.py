@@ -17,6 +17,8 @@ from robot_dyn.effects.effect import Conservative, Dissipative, coefficient, num
 from robot_dyn.errors import EffectError
 from robot_dyn.model.dynamics import Dynamics
 
+_NAME = "joint_stops"  # of both parts, as of the function that makes them
+
 
 @final
 @dataclass(frozen=True, eq=False)
@@ -36,6 +38,10 @@ class JointStopSpring(Conservative):
     def __post_init__(self) -> None:
         _check_stops(self)
         object.__setattr__(self, "stiffness", coefficient("stiffness", self.stiffness))
+
+    @property
+    def name(self) -> str:
+        return _NAME
 
     @property
     def widths(self) -> tuple[Any, Any]:
@@ -67,6 +73,10 @@ class JointStopDamper(Dissipative):
     def __post_init__(self) -> None:
         _check_stops(self)
         object.__setattr__(self, "damping", coefficient("damping", self.damping))
+
+    @property
+    def name(self) -> str:
+        return _NAME
 
     @property
     def widths(self) -> tuple[Any, Any]:

@@ -65,7 +65,7 @@ class Lagrangian(Dynamics):
         return linkage(tree(self.robot.description, self.robot.edits), self.joint_names, self.arithmetic)
 
     @cached_property
-    def joint_names(self) -> tuple[str, ...]:
+    def joint_names(self) -> tuple[str, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Names of the n joints, in the order of q."""
         return self.robot.joint_names
 

@@ -10,33 +10,39 @@ import numpy as np
 from robot_dyn.arithmetic import Array
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import QueryError
-from robot_dyn.model.dynamics import checked
+from robot_dyn.model.dynamics import Dynamics, checked
 
 _STEPS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)  # of Richardson's extrapolated central difference: error O(h⁴) and u/h
-_KINK = 0.01  # of a slope: more between its two sides is no curvature at the shortest step
+_ONE_SIDED = 0.01  # of a slope: a larger difference between its two sides is not curvature at the shortest step
 _NO_DERIVATIVE = "the plant has no derivative at this state, such as at an effort limit or a stop; move the state"
 _AGREE = 1e-6  # of the largest slope: two steps that differ by more do not show a derivative
 
 
-def linearise(plant: Plant, q: Array, v: Array, u: Array, t: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """A (2n, 2n) and B (2n, n) about one state.
+def linearise(
+    plant: Plant | Dynamics, q: Array, v: Array = None, u: Array = None, t: float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """A and B about one state.
 
     Args:
-        plant: What moves.
-        q: Position, (n,).
-        v: Velocity, (n,).
-        u: Actuation, (n,).
+        plant: A plant, or a robot without effects.
+        q: Position, shape (n,), in [rad] or [m].
+        v: Velocity, shape (n,), in [rad/s] or [m/s]; 0 by default.
+        u: Actuation, shape (n,), in [N m] or [N]; by default the actuation at which the acceleration is 0, so that a
+            state at rest is an equilibrium.
         t: Time, in [s].
 
+    Returns:
+        A, shape (2n, 2n), and B, shape (2n, n).
+
     Raises:
-        QueryError: If an argument is wrong, or the plant has a kink at this state.
+        QueryError: If an argument is wrong, or the acceleration has no derivative at this state.
     """
+    if not isinstance(plant, Plant):
+        plant = Plant(plant)
     names, n = plant.dynamics.joint_names, plant.dynamics.n
-    state = {name: checked(name, value, names) for name, value in (("q", q), ("v", v), ("u", u))}
-    for name, value in state.items():
-        if value.ndim != 1:
-            raise QueryError(f"{name} must be one state of shape ({n},), got {value.shape}")
-    x = np.concatenate(list(state.values()))
+    q, v = _state("q", q, names), _state("v", np.zeros(n) if v is None else v, names)
+    u = plant.inverse_dynamics(t, q, v, np.zeros(n)) if u is None else _state("u", u, names)
+    x = np.concatenate([q, v, u])
 
     def a(x: np.ndarray) -> np.ndarray:
         return plant.forward_dynamics(t, x[:n], x[n : 2 * n], x[2 * n :])
@@ -57,9 +63,16 @@ def linearise(plant: Plant, q: Array, v: Array, u: Array, t: float = 0.0) -> tup
     else:
         raise QueryError(_NO_DERIVATIVE)
     h, here = _STEPS[-1], a(x)
-    for i, step in enumerate(h * np.eye(3 * n)):  # at a kink the two sides differ, though their mean does not
-        if np.abs(a(x + step) + a(x - step) - 2 * here).max() > _KINK * h * np.abs(slopes[:, i]).max() + 1e-9:
+    for i, step in enumerate(h * np.eye(3 * n)):  # where one-sided slopes differ, though their mean has a value
+        if np.abs(a(x + step) + a(x - step) - 2 * here).max() > _ONE_SIDED * h * np.abs(slopes[:, i]).max() + 1e-9:
             raise QueryError(_NO_DERIVATIVE)
     A = np.zeros((2 * n, 2 * n))
     A[:n, n:], A[n:] = np.eye(n), slopes[:, : 2 * n]
     return A, np.vstack([np.zeros((n, n)), slopes[:, 2 * n :]])
+
+
+def _state(name: str, values: Array, joint_names: tuple[str, ...]) -> np.ndarray:
+    array = checked(name, values, joint_names)
+    if array.ndim != 1:
+        raise QueryError(f"{name} must be one state of shape ({len(joint_names)},), got {array.shape}")
+    return array

@@ -11,6 +11,7 @@ import numpy as np
 from robot_dyn.errors import RobotDynError
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.model.robot import Robot
+from robot_dyn.model.units import unit
 from robot_dyn.simulation.levels import Level, levels
 from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.observer import Observer, Visit
@@ -53,11 +54,8 @@ def _units(setup: Setup) -> list[tuple[str, str, str]]:
     """Units of q, v and tau of each joint."""
     dynamics = setup.plant.dynamics
     robot: Any = getattr(dynamics, "robot", dynamics)
-    if not isinstance(robot, Robot):
-        return [("", "", "")] * dynamics.n
-    kinds = {joint.get("name"): joint.get("type") for joint in robot.description.element.iterfind("joint")}
-    slides = [kinds[name] == "prismatic" for name in dynamics.joint_names]
-    return [("m", "m/s", "N") if each else ("rad", "rad/s", "N m") for each in slides]
+    types = robot.joint_types if isinstance(robot, Robot) else (None,) * dynamics.n
+    return [(unit("q", each), unit("v", each), unit("tau", each)) for each in types]
 
 
 def _passed(setup: Setup, visits: dict[Level, Visit], units: list[tuple[str, str, str]]) -> Iterator[Remark]:

@@ -13,7 +13,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from robot_dyn.errors import QueryError
+from robot_dyn.errors import DescriptionError, QueryError
 from robot_dyn.model import catalog
 from robot_dyn.model.description import check
 from robot_dyn.model.edits import Payload
@@ -64,6 +64,15 @@ def _portable(source: str, folder: Path) -> str:
     if home.name and path.is_relative_to(home):
         return (Path("~") / path.relative_to(home)).as_posix()
     return path.name
+
+
+def joint_types(run: Trajectory) -> tuple[str | None, ...]:
+    """Types of the joints of a run, as of `Robot.joint_types`; None for each of a run without a URDF."""
+    try:
+        kinds = check(run.about.get("urdf", ""), "the run's URDF").joint_kinds
+    except DescriptionError:
+        kinds = {}
+    return tuple(kinds.get(name) for name in run.joint_names)
 
 
 def robot_of(run: Trajectory) -> Robot:

@@ -104,9 +104,10 @@ def _starts(
 
 def _values(setup: Setup, name: str, values: Any) -> np.ndarray:
     """The values of a parameter, (B, n)."""
-    named = [(f"{effect.name}.{key}", x) for effect in setup.plant.effects for key, x in _numbers(effect)]
-    known = dict(named)
-    if sum(each == name for each, _ in named) > 1:
+    named = [(f"{effect.name}.{key}", type(effect), x) for effect in setup.plant.effects for key, x in _numbers(effect)]
+    known = {each: x for each, _, x in named}
+    classes = [cls for each, cls, _ in named if each == name]
+    if len(classes) > len(set(classes)):
         raise QueryError(f"params: {name} names a coefficient of several effects of the plant; make them one effect")
     known |= dict(_numbers(setup.controller)) | masses(setup.plant.dynamics)
     if name not in known:
@@ -124,7 +125,7 @@ def _values(setup: Setup, name: str, values: Any) -> np.ndarray:
         raise QueryError(f"params: {name} must be finite, {sign}of shape (B,) or (B, {n}), got {np.shape(values)}")
     rows = np.ascontiguousarray(np.broadcast_to(array, (len(array), n)))
     part, _, key = name.rpartition(".")
-    for effect in (effect for effect in setup.plant.effects if part and effect.name == part):
+    for effect in (effect for effect in setup.plant.effects if part and effect.name == part and key in vars(effect)):
         for row in np.unique(rows, axis=0):
             replace(effect, **{key: row})  # pyright: ignore[reportArgumentType]  refuses what has no meaning
     return rows

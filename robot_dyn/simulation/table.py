@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from robot_dyn.files import Kind, save, target
+from robot_dyn.model.units import unit
+from robot_dyn.simulation.origin import joint_types
 from robot_dyn.simulation.run_file import RunFileError
 from robot_dyn.simulation.trajectory import Trajectory
 
@@ -24,10 +26,10 @@ def export_csv(trajectory: Trajectory, path: str | Path) -> Path:
         RunFileError: If it cannot be written.
     """
     path = target(path, TABLE, RunFileError)
-    names = trajectory.joint_names
+    types = dict(zip(trajectory.joint_names, joint_types(trajectory), strict=True))
     heading = ["t [s]"]
-    for key, unit in (("q", "rad or m"), ("v", "rad/s or m/s"), ("a", "rad/s² or m/s²"), ("tau", "N m or N")):
-        heading += [f"{key} {name} [{unit}]" for name in names]
+    for key in ("q", "v", "a", "tau"):
+        heading += [f"{key} {name} [{unit(key, kind)}]" for name, kind in types.items()]
     heading += [f"power {name} [W]" for name in trajectory.power] + ["energy [J]", "residual [J]"]
     columns = [trajectory.t[:, None], trajectory.q, trajectory.v, trajectory.a, trajectory.tau]
     columns += [power[:, None] for power in trajectory.power.values()]

@@ -17,6 +17,7 @@ import numpy as np
 from robot_dyn import files
 from robot_dyn.errors import DescriptionError, QueryError, RobotDynError, nearest
 from robot_dyn.model import description
+from robot_dyn.model.units import unit
 from robot_dyn.simulation.trajectory import Trajectory
 from robot_dyn.view.figure import NEAR, THEMES, WANTED, Cell, Curve, Panel, draw
 
@@ -228,7 +229,7 @@ def _view(run: Trajectory, only: Collection[str] | None, limits: np.ndarray | No
     except DescriptionError:
         of = {}
     known = [of.get(name) for name in run.joint_names]
-    units = tuple("rad or m" if j is None else "m" if j.get("type") == "prismatic" else "rad" for j in known)
+    units = tuple(unit("q", None if j is None else j.get("type")) for j in known)
     if limits is None:
         limits = np.array([np.inf if j is None else float(j.find("limit").get("effort")) for j in known])
     limits = np.asarray(limits, dtype=float)

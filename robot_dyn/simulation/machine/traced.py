@@ -161,7 +161,8 @@ def with_values(motion: Motion, free: Mapping[str, Array]) -> Motion:
 
 
 def _own(effect: Effect, free: Mapping[str, Array]) -> dict[str, Array]:
-    return {name.partition(".")[2]: x for name, x in others(free).items() if name.partition(".")[0] == effect.name}
+    named = ((*name.partition(".")[::2], x) for name, x in others(free).items())
+    return {key: x for of, key, x in named if of == effect.name and key in vars(effect)}
 
 
 def _gains(free: Mapping[str, Array]) -> dict[str, Array]:
