@@ -3,7 +3,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test check clean
+.PHONY: demo test check lock clean
 
 demo: .venv/installed
 	$(BIN)/robot-dyn demo --force
@@ -18,10 +18,18 @@ check: .venv/installed
 	$(BIN)/pyright
 	$(BIN)/lint-imports --no-cache
 
-.venv/installed: pyproject.toml
+# versions that pass, written anew: those of a fresh environment with the latest of everything
+lock:
+	rm -rf .venv requirements-dev.lock
+	touch requirements-dev.lock
+	$(MAKE) .venv/installed
+	$(BIN)/python -m pip freeze --exclude-editable | sed 's/$$/ ; python_version == "3.11"/' > requirements-dev.lock
+	touch .venv/installed
+
+.venv/installed: pyproject.toml requirements-dev.lock
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --upgrade "pip>=25.1"
-	$(BIN)/python -m pip install --quiet --editable . --group dev
+	$(BIN)/python -m pip install --quiet --editable . --group dev --constraint requirements-dev.lock
 	touch $@
 
 clean:

@@ -1,5 +1,6 @@
 """Compiled code that survives its process: a Numba overload, taken from a store or compiled and put there.
 
+Numba never frees machine code, so a process loads each key once and keeps it: to load it again would lose memory.
 The key is the SHA-256 of all that the machine code depends on: the straight-line code and its constants, the signature,
 the versions of what made it, and the processor with its features.
 """
@@ -14,6 +15,8 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any, Protocol
 
 from robot_dyn.compiled.interrupts import interrupts_later
+
+_loaded: dict[str, Any] = {}  # functions by key
 
 
 class Store(Protocol):
@@ -42,31 +45,34 @@ def compiled(
     """
     from numba.core import types
 
-    signature, count = types.int64(*arguments), len(arguments)
+    signature = types.int64(*arguments)
     key = digest([str(signature), *identity])
     payload = store.load(key) if store is not None else None
-    if payload is not None and (restored := _restored(payload, count)) is not None:
-        return restored
-    function = make()
-    with interrupts_later():
-        function.compile(signature)
-    function.disable_compile()
-    if store is not None:
+    function = _loaded.get(key)
+    if function is None and payload is not None:
+        function = _restored(payload, len(arguments))
+    if function is None:
+        function, payload = make(), None
+        with interrupts_later():
+            function.compile(signature)
+        function.disable_compile()
+    if store is not None and payload is None:
         store.save(key, _payload(function), about)
-    return function
+    return _loaded.setdefault(key, function)
 
 
 def digest(identity: list[str]) -> str:
     """The key of what these texts, this processor and these versions determine."""
     import llvmlite.binding as llvm
 
-    versions = [f"{name} {_version(name)}" for name in ("robot-dyn", "numba", "llvmlite", "casadi", "numpy")]
+    versions = [f"{name} {version_of(name)}" for name in ("robot-dyn", "numba", "llvmlite", "casadi", "numpy")]
     machine = [platform.python_version(), llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()]
     parts = [*identity, *versions, *machine]
     return hashlib.sha256("\0".join(f"{len(part)} {part}" for part in parts).encode()).hexdigest()
 
 
-def _version(name: str) -> str:
+def version_of(name: str) -> str:
+    """The version of an installed distribution, or "unknown"."""
     try:
         return version(name)
     except PackageNotFoundError:  # run from its folder

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from functools import cache
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import final
 
 from robot_dyn.errors import QueryError
 
@@ -38,15 +39,27 @@ def shared(work: Callable[[int, int], int], count: int, piece: int, threads: int
     def take() -> int:
         return max((work(i * piece, count if i == pieces - 1 else (i + 1) * piece) for i in left), default=0)
 
-    others = [_pool(threads).submit(take) for _ in range(min(threads, pieces) - 1)]
+    others = _pool.submit(take, min(threads, pieces) - 1)
     return max(take(), *(other.result() for other in others)) if others else take()
 
 
-@cache
-def _pool(threads: int) -> ThreadPoolExecutor:
-    """Threads that wait for work; kept, since to start one takes as long as a thousand states."""
-    return ThreadPoolExecutor(threads - 1, "robot_dyn")
+@final
+class _Pool:
+    """Threads that wait for work, as many as were ever asked for at once; to start one costs a thousand states."""
 
+    def __init__(self) -> None:
+        self._lock, self._size, self._threads = threading.Lock(), 0, ThreadPoolExecutor(1)
+
+    def submit(self, work: Callable[[], int], count: int) -> list[Future[int]]:
+        """Give the work to so many threads."""
+        with self._lock:
+            if count > self._size:
+                self._threads.shutdown(wait=False)  # those that are at work finish it
+                self._size, self._threads = count, ThreadPoolExecutor(count, "robot_dyn")
+            return [self._threads.submit(work) for _ in range(count)]
+
+
+_pool = _Pool()
 
 if hasattr(os, "register_at_fork"):  # a child has no threads but its own
-    os.register_at_fork(after_in_child=_pool.cache_clear)
+    os.register_at_fork(after_in_child=_pool.__init__)

@@ -9,10 +9,10 @@ from __future__ import annotations
 import json
 import os
 from contextlib import suppress
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from robot_dyn.compiled.overload import version_of
 from robot_dyn.errors import DescriptionError, QueryError
 from robot_dyn.model import catalog
 from robot_dyn.model.description import check
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 def origin(dynamics: Any) -> dict[str, str]:
     """Where a run comes from, as texts: URDF, its path, edits and versions."""
     robot = getattr(dynamics, "robot", dynamics)
-    texts = {"versions": ", ".join(f"{name} {version(name)}" for name in ("robot-dyn", "pin", "numpy", "scipy"))}
+    texts = {"versions": ", ".join(f"{name} {version_of(name)}" for name in ("robot-dyn", "pin", "numpy", "scipy"))}
     if isinstance(robot, Robot):
         urdf = robot.description.text.decode(errors="replace")
         texts |= {"robot": robot.name, "source": robot.description.source}

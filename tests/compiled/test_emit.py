@@ -6,6 +6,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from robot_dyn.compiled import overload
 from robot_dyn.compiled.emit import EmitError, emit
 from robot_dyn.compiled.kernel import Kernel, Status
 from robot_dyn.compiled.source import WIDTH
@@ -55,7 +56,7 @@ def test_an_operation_without_code_is_refused() -> None:
         emit(ca.Function("f", [x], [ca.erf(x)]))
 
 
-def test_machine_code_is_restored_from_a_store() -> None:
+def test_machine_code_is_restored_from_a_store(monkeypatch: pytest.MonkeyPatch) -> None:
     """The second kernel compiles nothing and gives the same bits; a damaged payload is compiled anew."""
 
     class Memory(dict[str, bytes]):
@@ -70,10 +71,12 @@ def test_machine_code_is_restored_from_a_store() -> None:
     arguments = [np.ones((100, 3)), np.ones((100, 2))]
     Kernel(source, (9,), store=memory).many(arguments, first)
     (key,) = memory
+    monkeypatch.setattr(overload, "_loaded", {})  # as in another process
     Kernel(source, (9,), store=memory).many(arguments, y)
     assert np.array_equal(first, y)
     assert len(memory) == 1
     memory[key] = b"damaged"
+    monkeypatch.setattr(overload, "_loaded", {})
     Kernel(source, (9,), store=memory).many(arguments, y)
     assert np.array_equal(first, y)
     assert len(memory[key]) > 1000

@@ -1,0 +1,80 @@
+"""Dependencies: what the package imports is declared, at a version that works, and what is declared is used."""
+
+from __future__ import annotations
+
+import ast
+import re
+import sys
+import tomllib
+from importlib.metadata import packages_distributions
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+
+ROOT = Path(__file__).parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+# Declared and not imported: robots that the catalog finds by path, and the page's own script.
+HOMES = {"pinocchio": ["pin"]}  # its wheel puts the module beside site-packages, where nothing is listed
+BY_PATH = {"example-robot-data", "meshcat", "pycollada"}
+
+
+def imported(folder: str) -> dict[str, str]:
+    """Top-level modules that the files of a folder import and Python does not have, each with one such file."""
+    found: dict[str, str] = {}
+    for path in sorted((ROOT / folder).rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names = [each.name for each in node.names] if isinstance(node, ast.Import) else []
+            if isinstance(node, ast.ImportFrom) and not node.level and node.module:
+                names = [node.module]
+            found |= {name.partition(".")[0]: str(path.relative_to(ROOT)) for name in names}
+    own = {"robot_dyn", "tests", *(path.stem for path in (ROOT / folder).iterdir())}
+    return {name: path for name, path in found.items() if name not in own | set(sys.stdlib_module_names)}
+
+
+def names(requirements: list[str]) -> set[str]:
+    """Distributions, by their normalised names."""
+    return {normal(re.split(r"[^\w.-]", each)[0]) for each in requirements}
+
+
+def normal(name: str) -> str:
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+DECLARED = names(PROJECT["project"]["dependencies"])
+EXTRA = names([each for group in PROJECT["project"]["optional-dependencies"].values() for each in group])
+DEVELOPMENT = names(PROJECT["dependency-groups"]["dev"])
+
+
+@pytest.mark.parametrize(
+    ("folder", "allowed"),
+    [("robot_dyn", DECLARED | EXTRA), *((each, DECLARED | EXTRA | DEVELOPMENT) for each in ("tests", "scripts"))],
+)
+def test_what_is_imported_is_declared(folder: str, allowed: set[str]) -> None:
+    """Every module comes from a distribution that pyproject.toml names, not from one that another brings along."""
+    homes = packages_distributions() | HOMES
+    for module, path in imported(folder).items():
+        if module not in homes:  # not installed: by its own name
+            assert normal(module) in allowed, f"{path} imports {module}, which nothing declares"
+            continue
+        assert {normal(home) for home in homes[module]} & allowed, f"{path} imports {module}, of {homes[module]}"
+
+
+def test_what_is_declared_is_used() -> None:
+    homes = packages_distributions() | HOMES
+    used = {normal(home) for module in imported("robot_dyn") for home in homes.get(module, [module])}
+    assert used >= DECLARED - BY_PATH
+    assert BY_PATH <= DECLARED
+
+
+def test_the_lock_holds_what_is_declared() -> None:
+    """One version of each, that the declaration allows; on other Pythons than its own it asks for nothing."""
+    lines = (ROOT / "requirements-dev.lock").read_text(encoding="utf-8").splitlines()
+    locked = {normal(each.name): each for each in map(Requirement, lines)}
+    assert len(locked) == len(lines) > 50
+    for each in locked.values():
+        (version,) = each.specifier
+        assert version.operator == "==" and each.url is None and str(each.marker) == 'python_version == "3.11"'
+    for asked in map(Requirement, [*PROJECT["project"]["dependencies"], *PROJECT["dependency-groups"]["dev"]]):
+        (version,) = locked[normal(asked.name)].specifier
+        assert asked.specifier.contains(version.version), asked
