@@ -84,14 +84,14 @@ def test_estimate_of_a_sampled_controller_is_that_of_the_same_ticks() -> None:
     assert error / 10 < run.error.final < 10 * error
 
 
-def test_estimate_of_an_adaptive_run_bounds_its_error() -> None:
-    """The run of ten times the tolerance errs more: an upper bound, and no more than a thousandfold."""
+def test_estimate_of_an_adaptive_run_is_near_its_error() -> None:
+    """A run of a tenth of the tolerance errs about eight times less, so the difference is the error to some 15 %."""
     for scene in SCENES.values():
         run = rd.simulate(setup(*scene), integrator=rd.Adaptive())
         tight = rd.simulate(setup(*scene), integrator=rd.Adaptive(rtol=1e-13, atol=1e-14), estimate_error=False)
-        error = np.abs(run.q[-1] - tight.q[-1]).max()
+        error = np.abs(run.q - tight.q).max()
         assert run.error is not None
-        assert error < run.error.final < 1000 * max(error, 1e-12)
+        assert 0.3 * error < run.error.final < 3 * max(error, 2e-12)
 
 
 @pytest.mark.parametrize("step", [0.05, 0.02])
@@ -106,7 +106,8 @@ def test_chaos_at_a_coarse_step_is_not_resolved(step: float) -> None:
     assert error[-1] > 1.0  # the end of the run is fiction
     assert estimate is not None
     assert estimate.resolved_until < 20.0
-    assert f"not resolved after t* = {estimate.resolved_until:g} s" in estimate.note
+    assert "differ as much as the motion itself; take step_s" in estimate.note
+    assert f"up to t = {estimate.resolved_until:g} s" in run.summary
     assert estimate.note in run.summary
     before = error[run.t <= estimate.resolved_until]
     assert before[-1] < 0.1
@@ -118,7 +119,7 @@ def test_a_long_adaptive_run_of_chaos_is_not_resolved() -> None:
     run = rd.simulate(chaos, integrator=rd.Adaptive(rtol=1e-4, atol=1e-6))
     assert run.error is not None
     assert run.error.resolved_until < 20.0
-    assert "take a smaller tolerance" in run.error.note
+    assert "take rtol = 1e-06" in run.error.note
     assert run.error.final <= 0.1
 
 
@@ -129,12 +130,3 @@ def test_rounding_alone_is_not_an_error_of_the_method() -> None:
     assert run.error is not None
     assert run.error.resolved_until == 1.0
     assert run.error.final < 1e-11
-
-
-def test_too_few_steps_between_ticks_leave_no_companions_and_say_so() -> None:
-    plant, _, q0, v0, _, _ = SCENES["planar_2r with friction"]
-    law = rd.PD(rd.hold(q0), 60.0, 4.0, period_s=2e-3)
-    run = rd.simulate(setup(plant, law, q0, v0, 0.1, 1e-3))
-    assert run.error is not None
-    assert np.isnan(run.error.final)
-    assert "fewer than 4 steps" in run.error.note

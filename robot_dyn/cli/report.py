@@ -131,6 +131,8 @@ def run(trajectory: Trajectory) -> Document:
         "ledger_closure": _finite(trajectory.ledger.closure),
         "error": None if error is None else _finite(error.final),
         "error_resolved_until": None if error is None else error.resolved_until,
+        "error_verdict": None if error is None else str(error.verdict),
+        "error_note": None if error is None else error.note or error.reason,
         "tracking_error": trajectory.tracking_error,
         "remarks": [asdict(remark) for remark in trajectory.remarks],
         "extremes": _extremes(trajectory),

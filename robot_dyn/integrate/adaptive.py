@@ -19,7 +19,7 @@ from robot_dyn.errors import OverflowedError, QueryError, RobotDynError
 from robot_dyn.integrate.implicit import jacobian
 from robot_dyn.integrate.integrator import System
 
-_LEAST_RTOL = 100 * np.finfo(float).eps  # SciPy's bound; below it rounding is taken for local error
+LEAST_RTOL = 100 * np.finfo(float).eps  # SciPy's bound; below it rounding is taken for local error
 
 
 class Status(Enum):
@@ -97,8 +97,8 @@ class Adaptive:
     def __post_init__(self) -> None:
         if self.method not in ("DOP853", "Radau"):
             raise QueryError(f"no adaptive method {self.method!r}: give 'DOP853' or 'Radau'")
-        if not _LEAST_RTOL < self.rtol < 1:
-            raise QueryError(f"rtol must be between {_LEAST_RTOL:.2g} and 1, got {self.rtol!r}")
+        if not LEAST_RTOL < self.rtol < 1:
+            raise QueryError(f"rtol must be between {LEAST_RTOL:.2g} and 1, got {self.rtol!r}")
         if not 0 <= self.atol < inf:
             raise QueryError(f"atol must be finite and not negative, got {self.atol!r}")
         if not self.max_step > 0:

@@ -14,6 +14,7 @@ from robot_dyn.errors import RobotDynError
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.setup import Setup
+from robot_dyn.simulation.smoothness import foreign
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.machine.machine import Machine
@@ -37,8 +38,8 @@ def choose(setup: Setup, motion: Motion) -> tuple[Machine | None, str]:
         return None, "interpreted"
     if setup.engine == "compiled":
         return _machine(setup, motion), _label(setup)
-    if foreign := _foreign(setup):
-        return None, f"interpreted ({foreign} is not the library's own)"
+    if parts := foreign(setup):  # they may have effects of their own, which a trace would lose
+        return None, f"interpreted ({type(parts[0]).__name__} is not the library's own)"
     seconds = _evaluations(setup) * _cost(setup, motion)
     if seconds < _TRACE_S:
         return None, "interpreted (short: compiling does not pay)"
@@ -72,22 +73,14 @@ def _label(setup: Setup) -> str:
     return "compiled" if steps_whole(setup.integrator) else "compiled (the equation of motion; steps in Python)"
 
 
-def _foreign(setup: Setup) -> str:
-    """The name of a part written elsewhere: it may have effects of its own, which a trace would lose."""
-    parts = (setup.plant.dynamics, *setup.plant.effects, setup.controller, setup.integrator)
-    for part in (*parts, getattr(setup.controller, "model", None)):
-        if part is not None and not type(part).__module__.startswith("robot_dyn."):
-            return type(part).__name__
-    return ""
-
-
 def _evaluations(setup: Setup) -> float:
     """About how many evaluations of the equation of motion a run takes, with its companions."""
     method: Any = setup.integrator
     if isinstance(method, Adaptive):
-        return _PER_SECOND * setup.duration_s * (2 if setup.estimate_error else 1)
-    steps = sum(map(setup.steps, setup.stretches)) * (1.75 if setup.estimate_error else 1.0)
-    return steps * (method.evaluations_per_step or _GUESSED + 2 * len(setup.q0))
+        return _PER_SECOND * setup.duration_s * (3 if setup.estimate_error else 1)
+    return (
+        setup.steps * (2 if setup.estimate_error else 1) * (method.evaluations_per_step or _GUESSED + 2 * len(setup.q0))
+    )
 
 
 def _cost(setup: Setup, motion: Motion) -> float:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from math import ceil
 from typing import TypeVar, final
 
@@ -18,11 +19,13 @@ from robot_dyn.integrate.adaptive import Adaptive, Status
 from robot_dyn.integrate.integrator import IntegrationError, Integrator, System
 from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.observer import Observer
-from robot_dyn.simulation.setup import Setup, Stretch
+from robot_dyn.simulation.schedule import Stretch, paced
+from robot_dyn.simulation.setup import Setup
 
 WATCHED = 64  # steps between looks at the energy
 _RUNAWAY = 1e6  # [rad/s] or [m/s]: an adaptive method would follow an exploding state without end
 _SAMPLES = 1000  # of an adaptive run without a record period
+_LOCAL_ORDER = 8  # of DOP853: its steps grow as this root of the tolerance
 _PACED = 2000  # steps between looks at the pace of an adaptive method
 _MOST_AHEAD = 1e7  # steps that such a run may have before it at the pace it has: about an hour
 _STEEP = 1e-3  # of q or v: an effect that bends within less makes a system stiff
@@ -39,13 +42,15 @@ class Sample:
         t: In [s].
         y: The state of the motion.
         held: What a sampled controller holds, or None.
-        shared: Whether the companion runs pass here too.
+        key: Steps of the run, not of a companion, before it; −1 if other runs need not pass here.
+        kept: Whether it may be a sample of the record.
     """
 
     t: float
     y: Array
     held: Array | None
-    shared: bool
+    key: int = -1
+    kept: bool = True
 
 
 class DivergedError(Exception):
@@ -79,14 +84,14 @@ Systems = Callable[[Array | None, Stretch], System]
 
 
 def march(
-    setup: Setup, motion: Motion, factor: int, counter: Counter, systems: Systems | None = None
+    setup: Setup, motion: Motion, pace: Fraction, counter: Counter, systems: Systems | None = None
 ) -> Iterator[Sample]:
     """The states of a run, at the start of each step and at the end.
 
     Args:
         setup: What to run.
         motion: Its equation of motion.
-        factor: Length of a step, in steps of the setup; tolerances of an adaptive method are multiplied by it.
+        pace: Length of a step, in steps of the setup; tolerances of an adaptive method are multiplied by it.
         counter: Counts what it takes.
         systems: Gives the equation on a stretch, from what a controller holds; that of the motion unless given.
 
@@ -95,34 +100,27 @@ def march(
     """
     y, held = motion.start(setup.q0, setup.v0), None
     watch = Watch(setup, motion)
-    for stretch in setup.stretches:
+    adaptive, key = isinstance(setup.integrator, Adaptive), 0
+    for stretch in setup.stretches if adaptive else paced(setup.stretches, pace):
         if stretch.tick:
             y, held = watch.tick(stretch.start, y)
         system = counter.counted(systems(held, stretch) if systems else motion.system(held, stretch))
         method = setup.integrator
         if isinstance(method, Adaptive):
-            method = replace_tolerance(method, factor)
-            y = yield from _adaptively(setup, method, system, stretch, y, held, counter, watch)
+            y, key = yield from _adaptively(setup, method, pace, system, stretch, y, held, key, counter, watch)
         else:
-            y = yield from _by_steps(setup, method, system, stretch, y, held, factor, counter, watch)
+            y = yield from _by_steps(method, system, stretch, y, held, counter, watch)
     y, held = watch.tick(setup.duration_s, y)
-    yield Sample(setup.duration_s, y, held, shared=True)
-
-
-def replace_tolerance(method: Adaptive, factor: int) -> Adaptive:
-    """The method with its tolerances multiplied."""
-    return method if factor == 1 else replace(method, rtol=method.rtol * factor, atol=method.atol * factor)
+    yield Sample(setup.duration_s, y, held, key if adaptive else setup.steps)
 
 
 def _by_steps(
-    setup: Setup, method: Integrator, system: System, stretch: Stretch, y: Array, held: Array | None,
-    factor: int, counter: Counter, watch: Watch,
-) -> Iterator[Sample]:  # fmt: skip
-    count = setup.steps(stretch)
-    h = (stretch.end - stretch.start) / count * factor
-    for k in range(max(1, count // factor)):
-        t = stretch.start + k * h
-        yield Sample(t, y, held, shared=k * factor % 4 == 0)
+    method: Integrator, system: System, stretch: Stretch, y: Array, held: Array | None, counter: Counter, watch: Watch
+) -> Iterator[Sample]:
+    h = (stretch.end - stretch.start) / stretch.steps
+    for k in range(stretch.steps):
+        t, passed = stretch.start + k * h, k * stretch.pace
+        yield Sample(t, y, held, stretch.first + int(passed) if passed.denominator == 1 else -1)
         y = one_step(method, system, t, y, h, watch)
         counter.steps += 1
         if counter.observer is not None:
@@ -141,15 +139,18 @@ def one_step(method: Integrator, system: System, t: float, y: Array, h: float, w
 
 
 def _adaptively(
-    setup: Setup, method: Adaptive, system: System, stretch: Stretch, y: Array, held: Array | None,
-    counter: Counter, watch: Watch,
+    setup: Setup, method: Adaptive, pace: Fraction, system: System, stretch: Stretch, y: Array, held: Array | None,
+    key: int, counter: Counter, watch: Watch,
 ) -> Iterator[Sample]:  # fmt: skip
-    n, period = system.n, setup.record_period_s or setup.duration_s / _SAMPLES
+    n, factor, period = system.n, float(pace), setup.record_period_s or setup.duration_s / _SAMPLES
+    longest = min(method.max_step, setup.longest_step_s) * factor ** (1 / _LOCAL_ORDER)
+    method = replace(method, rtol=method.rtol * factor, atol=method.atol * factor, max_step=longest)
 
     def sane(_: float, y: Array) -> float:
         return 1.0 if np.abs(y[n : 2 * n]).max() < _RUNAWAY else -1.0
 
-    yield Sample(stretch.start, y, held, shared=True)
+    yield Sample(stretch.start, y, held, key)
+    key += 1
     due, end = ceil(stretch.start / period + 1e-9), ceil(stretch.end / period - 1e-9)  # multiples of the period inside
     steps = method.steps(system, stretch.start, y, stretch.end, stop=sane)
     ticked = stretch.tick and held is not None
@@ -158,14 +159,15 @@ def _adaptively(
         _observe(counter.observer, watch.motion, t, y, held, ticked)
         ticked = False
         while due < end and due * period <= t:
-            yield Sample(due * period, piece(due * period), held, shared=True)
-            due += 1
+            yield Sample(due * period, piece(due * period), held, key)
+            due, key = due + 1, key + 1
+        yield Sample(t, y, held, kept=False)
         watch.pace(t, counter.steps)
     if steps.status is Status.FAILED:
         raise DivergedError(steps.t, steps.message)
     if steps.status is Status.STOPPED:
         raise DivergedError(steps.t, f"a joint moves faster than {_RUNAWAY:g} rad/s: the control is unstable")
-    return steps.y
+    return steps.y, key
 
 
 def _observe(observer: Observer | None, motion: Motion, t: float, y: Array, held: Array | None, ticked: bool) -> None:

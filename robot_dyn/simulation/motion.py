@@ -20,7 +20,7 @@ from robot_dyn.effects.effect import Conservative, Force
 from robot_dyn.effects.plant import Plant
 from robot_dyn.integrate.integrator import System
 from robot_dyn.model.dynamics import acceleration
-from robot_dyn.simulation.setup import Stretch
+from robot_dyn.simulation.schedule import Stretch
 
 CONTROL = "control"
 
@@ -80,6 +80,11 @@ class Motion:
         q, second = y[:n], y[n : 2 * n]
         v = acceleration(self.plant.M(q), second, self.plant.dynamics.joint_names) if self.canonical else second
         return q, v, y[2 * n : 2 * n + m], y[2 * n + m :]
+
+    def velocities(self, y: Array) -> Array:
+        """V of states y (k, m), (k, n)."""
+        n = self.plant.dynamics.n
+        return np.array([self.state(row)[1] for row in y]).reshape(-1, n) if self.canonical else y[:, n : 2 * n]
 
     def command(self, t: float, q: Array, v: Array, z: Array) -> Array:
         """The actuation that the controller asks for, within the bounds of the plant."""

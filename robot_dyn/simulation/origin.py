@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import os
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 def origin(dynamics: Any) -> dict[str, str]:
     """Where a run comes from, as texts: URDF, its path, edits and versions."""
     robot = getattr(dynamics, "robot", dynamics)
-    texts = {"versions": ", ".join(f"{name} {version_of(name)}" for name in ("robot-dyn", "pin", "numpy", "scipy"))}
+    texts = {"versions": versions()}
     if isinstance(robot, Robot):
         urdf = robot.description.text.decode(errors="replace")
         texts |= {"robot": robot.name, "source": robot.description.source}
@@ -73,6 +74,12 @@ def joint_types(run: Trajectory) -> tuple[str | None, ...]:
     except DescriptionError:
         kinds = {}
     return tuple(kinds.get(name) for name in run.joint_names)
+
+
+@cache  # reading the metadata of packages takes longer than a short run
+def versions() -> str:
+    """Versions of this library and of those that its numbers depend on."""
+    return ", ".join(f"{name} {version_of(name)}" for name in ("robot-dyn", "pin", "numpy", "scipy"))
 
 
 def robot_of(run: Trajectory) -> Robot:

@@ -1,10 +1,11 @@
-"""What a march leaves behind: its samples at t = 0, T, 2 T, …, and the positions that companion runs share."""
+"""What a march leaves behind: its samples at t = 0, T, 2 T, …, and the states that companion runs share."""
 
 from __future__ import annotations
 
 from array import array
 from collections.abc import Callable
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import partial
 from typing import final
 
@@ -16,6 +17,24 @@ from robot_dyn.simulation.observer import Observer
 from robot_dyn.simulation.samples import row
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.trajectory import Ending, Outcome
+
+MOST_SHARED = 200_000  # states of a run that are compared with those of its companions
+
+
+@final
+@dataclass(frozen=True)
+class Path:
+    """States on the way, k of them.
+
+    Attributes:
+        key: Steps of the run before each, (k,), by which the states of a run and of its companions are matched.
+        t: In [s], (k,).
+        y: States of the motion, (k, m).
+    """
+
+    key: np.ndarray
+    t: np.ndarray
+    y: np.ndarray
 
 
 @final
@@ -29,8 +48,8 @@ class Record:
         y: States of the motion, (k, m).
         held: What a sampled controller holds, (k, n); None for any other.
         rows: What follows from them, side by side as of `samples.row`; None where machine code gives it.
-        shared_t: Times at which companion runs are compared, (c,), in [s].
-        shared_q: Positions there, (c, n).
+        shared: States at which runs of other steps are compared.
+        walked: States at the ends of all steps; the same, unless the method chooses its steps.
         steps: Number of steps.
         evaluations: Of the equation of motion.
     """
@@ -40,8 +59,8 @@ class Record:
     y: np.ndarray
     held: np.ndarray | None
     rows: np.ndarray | None
-    shared_t: np.ndarray
-    shared_q: np.ndarray
+    shared: Path
+    walked: Path
     steps: int
     evaluations: int
 
@@ -49,7 +68,7 @@ class Record:
 def collect(
     setup: Setup,
     motion: Motion,
-    factor: int,
+    pace: Fraction,
     thin: int,
     systems: Systems | None = None,
     on_progress: Callable[[float], object] | None = None,
@@ -60,28 +79,30 @@ def collect(
     Args:
         setup: What to run.
         motion: Its equation of motion.
-        factor: Length of a step, in steps of the setup; 1 keeps samples.
-        thin: Shared states between those that are kept.
+        pace: Length of a step, in steps of the setup; 1 keeps samples.
+        thin: Steps of the run between the states of `Record.shared`.
         systems: As of `march`.
         on_progress: Called with the time reached at each step.
         observer: Sees each step.
     """
     kept = _Kept(motion, derived=systems is None)
-    counter, shared, start = Counter(observer), list[Sample](), motion.start(setup.q0, setup.v0)
+    counter, shared, walked = Counter(observer), list[Sample](), list[Sample]()
+    start = motion.start(setup.q0, setup.v0)
     if observer is not None:
         systems = partial(systems or motion.system, seen=observer.seen)
-    next_record, t, seen = 0.0, 0.0, 0
+    next_record, t = 0.0, 0.0
     try:
         with np.errstate(all="ignore"):  # what overflows ends the march
-            for sample in march(setup, motion, factor, counter, systems):
+            for sample in march(setup, motion, pace, counter, systems):
                 t, last = sample.t, sample.t == setup.duration_s
-                if factor == 1 and (t >= next_record - 1e-9 * setup.step_s or last):
+                if not sample.kept:
+                    if len(walked) < MOST_SHARED:
+                        walked.append(sample)
+                elif pace == 1 and (t >= next_record - 1e-9 * setup.step_s or last):
                     kept.add(sample)
                     next_record += setup.record_period_s
-                if sample.shared:
-                    if seen % thin == 0 or last:
-                        shared.append(sample)
-                    seen += 1
+                if sample.key >= 0 and (sample.key % thin == 0 or last):
+                    shared.append(sample)
                 if on_progress is not None:
                     on_progress(t)
         outcome = Outcome(Ending.FINISHED, t)
@@ -89,12 +110,11 @@ def collect(
         outcome = Outcome(Ending.DIVERGED, end.t, str(end))
     except KeyboardInterrupt:
         outcome = Outcome(Ending.STOPPED, t, "interrupted; all samples up to here are kept")
-    if factor == 1 and not kept.numbers:  # interrupted, or without a tick, at once
-        kept.add(Sample(0.0, start, np.full_like(setup.q0, np.nan) if motion.sampled else None, shared=True))
-    n = motion.plant.dynamics.n
+    if pace == 1 and not kept.numbers:  # interrupted, or without a tick, at once
+        kept.add(Sample(0.0, start, np.full_like(setup.q0, np.nan) if motion.sampled else None))
     return Record(
         outcome, *kept.columns(len(start)),
-        np.array([sample.t for sample in shared]), np.array([sample.y[:n] for sample in shared]).reshape(-1, n),
+        _path(shared), _path(sorted([*walked, *shared], key=_time) if walked else shared),
         counter.steps, counter.evaluations,
     )  # fmt: skip
 
@@ -124,3 +144,12 @@ class _Kept:
         end = 1 + m + (self.motion.plant.dynamics.n if self.motion.sampled else 0)
         held = table[:, 1 + m : end] if self.motion.sampled else None
         return table[:, 0].copy(), table[:, 1 : 1 + m], held, table[:, end:] if self.derived else None
+
+
+def _time(sample: Sample) -> float:
+    return sample.t
+
+
+def _path(samples: list[Sample]) -> Path:
+    key, t = np.array([sample.key for sample in samples], np.int64), np.array([sample.t for sample in samples])
+    return Path(key, t, np.array([sample.y for sample in samples]).reshape(len(samples), -1))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass, field
-from itertools import pairwise
-from math import ceil, inf
+from functools import cached_property
+from math import inf
 from typing import final
 
 import numpy as np
@@ -18,25 +18,12 @@ from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.integrate.explicit import RK4
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.model.dynamics import checked
+from robot_dyn.simulation.schedule import LEAST_STEPS, Stretch, cuts, steps_on
 from robot_dyn.simulation.size import check_segments
+from robot_dyn.simulation.smoothness import may_switch
 
 ENGINES = ("auto", "interpreted", "compiled")
-
-
-@final
-@dataclass(frozen=True)
-class Stretch:
-    """A part of the run without ticks or switches inside.
-
-    Attributes:
-        start: In [s].
-        end: In [s].
-        tick: Whether a sampled controller acts at its start.
-    """
-
-    start: float
-    end: float
-    tick: bool
+_LONGEST_STEP_S, _LEAST_STEPS = 0.01, 200  # where something may switch between steps
 
 
 @final
@@ -51,10 +38,11 @@ class Setup:
         duration_s: In [s].
         controller: What drives it, or None.
         integrator: A method of fixed step, or an `Adaptive` one.
-        step_s: Fixed step; made a little smaller where ticks, switches and the end ask for it. Not to be given
-            for an Adaptive method.
+        step_s: Fixed step; made smaller where ticks, switches and the end ask for it. Not to be given for an Adaptive
+            method.
         record_period_s: Time between samples; 0 for every step.
-        estimate_error: Whether companion runs of longer steps are made, which cost 3/4 of the run.
+        estimate_error: Whether companion runs are made, which cost about as much as the run; five times as much
+            where only shorter steps can tell.
         about: Texts kept with the run.
         engine: "interpreted"; "compiled", the run in machine code, right angles of the file written out in
             full; or "auto", which compiles where that pays.
@@ -118,36 +106,39 @@ class Setup:
         if isinstance(frame := getattr(self.controller, "frame", None), str):
             plant.placement(self.q0, frame)  # so that an unknown link is told now
 
-    @property
+    @cached_property
     def stretches(self) -> tuple[Stretch, ...]:
-        """The run cut at the ticks of the controller, the breaks of its reference and the switches of effects."""
-        period = self.controller.period_s if self.controller else 0.0
-        ticks = {k * period for k in range(max(1, ceil(self.duration_s / period - 1e-9)))} if period > 0 else {0.0}
+        """The run cut at the ticks of the controller, the breaks of its reference and the switches of effects.
+
+        Raises:
+            QueryError: If two switches lie closer together than floats can tell.
+        """
         switches = {t for effect in self.plant.effects for t in effect.switches}
         switches |= set(self.controller.knots if self.controller else ())
-        least = 1e-9 * self.duration_s  # cuts nearer than this differ by rounding alone
-        cuts: list[tuple[float, bool]] = []
-        for cut in sorted(ticks | {t for t in switches if 0.0 < t < self.duration_s}):
-            if (
-                cuts and cut - cuts[-1][0] < least
-            ):  # one cut: at the switch, whose window is exact, and a tick if one is
-                at = cut if cut in switches else cuts[-1][0]
-                cuts[-1] = at, cuts[-1][1] or cut in ticks
-            elif self.duration_s - cut >= least:
-                cuts.append((cut, cut in ticks))
-        return tuple(Stretch(a, b, tick) for (a, tick), (b, _) in pairwise([*cuts, (self.duration_s, False)]))
+        starts = cuts(self.duration_s, self.controller.period_s if self.controller else 0.0, switches)
+        step, ends = self.step_s, [*(t for t, _ in starts[1:]), self.duration_s]
+        counts = [
+            steps_on(end - start, step, self.record_period_s) for (start, _), end in zip(starts, ends, strict=True)
+        ]
+        few = sum(count < LEAST_STEPS for count in counts)
+        if LEAST_STEPS * few <= sum(counts) / 10:  # so that companion runs can take longer steps there
+            counts = [max(count, LEAST_STEPS) for count in counts]
+        firsts = np.cumsum([0, *counts[:-1]]).tolist()
+        return tuple(
+            Stretch(start, end, tick, count, first)
+            for (start, tick), end, count, first in zip(starts, ends, counts, firsts, strict=True)
+        )
 
-    def steps(self, stretch: Stretch) -> int:
-        """Number of steps on a stretch: a multiple of 4, for the companion runs, where it has that many.
+    @property
+    def steps(self) -> int:
+        """Number of steps of a method of fixed step."""
+        return self.stretches[-1].first + self.stretches[-1].steps
 
-        Where the stretch holds record periods, each is a number of steps, so that samples lie on them.
+    @property
+    def longest_step_s(self) -> float:
+        """Longest step that an adaptive method may take, in [s]: 10 ms and 1/200 of the run where something may switch.
+
+        Joint stops, effects that act for a time, and code written elsewhere may act between the ends of a step, and
+        error control does not see what no stage meets. A fixed step is the user's.
         """
-        length, record = stretch.end - stretch.start, self.record_period_s
-        periods = round(length / record) if record else 0
-        if periods and abs(length / record - periods) < 1e-9:
-            each = max(1, ceil(record / self.step_s - 1e-9))
-            while periods * each >= 4 and periods * each % 4:
-                each += 1
-            return periods * each
-        count = max(1, ceil(length / self.step_s - 1e-9))
-        return 4 * ceil(count / 4) if count >= 4 else count
+        return min(_LONGEST_STEP_S, self.duration_s / _LEAST_STEPS) if may_switch(self) else inf

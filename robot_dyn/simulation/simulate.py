@@ -8,7 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from fractions import Fraction
 from functools import partial
+from math import ceil
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
@@ -21,14 +23,15 @@ from robot_dyn.errors import QueryError, nearest
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.simulation.choice import choose
-from robot_dyn.simulation.error import ErrorEstimate, difference, richardson
+from robot_dyn.simulation.error import ErrorEstimate, no_estimate
+from robot_dyn.simulation.estimate import estimate
 from robot_dyn.simulation.ledger import Ledger
 from robot_dyn.simulation.loads import at_stop, link_of, wrenches
 from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.observed import observer_of, remarks
 from robot_dyn.simulation.observer import Observer
 from robot_dyn.simulation.origin import origin
-from robot_dyn.simulation.record import Record, collect
+from robot_dyn.simulation.record import MOST_SHARED, Record, collect
 from robot_dyn.simulation.samples import columns, compiled_rows
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import check_record
@@ -36,8 +39,6 @@ from robot_dyn.simulation.trajectory import Ending, Outcome, Statistics, Traject
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.machine.machine import Machine
-
-_SHARED = 2000  # at most about this many times at which companion runs are compared
 
 
 def simulate(
@@ -64,62 +65,53 @@ def simulate(
         setup = Setup(what if isinstance(what, Plant) else Plant(what), **options)
     motion = Motion(setup.plant, setup.controller, getattr(setup.integrator, "canonical", False))
     check_record(setup, motion)
+    clock = [perf_counter()]
     machine, engine = choose(setup, motion)
-    began = perf_counter()
+    clock.append(perf_counter())
     observer = observer_of(setup, motion)
-    record = _run(setup, motion, machine, 1, on_progress, observer)
-    wall = perf_counter() - began
+    record = _run(setup, motion, machine, on_progress=on_progress, observer=observer)
+    clock.append(perf_counter())
     error = None
     if setup.estimate_error and record.outcome.ending is not Ending.STOPPED:
         try:
-            error = _estimate(setup, motion, machine, record)
+            error = estimate(setup, motion, record, partial(_run, setup, motion, machine))
         except KeyboardInterrupt:
-            error = ErrorEstimate(np.empty(0), np.empty(0), 0.0, "its companion runs were interrupted")
+            error = no_estimate("its companion runs were interrupted")
             if record.outcome.ending is Ending.FINISHED:
                 outcome = Outcome(Ending.STOPPED, record.outcome.t, "interrupted after the run, in its error estimate")
                 record = replace(record, outcome=outcome)
-    companions = perf_counter() - began - wall if setup.estimate_error else 0.0
+    clock.append(perf_counter())
+    compiling, wall, companions = np.diff(clock).tolist()
     adaptive = isinstance(setup.integrator, Adaptive)
     name = setup.integrator.method if isinstance(setup.integrator, Adaptive) else setup.integrator.name
     step = 0.0 if adaptive else record.outcome.t / max(record.steps, 1)
-    statistics = Statistics(name, step, record.steps, record.evaluations, wall, companions, engine)
+    statistics = Statistics(name, step, record.steps, record.evaluations, wall, companions, engine, compiling)
     observer.close()
-    return _trajectory(setup, motion, machine, record, statistics, error, observer)
+    made = _trajectory(setup, motion, machine, record, statistics, error, observer)
+    return replace(made, statistics=replace(statistics, samples_s=perf_counter() - clock[-1]))
 
 
 def _run(
     setup: Setup,
     motion: Motion,
     machine: Machine | None,
-    factor: int,
+    pace: Fraction = Fraction(1),
     on_progress: Callable[[float], object] | None = None,
     observer: Observer | None = None,
 ) -> Record:
     """March in machine code, in the interpreted engine, or in that with its rate in machine code."""
-    thin = max(1, sum(map(setup.steps, setup.stretches)) // (4 * _SHARED))
+    few = isinstance(setup.integrator, Adaptive) or setup.steps <= MOST_SHARED
+    thin = 1 if few else 30 * ceil(setup.steps / MOST_SHARED)  # steps of 2, 3 and 5 meet at every 30th
     if machine is not None and machine.whole:
         from robot_dyn.simulation.machine.follow import follow
 
-        record = follow(setup, motion, machine, factor, thin, on_progress, observer)
+        record = follow(setup, motion, machine, pace, thin, on_progress, observer)
     else:
         systems = partial(machine.system, setup=setup) if machine is not None else None
-        record = collect(setup, motion, factor, thin, systems, on_progress, observer)
-    if factor != 1 and record.outcome.ending is Ending.STOPPED:
+        record = collect(setup, motion, pace, thin, systems, on_progress, observer)
+    if pace != 1 and record.outcome.ending is Ending.STOPPED:
         raise KeyboardInterrupt
     return record
-
-
-def _estimate(setup: Setup, motion: Motion, machine: Machine | None, run: Record) -> ErrorEstimate:
-    """Companion runs: of 2 and 4 times the step, or of 10 times the tolerance."""
-    adaptive = isinstance(setup.integrator, Adaptive)
-    if not adaptive and min(map(setup.steps, setup.stretches)) < 4:
-        return ErrorEstimate(np.empty(0), np.empty(0), 0.0, "fewer than 4 steps between ticks, switches or breaks")
-    runs = [run, *(_run(setup, motion, machine, factor) for factor in ((10,) if adaptive else (2, 4)))]
-    reached = min(len(each.shared_t) for each in runs)
-    t, positions = run.shared_t[:reached], [each.shared_q[:reached] for each in runs]
-    if isinstance(setup.integrator, Adaptive):
-        return difference(t, *positions)
-    return richardson(t, *positions, order=setup.integrator.order)
 
 
 def _trajectory(

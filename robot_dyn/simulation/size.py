@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 MOST_BYTES = 8 * 2**30  # of all that is recorded, unless said
 MOST_STEPS = 1e11  # about a day of the fastest machine code
-_SEGMENT_BYTES, _SEGMENT_BYTES_PER_JOINT = 500, 100  # measured; the second is a quintic at its start and along it
+_SEGMENT_BYTES, _SEGMENT_BYTES_PER_JOINT = 500, 100  # by estimate; the second is a quintic at its start and along it
 
 
 def check_segments(setup: Setup) -> None:

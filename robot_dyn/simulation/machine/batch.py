@@ -8,6 +8,7 @@ from __future__ import annotations
 import threading
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import replace
+from fractions import Fraction
 from typing import final
 
 import numpy as np
@@ -143,7 +144,7 @@ class Batch:
         assert isinstance(setup.integrator, Integrator)
         free = {name: x[run] for name, x in self.values.items()}
         one = machine(self.nominal, setup.integrator, free=free)
-        record = follow(setup, one.motion, one, 1, 1)
+        record = follow(setup, one.motion, one, Fraction(1), 1)
         k, made, energy = len(record.t), *one.look(record.t, np.ascontiguousarray(record.y), record.held)
         for array in (self.out_y, self.out_u, self.out_e):
             array[:, :, run] = np.nan

@@ -7,6 +7,8 @@ by the interpreted engine, which alone ends a run, and words why.
 from __future__ import annotations
 
 from collections.abc import Callable
+from fractions import Fraction
+from math import ceil
 from time import perf_counter
 from typing import final
 
@@ -19,7 +21,8 @@ from robot_dyn.simulation.machine.timetable import Timetable, timetable
 from robot_dyn.simulation.march import DivergedError, Watch, one_step
 from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.observer import Observer
-from robot_dyn.simulation.record import Record
+from robot_dyn.simulation.record import MOST_SHARED, Path, Record
+from robot_dyn.simulation.schedule import paced
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.trajectory import Ending, Outcome
 
@@ -31,7 +34,7 @@ def follow(
     setup: Setup,
     motion: Motion,
     machine: Machine,
-    factor: int,
+    pace: Fraction,
     thin: int,
     on_progress: Callable[[float], object] | None = None,
     observer: Observer | None = None,
@@ -42,12 +45,12 @@ def follow(
         setup: What to run.
         motion: Its equation of motion.
         machine: The same compiled.
-        factor: Length of a step, in steps of the setup; 1 keeps samples.
-        thin: Shared states between those that are kept.
+        pace: Length of a step, in steps of the setup; 1 keeps samples.
+        thin: Steps of the setup between the states of `Record.shared`.
         on_progress: Called with the time reached now and then.
         observer: Sees each step.
     """
-    return _Run(setup, motion, machine, factor, thin, observer).record(on_progress)
+    return _Run(setup, motion, machine, pace, thin, observer).record(on_progress)
 
 
 @final
@@ -55,18 +58,20 @@ class _Run:
     """A run on its way."""
 
     def __init__(
-        self, setup: Setup, motion: Motion, machine: Machine, factor: int, thin: int, observer: Observer | None
+        self, setup: Setup, motion: Motion, machine: Machine, pace: Fraction, thin: int, observer: Observer | None
     ) -> None:
         self.setup, self.motion, self.machine, self.observer = setup, motion, machine, observer
-        self.table, self.watch = timetable(setup, factor), Watch(setup, motion)
+        self.stretches = paced(setup.stretches, pace)
+        self.table, self.watch = timetable(setup, pace), Watch(setup, motion)
         self.start = motion.start(setup.q0, setup.v0)
         self.work = machine.work(self.start)
-        places, n, counts = machine.program.places, machine.program.n, self.table.counts
+        places, counts = machine.program.places, self.table.counts
         self.m, self.held_at = places.state, slice(places.x + places.state, places.x + places.state + places.held)
         self.now = np.zeros(len(Now), dtype=np.int64)
-        every = 4 // factor
-        self.now[Now.EVERY], self.now[Now.THIN] = every, thin
-        rows, columns = _rows(setup, self.table) if factor == 1 else 0, [*range(self.m)]
+        every = max(1, int(thin / pace))
+        among = 2 * ceil(len(counts) / MOST_SHARED) if len(counts) > MOST_SHARED else 1
+        self.now[Now.EVERY], self.now[Now.THIN] = every, among
+        rows, columns = _rows(setup, self.table) if pace == 1 else 0, [*range(self.m)]
         if places.held:
             columns += range(self.held_at.start, self.held_at.stop)
         energy = np.zeros((5, 1))
@@ -76,8 +81,8 @@ class _Run:
             "which": np.array(columns, dtype=np.int64),
             "out_step": np.empty((rows, 2), np.int64),
             "out_y": np.empty((rows, len(columns), 1)),
-            "out_shared": np.empty((int((-(-counts // every)).sum()) // thin + 2, n + 2)),
-            "clock": np.array([0.0 if factor == 1 else np.inf, setup.record_period_s, 1e-9 * setup.step_s]),
+            "out_shared": np.empty((int((-(-counts // every)).sum()) // among + 2, self.m + 2)),
+            "clock": np.array([0.0 if pace == 1 else np.inf, setup.record_period_s, 1e-9 * setup.step_s]),
             "now": self.now,
         }
         if observer is not None:
@@ -152,10 +157,10 @@ class _Run:
             h, method = float(self.table.lengths[stretch]), self.setup.integrator
             assert isinstance(method, Integrator)
             seen = None if self.observer is None else self.observer.seen
-            system = self.motion.system(self.held, self.setup.stretches[stretch], seen)
+            system = self.motion.system(self.held, self.stretches[stretch], seen)
             y = one_step(method, system, t, y, h, self.watch)
             if self.observer is not None:
-                acted = self.held is None or (self.now[Now.STEP] == 0 and self.setup.stretches[stretch].tick)
+                acted = self.held is None or (self.now[Now.STEP] == 0 and self.stretches[stretch].tick)
                 self.observer.step(t + h, y, self.held, bool(acted))
             self.now[Now.STEP] += 1
             self.now[Now.STEPS] += 1
@@ -169,23 +174,31 @@ class _Run:
         """Times of (stretch, step), in [s]; not of machine code, which rounds once where Python rounds twice."""
         return self.table.starts[places[:, 0]] + places[:, 1] * self.table.lengths[places[:, 0]]
 
+    def _keys(self, places: np.ndarray) -> np.ndarray:
+        """Steps of the setup before (stretch, step)."""
+        first = np.array([each.first for each in self.stretches])[places[:, 0]]
+        pace = np.array([float(each.pace) for each in self.stretches])[places[:, 0]]
+        return first + np.rint(places[:, 1] * pace).astype(np.int64)
+
     def _record(self, outcome: Outcome, last: tuple[float, np.ndarray, np.ndarray | None] | None) -> Record:
         rows, m = int(self.now[Now.ROW]), self.m
         step = self.arrays["out_step"][:rows]
         t = self._times(step)
         y, seen = self.arrays["out_y"][:rows, :, 0], int(self.now[Now.SHARED])
-        shared, n = self.arrays["out_shared"][:seen], self.machine.program.n
-        shared_t, shared_q = self._times(shared[:, n:].astype(np.int64)), shared[:, :n]
+        shared = self.arrays["out_shared"][:seen]
+        at = shared[:, m:].astype(np.int64)
+        path = Path(self._keys(at), self._times(at), shared[:, :m])
         if last is None and not rows:  # interrupted, or without a tick, at once
             t = np.zeros(1)
             y = np.concatenate([self.start, np.full(len(self.arrays["which"]) - m, np.nan)])[None]
         elif last is not None:
             t = np.append(t, last[0])
             y = np.vstack([y, np.concatenate([last[1], [] if last[2] is None else last[2]])])
-            shared_t, shared_q = np.append(shared_t, last[0]), np.vstack([shared_q, last[1][:n]])
+            end = np.array([self.setup.steps]), np.array([last[0]]), last[1][None]
+            path = Path(*(np.concatenate(both) for both in zip((path.key, path.t, path.y), end, strict=True)))
         held = y[:, m:] if self.motion.sampled else None
         return Record(
-            outcome, t, y[:, :m], held, None, shared_t, shared_q,
+            outcome, t, y[:, :m], held, None, path, path,
             int(self.now[Now.STEPS]), int(self.now[Now.EVALUATIONS]),
         )  # fmt: skip
 

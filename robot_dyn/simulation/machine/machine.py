@@ -16,7 +16,8 @@ from robot_dyn.simulation.machine.places import Ended, Lane, Now
 from robot_dyn.simulation.machine.program import Program
 from robot_dyn.simulation.machine.timetable import Timetable, at_times, pieces, timetable
 from robot_dyn.simulation.motion import Motion
-from robot_dyn.simulation.setup import Setup, Stretch
+from robot_dyn.simulation.schedule import Stretch
+from robot_dyn.simulation.setup import Setup
 
 _STATES = 4
 _AGREES = 1e-13
@@ -65,11 +66,11 @@ class Machine:
 
     def run(self, work: np.ndarray, table: Timetable, **arrays: Any) -> Ended:
         """March; `arrays` are those of the program that matter, the others are empty."""
-        n, lanes, empty = self.program.n, self.program.lanes, np.empty
+        m, lanes, empty = self.program.places.state, self.program.lanes, np.empty
         given: dict[str, Any] = {
             "lanes": np.zeros((len(Lane), lanes)), "alive": np.ones(lanes, np.int64), "given": empty((0, 0)),
             "which": empty(0, np.int64), "out_step": empty((0, 2), np.int64), "out_y": empty((0, 0, lanes)),
-            "out_u": empty((0, 0, 0)), "out_e": empty((0, 2, lanes)), "out_shared": empty((0, n + 2)),
+            "out_u": empty((0, 0, 0)), "out_e": empty((0, 2, lanes)), "out_shared": empty((0, m + 2)),
             "columns": empty((0, 0)), "clock": np.array([np.inf, 0.0, 0.0]), "stop": np.zeros(1, np.int64),
         } | arrays  # fmt: skip
         order = (
@@ -175,7 +176,7 @@ class Machine:
         work, now = self.work(y), np.zeros(len(Now), dtype=np.int64)
         self.hold(work, held)
         now[Now.BUDGET], now[Now.EVERY], now[Now.THIN] = 2, 2, 2
-        self.run(work, part, now=now, out_shared=np.empty((1, self.program.n + 2)))
+        self.run(work, part, now=now, out_shared=np.empty((1, self.program.places.state + 2)))
         places = self.program.places
         return work[places.x : 2 * places.x].reshape(places.state, places.lanes).T
 

@@ -165,9 +165,9 @@ class MarchText:
             "        work[e] = given[s, e]",
             "elif k % now[8] == 0:",
             "    if seen % now[9] == 0:",
-            "        for e in range(n):",
+            f"        for e in range({places.state}):",
             "            out_shared[shared, e] = work[e]",
-            "        out_shared[shared, n], out_shared[shared, n + 1] = s, k",
+            f"        out_shared[shared, {places.state}], out_shared[shared, {places.state + 1}] = s, k",
             "        shared += 1",
             "    seen += 1",
         ]

@@ -6,11 +6,13 @@ q_d(t) = Σⱼ c_j (t − t₀)ʲ  on a stretch;  at one time, of a tick or a sa
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any, final
 
 import numpy as np
 
 from robot_dyn.control.reference import PiecewisePolynomial
+from robot_dyn.simulation.schedule import paced
 from robot_dyn.simulation.setup import Setup
 
 
@@ -44,18 +46,18 @@ class Timetable:
         return float(self.starts[stretch] + step * self.lengths[stretch])
 
 
-def timetable(setup: Setup, factor: int = 1, end: bool = False) -> Timetable:
-    """The stretches of a setup, with steps `factor` times as long.
+def timetable(setup: Setup, pace: Fraction = Fraction(1), end: bool = False) -> Timetable:
+    """The stretches of a setup, with steps `pace` times as long.
 
     Args:
         setup: What to run.
-        factor: 1, 2 or 4.
+        pace: Length of a step, in steps of the setup.
         end: Whether the end of the run is one stretch more, of no length.
     """
-    stretches = setup.stretches
-    steps = np.array([setup.steps(each) for each in stretches])
+    stretches = paced(setup.stretches, pace)
+    counts = np.array([each.steps for each in stretches])
     starts, ends = (np.array([getattr(each, name) for each in stretches]) for name in ("start", "end"))
-    lengths, counts = (ends - starts) / steps * factor, np.maximum(1, steps // factor)
+    lengths = (ends - starts) / counts
     lasts, ticks = np.nextafter(ends, -np.inf), np.array([each.tick for each in stretches])
     reference: Any = getattr(setup.controller, "reference", None)
     on_stretches, at_ticks = pieces(setup.controller, starts, ends), at_times(reference, starts)

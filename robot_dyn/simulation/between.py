@@ -1,0 +1,109 @@
+"""What acts between the ends of two steps and at neither, so that no companion run need see it.
+
+Joint stops: the cubic through q and v at the ends of a step tells how far the joint went between them. Code that this
+library did not write: its torque is looked at between the ends of steps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.control.controller import Controller
+from robot_dyn.effects.effect import Force
+from robot_dyn.effects.joint_limit import JointStopSpring
+from robot_dyn.errors import RobotDynError
+from robot_dyn.simulation.motion import Motion
+from robot_dyn.simulation.record import Path
+from robot_dyn.simulation.setup import Setup
+from robot_dyn.simulation.smoothness import extremes, foreign
+
+_LOOKS = 2000  # about so many states between steps
+_STANDS_OUT = 50.0  # times the change of the torque from step to step
+
+
+@final
+@dataclass(frozen=True)
+class Missed:
+    """Something that acted between two steps: start of the step in [s], and what it was."""
+
+    t: float
+    why: str
+
+
+def stepped_over(setup: Setup, motion: Motion, path: Path, error: float) -> Missed | None:
+    """The first thing that acted between two steps and would move a joint by more than the estimated error.
+
+    Args:
+        setup: What was run.
+        motion: Its equation of motion.
+        path: The states at the ends of its steps.
+        error: Estimated error of q, in [rad] or [m].
+    """
+    if len(path.t) < 2:
+        return None
+    q, v = path.y[:, : motion.plant.dynamics.n], motion.velocities(path.y)
+    found = [_stop(motion, effect, path, q, v, error) for effect in setup.plant.effects]
+    found += [_code(motion, part, path, q, v, error) for part in foreign(setup)]
+    return min((each for each in found if each is not None), key=lambda each: each.t, default=None)
+
+
+def _stop(motion: Motion, effect: Any, path: Path, q: np.ndarray, v: np.ndarray, error: float) -> Missed | None:
+    """A stop that a joint passed and left again within a step."""
+    if not isinstance(effect, JointStopSpring):
+        return None
+    low, high = extremes(path.t, q, v)
+    depth = np.maximum(effect.lower - low, high - effect.upper)
+    ends = np.maximum(effect.lower - q, q - effect.upper) > 0
+    depth[ends[:-1] | ends[1:]] = 0.0
+    torque = np.broadcast_to(effect.stiffness, depth.shape) * np.maximum(depth, 0.0)
+    for k in np.flatnonzero(torque.any(axis=1)):
+        joint = int(torque[k].argmax())
+        if _displacement(motion, path, q, int(k), torque[k]) > error:
+            name, h = motion.plant.dynamics.joint_names[joint], path.t[k + 1] - path.t[k]
+            why = f"joint {name!r} passes its stop by {depth[k, joint]:.1e} and leaves it within one step of {h:.1e} s"
+            return Missed(float(path.t[k]), why)
+    return None
+
+
+def _code(motion: Motion, part: Any, path: Path, q: np.ndarray, v: np.ndarray, error: float) -> Missed | None:
+    """A torque that stands out between two steps from what it is at their ends."""
+    n, m, dynamics = motion.plant.dynamics.n, motion.memory_size, motion.plant.dynamics
+    if not isinstance(part, Force | Controller) or (isinstance(part, Controller) and motion.sampled):
+        return None
+
+    def torque(t: float, q: np.ndarray, v: np.ndarray, z: np.ndarray) -> np.ndarray:
+        if isinstance(part, Controller):
+            return np.asarray(part.torque(t, q, v, z), dtype=float)
+        return np.broadcast_to(np.asarray(part.torque(dynamics, t, q, v), dtype=float), (n,))
+
+    every = max(1, len(path.t) // _LOOKS)
+    t, q, v, z = path.t[::every], q[::every], v[::every], path.y[::every, 2 * n : 2 * n + m]
+    looks = max(1, _LOOKS // len(t))  # in each step, at times that differ from step to step
+    s = (np.arange(looks)[:, None] + np.random.default_rng(0).uniform(size=(looks, len(t) - 1))) / looks
+    try:
+        ends = np.array([torque(*state) for state in zip(t.tolist(), q, v, z, strict=True)])
+        jump = np.zeros((len(t) - 1, n))
+        for weight in s[:, :, None]:
+            inside = [x[:-1] + weight * np.diff(x, axis=0) for x in (t[:, None], q, v, z)]
+            there = np.array([torque(float(at[0]), *state) for at, *state in zip(*inside, strict=True)])
+            jump = np.maximum(jump, np.abs(there - ends[:-1] - weight * np.diff(ends, axis=0)))
+    except RobotDynError:
+        return None  # the run itself says what is wrong
+    around = np.abs(np.diff(ends, axis=0))
+    for k in np.flatnonzero((jump > _STANDS_OUT * around + 1e-9).any(axis=1)).tolist():
+        if _displacement(motion, path, path.y[:, :n], k * every, jump[k]) > error:
+            why = f"{type(part).__name__} acts between steps after t = {t[k]:g} s and not at their ends"
+            return Missed(float(t[k]), f"{why}; declare its times as `switches`")
+    return None
+
+
+def _displacement(motion: Motion, path: Path, q: np.ndarray, k: int, torque: np.ndarray) -> float:
+    """How far, at the end of the run, a torque during step k moves a joint: M⁻¹ τ h (T − t), in [rad] or [m]."""
+    try:
+        a = np.linalg.solve(motion.plant.M(q[k]), torque)
+    except (RobotDynError, np.linalg.LinAlgError):
+        return np.inf
+    return float(np.abs(a).max() * (path.t[k + 1] - path.t[k]) * (path.t[-1] - path.t[k]))

@@ -1,0 +1,106 @@
+"""The schedule of a run: segments of time without ticks or switches inside, and the steps on each.
+
+A companion run takes steps of another length on the same segments. Every step ends at a whole number of steps of the
+run, or of parts of one, so that both pass common times.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import pairwise
+from math import ceil
+from typing import final
+
+import numpy as np
+
+from robot_dyn.errors import QueryError
+
+LEAST_STEPS = 3  # on a segment: fewer leave no room for a longer step
+ULPS = 4  # times that differ by no more units in the last place are one
+_ROUNDED = 1e-9  # of the period: k · period, as computed, is the time that the user wrote
+
+
+@final
+@dataclass(frozen=True)
+class Stretch:
+    """A segment of the run without ticks or switches inside.
+
+    Attributes:
+        start: In [s].
+        end: In [s].
+        tick: Whether a sampled controller acts at its start.
+        steps: Number of steps.
+        first: Number of steps of the run, not of a companion, before its start.
+        pace: Length of its steps, in steps of the run.
+    """
+
+    start: float
+    end: float
+    tick: bool
+    steps: int = 1
+    first: int = 0
+    pace: Fraction = Fraction(1)
+
+
+def cuts(duration_s: float, period_s: float, switches: Iterable[float]) -> list[tuple[float, bool]]:
+    """Times at which segments start, and whether each is a tick.
+
+    A switch keeps its exact time. A tick, whose time is the rounded product k · period, moves onto a switch, or onto
+    the end, that lies within rounding of it.
+
+    Args:
+        duration_s: Length of the run, in [s].
+        period_s: Period of a sampled controller, in [s]; 0 for none.
+        switches: Times at which something switches, in [s].
+
+    Raises:
+        QueryError: If two switches lie so close together that no segment fits between them.
+    """
+    inside = sorted({0.0, *(t for t in switches if 0.0 < t < duration_s - ULPS * np.spacing(duration_s))})
+    for before, after in pairwise(inside):
+        if after - before <= ULPS * np.spacing(after):
+            raise QueryError(
+                f"switches at {before!r} s and {after!r} s are {after - before:.1e} s apart, less than times of this "
+                "size can tell: make them one, or move them apart"
+            )
+    count = ceil(duration_s / period_s - _ROUNDED) if period_s > 0 else 1
+    ticks, fixed = period_s * np.arange(max(1, count)), np.array([*inside, duration_s])
+    near = _near(fixed, ticks)
+    ticks = np.where(np.abs(near - ticks) <= _ROUNDED * period_s + ULPS * np.spacing(near), near, ticks)
+    acting = set(ticks.tolist())
+    return [(t, t in acting) for t in sorted({*inside, *acting} - {duration_s})]
+
+
+def _near(fixed: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """The entry of ascending `fixed` nearest to each of t."""
+    right = np.clip(np.searchsorted(fixed, t), 1, len(fixed) - 1)
+    return np.where(t - fixed[right - 1] < fixed[right] - t, fixed[right - 1], fixed[right])
+
+
+def steps_on(length: float, step_s: float, record_period_s: float) -> int:
+    """Number of steps on a segment; where it holds whole record periods, each of them has the same number."""
+    periods = round(length / record_period_s) if record_period_s else 0
+    if periods and abs(length / record_period_s - periods) < _ROUNDED:
+        return periods * max(1, ceil(record_period_s / step_s - _ROUNDED))
+    return max(1, ceil(length / step_s - _ROUNDED))
+
+
+def paced(stretches: tuple[Stretch, ...], pace: Fraction) -> tuple[Stretch, ...]:
+    """The schedule of a companion run, whose steps are `pace` times as long.
+
+    A segment that does not hold a whole number of longer steps ends with one step of what is left.
+    """
+    if pace == 1:
+        return stretches
+    result: list[Stretch] = []
+    for each in stretches:
+        whole = int(each.steps / pace)
+        rest = each.steps - whole * pace
+        middle = each.end if not rest else each.start + float(whole * pace) * (each.end - each.start) / each.steps
+        if whole:
+            result.append(Stretch(each.start, middle, each.tick, whole, each.first, pace))
+        if rest:
+            result.append(Stretch(middle, each.end, each.tick and not whole, 1, each.first + int(whole * pace), rest))
+    return tuple(result)

@@ -1,0 +1,1 @@
+"""Random scenes with an independent truth, on which error estimates are judged."""

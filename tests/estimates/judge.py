@@ -1,0 +1,75 @@
+"""The judgement of an estimate: what it said, what is true, and whether it said so in silence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+import robot_dyn as rd
+from tests.estimates.scenes import Scene, scene
+from tests.estimates.truth import truth
+
+LEAST = 0.3  # an estimate below this part of the true error misleads
+MOST = 3.0  # an estimate beyond this multiple of it is of little use
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What came of a scene.
+
+    Attributes:
+        scene: The scene.
+        run: Its trajectory.
+        true: Largest error of q up to where the estimate holds.
+        true_at_end: The same up to the end of the run.
+        unsure: Error of the truth itself.
+    """
+
+    scene: Scene
+    run: rd.Trajectory
+    true: float
+    true_at_end: float
+    unsure: float
+
+    @property
+    def silent(self) -> bool:
+        """Whether nothing but the estimate warns: finished, no note, ledger closed."""
+        run = self.run
+        return run.outcome.ending == "finished" and not run.error.note and "does not close" not in run.summary
+
+    @property
+    def floor(self) -> float:
+        """Below it neither truth nor run can tell: rounding of q in 4500 steps."""
+        return 1e-12 * (1 + float(np.abs(self.run.q).max())) + self.unsure
+
+    @property
+    def ratio(self) -> float:
+        """Estimate over true error, both at least the floor."""
+        return max(self.run.error.final, self.floor) / max(self.true, self.floor)
+
+    @property
+    def misleads(self) -> bool:
+        return self.silent and not self.ratio >= LEAST
+
+    @property
+    def usable(self) -> bool:
+        """Whether the run is accurate enough to be of use."""
+        return self.run.outcome.ending == "finished" and self.true_at_end < 1e-3
+
+    def __str__(self) -> str:
+        error = self.run.error
+        return f"{self.scene.label}: {error} | true {self.true:.1e} ratio {self.ratio:.2g}"
+
+
+def judge(seed: int, index: int) -> Judgement:
+    """Run a scene and its truth."""
+    made = scene(seed, index)
+    run = rd.simulate(made.setup)
+    exact = truth(made.setup, run.t)
+    other = truth(made.setup, run.t, 2e-13, 7e-4)
+    errors = np.maximum.accumulate(np.abs(run.q - exact).max(axis=1))
+    known = run.t <= run.error.resolved_until
+    true = float(errors[known][-1]) if known.any() else 0.0
+    unsure = float(np.abs(exact - other)[known].max()) if known.any() else 0.0
+    return Judgement(made, run, true, float(errors[-1]), unsure)

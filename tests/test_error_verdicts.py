@@ -1,0 +1,224 @@
+"""What an error estimate rests on is said, and no estimate is silent where it would mislead."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+import robot_dyn as rd
+from robot_dyn.effects.effect import Active
+from robot_dyn.errors import QueryError
+from robot_dyn.simulation import origin
+from robot_dyn.simulation.error import Verdict
+from tests.estimates.judge import LEAST, MOST, judge
+from tests.estimates.scenes import arms
+from tests.estimates.truth import truth
+
+RAIL = arms()["rail"].with_(gravity=(0.0, 0.0, 0.0))
+TOSS = arms()["rail"]
+PANDA = rd.load("panda").with_(lock={"panda_finger_joint1": 0.0})
+READY = np.array([0.3, 0.6, -0.4, -1.2, 0.5, 1.1, 0.2])
+
+
+@pytest.mark.parametrize("index", range(40))
+def test_no_estimate_misleads_on_a_random_scene(index: int) -> None:
+    """Against SciPy near rounding: a silent estimate is at least 0.3 of the error; if smooth, at most 3 times it."""
+    judged = judge(20261121, index)
+    assert not judged.misleads, str(judged)
+    if judged.scene.family == "smooth" and judged.usable:
+        assert not judged.run.error.note, str(judged)
+        assert LEAST <= judged.ratio <= MOST, str(judged)
+
+
+def toss(gap: float, stiffness: float, speed: float = 10.0, **options) -> rd.Trajectory:
+    """1 kg tossed up, a stop `gap` below its apex."""
+    apex = speed**2 / (2 * 9.80665)
+    plant = rd.Plant(TOSS, rd.joint_stops([-50.0], [apex - gap], stiffness, 0.0))
+    return rd.simulate(plant, q0=[0.0], v0=[speed], duration_s=2.0, **options)
+
+
+def rebound(run: rd.Trajectory, gap: float, stiffness: float, speed: float = 10.0) -> float:
+    """Largest error of a toss against the closed form: free flight, half an oscillation in the stop, free flight."""
+    g = 9.80665
+    stop, omega = speed**2 / (2 * g) - gap, np.sqrt(stiffness)
+    v1 = np.sqrt(2 * g * gap)
+    t1 = (speed - v1) / g
+    sag = g / stiffness  # m = 1 kg: at rest in the stop, gravity pulls out of it
+    # in contact x = stop − sag + A cos(ω s − φ), entered at s = 0 with x = stop and speed v1
+    A, phi = np.hypot(sag, v1 / omega), np.arctan2(v1 / omega, sag)
+    contact = 2 * phi / omega
+    t = run.t
+    free = speed * t - g * t**2 / 2
+    inside = stop - sag + A * np.cos(omega * (t - t1) - phi)
+    s = t - t1 - contact
+    after = stop - v1 * s - g * s**2 / 2
+    exact = np.where(t <= t1, free, np.where(t <= t1 + contact, inside, after))
+    return float(np.abs(run.q[:, 0] - exact).max())
+
+
+def test_a_graze_of_a_stop_is_not_stepped_over() -> None:
+    """0.1 mm below the apex of a toss of 10 m/s: DOP853's own steps of 0.4 s would fly past, 78 mm wrong in silence."""
+    run = toss(1e-4, 1e7, integrator=rd.Adaptive())
+    error = rebound(run, 1e-4, 1e7)
+    assert np.diff(run.t).max() <= 0.01
+    assert error < 1e-6
+    assert LEAST * error < run.error.final
+
+
+@pytest.mark.parametrize(
+    "method", [rd.Adaptive(), rd.Adaptive(rtol=1e-6, atol=1e-8), rd.method("rk4"), rd.method("gauss_4")]
+)
+def test_random_grazes_are_met_or_told(method) -> None:
+    rng, met = np.random.default_rng(105), 0
+    for _ in range(5):
+        gap, stiffness, speed = 10 ** rng.uniform(-7, -3), 10 ** rng.uniform(5, 7.5), rng.uniform(5, 10)
+        options = {} if isinstance(method, rd.Adaptive) else {"step_s": 0.02}
+        run = toss(gap, stiffness, speed, integrator=method, **options)
+        error = rebound(run, gap, stiffness, speed)
+        silent = run.outcome.ending == "finished" and not run.error.note and not run.leak
+        assert not silent or run.error.final >= LEAST * error, (gap, stiffness, speed, error, str(run.error))
+        met += silent
+    assert met > 2 or not isinstance(method, rd.Adaptive)
+
+
+def test_an_impulse_in_a_long_run_is_not_merged_away() -> None:
+    """1 N s in 1 µs of 1000 s, 1e-9 of the run: v = 1 m/s from 333 s on; only the rounding of t and q is left."""
+    start, length = 333.0, 1e-6
+    push = rd.ExternalWrench("block", [0, 0, 1 / length, 0, 0, 0], start_s=start, end_s=start + length)
+    real = (start + length) - start  # as floats have it
+    run = rd.simulate(rd.Plant(RAIL, [push]), q0=[0.0], duration_s=1000.0, step_s=0.1, record_period_s=1.0)
+    v = real / length
+    exact = v * (1000.0 - start - length) + v * real / 2
+    assert abs(run.q[-1, 0] - exact) < 1e-9
+    assert run.v[-1, 0] == pytest.approx(v, rel=1e-12)
+
+
+def test_switches_closer_than_floats_can_tell_are_refused() -> None:
+    start = 333.0
+    push = rd.ExternalWrench("block", np.ones(6), start_s=start, end_s=start + 2 * np.spacing(start))
+    with pytest.raises(QueryError, match=r"switches at 333\.0 s and .* make them one, or move them apart"):
+        rd.simulate(rd.Plant(RAIL, [push]), q0=[0.0], duration_s=1000.0)
+
+
+def test_a_tick_within_rounding_of_a_switch_moves_onto_it() -> None:
+    """3 · 0.1 is not 0.3: one end of a segment, at the switch, and the controller acts there."""
+    push = rd.ExternalWrench("block", np.ones(6), start_s=0.3, end_s=0.7)
+    law = rd.PD(rd.hold([0.0]), 1.0, 1.0, period_s=0.1)
+    stretches = rd.Setup(rd.Plant(RAIL, [push]), [0.1], duration_s=1.0, controller=law).stretches
+    starts = [each.start for each in stretches]
+    assert len(starts) == 10
+    assert 0.3 in starts
+    assert 0.7 in starts
+    assert all(each.tick for each in stretches)
+
+
+def test_control_at_the_default_step_is_estimated() -> None:
+    """1 kHz control has one step a tick: only shorter steps can tell, and they do."""
+    law = rd.PD(rd.hold(READY), *rd.gains_from(np.diag(PANDA.M(READY)), 10.0), period_s=1e-3)
+    setup = rd.Setup(rd.Plant(PANDA), READY + 0.1, duration_s=0.1, controller=law, integrator=rd.method("midpoint"))
+    run = rd.simulate(setup)
+    error = np.abs(run.q - truth(setup, run.t)).max()
+    assert run.error.note == ""
+    assert LEAST * error < run.error.final < MOST * error
+
+
+def test_one_short_segment_leaves_the_estimate_of_the_others() -> None:
+    arm = rd.load("planar_2r")
+    push = rd.ExternalWrench(arm.frame_names[-1], 0.1 * np.ones(6), start_s=0.2003, end_s=0.2004)
+    setup = rd.Setup(rd.Plant(arm, [push]), [0.4, -0.7], [0.3, 0.5], 0.5, integrator=rd.method("midpoint"))
+    run = rd.simulate(setup)
+    error = np.abs(run.q - truth(setup, run.t)).max()
+    assert run.error.verdict is Verdict.ORDER
+    assert run.error.note == ""
+    assert LEAST * error < run.error.final < MOST * error
+
+
+def test_a_usable_run_with_stiff_friction_is_bounded_not_refused() -> None:
+    """RK4 is near its stability limit, so that no order shows; the run is right to 1e-6 all the same."""
+    plant = rd.Plant(PANDA, "urdf")
+    law = rd.PDGravity(PANDA, rd.quintic(READY, READY + 0.2, 0.2), *rd.gains_from(np.diag(PANDA.M(READY)), 10.0))
+    run = rd.simulate(plant, q0=READY, duration_s=0.2, controller=law, step_s=2.5e-4, record_period_s=1e-3)
+    tight = rd.simulate(plant, q0=READY, duration_s=0.2, controller=law, integrator=rd.Adaptive(rtol=1e-12, atol=1e-13),
+                        record_period_s=1e-3, estimate_error=False)  # fmt: skip
+    error = np.abs(run.q - tight.q).max()
+    assert error < 1e-6
+    assert run.error.note == ""
+    assert LEAST * error < run.error.final < 1e-3
+
+
+@pytest.mark.parametrize("far", [1e9, 1e13, 1e16])
+def test_rounding_of_a_far_position_is_in_the_estimate(far: float) -> None:
+    """Q += h v loses what is below half a unit of q's last place, in every step and every companion run alike."""
+    run = rd.simulate(rd.Plant(RAIL), q0=[far], v0=[0.7], duration_s=1.0, integrator=rd.method("semi_implicit_euler"))
+    error = abs(run.q[-1, 0] - (far + 0.7))
+    assert run.error.final >= LEAST * error
+
+
+@dataclass(frozen=True, eq=False)
+class Pulse(Active):
+    """A force of its own on a short time, told to nobody."""
+
+    start: float
+    length: float
+    force: float
+
+    def torque(self, dynamics, t, q, v):
+        return (self.force if self.start <= t < self.start + self.length else 0.0) + 0 * v
+
+
+@pytest.mark.parametrize(
+    "method", [rd.method("rk4"), rd.method("gauss_6"), rd.method("semi_implicit_euler"), rd.Adaptive()]
+)
+def test_code_that_acts_between_steps_is_looked_at_there(method) -> None:
+    """A pulse of 1 ms inside steps of 10 ms, at no node: nothing that marches sees it."""
+    options = {} if isinstance(method, rd.Adaptive) else {"step_s": 0.01}
+    run = rd.simulate(
+        rd.Plant(RAIL, [Pulse(0.5016, 1e-3, 1e3)]), q0=[0.0], v0=[0.2], duration_s=2.0, integrator=method, **options
+    )
+    error = abs(run.q[-1, 0] - (0.4 + 1.0 * (2.0 - 0.5021)))
+    assert run.error.note or run.error.final >= LEAST * error
+
+
+def test_the_summary_tells_an_estimate_from_a_bound_and_the_time_it_covers() -> None:
+    from robot_dyn.simulation.error import ErrorEstimate
+
+    t, error = np.array([0.0, 0.008]), np.array([0.0, 2e-9])
+    assert str(ErrorEstimate(t, error, 0.008)) == "2.0e-09 (order seen)"
+    bounded = ErrorEstimate(t, error, 0.008, verdict=Verdict.BOUND, reason="a joint touches its stop")
+    assert str(bounded) == "about 2.0e-09 at most (bounded: a joint touches its stop)"
+    early = ErrorEstimate(t, error, 0.008, note="companion runs differ; take step_s = 1e-04")
+    assert (
+        str(early)
+        == "2.0e-09 up to t = 0.008 s (order seen); after that none: companion runs differ; take step_s = 1e-04"
+    )
+
+
+def test_a_ledger_that_contradicts_the_estimate_is_told() -> None:
+    from dataclasses import replace
+
+    run = rd.simulate(rd.Plant(PANDA), q0=READY, duration_s=0.2, step_s=2e-3)
+    assert run.leak == ""
+    drift = run.ledger.kinetic * (1 + 1e-6 * run.t)
+    wrong = replace(run, ledger=replace(run.ledger, kinetic=drift))
+    assert "do not trust the estimate" in wrong.summary
+
+
+def test_times_of_compiling_running_and_estimating_are_told_apart() -> None:
+    run = rd.simulate(rd.Plant(PANDA), q0=READY, duration_s=0.05, engine="compiled")
+    s = run.statistics
+    assert s.compile_s > 0
+    assert s.companions_s > 0
+    assert s.samples_s > 0
+    assert f"compile {s.compile_s:.2g} s" in run.summary
+
+
+def test_metadata_of_packages_are_read_once(monkeypatch) -> None:
+    origin.versions.cache_clear()
+    asked = []
+    monkeypatch.setattr(origin, "version_of", lambda name: asked.append(name) or "1")
+    for _ in range(3):
+        rd.simulate(rd.Plant(RAIL), q0=[0.0], duration_s=0.01)
+    assert len(asked) == len(set(asked)) > 0
+    origin.versions.cache_clear()
