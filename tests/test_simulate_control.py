@@ -181,5 +181,5 @@ def test_companions_that_are_off_cost_nothing(method) -> None:
     assert more > 0.3 * without.statistics.evaluations
     if method == rd.method("rk4"):
         steps = without.statistics.steps
-        looks = steps + 1 + 2000 // (steps + 1) * steps  # at the ends of steps and between them
+        looks = steps + 1 + 4000 // (steps + 1) * steps  # at the ends of steps and between them
         assert more == 4 * (ceil(steps / 2) + ceil(steps / 3) + ceil(steps / 5)) + looks

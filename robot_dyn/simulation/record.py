@@ -151,5 +151,7 @@ def _time(sample: Sample) -> float:
 
 
 def _path(samples: list[Sample]) -> Path:
+    if not samples:
+        return Path(np.empty(0, np.int64), np.empty(0), np.empty((0, 0)))
     key, t = np.array([sample.key for sample in samples], np.int64), np.array([sample.t for sample in samples])
-    return Path(key, t, np.array([sample.y for sample in samples]).reshape(len(samples), -1))
+    return Path(key, t, np.array([sample.y for sample in samples]))

@@ -82,6 +82,7 @@ def simulate(
                 record = replace(record, outcome=outcome)
     clock.append(perf_counter())
     compiling, wall, companions = np.diff(clock).tolist()
+    companions = 0.0 if error is None else companions
     adaptive = isinstance(setup.integrator, Adaptive)
     name = setup.integrator.method if isinstance(setup.integrator, Adaptive) else setup.integrator.name
     step = 0.0 if adaptive else record.outcome.t / max(record.steps, 1)
