@@ -3,13 +3,18 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test check lock clean
+.PHONY: demo test stress check lock clean
 
 demo: .venv/installed
 	$(BIN)/robot-dyn demo --force
 
 test: .venv/installed
 	$(BIN)/python -m pytest -n auto
+
+# what takes long: error estimates on 600 random scenes of a fixed seed, and of the seed of the day
+stress: .venv/installed
+	$(BIN)/python -m tests.estimates --scenes 600 --seed 1
+	$(BIN)/python -m tests.estimates --scenes 600 --seed $$(date +%Y%m%d)
 
 # what CI asks for besides the tests
 check: .venv/installed
