@@ -13,8 +13,8 @@ from robot_dyn.simulation.ledger import Ledger, largest
 from robot_dyn.simulation.remarks import Remark
 from robot_dyn.simulation.remarks import lines as said
 
-# Residuals, as parts of the energy exchanged. Over 150 random scenes they were at most 10 times the estimated error of q,
-# as a part of the motion; one that is far larger contradicts the estimate.
+# Residuals, as parts of the energy exchanged. Over 150 random scenes they were at most 10 times the estimated error of
+# q, as a part of the motion; one that is far larger contradicts the estimate.
 _OPEN, _CONTRADICTS, _ROUNDING = 1e-3, 100.0, 1e-12
 _NOTICED = 0.01  # [s]: shorter times are not worth a word
 
