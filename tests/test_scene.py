@@ -154,7 +154,10 @@ MISTAKES = {
         SCENE + '[[effect]]\nkind = "external_wrench"\nframe = "tipp"\nforce_N = [1, 0, 0]',
         ["tipp", "nearest: tip"],
     ),
-    "missing gain": (SCENE + '[control]\nkind = "pd"', ["line 7", "control: frequency_rad_per_s: is missing"]),
+    "missing gain": (
+        SCENE + '[control]\nkind = "pd"',
+        ["line 7", "control: give frequency_rad_per_s, or both kp and kd"],
+    ),
     "reference alone": (SCENE + PD.split("[reference]")[1].join(["[reference]", ""]), ["reference", "[control]"]),
     "times and points": (
         SCENE

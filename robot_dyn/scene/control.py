@@ -9,7 +9,7 @@ from pydantic import Field
 
 from robot_dyn.control.cartesian import CartesianReference, circle, line
 from robot_dyn.control.computed_torque import ComputedTorque, FeedForward, PDGravity
-from robot_dyn.control.controller import Controller
+from robot_dyn.control.controller import Controller, gain
 from robot_dyn.control.independent_joint import PD, PID, gains_from
 from robot_dyn.control.operational_space import OperationalSpace
 from robot_dyn.control.reference import PiecewisePolynomial, hold, quintic, via_points
@@ -32,10 +32,11 @@ from robot_dyn.scene.schema import (
 
 
 class Hold(Part):
-    """Rest at a position, that of the start unless said."""
+    """Rest at a position."""
 
     kind: Literal["hold"]
     q: PerJoint | None = None
+    """Position; that of the start by default."""
 
     def build(self, robot: Robot, q0: np.ndarray, frame: str | None) -> PiecewisePolynomial:
         """The reference."""
@@ -43,12 +44,15 @@ class Hold(Part):
 
 
 class Quintic(Part):
-    """From the start to q in a given time, with least jerk."""
+    """From the start to q in a given time, by a polynomial of degree 5 at rest at both ends."""
 
     kind: Literal["quintic"]
     q: PerJoint
+    """Position at the end."""
     duration_s: Positive
+    """Time from the start to q."""
     start_s: NotNegative = 0.0
+    """When it starts."""
 
     def build(self, robot: Robot, q0: np.ndarray, frame: str | None) -> PiecewisePolynomial:
         """The reference."""
@@ -56,11 +60,13 @@ class Quintic(Part):
 
 
 class ViaPoints(Part):
-    """A spline from the start through points."""
+    """A spline from the start through points, at rest at both ends."""
 
     kind: Literal["via_points"]
     times_s: list[Positive]
+    """Time of each point."""
     points: list[list[Number]]
+    """Position at each time, a list of n numbers, in rad, or m for a prismatic joint."""
 
     def build(self, robot: Robot, q0: np.ndarray, frame: str | None) -> PiecewisePolynomial:
         """The reference."""
@@ -70,13 +76,17 @@ class ViaPoints(Part):
 
 
 class Line(Part):
-    """A straight line of the frame from where it is."""
+    """A straight line of the frame under control from where it is at the start; for operational_space."""
 
     kind: Literal["line"]
     by_m: Vector3
+    """From the start to the end, in base axes."""
     duration_s: Positive
+    """Time from start to end."""
     start_s: NotNegative = 0.0
+    """When it starts."""
     hold_orientation: Truth = True
+    """Whether the orientation of the start is kept; otherwise it is free."""
 
     def build(self, robot: Robot, q0: np.ndarray, frame: str | None) -> CartesianReference:
         """The reference."""
@@ -86,15 +96,21 @@ class Line(Part):
 
 
 class Circle(Part):
-    """A circle of the frame that begins where it is; the centre lies from there in the direction given."""
+    """A circle of the frame under control that begins where it is at the start; for operational_space."""
 
     kind: Literal["circle"]
     radius_m: Positive
+    """Radius."""
     period_s: Positive
+    """Time of one turn."""
     normal: Vector3 = (0.0, 0.0, 1.0)
+    """Normal of its plane, in base axes, of any length."""
     to_centre: Vector3 = (0.0, 1.0, 0.0)
+    """Direction from the start to the centre, in base axes; its part in the plane is used."""
     turns: Positive = 1.0
+    """Number of turns."""
     hold_orientation: Truth = True
+    """Whether the orientation of the start is kept; otherwise it is free."""
 
     def build(self, robot: Robot, q0: np.ndarray, frame: str | None) -> CartesianReference:
         """The reference."""
@@ -115,10 +131,12 @@ AnyReference = Annotated[Hold | Quintic | ViaPoints | Line | Circle, Field(discr
 
 
 class Model(Part):
-    """The controller's model of the arm, where it differs from the plant's."""
+    """The controller's model of the arm, where it differs from the plant's; a table of `[control]`."""
 
     mass_scale: Positive = 1.0
+    """Factor on mass and inertia of all links, payloads excepted."""
     effects: list[Annotated[Edit, Field(discriminator="kind")]] | None = None
+    """Its gravity, lock, payload and armature, as of `[[effect]]`, in place of the scene's; those by default."""
 
     def build(self, described: Robot, robot: Robot) -> Robot:
         """The model: the plant's robot, or the described one with edits of its own; masses scaled."""
@@ -129,28 +147,49 @@ class Model(Part):
         return robot.with_(mass_scale=self.mass_scale)
 
 
-class Control(Part):
-    """A controller; gains follow from the closed loop's frequency ω and damping ratio ζ.
+LAWS = {
+    "pd": "u = kp (q_d − q) + kd (v_d − v)",
+    "pid": "u = sat(kp e + kd ė + z),  ż = ki e + (u − wanted u)/T_t",
+    "pd_gravity": "u = kp e + kd ė + N(q)",
+    "feed_forward": "u = M a_d + C v_d + N at the reference + kp e + kd ė",
+    "computed_torque": "u = M (a_d + kd ė + kp e) + C v + N",
+    "operational_space": "u = Jᵀ (Λ (ẍ_d + kd ė + kp e) + μ + p) + null-space posture",
+}
 
-    kp = ω², kd = 2 ζ ω, times the diagonal of M at the start for joint controllers without a model in the loop. PID has
-    ki = integral_rate kp and is cut at effort_limit_N_m, unless given the limits of the file. Operational space holds
-    the posture of the start with a tenth of the stiffness.
+
+class Control(Part):
+    """A controller. Its gains are kp and kd, or follow from the frequency ω and the damping ratio ζ of the closed loop.
+
+    kp = ω² and kd = 2 ζ ω, times the diagonal of M at the start for `pd`, `pid`, `pd_gravity` and `feed_forward`.
+    `operational_space` holds the posture of the start with a tenth of the largest kp.
     """
 
     kind: Literal["pd", "pid", "pd_gravity", "feed_forward", "computed_torque", "operational_space"]
-    frequency_rad_per_s: PerJoint
+    """The control law."""
+    frequency_rad_per_s: PerJoint | None = None
+    """Frequency ω of the closed loop; required without kp and kd."""
     damping_ratio: PerJoint = 1.0
+    """Damping ratio ζ of the closed loop, 1 for critical damping."""
+    kp: PerJoint | None = None
+    """Stiffness, in N m/rad (N/m for a prismatic joint); in 1/s² for computed_torque and operational_space."""
+    kd: PerJoint | None = None
+    """Damping, in N m s/rad (N s/m for a prismatic joint); in 1/s for computed_torque and operational_space."""
     integral_rate_per_s: Positive = 1.0
+    """Of pid: ki = integral_rate_per_s · kp."""
     effort_limit_N_m: Stated = "urdf"
+    """Of pid: the greatest torque."""
     period_s: NotNegative = 0.0
+    """Time between samples, with the torque constant between them; 0 for continuous control."""
     frame: str | None = None
+    """Of operational_space: the link under control."""
     model: Model = Model()
+    """The controller's model of the arm; that of the plant by default."""
 
     def build(self, described: Robot, robot: Robot, q0: np.ndarray, reference: Any) -> Controller:
         """The controller for a reference.
 
         Raises:
-            SceneError: If the reference is none of its kind.
+            SceneError: If the gains are stated twice or not at all, or its kind does not follow this kind of reference.
         """
         for key, kinds in _OF_ONE_KIND.items():
             if key in self.model_fields_set and self.kind not in kinds:
@@ -160,16 +199,12 @@ class Control(Part):
         if cartesian != (self.kind == "operational_space"):
             need = "line or circle" if self.kind == "operational_space" else "hold, quintic or via_points"
             raise SceneError(f"reference.kind: {self.kind} follows {need}, got {reference.kind!r}")
+        kp, kd = self._gains(model, q0)
         if cartesian:
-            kp, kd = gains_from(1.0, self.frequency_rad_per_s, self.damping_ratio)
             return OperationalSpace(
                 model, _frame(self.frame), wanted, kp, kd, q0, kp.max() / 10, 2 * np.sqrt(kp.max() / 10),
                 period_s=self.period_s,
             )  # fmt: skip
-        frequency = per_joint("frequency_rad_per_s", self.frequency_rad_per_s, robot)
-        ratio = per_joint("damping_ratio", self.damping_ratio, robot)
-        inertia = 1.0 if self.kind == "computed_torque" else np.diag(model.M(q0))
-        kp, kd = gains_from(inertia, frequency, ratio)
         if self.kind == "computed_torque":
             return ComputedTorque(model, wanted, kp, kd, self.period_s)
         if self.kind == "pid":
@@ -179,6 +214,25 @@ class Control(Part):
         if self.kind == "pd":
             return PD(wanted, kp, kd, self.period_s)
         return (PDGravity if self.kind == "pd_gravity" else FeedForward)(model, wanted, kp, kd, self.period_s)
+
+    def _gains(self, model: Robot, q0: np.ndarray) -> tuple[Any, Any]:
+        """Stiffness and damping, as stated or of ω and ζ."""
+        stated = self.kp is not None
+        if stated != (self.kd is not None) or stated == (self.frequency_rad_per_s is not None):
+            raise SceneError("control: give frequency_rad_per_s, or both kp and kd")
+        if stated and "damping_ratio" in self.model_fields_set:
+            raise SceneError("control.damping_ratio: has no effect beside kp and kd; remove it")
+        names = ("kp", "kd") if stated else ("frequency_rad_per_s", "damping_ratio")
+        of_frame = self.kind == "operational_space"
+        first, second = (
+            gain(f"control.{name}", getattr(self, name), ("n",))
+            if of_frame
+            else per_joint(name, getattr(self, name), model)
+            for name in names
+        )
+        if stated:
+            return first, second
+        return gains_from(1.0 if of_frame or self.kind == "computed_torque" else np.diag(model.M(q0)), first, second)
 
 
 # keys that other kinds of control do not read

@@ -20,10 +20,11 @@ from robot_dyn.scene.schema import NotNegative, Number, Part, PerJoint, Positive
 
 
 class Gravity(Part):
-    """Gravity, standard unless said."""
+    """Gravity: ∂V/∂q in N, with V = −Σ m gᵀ p."""
 
     kind: Literal["gravity"]
     acceleration_m_s2: Vector3 = STANDARD_GRAVITY
+    """Acceleration of free fall, in base axes."""
 
     def edit(self, robot: Robot) -> Robot:
         """The robot in this gravity."""
@@ -31,10 +32,11 @@ class Gravity(Part):
 
 
 class Lock(Part):
-    """Joints held at a value."""
+    """Joints held at a value: their links become part of the links before them."""
 
     kind: Literal["lock"]
     joints: dict[str, Number]
+    """Value by joint, in rad, or m for a prismatic joint."""
 
     def edit(self, robot: Robot) -> Robot:
         """The robot with these joints held."""
@@ -42,13 +44,17 @@ class Lock(Part):
 
 
 class Load(Part):
-    """A payload."""
+    """A rigid body fixed to a link, in M, C and N."""
 
     kind: Literal["payload"]
     frame: str
+    """The link that carries it."""
     mass_kg: NotNegative
+    """Mass."""
     com_m: Vector3 = (0.0, 0.0, 0.0)
+    """Centre of mass, in the frame of the link."""
     inertia_kg_m2: tuple[Vector3, Vector3, Vector3] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    """Inertia about the centre of mass, three rows, in axes parallel to the link's."""
 
     def edit(self, robot: Robot) -> Robot:
         """The robot that carries it."""
@@ -56,10 +62,11 @@ class Load(Part):
 
 
 class Armature(Part):
-    """Inertia of the drives."""
+    """Inertia of the drives felt at the joints, added to the diagonal of M."""
 
     kind: Literal["armature"]
     inertia_kg_m2: PerJoint
+    """Inertia by joint."""
 
     def edit(self, robot: Robot) -> Robot:
         """The robot with these drives."""
@@ -67,10 +74,11 @@ class Armature(Part):
 
 
 class Viscous(Part):
-    """Viscous friction."""
+    """Viscous friction τ = −b v."""
 
     kind: Literal["viscous_friction"]
     damping_N_m_s_per_rad: Stated = "urdf"
+    """b."""
 
     def build(self, robot: Robot) -> tuple[Effect, ...]:
         """The effect."""
@@ -78,11 +86,13 @@ class Viscous(Part):
 
 
 class RegularisedCoulomb(Part):
-    """Dry friction, regularised."""
+    """Dry friction, regularised: τ = −f tanh(v / v_s). Inside |v| < v_s it creeps and does not stick."""
 
     kind: Literal["regularised_coulomb_friction"]
     friction_N_m: Stated = "urdf"
+    """f."""
     velocity_scale_rad_per_s: Positive = 0.01
+    """v_s."""
 
     def build(self, robot: Robot) -> tuple[Effect, ...]:
         """The effect."""
@@ -91,11 +101,13 @@ class RegularisedCoulomb(Part):
 
 
 class JointSpring(Part):
-    """Springs in the joints."""
+    """Springs in the joints: τ = −k (q − q₀)."""
 
     kind: Literal["spring"]
     stiffness_N_m_per_rad: PerJoint
+    """k."""
     rest_rad: PerJoint = 0.0
+    """Rest position q₀."""
 
     def build(self, robot: Robot) -> tuple[Effect, ...]:
         """The effect."""
@@ -104,13 +116,17 @@ class JointSpring(Part):
 
 
 class JointStops(Part):
-    """Joint stops, at the limits of the file unless said."""
+    """Soft joint stops: τ = k (δ₋ − δ₊) − c (δ₋ + δ₊) v, with δ the depth beyond a stop."""
 
     kind: Literal["joint_stops"]
     lower_rad: Stated = "urdf"
+    """Lower stops; joints left out have none."""
     upper_rad: Stated = "urdf"
+    """Upper stops; joints left out have none."""
     stiffness_N_m_per_rad: PerJoint = 1e4
+    """k."""
     damping_N_m_s_per_rad2: PerJoint = 1e3
+    """c, damping for each unit of depth."""
 
     def build(self, robot: Robot) -> tuple[Effect, ...]:
         """The elastic and the dissipative part."""
@@ -123,15 +139,21 @@ class JointStops(Part):
 
 
 class Wrench(Part):
-    """A wrench on a link."""
+    """A force and a torque on a link, for start_s ≤ t < end_s: τ = Jᵀ F."""
 
     kind: Literal["external_wrench"]
     frame: str
+    """The link."""
     force_N: Vector3 = (0.0, 0.0, 0.0)
+    """Force."""
     torque_N_m: Vector3 = (0.0, 0.0, 0.0)
+    """Torque."""
     expressed_in: Literal["world_aligned", "body", "world"] = "world_aligned"
+    """At the origin of the link in base axes, or in the axes of the link ("body"); or at the base ("world")."""
     start_s: NotNegative = 0.0
+    """When it starts."""
     end_s: Positive | None = None
+    """When it ends."""
 
     def build(self, robot: Robot) -> tuple[Effect, ...]:
         """The effect."""
@@ -142,10 +164,11 @@ class Wrench(Part):
 
 
 class Effort(Part):
-    """Effort limits, those of the file unless said."""
+    """Limits of the actuation: −u_max ≤ u ≤ u_max."""
 
     kind: Literal["effort_limit"]
     limit_N_m: Stated = "urdf"
+    """u_max; joints left out have none."""
 
     def build(self, robot: Robot) -> tuple[Effect, ...]:
         """The bound."""

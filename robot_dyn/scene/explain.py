@@ -9,6 +9,7 @@ import numpy as np
 
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import RobotDynError
+from robot_dyn.scene.control import LAWS
 from robot_dyn.scene.effects import Acting, Edit
 from robot_dyn.scene.scene import ADAPTIVE, Scene
 from robot_dyn.scene.schema import Part
@@ -28,14 +29,6 @@ _EDITS = {
     "payload": "a body more in M, C and N",
     "armature": "a constant diagonal in M",
 }
-_LAWS = {
-    "pd": "u = kp (q_d − q) + kd (v_d − v)",
-    "pid": "u = sat(kp e + kd ė + z),  ż = ki e + (u − wanted u)/T_t",
-    "pd_gravity": "u = kp e + kd ė + N(q)",
-    "feed_forward": "u = M a_d + C v_d + N at the reference + kp e + kd ė",
-    "computed_torque": "u = M (a_d + kd ė + kp e) + C v + N",
-    "operational_space": "u = Jᵀ (Λ (ẍ_d + kd ė + kp e) + μ + p) + null-space posture",
-}
 
 
 def explain(scene: Scene, setup: Setup) -> Iterator[str]:
@@ -48,7 +41,7 @@ def explain(scene: Scene, setup: Setup) -> Iterator[str]:
     yield f"{setup.plant.dynamics.n} joints of {scene.robot}: {', '.join(setup.plant.dynamics.joint_names)}"
     yield "\n    M(q) a + C(q, v) v + N = u"
     yield f"    N = {N}"
-    yield f"    u = {'0' if scene.control is None else _LAWS[scene.control.kind].removeprefix('u = ')}"
+    yield f"    u = {'0' if scene.control is None else LAWS[scene.control.kind].removeprefix('u = ')}"
     yield "\nin it:"
     for effect in scene.effect:
         yield f"  {effect.kind}: {(_TERMS | _EDITS)[effect.kind]}"

@@ -35,25 +35,40 @@ class Start(Part):
     """The state at the start; 0 where nothing is said."""
 
     q: PerJoint = 0.0
+    """Position."""
     v: PerJoint = 0.0
+    """Velocity."""
 
 
 class Scene(Part):
     """A scene file."""
 
     robot: str
+    """Name of a robot of the catalog, or path of a URDF, relative to the folder of the scene."""
     duration_s: Positive
+    """Length of the run."""
     method: str = "DOP853"
+    """Integrator."""
     step_s: Positive = 1e-3
+    """Step of a method with a fixed step."""
     rtol: Positive = 1e-10
+    """Relative tolerance of an adaptive method."""
     atol: Positive = 1e-12
+    """Absolute tolerance of an adaptive method, in rad and rad/s (m and m/s for a prismatic joint)."""
     record_period_s: NotNegative = 0.01
+    """Time between samples; 0 for every step."""
     estimate_error: Truth = True
+    """Whether the run is repeated with longer steps, to estimate its error."""
     engine: Literal["auto", "interpreted", "compiled"] = "auto"
+    """Which loop runs; "auto" compiles where that pays."""
     start: Start = Start()
+    """The state at the start."""
     effect: tuple[AnyEffect, ...] = ()
+    """What acts, gravity included; nothing by default."""
     control: Control | None = None
+    """What drives the joints; nothing by default."""
     reference: AnyReference = Hold(kind="hold")
+    """What the controller follows; rest at the start by default."""
 
     def described(self, folder: Path) -> Robot:
         """The robot as its file says, without gravity."""

@@ -35,7 +35,9 @@ def placed(*path: str | int) -> Iterator[None]:
 class Part(BaseModel):
     """A table of a scene."""
 
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True, strict=False)
+    model_config = ConfigDict(
+        extra="forbid", allow_inf_nan=False, frozen=True, strict=False, use_attribute_docstrings=True
+    )
 
 
 # Strict: a text or a truth value is no number.

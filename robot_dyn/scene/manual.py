@@ -1,0 +1,145 @@
+"""The manual of scene files, written from their schema: `python -m robot_dyn.scene.manual > docs/scenes.md`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from types import NoneType
+from typing import Annotated, Any, Literal, get_args, get_origin
+
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
+
+from robot_dyn.integrate.methods import METHODS
+from robot_dyn.scene.control import LAWS, AnyReference, Control, Model
+from robot_dyn.scene.effects import Acting, Edit
+from robot_dyn.scene.scene import ADAPTIVE, Scene, Start
+from robot_dyn.scene.schema import Part
+
+_OPENING = """# Scenes
+
+A scene is a TOML file that describes one simulation: `robot-dyn simulate scene.toml`. What it does not name does not
+act, gravity included. `robot-dyn scene` prints scenes to start from; `robot-dyn explain scene.toml` says what one
+integrates, and where each number comes from. This page is written from the schema that scenes are checked against.
+
+- Units are SI and end the names of keys. They are those of a revolute joint: for a prismatic joint read m for rad and
+  N for N m, so N m/rad is N/m, and kg for kg m² of an armature; a frequency is in rad/s for both.
+- *by joint* is one number for all joints, a list of n numbers in the order of `robot-dyn info`, or a table by name
+  such as `{elbow_joint = 0.3}`, in which joints left out have 0 unless said.
+- `"urdf"` takes what the file of the robot states.
+- Numbers are finite. A key that is not listed here is refused.
+"""
+# by the end of a key, the longest first
+_UNITS = {
+    "_N_m_s_per_rad2": "N m s/rad²", "_N_m_s_per_rad": "N m s/rad", "_N_m_per_rad": "N m/rad", "_rad_per_s": "rad/s",
+    "_kg_m2": "kg m²", "_m_s2": "m/s²", "_per_s": "1/s", "_N_m": "N m", "_rad": "rad", "_kg": "kg", "_N": "N",
+    "_m": "m", "_s": "s",
+}  # fmt: skip
+_UNITS_OF_KEYS = {
+    "q": "rad", "v": "rad/s", "joints": "rad", "points": "rad", "kp": "N m/rad", "kd": "N m s/rad",
+    "atol": "rad, rad/s",
+}  # fmt: skip
+_FORMS = {float: "number", int: "integer", bool: "true or false", str: "text"}
+
+
+def manual() -> str:
+    """The page, in Markdown."""
+    methods = ", ".join(f"`{name}`" for name in METHODS)
+    adaptive = ", ".join(f"`{name}`" for name in ADAPTIVE)
+    parts = [
+        _OPENING,
+        *_section("The run", "Keys at the top of the file.", Scene),
+        f"Methods with a fixed step: {methods}. Adaptive methods: {adaptive}.\n",
+        *_section("`[start]`", "The state at the start.", Start),
+        "## `[[effect]]`\n\nWhat acts; one table for each, with its `kind`.\n",
+    ]
+    for part in (*get_args(Edit), *get_args(Acting)):
+        parts += _section(f'`kind = "{_kind(part)}"`', _text(part), part, level=3)
+    parts += _section("`[control]`", _text(Control), Control)
+    parts += ["| kind | law |\n|---|---|", *(f"| `{kind}` | {_cell(law)} |" for kind, law in LAWS.items()), ""]
+    parts += _section("`[control.model]`", _text(Model), Model)
+    parts += ["## `[reference]`\n\nWhat the controller follows; one table, with its `kind`.\n"]
+    for part in get_args(get_args(AnyReference)[0]):
+        parts += _section(f'`kind = "{_kind(part)}"`', _text(part), part, level=3)
+    return "\n".join(parts).rstrip() + "\n"
+
+
+def _section(title: str, text: str, part: type[Part], level: int = 2) -> Iterator[str]:
+    yield f"{'#' * level} {title}\n\n{text}\n"
+    fields = {key: field for key, field in part.model_fields.items() if key != "kind" or part is Control}
+    if fields:
+        yield "| key | value | unit | default | meaning |\n|---|---|---|---|---|"
+        yield from (_row(key, field) for key, field in fields.items())
+        yield ""
+
+
+def _row(key: str, field: FieldInfo) -> str:
+    unit = _UNITS_OF_KEYS.get(key) or next((unit for end, unit in _UNITS.items() if key.endswith(end)), "")
+    return f"| `{key}` | {_cell(_form(field))} | {unit} | {_default(field)} | {_cell(field.description or '')} |"
+
+
+def _form(field: FieldInfo) -> str:
+    """What a value may be, in words."""
+    form = _of(field.annotation)
+    signs = {"Gt": "positive", "Ge": "not negative"}
+    sign = next((signs[name] for name in (type(each).__name__ for each in field.metadata) if name in signs), "")
+    return f"{form}, {sign}" if sign else form
+
+
+def _of(annotation: Any) -> str:
+    """What a value of a type may be."""
+    if annotation in _FORMS:
+        return _FORMS[annotation]
+    origin, args = get_origin(annotation), [each for each in get_args(annotation) if each is not NoneType]
+    if origin is Literal:
+        return " or ".join(f'`"{each}"`' for each in args)
+    if origin is None:
+        return "table"  # a part
+    first = _of(args[0])
+    if origin is Annotated:
+        return first
+    if origin is dict:
+        return f"table of {_of(args[1])}s by joint"
+    if origin is tuple and Ellipsis not in args:
+        return f"list of {len(args)} {'lists' if first.startswith('list') else first + 's'}"
+    if origin in (list, tuple):
+        return (
+            "list of tables"
+            if first == "table"
+            else f"list of {'lists of numbers' if first.startswith('list') else first + 's'}"
+        )
+    ways = dict.fromkeys(map(_of, args))
+    if "list of numbers" in ways:  # as `PerJoint`
+        ways = ["by joint", *(way for way in ways if way.startswith("`"))]
+    return " or ".join(ways)
+
+
+def _default(field: FieldInfo) -> str:
+    default = field.default
+    if default is PydanticUndefined:
+        return "required"
+    if default is None or isinstance(default, Part) or default == ():
+        return ""
+    return f"`{_toml(default)}`"
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, bool | str):
+        return f'"{value}"' if isinstance(value, str) else str(value).lower()
+    return f"[{', '.join(map(_toml, value))}]" if isinstance(value, tuple) else f"{value:g}"
+
+
+def _text(part: type[Part]) -> str:
+    """The docstring of a part."""
+    return "\n".join(line.strip() for line in (part.__doc__ or "").strip().splitlines())
+
+
+def _kind(part: type[Part]) -> str:
+    return str(get_args(part.model_fields["kind"].annotation)[0])
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|")
+
+
+if __name__ == "__main__":
+    print(manual(), end="")
