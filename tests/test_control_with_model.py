@@ -17,7 +17,7 @@ Q, V, T = np.array([0.4, -0.9, 1.3]), np.array([-0.7, 0.2, 1.1]), 0.6
 
 def arm(name: str) -> rd.Robot:
     """Panda with its fingers held, or the robot of that name."""
-    return rd.load(name).with_(lock={"panda_finger_joint1": 0.0} if name == "panda" else None)
+    return rd.load(name).with_(lock={"panda_finger_joint1": 0.0} if name == "panda" else {})
 
 
 def general_motion(n: int):
