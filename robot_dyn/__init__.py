@@ -1,4 +1,4 @@
-"""Dynamics of robot arms from a URDF: M(q) a + C(q, v) v + N(t, q, v) = Υ, by two independent roads."""
+"""Dynamics of robot arms from a URDF: M(q) a + C(q, v) v + N(t, q, v) = Υ, by Pinocchio and a Lagrangian."""
 
 from __future__ import annotations
 

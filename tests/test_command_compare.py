@@ -70,8 +70,8 @@ def test_a_road_that_says_nan_disagrees_in_valid_json(monkeypatch: pytest.Monkey
 @pytest.mark.parametrize(
     ("args", "message"),
     [
-        ([], r"name the robots to compare, or give --all, not both"),
-        (["ur5", "--all"], r"name the robots to compare, or give --all, not both"),
+        ([], r"nothing to compare; give the names of robots, or --all"),
+        (["ur5", "--all"], r"give the names of robots or --all, not both"),
         (["ur5", "ur6", "--samples", "1"], r"no robot 'ur6'; nearest: ur5.*"),
     ],
 )

@@ -142,7 +142,7 @@ def test_query_and_why_as_text():
 
 def test_units_are_those_of_the_joints():
     """cart_pole slides and turns, ur5 only turns."""
-    assert "[rad/s]" in said("query", "ur5") and "[m, rad]" in said("query", "cart_pole")
+    assert "[rad/s]" in said("query", "ur5") and "[m or rad]" in said("query", "cart_pole")
     why = said("query", "cart_pole", "--why", "slide", "--effects", "urdf")
     assert "why slide needs 0 N:" in why and "viscous_friction" in why
 

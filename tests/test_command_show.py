@@ -21,7 +21,7 @@ def file(tmp_path_factory) -> Path:
 def test_the_demo_ends_with_a_replay_a_plot_and_a_run(tmp_path, browser) -> None:
     """It shows arm and cross-check, then names four files that are there; the page opens with the network off."""
     text = said("demo", "--output", tmp_path / "new" / "demo")
-    assert "M, mass matrix:" in text and "1 of 1 agree" in text and "finished at t = 1.5 s" in text
+    assert "M, mass matrix [" in text and "1 of 1 agree" in text and "finished at t = 1.5 s" in text
     named = [Path(line.split()[0]) for line in text.partition("Now look:")[2].splitlines() if line.strip()]
     assert [path.name for path in named] == ["panda.html", "panda.png", "panda.npz", "panda.toml"]
     assert all(path.stat().st_size > 100 for path in named)
@@ -50,7 +50,7 @@ def test_help_names_every_plot() -> None:
         (["--joint", "elbo"], "no joint 'elbo'"),
         (["-o", "out.bmp"], "'.bmp' is not the suffix of a plot; end the name with .png, .svg, .pdf"),
         (["-o", "none/out.png"], "there is no folder"),
-        (["--show", "tracking"], "followed no reference"),
+        (["--show", "tracking"], "it followed no reference"),
     ],
 )
 def test_plots_without_meaning_are_refused_in_one_line(file, args: list[str], text: str) -> None:

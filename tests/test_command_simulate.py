@@ -34,7 +34,12 @@ def scene(tmp_path) -> Path:
 def test_simulate_prints_a_summary_and_keeps_the_run(scene, tmp_path) -> None:
     done = run("simulate", scene, "-o", tmp_path / "run.npz", "--csv", tmp_path / "run.csv")
     assert done.returncode == 0, done.stderr
-    for said in ("finished at t = 0.2 s", "effects: control, viscous_friction", "energy ledger", "error of q"):
+    for said in (
+        "finished at t = 0.2 s",
+        "effects: gravity 9.807 m/s², viscous_friction, spring, external_wrench\n",
+        "energy ledger",
+        "error of q [m or rad]",
+    ):
         assert said in done.stdout
     assert rd.load_run(tmp_path / "run.npz").summary in done.stdout
     assert (tmp_path / "run.csv").is_file()

@@ -37,8 +37,15 @@ def output(name: str, runs: int) -> str:
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    closures = [float(x) for x in re.findall(r"^energy ledger: .* (\S+) of exchanged$", done.stdout, re.MULTILINE)]
-    errors = [float(x) for x in re.findall(r"^error of q: (\S+), estimated$", done.stdout, re.MULTILINE)]
+    closures = [
+        float(x) for x in re.findall(r"^energy ledger: .* (\S+) of the energy exchanged$", done.stdout, re.MULTILINE)
+    ]
+    errors = [
+        float(x)
+        for x in re.findall(
+            r"^error of q \[.*\]: (?:about )?(\S+) .*\((?:order seen|bounded.*)\)$", done.stdout, re.MULTILINE
+        )
+    ]
     assert len(re.findall(r"^finished at", done.stdout, re.MULTILINE)) == len(closures) == len(errors) == runs
     assert max(closures) <= 1e-9
     assert max(errors) <= 1e-6

@@ -67,7 +67,7 @@ def test_a_truncated_file_is_refused(run, tmp_path, keep: float) -> None:
     path = rd.save_run(run, tmp_path / "run.npz")
     whole = path.read_bytes()
     path.write_bytes(whole[: int(keep * len(whole))])
-    with pytest.raises(RunFileError, match="is not a whole run file"):
+    with pytest.raises(RunFileError, match="is not a complete run file"):
         rd.load_run(path)
 
 
@@ -75,10 +75,10 @@ def test_other_files_are_refused(tmp_path) -> None:
     with pytest.raises(RunFileError, match="no such file"):
         rd.load_run(tmp_path / "none.npz")
     np.savez(tmp_path / "other.npz", x=np.ones(3))
-    with pytest.raises(RunFileError, match="is not a whole run file"):
+    with pytest.raises(RunFileError, match="is not a complete run file"):
         rd.load_run(tmp_path / "other.npz")
     (tmp_path / "text.npz").write_text("hello")
-    with pytest.raises(RunFileError, match="is not a whole run file"):
+    with pytest.raises(RunFileError, match="is not a complete run file"):
         rd.load_run(tmp_path / "text.npz")
 
 
@@ -179,7 +179,7 @@ def said(text: np.ndarray, **changes) -> np.ndarray:
 def test_members_that_do_not_fit_together_are_refused_by_name(run, tmp_path, name: str, change, message: str) -> None:
     """Also where the digest is right: it finds damage, not a program that writes nonsense."""
     path = resaved(run, tmp_path / "run.npz", **{name: change})
-    with pytest.raises(RunFileError, match=f"is not a whole run file: .*{message}"):
+    with pytest.raises(RunFileError, match=f"is not a complete run file: .*{message}"):
         rd.load_run(path)
 
 

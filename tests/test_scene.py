@@ -192,3 +192,13 @@ def test_a_missing_scene_is_told(tmp_path) -> None:
 def test_a_scene_is_checked_before_its_robot_is_loaded() -> None:
     with pytest.raises(SceneError, match="line 3: 'x' is not a key of a scene"):
         parse_scene('robot = "none"\nduration_s = 1.0\nx = 1', "here")
+
+
+def test_an_explanation_holds_no_key_that_is_not_read(write) -> None:
+    """A PD with kp and kd reads neither frame, integral rate, effort limit nor damping ratio; one joint is one."""
+    gains = '[control]\nkind = "pd"\nkp = 3.0\nkd = 1.0\n'
+    text = "\n".join(explain(*read_both(write(f'robot = "pendulum"\nduration_s = 0.1\n{gains}'))))
+    assert "None" not in text
+    for key in ("frame =", "integral_rate", "effort_limit_N_m", "damping_ratio", "frequency"):
+        assert key not in text
+    assert "kp = 3.0  (scene)" in text and "pendulum: 1 joint, " in text

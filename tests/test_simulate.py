@@ -182,7 +182,7 @@ def test_a_frame_that_follows_a_circle_has_a_deviation_in_metres() -> None:
     assert run.wanted is None
     np.testing.assert_allclose(run.deviation, p - wanted, atol=1e-15)
     assert run.tracking_error == pytest.approx(np.sqrt(np.mean((p - wanted) ** 2)))
-    assert "tracking error of the frame, m" in run.summary
+    assert "tracking error of the frame [m]: " in run.summary
 
 
 def test_a_run_from_python_carries_its_origin() -> None:
@@ -190,3 +190,27 @@ def test_a_run_from_python_carries_its_origin() -> None:
     assert "<robot" in about["urdf"]
     assert "gravity" in about["edits"]
     assert "pin" in about["versions"]
+
+
+def test_the_summary_says_what_acted_and_nothing_else() -> None:
+    """Gravity, payload, limits and control by name; no control without a controller."""
+    bare = rd.load("planar_2r").with_(gravity=(0.0, 0.0, 0.0))
+    start = {"q0": [0.3, 0.4], "duration_s": 0.01, "estimate_error": False}
+    assert "\neffects: none\n" in rd.simulate(bare, **start).summary
+    loaded = bare.with_(gravity=(0.0, 3.0, -4.0), payload=rd.Payload("tip", 0.5), armature=0.1, mass_scale=1.1)
+    plant = rd.Plant(loaded, [rd.EffortLimit(5.0), *rd.joint_stops(-2.0, 2.0), rd.ViscousFriction(0.1)])
+    run = rd.simulate(plant, controller=rd.PD(rd.hold([0.3, 0.4]), 1.0, 1.0), **start)
+    acting = "gravity 5 m/s²", "payload 0.5 kg on tip", "mass_scale 1.1", "armature"
+    assert run.acting == (*acting, "effort_limit", "joint_stops", "viscous_friction", "control")
+    assert f"\neffects: {', '.join(run.acting)}\n" in run.summary
+    locked = rd.simulate(bare.with_(lock={"joint_2": 0.1}), q0=[0.3], duration_s=0.01, estimate_error=False)
+    assert locked.acting == ("lock joint_2",)
+
+
+@pytest.mark.parametrize(("name", "unit"), [("planar_2r", "rad"), ("cart_pole", "m or rad")])
+def test_the_summary_states_units(name: str, unit: str) -> None:
+    """Of the errors of q; m and rad where both kinds of joints are."""
+    law = rd.PD(rd.hold([0.1, 0.2]), 1.0, 1.0)
+    text = rd.simulate(rd.load(name), q0=[0.1, 0.2], duration_s=0.05, controller=law).summary
+    assert f"\nerror of q [{unit}]: " in text and f"\ntracking error of q [{unit}]: " in text
+    assert " of the energy exchanged" in text

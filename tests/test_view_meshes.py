@@ -109,7 +109,7 @@ def test_a_huge_mesh_a_folder_and_a_device_are_not_read(tmp_path: Path) -> None:
         stream.truncate(MAX_BYTES + 1)
     (tmp_path / "folder.stl").mkdir()
     (tmp_path / "device.stl").symlink_to("/dev/zero")
-    for name, why in (("huge", "the limit is 64"), ("folder", "no regular file"), ("device", "no regular file")):
+    for name, why in (("huge", "the limit is 64"), ("folder", "not a regular file"), ("device", "not a regular file")):
         here = drawn(urdf(mesh_visual(f"{name}.stl")), tmp_path)
         assert why in here.notes[0]
         assert len(here.pieces) == 1
@@ -134,7 +134,7 @@ def test_instances_of_instances_are_counted_before_they_are_drawn(tmp_path: Path
         ('<visual><origin rpy="1 2"/><geometry><sphere radius="1"/></geometry></visual>', "at the origin"),
         ('<visual><geometry><sphere radius="-1"/></geometry></visual>', "not positive"),
         ('<visual><geometry><box size="1 2"/></geometry></visual>', "3 finite numbers"),
-        ('<visual><geometry><torus radius="1"/></geometry></visual>', "no shape of URDF"),
+        ('<visual><geometry><torus radius="1"/></geometry></visual>', "not a shape of URDF"),
         ("<visual><geometry/></visual>", "<geometry> is empty"),
         ("<visual/>", "<geometry> is empty"),
         (mesh_visual(""), "names no file"),

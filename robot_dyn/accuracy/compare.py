@@ -29,7 +29,7 @@ _U = np.finfo(float).eps / 2
 @final
 @dataclass(frozen=True)
 class Agreement:
-    """How well two roads agree on one quantity, at the worst of all states and entries.
+    """How well Pinocchio and the own Lagrangian agree on one quantity, at the worst of all states and entries.
 
     Attributes:
         quantity: Its name in the `Dynamics` protocol, or the identity that was checked.
@@ -73,7 +73,7 @@ class Comparison:
 
     @property
     def ok(self) -> bool:
-        """Whether the roads agree on every quantity."""
+        """Whether both agree on every quantity."""
         return all(agreement.ok for agreement in self.agreements)
 
     @property
@@ -123,7 +123,7 @@ def compare(
     Args:
         robot: The robot; its joints are matched by name.
         samples: Number of states.
-        seed: Of the random generator.
+        seed: Seed of the random generator.
         tolerance: Allowed error on each quantity's scale.
         on_sample: Called after each state.
 

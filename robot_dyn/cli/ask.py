@@ -84,7 +84,7 @@ def compare(
     ] = None,
     every: Annotated[bool, typer.Option("--all", help="All robots of `robot-dyn list` that load.")] = False,
     samples: Annotated[int, typer.Option(min=1, help="Random states for each robot.")] = 20,
-    seed: Annotated[int, typer.Option(help="Of the random states.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of the random states.")] = 0,
     lock: Lock = None,
     package_dir: PackageDir = None,
     xacro: Xacro = None,
@@ -93,8 +93,10 @@ def compare(
     """Cross-check Pinocchio against the library's own Lagrangian; exit code 1 if they disagree."""
     from robot_dyn.cli import report
 
-    if bool(robots) == every:
-        raise QueryError("name the robots to compare, or give --all, not both")
+    if robots and every:
+        raise QueryError("give the names of robots or --all, not both")
+    if not (robots or every):
+        raise QueryError("nothing to compare; give the names of robots, or --all")
     results, refused = [], {}
     for name in progress(rd.list_robots() if every else robots or (), "comparing"):
         try:

@@ -123,6 +123,7 @@ def run(trajectory: Trajectory) -> Document:
         "t": outcome.t,
         "advice": outcome.advice,
         "samples": len(trajectory.t),
+        "acting": trajectory.acting and list(trajectory.acting),
         "joints": list(trajectory.joint_names),
         "q": [_finite(x) for x in trajectory.q[-1].tolist()],
         "v": [_finite(x) for x in trajectory.v[-1].tolist()],

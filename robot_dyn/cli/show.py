@@ -115,7 +115,7 @@ def demo(
     output: Annotated[str, typer.Option("-o", "--output", metavar="FOLDER", help="Where its files go.")] = "demo",
     force: Force = False,
 ) -> None:
-    """Load a real arm, cross-check the two roads, simulate it, and write a replay and a plot of the run."""
+    """Load a real arm, compare Pinocchio with the own Lagrangian, simulate it, write a replay and a plot."""
     from robot_dyn.cli import report
     from robot_dyn.files import save
     from robot_dyn.scene.scene import SCENE, SceneError

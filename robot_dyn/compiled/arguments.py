@@ -11,7 +11,7 @@ from robot_dyn.errors import QueryError
 
 
 def time_of(t: Any) -> np.ndarray:
-    """Times (...,) as a column (..., 1); QueryError if they are none."""
+    """Times (...,) as a column (..., 1); raises QueryError for anything else."""
     try:
         return FLOAT64.asarray(t)[..., None]
     except (TypeError, ValueError, OverflowError):

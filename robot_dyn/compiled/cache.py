@@ -85,7 +85,7 @@ class Store:
         """The payload saved under `key`; None if there is none that is whole and yours (a bad one is removed).
 
         Raises:
-            QueryError: If `key` is none that `key()` gives.
+            QueryError: If `key` is not one that `key()` gives.
         """
         path = self._path(key)
         if _objection(self.folder):
@@ -171,7 +171,7 @@ def default_store() -> Store | None:
 def _objection(folder: Path) -> str:
     """Why a folder cannot be trusted and what to do; empty if it can, or is not there yet."""
     if not folder.is_absolute():
-        return f"is no full path; {_OTHER}"
+        return f"is not a full path; {_OTHER}"
     try:
         status = folder.lstat()
     except OSError:  # where it cannot be reached, reading and writing fail of themselves

@@ -232,7 +232,7 @@ def Compiled(
         cache: Whether compiled code is kept on disk.
 
     Raises:
-        QueryError: If it is neither, or an option has no meaning.
+        QueryError: If it is neither, or an option is not allowed.
     """
     if not isinstance(robot_or_plant, Plant):
         return CompiledDynamics(robot_or_plant, str(dtype), threads, cache)

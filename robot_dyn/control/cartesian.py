@@ -84,7 +84,7 @@ def line(
         start: Time at which it starts, in [s].
 
     Raises:
-        ControlError: If a value has the wrong shape or is no rotation.
+        ControlError: If a value has the wrong shape or is not a rotation.
 
     Source: Siciliano et al. 2009, secs. 4.3.2 and 4.3.3.
     """
@@ -133,7 +133,7 @@ def circle(
         start: Time at which it starts, in [s].
 
     Raises:
-        ControlError: If a value has no meaning.
+        ControlError: If a value is not allowed.
 
     Source: Siciliano et al. 2009, sec. 4.3.1 (path primitives).
     """
@@ -186,7 +186,7 @@ def _rotation(name: str, values: Any) -> np.ndarray:
 
 
 def _direction(name: str, values: Any) -> np.ndarray:
-    """A unit vector, (3,), frozen; ControlError if there is no direction."""
+    """A unit vector, (3,), frozen; raises ControlError if it is zero."""
     vector = numbers(name, values, (3,))
     length = np.linalg.norm(vector)
     if length < 1e-12:

@@ -28,7 +28,7 @@ class ModelBased(Memoryless):
         period_s: In [s], 0 for continuous control.
 
     Raises:
-        ControlError: If model and reference differ in their joints, or a gain has no meaning.
+        ControlError: If model and reference differ in their joints, or a gain is not allowed.
     """
 
     model: Dynamics

@@ -16,14 +16,14 @@ from robot_dyn.errors import RobotDynError
 
 
 class ControlError(RobotDynError):
-    """A controller or reference with values that have no meaning, or of the wrong shape."""
+    """A controller or reference with values that are not allowed, or of the wrong shape."""
 
 
 class Controller(ABC):
     """A control law: a pure function of time, state and memory. Subclass `Memoryless` if it has no memory.
 
     Attributes:
-        period_s: Time between samples in [s], with the torque held between them; 0 for continuous control.
+        period_s: Time between samples in [s], with the torque constant between them; 0 for continuous control.
     """
 
     period_s: float

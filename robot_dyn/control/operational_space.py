@@ -74,7 +74,7 @@ def task_dynamics(
 
     Raises:
         QueryError: If q or v has the wrong shape or the frame is unknown.
-        ControlError: If rows or threshold have no meaning.
+        ControlError: If rows or threshold are not allowed.
         SingularError: If M is singular.
 
     Source: Khatib 1987; Chiaverini, Siciliano, Egeland 1994 (damping in the singular directions only).

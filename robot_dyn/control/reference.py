@@ -90,7 +90,7 @@ class PiecewisePolynomial:
 
 
 def hold(q: Any) -> PiecewisePolynomial:
-    """Rest at q, shape (n,), at all times; ControlError if q is no such array."""
+    """Rest at q, shape (n,), at all times; raises ControlError for any other array."""
     return PiecewisePolynomial([0.0, 1.0], numbers("q", q, ("n",))[None, None])
 
 

@@ -44,7 +44,7 @@ def stated_efforts(robot: Any) -> np.ndarray:
     """The effort limits that the file of a robot states, (n,), inf for none, in [N m] or [N].
 
     Raises:
-        EffectError: If one is 0, which files write for a limit that nobody knows: the joint would have no drive at all.
+        EffectError: If one is 0, which files state for an unknown limit: the joint would have no drive.
     """
     if names := [name for name, limit in zip(robot.joint_names, robot.effort_limit, strict=True) if limit == 0]:
         listed = ", ".join(map(repr, names[:6])) + (", …" if len(names) > 6 else "")

@@ -86,7 +86,7 @@ class Adaptive:
         max_step: Longest step, in the unit of t.
 
     Raises:
-        QueryError: If an option has no meaning.
+        QueryError: If an option is not allowed.
     """
 
     method: str = "DOP853"

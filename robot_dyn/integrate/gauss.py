@@ -65,7 +65,7 @@ class Gauss(Integrator):
         order: 2, 4 or 6.
 
     Raises:
-        QueryError: If there is no such order.
+        QueryError: If the order is another.
     """
 
     order: int

@@ -44,7 +44,7 @@ class System:
         rate: f(t, y), a fresh array of the shape of y, (..., m); batch axes come first.
         n: Number of positions, 0 if y has no such parts.
         widths: Change of each entry of y over which the rate bends, (m,), positive, inf where it does not; None if
-            nothing is known. A difference quotient across more than that is no derivative.
+            nothing is known. A difference quotient across more than that is not a derivative.
     """
 
     rate: Callable[[Any, Array], Array]

@@ -38,7 +38,7 @@ def method(name: str) -> Integrator:
     """The fixed-step method of that name.
 
     Raises:
-        QueryError: If there is none, with the nearest names.
+        QueryError: If the name is unknown; gives the nearest names.
     """
     if name not in METHODS:
         adaptive = f"; rd.Adaptive({name!r}) is an adaptive one" if name in ("DOP853", "Radau") else ""

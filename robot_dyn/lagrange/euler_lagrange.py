@@ -147,7 +147,7 @@ def euler_lagrange(kinetic: Kinetic, potential: Potential | None, n: int) -> Eul
         n: Number of coordinates.
 
     Raises:
-        QueryError: If n is not a positive integer, or an energy cannot be evaluated or is no scalar.
+        QueryError: If n is not a positive integer, or an energy cannot be evaluated or is not a scalar.
     """
     import casadi as ca
 

@@ -76,7 +76,7 @@ def generalized_force(positions: Positions, n: int) -> GeneralizedForce:
         n: Number of coordinates.
 
     Raises:
-        QueryError: If n is not a positive integer, or a position cannot be evaluated or is no 3-vector.
+        QueryError: If n is not a positive integer, or a position cannot be evaluated or is not a 3-vector.
 
     Source: Goldstein, 3rd ed., eq. 1.49.
     """

@@ -35,7 +35,7 @@ from robot_dyn.spatial import adjoint, adjoint_inverse, block_diagonal, bracket,
 @final
 @dataclass(frozen=True)
 class Lagrangian(Dynamics):
-    """The own road to a robot's dynamics; shares neither parser nor algorithm with Pinocchio.
+    """The dynamics of a robot by the Lagrangian; shares neither parser nor algorithm with Pinocchio.
 
     Attributes:
         robot: The robot; its file, edits and order of joints are used, none of its numbers.

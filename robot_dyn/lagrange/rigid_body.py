@@ -36,7 +36,7 @@ def world_wrench(body: MassProperties, R: Any, omega: Any, acceleration: Any) ->
         (f, τ) at the centre of mass in world axes, shape (..., 6), in [N] and [N m].
 
     Raises:
-        QueryError: If a shape is wrong, a value is not finite, or R is no rotation.
+        QueryError: If a shape is wrong, a value is not finite, or R is not a rotation.
     """
     R, omega = rotation_matrix(R), numbers("omega", omega, 3)
     acceleration = numbers("acceleration", acceleration, 6)
@@ -151,7 +151,7 @@ def angular_momentum(body: MassProperties, R: Any, omega: Any) -> np.ndarray:
         omega: Angular velocity in world axes, shape (..., 3), in [rad/s].
 
     Raises:
-        QueryError: If a shape is wrong, a value is not finite, or R is no rotation.
+        QueryError: If a shape is wrong, a value is not finite, or R is not a rotation.
     """
     R, omega = rotation_matrix(R), numbers("omega", omega, 3)
     _batches(R=R[..., 0], omega=omega)

@@ -38,7 +38,7 @@ def find(name_or_path: str | Path, package_dirs: Iterable[str | Path] = ()) -> P
     """The URDF file of a name, a path or a package:// address.
 
     Raises:
-        CatalogError: If there is none; names the nearest robots or the places tried.
+        CatalogError: If the robot is not found; names the nearest robots or the places tried.
     """
     start = name_or_path.decode(errors="replace") if isinstance(name_or_path, bytes) else name_or_path
     if isinstance(start, str) and start.lstrip("\ufeff \t\r\n").startswith("<"):
@@ -80,7 +80,7 @@ def package(name: str, urdf: Path, package_dirs: Iterable[str | Path] = ()) -> P
     """The folder of a package that `urdf` names.
 
     Raises:
-        CatalogError: If there is none; lists the places tried.
+        CatalogError: If the file is not found; lists the places tried.
     """
     package_dirs = tuple(package_dirs)
     for folder in package_folders(name, urdf, package_dirs):

@@ -73,7 +73,7 @@ def read(path: str | Path) -> Description:
     try:
         mode = path.stat().st_mode
         if not S_ISREG(mode):
-            kind = "a folder" if S_ISDIR(mode) else "no regular file"
+            kind = "a folder" if S_ISDIR(mode) else "not a regular file"
             raise DescriptionError(f"{path}: is {kind}; give the path of a URDF file")
         with path.open("rb") as stream:
             text = stream.read(MAX_BYTES + 1)

@@ -40,7 +40,7 @@ def numbers(name: str, values: Any, *shape: int) -> np.ndarray:
 
 
 def rotation_matrix(R: Any) -> np.ndarray:
-    """R as float64 of shape (..., 3, 3); QueryError if it is no rotation: RᵀR = 1, det R = 1."""
+    """R as float64 of shape (..., 3, 3); raises QueryError if it is not a rotation: RᵀR = 1, det R = 1."""
     array = numbers("R", R, 3, 3)
     with np.errstate(over="ignore", invalid="ignore"):
         off = np.abs(np.swapaxes(array, -1, -2) @ array - np.eye(3)).max(initial=0)
@@ -97,7 +97,7 @@ class MassProperties:
             p: Origin of the body's frame, shape (3,), in [m].
 
         Raises:
-            QueryError: If R is no rotation, or a shape is wrong.
+            QueryError: If R is not a rotation, or a shape is wrong.
         """
         R, p = rotation_matrix(R), numbers("p", p, 3)
         return MassProperties(self.mass, R @ self.com + p, R @ self.inertia @ R.T)

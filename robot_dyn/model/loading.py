@@ -28,7 +28,7 @@ def load(
             program: expand none that you would not run. Needs `pip install robot-dyn[xacro]`.
 
     Raises:
-        CatalogError: If there is no such robot or file, or `package_dirs` names what is not a folder.
+        CatalogError: If there is no such robot or file, or an entry of `package_dirs` is not a folder.
         DescriptionError: If the file is refused, or cannot be expanded.
 
     Warns:

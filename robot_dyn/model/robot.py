@@ -96,7 +96,7 @@ class Robot(Dynamics):
                 several; armature: inertia of the drives, a scalar, (n,) or by joint, in [kg m²] or [kg]; mass_scale.
 
         Raises:
-            EditError: If a name is unknown or a value has no meaning.
+            EditError: If a name is unknown or a value is not allowed.
 
         Warns:
             ModelWarning: If the new gravity is not zero and has no torque on any joint.

@@ -16,5 +16,7 @@ def unit(quantity: str, joint_type: str | None) -> str:
 
 
 def units(quantity: str, joint_types: Iterable[str | None]) -> str:
-    """The units of a vector over joints, such as "rad, m": each once."""
-    return ", ".join(dict.fromkeys(unit(quantity, each) for each in joint_types))
+    """The units of a vector over joints, such as "rad or m": each once."""
+    of_joints = dict.fromkeys(unit(quantity, each) for each in joint_types)
+    both = unit(quantity, None)
+    return both if both in of_joints else " or ".join(of_joints)

@@ -31,7 +31,7 @@ def checked_robot(robot: etree._Element, source: str) -> tuple[etree._Element, t
     """A canonical copy of a `<robot>` element, and what was assumed where it departs from the format.
 
     Raises:
-        DescriptionError: If anything in it has no meaning, or more than one.
+        DescriptionError: If anything in it is undefined or ambiguous.
     """
     check = _Check(source)
     if robot.tag != "robot":

@@ -108,7 +108,7 @@ def _message(first: Any, found: list[Any], path: tuple[str | int, ...], table: A
     ways = [_WAYS[str(each["loc"][-1])] for each in found if _path(table, each) == path and each["loc"][-1] in _WAYS]
     if len(ways) > 1:
         return f"{at}: must be {', '.join(ways[:-1])} or {ways[-1]}, {got}"
-    must = next((text for start, text in _MUST.items() if kind.startswith(start)), "has another meaning than allowed")
+    must = next((text for start, text in _MUST.items() if kind.startswith(start)), "is not an allowed value")
     return f"{at}: {must}, {got}"
 
 

@@ -149,7 +149,7 @@ class Model(Part):
 
 LAWS = {
     "pd": "u = kp (q_d − q) + kd (v_d − v)",
-    "pid": "u = sat(kp e + kd ė + z),  ż = ki e + (u − wanted u)/T_t",
+    "pid": "u = sat(kp e + kd ė + z),  ż = ki e + (sat(u) − u)/T_t",
     "pd_gravity": "u = kp e + kd ė + N(q)",
     "feed_forward": "u = M a_d + C v_d + N at the reference + kp e + kd ė",
     "computed_torque": "u = M (a_d + kd ė + kp e) + C v + N",
@@ -184,6 +184,12 @@ class Control(Part):
     """Of operational_space: the link under control."""
     model: Model = Model()
     """The controller's model of the arm; that of the plant by default."""
+
+    @property
+    def unused(self) -> set[str]:
+        """Keys that this kind, with these gains, does not read."""
+        of_others = {key for key, kinds in _OF_ONE_KIND.items() if self.kind not in kinds}
+        return of_others | ({"damping_ratio"} if self.kp is not None else set())
 
     def build(self, described: Robot, robot: Robot, q0: np.ndarray, reference: Any) -> Controller:
         """The controller for a reference.

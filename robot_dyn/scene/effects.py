@@ -39,7 +39,7 @@ class Lock(Part):
     """Value by joint, in rad, or m for a prismatic joint."""
 
     def edit(self, robot: Robot) -> Robot:
-        """The robot with these joints held."""
+        """The robot with these joints locked."""
         return robot.with_(lock=self.joints)
 
 

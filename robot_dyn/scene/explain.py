@@ -9,7 +9,7 @@ import numpy as np
 
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import RobotDynError
-from robot_dyn.scene.control import LAWS
+from robot_dyn.scene.control import LAWS, Control
 from robot_dyn.scene.effects import Acting, Edit
 from robot_dyn.scene.scene import ADAPTIVE, Scene
 from robot_dyn.scene.schema import Part
@@ -25,9 +25,9 @@ _TERMS = {
 }
 _EDITS = {
     "gravity": "∂V/∂q in N, with V = −Σ m gᵀ p",
-    "lock": "a joint held, its link part of the one before",
-    "payload": "a body more in M, C and N",
-    "armature": "a constant diagonal in M",
+    "lock": "a joint held at a value, its link part of the link before",
+    "payload": "a rigid body on a link, in M, C and N",
+    "armature": "added to the diagonal of M",
 }
 
 
@@ -38,11 +38,12 @@ def explain(scene: Scene, setup: Setup) -> Iterator[str]:
     gravity = ["∂V/∂q"] if "gravity" in named else []
     N = " ".join([*gravity, *(f"− τ_{kind}" for kind in forces)]).removeprefix("− ") or "0"
     N = f"−{N}" if not gravity and forces else N
-    yield f"{setup.plant.dynamics.n} joints of {scene.robot}: {', '.join(setup.plant.dynamics.joint_names)}"
+    n, names = setup.plant.dynamics.n, setup.plant.dynamics.joint_names
+    yield f"{scene.robot}: {n} joint{'s' if n > 1 else ''}, {', '.join(names)}"
     yield "\n    M(q) a + C(q, v) v + N = u"
     yield f"    N = {N}"
     yield f"    u = {'0' if scene.control is None else LAWS[scene.control.kind].removeprefix('u = ')}"
-    yield "\nin it:"
+    yield "\neffects:" if scene.effect else "\neffects: none"
     for effect in scene.effect:
         yield f"  {effect.kind}: {(_TERMS | _EDITS)[effect.kind]}"
         yield from _numbers(effect, "    ")
@@ -50,7 +51,7 @@ def explain(scene: Scene, setup: Setup) -> Iterator[str]:
     missing = [kind for kind in (*_EDITS, *_TERMS) if kind not in named]
     yield f"  {', '.join(missing)}"
     if scene.control is not None:
-        every = f"every {scene.control.period_s:g} s, held between" if scene.control.period_s else "continuously"
+        every = f"every {scene.control.period_s:g} s, constant between" if scene.control.period_s else "continuously"
         yield f"\ncontrol: {scene.control.kind}, {every}"
         yield from _numbers(scene.control, "  ")
         yield f"reference: {scene.reference.kind}"
@@ -88,8 +89,9 @@ def kinds() -> tuple[str, ...]:
 
 
 def _numbers(part: Part, indent: str) -> Iterator[str]:
+    unused = part.unused if isinstance(part, Control) else ()
     for key in type(part).model_fields:
-        if key != "kind":
+        if key != "kind" and getattr(part, key) is not None and key not in unused:
             yield f"{indent}{key} = {_shown(getattr(part, key))}  ({_source(part, key)})"
 
 
@@ -101,5 +103,6 @@ def _source(part: Part, key: str) -> str:
 
 def _shown(value: Any) -> str:
     if isinstance(value, Part):
-        return "{" + ", ".join(f"{key} = {_shown(getattr(value, key))}" for key in type(value).model_fields) + "}"
+        stated = {key: getattr(value, key) for key in type(value).model_fields if getattr(value, key) is not None}
+        return "{" + ", ".join(f"{key} = {_shown(each)}" for key, each in stated.items()) + "}"
     return np.array2string(value, precision=6) if isinstance(value, np.ndarray) else str(value)

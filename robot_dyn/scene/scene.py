@@ -108,7 +108,7 @@ def read_scene(path: str | Path) -> Setup:
     """The setup of a scene file.
 
     Raises:
-        SceneError: If the file cannot be read, or a key or value of it has no meaning.
+        SceneError: If the file cannot be read, or a key or value of it is not allowed.
     """
     return read_both(path)[1]
 
@@ -134,7 +134,7 @@ def parse_scene(text: str, source: str) -> Scene:
     """A scene of its text; `source` names it in messages.
 
     Raises:
-        SceneError: If it is not TOML, or a key or value has no meaning.
+        SceneError: If it is not TOML, or a key or value is not allowed.
     """
     return _parsed(text, source)[0]
 
@@ -161,7 +161,7 @@ def _parsed(text: str, source: str) -> tuple[Scene, dict[str, Any]]:
 
 
 def _without_effect(scene: Scene) -> str:
-    """What a scene states and no run would heed, or nothing."""
+    """What a scene states that has no effect on its run; empty if nothing."""
     own = ("step_s",) if scene.method in ADAPTIVE else ("rtol", "atol")
     if unused := [key for key in own if key in scene.model_fields_set]:
         kind = "chooses its own step" if scene.method in ADAPTIVE else "has a fixed step"

@@ -40,7 +40,7 @@ class Part(BaseModel):
     )
 
 
-# Strict: a text or a truth value is no number.
+# Strict: a text or a truth value is not a number.
 Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 Positive = Annotated[float, Field(gt=0, strict=True)]
 NotNegative = Annotated[float, Field(ge=0, strict=True)]

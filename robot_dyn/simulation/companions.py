@@ -121,8 +121,8 @@ def _judged(run: Path, n: int, error: np.ndarray, seen: np.ndarray, lost: np.nda
     bad = np.flatnonzero(lost)
     last = int(bad[0]) - 1 if len(bad) else len(run.t) - 1
     if last < 0:
-        return no_estimate("companion runs cannot follow the start")
+        return no_estimate("runs with other steps fail at the start")
     rows = np.unique(np.linspace(0, last, min(last + 1, _ROWS)).astype(int))
     verdict = Verdict.ORDER if seen[last] else Verdict.BOUND
-    note = "" if last == len(run.t) - 1 else "companion runs differ as much as the motion itself"
+    note = "" if last == len(run.t) - 1 else "runs with other steps differ as much as the motion itself"
     return ErrorEstimate(run.t[rows], np.maximum.accumulate(error)[rows], float(run.t[last]), note, verdict)

@@ -26,7 +26,7 @@ class ErrorEstimate:
         t: Times of the estimate, (k,), in [s].
         error: Estimate of |q_h − q|, the largest up to each time, (k,).
         resolved_until: Time up to which it holds, in [s].
-        note: Why it ends there, or why there is none, and what to do; empty if it holds to the end of the run.
+        note: Why it ends there, or why no error is estimated, and what to do; empty if it holds to the end of the run.
         verdict: What it rests on at `resolved_until`.
         reason: Why an error that is bounded shows no order.
     """

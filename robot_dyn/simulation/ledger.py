@@ -33,12 +33,12 @@ class Ledger:
 
     @property
     def residual(self) -> np.ndarray:
-        """E(t) − E(0) − Σ W_k(t): energy that came from nowhere."""
+        """E(t) − E(0) − Σ W_k(t): energy that nothing accounts for, the error of the run in energy."""
         return self.energy - self.energy[0] - sum(self.work.values(), start=np.zeros_like(self.kinetic))
 
     @property
     def exchanged(self) -> float:
-        """Energy that changed hands: max K + Σ ∫ |P_k|, the integrals over the samples."""
+        """Energy exchanged: max K + Σ ∫ |P_k|, the integrals over the samples."""
         moved = sum(float(np.nansum(np.abs(np.diff(work)))) for work in self.work.values())
         return largest(self.kinetic) + moved
 

@@ -60,7 +60,7 @@ def rollouts(
         The runs, in the order given. Ctrl-C while they march ends them, and keeps what there is.
 
     Raises:
-        QueryError: If an argument has no meaning or the wrong shape, or the record would exceed `most_bytes`.
+        QueryError: If an argument is not allowed or has the wrong shape, or the record would exceed `most_bytes`.
         TraceError: If a part of the setup cannot be compiled; names it.
     """
     setup = replace(setup, estimate_error=False)

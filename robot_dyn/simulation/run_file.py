@@ -75,7 +75,7 @@ def load_run(path: str | Path, *, max_bytes: int = MAX_BYTES) -> Trajectory:
             run = _checked(arrays, about)
             return replace(run, about=unpacked(run.about, Path(path).parent))
         except (ArchiveError, SerialError) as error:
-            raise RunFileError(f"{path}: is not a whole run file: {error}; simulate again") from None
+            raise RunFileError(f"{path}: is not a complete run file: {error}; simulate again") from None
 
 
 def _about(archive: Archive) -> dict[str, Any]:

@@ -22,6 +22,7 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import QueryError, nearest
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.model.dynamics import Dynamics
+from robot_dyn.simulation.acting import acting
 from robot_dyn.simulation.choice import choose
 from robot_dyn.simulation.error import ErrorEstimate, no_estimate
 from robot_dyn.simulation.estimate import estimate
@@ -52,7 +53,7 @@ def simulate(
         **options: Attributes of the setup, or those to change.
 
     Raises:
-        QueryError: If the setup has no meaning, or its record would not fit into memory. Whatever happens later is
+        QueryError: If the setup is not allowed, or its record would not fit into memory. Whatever happens later is
             told by the trajectory's outcome.
     """
     for name in options.keys() - Setup.__dataclass_fields__.keys():
@@ -76,7 +77,7 @@ def simulate(
         try:
             error = estimate(setup, motion, record, partial(_run, setup, motion, machine))
         except KeyboardInterrupt:
-            error = no_estimate("its companion runs were interrupted")
+            error = no_estimate("it was interrupted")
             if record.outcome.ending is Ending.FINISHED:
                 outcome = Outcome(Ending.STOPPED, record.outcome.t, "interrupted after the run, in its error estimate")
                 record = replace(record, outcome=outcome)
@@ -141,7 +142,7 @@ def _trajectory(
     return Trajectory(
         names, t, q, v, a, tau, power, ledger, wanted, deviation, record.outcome, statistics, error, about,
         wrenches(plant, t, q), at_stop(plant, q),
-        remarks(setup, observer, t, np.hstack([q, v, tau])), observer.extremes,
+        remarks(setup, observer, t, np.hstack([q, v, tau])), observer.extremes, acting(setup),
     )  # fmt: skip
 
 

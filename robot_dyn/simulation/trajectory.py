@@ -8,6 +8,7 @@ from typing import final
 
 import numpy as np
 
+from robot_dyn.model.units import units
 from robot_dyn.simulation.error import ErrorEstimate
 from robot_dyn.simulation.ledger import Ledger, largest
 from robot_dyn.simulation.remarks import Remark
@@ -48,7 +49,7 @@ class Statistics:
         steps: Number of steps.
         evaluations: Evaluations of the equation of motion.
         wall_s: Time of the run itself, in [s].
-        companions_s: Time of the error estimate, its companion runs above all.
+        companions_s: Time of the error estimate.
         engine: Which loop ran, and why if another was possible.
         compile_s: Time before the run, for the choice of the loop and for compiling it.
         samples_s: Time after it, for what follows from the states of its samples.
@@ -82,13 +83,14 @@ class Trajectory:
             None without a reference.
         outcome: How it ended.
         statistics: What it took.
-        error: Its estimated error; None if companions were switched off.
+        error: Its estimated error; None without an estimate.
         about: Texts that make it whole: URDF, its path, edits, scene, versions; the frame under control, if one is.
         wrenches: External wrench by link, rows (t, force, torque), (k, 7), in base axes at its frame, in SI units:
             at the samples and at both sides of each switch.
         at_stop: Whether each joint bears on a stop, (m, n); None without stops.
         remarks: What was seen at every step that the samples need not show.
         extremes: The least and the largest of q, v and tau over all steps, (3, 2, n); None if it was not watched.
+        acting: What acted, in words: gravity, payloads, effects, limits, control; None if it is not known.
     """
 
     joint_names: tuple[str, ...]
@@ -109,6 +111,7 @@ class Trajectory:
     at_stop: np.ndarray | None = None
     remarks: tuple[Remark, ...] = ()
     extremes: np.ndarray | None = None
+    acting: tuple[str, ...] | None = None
 
     @property
     def tracking_error(self) -> float | None:
@@ -129,20 +132,22 @@ class Trajectory:
 
     @property
     def summary(self) -> str:
-        """A few lines: outcome, ledger, error, tracking, cost."""
-        s, ledger = self.statistics, self.ledger
+        """A few lines: outcome, what acted, ledger, error, tracking, cost."""
+        from robot_dyn.simulation.origin import joint_types
+
+        s, ledger, unit = self.statistics, self.ledger, units("q", joint_types(self))
         opening = f"{self.outcome.ending} at t = {self.outcome.t:g} s, {len(self.t)} samples"
-        residual = f"residual {largest(np.abs(ledger.residual)):.2e} J, {ledger.closure:.1e} of exchanged"
+        residual = f"residual {largest(np.abs(ledger.residual)):.2e} J, {ledger.closure:.1e} of the energy exchanged"
         lines = [
             opening + _after(self.outcome.advice),
-            f"effects: {', '.join(self.power)}",
+            *([] if self.acting is None else [f"effects: {', '.join(self.acting) or 'none'}"]),
             f"energy ledger: {residual}" + _after(self.leak),
-            f"error of q: {self.error or 'not estimated (companion runs are off)'}",
+            f"error of q [{unit}]: {self.error or 'not estimated (estimate_error is False)'}",
         ]
         lines += ["between samples: not watched"] if self.extremes is None else []
         lines += said(self.remarks)
         if self.tracking_error is not None:
-            what = "the frame, m" if self.wanted is None else "q"
+            what = "the frame [m]" if self.wanted is None else f"q [{unit}]"
             lines.append(f"tracking error of {what}: {self.tracking_error:.3e} rms")
         step = f"step {s.step_s:.4g} s, " if s.step_s else ""
         lines.append(f"{s.method}: {step}{s.steps} steps, {s.evaluations} evaluations, {s.engine}")

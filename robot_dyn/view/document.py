@@ -45,7 +45,7 @@ class Shown:
         stage: Where its robot stands.
         keys: Keyframes of its joints.
         drawing: The look of its robot.
-        problems: What is not shown as it is, in words.
+        problems: What is drawn otherwise than the files describe, in words.
         notes: What else a reader should know.
     """
 
@@ -117,7 +117,7 @@ def _shown(number: int, run: Trajectory, count: int, package_dirs: tuple[Path, .
     whole, run = len(run.t), _drawable(run)
     stage = Stage("run" if number == 0 else f"ghost {number}", robot)
     if unknown := run.wrenches.keys() - stage.linkage.links.keys():
-        raise QueryError(f"the run has a wrench on {min(unknown)!r}, which is no link of its robot; simulate again")
+        raise QueryError(f"the run has a wrench on {min(unknown)!r}, which is not a link of its robot; simulate again")
     keys = keyframes(run.t, stage.linkage.ties.position(run.q))
     problems = []
     if len(run.t) < whole:
@@ -125,8 +125,8 @@ def _shown(number: int, run: Trajectory, count: int, package_dirs: tuple[Path, .
     worst = int(keys.error.argmax())
     joint = stage.linkage.bodies[worst]
     thinning = (
-        f"{len(keys.t)} keyframes stand for {keys.samples} samples; between them joints are off by at most"
-        f" {keys.error[worst]:.1e} {'rad' if joint.revolute else 'm'} ({joint.joint})"
+        f"drawn at {len(keys.t)} of the {keys.samples} samples; between these, joint positions are interpolated, with"
+        f" an error of at most {keys.error[worst]:.1e} {'rad' if joint.revolute else 'm'} ({joint.joint})"
     )
     mark = "" if not number else " (ghost)" if count == 2 else f" (ghost {number})"
     look = drawing(robot, package_dirs, inertia=inertia)

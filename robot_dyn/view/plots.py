@@ -59,7 +59,7 @@ def joints(view: View) -> Panel:
     for i, name in zip(view.joints, view.names, strict=True):
         q = [Curve("actual", run.t, run.q[:, i])]
         if run.wanted is not None:
-            q.append(Curve("wanted", run.t, run.wanted[:, i], WANTED))
+            q.append(Curve("desired", run.t, run.wanted[:, i], WANTED))
         cells.append(Cell(name, "", f"q [{view.units[i]}]", tuple(q)))
         cells.append(Cell("", "t [s]", f"v [{_rate(view.units[i])}]", (Curve("actual", run.t, run.v[:, i]),)))
     pairs = zip(_grid(cells[::2]), _grid(cells[1::2]), strict=True)
@@ -110,7 +110,9 @@ def tracking(view: View) -> Panel:
     """
     run = view.run
     if run.deviation is None:
-        raise PlotError("the run followed no reference, so there is no tracking error; simulate with a controller")
+        raise PlotError(
+            "the run has no tracking error, since it followed no reference; simulate with a controller that has one"
+        )
     names, units, columns = view.names, [view.units[i] for i in view.joints], list(view.joints)
     if run.wanted is None:
         names, units, columns = [f"frame, {axis}" for axis in "xyz"], ["m"] * 3, [0, 1, 2]
@@ -140,7 +142,7 @@ def error_growth(view: View) -> Panel:
     """
     error = view.run.error
     if error is None or len(error.t) < 2:
-        why = "companion runs were off" if error is None else error.note or "it ended too soon"
+        why = "estimate_error was False" if error is None else error.note or "it ended too soon"
         raise PlotError(f"the run has no estimate of its error ({why}); simulate with estimate_error=True")
     unit = " or ".join(sorted(set(" or ".join(view.units).split(" or ")), reverse=True))
     until = error.resolved_until if error.resolved_until < error.t[-1] else np.inf

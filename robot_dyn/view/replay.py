@@ -42,7 +42,7 @@ def replay(
 
     Raises:
         ReplayError: If a run has no samples.
-        QueryError: If it carries no robot, or `frame` is no link of it.
+        QueryError: If it carries no robot, or `frame` is not one of its links.
         ServerError: If the port is taken.
     """
     return _served(document((run, *ghosts), package_dirs, frame, inertia), port)
@@ -62,7 +62,7 @@ def save_replay(
 
     Raises:
         ReplayError: If a run has no samples.
-        QueryError: If it carries no robot, or `frame` is no link of it.
+        QueryError: If it carries no robot, or `frame` is not one of its links.
         ReplayError: If the file cannot be written.
     """
     file = target(path, PAGE, ReplayError)
@@ -128,7 +128,7 @@ def _written(made: dict[str, Any], file: Path) -> Path:
 
 
 def _tell(made: dict[str, Any]) -> None:
-    """Warn, once, of what is not drawn as described."""
+    """Warn, once, of what is drawn otherwise than the files describe."""
     if problems := made["problems"]:
         rest = f"; and {len(problems) - 1} more, listed on the page" if len(problems) > 1 else ""
-        warnings.warn(f"not shown as described: {problems[0]}{rest}", ModelWarning, stacklevel=4)
+        warnings.warn(f"drawn otherwise than its files describe: {problems[0]}{rest}", ModelWarning, stacklevel=4)

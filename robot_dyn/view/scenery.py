@@ -116,7 +116,7 @@ def gravity_label(robot: Robot) -> str:
 def turned(gravity: tuple[float, float, float]) -> list[str]:
     """A note on how the scene stands, if it does not stand as the base does with gravity along −z."""
     if not any(gravity):
-        return ["there is no gravity; up is z of the base"]
+        return ["gravity is zero; up is z of the base"]
     if np.array_equal(upright(gravity), np.eye(3)):
         return []
     return [f"the scene is turned so that gravity, {gravity} m/s² in axes of the base, points down"]

@@ -89,7 +89,7 @@ def test_the_cache_can_be_elsewhere(monkeypatch, tmp_path: Path) -> None:
     monkeypatch.setenv("ROBOT_DYN_CACHE", "~/mine")
     assert default_store() == Store(tmp_path / "mine")
     monkeypatch.setenv("ROBOT_DYN_CACHE", "here")
-    with pytest.warns(CacheWarning, match="is no full path"):
+    with pytest.warns(CacheWarning, match="is not a full path"):
         assert default_store() is None
 
 

@@ -13,7 +13,7 @@ def starters() -> tuple[str, ...]:
 
 
 def starter(name: str) -> str:
-    """The text of a starter scene; SceneError with the nearest names if there is none."""
+    """The text of a starter scene; raises SceneError for an unknown name."""
     if name not in starters():
         raise SceneError(f"no scene {name!r}; {nearest(name, starters())}")
     return (files(__name__) / f"{name}.toml").read_text(encoding="utf-8")

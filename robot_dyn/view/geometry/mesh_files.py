@@ -23,11 +23,11 @@ class MeshError(RobotDynError):
 
 
 def bounded(path: Path) -> bytes:
-    """The bytes of a regular file of at most `MAX_BYTES`; MeshError if it is none."""
+    """The bytes of a regular file of at most `MAX_BYTES`; raises MeshError for any other."""
     try:
         status = path.stat()
         if not S_ISREG(status.st_mode):
-            raise MeshError("is no regular file")
+            raise MeshError("is not a regular file")
         if status.st_size > MAX_BYTES:
             raise MeshError(f"has {status.st_size / 2**20:.0f} MiB, the limit is {MAX_BYTES >> 20}; simplify it")
         return path.read_bytes()

@@ -190,7 +190,7 @@ class _Artist:
         if shape.tag == "mesh":
             return self.mesh(shape)
         if shape.tag not in PRIMITIVES:
-            raise MeshError(f"<{shorten(shape.tag)}> is no shape of URDF; name a box, cylinder, sphere or mesh")
+            raise MeshError(f"<{shorten(shape.tag)}> is not a shape of URDF; give a box, cylinder, sphere or mesh")
         lengths = tuple(x for key, count in PRIMITIVES[shape.tag][1].items() for x in _numbers(shape, key, count))
         if min(lengths) <= 0:
             raise MeshError(f"<{shape.tag}> has a length that is not positive; correct it")

@@ -141,7 +141,7 @@ async function main() {
     element(list).append(...notes.map((note) => Object.assign(document.createElement("li"), { textContent: note })));
   }
   element("trouble").hidden = !data.problems.length;
-  element("count").textContent = `not shown as described: ${data.problems.length}`;
+  element("count").textContent = `drawn otherwise than its files describe, in ${data.problems.length} place${data.problems.length > 1 ? "s" : ""}`;
   const viewer = window.viewer = makeViewer(data.scene);
   if (data.live) viewer.connect(); else data.commands.forEach((command) => viewer.handle_command(command));
   const marks = [];
