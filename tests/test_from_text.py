@@ -148,7 +148,7 @@ WRONG = {
     "joint 'j': is a FreeFlyer joint; only revolute": lambda: refused(pin.JointModelFreeFlyer()),
     "joint 'j': is a Spherical joint": lambda: refused(pin.JointModelSpherical()),
     "joint 'j': is a HX joint": lambda: refused(pin.JointModelHX(0.1)),
-    "its axis .* has not length 1": lambda: refused(pin.JointModelRevoluteUnaligned(np.array([0.0, 2.0, 0.0]))),
+    "its axis .* is not of length 1": lambda: refused(pin.JointModelRevoluteUnaligned(np.array([0.0, 2.0, 0.0]))),
     "has control characters": lambda: refused(name="a\x1b[2J"),
     "gravity: has an angular part": lambda: refused(more=bent_gravity),
     "no joint moves|holds no": pin.Model,

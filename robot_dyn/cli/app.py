@@ -32,7 +32,9 @@ Name = Annotated[
 Lock = Annotated[
     list[str] | None,
     typer.Option(
-        metavar="JOINT=VALUE", help="Hold a joint at a value; may be repeated.", autocompletion=completion.locks
+        metavar="JOINT=VALUE",
+        help="Lock a joint at a value in rad or m; may be repeated.",
+        autocompletion=completion.locks,
     ),
 ]
 PackageDir = Annotated[
@@ -42,7 +44,7 @@ Xacro = Annotated[
     list[str] | None,
     typer.Option(
         metavar="NAME=VALUE",
-        help="Expand a xacro file, which runs its expressions, with this argument; may be repeated; '' for none.",
+        help="Expand a xacro file, which runs its expressions; may be repeated; '' for no argument.",
     ),
 ]
 Force = Annotated[bool, typer.Option("--force", help="Replace files that are there already.")]

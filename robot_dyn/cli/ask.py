@@ -31,7 +31,7 @@ def info(
     xacro: Xacro = None,
     as_json: Json = False,
 ) -> None:
-    """Show a robot: joints, limits, friction, mass, and what is odd about it."""
+    """Show a robot: joints, limits, friction, mass, and findings on its file."""
     from robot_dyn.cli import kernels, report
 
     loaded = arguments.load(robot, lock, package_dir, xacro, quiet=True)  # the findings are shown below
@@ -47,10 +47,12 @@ def info(
 @app.command()
 def query(
     robot: Name,
-    q: Annotated[str | None, typer.Option(help="Positions: 0.1,-0.2,… or joint=0.1,…; 0 if not given.")] = None,
-    v: Annotated[str | None, typer.Option(help="Velocities, in the same form.")] = None,
-    a: Annotated[str | None, typer.Option(help="Accelerations: the torque is computed.")] = None,
-    tau: Annotated[str | None, typer.Option(help="Torques: the acceleration is computed.")] = None,
+    q: Annotated[
+        str | None, typer.Option(help="Positions in rad or m: 0.1,-0.2,… or joint=0.1,…; 0 by default.")
+    ] = None,
+    v: Annotated[str | None, typer.Option(help="Velocities in rad/s or m/s, in the same form.")] = None,
+    a: Annotated[str | None, typer.Option(help="Accelerations in rad/s² or m/s²: the torque is computed.")] = None,
+    tau: Annotated[str | None, typer.Option(help="Torques in N m or N: the acceleration is computed.")] = None,
     why: Annotated[
         str | None,
         typer.Option(

@@ -15,7 +15,9 @@ from robot_dyn.cli.terminal import put, say, say_json, tell
 @app.command()
 def simulate(
     scene: Annotated[str, typer.Argument(metavar="SCENE.toml", help="A scene file; `robot-dyn scene` prints some.")],
-    output: Annotated[str | None, typer.Option("-o", "--output", metavar="RUN.npz", help="Keep the run.")] = None,
+    output: Annotated[
+        str | None, typer.Option("-o", "--output", metavar="RUN.npz", help="Write the run to a file.")
+    ] = None,
     csv: Annotated[str | None, typer.Option(metavar="TABLE.csv", help="Write the samples as a table.")] = None,
     force: Force = False,
     as_json: Json = False,
@@ -54,7 +56,9 @@ def explain(scene: Annotated[str, typer.Argument(metavar="SCENE.toml", help="A s
 def scene(
     name: Annotated[
         str | None,
-        typer.Argument(metavar="NAME", help="Name of a starter; none lists them.", autocompletion=completion.scenes),
+        typer.Argument(
+            metavar="NAME", help="Name of a starter; without a name, they are listed.", autocompletion=completion.scenes
+        ),
     ] = None,
 ) -> None:
     """Print a scene file to start from."""

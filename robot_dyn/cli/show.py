@@ -17,14 +17,16 @@ from robot_dyn.errors import QueryError
 
 Html = Annotated[str | None, typer.Option(metavar="OUT.html", help="Write one file that needs no server, and end.")]
 Inertia = Annotated[bool, typer.Option("--inertia", help="Draw each link's equivalent inertia box.")]
-Port = Annotated[int | None, typer.Option(min=1, max=65535, help="Where to listen; a free one if none.")]
+Port = Annotated[int | None, typer.Option(min=1, max=65535, help="Where to listen; a free one by default.")]
 Browse = Annotated[bool, typer.Option("--open", help="Open the page in your browser.")]
 
 
 @app.command("show")
 def show_(
     robot: Name,
-    q: Annotated[str | None, typer.Option(help="Positions: 0.1,-0.2,… or joint=0.1,…; 0 if not given.")] = None,
+    q: Annotated[
+        str | None, typer.Option(help="Positions in rad or m: 0.1,-0.2,… or joint=0.1,…; 0 by default.")
+    ] = None,
     html: Html = None,
     inertia: Inertia = False,
     port: Port = None,
@@ -54,11 +56,11 @@ def show_(
 @app.command()
 def replay(
     runs: Annotated[
-        list[str], typer.Argument(metavar="RUN.npz...", help="Run files; those after the first are drawn as ghosts.")
+        list[str], typer.Argument(metavar="RUN.npz...", help="Run files; those after the first are drawn transparent.")
     ],
     html: Html = None,
     frame: Annotated[
-        str | None, typer.Option(metavar="LINK", help="Link whose path is drawn; the tip if none.")
+        str | None, typer.Option(metavar="LINK", help="Link whose path is drawn; the tip by default.")
     ] = None,
     inertia: Inertia = False,
     port: Port = None,
@@ -87,14 +89,14 @@ def replay(
 def plot(
     run: Annotated[str, typer.Argument(metavar="RUN.npz", help="A run file, as `robot-dyn simulate … -o` writes.")],
     output: Annotated[
-        str | None, typer.Option("-o", "--output", metavar="PLOT.png", help="A .png, .svg or .pdf; RUN.png if none.")
+        str | None, typer.Option("-o", "--output", metavar="PLOT.png", help="A .png, .svg or .pdf; RUN.png by default.")
     ] = None,
     only: Annotated[
         list[str] | None,
         typer.Option(
             "--show",
             metavar="NAME",
-            help="joints, torques, energy, tracking, phase or error_growth; may be repeated; all that apply if none.",
+            help="joints, torques, energy, tracking, phase or error_growth; may be repeated; by default all.",
         ),
     ] = None,
     joint: Annotated[list[str] | None, typer.Option(metavar="JOINT", help="Show this joint; may be repeated.")] = None,

@@ -57,7 +57,7 @@ class _Writer:
         self.model, self.source = model, f"pinocchio.Model {shorten(model.name)!r}" if model.name else "pinocchio.Model"
         self.findings: list[str] = []
         if np.any(model.gravity.angular):
-            self.refuse("gravity", "has an angular part; give it a linear one alone")
+            self.refuse("gravity", "has an angular part; give only a linear one")
 
     def refuse(self, where: str, why: str) -> NoReturn:
         raise DescriptionError(f"{self.source}: {where}: {why}")
@@ -104,7 +104,7 @@ class _Writer:
         joint.calc(data, pin.neutral(model))
         axis = np.asarray(data.S)[slice(3) if kind == "prismatic" else slice(3, 6)]
         if abs(np.linalg.norm(axis) - 1) > _UNIT_SLACK:
-            self.refuse(where, f"its axis {axis} has not length 1; normalise it")
+            self.refuse(where, f"its axis {axis} is not of length 1; normalise it")
         element = etree.SubElement(out, "joint", name=name, type=kind)
         self.ends(element, model.jointPlacements[i], link[model.parents[i]], link[i])
         etree.SubElement(element, "axis", xyz=_words(axis))

@@ -40,8 +40,8 @@ def parse(text: bytes, source: str) -> tuple[etree._Element, tuple[str, ...]]:
     listed = ", ".join(shorten(prefix, 40) for prefix in [*prefixes][:5])
     return root, (
         *findings,
-        f"line {errors[0].line}: uses prefixes that are not declared ({listed}); what bears them is left out; declare"
-        ' each: <robot xmlns:PREFIX="…">',
+        f"line {errors[0].line}: uses prefixes that are not declared ({listed}); what has one of them is left"
+        ' out; declare each: <robot xmlns:PREFIX="…">',
     )
 
 

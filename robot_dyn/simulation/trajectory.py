@@ -87,7 +87,7 @@ class Trajectory:
         about: Texts that make it whole: URDF, its path, edits, scene, versions; the frame under control, if one is.
         wrenches: External wrench by link, rows (t, force, torque), (k, 7), in base axes at its frame, in SI units:
             at the samples and at both sides of each switch.
-        at_stop: Whether each joint bears on a stop, (m, n); None without stops.
+        at_stop: Whether each joint is at or beyond a stop, (m, n); None without stops.
         remarks: What was seen at every step that the samples need not show.
         extremes: The least and the largest of q, v and tau over all steps, (3, 2, n); None if it was not watched.
         acting: What acted, in words: gravity, payloads, effects, limits, control; None if it is not known.

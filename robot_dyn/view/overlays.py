@@ -123,7 +123,7 @@ def _stops(found: Overlays, stage: Stage, run: Trajectory, reach: float) -> None
         turned = commands.track("quaternion", "quaternion", run.t[:1], along(axis[None]))
         seen = commands.track("visible", "bool", run.t[first], bears[first])
         found.add(path, cylinder(0.06 * reach, 0.15 * reach), _STOP, turned, seen)
-        found.notes.append(f"{name} turns red while it bears on a stop")
+        found.notes.append(f"{name} is red while it is at a stop")
 
 
 def along(vectors: np.ndarray) -> np.ndarray:
