@@ -53,6 +53,8 @@ if TYPE_CHECKING:
     from robot_dyn.simulation.linearise import linearise as linearise
     from robot_dyn.simulation.rollout import rollouts as rollouts
     from robot_dyn.simulation.rollout_result import Rollouts as Rollouts
+    from robot_dyn.simulation.rollouts_file import load_rollouts as load_rollouts
+    from robot_dyn.simulation.rollouts_file import save_rollouts as save_rollouts
     from robot_dyn.simulation.run_file import load_run as load_run
     from robot_dyn.simulation.run_file import save_run as save_run
     from robot_dyn.simulation.setup import Setup as Setup
@@ -106,6 +108,7 @@ _HOME = {
     "linearise": "simulation.linearise",
     "list_robots": "model.catalog",
     "load": "model.loading",
+    "load_rollouts": "simulation.rollouts_file",
     "load_run": "simulation.run_file",
     "method": "integrate.methods",
     "midpoint": "arithmetic",
@@ -117,6 +120,7 @@ _HOME = {
     "rollouts": "simulation.rollout",
     "save_plot": "view.plots",
     "save_replay": "view.replay",
+    "save_rollouts": "simulation.rollouts_file",
     "save_run": "simulation.run_file",
     "save_show": "view.replay",
     "show": "view.replay",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -162,6 +163,121 @@ def test_samples_lie_where_those_of_simulate_do(period: float) -> None:
     runs, alone = rd.rollouts(setup, starts(2)), rd.simulate(setup, q0=starts(2)[1])
     np.testing.assert_allclose(runs.t, alone.t, rtol=1e-15)
     np.testing.assert_allclose(runs.q[1], alone.q, rtol=0, atol=1e-12)
+
+
+def assert_alike(ours: np.ndarray, theirs: np.ndarray) -> None:
+    """To rounding of what a tile and a single state compute."""
+    assert ours.shape == theirs.shape
+    np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-10 * (1 + np.abs(theirs).max()))
+
+
+@pytest.mark.parametrize("setup", [SETUP, PID, replace(SETUP, integrator=rd.method("gauss_2"))])
+@pytest.mark.parametrize("record", [EVERYTHING, ("q", "v")])
+def test_a_run_of_a_batch_is_the_trajectory_of_simulate(setup: rd.Setup, record: tuple[str, ...]) -> None:
+    """In all that was recorded or follows from it; what neither tells is nan, and nothing is in its place."""
+    params = {"viscous_friction.damping": np.array([[0.3, 0.1], [0.7, 0.2], [0.0, 0.4]])}
+    runs = rd.rollouts(setup, starts(3), params=params, record=record)
+    effects = [rd.ViscousFriction(params["viscous_friction.damping"][-1]), *PLANT.effects[1:]]
+    alone = rd.simulate(setup, q0=starts(3)[-1], plant=rd.Plant(ARM, effects), estimate_error=False)
+    run = runs[-1]
+    for name in ("t", "q", "v", "wanted", "deviation"):
+        assert_alike(getattr(run, name), getattr(alone, name))
+    everything, follows = record == EVERYTHING, not setup.controller.memory_size
+    for ours, theirs, known in (
+        (run.tau, alone.tau, everything or follows),
+        (run.a, alone.a, everything or follows),
+        (run.power["control"], alone.power["control"], everything or follows),
+        (run.power["viscous_friction"], alone.power["viscous_friction"], True),
+        (run.ledger.kinetic, alone.ledger.kinetic, True),
+        (run.ledger.potential, alone.ledger.potential, True),
+        (run.ledger.work["control"], alone.ledger.work["control"], everything),
+    ):
+        assert_alike(ours, theirs) if known else np.testing.assert_array_equal(ours, np.full_like(theirs, np.nan))
+    assert run.power.keys() == alone.power.keys() == run.ledger.work.keys()
+    assert run.outcome == alone.outcome and run.statistics.steps == alone.statistics.steps
+    assert run.error is None and run.extremes is None
+    assert ("was not recorded" in run.summary) is not everything
+    assert {name: run.about[name] for name in alone.about} == alone.about
+
+
+def test_runs_are_numbered_as_lists_are() -> None:
+    runs = rd.rollouts(SETUP, starts(5), params={"kp": np.arange(5.0)})
+    np.testing.assert_array_equal(runs[-2].q, runs.q[3])
+    some = runs[1:4]
+    assert len(some) == 3 and some.params["kp"][0, 0] == 1.0 and len(list(runs)) == 5
+    np.testing.assert_array_equal(some[0].tau, runs[1].tau)
+    with pytest.raises(IndexError):
+        runs[5]
+    with pytest.raises(QueryError, match="a whole number or a slice"):
+        runs["first"]
+    with pytest.raises(QueryError, match="if q and v were recorded"):
+        rd.rollouts(SETUP, starts(2), record=["q"])[0]
+
+
+@pytest.mark.parametrize("method", ["rk4", "gauss_2"])
+def test_a_diverged_run_names_its_joint_its_time_and_what_to_do(method: str) -> None:
+    """The joint that moved fastest, as of simulate; each run its own."""
+    setup = replace(SETUP, integrator=rd.method(method), record_period_s=0.0)
+    v0 = np.array([V, [1e5, 3e7], V, [3e7, 1e4]])
+    runs = rd.rollouts(setup, starts(4), v0)
+    for i in (1, 3):
+        alone = rd.simulate(setup, q0=starts(4)[i], v0=v0[i], estimate_error=False).outcome
+        advice = runs.outcome(i).advice
+        if method == "rk4":  # stages that are not found name no joint in simulate
+            assert advice.endswith(alone.advice[alone.advice.index("; the fastest joint") :])
+        assert "the fastest joint is 'joint_" in advice and "take a smaller step than 0.002 s" in advice
+        assert runs[i].outcome == runs.outcome(i)
+        assert np.isfinite(runs[i].q).all() and runs[i].t[-1] <= runs.ended[i] + 1e-12
+    assert not runs.outcome(0).advice and f"run 1 diverged at t = {runs.ended[1]:g} s; " in runs.summary
+
+
+@pytest.mark.parametrize("record", [EVERYTHING, ("q", "v"), ("tau",)])
+def test_rollouts_are_saved_and_read(record: tuple[str, ...], tmp_path: Path) -> None:
+    """Bit for bit, and a file that was cut short, or is of another kind, is refused."""
+    v0 = np.tile(V, (4, 1))
+    v0[2] = 1e5, 3e7
+    runs = rd.rollouts(SETUP, starts(4), v0, params={"kp": np.arange(4.0)}, record=record)
+    path = rd.save_rollouts(runs, tmp_path / "runs")
+    back = rd.load_rollouts(path)
+    for x, y in zip(arrays(runs), arrays(back), strict=True):
+        np.testing.assert_array_equal(x, y)
+    assert back.setup is None and [back.outcome(i) for i in range(4)] == [runs.outcome(i) for i in range(4)]
+    assert back.about["urdf"] == runs.about["urdf"] and back.params["kp"][3, 0] == 3.0
+    with pytest.raises(rd.RobotDynError, match="load_rollouts reads it"):
+        rd.load_run(path)
+    path.write_bytes(path.read_bytes()[:-100])
+    with pytest.raises(rd.RobotDynError, match="is not a complete run file"):
+        rd.load_rollouts(path)
+    with pytest.raises(rd.RobotDynError, match="got Rollouts; save_rollouts takes"):
+        rd.save_run(runs, path)
+
+
+@pytest.mark.parametrize("read", [False, True])
+def test_a_run_of_a_batch_is_saved_drawn_and_replayed(read: bool, tmp_path: Path) -> None:
+    """With what it has: torques and energies that nobody recorded are not drawn."""
+    runs = rd.rollouts(PID, starts(2))
+    runs = rd.load_rollouts(rd.save_rollouts(runs, tmp_path / "runs")) if read else runs
+    run = runs[1]
+    again = rd.load_run(rd.save_run(run, tmp_path / "run"))
+    np.testing.assert_array_equal(again.q, run.q)
+    assert rd.save_replay(run, tmp_path / "run").stat().st_size > 10_000
+    assert rd.plot(run).axes
+    for name in ("torques", "energy"):
+        with pytest.raises(rd.RobotDynError, match="not recorded; add"):
+            rd.plot(run, name)
+
+
+def test_progress_of_a_batch() -> None:
+    """Times that grow from the start to the end of the run; what it raises ends the batch."""
+    setup, seen = replace(SETUP, duration_s=3.0), []
+    rd.rollouts(setup, starts(200), threads=1, on_progress=seen.append)
+    assert seen[-1] == 3.0 and seen == sorted(seen) and seen[0] >= 0
+
+    def enough(t: float) -> None:
+        raise ValueError("enough")
+
+    with pytest.raises(ValueError, match="enough"):
+        rd.rollouts(replace(SETUP, duration_s=100.0), starts(200), threads=1, on_progress=enough)
 
 
 class Table(Active):

@@ -37,6 +37,11 @@ class Ledger:
         return self.energy - self.energy[0] - sum(self.work.values(), start=np.zeros_like(self.kinetic))
 
     @property
+    def known(self) -> bool:
+        """Whether it was recorded: energies or work of rollouts may be nan throughout."""
+        return not np.isnan(self.residual).all()
+
+    @property
     def exchanged(self) -> float:
         """Energy exchanged: max K + Σ ∫ |P_k|, the integrals over the samples."""
         moved = sum(float(np.nansum(np.abs(np.diff(work)))) for work in self.work.values())

@@ -21,6 +21,7 @@ from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.observer import Observer
 from robot_dyn.simulation.schedule import Stretch, paced
 from robot_dyn.simulation.setup import Setup
+from robot_dyn.simulation.trajectory import diverged_advice
 
 WATCHED = 64  # steps between looks at the energy
 _RUNAWAY = 1e6  # [rad/s] or [m/s]: an adaptive method would follow an exploding state without end
@@ -249,5 +250,4 @@ class Watch:
         """The end of a run at time t and state y, with the fastest joint and the remedy."""
         names = self.motion.plant.dynamics.joint_names
         fastest = names[int(np.argmax(np.abs(y[len(names) : 2 * len(names)])))]
-        remedy = f"take a smaller step than {self.setup.step_s:g} s, or an implicit method"
-        return DivergedError(t, f"{why}; the fastest joint is {fastest!r}: {remedy}")
+        return DivergedError(t, diverged_advice(why, fastest, self.setup.step_s))

@@ -22,11 +22,13 @@ class Member:
             length; or several of these, each of which is allowed.
         dtype: Of its entries.
         finite: Whether nan and inf are refused unless the run diverged.
+        absent: Whether all of it may be nan: what a run of rollouts did not record.
     """
 
     shape: tuple[Any, ...]
     dtype: str = "float64"
     finite: bool = True
+    absent: bool = False
 
 
 # Paths of the fields of a Trajectory; `/*` stands for one array under each name.
@@ -35,12 +37,12 @@ MEMBERS: Mapping[str, Member] = MappingProxyType(
         "t": Member(("m",)),
         "q": Member(("m", "n")),
         "v": Member(("m", "n")),
-        "a": Member(("m", "n")),
-        "tau": Member(("m", "n")),
-        "power/*": Member(("m",)),
-        "ledger/kinetic": Member(("m",)),
-        "ledger/potential": Member(("m",)),
-        "ledger/work/*": Member(("m",)),
+        "a": Member(("m", "n"), absent=True),
+        "tau": Member(("m", "n"), absent=True),
+        "power/*": Member(("m",), absent=True),
+        "ledger/kinetic": Member(("m",), absent=True),
+        "ledger/potential": Member(("m",), absent=True),
+        "ledger/work/*": Member(("m",), absent=True),
         "wanted": Member(("m", "n")),
         "deviation": Member(("m", ("n", 3))),
         "at_stop": Member(("m", "n"), "bool"),
@@ -52,23 +54,45 @@ MEMBERS: Mapping[str, Member] = MappingProxyType(
 )
 
 
-def member(name: str) -> Member:
+# Paths of the fields of Rollouts; of runs that ended early the rest is nan.
+OF_ROLLOUTS: Mapping[str, Member] = MappingProxyType(
+    {
+        "t": Member(("m",)),
+        "q": Member(("B", "m", "n"), finite=False),
+        "v": Member(("B", "m", "n"), finite=False),
+        "tau": Member(("B", "m", "n"), finite=False),
+        "kinetic": Member(("B", "m"), finite=False),
+        "potential": Member(("B", "m"), finite=False),
+        "work/*": Member(("B", "m"), finite=False),
+        "ended": Member(("B",)),
+        "diverged": Member(("B",), "bool"),
+        "stopped": Member(("B",), "bool"),
+        "steps": Member(("B",), "int64"),
+        "evaluations": Member(("B",), "int64"),
+        "params/*": Member(("B", None)),
+    }
+)
+
+
+def member(name: str, members: Mapping[str, Member] = MEMBERS) -> Member:
     """What is known of a member; ArchiveError if nothing is."""
-    groups = [known for known in MEMBERS if known.endswith("/*") and name.startswith(known[:-1])]
+    groups = [known for known in members if known.endswith("/*") and name.startswith(known[:-1])]
     for known in (name, *groups):
         with suppress(KeyError):
-            return MEMBERS[known]
+            return members[known]
     raise ArchiveError(f"member {shorten(name)!r} is not known to this version")
 
 
-def check_headers(headers: Mapping[str, Header], about: dict[str, Any]) -> None:
+def check_headers(
+    headers: Mapping[str, Header], about: dict[str, Any], members: Mapping[str, Member] = MEMBERS
+) -> None:
     """Every array has the type and shape of its member, and letters of shapes stand for one length."""
     joint_names = about.get("joint_names")
     lengths: dict[Any, int] = {"n": len(joint_names) if isinstance(joint_names, list) else 0}
     for name, header in headers.items():
         if name in ("about", "sha256"):
             continue
-        known = member(name)
+        known = member(name, members)
         fits = len(header.shape) == len(known.shape) and header.dtype == known.dtype
         if not fits or not all(_fits(*pair, lengths) for pair in zip(header.shape, known.shape, strict=True)):
             shape = ", ".join(f"{each} = {lengths[each]}" if each in lengths else str(each) for each in known.shape)

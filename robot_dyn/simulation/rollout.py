@@ -7,7 +7,7 @@ Each run is a lane of a tile, and no lane depends on another: one that diverges 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -39,6 +39,7 @@ def rollouts(
     record: Iterable[str] = ("q", "v"),
     threads: int | None = None,
     most_bytes: int = MOST_BYTES,
+    on_progress: Callable[[float], object] | None = None,
 ) -> Rollouts:
     """Run a setup many times at once, in machine code.
 
@@ -53,6 +54,8 @@ def rollouts(
         record: Which of "q", "v", "tau", "energy", "work" to keep at the samples of the setup.
         threads: Number of threads; None for all processors.
         most_bytes: Refuse to record more than this.
+        on_progress: Called with the time that the runs have reached, the mean in [s], some ten times a second; with
+            a record period of 0 it grows as tiles of 64 runs end.
 
     Runs are not watched at every step, as those of `simulate` are: they carry no remarks.
 
@@ -82,7 +85,7 @@ def rollouts(
         tau="tau" in wanted or (motion.canonical and "v" in wanted),
     )
     made.check(setup)
-    return Batch(setup, motion, made, q, v, free, wanted, most_bytes).run(thread_count(threads))
+    return Batch(setup, motion, made, q, v, free, wanted, most_bytes).run(thread_count(threads), on_progress)
 
 
 def _starts(

@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import final
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, replace
+from operator import index
+from typing import Any, final, overload
 
 import numpy as np
 
-from robot_dyn.simulation.trajectory import Ending, Outcome
+from robot_dyn.errors import QueryError
+from robot_dyn.simulation.setup import Setup
+from robot_dyn.simulation.trajectory import Ending, Outcome, Statistics, Trajectory
 
-_REASONS = ("", "a number overflowed", "energy grows without a source")
+_SHARED = ("joint_names", "t", "statistics", "sources", "about", "setup")  # by all runs
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Rollouts:
     """B runs, m samples of each. Samples after a run diverged are nan. What was not recorded is None.
+
+    `runs[i]` is the `Trajectory` of a run, `runs[i:j]` some of the runs; both copy no samples.
 
     Attributes:
         joint_names: Of the n joints.
@@ -27,6 +33,14 @@ class Rollouts:
         ended: When each run ended, (B,), in [s].
         diverged: Whether it ended before its time, (B,).
         stopped: Whether it was interrupted, (B,).
+        advice: Why a run diverged and what to do, as of `simulate`; empty for the others.
+        steps: Of each run, (B,).
+        evaluations: Of the equation of motion, by the 64 runs that each was side by side with, (B,).
+        statistics: Of the longest run; its time is that of all runs.
+        sources: Names of what does work: the control and the effects without a potential.
+        about: Texts that make the runs whole, as of a `Trajectory`; of all runs, without `params`.
+        params: Values that differ from run to run, by name, (B, n).
+        setup: What was run; None for runs that were read from a file.
     """
 
     joint_names: tuple[str, ...]
@@ -40,22 +54,73 @@ class Rollouts:
     ended: np.ndarray
     diverged: np.ndarray
     stopped: np.ndarray
-    reasons: np.ndarray
+    advice: tuple[str, ...]
+    steps: np.ndarray
+    evaluations: np.ndarray
+    statistics: Statistics
+    sources: tuple[str, ...]
+    about: dict[str, str]
+    params: dict[str, np.ndarray]
+    setup: Setup | None = None
 
     def __len__(self) -> int:
         return len(self.ended)
 
+    def __iter__(self) -> Iterator[Trajectory]:
+        return (self[run] for run in range(len(self)))
+
+    @overload
+    def __getitem__(self, run: int) -> Trajectory: ...
+    @overload
+    def __getitem__(self, run: slice) -> Rollouts: ...
+
+    def __getitem__(self, run: int | slice) -> Trajectory | Rollouts:
+        """The trajectory of a run, counted from the end if negative; or the runs of a slice.
+
+        Positions and velocities are those recorded. The rest is recorded, or follows from them and the setup: the
+        acceleration, the powers and energies, and the torque of a continuous controller without an integral. What
+        neither tells is nan: work that was not recorded; the torque of other controllers; and all but what was
+        recorded of runs that were read from a file. It has no error estimate and no remarks, which `simulate` gives.
+
+        Raises:
+            QueryError: If q or v was not recorded, or `run` is neither a whole number nor a slice.
+            IndexError: If there is no such run.
+        """
+        from robot_dyn.simulation.rollout_run import trajectory
+
+        if isinstance(run, slice):
+            return replace(self, **{name: _taken(x, run) for name, x in self._by_run().items()})
+        try:
+            number = range(len(self))[index(run)]
+        except TypeError:
+            raise QueryError(f"runs are numbered: give a whole number or a slice, got {run!r}") from None
+        return trajectory(self, number)
+
     def outcome(self, run: int) -> Outcome:
         """How a run ended."""
+        ended = float(self.ended[run])
         if self.stopped[run]:
-            return Outcome(Ending.STOPPED, float(self.ended[run]), "interrupted")
+            return Outcome(Ending.STOPPED, ended, "interrupted; all samples up to here are kept")
         if not self.diverged[run]:
-            return Outcome(Ending.FINISHED, float(self.ended[run]))
-        advice = f"{_REASONS[int(self.reasons[run])]}: simulate it by itself for more; take a smaller step"
-        return Outcome(Ending.DIVERGED, float(self.ended[run]), advice)
+            return Outcome(Ending.FINISHED, ended)
+        return Outcome(Ending.DIVERGED, ended, self.advice[run])
 
     @property
     def summary(self) -> str:
-        """One line: how many runs, and how many of them ended before their time."""
+        """How many runs, how many of them ended before their time, and what the first of these says."""
         early = f"{int(self.diverged.sum())} diverged, {int(self.stopped.sum())} stopped"
-        return f"{len(self)} runs of {len(self.t)} samples to t = {self.t[-1]:g} s; {early}"
+        line = f"{len(self)} runs of {len(self.t)} samples to t = {self.t[-1]:g} s; {early}"
+        if not self.diverged.any():
+            return line
+        run = int(self.diverged.argmax())
+        return f"{line}\nrun {run} diverged at t = {self.ended[run]:g} s; {self.advice[run]}"
+
+    def _by_run(self) -> dict[str, Any]:
+        return {each.name: getattr(self, each.name) for each in fields(self) if each.name not in _SHARED}
+
+
+def _taken(values: Any, runs: slice) -> Any:
+    """The same of some of the runs."""
+    if isinstance(values, dict):
+        return {name: x[runs] for name, x in values.items()}
+    return None if values is None else values[runs]

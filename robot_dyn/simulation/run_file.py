@@ -7,9 +7,10 @@ URDF, edits, scene, versions) is one JSON text, `about`. A SHA-256 covers all of
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
@@ -17,15 +18,26 @@ from robot_dyn.errors import RobotDynError, shorten
 from robot_dyn.files import Kind, save, target
 from robot_dyn.reading import reading
 from robot_dyn.simulation.archive import Archive, ArchiveError, Header, write
-from robot_dyn.simulation.members import check_headers, member
+from robot_dyn.simulation.members import MEMBERS, Member, check_headers, member
 from robot_dyn.simulation.origin import packed, unpacked
 from robot_dyn.simulation.serialise import Arrays, SerialError, build, take_apart
 from robot_dyn.simulation.trajectory import Ending, Trajectory
 
 FORMAT = 3
+ROLLOUTS_FORMAT = "rollouts 1"
 RUN = Kind("a run file", ".npz", b"PK\x03\x04")
 MAX_BYTES = 4 * 2**30  # of the arrays of a run that is read without being asked for more
 _MAX_TEXT = 2**28  # bytes of `about`, 4 a character; the largest URDF that loads has 2^24
+
+
+Run = TypeVar("Run", bound=Any)
+RunOf = TypeVar("RunOf", covariant=True)
+
+
+class Checked(Protocol[RunOf]):
+    """Gives the run of arrays and plain data, or an ArchiveError if they do not fit together."""
+
+    def __call__(self, arrays: Arrays, about: dict[str, Any], /) -> RunOf: ...
 
 
 class RunFileError(RobotDynError):
@@ -41,15 +53,9 @@ def save_run(trajectory: Trajectory, path: str | Path) -> Path:
         RunFileError: If it cannot be written.
     """
     if not isinstance(trajectory, Trajectory):
-        raise RunFileError(f"save_run takes the Trajectory of rd.simulate, got {type(trajectory).__name__}")
-    path = target(path, RUN, RunFileError)
-    try:
-        arrays, plain = take_apart(replace(trajectory, about=packed(trajectory.about, path.parent)))
-        text = json.dumps({"format": FORMAT} | plain)
-        _checked(dict(arrays), json.loads(text))
-        return save(path, lambda stream: write(stream, arrays | {"about": np.array(text)}), RunFileError)
-    except (ArchiveError, SerialError, TypeError, ValueError) as error:
-        raise RunFileError(f"the run cannot be written to {path}: {error}; save one that rd.simulate gives") from None
+        kind = type(trajectory).__name__
+        raise RunFileError(f"save_run takes the Trajectory of rd.simulate, got {kind}; save_rollouts takes Rollouts")
+    return write_whole(trajectory, path, FORMAT, _checked)
 
 
 def load_run(path: str | Path, *, max_bytes: int = MAX_BYTES) -> Trajectory:
@@ -62,23 +68,42 @@ def load_run(path: str | Path, *, max_bytes: int = MAX_BYTES) -> Trajectory:
     Raises:
         RunFileError: If it is missing, damaged, cut short, larger, of another format, or was changed.
     """
+    return read_whole(path, max_bytes, FORMAT, MEMBERS, _checked)
+
+
+def write_whole(run: Run, path: str | Path, form: int | str, checked: Checked[Run]) -> Path:
+    """Write a run, or many, of a format, after it was checked as a reader would; errors as of `save_run`."""
+    path = target(path, RUN, RunFileError)
+    try:
+        arrays, plain = take_apart(replace(run, about=packed(run.about, path.parent)))
+        text = json.dumps({"format": form} | plain)
+        checked(dict(arrays), json.loads(text))
+        return save(path, lambda stream: write(stream, arrays | {"about": np.array(text)}), RunFileError)
+    except (ArchiveError, SerialError, TypeError, ValueError) as error:
+        raise RunFileError(f"the run cannot be written to {path}: {error}; save one that rd.simulate gives") from None
+
+
+def read_whole(
+    path: str | Path, max_bytes: int, form: int | str, members: Mapping[str, Member], checked: Checked[Run]
+) -> Run:
+    """Read what `write_whole` wrote; errors as of `load_run`."""
     with reading(path, RunFileError, f"write one with robot-dyn simulate … -o {path}") as stream:
         try:
             archive = Archive(stream)
-            about = _about(archive)
-            check_headers(archive.headers, about)
+            about = _about(archive, form)
+            check_headers(archive.headers, about, members)
             if archive.size > max_bytes:
                 held = f"{archive.size / 2**30:.3g} GiB, more than {max_bytes / 2**30:.3g} GiB"
-                raise RunFileError(f"{path}: holds {held}; if you trust it, raise max_bytes of load_run")
+                raise RunFileError(f"{path}: holds {held}; if you trust it, raise max_bytes of the load")
             arrays = archive.arrays()
             del arrays["about"]
-            run = _checked(arrays, about)
+            run = checked(arrays, about)
             return replace(run, about=unpacked(run.about, Path(path).parent))
         except (ArchiveError, SerialError) as error:
             raise RunFileError(f"{path}: is not a complete run file: {error}; simulate again") from None
 
 
-def _about(archive: Archive) -> dict[str, Any]:
+def _about(archive: Archive, form: int | str) -> dict[str, Any]:
     """The plain data, of this format."""
     if "about" in archive.headers and archive.headers["about"].size > _MAX_TEXT:
         raise ArchiveError(f"member 'about' is larger than {_MAX_TEXT >> 20} MiB")
@@ -87,8 +112,10 @@ def _about(archive: Archive) -> dict[str, Any]:
         found = about["format"]
     except (ValueError, TypeError, KeyError, RecursionError, MemoryError) as error:
         raise ArchiveError(f"member 'about' is not the JSON of a run ({type(error).__name__})") from None
-    if found != FORMAT:
-        raise ArchiveError(f"it has format {shorten(repr(found))}, this version reads {FORMAT}")
+    if found != form:
+        other = "; rd.load_rollouts reads it" if found == ROLLOUTS_FORMAT else "; rd.load_run reads it"
+        also = other if {found, form} == {FORMAT, ROLLOUTS_FORMAT} else ""
+        raise ArchiveError(f"it has format {shorten(repr(found))}, this version reads {form!r}{also}")
     return about
 
 
@@ -101,7 +128,8 @@ def _checked(arrays: Arrays, about: dict[str, Any]) -> Trajectory:
         raise ArchiveError(f"member {min(arrays)!r} belongs to nothing")
     if run.outcome.ending is not Ending.DIVERGED:
         for name, array in members.items():
-            if member(name).finite and not np.isfinite(array).all():
+            known = member(name)
+            if known.finite and not np.isfinite(array).all() and not (known.absent and np.isnan(array).all()):
                 raise ArchiveError(f"member {shorten(name)!r} of a run that did not diverge holds nan or inf")
     for name, t in (("t", run.t), *((f"wrenches/{link}", F[:, 0]) for link, F in run.wrenches.items())):
         if not np.isfinite(t).all() or not (np.diff(t) >= 0).all():

@@ -132,7 +132,7 @@ def _trajectory(
     else:
         assert machine is not None
         q, v, a, tau, W, P, E = compiled_rows(motion, machine, record)
-    wanted, deviation = _deviation(setup, t, q)
+    wanted, deviation = deviation_of(setup, t, q)
     ledger = Ledger(E[:, 0], E[:, 1], dict(zip(motion.sources, W.T, strict=True)))
     power = dict(zip(motion.sources, P.T, strict=True))
     plant = setup.plant
@@ -146,7 +146,7 @@ def _trajectory(
     )  # fmt: skip
 
 
-def _deviation(setup: Setup, t: np.ndarray, q: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:
+def deviation_of(setup: Setup, t: np.ndarray, q: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:
     """Wanted positions, and how far the joints, or the frame, are from what the reference wants."""
     controller: Any = setup.controller
     reference = getattr(controller, "reference", None)

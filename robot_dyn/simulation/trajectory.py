@@ -38,6 +38,11 @@ class Outcome:
     advice: str = ""
 
 
+def diverged_advice(why: str, joint: str, step_s: float) -> str:
+    """Why a run diverged, which joint moved fastest then, and what to do."""
+    return f"{why}; the fastest joint is {joint!r}: take a smaller step than {step_s:g} s, or an implicit method"
+
+
 @final
 @dataclass(frozen=True)
 class Statistics:
@@ -141,7 +146,7 @@ class Trajectory:
         lines = [
             opening + _after(self.outcome.advice),
             *([] if self.acting is None else [f"effects: {', '.join(self.acting) or 'none'}"]),
-            f"energy ledger: {residual}" + _after(self.leak),
+            f"energy ledger: {residual}" + _after(self.leak) if ledger.known else "energy ledger: was not recorded",
             f"error of q [{unit}]: {self.error or 'not estimated (estimate_error is False)'}",
         ]
         lines += ["between samples: not watched"] if self.extremes is None else []

@@ -135,7 +135,8 @@ def _shown(number: int, run: Trajectory, count: int, package_dirs: tuple[Path, .
 
 def _drawable(run: Trajectory) -> Trajectory:
     """The run up to its first sample that cannot be drawn."""
-    good = np.all(np.abs(run.q) < _FAR, axis=1) & np.all(np.isfinite(run.v) & np.isfinite(run.tau), axis=1)
+    tau = np.isfinite(run.tau) | np.isnan(run.tau).all()  # rollouts may not have recorded it
+    good = np.all(np.abs(run.q) < _FAR, axis=1) & np.all(np.isfinite(run.v) & tau, axis=1)
     end = len(good) if good.all() else int(good.argmin())
     if not end:
         raise ReplayError("the run has no samples that can be shown; simulate it again, with a smaller step")

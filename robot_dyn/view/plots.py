@@ -67,7 +67,13 @@ def joints(view: View) -> Panel:
 
 
 def torques(view: View) -> Panel:
-    """Actuation of each joint against ± its effort limit, with the part of it that was used, between samples too."""
+    """Actuation of each joint against ± its effort limit, with the part of it that was used, between samples too.
+
+    Raises:
+        PlotError: If it was not recorded.
+    """
+    if np.isnan(view.run.tau).all():
+        raise PlotError("the torques of the run were not recorded; add tau to record of rollouts")
     cells = []
     for i, name in zip(view.joints, view.names, strict=True):
         tau, limit = view.run.tau[:, i], float(view.limits[i])
@@ -86,8 +92,14 @@ def torques(view: View) -> Panel:
 
 
 def energy(view: View) -> Panel:
-    """K, V and E from the start, the work of each source, and what the ledger leaves over, on an axis of its own."""
+    """K, V and E from the start, the work of each source, and what the ledger leaves over, on an axis of its own.
+
+    Raises:
+        PlotError: If they were not recorded.
+    """
     t, ledger = view.run.t, view.run.ledger
+    if not ledger.known:
+        raise PlotError("energy and work of the run were not recorded; add energy and work to record of rollouts")
     E, V = ledger.energy, ledger.potential
     own = (("K", ledger.kinetic), ("V − V(0)", V - V[0]), ("E − E(0)", E - E[0]))
     stores = tuple(Curve(label, t, y, (i, i)) for i, (label, y) in enumerate(own))

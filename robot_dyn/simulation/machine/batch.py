@@ -6,26 +6,33 @@ Records are arrays over time, row and run, in this order, so that a tile writes 
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import replace
 from fractions import Fraction
+from time import perf_counter
 from typing import final
 
 import numpy as np
 
+from robot_dyn.effects.plant import Plant
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.simulation.machine.follow import follow
 from robot_dyn.simulation.machine.machine import Machine
 from robot_dyn.simulation.machine.making import machine
+from robot_dyn.simulation.machine.parts import with_
 from robot_dyn.simulation.machine.places import Ended, Lane, Now
 from robot_dyn.simulation.machine.timetable import Timetable, timetable
+from robot_dyn.simulation.machine.traced import robot_of
 from robot_dyn.simulation.motion import Motion
+from robot_dyn.simulation.origin import origin
 from robot_dyn.simulation.rollout_result import Rollouts
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import samples, too_large
-from robot_dyn.simulation.trajectory import Ending
+from robot_dyn.simulation.trajectory import Ending, Statistics, diverged_advice
 
 LANES = 64  # runs in a tile: with 8, 16 or 32 a step of RK4 took 1.5, 1.1 and 1.05 times as long
+_REASONS = ("", "a number overflowed", "energy grows without a source", "the stages of a step are not found")
 _FAR = 5e4  # [rad]: half the range of a tile's sine and cosine; such a run is done again by itself
 
 
@@ -65,9 +72,12 @@ class Batch:
         self.lanes, self.stop = np.zeros((tiles, len(Lane), LANES)), np.zeros(1, np.int64)
         self.lanes[:, Lane.ENDED] = setup.duration_s
         self.unfinished = np.ones(tiles, dtype=bool)
+        self.clocks = np.tile([0.0, setup.record_period_s, 1e-9 * setup.step_s], (tiles, 1))
+        self.evaluations, self.advice = np.zeros(tiles, np.int64), dict[int, str]()
 
-    def run(self, threads: int) -> Rollouts:
-        """All tiles, each by one thread; Ctrl-C ends them at their next step."""
+    def run(self, threads: int, on_progress: Callable[[float], object] | None = None) -> Rollouts:
+        """All tiles, each by one thread; Ctrl-C ends them at their next step, and an error of `on_progress`."""
+        began = perf_counter()
         tiles, _ = iter(range(len(self.lanes))), self.machine.program.march  # compiled by this thread alone
         turn = threading.Lock()
 
@@ -83,13 +93,27 @@ class Batch:
             futures = [pool.submit(work) for _ in range(min(threads, len(self.lanes)))]
             try:
                 while wait(futures, timeout=0.1).not_done:
-                    pass
-            except KeyboardInterrupt:
+                    if on_progress is not None:
+                        on_progress(self._reached())
+            except BaseException as error:
                 self.stop[0] = 1
                 wait(futures)
+                if not isinstance(error, KeyboardInterrupt):
+                    raise
         for future in futures:
             future.result()
-        return self._result()
+        result = self._result()
+        if on_progress is not None and not result.stopped.any():
+            on_progress(self.setup.duration_s)
+        return replace(result, statistics=replace(result.statistics, wall_s=perf_counter() - began))
+
+    def _reached(self) -> float:
+        """The time reached, in [s], the mean over the tiles: that of the next sample of each."""
+        return float(
+            np.where(
+                self.unfinished, np.minimum(self.clocks[:, 0], self.setup.duration_s), self.setup.duration_s
+            ).mean()
+        )
 
     def _tile(self, tile: int) -> None:
         program, table = self.machine.program, self.table
@@ -100,13 +124,13 @@ class Batch:
         work[places.x + (places.state + places.held) * LANES : places.k] = self.free[index].T.ravel()
         now = np.zeros(len(Now), dtype=np.int64)
         now[Now.BUDGET], now[Now.BASE], now[Now.FINAL] = np.iinfo(np.int64).max, own.start, 1
-        clock = np.array([0.0, self.setup.record_period_s, 1e-9 * self.setup.step_s])
         steps = np.empty((len(self.rows), 2), np.int64)
         ended = self.machine.run(
             work, table, lanes=self.lanes[tile], alive=np.ones(LANES, np.int64), which=np.array(self.columns, np.int64),
-            out_step=steps, out_y=self.out_y, out_u=self.out_u, out_e=self.out_e, now=now, clock=clock, stop=self.stop,
+            out_step=steps, out_y=self.out_y, out_u=self.out_u, out_e=self.out_e, now=now, clock=self.clocks[tile],
+            stop=self.stop,
         )  # fmt: skip
-        self.unfinished[tile] = ended is not Ended.DONE
+        self.unfinished[tile], self.evaluations[tile] = ended is not Ended.DONE, now[Now.EVALUATIONS]
         if ended is not Ended.DONE:
             going = self.lanes[tile, Lane.REASON] == 0
             self.lanes[tile, Lane.ENDED, going] = table.time(int(now[Now.STRETCH]), int(now[Now.STEP]))
@@ -134,8 +158,42 @@ class Batch:
         ended, reasons = lanes[Lane.ENDED].copy(), lanes[Lane.REASON].astype(int)
         return Rollouts(
             motion.plant.dynamics.joint_names, t, part("q", 0, n), v, tau, K, V, works,
-            ended, reasons > 0, stopped, reasons,
+            ended, reasons > 0, stopped, self._advice(reasons, lanes[Lane.JOINT].astype(int)),
+            self._steps(ended), np.repeat(self.evaluations, LANES)[:B], self._statistics(), tuple(motion.sources),
+            origin(self.setup.plant.dynamics) | self.setup.about, dict(self.values), self._compiled(),
         )  # fmt: skip
+
+    def _compiled(self) -> Setup:
+        """The setup whose equations were compiled: right angles of the file written out in full."""
+        plant, controller = self.setup.plant, self.setup.controller
+        if (model := robot_of(getattr(controller, "model", None))) is not None:
+            controller = with_(controller, {"model": model})
+        plant = Plant(robot_of(plant.dynamics) or plant.dynamics, plant.effects)
+        return replace(self.setup, plant=plant, controller=controller)
+
+    def _advice(self, reasons: np.ndarray, fastest: np.ndarray) -> tuple[str, ...]:
+        """Why runs diverged and what to do; nothing for the others."""
+        advice, names = [""] * len(reasons), self.machine.motion.plant.dynamics.joint_names
+        for run in np.flatnonzero(reasons).tolist():
+            made = diverged_advice(_REASONS[reasons[run]], names[fastest[run]], self.setup.step_s)
+            advice[run] = self.advice.get(run, made)
+        return tuple(advice)
+
+    def _steps(self, ended: np.ndarray) -> np.ndarray:
+        """Number of steps of each run up to its end."""
+        table = self.table
+        stretch = np.maximum(np.searchsorted(table.starts[:-1], ended, side="right") - 1, 0)
+        before = np.cumsum(table.counts) - table.counts
+        return before[stretch] + np.rint((ended - table.starts[stretch]) / table.lengths[stretch]).astype(np.int64)
+
+    def _statistics(self) -> Statistics:
+        """Of the batch; its steps and evaluations are those of one run to the end."""
+        method, steps = self.setup.integrator, int(self.table.counts[:-1].sum())
+        assert isinstance(method, Integrator)
+        runs = f"compiled, {len(self.y)} runs side by side"
+        return Statistics(
+            method.name, self.setup.duration_s / steps, steps, int(self.evaluations.max()), 0.0, engine=runs
+        )
 
     def _again(self, run: int) -> Ending:
         """A run that turned beyond the range of a tile's sine, by itself, in the march of one state; how it ended."""
@@ -157,6 +215,7 @@ class Batch:
         tile, lane = divmod(run, LANES)
         self.lanes[tile, Lane.ENDED, lane] = record.outcome.t
         self.lanes[tile, Lane.REASON, lane] = record.outcome.ending is Ending.DIVERGED
+        self.advice[run] = record.outcome.advice
         return record.outcome.ending
 
 

@@ -48,10 +48,11 @@ class Lane(IntEnum):
     """Rows of `lanes`: what is known of each lane."""
 
     ENDED = 0  # time at which it diverged
-    REASON = 1  # 0: it goes on; 1: a number overflowed; 2: energy grows
+    REASON = 1  # 0: it goes on; 1: a number overflowed; 2: energy grows; 3: the stages of a step are not found
     ENERGY = 2  # at the start
     SCALE = 3  # of energies
     FASTEST = 4  # largest |q|
+    JOINT = 5  # that moved fastest when it diverged
 
 
 ARGUMENTS = (

@@ -50,6 +50,8 @@ def _one(places: Places, take: list[str], gained: list[str], leave: Callable[[En
 
 def _tile(places: Places, n: int, take: list[str], gained: list[str]) -> list[str]:
     W, size = places.lanes, f"abs(work[{places.x} + e * {places.lanes} + b])"
+    v, most = f"abs(work[({n} + e) * {W} + b])", f"abs(work[({n} + int(lanes[5, b])) * {W} + b])"
+    fastest = [f"for e in range({n}):", f"    lanes[5, b] = e if {v} > {most} else lanes[5, b]"]
     return [
         f"for b in range({W}):",
         "    sizes[b] = zero",
@@ -65,15 +67,18 @@ def _tile(places: Places, n: int, take: list[str], gained: list[str]) -> list[st
         f"for b in range({W}):",
         f"    ill += 0 if sizes[b] < {LARGEST!r} else 1",
         "    ill += failed[b]",
-        *take,
-        f"if ill != 0 or steps % {WATCHED} == 0:",
+        "if ill != 0:",
         f"    for b in range({W}):",
         f"        if alive[b] == 1 and (failed[b] != 0 or not sizes[b] < {LARGEST!r}):",
-        "            alive[b], lanes[0, b], lanes[1, b] = 0, t, one",
+        "            alive[b], lanes[0, b], lanes[1, b] = 0, t, 3.0 if failed[b] == 1 else 1.0",
+        *indented(fastest, 3),
+        *take,
+        f"if ill != 0 or steps % {WATCHED} == 0:",
         f"    if steps % {WATCHED} == 0:",
         *indented(gained, 2),
         f"            if alive[b] == 1 and came > {RUNAWAY!r} * moved:",
-        "                alive[b], lanes[0, b], lanes[1, b] = 0, t + h, one + one",
+        "                alive[b], lanes[0, b], lanes[1, b] = 0, t + h, 2.0",
+        *indented(fastest, 4),
         f"    for b in range({W}):",
         "        if alive[b] == 0:",
         f"            for e in range({places.state}):",

@@ -1,0 +1,84 @@
+"""One run of a batch as a trajectory: what was recorded, and what follows from it and the setup.
+
+a = M⁻¹ (u + Σ τ − C v − N),   P_k = τ_kᵀ v;   nan where neither record nor setup tells
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from robot_dyn.errors import QueryError
+from robot_dyn.simulation.acting import acting
+from robot_dyn.simulation.ledger import Ledger
+from robot_dyn.simulation.loads import at_stop, wrenches
+from robot_dyn.simulation.motion import Motion
+from robot_dyn.simulation.samples import columns, row
+from robot_dyn.simulation.setup import Setup
+from robot_dyn.simulation.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from robot_dyn.simulation.rollout_result import Rollouts
+
+
+def trajectory(runs: Rollouts, run: int) -> Trajectory:
+    """The trajectory of a run; see `Rollouts`.
+
+    Raises:
+        QueryError: If its positions or velocities were not recorded.
+    """
+    if runs.q is None or runs.v is None:
+        raise QueryError("a run of rollouts is a trajectory if q and v were recorded: add them to record")
+    known = ~np.isnan(runs.q[run]).all(axis=1)  # a run that ended early has nan after its end
+    t, q, v = runs.t[known], runs.q[run, known], runs.v[run, known]
+    unknown = np.full_like(q, np.nan)
+    tau = unknown if runs.tau is None else runs.tau[run, known]
+    a, power, energy = unknown, np.full((len(t), len(runs.sources)), np.nan), np.full((len(t), 2), np.nan)
+    setup = None if runs.setup is None else _own(runs, runs.setup, run)
+    if setup is not None:
+        a, tau, power, energy = _follows(setup, t, q, v, None if runs.tau is None else tau)
+    if runs.kinetic is not None and runs.potential is not None:
+        energy = np.column_stack([runs.kinetic[run, known], runs.potential[run, known]])
+    work = {name: np.full(len(t), np.nan) for name in runs.sources}
+    if runs.work is not None:
+        work = {name: x[run, known] for name, x in runs.work.items()}
+    wanted, deviation, loads, stops, acts = None, None, {}, None, None
+    if setup is not None:
+        from robot_dyn.simulation.simulate import deviation_of
+
+        wanted, deviation = deviation_of(setup, t, q)
+        loads, stops, acts = wrenches(setup.plant, t, q), at_stop(setup.plant, q), acting(setup)
+    steps, evaluations = int(runs.steps[run]), int(runs.evaluations[run])
+    about = runs.about | {"run": f"{run} of {len(runs)}"}
+    return Trajectory(
+        runs.joint_names, t, q, v, a, tau, dict(zip(runs.sources, power.T, strict=True)),
+        Ledger(energy[:, 0], energy[:, 1], work), wanted, deviation, runs.outcome(run),
+        replace(runs.statistics, steps=steps, evaluations=evaluations), None, about, loads, stops,
+        acting=acts,
+    )  # fmt: skip
+
+
+def _own(runs: Rollouts, setup: Setup, run: int) -> Setup:
+    """The setup of a run, with its own start and parameters."""
+    if runs.params:
+        from robot_dyn.simulation.machine.traced import with_values
+
+        motion = with_values(Motion(setup.plant, setup.controller), {name: x[run] for name, x in runs.params.items()})
+        setup = replace(setup, plant=motion.plant, controller=motion.controller)
+    return setup
+
+
+def _follows(
+    setup: Setup, t: np.ndarray, q: np.ndarray, v: np.ndarray, tau: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Acceleration, torque, powers and energies at the samples."""
+    motion = Motion(setup.plant, setup.controller)
+    if tau is None and (motion.sampled or motion.memory_size):
+        tau = np.full_like(q, np.nan)  # it depends on what was before
+    held = [None] * len(t) if tau is None else tau
+    rest = np.zeros(motion.memory_size + len(motion.sources))
+    made = [row(motion, at, np.concatenate([*y, rest]), u) for at, *y, u in zip(t.tolist(), q, v, held, strict=True)]
+    _, _, a, u, _, power, energy = columns(motion, np.array(made))
+    return a, u, power, energy

@@ -1,0 +1,65 @@
+"""Files of rollouts: one .npz that holds the recorded arrays of all runs, in the manner of a run file."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from robot_dyn.simulation.archive import ArchiveError, Header
+from robot_dyn.simulation.members import OF_ROLLOUTS, check_headers
+from robot_dyn.simulation.rollout_result import Rollouts
+from robot_dyn.simulation.run_file import MAX_BYTES, ROLLOUTS_FORMAT, RunFileError, read_whole, write_whole
+from robot_dyn.simulation.serialise import Arrays, build
+
+
+def save_rollouts(runs: Rollouts, path: str | Path) -> Path:
+    """Write rollouts to `path` (.npz is added if it has no suffix), whole or not at all; without their setup.
+
+    Another run file under that name is replaced; a file of another kind is not.
+
+    Raises:
+        RunFileError: If it cannot be written.
+    """
+    if not isinstance(runs, Rollouts):
+        raise RunFileError(f"save_rollouts takes the Rollouts of rd.rollouts, got {type(runs).__name__}")
+    return write_whole(replace(runs, setup=None), path, ROLLOUTS_FORMAT, _checked)
+
+
+def load_rollouts(path: str | Path, *, max_bytes: int = MAX_BYTES) -> Rollouts:
+    """The rollouts of a file; `setup` is None.
+
+    Args:
+        path: Of the file.
+        max_bytes: The largest size of its arrays that is read.
+
+    Raises:
+        RunFileError: If it is missing, damaged, cut short, larger, of another format, or was changed.
+    """
+    return read_whole(path, max_bytes, ROLLOUTS_FORMAT, OF_ROLLOUTS, _checked)
+
+
+def _checked(arrays: Arrays, about: dict[str, Any]) -> Rollouts:
+    """The rollouts of these, whose arrays fit together and whose numbers can be those of runs."""
+    check_headers({name: Header(x.shape, x.dtype) for name, x in arrays.items()}, about, OF_ROLLOUTS)
+    if about.get("setup") is not None:
+        raise ArchiveError("'setup' is not empty")
+    runs = build(Rollouts, {key: value for key, value in about.items() if key != "format"}, arrays)
+    if arrays:
+        raise ArchiveError(f"member {min(arrays)!r} belongs to nothing")
+    if not np.isfinite(runs.t).all() or not (np.diff(runs.t) >= 0).all() or not len(runs.t):
+        raise ArchiveError("the times of member 't' are not finite, or do not grow")
+    if not np.isfinite(runs.ended).all() or (runs.ended < 0).any() or (runs.diverged & runs.stopped).any():
+        raise ArchiveError("members 'ended', 'diverged' and 'stopped' are not those of runs")
+    if len(runs.advice) != len(runs):
+        raise ArchiveError(f"'advice' is of {len(runs.advice)} runs, not of {len(runs)}")
+    if runs.work is not None and set(runs.work) != set(runs.sources):
+        raise ArchiveError("members 'work/…' and 'sources' have different names")
+    whole = ~(runs.diverged | runs.stopped)
+    for name in ("q", "v", "tau", "kinetic", "potential"):
+        array = getattr(runs, name)
+        if array is not None and not np.isfinite(array[whole]).all():
+            raise ArchiveError(f"member {name!r} of a run that did not diverge holds nan or inf")
+    return runs
