@@ -33,12 +33,12 @@ def test_positions_and_velocities_are_the_runs(run) -> None:
     assert [axes.get_title(loc="left") for axes in cells(figure, "q")] == list(run.joint_names)
 
 
-def test_wanted_positions_are_dashed(run, cart) -> None:
+def test_desired_positions_are_dashed(run, cart) -> None:
     for axes, column in zip(cells(plot(run, "joints"), "q"), run.wanted.T, strict=True):
-        (line,) = lines(axes, "wanted")
+        (line,) = lines(axes, "desired")
         assert line.is_dashed()
         np.testing.assert_array_equal(line.get_ydata(), column)
-    assert not any(lines(axes, "wanted") for axes in plot(cart, "joints").axes)
+    assert not any(lines(axes, "desired") for axes in plot(cart, "joints").axes)
 
 
 def test_units_are_those_of_each_joint(run, cart) -> None:

@@ -80,7 +80,7 @@ def test_the_thinning_error_is_as_stated(view, fall) -> None:
     note = next(
         text
         for text in view.ask("[...document.querySelectorAll('#notes li')].map(e => e.textContent)")
-        if "keyframes" in text
+        if "interpolated" in text
     )
     stated = float(note.partition("at most ")[2].split()[0])
     assert stated <= 5.1e-4  # 5e-4, printed with two digits
