@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from robot_dyn.control.reference import hold as hold
     from robot_dyn.control.reference import quintic as quintic
     from robot_dyn.control.reference import via_points as via_points
+    from robot_dyn.control.samples import Samples as Samples
     from robot_dyn.effects.actuator import EffortLimit as EffortLimit
     from robot_dyn.effects.friction import RegularisedCoulombFriction as RegularisedCoulombFriction
     from robot_dyn.effects.friction import ViscousFriction as ViscousFriction
@@ -94,6 +95,7 @@ _HOME = {
     "RobotDynError": "errors",
     "Rollouts": "simulation.rollout_result",
     "STANDARD_GRAVITY": "model.edits",
+    "Samples": "control.samples",
     "Setup": "simulation.setup",
     "Spring": "effects.spring",
     "Trajectory": "simulation.trajectory",

@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import robot_dyn as rd
 from robot_dyn.control.cartesian import CartesianReference, circle, line
 from robot_dyn.control.controller import ControlError
 from robot_dyn.control.orientation import orientation_error, rotation_vector
 from robot_dyn.control.reference import PiecewisePolynomial, hold, quintic, via_points
+from robot_dyn.control.samples import Samples
 from robot_dyn.spatial import rotation
 
 Q0, Q1 = np.array([0.3, -1.2, 2.0]), np.array([1.1, 0.4, -0.7])
@@ -21,6 +23,9 @@ REFERENCES = {
     "quintic between motions": quintic(Q0, Q1, 1.7, v0=[0.3, -0.4, 0.5], v1=-0.8, a0=1.3, a1=[0.2, 0.6, -0.9]),
     "cubic spline": via_points(TIMES, POINTS, kind="cubic"),
     "quintic spline": via_points(TIMES, POINTS),
+    "spline with velocities at its ends": via_points(TIMES, POINTS, v0=[0.3, -0.4, 0.5], v1=-0.8),
+    "samples of q": Samples(TIMES, POINTS),
+    "samples of q, v, a": Samples(TIMES, POINTS, POINTS[::-1], 2 * POINTS),
     "circle": circle([0.4, -0.2, 0.5], 0.3, [1.0, -2.0, 0.5], 2.0, turns=1.3).position,
 }
 
@@ -236,3 +241,82 @@ def test_steps_end_where_a_reference_jumps() -> None:
     stairs = PiecewisePolynomial([0.0, 0.5, 1.0], [[[0.1, 0.2]], [[0.3, -0.2]]])
     np.testing.assert_array_equal(stairs.knots, [0.0, 0.5, 1.0])
     assert not len(hold([0.1, 0.2]).knots)
+
+
+def motion(t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    w = np.array([2.0, 3.0])
+    t = t[:, None]
+    return np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
+
+
+@pytest.mark.parametrize(("given", "order"), [(1, 6), (2, 4), (3, 6)])
+def test_samples_converge_to_the_motion(given: int, order: int) -> None:
+    """With half the spacing the error falls by 2 to the order: splines and Hermite's polynomials of smooth motions."""
+    x, errors = np.linspace(0.8, 1.2, 500), []  # where what the ends do to a spline has died away
+    for m in (33, 65):
+        t = np.linspace(0.0, 2.0, m)
+        reference = Samples(t, *motion(t)[:given])
+        np.testing.assert_allclose(reference.at(t)[0], motion(t)[0], atol=1e-14)
+        errors.append(np.abs(reference.at(x)[0] - motion(x)[0]).max())
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.3)
+
+
+@pytest.mark.parametrize("m", [2, 3, 4, 5, 6])
+def test_few_samples_give_the_polynomial_of_least_degree(m: int) -> None:
+    t, x = np.sort(np.random.default_rng(m).uniform(0, 2, m)), np.random.default_rng(0).normal(size=(m, 2))
+    exact = np.stack([np.polyfit(t, column, m - 1) for column in x.T])
+    between = np.linspace(t[0], t[-1], 50)
+    for i in range(2):
+        np.testing.assert_allclose(Samples(t, x).at(between)[0][:, i], np.polyval(exact[i], between), atol=1e-8)
+
+
+@pytest.mark.parametrize("kind", ["cubic", "quintic"])
+def test_a_spline_has_the_velocities_asked_for_at_its_ends(kind: str) -> None:
+    reference = via_points(TIMES, POINTS, kind=kind, v0=[0.3, -0.4, 0.5], v1=-0.8)
+    np.testing.assert_allclose(reference.at(TIMES)[0], POINTS, atol=1e-12)
+    np.testing.assert_allclose(reference.at(TIMES[0])[1], [0.3, -0.4, 0.5], atol=1e-12)
+    np.testing.assert_allclose(reference.at(TIMES[-1])[1], -0.8, atol=1e-12)
+
+
+def test_samples_are_read_from_the_table_of_a_run(tmp_path) -> None:
+    """Columns by name, in the order of the joints asked for; what is not a table of samples is refused."""
+    path, t = tmp_path / "run.csv", np.linspace(0, 1, 9)
+    q, v, _ = motion(t)
+    head = "t [s],q b [rad],q a [rad],v a [rad/s],v b [rad/s],tau a [N m],energy [J]"
+    rows = np.column_stack([t, q[:, ::-1], v, v[:, 0], t]).tolist()
+    path.write_text("\n".join([head, *(",".join(map(repr, row)) for row in rows)]))
+    reference = Samples.from_csv(path, ["a", "b"])
+    np.testing.assert_array_equal(reference.coefficients, Samples(t, q, v).coefficients)
+    for text, message in {
+        "t,q a,accel a\n0,1,2\n1,2,3": "column 'accel a' is unknown",
+        "q a\n0\n1": "no column t",
+        "t,q c\n0,1\n1,2": "no column 'q a'",
+        "t,q a,q b\n0,1,2\n1,x,3": "row 2 is not 3 numbers",
+        "t,q a,q b\n0,1,2\n1,nan,3": "must be finite",
+        "t,q a,q b\n0,1,2\n0,1,3": "must increase",
+    }.items():
+        path.write_text(text)
+        with pytest.raises(ControlError, match=message):
+            Samples.from_csv(path, ["a", "b"])
+    with pytest.raises(ControlError, match="a folder"):
+        Samples.from_csv(tmp_path)
+
+
+def test_the_estimate_along_dense_samples_is_honest(tmp_path) -> None:
+    """Samples nearer than a step: each ends a step, no order is lost, and the error estimate covers the error.
+
+    The truth is a run of a tenth of the step; 2 allows for what Richardson's first term leaves out.
+    """
+    arm, t = rd.load("planar_2r"), np.linspace(0, 0.3, 101)
+    reference = Samples(t, *motion(t)[:2])
+    controller = rd.ComputedTorque(arm, reference, 100.0, 20.0)
+    setup = rd.Setup(rd.Plant(arm), motion(t)[0][0] + 0.1, duration_s=0.3, controller=controller, step_s=5e-3)
+    run, truth = rd.simulate(setup), rd.simulate(setup, step_s=3e-4, estimate_error=False)
+    error = np.abs(run.q[-1] - truth.q[-1]).max()
+    assert run.error is not None and run.error.resolved_until == 0.3
+    assert 0 < error < 2 * run.error.final < 1e-4
+    (tmp_path / "wave.csv").write_text("\n".join(["t,q joint_1,q joint_2", *(f"{x},{x},{2 * x}" for x in t)]))
+    scene = 'robot = "planar_2r"\nduration_s = 0.1\n[control]\nkind = "pd"\nfrequency_rad_per_s = 5.0\n'
+    (tmp_path / "s.toml").write_text(scene + '[reference]\nkind = "samples"\nfile = "wave.csv"\n')
+    followed = rd.read_scene(tmp_path / "s.toml").controller.reference
+    np.testing.assert_allclose(followed.at(np.array([0.05]))[0], [[0.05, 0.1]], atol=1e-12)

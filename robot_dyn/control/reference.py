@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import factorial, perm
-from typing import Any, final
+from typing import Any
 
 import numpy as np
 
@@ -25,7 +25,6 @@ _UPPER = {
 }
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class PiecewisePolynomial:
     """A motion q(t) with its velocity and acceleration; before its first and after its last break it rests there.
@@ -126,8 +125,8 @@ def quintic(
     return PiecewisePolynomial([begin, begin + T], hermite(np.array([T]), ends[None]))
 
 
-def via_points(times: Any, points: Any, *, kind: str = "quintic") -> PiecewisePolynomial:
-    """The spline through points at given times, from rest to rest.
+def via_points(times: Any, points: Any, *, kind: str = "quintic", v0: Any = 0.0, v1: Any = 0.0) -> PiecewisePolynomial:
+    """The spline through points at given times, from rest to rest unless velocities at its ends are given.
 
     "quintic" has four continuous derivatives and starts and ends with zero acceleration; "cubic" has two, and its
     acceleration jumps where it starts and ends.
@@ -136,6 +135,8 @@ def via_points(times: Any, points: Any, *, kind: str = "quintic") -> PiecewisePo
         times: Increasing, shape (k + 1,), in [s].
         points: Shape (k + 1, n), in [rad] or [m].
         kind: "quintic" or "cubic".
+        v0: Velocity at the start, a scalar or (n,), in [rad/s] or [m/s].
+        v1: Velocity at the end, likewise.
 
     Raises:
         ControlError: If times do not increase, shapes do not match or the kind is unknown.
@@ -149,7 +150,9 @@ def via_points(times: Any, points: Any, *, kind: str = "quintic") -> PiecewisePo
         raise ControlError(f"points must be 2 at least, got {len(points)}; to rest at one, hold(q)")
     times = increasing("times", times, len(points))
     unit = (times[-1] - times[0]) / (len(times) - 1)  # of time: derivatives of one size keep the solve well conditioned
-    data = _smooth_derivatives(np.diff(times) / unit, points, m)
+    shape = points.shape[1:]
+    ends = np.stack([np.broadcast_to(numbers(name, v, (), shape), shape) for name, v in (("v0", v0), ("v1", v1))])
+    data = _smooth_derivatives(np.diff(times) / unit, points, m, ends * unit)
     pieces = hermite(np.diff(times) / unit, np.concatenate([data[:-1], data[1:]], axis=1))
     return PiecewisePolynomial(times, pieces / unit ** np.arange(2.0 * m)[:, None])
 
@@ -172,8 +175,11 @@ def hermite(h: np.ndarray, ends: np.ndarray) -> np.ndarray:
     return np.concatenate([low, _UPPER[m] @ rest], axis=1) / powers
 
 
-def _smooth_derivatives(h: np.ndarray, points: np.ndarray, m: int) -> np.ndarray:
-    """Values and m − 1 derivatives at the knots for which derivatives m … 2m − 2 are continuous, (k + 1, m, n)."""
+def _smooth_derivatives(h: np.ndarray, points: np.ndarray, m: int, ends: np.ndarray) -> np.ndarray:
+    """Values and m − 1 derivatives at the knots for which derivatives m … 2m − 2 are continuous, (k + 1, m, n).
+
+    Velocities at the ends are given, (2, n); accelerations there are zero.
+    """
     k, n = len(h), points.shape[-1]
     basis = hermite(h, np.broadcast_to(np.eye(2 * m), (k, 2 * m, 2 * m)))  # coefficients of each piece from its ends
     orders = range(m, 2 * m - 1)
@@ -186,9 +192,10 @@ def _smooth_derivatives(h: np.ndarray, points: np.ndarray, m: int) -> np.ndarray
             jumps[i, row, i : i + 2] += before[i]
             jumps[i, row, i + 1 : i + 3] -= after[i]
     data = np.zeros((k + 1, m, n))
-    data[:, 0] = points
+    data[:, 0], data[[0, -1], 1] = points, ends
     size = (k - 1) * (m - 1)
-    known = jumps[..., 0].reshape(size, k + 1) @ points  # the ends are at rest: their derivatives add nothing
+    known = jumps[..., 0].reshape(size, k + 1) @ points  # accelerations at the ends are zero and add nothing
+    known += jumps[:, :, [0, -1], 1].reshape(size, 2) @ ends
     unknown = jumps[:, :, 1:-1, 1:].reshape(size, size)
     data[1:-1, 1:] = np.linalg.solve(unknown, -known).reshape(k - 1, m - 1, n)
     return data

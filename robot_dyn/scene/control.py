@@ -13,6 +13,7 @@ from robot_dyn.control.controller import Controller, gain
 from robot_dyn.control.independent_joint import PD, PID, gains_from
 from robot_dyn.control.operational_space import OperationalSpace
 from robot_dyn.control.reference import PiecewisePolynomial, hold, quintic, via_points
+from robot_dyn.control.samples import Samples
 from robot_dyn.effects.actuator import stated_efforts
 from robot_dyn.effects.effect import URDF
 from robot_dyn.errors import SceneError
@@ -60,19 +61,34 @@ class Quintic(Part):
 
 
 class ViaPoints(Part):
-    """A spline from the start through points, at rest at both ends."""
+    """A spline from the start, at rest, through points; at rest at the end unless v_end is given."""
 
     kind: Literal["via_points"]
     times_s: list[Positive]
     """Time of each point."""
     points: list[list[Number]]
     """Position at each time, a list of n numbers, in rad, or m for a prismatic joint."""
+    v_end: PerJoint = 0.0
+    """Velocity at the last point."""
 
     def build(self, robot: Robot, q0: np.ndarray, frame: str | None) -> PiecewisePolynomial:
         """The reference."""
         if len(self.times_s) != len(self.points):
             raise SceneError(f"reference: {len(self.times_s)} times_s for {len(self.points)} points; give one for each")
-        return via_points([0.0, *self.times_s], [q0.tolist(), *self.points])
+        v1 = per_joint("v_end", self.v_end, robot)
+        return via_points([0.0, *self.times_s], [q0.tolist(), *self.points], v1=v1)
+
+
+class Sampled(Part):
+    """Samples of a CSV file with columns t, q and if given v and a of each joint, as rd.Samples takes them."""
+
+    kind: Literal["samples"]
+    file: str
+    """Path of the file, from the folder of the scene."""
+
+    def build(self, robot: Robot, q0: np.ndarray, frame: str | None) -> PiecewisePolynomial:
+        """The reference."""
+        return Samples.from_csv(self.file, robot.joint_names)
 
 
 class Line(Part):
@@ -127,7 +143,7 @@ class Circle(Part):
         )
 
 
-AnyReference = Annotated[Hold | Quintic | ViaPoints | Line | Circle, Field(discriminator="kind")]
+AnyReference = Annotated[Hold | Quintic | ViaPoints | Sampled | Line | Circle, Field(discriminator="kind")]
 
 
 class Model(Part):
@@ -203,7 +219,7 @@ class Control(Part):
         model, wanted = self.model.build(described, robot), reference.build(robot, q0, self.frame)
         cartesian = isinstance(wanted, CartesianReference)
         if cartesian != (self.kind == "operational_space"):
-            need = "line or circle" if self.kind == "operational_space" else "hold, quintic or via_points"
+            need = "line or circle" if self.kind == "operational_space" else "hold, quintic, via_points or samples"
             raise SceneError(f"reference.kind: {self.kind} follows {need}, got {reference.kind!r}")
         kp, kd = self._gains(model, q0)
         if cartesian:

@@ -21,7 +21,7 @@ from robot_dyn.model.loading import load
 from robot_dyn.model.robot import Robot
 from robot_dyn.reading import read
 from robot_dyn.scene.complaint import complaint, located, where
-from robot_dyn.scene.control import AnyReference, Control, Hold
+from robot_dyn.scene.control import AnyReference, Control, Hold, Sampled
 from robot_dyn.scene.effects import Acting, AnyEffect, Edit
 from robot_dyn.scene.schema import NotNegative, Part, PerJoint, PlacedError, Positive, Truth, per_joint, placed
 from robot_dyn.simulation.setup import Setup
@@ -90,8 +90,11 @@ class Scene(Part):
                     acting += effect.build(robot)
         with placed("start"):
             q0, v0 = (per_joint(name, value, robot) for name, value in (("q", self.start.q), ("v", self.start.v)))
+        reference = self.reference
+        if isinstance(reference, Sampled):
+            reference = reference.model_copy(update={"file": str(folder / reference.file)})
         with placed("control"):
-            controller = None if self.control is None else self.control.build(described, robot, q0, self.reference)
+            controller = None if self.control is None else self.control.build(described, robot, q0, reference)
         return Setup(
             Plant(robot, acting), q0, v0, self.duration_s, controller, self.integrator(),
             self.step_s, self.record_period_s, self.estimate_error, about, self.engine,
