@@ -107,6 +107,8 @@ def _syntax(message: str, line: int) -> str:
 
 
 def _refuse_document_type(element: etree._Element, source: str) -> None:
+    if str(element.tag).rpartition("}")[2].lower() == "html":
+        raise DescriptionError(f"{source}: is a web page, not a URDF; download the file itself (raw)")
     if element.getroottree().docinfo.internalDTD is not None:
         raise DescriptionError(
             f"{source}: declares a document type (<!DOCTYPE …>), through which a file can grow without bound or read"

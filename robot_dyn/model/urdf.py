@@ -144,7 +144,8 @@ class _Check:
         text = (text or "").strip()
         if len(text) > _MAX_LITERAL or not _LITERAL.fullmatch(text) or not isfinite(float(text)):
             limit = f" of at most {_MAX_LITERAL} characters" if len(text) > _MAX_LITERAL else ""
-            self.refuse(where, f"{what} must be a finite decimal number{limit}, got {shorten(text)!r}; correct it")
+            remedy = EXPAND if "${" in text or "$(" in text else "correct it"
+            self.refuse(where, f"{what} must be a finite decimal number{limit}, got {shorten(text)!r}; {remedy}")
         if abs(float(text)) > largest:
             self.refuse(where, f"{what} is {text}, beyond ±{largest:g} in SI units; correct it")
         if minimum is not None and float(text) < minimum:

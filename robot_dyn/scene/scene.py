@@ -144,7 +144,7 @@ def parse_scene(text: str, source: str) -> Scene:
 
 def _parsed(text: str, source: str) -> tuple[Scene, dict[str, Any]]:
     try:
-        table = tomllib.loads(text)
+        table = tomllib.loads(text.removeprefix("\ufeff"))  # the mark of some editors for UTF-8
     except (ValueError, RecursionError) as error:
         raise SceneError(f"{source}: {_syntax(error)}; correct the file") from None
     try:

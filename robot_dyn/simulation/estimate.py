@@ -95,5 +95,5 @@ def _advised(setup: Setup, made: ErrorEstimate, why: str) -> ErrorEstimate:
     if not made.note:
         return made
     method = setup.integrator
-    finer = f"rtol = {method.rtol / 100:.0e}" if isinstance(method, Adaptive) else f"step_s = {setup.step_s / 4:.0e}"
+    finer = f"rtol = {method.rtol / 100:.0e}" if isinstance(method, Adaptive) else f"step_s = {setup.taken_step_s / 4:.0e}"
     return replace(made, note=f"{made.note}; take {finer}, or a shorter run")

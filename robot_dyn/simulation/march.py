@@ -250,4 +250,4 @@ class Watch:
         """The end of a run at time t and state y, with the fastest joint and the remedy."""
         names = self.motion.plant.dynamics.joint_names
         fastest = names[int(np.argmax(np.abs(y[len(names) : 2 * len(names)])))]
-        return DivergedError(t, diverged_advice(why, fastest, self.setup.step_s))
+        return DivergedError(t, diverged_advice(why, fastest, self.setup.taken_step_s))

@@ -38,7 +38,7 @@ class Setup:
         duration_s: In [s].
         controller: What drives it, or None.
         integrator: A method of fixed step, or an `Adaptive` one.
-        step_s: Fixed step; made smaller where ticks, switches and the end ask for it. Not to be given for an Adaptive
+        step_s: Fixed step; made smaller where samples, ticks, switches and the end ask for it. Not to be given for an Adaptive
             method.
         record_period_s: Time between samples; 0 for every step.
         estimate_error: Whether companion runs are made, which cost about as much as the run; five times as much
@@ -133,6 +133,11 @@ class Setup:
     def steps(self) -> int:
         """Number of steps of a method of fixed step."""
         return self.stretches[-1].first + self.stretches[-1].steps
+
+    @property
+    def taken_step_s(self) -> float:
+        """Longest step that a method of fixed step takes, in [s]: at most `step_s` and the record period."""
+        return max((each.end - each.start) / each.steps for each in self.stretches)
 
     @property
     def longest_step_s(self) -> float:

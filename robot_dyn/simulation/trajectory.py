@@ -17,6 +17,7 @@ from robot_dyn.simulation.remarks import lines as said
 # Residuals, as parts of the energy exchanged. Over 150 random scenes they were at most 10 times the estimated error of
 # q, as a part of the motion; one that is far larger contradicts the estimate.
 _OPEN, _CONTRADICTS, _ROUNDING = 1e-3, 100.0, 1e-12
+_NOT_ESTIMATED = ("not estimated (estimate_error is False)", "not estimated (the run was stopped)")
 _NOTICED = 0.01  # [s]: shorter times are not worth a word
 
 
@@ -147,7 +148,7 @@ class Trajectory:
             opening + _after(self.outcome.advice),
             *([] if self.acting is None else [f"effects: {', '.join(self.acting) or 'none'}"]),
             f"energy ledger: {residual}" + _after(self.leak) if ledger.known else "energy ledger: was not recorded",
-            f"error of q [{unit}]: {self.error or 'not estimated (estimate_error is False)'}",
+            f"error of q [{unit}]: {self.error or _NOT_ESTIMATED[self.outcome.ending is Ending.STOPPED]}",
         ]
         lines += ["between samples: not watched"] if self.extremes is None else []
         lines += said(self.remarks)

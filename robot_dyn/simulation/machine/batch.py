@@ -175,7 +175,7 @@ class Batch:
         """Why runs diverged and what to do; nothing for the others."""
         advice, names = [""] * len(reasons), self.machine.motion.plant.dynamics.joint_names
         for run in np.flatnonzero(reasons).tolist():
-            made = diverged_advice(_REASONS[reasons[run]], names[fastest[run]], self.setup.step_s)
+            made = diverged_advice(_REASONS[reasons[run]], names[fastest[run]], self.setup.taken_step_s)
             advice[run] = self.advice.get(run, made)
         return tuple(advice)
 
