@@ -13,7 +13,9 @@ With e(h) = q_h − q the error of a run of step h:
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from fractions import Fraction
+from typing import final
 
 import numpy as np
 
@@ -29,63 +31,77 @@ _FAR_OFF = 8.0  # times the bound of the others: beyond, the longest step is no 
 _LOST = 0.1  # of the motion, at most 0.1 rad or m: companions that differ by more tell nothing
 
 
-def from_longer_steps(run: Path, n: int, companions: Mapping[Fraction, Path], order: int, kink: float) -> ErrorEstimate:
-    """The estimate from companion runs of longer steps.
+@final
+@dataclass(frozen=True)
+class Estimated:
+    """The run whose error is estimated.
 
-    Args:
-        run: States of the run.
+    Attributes:
+        path: Its states at which companion runs are compared, k of them.
         n: Number of joints.
-        companions: States of the companions by the length of their steps; those of `COARSE`.
-        order: p, of the method.
         kink: Time from which the right-hand side may not be smooth, in [s]: no division by 2ᵖ − 1 after it.
+        floor: Error that rounding may leave in q, up to each state, (k,).
+        meaningless: Difference of companions that tells nothing, in [rad] or [m].
     """
-    gaps = {pace: differences(run, path, n) for pace, path in companions.items()}
-    t = run.t
-    A, B, C = (gaps[pace] for pace in COARSE)
-    floor = rounding(run, n)
-    # a companion that ended early leaves nan; the longest step may, the others are needed
-    bound = np.maximum(A, B / 2)
-    bound = np.fmax(bound, np.minimum(C / 4, _FAR_OFF * bound))
-    ratio = np.maximum(B, floor) / np.maximum(A, floor)
-    nominal = (3.0**order - 1) / (2.0**order - 1)
-    seen = ((ratio > nominal / _BAND) & (ratio < nominal * _BAND) | (floor >= A)) & (t < kink)
-    error = np.maximum(np.where(seen, A / (2.0**order - 1), bound), floor)
-    return _judged(run, n, error, seen, np.isnan(bound) | (_least_motion(run, n) < A))
 
+    path: Path
+    n: int
+    kink: float
+    floor: np.ndarray
+    meaningless: float
 
-def from_shorter_steps(
-    run: Path, n: int, companions: Mapping[Fraction, Path], order: int, kink: float
-) -> ErrorEstimate:
-    """The estimate from companion runs of shorter steps, as `from_longer_steps`; those of `FINE`.
+    def from_longer_steps(self, companions: Mapping[Fraction, Path], order: int) -> ErrorEstimate:
+        """The estimate from companions of longer steps, by the length of their steps: those of `COARSE`."""
+        A, B, C = (differences(self.path, companions[pace], self.n) for pace in COARSE)
+        bound = np.maximum(A, B / 2)  # nan after the end of a companion that ended early
+        bound = np.fmax(bound, np.minimum(C / 4, _FAR_OFF * bound))
+        ratio = np.maximum(B, self.floor) / np.maximum(A, self.floor)
+        nominal = (3.0**order - 1) / (2.0**order - 1)
+        seen = (ratio > nominal / _BAND) & (ratio < nominal * _BAND) | (self.floor >= A)
+        return self._judged(np.where(self._smooth(seen), A / (2.0**order - 1), bound), bound, seen)
 
-    |q_h − q_{h/m}| = |e(h)| (1 − m⁻ᵖ) needs no division.
-    """
-    gaps = [differences(run, companions[pace], n) for pace in FINE]
-    between = differences(companions[FINE[1]], companions[FINE[0]], n)
-    between = between[np.minimum(np.searchsorted(companions[FINE[1]].key, run.key), len(between) - 1)]
-    floor = rounding(run, n)
-    error = np.maximum(np.maximum(*gaps), between)
-    seen = ((between < error / 2) | (error <= floor)) & (run.t < kink)
-    return _judged(run, n, np.maximum(error, floor), seen, np.isnan(error) | (error > _least_motion(run, n)))
+    def from_shorter_steps(self, companions: Mapping[Fraction, Path]) -> ErrorEstimate:
+        """The estimate from companions of `FINE`: |q_h − q_{h/m}| = |e(h)| (1 − m⁻ᵖ) needs no division."""
+        half, third = (companions[pace] for pace in FINE)
+        between = differences(third, half, self.n)[np.searchsorted(third.key[:-1], self.path.key)]
+        gaps = [differences(self.path, each, self.n) for each in (half, third)]
+        error = np.maximum(np.maximum(*gaps), between)
+        return self._judged(error, error, (between < error / 2) | (error <= self.floor))
 
+    def from_tolerances(self, tight: Path | None, loose: Path) -> ErrorEstimate:
+        """The estimate of a method that chooses its steps.
 
-def from_tolerances(run: Path, n: int, tight: Path | None, loose: Path, kink: float) -> ErrorEstimate:
-    """The estimate of a method that chooses its steps, from companions of a tenth and of ten times its tolerance.
+        Args:
+            tight: The companion of a tenth of the tolerance; None where that is beyond floats.
+            loose: That of ten times the tolerance.
+        """
+        far = differences(self.path, loose, self.n)
+        near = far if tight is None else differences(self.path, tight, self.n)
+        bound = far if tight is None else np.fmax(near, far / 4)
+        ratio = np.maximum(far, self.floor) / np.maximum(near, self.floor)
+        seen = ((ratio > 2) & (ratio < 100) | (bound <= self.floor)) & (tight is not None)
+        return self._judged(np.where(self._smooth(seen), near, bound), bound, seen)
 
-    Args:
-        run: States of the run.
-        n: Number of joints.
-        tight: Of a tenth of the tolerance; None where that is beyond floats.
-        loose: Of ten times the tolerance.
-        kink: As of `from_longer_steps`.
-    """
-    far, floor = differences(run, loose, n), rounding(run, n)
-    near = differences(run, tight, n) if tight is not None else far
-    bound = np.fmax(near, far / 4) if tight is not None else far
-    ratio = np.maximum(far, floor) / np.maximum(near, floor)
-    seen = ((ratio > 2) & (ratio < 100) | (bound <= floor)) & (run.t < kink) & (tight is not None)
-    error = np.maximum(np.where(seen, near, bound), floor)
-    return _judged(run, n, error, seen, np.isnan(bound) | (bound > _least_motion(run, n)))
+    def lost_at(self, companion: Path) -> float:
+        """Time in [s] at which a companion differs from the run as much as the motion itself; inf if it does not."""
+        gap = differences(self.path, companion, self.n)
+        lost = np.flatnonzero(np.isnan(gap) | (gap > self.meaningless))
+        return float(self.path.t[lost[0]]) if len(lost) else np.inf
+
+    def _smooth(self, seen: np.ndarray) -> np.ndarray:
+        return seen & (self.path.t < self.kink)
+
+    def _judged(self, error: np.ndarray, bound: np.ndarray, seen: np.ndarray) -> ErrorEstimate:
+        """The estimate up to where nothing is known, with its verdict."""
+        t, error = self.path.t, np.maximum(error, self.floor)
+        bad = np.flatnonzero(np.isnan(bound) | (np.maximum(bound, self.floor) > self.meaningless))
+        last = int(bad[0]) - 1 if len(bad) else len(t) - 1
+        if last < 1 < len(t):
+            return no_estimate("runs with other steps fail at the start")
+        rows = np.unique(np.linspace(0, last, min(last + 1, _ROWS)).astype(int))
+        verdict = Verdict.ORDER if self._smooth(seen)[last] else Verdict.BOUND
+        note = "" if last == len(t) - 1 else "runs with other steps differ as much as the motion itself"
+        return ErrorEstimate(t[rows], np.maximum.accumulate(error)[rows], float(t[last]), note, verdict)
 
 
 def differences(run: Path, companion: Path, n: int) -> np.ndarray:
@@ -94,35 +110,18 @@ def differences(run: Path, companion: Path, n: int) -> np.ndarray:
     if not len(here):
         return np.full(len(run.t), np.nan)
     gap = np.maximum.accumulate(np.abs(run.y[here, :n] - companion.y[there, :n]).max(axis=1))
-    result = gap[np.maximum(np.searchsorted(here, np.arange(len(run.t)), side="right") - 1, 0)]
+    following = np.searchsorted(here, np.arange(len(run.t)))  # between two common states the later one counts
+    result = gap[np.minimum(following, len(gap) - 1)]
     result[run.key > companion.key[-1]] = np.nan
     return result
 
 
-def lost_at(run: Path, companion: Path, n: int) -> float:
-    """Time in [s] at which a companion differs from the run as much as the motion itself; inf if it does not."""
-    gap = differences(run, companion, n)
-    lost = np.flatnonzero(np.isnan(gap) | (gap > _least_motion(run, n)))
-    return float(run.t[lost[0]]) if len(lost) else np.inf
-
-
 def rounding(run: Path, n: int) -> np.ndarray:
-    """Error that rounding of q in every step may leave, up to each state."""
+    """Error that rounding of q in every step may leave, up to each state, where nothing magnifies it."""
     size = np.maximum.accumulate(np.abs(run.y[:, :n]).max(axis=1))
     return np.finfo(float).eps * np.maximum(ROUNDING, run.key) * (1 + size)
 
 
-def _least_motion(run: Path, n: int) -> float:
-    return _LOST * min(1.0, max(float(np.ptp(run.y[:, :n], axis=0).max()), 1e-6))
-
-
-def _judged(run: Path, n: int, error: np.ndarray, seen: np.ndarray, lost: np.ndarray) -> ErrorEstimate:
-    """The estimate up to where it is lost, with its verdict."""
-    bad = np.flatnonzero(lost)
-    last = int(bad[0]) - 1 if len(bad) else len(run.t) - 1
-    if last < 0:
-        return no_estimate("runs with other steps fail at the start")
-    rows = np.unique(np.linspace(0, last, min(last + 1, _ROWS)).astype(int))
-    verdict = Verdict.ORDER if seen[last] else Verdict.BOUND
-    note = "" if last == len(run.t) - 1 else "runs with other steps differ as much as the motion itself"
-    return ErrorEstimate(run.t[rows], np.maximum.accumulate(error)[rows], float(run.t[last]), note, verdict)
+def meaningless(walked: Path, n: int) -> float:
+    """Difference of companions that tells nothing: a tenth of the motion of a run, at most 0.1 rad or m."""
+    return _LOST * min(1.0, max(float(np.ptp(walked.y[:, :n], axis=0).max()), 1e-6))

@@ -10,16 +10,12 @@ from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 
+import numpy as np
+
 from robot_dyn.integrate.adaptive import LEAST_RTOL, Adaptive
+from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.simulation.between import stepped_over
-from robot_dyn.simulation.companions import (
-    COARSE,
-    FINE,
-    from_longer_steps,
-    from_shorter_steps,
-    from_tolerances,
-    lost_at,
-)
+from robot_dyn.simulation.companions import COARSE, FINE, Estimated, differences, meaningless, rounding
 from robot_dyn.simulation.error import ErrorEstimate, Verdict, no_estimate
 from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.record import Path, Record
@@ -29,55 +25,83 @@ from robot_dyn.simulation.smoothness import first_kink
 
 _GAIN = 1.3  # in the time resolved, that a shorter step must bring
 _TENTH, _TENFOLD = Fraction(1, 10), Fraction(10)
+_FAR_TURN, _BLIND_TURN = (
+    1.0,
+    np.pi,
+)  # [rad] in a step: multiples of a step may meet the same angles; and so do parts of it
+_PUSH = 4.0  # units of rounding by which a start is moved, to see what the motion makes of rounding
+
+Companion = Callable[[Fraction, Setup], Record]
 
 
-def estimate(setup: Setup, motion: Motion, run: Record, companion: Callable[[Fraction], Record]) -> ErrorEstimate:
+def estimate(setup: Setup, motion: Motion, run: Record, companion: Companion) -> ErrorEstimate:
     """The estimated error of a run.
 
     Args:
         setup: What was run.
         motion: Its equation of motion.
         run: What it left behind.
-        companion: Runs the setup with steps, or tolerances, multiplied by a factor.
+        companion: Runs a setup with steps, or tolerances, multiplied by a factor.
     """
     if len(run.shared.t) < 2:
         return no_estimate("it ended in its first step")
+    n = motion.plant.dynamics.n
     kink, why = first_kink(setup, motion, run.walked)
+    estimated = Estimated(run.shared, n, kink, rounding(run.shared, n), meaningless(run.walked, n))
     if isinstance(setup.integrator, Adaptive):
-        made = _by_tolerances(setup, motion, run, companion, kink)
+        made = _by_tolerances(setup, setup.integrator, estimated, companion)
     else:
-        made = _by_steps(setup, motion, run, companion, kink)
+        made = _by_steps(setup, setup.integrator, estimated, companion, _turn(motion, run.walked))
     return _advised(setup, _looked_between(setup, motion, run, made), why)
 
 
 def _by_steps(
-    setup: Setup, motion: Motion, run: Record, companion: Callable[[Fraction], Record], kink: float
+    setup: Setup, method: Integrator, estimated: Estimated, companion: Companion, turn: float
 ) -> ErrorEstimate:
     """From longer steps, then from shorter ones."""
-    n, order = motion.plant.dynamics.n, setup.integrator.order  # pyright: ignore[reportAttributeAccessIssue]
+    if turn > _BLIND_TURN:
+        return no_estimate(
+            f"a joint turns by {turn:.3g} rad in a step, so that runs with other steps may meet the same angles"
+        )
     made = no_estimate("fewer than 3 steps between ticks, switches or breaks")
-    if min(each.steps for each in setup.stretches) >= LEAST_STEPS:
-        made = from_longer_steps(run.shared, n, _paths(companion, COARSE), order, kink)
-        if made.resolved_until >= run.shared.t[-1]:
+    if turn < _FAR_TURN and min(each.steps for each in setup.stretches) >= LEAST_STEPS:
+        paths = {pace: companion(pace, setup).shared for pace in COARSE}
+        pushed = differences(paths[COARSE[1]], companion(COARSE[1], _pushed(setup)).shared, estimated.n)
+        rows = np.searchsorted(paths[COARSE[1]].key[:-1], estimated.path.key)
+        estimated = replace(estimated, floor=np.fmax(estimated.floor, np.append(pushed, pushed[-1])[rows]))
+        made = estimated.from_longer_steps(paths, method.order)
+        if made.resolved_until >= estimated.path.t[-1]:
             return made
-    half = companion(FINE[0]).shared
-    if made.resolved_until > 0 and lost_at(run.shared, half, n) < _GAIN * made.resolved_until:
+    half = companion(FINE[0], setup).shared
+    if made.resolved_until > 0 and estimated.lost_at(half) < _GAIN * made.resolved_until:
         return made  # chaos: no step of practical length resolves it
-    return from_shorter_steps(run.shared, n, {FINE[0]: half, **_paths(companion, FINE[1:])}, order, kink)
+    pushed = differences(estimated.path, companion(Fraction(1), _pushed(setup)).shared, estimated.n)
+    estimated = replace(estimated, floor=np.fmax(estimated.floor, pushed))
+    return estimated.from_shorter_steps({FINE[0]: half, FINE[1]: companion(FINE[1], setup).shared})
 
 
-def _by_tolerances(
-    setup: Setup, motion: Motion, run: Record, companion: Callable[[Fraction], Record], kink: float
-) -> ErrorEstimate:
+def _by_tolerances(setup: Setup, method: Adaptive, estimated: Estimated, companion: Companion) -> ErrorEstimate:
     """From a tenth of the tolerance, where floats have it, and from ten times."""
-    method = setup.integrator
-    assert isinstance(method, Adaptive)
-    tight = companion(_TENTH).shared if method.rtol / 10 > LEAST_RTOL else None
-    return from_tolerances(run.shared, motion.plant.dynamics.n, tight, companion(_TENFOLD).shared, kink)
+    tight = companion(_TENTH, setup).shared if method.rtol / 10 > LEAST_RTOL else None
+    return estimated.from_tolerances(tight, companion(_TENFOLD, setup).shared)
 
 
-def _paths(companion: Callable[[Fraction], Record], paces: tuple[Fraction, ...]) -> dict[Fraction, Path]:
-    return {pace: companion(pace).shared for pace in paces}
+def _pushed(setup: Setup) -> Setup:
+    """The setup from a start that differs by rounding: its run tells what the motion makes of rounding."""
+    sign = np.where(np.arange(len(setup.q0)) % 2, -1.0, 1.0)
+    unit = _PUSH * np.finfo(float).eps
+    return replace(
+        setup, q0=setup.q0 + sign * unit * (1 + np.abs(setup.q0)), v0=setup.v0 + unit * (1 + np.abs(setup.v0))
+    )
+
+
+def _turn(motion: Motion, walked: Path) -> float:
+    """Largest angle by which a joint turns in a step, in [rad]; joints that slide do not count."""
+    dynamics = motion.plant.dynamics
+    kinds = getattr(dynamics, "joint_types", ("revolute",) * dynamics.n)
+    turns = np.array([kind != "prismatic" for kind in kinds])
+    steps = np.maximum(1, np.diff(walked.key))[:, None]
+    return float((np.abs(np.diff(walked.y[:, : dynamics.n], axis=0)) / steps)[:, turns].max(initial=0.0))
 
 
 def _looked_between(setup: Setup, motion: Motion, run: Record, made: ErrorEstimate) -> ErrorEstimate:
@@ -95,5 +119,7 @@ def _advised(setup: Setup, made: ErrorEstimate, why: str) -> ErrorEstimate:
     if not made.note:
         return made
     method = setup.integrator
-    finer = f"rtol = {method.rtol / 100:.0e}" if isinstance(method, Adaptive) else f"step_s = {setup.taken_step_s / 4:.0e}"
+    finer = (
+        f"rtol = {method.rtol / 100:.0e}" if isinstance(method, Adaptive) else f"step_s = {setup.taken_step_s / 4:.0e}"
+    )
     return replace(made, note=f"{made.note}; take {finer}, or a shorter run")

@@ -75,7 +75,7 @@ def simulate(
     error = None
     if setup.estimate_error and record.outcome.ending is not Ending.STOPPED:
         try:
-            error = estimate(setup, motion, record, partial(_run, setup, motion, machine))
+            error = estimate(setup, motion, record, lambda pace, of: _run(of, motion, machine, pace, companion=True))
         except KeyboardInterrupt:
             error = no_estimate("it was interrupted")
             if record.outcome.ending is Ending.FINISHED:
@@ -100,6 +100,7 @@ def _run(
     pace: Fraction = Fraction(1),
     on_progress: Callable[[float], object] | None = None,
     observer: Observer | None = None,
+    companion: bool = False,
 ) -> Record:
     """March in machine code, in the interpreted engine, or in that with its rate in machine code."""
     few = isinstance(setup.integrator, Adaptive) or setup.steps <= MOST_SHARED
@@ -111,7 +112,7 @@ def _run(
     else:
         systems = partial(machine.system, setup=setup) if machine is not None else None
         record = collect(setup, motion, pace, thin, systems, on_progress, observer)
-    if pace != 1 and record.outcome.ending is Ending.STOPPED:
+    if companion and record.outcome.ending is Ending.STOPPED:
         raise KeyboardInterrupt
     return record
 
