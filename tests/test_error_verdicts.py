@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import flint
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import robot_dyn as rd
 from robot_dyn.effects.effect import Active
@@ -164,7 +166,63 @@ def test_rounding_of_a_far_position_is_in_the_estimate(far: float) -> None:
     """Q += h v loses what is below half a unit of q's last place, in every step and every companion run alike."""
     run = rd.simulate(rd.Plant(RAIL), q0=[far], v0=[0.7], duration_s=1.0, integrator=rd.method("semi_implicit_euler"))
     error = abs(run.q[-1, 0] - (far + 0.7))
+    assert run.error.final >= LEAST * error or "rounding" in run.error.note
+    assert (far == 1e9) == (run.error.note == "")
+
+
+@pytest.mark.parametrize(
+    ("start", "duration", "method"),
+    [(np.pi, 12.0, "rk4"), (np.pi - 1e-12, 8.0, "order_8"), (np.pi - 1e-10, 6.0, "rk4")],
+)
+def test_rounding_that_the_motion_magnifies_is_in_the_estimate(start: float, duration: float, method: str) -> None:
+    """Upright, a pendulum leaves its start as e^(3.8 t): a unit of rounding is a radian after 10 s."""
+    plant = rd.Plant(rd.load("pendulum"))
+    run = rd.simulate(plant, q0=[start], duration_s=duration, integrator=rd.method(method))
+    exact = upright(start, run.t)
+    known = run.t <= run.error.resolved_until
+    error = np.abs(run.q[:, 0] - exact)[known].max()
     assert run.error.final >= LEAST * error
+    assert run.error.note or np.abs(run.q[-1, 0] - exact[-1]) < 1e-3
+
+
+def upright(start: float, times: np.ndarray) -> np.ndarray:
+    """The angle of the pendulum from rest at `start`: d = q − π obeys d'' = k sin d, from the exact d of the float."""
+    arm = rd.load("pendulum")
+    k = float(arm.N(np.array([0.5]))[0] / np.sin(0.5) / arm.M(np.zeros(1))[0, 0])
+    with flint.ctx.workprec(200):
+        d = float(flint.arb(start) - flint.arb.pi())
+    solved = solve_ivp(
+        lambda t, y: [y[1], k * np.sin(y[0])], (0, times[-1]), [d, 0.0], "DOP853", times, rtol=3e-14, atol=1e-30
+    )
+    return np.pi + solved.y[0]
+
+
+def test_turns_that_no_step_can_see_have_no_estimate() -> None:
+    """A whole turn in each step: gravity is sampled at one angle, in all companions alike."""
+    run = rd.simulate(rd.Plant(rd.load("pendulum")), q0=[0.0], v0=[400 * np.pi], duration_s=0.5, step_s=5e-3)
+    assert run.error.verdict is Verdict.NONE
+    assert "turns by 6.28 rad in a step" in run.error.note
+
+
+def test_a_record_that_meets_every_turning_point_accuses_no_run() -> None:
+    """Samples at rest alone: the energy exchanged and the motion are those between them."""
+    plant = rd.Plant(RAIL, [rd.Spring(1.0)])
+    period = 2 * np.pi  # of 1 kg on 1 N/m
+    for method in (rd.method("rk4"), rd.Adaptive(rtol=1e-6, atol=1e-8)):
+        run = rd.simulate(plant, q0=[1.0], duration_s=period, record_period_s=period, integrator=method)
+        assert run.leak == ""
+        assert run.error.note == ""
+        assert run.error.final >= LEAST * abs(run.q[-1, 0] - 1.0)
+
+
+def test_a_setup_keeps_its_start() -> None:
+    """The caller may go on with his own array."""
+    q0 = np.array([0.5])
+    setup = rd.Setup(rd.Plant(RAIL), q0)
+    q0[0] = 9.0
+    assert setup.q0 == [0.5]
+    with pytest.raises(ValueError, match="read-only"):
+        setup.q0[0] = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,7 +256,7 @@ def test_the_summary_tells_an_estimate_from_a_bound_and_the_time_it_covers() -> 
     t, error = np.array([0.0, 0.008]), np.array([0.0, 2e-9])
     assert str(ErrorEstimate(t, error, 0.008)) == "2.0e-09 (order seen)"
     bounded = ErrorEstimate(t, error, 0.008, verdict=Verdict.BOUND, reason="a joint touches its stop")
-    assert str(bounded) == "about 2.0e-09 at most (bounded: a joint touches its stop)"
+    assert str(bounded) == "about 2.0e-09 (bounded: a joint touches its stop)"
     early = ErrorEstimate(t, error, 0.008, note="companion runs differ; take step_s = 1e-04")
     assert (
         str(early)

@@ -163,6 +163,8 @@ class _Check:
 
     def origin(self, parent: etree._Element, out: etree._Element, where: str) -> None:
         origin = self.one(parent, "origin", where)
+        if origin is not None and (other := [key for key in origin.attrib if "quat" in key]):
+            self.refuse(where, f"<origin> has {other[0]}, which is not read; write the rotation as rpy")
         xyz, rpy = (self.triple(origin, key, where, "0 0 0") for key in ("xyz", "rpy"))
         etree.SubElement(out, "origin", xyz=xyz, rpy=rpy)
 

@@ -18,9 +18,8 @@ from robot_dyn.errors import RobotDynError
 from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.record import Path
 from robot_dyn.simulation.setup import Setup
-from robot_dyn.simulation.smoothness import extremes, foreign
+from robot_dyn.simulation.smoothness import LOOKS, extremes, foreign
 
-_LOOKS = 4000  # about so many states between steps
 _STANDS_OUT = 50.0  # times the change of the torque from step to step
 
 
@@ -79,9 +78,9 @@ def _code(motion: Motion, part: Any, path: Path, q: np.ndarray, v: np.ndarray, e
             return np.asarray(part.torque(t, q, v, z), dtype=float)
         return np.broadcast_to(np.asarray(part.torque(dynamics, t, q, v), dtype=float), (n,))
 
-    every = max(1, len(path.t) // _LOOKS)
+    every = max(1, len(path.t) // LOOKS)
     t, q, v, z = path.t[::every], q[::every], v[::every], path.y[::every, 2 * n : 2 * n + m]
-    looks = max(1, _LOOKS // len(t))  # in each step, at times that differ from step to step
+    looks = max(1, LOOKS // len(t))  # in each step, at times that differ from step to step
     s = (np.arange(looks)[:, None] + np.random.default_rng(0).uniform(size=len(t) - 1)) / looks
     try:
         ends = np.array([torque(*state) for state in zip(t.tolist(), q, v, z, strict=True)])

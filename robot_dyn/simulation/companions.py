@@ -22,6 +22,7 @@ import numpy as np
 from robot_dyn.simulation.error import ErrorEstimate, Verdict, no_estimate
 from robot_dyn.simulation.record import Path
 
+ROUNDED = "what rounding leaves of q, as the motion magnifies it, is as large as the motion itself"
 ROUNDING = 4500  # units of rounding of q, or as many as steps if there are more: differences below are no error
 COARSE = (Fraction(2), Fraction(3), Fraction(5))
 FINE = (Fraction(1, 2), Fraction(1, 3))
@@ -96,11 +97,16 @@ class Estimated:
         t, error = self.path.t, np.maximum(error, self.floor)
         bad = np.flatnonzero(np.isnan(bound) | (np.maximum(bound, self.floor) > self.meaningless))
         last = int(bad[0]) - 1 if len(bad) else len(t) - 1
+        why = (
+            ROUNDED
+            if len(bad) and self.floor[bad[0]] > self.meaningless
+            else "runs with other steps differ as much as the motion itself"
+        )
         if last < 1 < len(t):
-            return no_estimate("runs with other steps fail at the start")
+            return no_estimate(why)
         rows = np.unique(np.linspace(0, last, min(last + 1, _ROWS)).astype(int))
         verdict = Verdict.ORDER if self._smooth(seen)[last] else Verdict.BOUND
-        note = "" if last == len(t) - 1 else "runs with other steps differ as much as the motion itself"
+        note = "" if last == len(t) - 1 else why
         return ErrorEstimate(t[rows], np.maximum.accumulate(error)[rows], float(t[last]), note, verdict)
 
 

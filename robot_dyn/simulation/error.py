@@ -41,7 +41,7 @@ class ErrorEstimate:
     def __str__(self) -> str:
         if not self.resolved_until > 0:
             return f"not estimated; {self.note}"
-        figure = f"{self.final:.1e}" if self.verdict is Verdict.ORDER else f"about {self.final:.1e} at most"
+        figure = f"{self.final:.1e}" if self.verdict is Verdict.ORDER else f"about {self.final:.1e}"
         if self.note:
             figure += f" up to t = {self.resolved_until:g} s"
         reason = f": {self.reason}" if self.reason else ""

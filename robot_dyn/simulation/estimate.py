@@ -15,7 +15,7 @@ import numpy as np
 from robot_dyn.integrate.adaptive import LEAST_RTOL, Adaptive
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.simulation.between import stepped_over
-from robot_dyn.simulation.companions import COARSE, FINE, Estimated, differences, meaningless, rounding
+from robot_dyn.simulation.companions import COARSE, FINE, ROUNDED, Estimated, differences, meaningless, rounding
 from robot_dyn.simulation.error import ErrorEstimate, Verdict, no_estimate
 from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.record import Path, Record
@@ -118,6 +118,8 @@ def _advised(setup: Setup, made: ErrorEstimate, why: str) -> ErrorEstimate:
         made = replace(made, reason=why or "the order of the method does not show")
     if not made.note:
         return made
+    if made.note == ROUNDED:
+        return replace(made, note=f"{made.note}; take a shorter run")
     method = setup.integrator
     finer = (
         f"rtol = {method.rtol / 100:.0e}" if isinstance(method, Adaptive) else f"step_s = {setup.taken_step_s / 4:.0e}"

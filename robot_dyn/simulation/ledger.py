@@ -20,11 +20,13 @@ class Ledger:
         kinetic: K.
         potential: Of gravity and of the conservative effects.
         work: Done up to each sample by the control and by each other effect, by name.
+        kinetic_peak: Largest K between the samples that is known.
     """
 
     kinetic: np.ndarray
     potential: np.ndarray
     work: dict[str, np.ndarray]
+    kinetic_peak: float = 0.0
 
     @property
     def energy(self) -> np.ndarray:
@@ -43,9 +45,9 @@ class Ledger:
 
     @property
     def exchanged(self) -> float:
-        """Energy exchanged: max K + Σ ∫ |P_k|, the integrals over the samples."""
+        """Energy exchanged: max K + Σ ∫ |P_k|, K over steps and samples, the integrals over the samples."""
         moved = sum(float(np.nansum(np.abs(np.diff(work)))) for work in self.work.values())
-        return largest(self.kinetic) + moved
+        return max(largest(self.kinetic), self.kinetic_peak) + moved
 
     @property
     def closure(self) -> float:

@@ -26,6 +26,7 @@ from robot_dyn.simulation.trajectory import diverged_advice
 WATCHED = 64  # steps between looks at the energy
 _RUNAWAY = 1e6  # [rad/s] or [m/s]: an adaptive method would follow an exploding state without end
 _SAMPLES = 1000  # of an adaptive run without a record period
+_COMPARED = 1000  # times at which an adaptive run is compared with runs of other tolerances
 _LOCAL_ORDER = 8  # of DOP853: its steps grow as this root of the tolerance
 _PACED = 2000  # steps between looks at the pace of an adaptive method
 _MOST_AHEAD = 1e7  # steps that such a run may have before it at the pace it has: about an hour
@@ -153,6 +154,8 @@ def _adaptively(
     yield Sample(stretch.start, y, held, key)
     key += 1
     due, end = ceil(stretch.start / period + 1e-9), ceil(stretch.end / period - 1e-9)  # multiples of the period inside
+    compared = setup.duration_s / _COMPARED
+    met = ceil(stretch.start / compared + 1e-9)
     steps = method.steps(system, stretch.start, y, stretch.end, stop=sane)
     ticked = stretch.tick and held is not None
     for t, y, piece in steps:
@@ -160,8 +163,11 @@ def _adaptively(
         _observe(counter.observer, watch.motion, t, y, held, ticked)
         ticked = False
         while due < end and due * period <= t:
-            yield Sample(due * period, piece(due * period), held, key)
-            due, key = due + 1, key + 1
+            yield Sample(due * period, piece(due * period), held)
+            due += 1
+        while met * compared < min(t, stretch.end):
+            yield Sample(met * compared, piece(met * compared), held, key, kept=False)
+            met, key = met + 1, key + 1
         yield Sample(t, y, held, kept=False)
         watch.pace(t, counter.steps)
     if steps.status is Status.FAILED:

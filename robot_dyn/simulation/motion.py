@@ -122,6 +122,8 @@ class Motion:
         def rate(t: float, y: Array) -> Array:
             if y.ndim > 1:  # an implicit method asks for its Jacobian
                 return np.array([rate(t, row) for row in y.reshape(-1, y.shape[-1])]).reshape(y.shape)
+            y = y.view()
+            y.setflags(write=False)  # code of a user's own that changes its arguments would change the run
             made, u = self.rate(min(max(t, first), last), y, held)
             if seen is not None:
                 seen[:n], seen[n:] = made[:n], u

@@ -95,7 +95,7 @@ def collect(
         with np.errstate(all="ignore"):  # what overflows ends the march
             for sample in march(setup, motion, pace, counter, systems):
                 t, last = sample.t, sample.t == setup.duration_s
-                if not sample.kept:
+                if sample.key < 0 and not sample.kept:
                     if len(walked) < MOST_SHARED:
                         walked.append(sample)
                 elif pace == 1 and (t >= next_record - 1e-9 * setup.step_s or last):

@@ -38,8 +38,8 @@ class Setup:
         duration_s: In [s].
         controller: What drives it, or None.
         integrator: A method of fixed step, or an `Adaptive` one.
-        step_s: Fixed step; made smaller where samples, ticks, switches and the end ask for it. Not to be given for an Adaptive
-            method.
+        step_s: Fixed step; made smaller where samples, ticks, switches and the end ask for it. Not to be given
+            for an Adaptive method.
         record_period_s: Time between samples; 0 for every step.
         estimate_error: Whether companion runs are made, which cost about as much as the run; five times as much
             where only shorter steps can tell.
@@ -70,6 +70,8 @@ class Setup:
             value = checked(name, getattr(self, name), names)
             if value.ndim != 1:
                 raise QueryError(f"{name} must be one state of shape ({len(names)},), got {value.shape}")
+            value = value.copy()  # the caller may go on with his own array
+            value.setflags(write=False)
             object.__setattr__(self, name, value)
         for name in ("duration_s", "step_s", "record_period_s"):
             value, least = getattr(self, name), 0.0 if name == "record_period_s" else 1e-12

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 STOPS = (JointStopSpring, JointStopDamper)
 _IN_LAYER = 4  # steps within |v| < v_s that show a method's order
 _NEAR_LIMIT = 0.95  # of the effort limit
+LOOKS = 4000  # at foreign code, between steps
 _LOOKS = 300  # states at which the actuation is computed
 
 
@@ -33,6 +34,11 @@ def foreign(setup: Setup) -> tuple[Any, ...]:
     return tuple(
         part for part in (*parts, model) if part is not None and not type(part).__module__.startswith("robot_dyn.")
     )
+
+
+def looked_s(setup: Setup) -> float:
+    """Time in [s] between looks at what foreign code does, where steps are longer."""
+    return setup.duration_s / LOOKS
 
 
 def may_switch(setup: Setup) -> bool:
@@ -51,7 +57,10 @@ def first_kink(setup: Setup, motion: Motion, path: Path) -> tuple[float, str]:
         path: Its states, step by step.
     """
     if parts := foreign(setup):
-        return 0.0, f"{type(parts[0]).__name__} may switch"
+        return (
+            0.0,
+            f"{type(parts[0]).__name__} may switch, and what is shorter than {looked_s(setup):.1g} s is not seen",
+        )
     if len(path.t) < 2:
         return np.inf, ""
     n = motion.plant.dynamics.n
