@@ -68,7 +68,8 @@ def massless_bodies(robot: Structure) -> Iterator[str]:
 
 def no_inertia_about_axis(robot: Structure, joint: str | None) -> Iterator[str]:
     """A joint whose bodies have mass, but on its axis alone, so that M is singular."""
-    if joint is not None and _has_mass(robot, joint):
+    # beside a body without mass, the axes of two joints may coincide: then that body is the fault
+    if joint is not None and all(_has_mass(robot, each) for each in robot.bodies):
         yield (
             f"joint {joint!r}: what it moves has mass but no inertia about its axis, so M is singular; give its link"
             " moments of inertia, or give the joint armature"

@@ -26,6 +26,7 @@ _MOST_HEADER = 4096  # bytes of an array's own header; NumPy writes 118
 _MOST_NAME = 10_000  # characters; zip files end at 65 535 bytes
 _MAGIC = b"\x93NUMPY\x01\x00"  # version 1.0, which NumPy writes for all arrays without fields
 _TYPE = re.compile(r"[<|][bfiuU][1-9]\d{0,9}")  # booleans, numbers and text, in the byte order of files
+_START = b"PK"  # of a zip file
 _DEFLATED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
 
@@ -80,6 +81,9 @@ class Archive:
 
     def __init__(self, stream: BinaryIO) -> None:
         with _reading("the file"):
+            if (start := stream.read(len(_START))) != _START and start:
+                raise ArchiveError("it is not a file that robot-dyn simulate -o writes")
+            stream.seek(0)
             self._file = zipfile.ZipFile(stream)
         members = self._file.infolist()
         if len(members) > _MOST_MEMBERS:
