@@ -103,7 +103,7 @@ def test_a_comparison_is_repeatable() -> None:
 
 
 def test_samples_must_be_positive() -> None:
-    with pytest.raises(QueryError, match="samples must be at least 1, got 0"):
+    with pytest.raises(QueryError, match="samples must be a whole number of at least 1, got 0"):
         compare(rd.load("ur5"), samples=0)
 
 
@@ -128,3 +128,11 @@ def test_shares_of_the_links_add_up_to_the_torque(name: str) -> None:
     np.testing.assert_allclose(sum(s.gravity for s in shares), robot.N(q), atol=1e-14 * size.max())
     (armature,) = (share for share in shares if share.source == "(armature)")
     np.testing.assert_allclose(armature.inertia, 0.1 * a, rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"), [({"seed": -1}, "seed"), ({"samples": 1.5}, "samples"), ({"samples": True}, "samples")]
+)
+def test_states_and_seeds_are_counted_in_whole_numbers(options, said) -> None:
+    with pytest.raises(QueryError, match=f"{said} must be a whole number"):
+        rd.compare(rd.load("pendulum"), **options)

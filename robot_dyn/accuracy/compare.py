@@ -130,8 +130,9 @@ def compare(
     Raises:
         QueryError: If samples is not positive.
     """
-    if samples < 1:
-        raise QueryError(f"samples must be at least 1, got {samples}")
+    for name, count, least in (("samples", samples, 1), ("seed", seed, 0)):
+        if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < least:
+            raise QueryError(f"{name} must be a whole number of at least {least}, got {count!r}")
     own, rng = Lagrangian(robot), np.random.default_rng(seed)
     worst: dict[str, Agreement] = {}
     unsolved = 0

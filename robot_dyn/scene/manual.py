@@ -7,7 +7,6 @@ from types import NoneType
 from typing import Annotated, Any, Literal, get_args, get_origin
 
 from pydantic.fields import FieldInfo
-from pydantic_core import PydanticUndefined
 
 from robot_dyn.integrate.methods import METHODS
 from robot_dyn.scene.control import LAWS, AnyReference, Control, Model
@@ -114,9 +113,9 @@ def _of(annotation: Any) -> str:
 
 
 def _default(field: FieldInfo) -> str:
-    default = field.default
-    if default is PydanticUndefined:
+    if field.is_required():
         return "required"
+    default = field.default
     if default is None or isinstance(default, Part) or default == ():
         return ""
     return f"`{_toml(default)}`"

@@ -95,12 +95,11 @@ def collect(
         with np.errstate(all="ignore"):  # what overflows ends the march
             for sample in march(setup, motion, pace, counter, systems):
                 t, last = sample.t, sample.t == setup.duration_s
-                if sample.key < 0 and not sample.kept:
-                    if len(walked) < MOST_SHARED:
-                        walked.append(sample)
-                elif pace == 1 and (t >= next_record - 1e-9 * setup.step_s or last):
+                if sample.kept and pace == 1 and (t >= next_record - 1e-9 * setup.step_s or last):
                     kept.add(sample)
                     next_record += setup.record_period_s
+                if not sample.kept and sample.key < 0 and len(walked) < MOST_SHARED:
+                    walked.append(sample)
                 if sample.key >= 0 and (sample.key % thin == 0 or last):
                     shared.append(sample)
                 if on_progress is not None:

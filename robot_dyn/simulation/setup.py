@@ -6,7 +6,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf
-from typing import final
+from typing import Any, final
 
 import numpy as np
 
@@ -87,6 +87,8 @@ class Setup:
             raise QueryError(f"controller: give one, such as rd.PD(…), or None, got {self.controller!r}")
         if self.controller is not None and self.controller.n != len(names):
             raise QueryError(f"the controller drives {self.controller.n} joints, the plant has {len(names)}")
+        if self.controller is not None:
+            _check_period(self.controller)
         self._check_model()
         check_segments(self)
         self.plant.torque(0.0, self.q0, self.v0)  # so that an effect that does not fit is told now
@@ -149,3 +151,13 @@ class Setup:
         error control does not see what no stage meets. A fixed step is the user's.
         """
         return min(_LONGEST_STEP_S, self.duration_s / _LEAST_STEPS) if may_switch(self) else inf
+
+
+def _check_period(controller: Controller) -> None:
+    """Refuse a controller, of a user's own perhaps, whose period is not a time."""
+    period: Any = getattr(controller, "period_s", None)
+    real = isinstance(period, int | float | np.integer | np.floating) and not isinstance(period, bool)
+    if not (real and 0 <= period < inf):
+        raise QueryError(
+            f"{type(controller).__name__}.period_s must be a time in seconds, 0 for continuous control, got {period!r}"
+        )

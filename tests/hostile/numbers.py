@@ -7,7 +7,7 @@ import re
 from tests.hostile.kinds import ARM, AXIS, LIMIT, MASS, MOMENTS, Kind, altered, text
 
 NOT_DECIMAL = (
-    *("nan", "inf", "1e999", "1e99999", "1,5", "1_000", "0x1p4", "", "1.5 kg", "${mass}"),
+    *("nan", "inf", "1e999", "1e99999", "1,5", "1_000", "0x1p4", "", "1.5 kg"),
     *("١٢", "1½", "0" * 65),
 )
 XYZ, RPY, CENTRE = 'xyz="0 0 0.7"', 'rpy="0 0 0.7"', 'xyz="0 0 0.1"'
@@ -25,6 +25,7 @@ def moment(key: str, value: str) -> tuple[str, str]:
 
 ON_LINK = (
     ("a mass below zero", MASS, '<mass value="-1e-9"/>', ("<mass> value", "below 0", "-1e-9", "correct it")),
+    ("a mass of an expression", MASS, '<mass value="${mass}"/>', ("<mass> value", "'${mass}'", "expand the file")),
     ("a mass without value", MASS, "<mass/>", ("<mass> has no value", 'write value="')),
     ("no mass", MASS, "", ("both <mass> and <inertia>", "add the one that is missing")),
     ("two masses", MASS, MASS + MASS, ("2 <mass> elements", "keep one")),
