@@ -89,5 +89,5 @@ FILES = [
         arm(('name="elbow" type="revolute"', 'name="elbow" type="ball"')),
         refused=("'ball'", "revolute"),
     ),
-    Foreign("a page of the web", "<!DOCTYPE html><html></html>", refused=("<!DOCTYPE",)),
+    Foreign("a page of the web", "<!DOCTYPE html><html></html>", refused=("is a web page", "download the file itself")),
 ]
