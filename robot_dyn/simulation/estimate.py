@@ -25,10 +25,8 @@ from robot_dyn.simulation.smoothness import first_kink
 
 _GAIN = 1.3  # in the time resolved, that a shorter step must bring
 _TENTH, _TENFOLD = Fraction(1, 10), Fraction(10)
-_FAR_TURN, _BLIND_TURN = (
-    1.0,
-    np.pi,
-)  # [rad] in a step: multiples of a step may meet the same angles; and so do parts of it
+_FAR_TURN = 1.0  # [rad] in a step: beyond, longer steps may meet the same angles
+_BLIND_TURN = np.pi  # [rad] in a step: beyond, shorter ones may, too
 _PUSH = 4.0  # units of rounding by which a start is moved, to see what the motion makes of rounding
 
 Companion = Callable[[Fraction, Setup], Record]
