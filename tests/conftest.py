@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import os
 import shutil
+import signal
 import tempfile
 from collections.abc import Iterator
 from typing import Any
@@ -17,6 +18,9 @@ settings.register_profile(
     "robot_dyn", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow], print_blob=True
 )
 settings.load_profile("robot_dyn")
+
+# A shell ignores Ctrl-C for what it runs in the background, and programs hand that on: the commands under test obey it.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 if "ROBOT_DYN_CACHE" not in os.environ:  # kernels of a test run are its own; workers inherit the folder
     os.environ["ROBOT_DYN_CACHE"] = tempfile.mkdtemp(prefix="robot_dyn-kernels-")
