@@ -18,6 +18,7 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.errors import QueryError
+from robot_dyn.validate import integer, real, shown
 
 Array = Any  # numpy.ndarray of floats, or of flint.arb objects; NumPy's own types do not tell them apart
 
@@ -69,9 +70,7 @@ class Float(Arithmetic):
         return nullcontext()
 
     def asarray(self, values: Any) -> Array:
-        array = np.asarray(values)
-        if array.dtype.kind not in "fiu":
-            raise TypeError(f"not real numbers: {array.dtype}")
+        array = real(values)
         with np.errstate(over="ignore"):  # a longdouble may be too large: then it is not finite
             return array.astype(self.dtype, copy=False)
 
@@ -80,6 +79,8 @@ class Float(Arithmetic):
 
 
 FLOAT64 = Float(np.dtype(np.float64))
+
+MOST_BITS = 1_000_000  # of a ball: a product of such takes milliseconds
 
 # flint keeps one working precision for the whole process, so balls of two precisions must take turns.
 _flint_turn = RLock()
@@ -91,11 +92,14 @@ class Ball(Arithmetic):
     """Balls (flint.arb) with midpoints of `bits` bits: every result encloses the exact value.
 
     Attributes:
-        bits: Precision of the midpoints, 53 for that of float64.
+        bits: Precision of the midpoints, from 2 to a million, 53 for that of float64.
     """
 
     bits: int = 53
     dtype: np.dtype = field(default_factory=lambda: np.dtype(object), init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "bits", integer("bits of a Ball", self.bits, least=2, most=MOST_BITS))
 
     def number(self, literal: Any) -> Any:
         from flint import arb
@@ -114,7 +118,10 @@ class Ball(Arithmetic):
             yield
 
     def asarray(self, values: Any) -> Array:
-        return self.array(values)
+        array = np.asarray(values, dtype=object) if not isinstance(values, np.ma.MaskedArray) else real(values)
+        if any(isinstance(x, bool | np.bool_) for x in array.flat):
+            raise ValueError("truth values")
+        return self.array(array)
 
     def finite(self, x: Array) -> np.ndarray:
         return np.vectorize(lambda ball: ball.is_finite(), otypes=[bool])(x)
@@ -130,10 +137,10 @@ def arithmetic_of(dtype: Any) -> Arithmetic:
         return dtype
     try:
         found = np.dtype(dtype)
-    except TypeError:
+    except Exception:  # whatever a foreign object makes of it
         found = None
-    if found is None or found.kind != "f" or found.itemsize < 4:
-        raise QueryError(f"no arithmetic {dtype!r}: give float32, float64, np.longdouble or Ball(bits)")
+    if dtype is None or found is None or found.kind != "f" or found.itemsize < 4:
+        raise QueryError(f"no arithmetic {shown(dtype)}: give float32, float64, np.longdouble or Ball(bits)")
     return Float(found)
 
 
@@ -150,12 +157,21 @@ def in_arithmetic(method: Callable[..., Any]) -> Callable[..., Any]:
 
 def midpoint(x: Array) -> Array:
     """The float64 nearest to the midpoint of each ball."""
-    return np.vectorize(lambda ball: float(ball.mid()), otypes=[float])(x)
+    return _of_each(x, lambda ball: float(ball.mid()))
 
 
 def radius(x: Array) -> Array:
     """A float64 upper bound of the radius of each ball."""
-    return np.vectorize(lambda ball: float(ball.rad().upper()), otypes=[float])(x)
+    return _of_each(x, lambda ball: float(ball.rad().upper()))
+
+
+def _of_each(x: Any, of: Callable[[Any], float]) -> Array:
+    from flint import arb
+
+    balls = np.asarray(x, dtype=object)
+    if not all(isinstance(ball, arb) for ball in balls.flat):
+        raise QueryError(f"give an array of balls, such as rd.Lagrangian(robot, rd.Ball(200)) answers, got {shown(x)}")
+    return np.vectorize(of, otypes=[float])(balls)
 
 
 # NumPy applies these to object arrays by calling the method of the same name on each entry, so one name serves all.

@@ -210,7 +210,7 @@ def test_friction_of_tied_joints_counts_by_virtual_work() -> None:
     [
         (lambda: rd.ViscousFriction(-0.1), "damping must not be negative"),
         (lambda: rd.ViscousFriction([0.1, np.nan]), "damping must be finite"),
-        (lambda: rd.ViscousFriction("much"), "damping must be a number"),
+        (lambda: rd.ViscousFriction("much"), "damping must be real numbers"),
         (lambda: rd.RegularisedCoulombFriction(1.0, 0.0), "velocity_scale must be positive"),
         (lambda: rd.JointStopSpring(1.0, 0.5, 3.0), "lower stops must lie below"),
         (lambda: rd.ExternalWrench("pole", [1, 2, 3]), r"shape \(6,\)"),
@@ -218,7 +218,7 @@ def test_friction_of_tied_joints_counts_by_virtual_work() -> None:
         (lambda: rd.EffortLimit(-1.0), "limit must not be negative"),
         (lambda: Plant(ROBOT, "friction"), "give effects, or 'urdf'"),
         (lambda: Plant(ROBOT, [3]), "3 is neither a Force nor a Bound"),
-        (lambda: Plant(object(), "urdf"), "needs a robot with a URDF"),
+        (lambda: Plant(object(), "urdf"), "give a robot, such as rd.load"),
     ],
 )
 def test_meaningless_coefficients_are_refused(make, message: str) -> None:

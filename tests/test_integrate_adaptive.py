@@ -120,10 +120,10 @@ def test_longest_step_is_kept_and_inputs_are_left_alone() -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"method": "LSODA"}, "give 'DOP853' or 'Radau'"),
+        ({"method": "LSODA"}, "known: DOP853, Radau"),
         ({"rtol": 1e-15}, "rtol must be between 2.2e-14 and 1"),
         ({"rtol": float("nan")}, "rtol must be"),
-        ({"atol": -1.0}, "atol must be"),
+        ({"atol": -1.0}, "atol must "),
         ({"max_step": 0.0}, "max_step must be positive"),
     ],
 )
@@ -138,8 +138,8 @@ def test_meaningless_options_are_refused(options: dict[str, Any], message: str) 
         (np.ones((2, 2)), 1.0, r"shape \(m,\)"),
         (np.array([1.0, np.inf]), 1.0, "must be finite"),
         (START.astype(object), 1.0, "float64"),
-        (START, 0.0, "must be finite and differ"),
-        (START, float("inf"), "must be finite and differ"),
+        (START, 0.0, "t0 and t1 must differ"),
+        (START, float("inf"), "t1 must be finite"),
     ],
 )
 def test_an_unfit_start_is_refused(y0: np.ndarray, t1: float, message: str) -> None:

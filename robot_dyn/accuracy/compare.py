@@ -10,17 +10,18 @@ entry that has no terms is held to the largest scale in its row and column.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.errors import QueryError, SingularError
+from robot_dyn.errors import SingularError
 from robot_dyn.lagrange.articulated_body import articulated_body
 from robot_dyn.lagrange.magnitude import Magnitudes, floored, magnitudes, mass_norm, scaled
 from robot_dyn.lagrange.manipulator import Lagrangian
 from robot_dyn.model.dynamics import Axes
 from robot_dyn.model.robot import Robot
+from robot_dyn.validate import instance, integer, number
 
 TOLERANCE = 1e-12
 _U = np.finfo(float).eps / 2
@@ -46,7 +47,7 @@ class Agreement:
     entry: str
     pinocchio: float
     own: float
-    state: dict[str, list[float]]
+    state: dict[str, list[float]] = field(hash=False)
 
     @property
     def ok(self) -> bool:
@@ -130,9 +131,9 @@ def compare(
     Raises:
         QueryError: If samples is not positive.
     """
-    for name, count, least in (("samples", samples, 1), ("seed", seed, 0)):
-        if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < least:
-            raise QueryError(f"{name} must be a whole number of at least {least}, got {count!r}")
+    instance("robot", robot, Robot, "give one of rd.load")
+    samples, seed = integer("samples", samples, least=1), integer("seed", seed)
+    tolerance = number("tolerance", tolerance, above=0)
     own, rng = Lagrangian(robot), np.random.default_rng(seed)
     worst: dict[str, Agreement] = {}
     unsolved = 0

@@ -1,4 +1,4 @@
-"""Arguments and results of a query on its general way: times, and the array `out` that takes the result."""
+"""Results of a query on its general way, and the array `out` that takes them."""
 
 from __future__ import annotations
 
@@ -6,16 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.errors import QueryError
-
-
-def time_of(t: Any) -> np.ndarray:
-    """Times (...,) as a column (..., 1); raises QueryError for anything else."""
-    try:
-        return FLOAT64.asarray(t)[..., None]
-    except (TypeError, ValueError, OverflowError):
-        raise QueryError(f"t must be a time in seconds, got {t!r}") from None
 
 
 def into(out: np.ndarray | None, result: np.ndarray) -> Any:

@@ -18,9 +18,9 @@ import pinocchio as pin  # pyright: ignore[reportMissingImports]
 
 from robot_dyn.arithmetic import Array, apply
 from robot_dyn.model.coriolis import columnwise_bracket, columnwise_dual
-from robot_dyn.model.dynamics import check_batches
 from robot_dyn.model.robot import Robot
 from robot_dyn.spatial import bracket
+from robot_dyn.validate import check_batches
 
 
 def forward_dynamics_derivatives(robot: Robot, q: Array, v: Array, tau: Array) -> np.ndarray:

@@ -19,9 +19,9 @@ from robot_dyn.compiled.referee import Referee
 from robot_dyn.compiled.right_angles import completed
 from robot_dyn.compiled.threads import thread_count
 from robot_dyn.compiled.trace import ARGUMENTS, Trace
-from robot_dyn.errors import QueryError
 from robot_dyn.model.dynamics import Axes, Dynamics
 from robot_dyn.model.robot import Robot
+from robot_dyn.validate import choice, instance, truth
 
 _DERIVATIVES = "forward_dynamics_derivatives"
 
@@ -46,10 +46,9 @@ class CompiledDynamics(Dynamics):
     cache: bool = True
 
     def __post_init__(self) -> None:
-        if not isinstance(self.original, Robot):
-            raise QueryError(f"robot: give a Robot, such as rd.load('ur5'), got {self.original!r}")
-        if self.dtype not in ("float64", "float32"):
-            raise QueryError(f"dtype must be 'float64' or 'float32', got {self.dtype!r}")
+        instance("robot", self.original, Robot, "give a Robot, such as rd.load('ur5')")
+        choice("dtype", self.dtype, ("float64", "float32"))
+        truth("cache", self.cache)
         thread_count(self.threads)
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -15,7 +15,7 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.arithmetic import Float
-from robot_dyn.compiled.arguments import into, time_of
+from robot_dyn.compiled.arguments import into
 from robot_dyn.compiled.emit import emit
 from robot_dyn.compiled.kernel import Kernel, Status
 from robot_dyn.compiled.on_first_use import OnFirstUse
@@ -24,7 +24,7 @@ from robot_dyn.compiled.referee import STATES, Referee
 from robot_dyn.compiled.trace import Traced
 from robot_dyn.errors import RobotDynWarning
 from robot_dyn.model.batch import DoubtError, answered
-from robot_dyn.model.dynamics import shaped
+from robot_dyn.validate import shaped, times
 
 # Measured on chains: forward dynamics of 64 joints, 48 875 instructions, takes 8 s to compile; a batch is then 13 times
 # as fast as Pinocchio, one state from Python twice. The time grows as the count: above this, a quarter of a minute.
@@ -155,9 +155,10 @@ class Engine:
         if len(states) != 1 or states[0] <= _FEW or quantity.endswith("energy"):
             return None
         if self.arguments[quantity][0] == "t":
-            if np.shape(arguments[0]) != states:
+            t = arguments[0]
+            if type(t) is not np.ndarray or t.dtype.kind not in "fiu" or t.shape != states:
                 return None
-            arguments = (np.asarray(arguments[0], self.dtype)[:, None], *arguments[1:])
+            arguments = (t.astype(self.dtype)[:, None], *arguments[1:])
         try:
             if all(type(x) is np.ndarray and x.flags.aligned for x in arguments):
                 y = np.empty(
@@ -172,7 +173,7 @@ class Engine:
     def _array(self, name: str, x: Any) -> np.ndarray:
         """An argument as an array; that its numbers are finite the kernel sees faster."""
         if name == "t":
-            return time_of(x)
+            return times(name, x)[..., None]
         plain = x.__class__ is np.ndarray and x.dtype == self.dtype and x.shape[-1:] == (len(self.joint_names),)
         return x if plain else shaped(name, x, self.joint_names)
 

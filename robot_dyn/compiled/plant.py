@@ -235,6 +235,6 @@ def Compiled(
         QueryError: If it is neither, or an option is not allowed.
     """
     if not isinstance(robot_or_plant, Plant):
-        return CompiledDynamics(robot_or_plant, str(dtype), threads, cache)
+        return CompiledDynamics(robot_or_plant, dtype, threads, cache)
     robot: Any = getattr(robot_or_plant.dynamics, "robot", robot_or_plant.dynamics)
-    return CompiledPlant(robot_or_plant, CompiledDynamics(robot, str(dtype), threads, cache))
+    return CompiledPlant(robot_or_plant, CompiledDynamics(robot, dtype, threads, cache))

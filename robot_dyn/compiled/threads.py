@@ -8,7 +8,7 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import final
 
-from robot_dyn.errors import QueryError
+from robot_dyn.validate import integer
 
 
 def thread_count(threads: int | None) -> int:
@@ -19,9 +19,7 @@ def thread_count(threads: int | None) -> int:
     """
     if threads is None:
         return os.cpu_count() or 1
-    if not isinstance(threads, int) or isinstance(threads, bool) or threads < 1:
-        raise QueryError(f"threads must be a positive number, or None for all processors, got {threads!r}")
-    return threads
+    return integer("threads (None for all processors)", threads, least=1)
 
 
 def shared(work: Callable[[int, int], int], count: int, piece: int, threads: int) -> int:

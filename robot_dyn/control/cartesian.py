@@ -12,11 +12,14 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.control.controller import ControlError, gain, numbers, positive
+from robot_dyn.control.controller import ControlError, number, numbers
 from robot_dyn.control.orientation import orientation_error
 from robot_dyn.control.reference import PiecewisePolynomial, hermite, quintic
 from robot_dyn.spatial import rotation as rotation_about
+from robot_dyn.validate import duration as seconds
+from robot_dyn.validate import shown
 
+_MOST_TURNS = 1000
 _TURN_KNOTS, _RAMP_KNOTS = 64, 32  # per turn and per ramp: the accuracy that `circle` states
 
 
@@ -39,7 +42,9 @@ class CartesianReference:
 
     def __post_init__(self) -> None:
         if not isinstance(self.position, PiecewisePolynomial) or self.position.n != 3:
-            raise ControlError(f"position must be a PiecewisePolynomial of 3 coordinates, got {self.position!r}")
+            raise ControlError(f"position must be a PiecewisePolynomial of 3 coordinates, got {shown(self.position)}")
+        if self.angle is not None and not isinstance(self.angle, PiecewisePolynomial):
+            raise ControlError(f"angle must be a PiecewisePolynomial of 1 coordinate, got {shown(self.angle)}")
         if self.angle is not None and (self.rotation is None or self.angle.n != 1):
             raise ControlError("angle must have 1 coordinate and needs a rotation R₀ that it turns")
         if self.rotation is not None:
@@ -124,7 +129,7 @@ def circle(
         radius: In [m], positive.
         normal: Axis about which it turns by the right hand, shape (3,), of any length.
         period: Time of one turn at full speed, in [s].
-        turns: Number of turns, positive; ramp may be at most turns · period.
+        turns: Number of turns, positive, 1000 at most; ramp may be at most turns · period.
         ramp: Time to full speed in [s]; 0 starts at full speed, with a jump. Unless given, a quarter of the period, or
             turns · period if that is less.
         toward: Direction from the centre to the starting point; unless given, that of the base's axis (x, y or z) which
@@ -137,9 +142,11 @@ def circle(
 
     Source: Siciliano et al. 2009, sec. 4.3.1 (path primitives).
     """
-    centre, r, normal = numbers("centre", centre, (3,)), positive("radius", radius), _direction("normal", normal)
-    T, turns = positive("period", period), positive("turns", turns)
-    rise = float(gain("ramp", min(T / 4, turns * T) if ramp is None else ramp))
+    centre, r, normal = numbers("centre", centre, (3,)), number("radius", radius, above=0), _direction("normal", normal)
+    T, turns = seconds("period", period, error=ControlError), number("turns", turns, above=0)
+    if turns > _MOST_TURNS:
+        raise ControlError(f"turns must be at most {_MOST_TURNS}, got {turns:g}; each takes {_TURN_KNOTS} pieces")
+    rise = number("ramp", min(T / 4, turns * T) if ramp is None else ramp, least=0)
     if rise > turns * T:
         raise ControlError(f"ramp must be at most turns · period = {turns * T} s, got {rise} s")
     toward = np.eye(3)[np.argmin(np.abs(normal))] if toward is None else numbers("toward", toward, (3,))
@@ -151,7 +158,7 @@ def circle(
     along, across = np.cos(phi) * x + np.sin(phi) * y, np.cos(phi) * y - np.sin(phi) * x
     data = np.stack([centre + r * along, r * rate * across, r * (rate2 * across - rate**2 * along)], axis=1)
     pieces = hermite(np.diff(knots), np.concatenate([data[:-1], data[1:]], axis=1))
-    return CartesianReference(PiecewisePolynomial(float(numbers("start", start, ())) + knots, pieces), rotation)
+    return CartesianReference(PiecewisePolynomial(number("start", start) + knots, pieces), rotation)
 
 
 def _ramped_angle(speed: float, cruise: float, rise: float) -> PiecewisePolynomial:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any, final
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.control.controller import ControlError, Memoryless, freeze
+from robot_dyn.control.controller import ControlError, Memoryless, check_model, freeze
 from robot_dyn.control.independent_joint import joint_count
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.model.dynamics import Dynamics
@@ -38,6 +38,7 @@ class ModelBased(Memoryless):
     period_s: float = 0.0
 
     def __post_init__(self) -> None:
+        check_model(self.model)
         n, count = self.model.n, joint_count(self.reference)
         if n != count:
             raise ControlError(f"the model has {n} joints, the reference {count}")

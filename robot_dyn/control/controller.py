@@ -7,12 +7,14 @@ one takes z⁺ = z + period · rate at its ticks and holds its torque between th
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from functools import partial
 from typing import Any
 
-import numpy as np
-
+from robot_dyn import validate
 from robot_dyn.arithmetic import Array
 from robot_dyn.errors import RobotDynError
+from robot_dyn.model.dynamics import Dynamics
+from robot_dyn.validate import duration
 
 
 class ControlError(RobotDynError):
@@ -26,7 +28,7 @@ class Controller(ABC):
         period_s: Time between samples in [s], with the torque constant between them; 0 for continuous control.
     """
 
-    period_s: float
+    period_s: float = 0.0
 
     @property
     @abstractmethod
@@ -68,46 +70,13 @@ class Memoryless(Controller):
         return z
 
 
-def numbers(name: str, values: Any, *shapes: tuple[int | str, ...]) -> np.ndarray:
-    """Finite numbers of one of the shapes, copied and frozen; a length with a name such as "n" may be any but 0.
-
-    Raises:
-        ControlError: If they are anything else.
-    """
-    try:
-        array = np.array(values, dtype=float)
-    except (TypeError, ValueError):
-        raise ControlError(f"{name} must be an array of numbers, got {values!r}") from None
-    if not any(_fits(array.shape, shape) for shape in shapes):
-        wanted = " or ".join(str(shape).replace("'", "") for shape in shapes)
-        raise ControlError(f"{name} must have shape {wanted}, got {array.shape}")
-    if not np.isfinite(array).all():
-        raise ControlError(f"{name} must be finite, got {values!r}")
-    array.setflags(write=False)
-    return array
+number, numbers = (partial(check, error=ControlError) for check in (validate.number, validate.numbers))
 
 
-def _fits(shape: tuple[int, ...], wanted: tuple[int | str, ...]) -> bool:
-    """Whether lengths are as wanted."""
-    if len(shape) != len(wanted):
-        return False
-    return all(a > 0 if isinstance(b, str) else a == b for a, b in zip(shape, wanted, strict=True))
-
-
-def positive(name: str, value: Any) -> float:
-    """A positive number; ControlError if it is none."""
-    number = float(numbers(name, value, ()))
-    if not number > 0:
-        raise ControlError(f"{name} must be positive, got {number}")
-    return number
-
-
-def gain(name: str, values: Any, *shapes: tuple[int | str, ...]) -> np.ndarray:
-    """Numbers that are not negative, a scalar or of one of the shapes, frozen; ControlError if they are none."""
-    array = numbers(name, values, (), *shapes)
-    if (array < 0).any():
-        raise ControlError(f"{name} must not be negative, got {values!r}")
-    return array
+def check_model(model: Any) -> None:
+    """ControlError if it is not the dynamics of an arm."""
+    if isinstance(model, type) or not isinstance(model, Dynamics):
+        raise ControlError(f"model: give a robot, such as rd.load('ur5'), got {validate.shown(model)}")
 
 
 def freeze(controller: Controller, n: int, *gains: str) -> None:
@@ -117,5 +86,5 @@ def freeze(controller: Controller, n: int, *gains: str) -> None:
         ControlError: If one is negative, not finite or of the wrong shape.
     """
     for name in gains:
-        object.__setattr__(controller, name, gain(name, getattr(controller, name), (n,)))
-    object.__setattr__(controller, "period_s", float(gain("period_s", controller.period_s)))
+        object.__setattr__(controller, name, numbers(name, getattr(controller, name), (), (n,), least=0))
+    object.__setattr__(controller, "period_s", duration("period_s", controller.period_s, zero=True, error=ControlError))

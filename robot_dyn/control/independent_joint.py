@@ -11,8 +11,9 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.control.controller import ControlError, Controller, Memoryless, freeze, numbers, positive
+from robot_dyn.control.controller import ControlError, Controller, Memoryless, freeze, number, numbers
 from robot_dyn.control.reference import PiecewisePolynomial
+from robot_dyn.validate import shown
 
 
 @final
@@ -78,13 +79,14 @@ class PID(Controller):
 
     def __post_init__(self) -> None:
         freeze(self, self.n, "kp", "ki", "kd")
-        object.__setattr__(self, "effort_limit", _effort_limit(self.effort_limit, self.n))
+        limit = numbers("effort_limit", self.effort_limit, (), (self.n,), above=0, infinite=True)
+        object.__setattr__(self, "effort_limit", limit)
         if self.tracking_time_s is None:
             kd, ki = np.broadcast_arrays(self.kd, self.ki)
             acts = (kd > 0) & (ki > 0)
             time = np.sqrt((kd[acts] / ki[acts]).max()) if acts.any() else 1.0  # without ki nothing winds up
         else:
-            time = positive("tracking_time_s", self.tracking_time_s)
+            time = number("tracking_time_s", self.tracking_time_s, above=0)
             if np.isinf(self.effort_limit).all():
                 raise ControlError("tracking_time_s has no effect without an effort_limit; give one, or leave it out")
         object.__setattr__(self, "tracking_time_s", float(time))
@@ -129,28 +131,16 @@ def gains_from(inertia_diagonal: Any, frequency: Any, damping_ratio: Any = 1.0) 
     Source: Siciliano et al. 2009, sec. 8.3.1.
     """
     given = {"inertia_diagonal": inertia_diagonal, "frequency": frequency, "damping_ratio": damping_ratio}
-    inertia, omega, zeta = (numbers(name, x, (), ("n",)) for name, x in given.items())
+    inertia, omega, zeta = (numbers(name, x, (), ("n",), least=0) for name, x in given.items())
     if len({x.shape for x in (inertia, omega, zeta)} - {()}) > 1:
         raise ControlError(f"shapes do not match: {inertia.shape}, {omega.shape}, {zeta.shape}")
-    if not ((inertia > 0).all() and (omega > 0).all() and (zeta >= 0).all()):
-        raise ControlError(f"inertia_diagonal and frequency must be positive, damping_ratio not negative, got {given}")
+    if not ((inertia > 0).all() and (omega > 0).all()):
+        raise ControlError(f"inertia_diagonal and frequency must be positive, got {inertia} and {omega}")
     return inertia * omega**2, 2 * zeta * omega * inertia
 
 
 def joint_count(reference: Any) -> int:
     """Number of joints of a joint reference; ControlError if it is none."""
     if not isinstance(reference, PiecewisePolynomial):
-        raise ControlError(f"reference must be a PiecewisePolynomial, such as hold(q), got {reference!r}")
+        raise ControlError(f"reference must be a PiecewisePolynomial, such as hold(q), got {shown(reference)}")
     return reference.n
-
-
-def _effort_limit(values: Any, n: int) -> np.ndarray:
-    """Limits, positive, inf where there is none; ControlError if they are none."""
-    try:
-        limit = np.array(values, dtype=float)
-    except (TypeError, ValueError):
-        raise ControlError(f"effort_limit must be numbers, got {values!r}") from None
-    if limit.shape not in ((), (n,)) or not (limit > 0).all():
-        raise ControlError(f"effort_limit must be positive, a scalar or ({n},), got {values!r}")
-    limit.setflags(write=False)
-    return limit

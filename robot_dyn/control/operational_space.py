@@ -14,9 +14,10 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array, apply, transpose
 from robot_dyn.control.cartesian import CartesianReference
-from robot_dyn.control.controller import ControlError, Memoryless, freeze, gain, numbers, positive
+from robot_dyn.control.controller import ControlError, Memoryless, check_model, freeze, number, numbers
 from robot_dyn.control.orientation import orientation_error
 from robot_dyn.model.dynamics import Dynamics, acceleration
+from robot_dyn.validate import shown
 
 POSITION, POSE = (0, 1, 2), (0, 1, 2, 3, 4, 5)  # rows of a twist
 
@@ -79,7 +80,8 @@ def task_dynamics(
 
     Source: Khatib 1987; Chiaverini, Siciliano, Egeland 1994 (damping in the singular directions only).
     """
-    rows, epsilon = _rows(rows), positive("threshold", threshold)
+    check_model(dynamics)
+    rows, epsilon = _rows(rows), number("threshold", threshold, above=0)
     J = dynamics.jacobian(q, frame)[..., rows, :]
     drift = apply(dynamics.jacobian_rate(q, v, frame)[..., rows, :], np.asarray(v))
     # rows of J M⁻¹, one solve each: M is symmetric
@@ -132,8 +134,9 @@ class OperationalSpace(Memoryless):
     period_s: float = 0.0
 
     def __post_init__(self) -> None:
+        check_model(self.model)
         if not isinstance(self.reference, CartesianReference):
-            raise ControlError(f"reference must be a CartesianReference, such as line(…), got {self.reference!r}")
+            raise ControlError(f"reference must be a CartesianReference, such as line(…), got {shown(self.reference)}")
         free = self.reference.rotation is None
         rows = _rows((POSITION if free else POSE) if self.rows is None else self.rows)
         if free and max(rows) > 2:
@@ -144,10 +147,10 @@ class OperationalSpace(Memoryless):
             raise ControlError("posture_kp needs a posture")
         values = {
             "rows": rows,
-            "kp": gain("kp", self.kp, (len(rows),)),
-            "kd": gain("kd", self.kd, (len(rows),)),
+            "kp": numbers("kp", self.kp, (), (len(rows),), least=0),
+            "kd": numbers("kd", self.kd, (), (len(rows),), least=0),
             "posture": numbers("posture", np.zeros(self.n) if self.posture is None else self.posture, (self.n,)),
-            "threshold": positive("threshold", self.threshold),
+            "threshold": number("threshold", self.threshold, above=0),
         }
         for name, value in values.items():
             object.__setattr__(self, name, value)
@@ -178,9 +181,9 @@ class OperationalSpace(Memoryless):
 def _rows(rows: Any) -> tuple[int, ...]:
     """Rows of a twist, increasing; ControlError if they are none."""
     try:
-        chosen = tuple(index(row) for row in rows)
-    except TypeError:
+        chosen = tuple(index(row) for row in rows if not isinstance(row, bool))
+    except (TypeError, OverflowError):
         chosen = ()
     if not chosen or chosen != tuple(sorted(set(chosen) & set(POSE))):
-        raise ControlError(f"rows must be increasing numbers from 0 to 5, the rows of (ṗ, ω), got {rows!r}")
+        raise ControlError(f"rows must be increasing numbers from 0 to 5, the rows of (ṗ, ω), got {shown(rows)}")
     return chosen

@@ -7,13 +7,17 @@ Each piece is Hermite's polynomial of what is given at its two ends. [Siciliano 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import factorial, perm
+from math import factorial, isfinite, perm
 from typing import Any
 
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.control.controller import ControlError, numbers, positive
+from robot_dyn.control.controller import ControlError, number, numbers
+from robot_dyn.errors import QueryError
+from robot_dyn.validate import choice
+from robot_dyn.validate import duration as seconds
+from robot_dyn.validate import times as real_times
 
 # values given at each end of a piece, by kind of spline
 _DERIVATIVES = {"cubic": 2, "quintic": 3}
@@ -74,6 +78,10 @@ class PiecewisePolynomial:
         Returns:
             (q, v, a), each of shape (n,) or (..., n).
         """
+        if not (isinstance(t, float) and isfinite(t)):
+            t = real_times("t", t)
+            if np.isnan(t).any():
+                raise QueryError("t must be a time in seconds, got nan")
         t, breaks = np.asarray(t), self.breaks
         inside = np.clip(t, breaks[0], breaks[-1])
         piece = np.searchsorted(breaks[1:-1], inside, side="right")
@@ -115,7 +123,7 @@ def quintic(
 
     Source: Siciliano et al. 2009, sec. 4.2.1; Flash and Hogan, The coordination of arm movements, 1985.
     """
-    T, begin = positive("duration", duration), float(numbers("start", start, ()))
+    T, begin = seconds("duration", duration, error=ControlError), number("start", start)
     q0 = numbers("q0", q0, ("n",))
     shape = q0.shape
     q1 = numbers("q1", q1, shape)
@@ -143,8 +151,7 @@ def via_points(times: Any, points: Any, *, kind: str = "quintic", v0: Any = 0.0,
 
     Source: de Boor, A Practical Guide to Splines, 2001; Siciliano et al. 2009, sec. 4.2.2.
     """
-    if kind not in _DERIVATIVES:
-        raise ControlError(f"kind={kind!r}; give one of {', '.join(_DERIVATIVES)}")
+    kind = choice("kind of spline", kind, _DERIVATIVES, error=ControlError)
     m, points = _DERIVATIVES[kind], numbers("points", points, ("k + 1", "n"))
     if len(points) < 2:
         raise ControlError(f"points must be 2 at least, got {len(points)}; to rest at one, hold(q)")

@@ -8,7 +8,7 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.effects.effect import URDF, Bound, Effect, number
+from robot_dyn.effects.effect import URDF, Bound, Effect, coefficient
 from robot_dyn.errors import EffectError
 
 
@@ -25,10 +25,7 @@ class EffortLimit(Bound):
     limit: Any
 
     def __post_init__(self) -> None:
-        limit = number("limit", self.limit, infinite=True)
-        if isinstance(limit, np.ndarray) and (limit < 0).any():
-            raise EffectError(f"limit must not be negative, got {self.limit!r}")
-        object.__setattr__(self, "limit", limit)
+        object.__setattr__(self, "limit", coefficient("limit", self.limit, least=0, infinite=True))
 
     def on(self, dynamics: Any) -> Effect:
         made = super().on(dynamics)

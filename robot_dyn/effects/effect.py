@@ -15,9 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.arithmetic import FLOAT64, Array
+from robot_dyn.arithmetic import Array
 from robot_dyn.errors import EffectError, nearest
 from robot_dyn.model.dynamics import Dynamics
+from robot_dyn.validate import numbers
 
 URDF = "urdf"  # in place of a coefficient: what the robot's file states
 _ELSEWHERE = {"limit": np.inf, "lower": -np.inf, "upper": np.inf}  # for joints not named; 0 for other coefficients
@@ -93,16 +94,8 @@ class Bound(Effect, ABC):
         """What is left of the actuation u, (..., n)."""
 
 
-def coefficient(name: str, values: Any) -> np.ndarray:
-    """A coefficient that is not negative: a scalar or (n,), frozen; EffectError if it is anything else."""
-    array = number(name, values)
-    if isinstance(array, np.ndarray) and (array < 0).any():
-        raise EffectError(f"{name} must not be negative, got {values!r}")
-    return array
-
-
-def number(name: str, values: Any, infinite: bool = False) -> np.ndarray:
-    """A parameter of any sign: a scalar or (n,), finite unless said, frozen; EffectError if it is anything else.
+def coefficient(name: str, values: Any, *, least: float | None = None, infinite: bool = False) -> np.ndarray:
+    """A parameter: a scalar or (n,), frozen; EffectError if it is anything else, or less than `least`.
 
     Values by joint name, and "urdf", stay until the plant that the effect acts on is known.
     """
@@ -110,18 +103,11 @@ def number(name: str, values: Any, infinite: bool = False) -> np.ndarray:
         return values  # pyright: ignore[reportReturnType]
     if isinstance(values, str) and values == URDF:
         return URDF  # pyright: ignore[reportReturnType]
-    try:
-        array = np.array(FLOAT64.asarray(values))
-    except (TypeError, ValueError):
-        raise EffectError(f"{name} must be a number or one for each joint, got {values!r}") from None
-    if array.ndim > 1 or np.isnan(array).any() or not (infinite or np.isfinite(array).all()):
-        raise EffectError(f"{name} must be finite, a scalar or (n,), got {values!r}")
-    array.setflags(write=False)
-    return array
+    return numbers(name, values, (), ("n",), error=EffectError, least=least, infinite=infinite)
 
 
-def _of(dynamics: Any, key: str, values: Any) -> np.ndarray:
-    """The (n,) array of values by joint name, or of what the file states, which must not be nothing."""
+def _of(dynamics: Any, key: str, values: Any) -> Any:
+    """The n values by joint name, or of what the file states, which must not be nothing."""
     names = dynamics.joint_names
     if values is URDF:
         try:
@@ -136,4 +122,4 @@ def _of(dynamics: Any, key: str, values: Any) -> np.ndarray:
         return stated
     for name in values.keys() - set(names):
         raise EffectError(f"{key}: no joint {name!r}; {nearest(str(name), names)}")
-    return np.array([values.get(name, _ELSEWHERE.get(key, 0.0)) for name in names])
+    return [values.get(name, _ELSEWHERE.get(key, 0.0)) for name in names]

@@ -26,7 +26,7 @@ class ViscousFriction(Dissipative):
     damping: Any
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "damping", coefficient("damping", self.damping))
+        object.__setattr__(self, "damping", coefficient("damping", self.damping, least=0))
 
     def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
         return -self.damping * v
@@ -48,8 +48,8 @@ class RegularisedCoulombFriction(Dissipative):
     velocity_scale: Any = 0.01
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "friction", coefficient("friction", self.friction))
-        object.__setattr__(self, "velocity_scale", coefficient("velocity_scale", self.velocity_scale))
+        object.__setattr__(self, "friction", coefficient("friction", self.friction, least=0))
+        object.__setattr__(self, "velocity_scale", coefficient("velocity_scale", self.velocity_scale, least=0))
         if isinstance(self.velocity_scale, np.ndarray) and not (self.velocity_scale > 0).all():
             raise EffectError(f"velocity_scale must be positive, got {self.velocity_scale}")
 

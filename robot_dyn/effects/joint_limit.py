@@ -13,7 +13,7 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.arithmetic import Array, positive_part
-from robot_dyn.effects.effect import Conservative, Dissipative, coefficient, number
+from robot_dyn.effects.effect import Conservative, Dissipative, coefficient
 from robot_dyn.errors import EffectError
 from robot_dyn.model.dynamics import Dynamics
 
@@ -37,7 +37,7 @@ class JointStopSpring(Conservative):
 
     def __post_init__(self) -> None:
         _check_stops(self)
-        object.__setattr__(self, "stiffness", coefficient("stiffness", self.stiffness))
+        object.__setattr__(self, "stiffness", coefficient("stiffness", self.stiffness, least=0))
 
     @property
     def name(self) -> str:
@@ -72,7 +72,7 @@ class JointStopDamper(Dissipative):
 
     def __post_init__(self) -> None:
         _check_stops(self)
-        object.__setattr__(self, "damping", coefficient("damping", self.damping))
+        object.__setattr__(self, "damping", coefficient("damping", self.damping, least=0))
 
     @property
     def name(self) -> str:
@@ -101,10 +101,12 @@ def _depth(coefficient: Any) -> Any:
 
 def _check_stops(stops: Any) -> None:
     for name in ("lower", "upper"):
-        stop = number(name, getattr(stops, name), infinite=True)
+        stop = coefficient(name, getattr(stops, name), infinite=True)
         if not isinstance(stop, np.ndarray):
             return  # by name, or as the file states: checked when the joints are known
         # A stop that does not exist lies where no depth can be reached, and inf − inf is avoided.
         object.__setattr__(stops, name, np.clip(stop, -1e9, 1e9))
+    if np.ndim(stops.lower) == np.ndim(stops.upper) == 1 and len(stops.lower) != len(stops.upper):
+        raise EffectError(f"lower and upper stops must be of the same joints, got {stops.lower} and {stops.upper}")
     if not np.all(stops.lower < stops.upper):
         raise EffectError(f"lower stops must lie below upper ones, got {stops.lower} and {stops.upper}")

@@ -12,11 +12,12 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
+from robot_dyn.arithmetic import FLOAT64, Arithmetic, Array
 from robot_dyn.effects.effect import Bound, Effect, Force
 from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFriction
-from robot_dyn.errors import EffectError, QueryError
+from robot_dyn.errors import EffectError, OverflowedError
 from robot_dyn.model.dynamics import Dynamics
+from robot_dyn.validate import check_batches, joint_values, number, shown
 
 
 @final
@@ -33,20 +34,21 @@ class Plant:
     effects: tuple[Effect, ...] = ()
 
     def __init__(self, dynamics: Dynamics, effects: Iterable[Effect] | str = ()) -> None:
+        if isinstance(dynamics, type) or not isinstance(dynamics, Dynamics):
+            raise EffectError(f"dynamics: give a robot, such as rd.load('ur5'), got {shown(dynamics)}")
         object.__setattr__(self, "dynamics", dynamics)
         if isinstance(effects, str):
             if effects != "urdf":
-                raise EffectError(f"effects={effects!r}; give effects, or 'urdf' for those the file states")
+                raise EffectError(f"effects={shown(effects)}; give effects, or 'urdf' for those the file states")
             effects = stated_friction(dynamics)
-        try:
-            effects = tuple(effects)
-        except TypeError:
-            raise EffectError(f"effects must be several, such as [rd.ViscousFriction(0.1)], got {effects!r}") from None
+        if not isinstance(effects, Iterable):
+            raise EffectError(f"effects must be several, such as [rd.ViscousFriction(0.1)], got {shown(effects)}")
+        effects = tuple(effects)
         for effect in effects:
             if not isinstance(effect, Force | Bound):
                 raise EffectError(
-                    f"{effect!r} is neither a Force nor a Bound, so nothing would evaluate it; subclass Conservative,"
-                    " Dissipative, Active or Bound"
+                    f"{shown(effect)} is neither a Force nor a Bound, so nothing would evaluate it; subclass"
+                    " Conservative, Dissipative, Active or Bound"
                 )
         object.__setattr__(self, "effects", tuple(effect.on(dynamics) for effect in effects))
 
@@ -57,14 +59,8 @@ class Plant:
 
     def actuation(self, u: Array) -> Array:
         """What the bounds among the effects leave of the actuation u, (..., n); EffectError if one does not fit."""
-        shape = np.shape(u)
-        for effect in self.effects:
-            if isinstance(effect, Bound):
-                try:
-                    u = effect.actuation(u)
-                except (TypeError, ValueError) as error:
-                    raise EffectError(f"{effect.name} does not fit an actuation of shape {shape}: {error}") from None
-        return u
+        (u,) = self._states(u=u)
+        return bounded(self.effects, u)
 
     def M(self, q: Array) -> Array:
         """Mass matrix, (..., n, n)."""
@@ -76,33 +72,75 @@ class Plant:
 
     def N(self, t: float, q: Array, v: Array) -> Array:
         """Every force but actuation, as what must be overcome: N = ∂V/∂q − Σ τ_effect, (..., n)."""
-        return self.dynamics.N(q) - self.torque(t, q, v)
+        torque = self.torque(t, q, v)
+        return self._finite(self.dynamics.N(q) - torque)
 
     def torque(self, t: float, q: Array, v: Array) -> Array:
         """Σ τ_effect, the torque of all effects on the joints, (..., n); 0 without effects.
 
+        Args:
+            t: Time, one number, in [s].
+            q: Position, (..., n).
+            v: Velocity, (..., n).
+
         Raises:
-            QueryError: If v has the wrong shape.
+            QueryError: If an argument has another shape or is not finite; OverflowedError if the result is not.
             EffectError: If an effect does not fit the joints.
         """
-        n, q, v = self.dynamics.n, np.asarray(q), np.asarray(v)
-        if v.shape[-1:] != (n,):
-            raise QueryError(f"v must have shape ({n},) or (..., {n}), got {v.shape}")
-        try:
-            return sum(force.torque(self.dynamics, t, q, v) for force in self.forces)
-        except (TypeError, ValueError) as error:
-            raise EffectError(f"an effect does not fit {n} joints and v of shape {v.shape}: {error}") from None
+        t, (q, v) = number("t", t), self._states(q=q, v=v)
+        shape = (*check_batches(q=q, v=v), self.dynamics.n)
+        with self._arithmetic.scope(), np.errstate(all="ignore"):  # what overflows is told in words
+            total = np.zeros(shape) if q.dtype != object else self._arithmetic.array(np.zeros(shape))
+            for force in self.forces:
+                total = total + _torque(force, self.dynamics, t, q, v)
+            return self._finite(total)
 
     def inverse_dynamics(self, t: float, q: Array, v: Array, a: Array) -> Array:
         """Actuation Υ = M a + C v + N that gives the acceleration a, (..., n)."""
-        return self.dynamics.inverse_dynamics(q, v, a) - self.torque(t, q, v)
+        torque = self.torque(t, q, v)
+        return self._finite(self.dynamics.inverse_dynamics(q, v, a) - torque)
 
     def forward_dynamics(self, t: float, q: Array, v: Array, u: Array) -> Array:
         """Acceleration under the actuation u, (..., n)."""
-        u = np.asarray(u)
-        if u.dtype.kind not in "fiuO":
-            raise QueryError(f"u must be an array of {self.dynamics.n} numbers, got {u!r}")
         return self.dynamics.forward_dynamics(q, v, self.actuation(u) + self.torque(t, q, v))
+
+    @property
+    def _arithmetic(self) -> Arithmetic:
+        return getattr(self.dynamics, "arithmetic", FLOAT64)
+
+    def _states(self, **given: Any) -> list[Array]:
+        names = self.dynamics.joint_names
+        return [joint_values(name, x, names, self._arithmetic) for name, x in given.items()]
+
+    def _finite(self, result: Array) -> Array:
+        if not self._arithmetic.finite(result).all():
+            raise OverflowedError("the arguments are so large that the result overflows")
+        return result
+
+
+def bounded(effects: Iterable[Effect], u: Array) -> Array:
+    """What the bounds among effects leave of an actuation, (..., n), that is not checked: floats, balls or symbols.
+
+    Raises:
+        EffectError: If a bound does not fit it.
+    """
+    shape = np.shape(u)
+    for effect in effects:
+        if isinstance(effect, Bound):
+            try:
+                u = effect.actuation(u)
+            except (TypeError, ValueError) as error:
+                raise EffectError(f"{effect.name} does not fit an actuation of shape {shape}: {error}") from None
+    return u
+
+
+def _torque(force: Force, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
+    """The torque of one effect; EffectError if it is not one number for each joint."""
+    n, batch = dynamics.n, check_batches(q=q, v=v)
+    try:
+        return np.broadcast_to(force.torque(dynamics, t, q, v), (*batch, n))
+    except (TypeError, ValueError) as error:
+        raise EffectError(f"{force.name} does not fit {n} joints and v of shape {v.shape}: {error}") from None
 
 
 def stated_friction(dynamics: Any) -> tuple[Effect, ...]:

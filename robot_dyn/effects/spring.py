@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any, final
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.effects.effect import Conservative, coefficient, number
+from robot_dyn.effects.effect import Conservative, coefficient
 from robot_dyn.model.dynamics import Dynamics
 
 
@@ -24,8 +24,8 @@ class Spring(Conservative):
     rest: Any = 0.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "stiffness", coefficient("stiffness", self.stiffness))
-        object.__setattr__(self, "rest", number("rest", self.rest))
+        object.__setattr__(self, "stiffness", coefficient("stiffness", self.stiffness, least=0))
+        object.__setattr__(self, "rest", coefficient("rest", self.rest))
 
     def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
         return -self.stiffness * (q - self.rest)

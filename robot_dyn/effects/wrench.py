@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf
 from typing import Any, final
@@ -11,9 +10,10 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array, transpose
 from robot_dyn.arithmetic import apply as times
-from robot_dyn.effects.effect import Active, number
+from robot_dyn.effects.effect import Active
 from robot_dyn.errors import EffectError, QueryError
 from robot_dyn.model.dynamics import Axes, Dynamics
+from robot_dyn.validate import instance, number, numbers
 
 
 @final
@@ -36,14 +36,10 @@ class ExternalWrench(Active):
     end_s: float = inf
 
     def __post_init__(self) -> None:
-        wrench = number("wrench", self.wrench)
-        if np.shape(wrench) != (6,):
-            raise EffectError(f"wrench must be force and torque, shape (6,), got {self.wrench!r}")
+        instance("frame", self.frame, str, "give the name of a link", error=EffectError)
+        wrench = numbers("wrench, force and torque,", self.wrench, (6,), error=EffectError)
         for name in ("start_s", "end_s"):
-            time = number(name, getattr(self, name), infinite=True)
-            if np.shape(time) != () or isinstance(time, str | Mapping):
-                raise EffectError(f"{name} must be a time in seconds, got {getattr(self, name)!r}")
-            object.__setattr__(self, name, float(time))
+            object.__setattr__(self, name, number(name, getattr(self, name), error=EffectError, infinite=True))
         if not self.start_s < self.end_s:
             raise EffectError(f"end_s must lie after start_s, got {self.start_s} and {self.end_s}")
         object.__setattr__(self, "wrench", wrench)

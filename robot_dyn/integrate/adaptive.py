@@ -18,6 +18,7 @@ from robot_dyn.arithmetic import Array
 from robot_dyn.errors import OverflowedError, QueryError, RobotDynError
 from robot_dyn.integrate.implicit import jacobian
 from robot_dyn.integrate.integrator import System
+from robot_dyn.validate import choice, instance, number, numbers, rows, shown
 
 LEAST_RTOL = 100 * np.finfo(float).eps  # SciPy's bound; below it rounding is taken for local error
 
@@ -61,7 +62,7 @@ class Solution:
         Raises:
             QueryError: If a time is not within the run.
         """
-        t = np.asarray(t, dtype=float)
+        t = rows("t", t)
         low, high = sorted((self.times[0], self.times[-1]))
         if not np.all((t >= low) & (t <= high)):
             raise QueryError(f"t must be within the run, from {low} to {high}")
@@ -95,14 +96,16 @@ class Adaptive:
     max_step: float = inf
 
     def __post_init__(self) -> None:
-        if self.method not in ("DOP853", "Radau"):
-            raise QueryError(f"no adaptive method {self.method!r}: give 'DOP853' or 'Radau'")
-        if not LEAST_RTOL < self.rtol < 1:
+        choice("adaptive method", self.method, ("DOP853", "Radau"))
+        values = {
+            "rtol": number("rtol", self.rtol),
+            "atol": number("atol", self.atol, least=0),
+            "max_step": number("max_step", self.max_step, above=0, infinite=True),
+        }
+        if not LEAST_RTOL < values["rtol"] < 1:
             raise QueryError(f"rtol must be between {LEAST_RTOL:.2g} and 1, got {self.rtol!r}")
-        if not 0 <= self.atol < inf:
-            raise QueryError(f"atol must be finite and not negative, got {self.atol!r}")
-        if not self.max_step > 0:
-            raise QueryError(f"max_step must be positive, got {self.max_step!r}")
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
 
     def solve(
         self,
@@ -144,10 +147,13 @@ class Adaptive:
         self, system: System, t0: float, y0: Array, t1: float, stop: Callable[[float, Array], float] | None = None
     ) -> Steps:
         """The steps from t0 to t1, one at a time; arguments and errors as of `solve`."""
-        y0 = _initial_state(y0)
-        if not (np.isfinite([t0, t1]).all() and t0 != t1):
-            raise QueryError(f"t0 and t1 must be finite and differ, got {t0!r} and {t1!r}")
-        return Steps(self, system, stop, float(t0), y0, float(t1))
+        instance("system", system, System, "give a System(rate, n)")
+        t0, t1, y0 = number("t0", t0), number("t1", t1), _initial_state(y0)
+        if t0 == t1:
+            raise QueryError(f"t0 and t1 must differ, got {t0} twice")
+        if not (stop is None or callable(stop)):
+            raise QueryError(f"stop must be a function of (t, y), or None, got {shown(stop)}")
+        return Steps(self, system, stop, t0, y0, t1)
 
 
 class _NotFiniteError(Exception):
@@ -249,10 +255,6 @@ class Steps:
 
 
 def _initial_state(y0: Array) -> np.ndarray:
-    given = np.asarray(y0)
-    if given.dtype.kind not in "fiu" or given.dtype.itemsize > 8 or given.ndim != 1 or not given.size:
-        raise QueryError(f"y0 must be float64 of shape (m,), got {given.dtype} of shape {given.shape}")
-    y = given.astype(float)
-    if not np.isfinite(y).all():
-        raise QueryError(f"y0 must be finite, got {y}")
-    return y
+    if getattr(y0, "dtype", None) in (object, np.longdouble):
+        raise QueryError(f"y0 must be float64 of shape (m,), got {y0.dtype}: adaptive methods work in float64 alone")
+    return np.array(numbers("y0", y0, ("m",)))

@@ -19,6 +19,7 @@ from robot_dyn.errors import QueryError
 from robot_dyn.integrate.fixed_point import MOST_ITERATIONS, enclose_fixed_point, fixed_point
 from robot_dyn.integrate.integrator import IntegrationError, Integrator, System
 from robot_dyn.integrate.tableau import ButcherTableau, Surd, combine
+from robot_dyn.validate import integer
 
 
 def _surd(rational: tuple[int, int], factor: tuple[int, int], radicand: int) -> Surd:
@@ -74,7 +75,7 @@ class Gauss(Integrator):
     canonical: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        if self.order not in _TABLEAUS:
+        if integer("order", self.order) not in _TABLEAUS:
             raise QueryError(f"no Gauss method of order {self.order!r}: give 2, 4 or 6")
         object.__setattr__(self, "name", f"gauss_{self.order}")
 

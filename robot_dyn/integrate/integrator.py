@@ -33,7 +33,7 @@ class IntegrationError(RobotDynError):
 
 
 @final
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class System:
     """An ordinary differential equation y' = f(t, y).
 

@@ -10,11 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
-from robot_dyn.errors import QueryError, nearest, shorten
+from robot_dyn.errors import QueryError
 from robot_dyn.integrate.explicit import EXPLICIT_EULER, MIDPOINT, RK4, SemiImplicitEuler, order_8
 from robot_dyn.integrate.gauss import Gauss
 from robot_dyn.integrate.implicit import SDIRK_3, LinearlyImplicitEuler
 from robot_dyn.integrate.integrator import Integrator
+from robot_dyn.validate import choice
 
 _READY = (
     EXPLICIT_EULER,
@@ -40,7 +41,6 @@ def method(name: str) -> Integrator:
     Raises:
         QueryError: If the name is unknown; gives the nearest names.
     """
-    if name not in METHODS:
-        adaptive = f"; rd.Adaptive({name!r}) is an adaptive one" if name in ("DOP853", "Radau") else ""
-        raise QueryError(f"no integration method {shorten(name)!r}; {nearest(str(name), METHODS)}{adaptive}")
-    return METHODS[name]()
+    if isinstance(name, str) and name in ("DOP853", "Radau"):
+        raise QueryError(f"no integration method {name!r} of fixed step; rd.Adaptive({name!r}) is an adaptive one")
+    return METHODS[choice("integration method", name, METHODS)]()

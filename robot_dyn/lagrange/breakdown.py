@@ -13,11 +13,11 @@ import numpy as np
 from robot_dyn.arithmetic import apply, transpose
 from robot_dyn.lagrange.linkage import BASE
 from robot_dyn.lagrange.manipulator import Lagrangian, christoffel, inertia_derivative
-from robot_dyn.model.dynamics import checked
+from robot_dyn.validate import joint_values
 
 
 @final
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Share:
     """What one link, or the armature, adds to the torque of each joint; arrays of shape (n,), in [N m] or [N]."""
 
@@ -45,7 +45,7 @@ def torque_breakdown(lagrangian: Lagrangian, q: np.ndarray, v: np.ndarray, a: np
         QueryError: If a shape is wrong or a value is not finite.
     """
     names = lagrangian.joint_names
-    q, v, a = (checked(name, x, names, lagrangian.arithmetic) for name, x in zip("qva", (q, v, a), strict=True))
+    q, v, a = (joint_values(name, x, names, lagrangian.arithmetic) for name, x in zip("qva", (q, v, a), strict=True))
     linkage, ties = lagrangian.linkage, lagrangian.linkage.ties
     at, full_v, full_a = linkage.at(q), ties.velocity(v), ties.velocity(a)
     shares = []

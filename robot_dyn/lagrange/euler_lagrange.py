@@ -17,7 +17,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import NotPositiveDefiniteError, apply, cholesky_solve
 from robot_dyn.errors import OverflowedError, QueryError, RobotDynError, SingularError
-from robot_dyn.model.inertia import numbers
+from robot_dyn.validate import integer, rows
 
 Kinetic = Callable[[Any, Any, Any], Any]
 Potential = Callable[[Any, Any], Any]
@@ -92,7 +92,7 @@ class EulerLagrange:
 
     def inverse_dynamics(self, t: Any, q: Any, v: Any, a: Any) -> np.ndarray:
         """Generalised force Q = M a + b, shape (..., n)."""
-        a = numbers("a", a, self.n)
+        a = rows("a", a, self.n)
         M, b = self.M(t, q, v), self.bias(t, q, v)
         _batches("a", a.shape[:-1], b.shape[:-1])
         return _finite(apply(M, a) + b)
@@ -103,7 +103,7 @@ class EulerLagrange:
         Raises:
             SingularError: If M is not positive definite here, as Euler angles make it at gimbal lock.
         """
-        Q = numbers("Q", Q, self.n)
+        Q = rows("Q", Q, self.n)
         M, b = self.M(t, q, v), self.bias(t, q, v)
         batch = _batches("Q", Q.shape[:-1], b.shape[:-1])
         try:
@@ -119,8 +119,8 @@ class EulerLagrange:
         return f"M a + b = Q\nM = {M}\nb = {b}"
 
     def _evaluate(self, name: str, t: Any, q: Any, v: Any = None, *, shape: tuple[int, ...]) -> np.ndarray:
-        t, q = numbers("t", t), numbers("q", q, self.n)
-        v = np.zeros(self.n) if v is None else numbers("v", v, self.n)
+        t, q = rows("t", t), rows("q", q, self.n)
+        v = np.zeros(self.n) if v is None else rows("v", v, self.n)
         batch = _batches("v", v.shape[:-1], _batches("t", t.shape, q.shape[:-1]))
         size = int(np.prod(batch))
         columns = [
@@ -151,8 +151,7 @@ def euler_lagrange(kinetic: Kinetic, potential: Potential | None, n: int) -> Eul
     """
     import casadi as ca
 
-    if isinstance(n, bool) or not isinstance(n, int) or n < 1:
-        raise QueryError(f"n must be the number of coordinates, 1 or more; got {n!r}")
+    n = integer("n, the number of coordinates,", n, least=1)
     t, q, v = _symbols(n)
     K = traced("K(t, q, v)", kinetic, (t, q, v))
     V = traced("V(t, q)", potential, (t, q)) if potential is not None else ca.SX(0)

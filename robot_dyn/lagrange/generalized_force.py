@@ -15,7 +15,7 @@ import numpy as np
 
 from robot_dyn.errors import OverflowedError, QueryError
 from robot_dyn.lagrange.euler_lagrange import EulerLagrange, Potential, euler_lagrange, traced
-from robot_dyn.model.inertia import numbers
+from robot_dyn.validate import integer, number, numbers
 
 Positions = Callable[[Any, Any], Sequence[Any]]
 
@@ -45,9 +45,7 @@ class GeneralizedForce:
             q: Coordinates, shape (n,).
             forces: F_i, shape (N, 3), in [N].
         """
-        forces = numbers("forces", forces, self.count, 3)
-        if forces.ndim > 2:
-            raise QueryError(f"forces must have shape ({self.count}, 3), got {forces.shape}")
+        forces = numbers("forces", forces, (self.count, 3))
         return np.einsum("ik,ikj->j", forces, self.jacobian(t, q))
 
     def positions(self, t: float, q: Any) -> np.ndarray:
@@ -59,10 +57,7 @@ class GeneralizedForce:
         return self._evaluate("J", t, q).reshape(self.count, 3, self.n)
 
     def _evaluate(self, name: str, t: Any, q: Any) -> np.ndarray:
-        t, q = numbers("t", t), numbers("q", q, self.n)
-        if t.ndim or q.ndim > 1:
-            raise QueryError(f"t must be one time and q have shape ({self.n},), got {t.shape} and {q.shape}")
-        result = self.kernels[name](t, q).full()
+        result = self.kernels[name](number("t", t), numbers("q", q, (self.n,))).full()
         if not np.isfinite(result).all():
             raise OverflowedError("positions or their derivatives are not finite at this q")
         return result
@@ -82,8 +77,7 @@ def generalized_force(positions: Positions, n: int) -> GeneralizedForce:
     """
     import casadi as ca
 
-    if isinstance(n, bool) or not isinstance(n, int) or n < 1:
-        raise QueryError(f"n must be the number of coordinates, 1 or more; got {n!r}")
+    n = integer("n, the number of coordinates,", n, least=1)
     t, q = ca.SX.sym("t"), ca.SX.sym("q", n)
     r = _positions(positions, t, q)
     expressions = {"r": r, "J": ca.jacobian(r, q)}
@@ -115,9 +109,7 @@ def lagrangian_of_particles(
     """
     import casadi as ca
 
-    m, g = numbers("masses", masses), numbers("gravity", gravity, 3)
-    if m.ndim != 1 or not np.all(m > 0) or g.ndim > 1:
-        raise QueryError(f"masses must be positive, shape (N,), and gravity (3,); got {m} and shape {g.shape}")
+    m, g = numbers("masses", masses, ("N",), above=0), numbers("gravity", gravity, (3,))
     weights = ca.DM(np.repeat(m, 3))
 
     def kinetic(t: Any, q: Any, v: Any) -> Any:

@@ -22,7 +22,7 @@ BASE = -1  # the body that does not move
 
 
 @final
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Pose:
     """A constant placement (R, p)."""
 
@@ -34,7 +34,7 @@ class Pose:
 
 
 @final
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Body:
     """A moving body and the joint that carries it.
 
@@ -79,7 +79,7 @@ class Body:
 
 
 @final
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Step:
     """The change of frame from a body to the one before it, Ad⁻¹ = Ad_joint⁻¹ Ad_pose⁻¹; in two, for fewer products.
 
@@ -107,7 +107,7 @@ class Step:
 
 
 @final
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Linkage:
     """The N bodies that move, parents first.
 
@@ -147,7 +147,7 @@ class Linkage:
 
 
 @final
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Configuration:
     """The linkage at one configuration, or a batch.
 

@@ -22,7 +22,7 @@ from robot_dyn.spatial import first_moment
 
 
 @final
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Magnitudes:
     """Bounds of the terms at one configuration q (n,) of a float64 linkage; entries as those of the quantities.
 

@@ -27,9 +27,10 @@ from robot_dyn.errors import QueryError
 from robot_dyn.lagrange.linkage import BASE, Configuration, Linkage, linkage
 from robot_dyn.model.batch import answered
 from robot_dyn.model.description import Description
-from robot_dyn.model.dynamics import Axes, Dynamics, acceleration, entry, shape_of, shaped
+from robot_dyn.model.dynamics import Axes, Dynamics, acceleration, entry, shape_of
 from robot_dyn.model.tree import Described, tree
 from robot_dyn.spatial import adjoint, adjoint_inverse, block_diagonal, bracket, first_moment, hat, homogeneous
+from robot_dyn.validate import shaped, shown
 
 
 @final
@@ -47,7 +48,7 @@ class Lagrangian(Dynamics):
 
     def __post_init__(self) -> None:
         if not isinstance(getattr(self.robot, "description", None), Description):
-            raise QueryError(f"robot: give a Robot, such as rd.load('ur5'), got {self.robot!r}")
+            raise QueryError(f"robot: give a Robot, such as rd.load('ur5'), got {shown(self.robot)}")
         _ = self.linkage
 
     def __reduce__(self) -> tuple[Any, ...]:

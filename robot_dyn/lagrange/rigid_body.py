@@ -17,7 +17,8 @@ import numpy as np
 
 from robot_dyn.arithmetic import NotPositiveDefiniteError, apply, cholesky_solve, transpose
 from robot_dyn.errors import OverflowedError, QueryError
-from robot_dyn.model.inertia import MassProperties, numbers, rotation_matrix
+from robot_dyn.model.inertia import MassProperties, rotation_matrix
+from robot_dyn.validate import rows
 
 _too_large_shows_in_the_result = np.errstate(over="ignore", invalid="ignore")
 
@@ -38,8 +39,8 @@ def world_wrench(body: MassProperties, R: Any, omega: Any, acceleration: Any) ->
     Raises:
         QueryError: If a shape is wrong, a value is not finite, or R is not a rotation.
     """
-    R, omega = rotation_matrix(R), numbers("omega", omega, 3)
-    acceleration = numbers("acceleration", acceleration, 6)
+    R, omega = rotation_matrix(R), rows("omega", omega, 3)
+    acceleration = rows("acceleration", acceleration, 6)
     _batches(R=R[..., 0], omega=omega, acceleration=acceleration)
     I_s = R @ body.inertia @ transpose(R)
     torque = apply(I_s, acceleration[..., 3:]) + np.cross(omega, apply(I_s, omega))
@@ -62,7 +63,7 @@ def world_acceleration(body: MassProperties, R: Any, omega: Any, wrench: Any) ->
     Raises:
         QueryError: As `world_wrench`, or if the inertia is singular.
     """
-    R, omega, wrench = rotation_matrix(R), numbers("omega", omega, 3), numbers("wrench", wrench, 6)
+    R, omega, wrench = rotation_matrix(R), rows("omega", omega, 3), rows("wrench", wrench, 6)
     _batches(R=R[..., 0], omega=omega, wrench=wrench)
     I_s = R @ body.inertia @ transpose(R)
     torque = wrench[..., 3:] - np.cross(omega, apply(I_s, omega))
@@ -84,7 +85,7 @@ def body_wrench(body: MassProperties, twist: Any, rate: Any) -> np.ndarray:
     Raises:
         QueryError: If a shape is wrong or a value is not finite.
     """
-    twist, rate = numbers("twist", twist, 6), numbers("rate", rate, 6)
+    twist, rate = rows("twist", twist, 6), rows("rate", rate, 6)
     _batches(twist=twist, rate=rate)
     force, torque = _gyroscopic(body, twist)
     return _pair(body.mass * rate[..., :3] + force, apply(body.inertia, rate[..., 3:]) + torque)
@@ -105,7 +106,7 @@ def body_acceleration(body: MassProperties, twist: Any, wrench: Any) -> np.ndarr
     Raises:
         QueryError: If a shape is wrong, a value is not finite, or the inertia is singular.
     """
-    twist, wrench = numbers("twist", twist, 6), numbers("wrench", wrench, 6)
+    twist, wrench = rows("twist", twist, 6), rows("wrench", wrench, 6)
     _batches(twist=twist, wrench=wrench)
     force, torque = _gyroscopic(body, twist)
     return _pair((wrench[..., :3] - force) / body.mass, _solve(body, wrench[..., 3:] - torque))
@@ -120,7 +121,7 @@ def kinetic_energy(body: MassProperties, twist: Any) -> np.ndarray:
     Raises:
         QueryError: If the shape is wrong or a value is not finite.
     """
-    twist = numbers("twist", twist, 6)
+    twist = rows("twist", twist, 6)
     v, omega = twist[..., :3], twist[..., 3:]
     return _finite((body.mass * (v * v).sum(-1) + (omega * apply(body.inertia, omega)).sum(-1)) / 2)
 
@@ -136,7 +137,7 @@ def point_velocity(twist: Any, r: Any) -> np.ndarray:
     Raises:
         QueryError: If a shape is wrong or a value is not finite.
     """
-    twist, r = numbers("twist", twist, 6), numbers("r", r, 3)
+    twist, r = rows("twist", twist, 6), rows("r", r, 3)
     _batches(twist=twist, r=r)
     return _finite(twist[..., :3] + np.cross(twist[..., 3:], r))
 
@@ -153,7 +154,7 @@ def angular_momentum(body: MassProperties, R: Any, omega: Any) -> np.ndarray:
     Raises:
         QueryError: If a shape is wrong, a value is not finite, or R is not a rotation.
     """
-    R, omega = rotation_matrix(R), numbers("omega", omega, 3)
+    R, omega = rotation_matrix(R), rows("omega", omega, 3)
     _batches(R=R[..., 0], omega=omega)
     return _finite(apply(R @ body.inertia @ transpose(R), omega))
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import FLOAT64, Arithmetic, Array
 from robot_dyn.errors import NotFiniteError, OverflowedError, QueryError, RobotDynError, SingularError
-from robot_dyn.model.dynamics import check_batches, check_finite
+from robot_dyn.validate import check_batches, check_finite, shown
 
 _REFUSALS = (NotFiniteError, OverflowedError, SingularError)  # of a state; all else is wrong with the query
 
@@ -43,8 +43,8 @@ def answered(
         OverflowedError: If the answer of a state is not finite.
         SingularError: Where forward dynamics has no answer. In a batch each names the row.
     """
-    if errors not in ("raise", "nan"):
-        raise QueryError(f"errors must be 'raise' or 'nan', got {errors!r}")
+    if errors.__class__ is not str or errors not in ("raise", "nan"):
+        raise QueryError(f"errors must be 'raise' or 'nan', got {shown(errors)}")
     batch = check_batches(**arrays)
 
     def attempt(*given: Array) -> Array:

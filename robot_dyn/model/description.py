@@ -20,6 +20,7 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 from robot_dyn.errors import DescriptionError
 from robot_dyn.model import urdf
 from robot_dyn.model.markup import parse
+from robot_dyn.validate import instance
 
 MAX_BYTES = 16 * 2**20  # the largest robot of example-robot-data has 0.2 MiB
 _MARK = "\ufeff".encode()  # outweighs the encoding that a text declares, which is that of its file
@@ -90,6 +91,7 @@ def check(text: bytes | str, source: str, findings: Iterable[str] = ()) -> Descr
     Raises:
         DescriptionError: As `read`.
     """
+    instance("source", source, str, "give a text that messages call the URDF", error=DescriptionError)
     if not isinstance(text, str | bytes):
         raise DescriptionError(f"{source}: must be a text or bytes, got {type(text).__name__}")
     if isinstance(text, str):

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from enum import StrEnum
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 
-from robot_dyn.arithmetic import FLOAT64, Arithmetic, Array, NotPositiveDefiniteError, cholesky_solve, rounding
-from robot_dyn.errors import NotFiniteError, OverflowedError, QueryError, SingularError, UndecidedError, nearest
+from robot_dyn.arithmetic import Array, NotPositiveDefiniteError, cholesky_solve, rounding
+from robot_dyn.errors import OverflowedError, SingularError, UndecidedError
+from robot_dyn.validate import choice, shown
 
 T = TypeVar("T")
 
@@ -31,17 +32,15 @@ class Axes(StrEnum):
     @classmethod
     def of(cls, name: Any) -> Axes:
         """The axes of that name; raises QueryError for any other."""
-        text = str(name)  # of Pinocchio's enumeration its name
-        try:
-            return cls(_OF_PINOCCHIO.get(text, text))
-        except ValueError:
-            raise QueryError(f"expressed_in={name!r}; {nearest(text, list(cls))}") from None
+        text = name if isinstance(name, str) else shown(name).rpartition(".")[2]  # of Pinocchio's enumeration its name
+        return cls(choice("expressed_in", _OF_PINOCCHIO.get(text, text), list(cls)))
 
 
 _OF_PINOCCHIO = {"LOCAL": "body", "LOCAL_WORLD_ALIGNED": "world_aligned", "WORLD": "world"}
 _OF_PINOCCHIO |= {name.lower(): axes for name, axes in _OF_PINOCCHIO.items()}
 
 
+@runtime_checkable
 class Dynamics(Protocol):
     """Rigid bodies in gravity: M(q) a + C(q, v) v + N(q) = τ.
 
@@ -309,42 +308,6 @@ class Dynamics(Protocol):
         ...
 
 
-def checked(name: str, values: Array, joint_names: tuple[str, ...], arithmetic: Arithmetic = FLOAT64) -> Array:
-    """`values` as numbers of the arithmetic, shape (..., n).
-
-    Raises:
-        QueryError: If they are not numbers, have another shape, or are not finite; names the joint.
-    """
-    array = shaped(name, values, joint_names, arithmetic)
-    check_finite(name, array, joint_names, arithmetic)
-    return array
-
-
-def shaped(name: str, values: Array, joint_names: tuple[str, ...], arithmetic: Arithmetic = FLOAT64) -> Array:
-    """`values` as numbers of the arithmetic, finite or not, shape (..., n).
-
-    Raises:
-        QueryError: If they are not numbers, or have another shape.
-    """
-    n = len(joint_names)
-    try:
-        array = arithmetic.asarray(values)
-    except (TypeError, ValueError):
-        raise QueryError(f"{name} must be an array of {n} numbers, got {values!r}") from None
-    if array.ndim == 0 or array.shape[-1] != n:
-        raise QueryError(f"{name} must have shape ({n},) or (..., {n}), got {array.shape}")
-    return array
-
-
-def check_finite(name: str, array: Array, joint_names: tuple[str, ...], arithmetic: Arithmetic = FLOAT64) -> None:
-    """Raise NotFiniteError, which names the joint, unless every number of an argument (..., n) is finite."""
-    finite = arithmetic.finite(array)
-    if not finite.all():
-        index = tuple(np.argwhere(~finite)[0])
-        joint = "" if name == "t" else f" for joint {joint_names[index[-1]]!r}"
-        raise NotFiniteError(f"{name} must be finite, got {array[index]}{joint}")
-
-
 def shape_of(quantity: str, n: int) -> tuple[int, ...]:
     """Shape of a quantity of the protocol for one state."""
     if quantity in ("kinetic_energy", "potential_energy"):
@@ -381,16 +344,4 @@ def acceleration(M: Array, tau: Array, joint_names: tuple[str, ...]) -> Array:
 
 def entry(table: Mapping[str, T], frame: str) -> T:
     """What a table holds for a frame; QueryError with the nearest names if there is no such frame."""
-    try:
-        return table[frame]
-    except (KeyError, TypeError):
-        raise QueryError(f"no frame {frame!r}; {nearest(str(frame), table)}") from None
-
-
-def check_batches(**arrays: Array) -> tuple[int, ...]:
-    """The common batch shape of arguments; QueryError if they do not broadcast."""
-    try:
-        return np.broadcast_shapes(*(array.shape[:-1] for array in arrays.values()))
-    except ValueError:
-        shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
-        raise QueryError(f"batch axes do not match: {shapes}") from None
+    return table[choice("frame", frame, table)]

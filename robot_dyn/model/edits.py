@@ -9,9 +9,9 @@ from typing import Any, TypedDict, Unpack, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.errors import EditError, nearest
 from robot_dyn.model.urdf import LARGEST
+from robot_dyn.validate import instance, numbers, shown
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.80665)  # [m/s²], CGPM 1901
 
@@ -36,14 +36,11 @@ class Payload:
     inertia: Matrix3 = ((0.0, 0.0, 0.0),) * 3
 
     def __post_init__(self) -> None:
-        if not isinstance(self.frame, str):
-            raise EditError(f"payload frame must be the name of a link, got {self.frame!r}")
+        instance("payload frame", self.frame, str, "give the name of a link", error=EditError)
         inertia = _numbers("payload inertia", self.inertia, (3, 3))
         if not np.array_equal(inertia, inertia.T):
             raise EditError(f"payload inertia must be symmetric, got {inertia.tolist()}")
-        mass = float(_numbers("payload mass", self.mass, ()))
-        if mass < 0:
-            raise EditError(f"payload mass must not be negative, got {mass:g} kg")
+        mass = float(_numbers("payload mass", self.mass, (), least=0))
         object.__setattr__(self, "mass", mass)
         object.__setattr__(self, "com", tuple(_numbers("payload com", self.com, (3,)).tolist()))
         object.__setattr__(self, "inertia", tuple(map(tuple, inertia.tolist())))
@@ -104,9 +101,7 @@ class Edits:
             new = replace(new, payloads=new.payloads + more)
         if "mass_scale" in changes:
             mass_scale = changes["mass_scale"]
-            factor = float(_numbers("mass_scale", mass_scale, ()))
-            if factor <= 0:
-                raise EditError(f"mass_scale must be positive, got {factor:g}")
+            factor = float(_numbers("mass_scale", mass_scale, (), above=0))
             new = replace(new, mass_scale=factor)
         return new
 
@@ -123,24 +118,18 @@ def by_joint(what: str, values: Any, joint_names: tuple[str, ...]) -> dict[str, 
     """
     if not isinstance(values, Mapping):
         n = len(joint_names)
-        numbers = _numbers(what, values, (n,) if np.ndim(values) else ())
-        values = dict(zip(joint_names, np.broadcast_to(numbers, (n,)).tolist(), strict=True))
+        given = _numbers(what, values, (), (n,))
+        values = dict(zip(joint_names, np.broadcast_to(given, (n,)).tolist(), strict=True))
+    least, checked = 0 if what == "armature" else None, {}
     for name, value in values.items():
         if name not in joint_names:
             raise EditError(f"{what}: no joint {name!r} that moves freely; {nearest(str(name), joint_names)}")
-        number = float(_numbers(f"{what} of {name!r}", value, ()))
-        if what == "armature" and number < 0:
-            raise EditError(f"armature of {name!r} must not be negative, got {number:g}")
-    return {name: float(value) for name, value in values.items()}
+        checked[name] = float(_numbers(f"{what} of {name!r}", value, (), least=least))
+    return checked
 
 
-def _numbers(what: str, values: Any, shape: tuple[int, ...]) -> np.ndarray:
-    try:
-        array = np.array(FLOAT64.asarray(values))
-    except (TypeError, ValueError):
-        raise EditError(f"{what} must be numbers of shape {shape}, got {values!r}") from None
-    if array.shape != shape or not np.isfinite(array).all():
-        raise EditError(f"{what} must be finite numbers of shape {shape}, got {values!r}")
+def _numbers(what: str, values: Any, *shapes: tuple[int, ...], **limits: float | None) -> np.ndarray:
+    array = numbers(what, values, *shapes, error=EditError, **limits)
     if (np.abs(array) > LARGEST).any():
-        raise EditError(f"{what} is beyond ±{LARGEST:g} in SI units, got {values!r}; correct it")
+        raise EditError(f"{what} is beyond ±{LARGEST:g} in SI units, got {shown(values)}; correct it")
     return array

@@ -12,36 +12,18 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.errors import QueryError
 from robot_dyn.spatial import hat, spatial_inertia
+from robot_dyn.validate import number, numbers, rows
 
 _SLACK = 1e-9  # of the largest moment: printed digits
 _LEVER_SLACK = 1e-12  # of m c², and of m (1 m)²: rounding left behind by merging bodies
 _ROTATION_SLACK = 1e-6  # of RᵀR − 1: what integrating R leaves behind
 
 
-def numbers(name: str, values: Any, *shape: int) -> np.ndarray:
-    """`values` as float64 of shape (..., *shape).
-
-    Raises:
-        QueryError: If they are not numbers, have another shape, or are not finite.
-    """
-    try:
-        array = FLOAT64.asarray(values)
-    except (TypeError, ValueError):
-        raise QueryError(f"{name} must be an array of numbers, got {type(values).__name__}") from None
-    if array.shape[array.ndim - len(shape) :] != shape or array.ndim < len(shape):
-        expected = ", ".join(map(str, shape))
-        raise QueryError(f"{name} must have shape {shape} or (..., {expected}), got {array.shape}")
-    if not np.isfinite(array).all():
-        raise QueryError(f"{name} must be finite, got {array[~np.isfinite(array)].flat[0]}")
-    return array
-
-
 def rotation_matrix(R: Any) -> np.ndarray:
     """R as float64 of shape (..., 3, 3); raises QueryError if it is not a rotation: RᵀR = 1, det R = 1."""
-    array = numbers("R", R, 3, 3)
+    array = rows("R", R, 3, 3)
     with np.errstate(over="ignore", invalid="ignore"):
         off = np.abs(np.swapaxes(array, -1, -2) @ array - np.eye(3)).max(initial=0)
     if not off <= _ROTATION_SLACK or np.any(np.linalg.det(array) < 0):
@@ -72,17 +54,13 @@ class MassProperties:
     inertia: np.ndarray
 
     def __post_init__(self) -> None:
-        mass, com = numbers("mass", self.mass), numbers("com", self.com, 3)
-        inertia = numbers("inertia", self.inertia, 3, 3)
-        if mass.ndim or com.ndim > 1 or inertia.ndim > 2:
-            raise QueryError("a body has one mass, one centre of mass (3,) and one inertia (3, 3); make one per body")
-        if not mass > 0:
-            raise QueryError(f"mass must be positive, got {mass}")
+        mass, com = number("mass", self.mass, above=0), numbers("com", self.com, (3,))
+        inertia = numbers("inertia", self.inertia, (3, 3))
         if np.abs(inertia - inertia.T).max() > _SLACK * np.abs(inertia).max():
             raise QueryError("inertia must be symmetric; a URDF's six moments fill both triangles")
-        if why := implausibility(float(mass), com, inertia):
+        if why := implausibility(mass, com, inertia):
             raise QueryError(f"no body has these mass properties: {why}")
-        object.__setattr__(self, "mass", float(mass))
+        object.__setattr__(self, "mass", mass)
         for name, array in (("com", com.copy()), ("inertia", (inertia + inertia.T) / 2)):
             array.setflags(write=False)
             object.__setattr__(self, name, array)
@@ -99,7 +77,7 @@ class MassProperties:
         Raises:
             QueryError: If R is not a rotation, or a shape is wrong.
         """
-        R, p = rotation_matrix(R), numbers("p", p, 3)
+        R, p = rotation_matrix(R), numbers("p", p, (3,))
         return MassProperties(self.mass, R @ self.com + p, R @ self.inertia @ R.T)
 
     def about(self, point: Any) -> np.ndarray:
@@ -107,7 +85,7 @@ class MassProperties:
 
         Source: the parallel-axis theorem; Featherstone 2008, §2.13.
         """
-        d = hat(self.com - numbers("point", point, 3))
+        d = hat(self.com - numbers("point", point, (3,)))
         return self.inertia + self.mass * d.T @ d
 
     @property

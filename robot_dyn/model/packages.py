@@ -13,6 +13,7 @@ from itertools import islice
 from pathlib import Path
 
 from robot_dyn.errors import CatalogError
+from robot_dyn.validate import shown
 
 _MAX_BYTES = 2**16  # of a package.xml
 _MAX_FOLDERS = 5000  # looked into below one folder
@@ -29,10 +30,15 @@ def searched(package_dirs: Iterable[str | Path]) -> tuple[Path, ...]:
     """
     if isinstance(package_dirs, str | Path):
         raise CatalogError(f"package_dirs must be several folders, such as [{str(package_dirs)!r}], got one path")
-    folders = tuple(Path(folder).expanduser() for folder in package_dirs)
-    for folder in folders:
-        if not folder.is_dir():
-            raise CatalogError(f"package_dirs: there is no folder {folder}; correct it, or leave it out")
+    try:
+        folders = tuple(Path(folder).expanduser() for folder in package_dirs)
+        missing = [folder for folder in folders if not folder.is_dir()]
+    except (TypeError, RuntimeError, ValueError, OSError):  # not paths; no such user; a NUL
+        raise CatalogError(
+            f"package_dirs must be several folders, such as ['/opt/arms'], got {shown(package_dirs)}"
+        ) from None
+    if missing:
+        raise CatalogError(f"package_dirs: there is no folder {missing[0]}; correct it, or leave it out")
     return folders
 
 

@@ -17,17 +17,26 @@ import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy import ndarray
 
-from robot_dyn.errors import DescriptionError, ModelWarning, QueryError, SingularError, UndecidedError, announce
+from robot_dyn.errors import (
+    DescriptionError,
+    EditError,
+    ModelWarning,
+    QueryError,
+    SingularError,
+    UndecidedError,
+    announce,
+)
 from robot_dyn.model import doctor, kernels, pinocchio_model
 from robot_dyn.model.batch import answered
 from robot_dyn.model.coriolis import Bodies
 from robot_dyn.model.description import Description, check
-from robot_dyn.model.dynamics import Array, Axes, Dynamics, acceleration, entry, shape_of, shaped
+from robot_dyn.model.dynamics import Array, Axes, Dynamics, acceleration, entry, shape_of
 from robot_dyn.model.edits import Changes, Edits
 from robot_dyn.model.gravity import gravity_acts, no_torque
 from robot_dyn.model.kernels import Kernel, Scratch, frozen, is_moderate, is_state
 from robot_dyn.model.structure import structure
 from robot_dyn.model.ties import Ties
+from robot_dyn.validate import instance, shaped
 
 _DOUBTFUL = 1e10  # of ‖a‖: M may be singular at this q, which rounding hides
 
@@ -46,6 +55,7 @@ class Robot(Dynamics):
     edits: Edits = field(default_factory=Edits)
 
     def __post_init__(self) -> None:
+        instance("edits", self.edits, Edits, "give those of another robot, or use with_", error=EditError)
         if not isinstance(self.description, Description):
             given = type(self.description).__name__
             raise DescriptionError(

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from robot_dyn.errors import QueryError
-from robot_dyn.model.inertia import MassProperties, numbers
+from robot_dyn.model.inertia import MassProperties
 from robot_dyn.spatial import hat
+from robot_dyn.validate import integer, number, numbers, rows
 
 Density = Callable[[np.ndarray], Any]
 Chart = Callable[[np.ndarray], tuple[Any, Any]]
@@ -101,7 +102,7 @@ def from_density(
             x, jacobian = chart(u)
         except (TypeError, ValueError) as error:
             raise QueryError(f"chart must map u (N, 3) to x (N, 3) and |det ∂x/∂u| (N,): {error}") from error
-        x = numbers("x of the chart", x, 3)
+        x = rows("x of the chart", x, 3)
         weight = weight * _field("|det ∂x/∂u|", jacobian, weight.shape)
     dm = weight * _field("density", density(x), weight.shape)
     mass = dm.sum()
@@ -114,12 +115,10 @@ def from_density(
 
 def _nodes(lower: Any, upper: Any, points: int) -> tuple[np.ndarray, np.ndarray]:
     """Nodes (N, 3) and weights (N,) of the product rule over a box."""
-    lower, upper = (numbers(name, x, 3).reshape(-1) for name, x in (("lower", lower), ("upper", upper)))
-    if lower.shape != (3,) or upper.shape != (3,) or not np.all(upper > lower):
-        raise QueryError(f"a box needs corners lower < upper of shape (3,), got {lower} and {upper}")
-    if isinstance(points, bool) or not isinstance(points, int) or not 1 <= points <= 100:
-        raise QueryError(f"points must be an integer from 1 to 100, got {points!r}")
-    node, weight = np.polynomial.legendre.leggauss(points)
+    lower, upper = numbers("lower", lower, (3,)), numbers("upper", upper, (3,))
+    if not np.all(upper > lower):
+        raise QueryError(f"a box needs corners lower < upper, got {lower} and {upper}")
+    node, weight = np.polynomial.legendre.leggauss(integer("points", points, least=1, most=100))
     half = (upper - lower) / 2
     axes = [c + h * node for c, h in zip((upper + lower) / 2, half, strict=True)]
     u = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -128,28 +127,18 @@ def _nodes(lower: Any, upper: Any, points: int) -> tuple[np.ndarray, np.ndarray]
 
 def _field(name: str, values: Any, shape: tuple[int, ...]) -> np.ndarray:
     """Values of a field at the nodes, or its one value."""
-    array = numbers(name, values)
-    if array.shape not in ((), shape):
-        raise QueryError(f"{name} of points (N, 3) must have shape (N,), here {shape}; got {array.shape}")
-    if np.any(array < 0):
-        raise QueryError(f"{name} must not be negative, got {array.min():.3g}")
-    return array
+    return numbers(f"{name} of points (N, 3)", values, (), shape, least=0)
 
 
 def _squares(**lengths: Any) -> np.ndarray:
-    for name, length in lengths.items():
-        value = numbers(name, length)
-        if value.ndim or not value > 0:
-            raise QueryError(f"{name} must be one positive length in m, got {length!r}")
+    checked = [number(name, length, above=0) for name, length in lengths.items()]
     with np.errstate(over="ignore"):  # then the inertia is refused as not finite
-        return np.array(list(lengths.values()), dtype=float) ** 2
+        return np.array(checked) ** 2
 
 
 def _principal(mass: Any, per_mass: np.ndarray) -> MassProperties:
-    m = numbers("mass", mass)
-    if m.ndim or not m > 0:
-        raise QueryError(f"mass must be one positive number of kg, got {mass!r}")
+    m = number("mass", mass, above=0)
     inertia = np.zeros((3, 3))
     with np.errstate(over="ignore"):
         np.fill_diagonal(inertia, m * per_mass)
-    return MassProperties(float(m), np.zeros(3), inertia)
+    return MassProperties(m, np.zeros(3), inertia)

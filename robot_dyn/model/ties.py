@@ -34,7 +34,7 @@ def resolve(name: str, mimics: Mapping[str, Mimic], arithmetic: Arithmetic) -> t
 
 
 @final
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Ties:
     """The map q_full = S q + s₀ from n independent coordinates to all N joints that move.
 

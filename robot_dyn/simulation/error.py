@@ -18,7 +18,7 @@ class Verdict(StrEnum):
 
 
 @final
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ErrorEstimate:
     """Estimated error of positions, the largest over the joints, in [rad] or [m].
 

@@ -12,7 +12,7 @@ import numpy as np
 
 
 @final
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Ledger:
     """Energy at the samples of a run, in [J]; arrays of shape (m,).
 

@@ -10,7 +10,8 @@ import numpy as np
 from robot_dyn.arithmetic import Array
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import QueryError
-from robot_dyn.model.dynamics import Dynamics, checked
+from robot_dyn.model.dynamics import Dynamics
+from robot_dyn.validate import one_state
 
 _STEPS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)  # of Richardson's extrapolated central difference: error O(h⁴) and u/h
 _ONE_SIDED = 0.01  # of a slope: a larger difference between its two sides is not curvature at the shortest step
@@ -40,8 +41,8 @@ def linearise(
     if not isinstance(plant, Plant):
         plant = Plant(plant)
     names, n = plant.dynamics.joint_names, plant.dynamics.n
-    q, v = _state("q", q, names), _state("v", np.zeros(n) if v is None else v, names)
-    u = plant.inverse_dynamics(t, q, v, np.zeros(n)) if u is None else _state("u", u, names)
+    q, v = one_state("q", q, names), one_state("v", np.zeros(n) if v is None else v, names)
+    u = plant.inverse_dynamics(t, q, v, np.zeros(n)) if u is None else one_state("u", u, names)
     x = np.concatenate([q, v, u])
 
     def a(x: np.ndarray) -> np.ndarray:
@@ -69,10 +70,3 @@ def linearise(
     A = np.zeros((2 * n, 2 * n))
     A[:n, n:], A[n:] = np.eye(n), slopes[:, : 2 * n]
     return A, np.vstack([np.zeros((n, n)), slopes[:, 2 * n :]])
-
-
-def _state(name: str, values: Array, joint_names: tuple[str, ...]) -> np.ndarray:
-    array = checked(name, values, joint_names)
-    if array.ndim != 1:
-        raise QueryError(f"{name} must be one state of shape ({len(joint_names)},), got {array.shape}")
-    return array

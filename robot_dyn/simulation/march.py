@@ -36,7 +36,7 @@ T = TypeVar("T")
 
 
 @final
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Sample:
     """A state on the way.
 

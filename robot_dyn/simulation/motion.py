@@ -17,7 +17,7 @@ import numpy as np
 from robot_dyn.arithmetic import Array, apply
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.effect import Conservative, Force
-from robot_dyn.effects.plant import Plant
+from robot_dyn.effects.plant import Plant, bounded
 from robot_dyn.integrate.integrator import System
 from robot_dyn.model.dynamics import acceleration
 from robot_dyn.simulation.schedule import Stretch
@@ -90,7 +90,7 @@ class Motion:
         """The actuation that the controller asks for, within the bounds of the plant."""
         if self.controller is None:
             return np.zeros_like(v)
-        return self.plant.actuation(self.controller.torque(t, q, v, z))
+        return bounded(self.plant.effects, self.controller.torque(t, q, v, z))
 
     @property
     def sampled(self) -> bool:

@@ -38,7 +38,7 @@ class Path:
 
 
 @final
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Record:
     """The states of a run.
 

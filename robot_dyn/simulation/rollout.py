@@ -16,7 +16,6 @@ import numpy as np
 from robot_dyn.compiled.threads import thread_count
 from robot_dyn.errors import QueryError, nearest
 from robot_dyn.integrate.integrator import Integrator
-from robot_dyn.model.dynamics import checked
 from robot_dyn.simulation.machine.batch import LANES, Batch
 from robot_dyn.simulation.machine.making import machine
 from robot_dyn.simulation.machine.payloads import masses
@@ -25,6 +24,7 @@ from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.rollout_result import Rollouts
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import MOST_BYTES
+from robot_dyn.validate import choice, instance, integer, joint_values, numbers
 
 RECORDS = ("q", "v", "tau", "energy", "work")
 _SIGNED = ("rest", "wrench", "lower", "upper", "posture")  # coefficients that may be negative
@@ -66,14 +66,14 @@ def rollouts(
         QueryError: If an argument is not allowed or has the wrong shape, or the record would exceed `most_bytes`.
         TraceError: If a part of the setup cannot be compiled; names it.
     """
-    setup = replace(setup, estimate_error=False)
+    setup = replace(instance("setup", setup, Setup, "give an rd.Setup"), estimate_error=False)
+    most_bytes = integer("most_bytes", most_bytes)
     if not steps_whole(setup.integrator):
         raise QueryError("rollouts take an explicit or a Gauss method, such as rd.method('rk4'); simulate takes any")
     if params is not None and not (isinstance(params, Mapping) and all(isinstance(name, str) for name in params)):
         raise QueryError(f"params must give values by name, such as {{'kp': …}}, got {params!r}")
-    wanted = tuple(record)
-    if unknown := [name for name in wanted if name not in RECORDS]:
-        raise QueryError(f"record: no {unknown[0]!r}; {nearest(str(unknown[0]), RECORDS)}")
+    instance("record", record, Iterable, f"give names of {', '.join(RECORDS)}")
+    wanted = tuple(choice("record", name, RECORDS) for name in record)
     q, v, free = _starts(setup, q0, v0, params or {})
     motion = Motion(setup.plant, setup.controller, getattr(setup.integrator, "canonical", False))
     assert isinstance(setup.integrator, Integrator)
@@ -94,8 +94,8 @@ def _starts(
     """Starts (B, n) and values (B, n), of one number of runs."""
     names = setup.plant.dynamics.joint_names
     n = len(names)
-    q = checked("q0", setup.q0 if q0 is None else q0, names)
-    v = checked("v0", setup.v0 if v0 is None else v0, names)
+    q = joint_values("q0", setup.q0 if q0 is None else q0, names)
+    v = joint_values("v0", setup.v0 if v0 is None else v0, names)
     free = {name: _values(setup, name, x) for name, x in params.items()}
     counts = {len(x) for x in (q, v, *free.values()) if x.ndim > 1} or {1}
     if len(counts) > 1 or max(q.ndim, v.ndim) > 2 or counts == {0}:
@@ -116,16 +116,9 @@ def _values(setup: Setup, name: str, values: Any) -> np.ndarray:
     if name not in known:
         raise QueryError(f"params: no {name!r}; {nearest(name, known)}")
     n = known[name].size if known[name].ndim else setup.plant.dynamics.n
-    try:
-        array = np.array(values, dtype=float)
-    except (TypeError, ValueError):
-        raise QueryError(f"params: {name} must be numbers, got {values!r}") from None
-    signed = name.rpartition(".")[2] in _SIGNED
+    least = None if name.rpartition(".")[2] in _SIGNED else 0
+    array = numbers(f"params: {name}", values, ("B",), ("B", 1), ("B", n), least=least)
     array = array[:, None] if array.ndim == 1 else array
-    fits = array.ndim == 2 and array.shape[1] in (1, n) and np.isfinite(array).all()
-    if not fits or not (signed or (array >= 0).all()):
-        sign = "" if signed else "not negative, "
-        raise QueryError(f"params: {name} must be finite, {sign}of shape (B,) or (B, {n}), got {np.shape(values)}")
     rows = np.ascontiguousarray(np.broadcast_to(array, (len(array), n)))
     part, _, key = name.rpartition(".")
     for effect in (effect for effect in setup.plant.effects if part and effect.name == part and key in vars(effect)):

@@ -12,6 +12,7 @@ import numpy as np
 from robot_dyn.errors import QueryError
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.trajectory import Ending, Outcome, Statistics, Trajectory
+from robot_dyn.validate import integer
 
 _SHARED = ("joint_names", "t", "statistics", "sources", "about", "setup")  # by all runs
 
@@ -97,7 +98,8 @@ class Rollouts:
         return trajectory(self, number)
 
     def outcome(self, run: int) -> Outcome:
-        """How a run ended."""
+        """How a run ended; raises QueryError if there is no run of that number."""
+        run = integer("run", run, least=-len(self), most=len(self) - 1)
         ended = float(self.ended[run])
         if self.stopped[run]:
             return Outcome(Ending.STOPPED, ended, "interrupted; all samples up to here are kept")

@@ -22,6 +22,7 @@ from robot_dyn.simulation.members import MEMBERS, Member, check_headers, member
 from robot_dyn.simulation.origin import packed, unpacked
 from robot_dyn.simulation.serialise import Arrays, SerialError, build, take_apart
 from robot_dyn.simulation.trajectory import Ending, Trajectory
+from robot_dyn.validate import integer
 
 FORMAT = 3
 ROLLOUTS_FORMAT = "rollouts 1"
@@ -87,6 +88,7 @@ def read_whole(
     path: str | Path, max_bytes: int, form: int | str, members: Mapping[str, Member], checked: Checked[Run]
 ) -> Run:
     """Read what `write_whole` wrote; errors as of `load_run`."""
+    max_bytes = integer("max_bytes", max_bytes, most=2**63 - 1, error=RunFileError)
     with reading(path, RunFileError, f"write one with robot-dyn simulate … -o {path}") as stream:
         try:
             archive = Archive(stream)

@@ -17,17 +17,17 @@ from robot_dyn.errors import OverflowedError, QueryError
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.integrate.explicit import RK4
 from robot_dyn.integrate.integrator import Integrator
-from robot_dyn.model.dynamics import checked
 from robot_dyn.simulation.schedule import LEAST_STEPS, Stretch, cuts, steps_on
 from robot_dyn.simulation.size import check_segments
 from robot_dyn.simulation.smoothness import may_switch
+from robot_dyn.validate import choice, duration, instance, one_state, truth
 
 ENGINES = ("auto", "interpreted", "compiled")
 _LONGEST_STEP_S, _LEAST_STEPS = 0.01, 200  # where something may switch between steps
 
 
 @final
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Setup:
     """All that a run depends on.
 
@@ -61,34 +61,26 @@ class Setup:
     engine: str = "auto"
 
     def __post_init__(self) -> None:
+        instance("plant", self.plant, Plant, "give one, as rd.Plant(robot)")
         names = self.plant.dynamics.joint_names
         if self.v0 is None:
             object.__setattr__(self, "v0", np.zeros(len(names)))
-        if not isinstance(self.integrator, Integrator | Adaptive):
-            raise QueryError(f"integrator: give one, as rd.method('rk4') or rd.Adaptive(), got {self.integrator!r}")
+        instance("integrator", self.integrator, Integrator | Adaptive, "give rd.method('rk4') or rd.Adaptive()")
         for name in ("q0", "v0"):
-            value = checked(name, getattr(self, name), names)
-            if value.ndim != 1:
-                raise QueryError(f"{name} must be one state of shape ({len(names)},), got {value.shape}")
-            value = value.copy()  # the caller may go on with his own array
-            value.setflags(write=False)
-            object.__setattr__(self, name, value)
+            object.__setattr__(self, name, one_state(name, getattr(self, name), names))
         for name in ("duration_s", "step_s", "record_period_s"):
-            value, least = getattr(self, name), 0.0 if name == "record_period_s" else 1e-12
-            real = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
-            if not (real and least <= value < inf):
-                raise QueryError(f"{name} must be a positive number of seconds, got {value!r}")
-            object.__setattr__(self, name, float(value))
+            seconds = duration(name, getattr(self, name), zero=name == "record_period_s")
+            object.__setattr__(self, name, seconds)
+        truth("estimate_error", self.estimate_error)
+        instance("about", self.about, dict, "give texts by name")
         if isinstance(self.integrator, Adaptive) and self.step_s != Setup.step_s:
             raise QueryError("step_s has no effect on an Adaptive method; leave it out, or give Adaptive(max_step=…)")
-        if self.engine not in ENGINES:
-            raise QueryError(f"engine={self.engine!r}; give one of {', '.join(ENGINES)}")
-        if not isinstance(self.controller, Controller | None):
-            raise QueryError(f"controller: give one, such as rd.PD(…), or None, got {self.controller!r}")
-        if self.controller is not None and self.controller.n != len(names):
-            raise QueryError(f"the controller drives {self.controller.n} joints, the plant has {len(names)}")
+        choice("engine", self.engine, ENGINES)
+        instance("controller", self.controller, Controller | None, "give one, such as rd.PD(…), or None")
         if self.controller is not None:
-            _check_period(self.controller)
+            duration("period_s of the controller", self.controller.period_s, zero=True)
+            if self.controller.n != len(names):
+                raise QueryError(f"the controller drives {self.controller.n} joints, the plant has {len(names)}")
         self._check_model()
         check_segments(self)
         self.plant.torque(0.0, self.q0, self.v0)  # so that an effect that does not fit is told now
@@ -151,13 +143,3 @@ class Setup:
         error control does not see what no stage meets. A fixed step is the user's.
         """
         return min(_LONGEST_STEP_S, self.duration_s / _LEAST_STEPS) if may_switch(self) else inf
-
-
-def _check_period(controller: Controller) -> None:
-    """Refuse a controller, of a user's own perhaps, whose period is not a time."""
-    period: Any = getattr(controller, "period_s", None)
-    real = isinstance(period, int | float | np.integer | np.floating) and not isinstance(period, bool)
-    if not (real and 0 <= period < inf):
-        raise QueryError(
-            f"{type(controller).__name__}.period_s must be a time in seconds, 0 for continuous control, got {period!r}"
-        )

@@ -37,6 +37,7 @@ from robot_dyn.simulation.samples import columns, compiled_rows
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import check_record
 from robot_dyn.simulation.trajectory import Ending, Outcome, Statistics, Trajectory
+from robot_dyn.validate import shown
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.machine.machine import Machine
@@ -58,6 +59,8 @@ def simulate(
         QueryError: If the setup is not allowed, or its record would not fit into memory. Whatever happens later is
             told by the trajectory's outcome.
     """
+    if not (on_progress is None or callable(on_progress)):
+        raise QueryError(f"on_progress must be a function of the time reached, or None, got {shown(on_progress)}")
     for name in options.keys() - Setup.__dataclass_fields__.keys():
         raise QueryError(f"simulate: no option {name!r}; {nearest(name, Setup.__dataclass_fields__)}")
     if isinstance(options.get("integrator"), Adaptive):
@@ -65,7 +68,10 @@ def simulate(
     if isinstance(what, Setup):
         setup = replace(what, **options)
     else:
-        setup = Setup(what if isinstance(what, Plant) else Plant(what), **options)
+        plant = what if isinstance(what, Plant) else Plant(what)
+        if "q0" not in options:
+            raise QueryError(f"simulate: give q0, the position at the start, ({plant.dynamics.n},)")
+        setup = Setup(plant, **options)
     motion = Motion(setup.plant, setup.controller, getattr(setup.integrator, "canonical", False))
     check_record(setup, motion)
     clock = [perf_counter()]

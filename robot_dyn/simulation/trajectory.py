@@ -73,7 +73,7 @@ class Statistics:
 
 
 @final
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Trajectory:
     """Samples of a run, m of them; arrays are (m,) or (m, n).
 

@@ -18,6 +18,7 @@ from robot_dyn.simulation.origin import robot_of
 from robot_dyn.simulation.remarks import lines
 from robot_dyn.simulation.trajectory import Trajectory
 from robot_dyn.spatial import homogeneous
+from robot_dyn.validate import instance, truth
 from robot_dyn.view import commands
 from robot_dyn.view.arrows import arrows
 from robot_dyn.view.geometry.visuals import Drawing, drawing
@@ -67,7 +68,10 @@ def document(
         ReplayError: If a run has no samples.
         QueryError: If it carries no robot, or no robot has the frame.
     """
-    package_dirs = searched(package_dirs)
+    for run in runs:
+        instance("run", run, Trajectory, "give the trajectory of rd.simulate")
+    package_dirs, inertia = searched(package_dirs), truth("inertia", inertia)
+    instance("frame", frame, str | None, "give the name of a link, or None")
     shown = [_shown(number, run, len(runs), package_dirs, inertia) for number, run in enumerate(runs)]
     if frame is not None and all(frame not in each.stage.linkage.links for each in shown):
         shown[0].stage.link_path(frame)  # says so, with the nearest names

@@ -34,7 +34,7 @@ WANTED, _LIMIT = (1, 1), (1, 1)  # colour and dashes of what is asked for, and o
 
 
 @final
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Curve:
     """y over x, both (m,); `style` numbers its colour and its dashes."""
 

@@ -15,10 +15,11 @@ from typing import TYPE_CHECKING, Any, Literal, final
 import numpy as np
 
 from robot_dyn import files
-from robot_dyn.errors import DescriptionError, QueryError, RobotDynError, nearest
+from robot_dyn.errors import DescriptionError, QueryError, RobotDynError
 from robot_dyn.model import description
 from robot_dyn.model.units import unit
 from robot_dyn.simulation.trajectory import Trajectory
+from robot_dyn.validate import choice, instance, number, shaped
 from robot_dyn.view.figure import NEAR, THEMES, WANTED, Cell, Curve, Panel, draw
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ class PlotError(RobotDynError):
 
 
 @final
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class View:
     """What is shown of a run: joints by column, each with its unit and its effort limit in [N m] or [N]."""
 
@@ -188,10 +189,11 @@ def plot(
         QueryError: If a plot, a joint or a theme is unknown, or the limits have another shape.
         PlotError: If the run has no samples, too many joints, or not what an asked plot shows.
     """
+    instance("run", run, Trajectory, "give the trajectory of rd.simulate")
+    instance("only", only, Collection | None, "give names of joints")
     for kind, known, asked in (("plot", PLOTS, names), ("theme", THEMES, (theme,)), ("joint", run.joint_names, only)):
         for name in asked or ():
-            if name not in known:
-                raise QueryError(f"no {kind} {name!r}; {nearest(name, known)}")
+            choice(kind, name, known)
     if not len(run.t):
         raise PlotError("the run has no samples, so there is nothing to draw; simulate again")
     view = _view(run, only, limits)
@@ -221,6 +223,7 @@ def save_plot(run: Trajectory, path: str | Path, *names: str, dpi: float = 150, 
     Raises:
         PlotError: If it cannot be written; else as `plot`.
     """
+    dpi = number("dpi", dpi, above=0)
     path = files.target(path, PICTURES, PlotError)
     picture = io.BytesIO()
     figure = plot(run, *names, **options)
@@ -246,8 +249,8 @@ def _view(run: Trajectory, only: Collection[str] | None, limits: np.ndarray | No
     units = tuple(unit("q", None if j is None else j.get("type")) for j in known)
     if limits is None:
         limits = np.array([np.inf if j is None else float(j.find("limit").get("effort")) for j in known])
-    limits = np.asarray(limits, dtype=float)
-    if limits.shape != (len(known),):
+    limits = shaped("limits", limits, run.joint_names)  # nan: none is known
+    if limits.ndim != 1:
         raise QueryError(f"limits must have shape ({len(known)},), got {limits.shape}")
     return View(run, shown, units, np.where((limits > 0) & (limits < 1e300), limits, np.inf))  # 0: none is stated
 

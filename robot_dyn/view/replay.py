@@ -12,6 +12,7 @@ from robot_dyn.files import Kind, save, target
 from robot_dyn.model.dynamics import Array
 from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.trajectory import Trajectory
+from robot_dyn.validate import integer
 from robot_dyn.view.document import ReplayError, document
 from robot_dyn.view.page import page
 from robot_dyn.view.still import still
@@ -45,6 +46,7 @@ def replay(
         QueryError: If it carries no robot, or `frame` is not one of its links.
         ServerError: If the port is taken.
     """
+    port = _free(port)
     return _served(document((run, *ghosts), package_dirs, frame, inertia), port)
 
 
@@ -90,6 +92,7 @@ def show(
         QueryError: If q is not one configuration of the robot.
         ServerError: If the port is taken.
     """
+    port = _free(port)
     return _served(still(robot, q, package_dirs, inertia), port)
 
 
@@ -111,6 +114,10 @@ def save_show(
     """
     file = target(path, PAGE, ReplayError)
     return _written(still(robot, q, package_dirs, inertia), file)
+
+
+def _free(port: int | None) -> int | None:
+    return None if port is None else integer("port", port, least=1, most=65535)
 
 
 def _served(made: dict[str, Any], port: int | None) -> Server:

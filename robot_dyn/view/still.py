@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 
 from robot_dyn.errors import QueryError, shorten
-from robot_dyn.model.dynamics import Array, checked
+from robot_dyn.model.dynamics import Array
+from robot_dyn.model.packages import searched
 from robot_dyn.model.robot import Robot
 from robot_dyn.spatial import homogeneous
+from robot_dyn.validate import instance, one_state, truth
 from robot_dyn.view import commands
 from robot_dyn.view.geometry.visuals import drawing
 from robot_dyn.view.keyframes import keyframes
@@ -27,11 +29,11 @@ def still(robot: Robot, q: Array | None, package_dirs: Iterable[str | Path], ine
     Raises:
         QueryError: If q is not one configuration of the robot.
     """
-    if not isinstance(robot, Robot):
-        raise QueryError(f"give a robot of rd.load, got {type(robot).__name__}")
-    at: Array = np.zeros(robot.n) if q is None else checked("q", q, robot.joint_names)
-    if at.ndim != 1 or np.abs(at).max() > _FAR:
-        raise QueryError(f"q must be one configuration of shape ({robot.n},), within ±{_FAR:g}, got {shorten(at)}")
+    instance("robot", robot, Robot, "give one of rd.load")
+    package_dirs, inertia = searched(package_dirs), truth("inertia", inertia)
+    at: Array = np.zeros(robot.n) if q is None else one_state("q", q, robot.joint_names)
+    if np.abs(at).max() > _FAR:
+        raise QueryError(f"q must be within ±{_FAR:g}, got {shorten(at)}")
     stage, look = Stage("run", robot), drawing(robot, package_dirs, inertia=inertia)
     gravity = robot.edits.gravity
     turn = upright(gravity)

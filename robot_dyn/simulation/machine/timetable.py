@@ -17,7 +17,7 @@ from robot_dyn.simulation.setup import Setup
 
 
 @final
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Timetable:
     """Stretches of a run, S of them.
 

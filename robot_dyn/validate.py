@@ -1,0 +1,257 @@
+"""Arguments of public functions, checked where they enter: real numbers, their shape and sign; counts; names; kinds.
+
+Each function returns the argument in one form, or raises the `error` of its caller with one sentence: what must be, and
+what was given. Time loops call what is behind these checks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from math import inf, isfinite
+from numbers import Real
+from operator import index
+from typing import Any
+
+import numpy as np
+
+from robot_dyn.errors import NotFiniteError, QueryError, RobotDynError, nearest, shorten
+
+Shape = tuple[int | str, ...]  # a length with a name, such as "n", may be any but 0
+Kind = type[RobotDynError]
+_PLAIN = {float, int, np.float64}  # most entries of lists; bool is another class
+
+
+def shown(value: Any) -> str:
+    """A value in a message."""
+    try:
+        return shorten(repr(value))
+    except Exception:  # an int of many digits, or whatever an object's own repr raises
+        return f"a value of type {type(value).__name__}"
+
+
+def real(values: Any) -> np.ndarray:
+    """Real numbers as an array of floats or integers; not copied if they are one.
+
+    Raises:
+        ValueError: If they are truth values, complex, text, ragged, too large or anything else, or have masked entries;
+            its text is what was found.
+    """
+    if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
+        raise ValueError("masked entries")
+    if isinstance(values, list | tuple) and not set(map(type, values)) <= _PLAIN:
+        for each in values:  # NumPy takes True for 1, and ignores masks
+            if each.__class__ is not np.ndarray:
+                real(each)
+    try:
+        array = np.asarray(values)
+        if array.dtype == object and not isinstance(values, np.ndarray):
+            array = _of_objects(array)
+    except OverflowError:
+        raise ValueError("a number too large for a float") from None
+    except (MemoryError, KeyboardInterrupt):
+        raise
+    except Exception:  # a ragged list, or whatever an object's own conversion raises
+        raise ValueError(shown(values)) from None
+    if array.dtype.kind not in "fiu":
+        raise ValueError(shown(values))
+    return array
+
+
+def _of_objects(array: np.ndarray) -> np.ndarray:
+    """Python numbers that NumPy has no type for, such as 2**64 or a Fraction, as float64."""
+    if not all(isinstance(x, Real) and not isinstance(x, bool) for x in array.flat):
+        raise TypeError
+    return array.astype(float)
+
+
+def float64(values: Any) -> np.ndarray:
+    """Real numbers as float64; ValueError as of `real`. What is too large for it becomes infinite."""
+    with np.errstate(over="ignore"):
+        return real(values).astype(np.float64, copy=False)
+
+
+def numbers(
+    what: str,
+    values: Any,
+    *shapes: Shape,
+    error: Kind = QueryError,
+    above: float | None = None,
+    least: float | None = None,
+    infinite: bool = False,
+) -> np.ndarray:
+    """Finite numbers of one of the shapes, copied and frozen.
+
+    Args:
+        what: What messages call them.
+        values: The argument.
+        *shapes: Of which they must have one.
+        error: What is raised.
+        above: They must be greater than this.
+        least: They must not be less than this.
+        infinite: Whether ±inf is taken as well.
+    """
+    wanted = " or ".join(str(shape).replace("'", "") for shape in shapes)
+    try:
+        array = np.array(float64(values))
+    except ValueError as found:
+        kind = "a real number" if shapes == ((),) else f"real numbers of shape {wanted}"
+        raise error(f"{what} must be {kind}, got {found}") from None
+    if not any(_fits(array.shape, shape) for shape in shapes):
+        raise error(f"{what} must be one number, got shape {array.shape}" if shapes == ((),) else
+                    f"{what} must have shape {wanted}, got {array.shape}")  # fmt: skip
+    good = ~np.isnan(array) if infinite else np.isfinite(array)
+    if not good.all():
+        raise error(f"{what} must be {'a number' if infinite else 'finite'}, got {array[~good][0]}")
+    low = (array <= above) if above is not None else (array < (-inf if least is None else least))
+    if low.any():
+        raise error(f"{what} must {_bound(above, least)}, got {shorten(array[low][0])}")
+    array.setflags(write=False)
+    return array
+
+
+def _bound(above: float | None, least: float | None) -> str:
+    if above is not None:
+        return "be positive" if above == 0 else f"be greater than {above:g}"
+    return "not be negative" if least == 0 else f"be at least {least:g}"
+
+
+def _fits(shape: tuple[int, ...], wanted: Shape) -> bool:
+    if len(shape) != len(wanted):
+        return False
+    return all(a > 0 if isinstance(b, str) else a == b for a, b in zip(shape, wanted, strict=True))
+
+
+def number(
+    what: str,
+    value: Any,
+    *,
+    error: Kind = QueryError,
+    above: float | None = None,
+    least: float | None = None,
+    infinite: bool = False,
+) -> float:
+    """One finite number, as of `numbers`."""
+    if value.__class__ is float and isfinite(value) and above is least is None:
+        return value
+    return float(numbers(what, value, (), error=error, above=above, least=least, infinite=infinite))
+
+
+def duration(what: str, value: Any, *, zero: bool = False, error: Kind = QueryError) -> float:
+    """A time in [s] that a clock can tell, 1e-12 s or more; or 0, where that has a meaning."""
+    seconds = number(what, value, error=error)
+    if not (seconds >= 1e-12 or (zero and seconds == 0)):
+        least = "1e-12 at least, or 0" if zero else "1e-12 at least"
+        raise error(f"{what} must be a positive number of seconds, {least}; got {seconds:g}")
+    return seconds
+
+
+def times(what: str, t: Any) -> np.ndarray:
+    """Times in [s], finite or not, of any shape, not copied; QueryError if they are anything else."""
+    try:
+        return float64(t)
+    except ValueError as found:
+        raise QueryError(f"{what} must be a time in seconds, got {found}") from None
+
+
+def rows(what: str, values: Any, *shape: int) -> np.ndarray:
+    """Finite numbers of shape (..., *shape), not copied; QueryError if they are anything else."""
+    try:
+        array = float64(values)
+    except ValueError as found:
+        raise QueryError(f"{what} must be an array of real numbers, got {found}") from None
+    if array.shape[array.ndim - len(shape) :] != shape or array.ndim < len(shape):
+        expected = ", ".join(map(str, shape))
+        raise QueryError(f"{what} must have shape {shape} or (..., {expected}), got {array.shape}")
+    if not np.isfinite(array).all():
+        raise QueryError(f"{what} must be finite, got {array[~np.isfinite(array)].flat[0]}")
+    return array
+
+
+def joint_values(what: str, values: Any, joint_names: Sequence[str], arithmetic: Any = None) -> Any:
+    """Finite numbers of each joint, shape (..., n), not copied; errors as of `shaped` and `check_finite`."""
+    array = shaped(what, values, joint_names, arithmetic)
+    check_finite(what, array, joint_names, arithmetic)
+    return array
+
+
+def shaped(what: str, values: Any, joint_names: Sequence[str], arithmetic: Any = None) -> Any:
+    """Numbers of each joint, finite or not, shape (..., n), not copied.
+
+    Args:
+        what: What messages call them.
+        values: The argument.
+        joint_names: Of the n joints.
+        arithmetic: An `Arithmetic` whose numbers they become; float64 unless given.
+
+    Raises:
+        QueryError: If they are not real numbers, or have another shape.
+    """
+    n = len(joint_names)
+    try:
+        array = float64(values) if arithmetic is None else arithmetic.asarray(values)
+    except (TypeError, ValueError, OverflowError) as found:
+        raise QueryError(f"{what} must be an array of {n} real numbers, got {found}") from None
+    if array.ndim == 0 or array.shape[-1] != n:
+        raise QueryError(f"{what} must have shape ({n},) or (..., {n}), got {array.shape}")
+    return array
+
+
+def check_finite(what: str, array: Any, joint_names: Sequence[str], arithmetic: Any = None) -> None:
+    """Raise NotFiniteError, which names the joint, unless every number of an argument (..., n) is finite."""
+    finite = np.isfinite(array) if arithmetic is None else arithmetic.finite(array)
+    if not finite.all():
+        place = tuple(np.argwhere(~finite)[0])
+        joint = "" if what == "t" else f" for joint {joint_names[place[-1]]!r}"
+        raise NotFiniteError(f"{what} must be finite, got {array[place]}{joint}")
+
+
+def one_state(what: str, values: Any, joint_names: Sequence[str]) -> np.ndarray:
+    """Finite numbers of each joint, shape (n,), copied and frozen; QueryError if they are anything else."""
+    array = np.array(joint_values(what, values, joint_names))
+    if array.ndim != 1:
+        raise QueryError(f"{what} must be one state of shape ({len(joint_names)},), got {array.shape}")
+    array.setflags(write=False)
+    return array
+
+
+def check_batches(**arrays: Any) -> tuple[int, ...]:
+    """The common batch shape of arguments (..., n); QueryError if they do not broadcast."""
+    try:
+        return np.broadcast_shapes(*(array.shape[:-1] for array in arrays.values()))
+    except ValueError:
+        shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
+        raise QueryError(f"batch axes do not match: {shapes}") from None
+
+
+def integer(what: str, value: Any, *, least: int = 0, most: int | None = None, error: Kind = QueryError) -> int:
+    """A whole number from `least` to `most`."""
+    try:
+        whole = None if isinstance(value, bool) else index(value)
+    except TypeError:
+        whole = None
+    if whole is None or whole < least or (most is not None and whole > most):
+        limits = f"{least} or more" if most is None else f"from {least} to {most}"
+        raise error(f"{what} must be a whole number, {limits}, got {shown(value)}")
+    return whole
+
+
+def truth(what: str, value: Any, *, error: Kind = QueryError) -> bool:
+    """True or False."""
+    if not isinstance(value, bool | np.bool_):
+        raise error(f"{what} must be True or False, got {shown(value)}")
+    return bool(value)
+
+
+def choice(what: str, value: Any, known: Collection[str], *, error: Kind = QueryError) -> str:
+    """One of the known names."""
+    if not isinstance(value, str) or value not in known:
+        told = nearest(value if isinstance(value, str) else "", known)
+        raise error(f"no {what} {shown(value)}; {told}")
+    return value
+
+
+def instance(what: str, value: Any, kind: Any, remedy: str, *, error: Kind = QueryError) -> Any:
+    """An object of a kind; the remedy says how to make one."""
+    if not isinstance(value, kind):
+        raise error(f"{what}: {remedy}, got {shown(value)}")
+    return value
