@@ -19,6 +19,7 @@ from typing import Any, BinaryIO, final
 
 from robot_dyn.errors import RobotDynError
 from robot_dyn.reading import READ, read_start, why
+from robot_dyn.validate import file_path
 
 _NEW_S = 10.0  # a younger file may be open and not yet locked
 # Locks tell a file that is being written from an abandoned one. Windows, where no open file can be removed, needs none.
@@ -50,7 +51,7 @@ def target(
     """
     kinds = kinds if isinstance(kinds, tuple) else (kinds,)
     try:
-        path = Path(path)
+        path = file_path(path, error)
         if not path.name or path.is_dir():
             raise error(
                 f"{path}: is a folder; give the name of a file in it, such as {path / ('run' + kinds[0].suffix)}"

@@ -10,6 +10,7 @@ from stat import S_ISDIR, S_ISREG
 from typing import BinaryIO
 
 from robot_dyn.errors import RobotDynError
+from robot_dyn.validate import file_path
 
 # Opening a pipe would wait for its writer; Windows has no O_NONBLOCK, POSIX no O_BINARY.
 READ = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
@@ -44,8 +45,8 @@ def read_start(path: str | Path, count: int, error: type[RobotDynError], remedy:
 
 
 def _opened(path: str | Path, error: type[RobotDynError], remedy: str) -> BinaryIO:
+    path = file_path(path, error)
     try:
-        path = Path(path)
         _refuse_irregular(path, path.stat().st_mode, error, remedy)
         handle = os.open(path, READ)
         stream = os.fdopen(handle, "rb")

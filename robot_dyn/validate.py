@@ -6,10 +6,12 @@ what was given. Time loops call what is behind these checks.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection, Sequence
 from math import inf, isfinite
 from numbers import Real
 from operator import index
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -247,6 +249,18 @@ def choice(what: str, value: Any, known: Collection[str], *, error: Kind = Query
     if not isinstance(value, str) or value not in known:
         told = nearest(value if isinstance(value, str) else "", known)
         raise error(f"no {what} {shown(value)}; {told}")
+    return value
+
+
+def file_path(value: Any, error: Kind) -> Path:
+    """The path of a file."""
+    return Path(instance("path", value, str | os.PathLike, "give the path of a file", error=error))
+
+
+def function(what: str, value: Any, arguments: str, *, error: Kind = QueryError) -> Any:
+    """A function, or None; `arguments` tells which it takes."""
+    if not (value is None or callable(value)):
+        raise error(f"{what} must be a function of {arguments}, or None, got {shown(value)}")
     return value
 
 

@@ -21,7 +21,7 @@ from robot_dyn.lagrange.magnitude import Magnitudes, floored, magnitudes, mass_n
 from robot_dyn.lagrange.manipulator import Lagrangian
 from robot_dyn.model.dynamics import Axes
 from robot_dyn.model.robot import Robot
-from robot_dyn.validate import instance, integer, number
+from robot_dyn.validate import function, instance, integer, number
 
 TOLERANCE = 1e-12
 _U = np.finfo(float).eps / 2
@@ -132,7 +132,8 @@ def compare(
         QueryError: If samples is not positive.
     """
     instance("robot", robot, Robot, "give one of rd.load")
-    samples, seed = integer("samples", samples, least=1), integer("seed", seed)
+    samples, seed = integer("samples", samples, least=1, most=10**6), integer("seed", seed, most=2**128 - 1)
+    function("on_sample", on_sample, "no argument")
     tolerance = number("tolerance", tolerance, above=0)
     own, rng = Lagrangian(robot), np.random.default_rng(seed)
     worst: dict[str, Agreement] = {}

@@ -75,6 +75,7 @@ class CartesianReference:
         return p, R, np.concatenate(V, -1), np.concatenate(V_rate, -1)
 
 
+@np.errstate(all="ignore")  # what overflows is refused as not finite
 def line(
     p0: Any, p1: Any, duration: float, *, rotation: Any = None, rotation_end: Any = None, start: float = 0.0
 ) -> CartesianReference:
@@ -106,6 +107,7 @@ def line(
     return CartesianReference(position, rotation, turn, quintic([0.0], [angle], duration, start=start))
 
 
+@np.errstate(all="ignore")  # what overflows is refused as not finite
 def circle(
     centre: Any,
     radius: float,
@@ -184,18 +186,19 @@ def _knots(angle: PiecewisePolynomial, period: float, rise: float) -> np.ndarray
     return np.concatenate([*parts, angle.breaks[-1:]])
 
 
+@np.errstate(all="ignore")  # what overflows is refused as not finite
 def _rotation(name: str, values: Any) -> np.ndarray:
     """A rotation matrix, frozen; ControlError if RᵀR is not 1 to 1e-8 or det R is not positive."""
     R = numbers(name, values, (3, 3))
-    if np.abs(R.T @ R - np.eye(3)).max() > 1e-8 or np.linalg.det(R) < 0:
-        raise ControlError(f"{name} must be a rotation matrix, got {values!r}")
+    if not np.abs(R.T @ R - np.eye(3)).max() <= 1e-8 or np.linalg.det(R) < 0:
+        raise ControlError(f"{name} must be a rotation matrix, got {shown(values)}")
     return R
 
 
 def _direction(name: str, values: Any) -> np.ndarray:
     """A unit vector, (3,), frozen; raises ControlError if it is zero."""
     vector = numbers(name, values, (3,))
-    length = np.linalg.norm(vector)
-    if length < 1e-12:
-        raise ControlError(f"{name} must not be zero, got {values!r}")
-    return numbers(name, vector / length, (3,))
+    largest = np.abs(vector).max()  # scaled by it, no square overflows
+    if not largest > 1e-12:
+        raise ControlError(f"{name} must not be zero, got {shown(values)}")
+    return numbers(name, vector / largest / np.linalg.norm(vector / largest), (3,))

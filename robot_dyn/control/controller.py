@@ -70,7 +70,7 @@ class Memoryless(Controller):
         return z
 
 
-number, numbers = (partial(check, error=ControlError) for check in (validate.number, validate.numbers))
+number, numbers = partial(validate.number, error=ControlError), partial(validate.numbers, error=ControlError)
 
 
 def check_model(model: Any) -> None:

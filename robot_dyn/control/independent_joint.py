@@ -136,7 +136,9 @@ def gains_from(inertia_diagonal: Any, frequency: Any, damping_ratio: Any = 1.0) 
         raise ControlError(f"shapes do not match: {inertia.shape}, {omega.shape}, {zeta.shape}")
     if not ((inertia > 0).all() and (omega > 0).all()):
         raise ControlError(f"inertia_diagonal and frequency must be positive, got {inertia} and {omega}")
-    return inertia * omega**2, 2 * zeta * omega * inertia
+    with np.errstate(over="ignore"):
+        kp, kd = inertia * omega**2, 2 * zeta * omega * inertia
+    return numbers("kp = M_ii ω²", kp, (), ("n",)), numbers("kd = 2 ζ ω M_ii", kd, (), ("n",))
 
 
 def joint_count(reference: Any) -> int:

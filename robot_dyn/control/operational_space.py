@@ -87,7 +87,9 @@ def task_dynamics(
     # rows of J M⁻¹, one solve each: M is symmetric
     J_over_M = acceleration(dynamics.M(q)[..., None, :, :], J, dynamics.joint_names)
     s, U = np.linalg.eigh(J_over_M @ transpose(J))
-    Lambda = (U * (s / np.maximum(s, epsilon) ** 2)[..., None, :]) @ transpose(U)
+    with np.errstate(over="ignore", under="ignore"):
+        weight = s / np.maximum(s, epsilon) ** 2
+    Lambda = (U * weight[..., None, :]) @ transpose(U)
     J_bar = transpose(J_over_M) @ Lambda
     mu = apply(transpose(J_bar), dynamics.coriolis_torque(q, v)) - apply(Lambda, drift)
     return TaskDynamics(J, Lambda, J_bar, mu, apply(transpose(J_bar), dynamics.N(q)), drift, s[..., 0])

@@ -101,6 +101,7 @@ def hold(q: Any) -> PiecewisePolynomial:
     return PiecewisePolynomial([0.0, 1.0], numbers("q", q, ("n",))[None, None])
 
 
+@np.errstate(all="ignore")  # what overflows is refused as not finite
 def quintic(
     q0: Any, q1: Any, duration: float, *, start: float = 0.0, v0: Any = 0.0, v1: Any = 0.0, a0: Any = 0.0, a1: Any = 0.0
 ) -> PiecewisePolynomial:
@@ -133,6 +134,7 @@ def quintic(
     return PiecewisePolynomial([begin, begin + T], hermite(np.array([T]), ends[None]))
 
 
+@np.errstate(all="ignore")  # what overflows is refused as not finite
 def via_points(times: Any, points: Any, *, kind: str = "quintic", v0: Any = 0.0, v1: Any = 0.0) -> PiecewisePolynomial:
     """The spline through points at given times, from rest to rest unless velocities at its ends are given.
 

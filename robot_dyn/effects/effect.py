@@ -100,6 +100,8 @@ def coefficient(name: str, values: Any, *, least: float | None = None, infinite:
     Values by joint name, and "urdf", stay until the plant that the effect acts on is known.
     """
     if isinstance(values, Mapping):
+        if not values:
+            raise EffectError(f"{name} names no joint; give values by joint, or one for all")
         return values  # pyright: ignore[reportReturnType]
     if isinstance(values, str) and values == URDF:
         return URDF  # pyright: ignore[reportReturnType]

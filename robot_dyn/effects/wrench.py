@@ -13,7 +13,7 @@ from robot_dyn.arithmetic import apply as times
 from robot_dyn.effects.effect import Active
 from robot_dyn.errors import EffectError, QueryError
 from robot_dyn.model.dynamics import Axes, Dynamics
-from robot_dyn.validate import instance, number, numbers
+from robot_dyn.validate import instance, number, numbers, rows
 
 
 @final
@@ -64,10 +64,12 @@ class ExternalWrench(Active):
 
     def acts(self, t: Array) -> Array:
         """Whether it acts at times t (...,)."""
+        t = rows("t", t)
         return (self.start_s <= t) & (t < self.end_s)
 
     def at(self, placement: Array) -> Array:
         """The wrench in base axes at the frame's origin, (..., 6), where the frame is placed at (..., 4, 4)."""
+        placement = rows("placement", placement, 4, 4)
         R, p = placement[..., :3, :3], placement[..., :3, 3]
         force, torque = self.wrench[:3], self.wrench[3:]
         if self.expressed_in is Axes.BODY:

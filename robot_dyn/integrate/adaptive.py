@@ -18,7 +18,7 @@ from robot_dyn.arithmetic import Array
 from robot_dyn.errors import OverflowedError, QueryError, RobotDynError
 from robot_dyn.integrate.implicit import jacobian
 from robot_dyn.integrate.integrator import System
-from robot_dyn.validate import choice, instance, number, numbers, rows, shown
+from robot_dyn.validate import choice, function, instance, number, numbers, rows
 
 LEAST_RTOL = 100 * np.finfo(float).eps  # SciPy's bound; below it rounding is taken for local error
 
@@ -151,8 +151,7 @@ class Adaptive:
         t0, t1, y0 = number("t0", t0), number("t1", t1), _initial_state(y0)
         if t0 == t1:
             raise QueryError(f"t0 and t1 must differ, got {t0} twice")
-        if not (stop is None or callable(stop)):
-            raise QueryError(f"stop must be a function of (t, y), or None, got {shown(stop)}")
+        function("stop", stop, "(t, y)")
         return Steps(self, system, stop, t0, y0, t1)
 
 

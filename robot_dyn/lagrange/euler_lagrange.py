@@ -151,7 +151,7 @@ def euler_lagrange(kinetic: Kinetic, potential: Potential | None, n: int) -> Eul
     """
     import casadi as ca
 
-    n = integer("n, the number of coordinates,", n, least=1)
+    n = integer("n, the number of coordinates,", n, least=1, most=1000)
     t, q, v = _symbols(n)
     K = traced("K(t, q, v)", kinetic, (t, q, v))
     V = traced("V(t, q)", potential, (t, q)) if potential is not None else ca.SX(0)

@@ -77,7 +77,7 @@ def generalized_force(positions: Positions, n: int) -> GeneralizedForce:
     """
     import casadi as ca
 
-    n = integer("n, the number of coordinates,", n, least=1)
+    n = integer("n, the number of coordinates,", n, least=1, most=1000)
     t, q = ca.SX.sym("t"), ca.SX.sym("q", n)
     r = _positions(positions, t, q)
     expressions = {"r": r, "J": ca.jacobian(r, q)}

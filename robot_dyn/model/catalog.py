@@ -12,6 +12,7 @@ from pathlib import Path
 
 from robot_dyn.errors import CatalogError, nearest, shorten
 from robot_dyn.model.packages import environment_folders, package_folders
+from robot_dyn.validate import shown
 
 # Files whose own stem is shared, or says nothing.
 _RENAMED = {
@@ -44,7 +45,7 @@ def find(name_or_path: str | Path, package_dirs: Iterable[str | Path] = ()) -> P
     if isinstance(start, str) and start.lstrip("\ufeff \t\r\n").startswith("<"):
         raise CatalogError("this is the text of a URDF, not its name or path; give it to Robot.from_text")
     if not isinstance(name_or_path, str | Path) or not str(name_or_path).strip():
-        raise CatalogError(f"give the name of a robot or the path of a URDF file, got {shorten(repr(name_or_path))}")
+        raise CatalogError(f"give the name of a robot or the path of a URDF file, got {shown(name_or_path)}")
     text = str(name_or_path)
     if text in _files():
         return _files()[text]

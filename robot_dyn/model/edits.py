@@ -90,14 +90,14 @@ class Edits:
             lock = changes["lock"]
             if not isinstance(lock, Mapping):
                 raise EditError(
-                    f"lock must give values by joint name, such as {{{joint_names[0]!r}: 0.0}}, got {lock!r}"
+                    f"lock must give values by joint name, such as {{{joint_names[0]!r}: 0.0}}, got {shown(lock)}"
                 )
             new = replace(new, lock=new.lock + tuple(by_joint("lock", lock, joint_names).items()))
         if "payload" in changes:
             payload = changes["payload"]
             more = tuple(payload) if isinstance(payload, Iterable) else (payload,)
             if not all(isinstance(each, Payload) for each in more):
-                raise EditError(f"payload must be a Payload or several, got {payload!r}")
+                raise EditError(f"payload must be a Payload or several, got {shown(payload)}")
             new = replace(new, payloads=new.payloads + more)
         if "mass_scale" in changes:
             mass_scale = changes["mass_scale"]
@@ -128,8 +128,10 @@ def by_joint(what: str, values: Any, joint_names: tuple[str, ...]) -> dict[str, 
     return checked
 
 
-def _numbers(what: str, values: Any, *shapes: tuple[int, ...], **limits: float | None) -> np.ndarray:
-    array = numbers(what, values, *shapes, error=EditError, **limits)
+def _numbers(
+    what: str, values: Any, *shapes: tuple[int, ...], least: float | None = None, above: float | None = None
+) -> np.ndarray:
+    array = numbers(what, values, *shapes, error=EditError, least=least, above=above)
     if (np.abs(array) > LARGEST).any():
         raise EditError(f"{what} is beyond ±{LARGEST:g} in SI units, got {shown(values)}; correct it")
     return array

@@ -21,7 +21,6 @@ from robot_dyn.errors import (
     DescriptionError,
     EditError,
     ModelWarning,
-    QueryError,
     SingularError,
     UndecidedError,
     announce,
@@ -230,8 +229,7 @@ class Robot(Dynamics):
         Raises:
             QueryError: If rng is not a numpy.random.Generator.
         """
-        if not isinstance(rng, np.random.Generator):
-            raise QueryError(f"rng must be a numpy.random.Generator, such as numpy.random.default_rng(0), got {rng!r}")
+        instance("rng", rng, np.random.Generator, "give one, such as numpy.random.default_rng(0)")
         slides = np.array([each == "prismatic" for each in self.joint_types])
         lower, upper = self.lower, self.upper
         half = (upper - lower) / 2

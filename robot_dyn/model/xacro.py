@@ -19,6 +19,7 @@ from typing import Any
 
 from robot_dyn.errors import DescriptionError, RobotDynError, nearest, shorten
 from robot_dyn.model import catalog
+from robot_dyn.validate import shown
 
 SECONDS = 60  # of an expansion
 MEMORY = 2 << 30  # bytes
@@ -45,7 +46,7 @@ def expand(path: Path, arguments: Mapping[str, Any], package_dirs: Iterable[str 
     if find_spec("xacro") is None:
         raise DescriptionError(f"{path}: to expand it, the package xacro is needed; pip install robot-dyn[xacro]")
     if not isinstance(arguments, Mapping):
-        raise DescriptionError(f"xacro must be a mapping of names to values, such as {{}}, got {shorten(arguments)!r}")
+        raise DescriptionError(f"xacro must be a mapping of names to values, such as {{}}, got {shown(arguments)}")
     order = {
         "path": str(path),
         "arguments": {str(name): _text(str(name), value) for name, value in arguments.items()},
@@ -77,7 +78,7 @@ def _text(name: str, value: Any) -> str:
         return str(value).lower()
     if isinstance(value, str | int | float | Path):
         return str(value)
-    raise DescriptionError(f"xacro: {name!r} must be a text, a number or a boolean, got {shorten(value)!r}")
+    raise DescriptionError(f"xacro: {name!r} must be a text, a number or a boolean, got {shown(value)}")
 
 
 class _Arguments(dict[str, str]):

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from robot_dyn.control.cartesian import CartesianReference, circle, line
 from robot_dyn.control.computed_torque import ComputedTorque, FeedForward, PDGravity
-from robot_dyn.control.controller import Controller, gain
+from robot_dyn.control.controller import Controller, numbers
 from robot_dyn.control.independent_joint import PD, PID, gains_from
 from robot_dyn.control.operational_space import OperationalSpace
 from robot_dyn.control.reference import PiecewisePolynomial, hold, quintic, via_points
@@ -247,7 +247,7 @@ class Control(Part):
         names = ("kp", "kd") if stated else ("frequency_rad_per_s", "damping_ratio")
         of_frame = self.kind == "operational_space"
         first, second = (
-            gain(f"control.{name}", getattr(self, name), ("n",))
+            numbers(f"control.{name}", getattr(self, name), (), ("n",), least=0)
             if of_frame
             else per_joint(name, getattr(self, name), model)
             for name in names

@@ -24,7 +24,7 @@ from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.rollout_result import Rollouts
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import MOST_BYTES
-from robot_dyn.validate import choice, instance, integer, joint_values, numbers
+from robot_dyn.validate import choice, instance, integer, joint_values, numbers, shown
 
 RECORDS = ("q", "v", "tau", "energy", "work")
 _SIGNED = ("rest", "wrench", "lower", "upper", "posture")  # coefficients that may be negative
@@ -67,11 +67,11 @@ def rollouts(
         TraceError: If a part of the setup cannot be compiled; names it.
     """
     setup = replace(instance("setup", setup, Setup, "give an rd.Setup"), estimate_error=False)
-    most_bytes = integer("most_bytes", most_bytes)
+    most_bytes = integer("most_bytes", most_bytes, most=2**63 - 1)
     if not steps_whole(setup.integrator):
         raise QueryError("rollouts take an explicit or a Gauss method, such as rd.method('rk4'); simulate takes any")
     if params is not None and not (isinstance(params, Mapping) and all(isinstance(name, str) for name in params)):
-        raise QueryError(f"params must give values by name, such as {{'kp': …}}, got {params!r}")
+        raise QueryError(f"params must give values by name, such as {{'kp': …}}, got {shown(params)}")
     instance("record", record, Iterable, f"give names of {', '.join(RECORDS)}")
     wanted = tuple(choice("record", name, RECORDS) for name in record)
     q, v, free = _starts(setup, q0, v0, params or {})

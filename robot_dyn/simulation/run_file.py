@@ -22,7 +22,7 @@ from robot_dyn.simulation.members import MEMBERS, Member, check_headers, member
 from robot_dyn.simulation.origin import packed, unpacked
 from robot_dyn.simulation.serialise import Arrays, SerialError, build, take_apart
 from robot_dyn.simulation.trajectory import Ending, Trajectory
-from robot_dyn.validate import integer
+from robot_dyn.validate import file_path, integer
 
 FORMAT = 3
 ROLLOUTS_FORMAT = "rollouts 1"

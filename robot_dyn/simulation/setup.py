@@ -72,7 +72,10 @@ class Setup:
             seconds = duration(name, getattr(self, name), zero=name == "record_period_s")
             object.__setattr__(self, name, seconds)
         truth("estimate_error", self.estimate_error)
-        instance("about", self.about, dict, "give texts by name")
+        for text in (
+            text for pair in instance("about", self.about, dict, "give texts by name").items() for text in pair
+        ):
+            instance("about", text, str, "give texts by name")
         if isinstance(self.integrator, Adaptive) and self.step_s != Setup.step_s:
             raise QueryError("step_s has no effect on an Adaptive method; leave it out, or give Adaptive(max_step=…)")
         choice("engine", self.engine, ENGINES)

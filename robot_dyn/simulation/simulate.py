@@ -37,7 +37,7 @@ from robot_dyn.simulation.samples import columns, compiled_rows
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import check_record
 from robot_dyn.simulation.trajectory import Ending, Outcome, Statistics, Trajectory
-from robot_dyn.validate import shown
+from robot_dyn.validate import function
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.machine.machine import Machine
@@ -59,8 +59,7 @@ def simulate(
         QueryError: If the setup is not allowed, or its record would not fit into memory. Whatever happens later is
             told by the trajectory's outcome.
     """
-    if not (on_progress is None or callable(on_progress)):
-        raise QueryError(f"on_progress must be a function of the time reached, or None, got {shown(on_progress)}")
+    function("on_progress", on_progress, "the time reached")
     for name in options.keys() - Setup.__dataclass_fields__.keys():
         raise QueryError(f"simulate: no option {name!r}; {nearest(name, Setup.__dataclass_fields__)}")
     if isinstance(options.get("integrator"), Adaptive):

@@ -192,7 +192,7 @@ def plot(
     instance("run", run, Trajectory, "give the trajectory of rd.simulate")
     instance("only", only, Collection | None, "give names of joints")
     for kind, known, asked in (("plot", PLOTS, names), ("theme", THEMES, (theme,)), ("joint", run.joint_names, only)):
-        for name in asked or ():
+        for name in () if asked is None else asked:
             choice(kind, name, known)
     if not len(run.t):
         raise PlotError("the run has no samples, so there is nothing to draw; simulate again")
@@ -249,10 +249,10 @@ def _view(run: Trajectory, only: Collection[str] | None, limits: np.ndarray | No
     units = tuple(unit("q", None if j is None else j.get("type")) for j in known)
     if limits is None:
         limits = np.array([np.inf if j is None else float(j.find("limit").get("effort")) for j in known])
-    limits = shaped("limits", limits, run.joint_names)  # nan: none is known
-    if limits.ndim != 1:
-        raise QueryError(f"limits must have shape ({len(known)},), got {limits.shape}")
-    return View(run, shown, units, np.where((limits > 0) & (limits < 1e300), limits, np.inf))  # 0: none is stated
+    efforts = shaped("limits", limits, run.joint_names)  # nan: none is known
+    if efforts.ndim != 1:
+        raise QueryError(f"limits must have shape ({len(known)},), got {efforts.shape}")
+    return View(run, shown, units, np.where((efforts > 0) & (efforts < 1e300), efforts, np.inf))  # 0: none is stated
 
 
 def _rate(unit: str) -> str:

@@ -18,7 +18,7 @@ import numpy as np
 
 from robot_dyn.errors import RobotDynError, RobotDynWarning
 
-FUZZERS = ("urdf", "run_files", "scenes", "arguments", "cache")
+FUZZERS = ("urdf", "run_files", "scenes", "arguments", "queries", "cache")
 CASES = int(os.environ.get("ROBOT_DYN_FUZZ_CASES", "300"))  # of each fuzzer in the suite
 MEMORY_BYTES = 4 * 2**30  # of a campaign by hand
 

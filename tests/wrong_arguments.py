@@ -1,0 +1,250 @@
+"""A valid call of every public callable, and what is wrong in place of each of its arguments."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from inspect import isclass, signature
+from pathlib import Path
+from socket import socket
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+import robot_dyn as rd
+from robot_dyn.arithmetic import Arithmetic
+from robot_dyn.control.controller import Controller
+from robot_dyn.effects.effect import Bound, Conservative, Force
+from robot_dyn.integrate.integrator import System
+from tests.queries import ARGUMENTS, FRAMED
+
+Example = tuple[Callable[..., Any], dict[str, Any]]
+NAN, INF = float("nan"), float("inf")
+MASKED = np.ma.masked_array([0.1, 0.2], [False, True])
+NOT_REAL: tuple[Any, ...] = (1j, True, "one", b"1", object(), [[0.1], [0.1, 0.2]], MASKED, 10**400, {}, [True, 0.2], rd)
+NOT_NUMBERS = (*NOT_REAL, NAN, INF, -INF, [0.1, NAN], None, np.ones((7, 1)), np.zeros((0, 3)))
+NOT_WHOLE = (*NOT_NUMBERS, -1, 0.5, [1])
+NOT_TEXT = (None, 3, NAN, True, b"arm", object(), ["arm"], {}, np.ones(2), 10**5000)
+NOT_OBJECTS = (None, 3, NAN, True, "no such", object(), np.ones(2), MASKED, {"a": 1}, rd.Robot, 10**5000)
+
+RESULTS = {"Comparison", "Rollouts", "Trajectory"}  # made by the library: their constructors take what it computed
+# What time loops and traces call, with numbers that were checked before, or symbols.
+INTERFACES = {name for kind in (Force, Conservative, Bound, Controller, Arithmetic) for name in dir(kind)}
+INTERFACES |= {"task_acceleration"}
+LAX = {  # arguments that may be infinite or unknown, or of any shape
+    "ExternalWrench.acts": {"t"},
+    "Adaptive": {"max_step"}, "EffortLimit": {"limit"}, "ExternalWrench": {"start_s", "end_s"},
+    "JointStopDamper": {"lower", "upper"}, "JointStopSpring": {"lower", "upper"}, "PID": {"effort_limit"},
+    "PiecewisePolynomial.at": {"t"}, "Robot.with_": {"lock", "armature"},
+    "midpoint": {"x"}, "radius": {"x"},
+    "joint_stops": {"lower", "upper"}, "plot": {"limits"},
+}  # fmt: skip
+SIGNED = {"Adaptive": ("rtol", "atol", "max_step"), "Payload": ("mass",), "Setup": ("duration_s", "step_s")}
+
+
+def public() -> Iterator[str]:
+    """Names of all public callables: functions, classes and their public methods."""
+    for name in rd.__all__:
+        thing = getattr(rd, name)
+        if (
+            not callable(thing)
+            or thing is rd.Dynamics
+            or (isclass(thing) and issubclass(thing, BaseException | Warning))
+        ):
+            continue  # the protocol is held by Robot and Lagrangian
+        if name not in RESULTS:
+            yield name
+        for method in dir(thing) if isclass(thing) else ():
+            field = method in getattr(thing, "__dataclass_fields__", {})
+            if (
+                not method.startswith("_")
+                and callable(getattr(thing, method))
+                and method not in INTERFACES
+                and not field
+            ):
+                yield f"{name}.{method}"
+
+
+def examples(folder: Path) -> dict[str, Example]:
+    """By name, a callable and arguments that it takes."""
+    robot = rd.load("cart_pole")
+    q, v, u = np.array([0.3, -0.4]), np.array([0.7, 1.1]), np.array([1.3, 0.9])
+    friction, hold = rd.ViscousFriction(0.1), rd.hold(q)
+    plant, own = rd.Plant(robot, [friction]), rd.Lagrangian(robot)
+    setup = rd.Setup(plant, q, duration_s=0.01)
+    run, several = rd.simulate(setup), rd.rollouts(setup, np.tile(q, (2, 1)))
+    saved, scene, urdf = rd.save_run(run, folder / "run"), folder / "scene.toml", folder / "arm.urdf"
+    scene.write_text('robot = "cart_pole"\nduration_s = 0.01\n', encoding="utf-8")
+    urdf.write_bytes(robot.description.xml)
+    adaptive = rd.Adaptive()
+    system = System(lambda t, y: -y, 1)
+    linked = {"frame": "pole", "expressed_in": "body"}
+    given = {"q": q, "v": v, "a": u, "tau": u}
+    made: dict[str, Example] = {
+        f"{kind}.{method}": (
+            getattr(dynamics, method),
+            {name: given[name] for name in names} | ({"frame": "pole"} if method in FRAMED else {}),
+        )
+        for kind, dynamics in (("Robot", robot), ("Lagrangian", own))
+        for method, names in ARGUMENTS.items()
+    }
+    for kind, dynamics in (("Robot", robot), ("Lagrangian", own)):
+        for method in ("jacobian", "jacobian_rate"):
+            made[f"{kind}.{method}"][1]["expressed_in"] = "body"
+        made[f"{kind}.total_energy"] = getattr(dynamics, "total_energy", None), {"q": q, "v": v}
+    stops = {"lower": [-1.0, -2.0], "upper": 1.0}
+    pair = {"model": robot, "reference": hold, "kp": 9.0, "kd": [6.0, 2.0], "period_s": 0.01}
+    points, eye = [q, u, v], np.eye(3)
+    path: Any = rd.line([0.1, 0.2, 0.3], [0.4, 0.2, 0.1], 1.0)
+    return made | {
+        "Adaptive": (rd.Adaptive, {"method": "Radau", "rtol": 1e-8, "atol": 1e-9, "max_step": 0.5}),
+        "Adaptive.solve": (adaptive.solve, {"system": system, "t0": 0.0, "y0": q, "t1": 1.0, "stop": lambda t, y: 1.0}),
+        "Adaptive.steps": (adaptive.steps, {"system": system, "t0": 0.0, "y0": q, "t1": 1.0, "stop": lambda t, y: 1.0}),
+        "Ball": (rd.Ball, {"bits": 53}),
+        "Compiled": (rd.Compiled, {"robot_or_plant": robot, "dtype": "float64", "threads": 1, "cache": False}),
+        "ComputedTorque": (rd.ComputedTorque, pair),
+        "EffortLimit": (rd.EffortLimit, {"limit": [1.0, 2.0]}),
+        "ExternalWrench": (
+            rd.ExternalWrench,
+            linked | {"wrench": [1.0, 2.0, 3.0, 0.1, 0.2, 0.3], "start_s": 0.1, "end_s": 0.2},
+        ),
+        "ExternalWrench.acts": (rd.ExternalWrench("pole", np.ones(6)).acts, {"t": 0.1}),
+        "ExternalWrench.at": (rd.ExternalWrench("pole", np.ones(6)).at, {"placement": np.eye(4)}),
+        "FeedForward": (rd.FeedForward, pair),
+        "JointStopDamper": (rd.JointStopDamper, stops | {"damping": 0.1}),
+        "JointStopSpring": (rd.JointStopSpring, stops | {"stiffness": 0.1}),
+        "Lagrangian": (rd.Lagrangian, {"robot": robot, "dtype": np.float32}),
+        "Lagrangian.mass_matrix_derivative": (own.mass_matrix_derivative, {"q": q}),
+        "OperationalSpace": (
+            rd.OperationalSpace,
+            {"model": robot, "frame": "pole", "reference": path, "kp": 1.0, "kd": [1.0], "posture": q,
+             "posture_kp": 1.0, "posture_kd": 2.0, "rows": (0,), "threshold": 0.01, "period_s": 0.01},
+        ),
+        "PD": (rd.PD, {"reference": hold, "kp": 9.0, "kd": [6.0, 2.0], "period_s": 0.01}),
+        "PDGravity": (rd.PDGravity, pair),
+        "PID": (
+            rd.PID,
+            {"reference": hold, "kp": 9.0, "ki": 1.0, "kd": 2.0, "effort_limit": 3.0, "tracking_time_s": 0.5,
+             "period_s": 0.01},
+        ),
+        "Payload": (rd.Payload, {"frame": "pole", "mass": 0.5, "com": (0.1, 0.2, 0.3), "inertia": eye}),
+        "PiecewisePolynomial": (rd.PiecewisePolynomial, {"breaks": [0.0, 1.0], "coefficients": [[[0.1], [0.2]]]}),
+        "PiecewisePolynomial.at": (hold.at, {"t": 0.1}),
+        "Plant": (rd.Plant, {"dynamics": robot, "effects": [friction]}),
+        "Plant.C": (plant.C, {"q": q, "v": v}),
+        "Plant.M": (plant.M, {"q": q}),
+        "Plant.N": (plant.N, {"t": 0.1, "q": q, "v": v}),
+        "Plant.actuation": (plant.actuation, {"u": u}),
+        "Plant.forward_dynamics": (plant.forward_dynamics, {"t": 0.1, "q": q, "v": v, "u": u}),
+        "Plant.inverse_dynamics": (plant.inverse_dynamics, {"t": 0.1, "q": q, "v": v, "a": u}),
+        "Plant.torque": (plant.torque, {"t": 0.1, "q": q, "v": v}),
+        "RegularisedCoulombFriction": (rd.RegularisedCoulombFriction, {"friction": 0.1, "velocity_scale": [0.1, 0.2]}),
+        "Robot": (rd.Robot, {"description": robot.description, "edits": robot.edits}),
+        "Robot.from_pinocchio": (rd.Robot.from_pinocchio, {"model": robot.model}),
+        "Robot.from_text": (rd.Robot.from_text, {"urdf": robot.description.xml.decode(), "source": "arm"}),
+        "Robot.random_configuration": (getattr(robot, "random_configuration", None), {"rng": np.random.default_rng(0)}),
+        "Robot.with_": (
+            robot.with_,
+            {"gravity": (1.0, 0.0, -9.0), "lock": {"hinge": 0.1}, "payload": rd.Payload("pole", 1.0), "armature": 0.1,
+             "mass_scale": 1.1},
+        ),
+        "Rollouts.outcome": (several.outcome, {"run": 1}),
+        "Setup": (
+            rd.Setup,
+            {"plant": plant, "q0": q, "v0": v, "duration_s": 0.1, "controller": rd.PD(hold, 1.0, 1.0),
+             "integrator": rd.method("rk4"), "step_s": 1e-3, "record_period_s": 0.01, "estimate_error": True,
+             "about": {"note": "text"}, "engine": "interpreted"},
+        ),
+        "Spring": (rd.Spring, {"stiffness": 2.0, "rest": [0.1, -0.2]}),
+        "ViscousFriction": (rd.ViscousFriction, {"damping": [0.1, 0.2]}),
+        "circle": (
+            rd.circle,
+            {"centre": [0.1, 0.2, 0.3], "radius": 0.1, "normal": [0.0, 0.1, 1.0], "period": 1.0, "turns": 1.0,
+             "ramp": 0.1, "toward": [1.0, 0.0, 0.0], "rotation": eye, "start": 0.1},
+        ),
+        "compare": (
+            rd.compare, {"robot": robot, "samples": 1, "seed": 3, "tolerance": 1e-9, "on_sample": print_nothing},
+        ),
+        "euler_lagrange": (
+            rd.euler_lagrange,
+            {"kinetic": lambda t, q, v: v[0] ** 2 / 2, "potential": lambda t, q: ca.cos(q[0]), "n": 1},
+        ),
+        "gains_from": (rd.gains_from, {"inertia_diagonal": [1.0, 2.0], "frequency": 3.0, "damping_ratio": 0.9}),
+        "hold": (rd.hold, {"q": q}),
+        "joint_stops": (rd.joint_stops, stops | {"stiffness": 10.0, "damping": 0.1}),
+        "line": (
+            rd.line,
+            {"p0": [0.1, 0.2, 0.3], "p1": [0.4, 0.2, 0.1], "duration": 1.0, "rotation": eye, "rotation_end": eye,
+             "start": 0.1},
+        ),
+        "linearise": (rd.linearise, {"plant": plant, "q": q, "v": v, "u": u, "t": 0.1}),
+        "list_robots": (rd.list_robots, {}),
+        "load": (rd.load, {"name_or_path": urdf, "package_dirs": [folder], "xacro": None}),
+        "load_run": (rd.load_run, {"path": saved, "max_bytes": 2**30}),
+        "method": (rd.method, {"name": "rk4"}),
+        "midpoint": (rd.midpoint, {"x": rd.Lagrangian(robot, rd.Ball(60)).N(q)}),
+        "radius": (rd.radius, {"x": rd.Lagrangian(robot, rd.Ball(60)).N(q)}),
+        "plot": (rd.plot, {"run": run, "only": ["hinge"], "limits": u, "theme": "dark"}),
+        "quintic": (
+            rd.quintic,
+            {"q0": q, "q1": v, "duration": 1.0, "start": 0.1, "v0": 0.1, "v1": u, "a0": u, "a1": 0.0},
+        ),
+        "read_scene": (rd.read_scene, {"path": scene}),
+        "replay": (
+            rd.replay, {"run": run, "package_dirs": [folder], "frame": "pole", "inertia": True, "port": free_port()},
+        ),
+        "rollouts": (
+            rd.rollouts,
+            {"setup": setup, "q0": [q, u], "v0": [v, u], "params": {"viscous_friction.damping": [0.1, 0.2]},
+             "record": ("q",), "threads": 1, "most_bytes": 10**9},
+        ),
+        "save_plot": (rd.save_plot, {"run": run, "path": folder / "plot.png", "dpi": 50.0, "only": ["hinge"]}),
+        "save_replay": (
+            rd.save_replay,
+            {"run": run, "path": folder / "page", "package_dirs": [folder], "frame": "pole", "inertia": True},
+        ),
+        "save_run": (rd.save_run, {"trajectory": run, "path": folder / "again"}),
+        "save_show": (
+            rd.save_show,
+            {"robot": robot, "path": folder / "still", "q": q, "package_dirs": [folder], "inertia": False},
+        ),
+        "show": (rd.show, {"robot": robot, "q": q, "package_dirs": [folder], "inertia": False, "port": free_port()}),
+        "simulate": (rd.simulate, {"what": plant, "on_progress": lambda t: None, "q0": q, "duration_s": 0.01}),
+        "task_dynamics": (
+            rd.task_dynamics,
+            {"dynamics": robot, "q": q, "v": v, "frame": "pole", "rows": (0,), "threshold": 0.01},
+        ),
+        "via_points": (rd.via_points, {"times": [0.0, 0.5, 1.0], "points": points, "kind": "cubic"}),
+    }  # fmt: skip
+
+
+def print_nothing(*_: object) -> None:
+    """A function of anything."""
+
+
+def free_port() -> int:
+    """A port that nobody listens on."""
+    with socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def wrong(name: str, function: Callable[..., Any], argument: str, value: Any) -> Iterator[Any]:
+    """What is not of the kind of a valid value."""
+    kinds = ((bool, NOT_OBJECTS), (int, NOT_WHOLE), (str, NOT_TEXT), (float | np.ndarray | list | tuple, NOT_NUMBERS))
+    candidates = next((each for kind, each in kinds if isinstance(value, kind)), NOT_OBJECTS)
+    if isinstance(value, list | tuple) and not all(isinstance(x, float | np.ndarray | list | int) for x in value):
+        candidates = NOT_OBJECTS
+    if isinstance(value, Path):
+        candidates = [each for each in candidates if not isinstance(each, str)]
+    if callable(value):
+        candidates = [each for each in candidates if not callable(each)]
+    parameter = signature(function).parameters.get(argument)
+    for each in candidates:
+        if each is None and (parameter is None or parameter.default is None or "None" in str(parameter.annotation)):
+            continue
+        if each is True and isinstance(value, bool):
+            continue
+        yield each
+    if argument in SIGNED.get(name, ()):
+        yield -1.0
