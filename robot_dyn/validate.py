@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Sequence
-from math import inf, isfinite
+from math import hypot, inf, isfinite
 from numbers import Real
 from operator import index
 from pathlib import Path
@@ -20,6 +20,7 @@ from robot_dyn.errors import NotFiniteError, QueryError, RobotDynError, nearest,
 
 Shape = tuple[int | str, ...]  # a length with a name, such as "n", may be any but 0
 Kind = type[RobotDynError]
+_F8 = np.dtype(np.float64)
 _PLAIN = {float, int, np.float64}  # most entries of lists; bool is another class
 
 
@@ -40,11 +41,10 @@ def real(values: Any) -> np.ndarray:
     """
     if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
         raise ValueError("masked entries")
-    if isinstance(values, list | tuple) and not set(map(type, values)) <= _PLAIN:
-        for each in values:  # NumPy takes True for 1, and ignores masks
-            if each.__class__ is not np.ndarray:
-                real(each)
     try:
+        if isinstance(values, list | tuple) and not set(map(type, values)) <= _PLAIN:
+            for each in values:  # NumPy takes True for 1, and ignores masks
+                real(each)
         array = np.asarray(values)
         if array.dtype == object and not isinstance(values, np.ndarray):
             array = _of_objects(array)
@@ -167,6 +167,16 @@ def rows(what: str, values: Any, *shape: int) -> np.ndarray:
     if not np.isfinite(array).all():
         raise QueryError(f"{what} must be finite, got {array[~np.isfinite(array)].flat[0]}")
     return array
+
+
+def is_state(x: Any, shape: tuple[int] | None) -> bool:
+    """Whether x has the form that goes to Pinocchio as it is: float64 of that shape."""
+    return x.__class__ is np.ndarray and x.dtype is _F8 and x.shape == shape
+
+
+def is_moderate(x: np.ndarray, most: float = 1e100) -> bool:
+    """Whether ‖x‖ < most: then x holds neither NaN nor inf, nor numbers whose products overflow."""
+    return hypot(*x.tolist()) < most  # faster than any reduction of NumPy at this size, and never warns
 
 
 def joint_values(what: str, values: Any, joint_names: Sequence[str], arithmetic: Any = None) -> Any:

@@ -49,7 +49,7 @@ def test_an_effect_given_by_name_is_left_as_it_was() -> None:
         (lambda: only(rd.RegularisedCoulombFriction(1.0, {"slide": 0.0})), "velocity_scale must be positive"),
         (lambda: only(rd.JointStopSpring({"slide": 1.0}, {"slide": -1.0}, 1.0)), "lower stops must lie below"),
         (lambda: rd.Plant(rd.Lagrangian(ROBOT), [rd.ViscousFriction("urdf")]), "damping='urdf' needs a Robot"),
-        (lambda: only(rd.ViscousFriction("file")), "damping must be a number"),
+        (lambda: only(rd.ViscousFriction("file")), "damping must be real numbers"),
     ],
 )
 def test_names_and_values_are_checked_when_the_joints_are_known(make, message: str) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 import robot_dyn as rd
 from robot_dyn.arithmetic import Arithmetic
 from robot_dyn.control.controller import Controller
-from robot_dyn.effects.effect import Bound, Conservative, Force
+from robot_dyn.effects.effect import Bound, Conservative, Effect, Force
 from robot_dyn.integrate.integrator import System
 from tests.queries import ARGUMENTS, FRAMED
 
@@ -29,8 +29,9 @@ NOT_OBJECTS = (None, 3, NAN, True, "no such", object(), np.ones(2), MASKED, {"a"
 
 RESULTS = {"Comparison", "Rollouts", "Trajectory"}  # made by the library: their constructors take what it computed
 # What time loops and traces call, with numbers that were checked before, or symbols.
-INTERFACES = {name for kind in (Force, Conservative, Bound, Controller, Arithmetic) for name in dir(kind)}
-INTERFACES |= {"task_acceleration"}
+INTERFACES = (Effect, Controller, Arithmetic)
+FOR_LOOPS = {name for kind in (Force, Conservative, Bound, Controller, Arithmetic) for name in dir(kind)}
+FOR_LOOPS |= {"task_acceleration"}
 LAX = {  # arguments that may be infinite or unknown, or of any shape
     "ExternalWrench.acts": {"t"},
     "Adaptive": {"max_step"}, "EffortLimit": {"limit"}, "ExternalWrench": {"start_s", "end_s"},
@@ -56,12 +57,8 @@ def public() -> Iterator[str]:
             yield name
         for method in dir(thing) if isclass(thing) else ():
             field = method in getattr(thing, "__dataclass_fields__", {})
-            if (
-                not method.startswith("_")
-                and callable(getattr(thing, method))
-                and method not in INTERFACES
-                and not field
-            ):
+            for_loops = issubclass(thing, INTERFACES) and method in FOR_LOOPS
+            if not method.startswith("_") and callable(getattr(thing, method)) and not field and not for_loops:
                 yield f"{name}.{method}"
 
 

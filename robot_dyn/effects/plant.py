@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
+from math import isfinite
 from typing import Any, final
 
 import numpy as np
@@ -17,7 +18,7 @@ from robot_dyn.effects.effect import Bound, Effect, Force
 from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFriction
 from robot_dyn.errors import EffectError, OverflowedError
 from robot_dyn.model.dynamics import Dynamics
-from robot_dyn.validate import check_batches, joint_values, number, shown
+from robot_dyn.validate import check_batches, is_moderate, is_state, joint_values, number, shown
 
 
 @final
@@ -59,7 +60,7 @@ class Plant:
 
     def actuation(self, u: Array) -> Array:
         """What the bounds among the effects leave of the actuation u, (..., n); EffectError if one does not fit."""
-        (u,) = self._states(u=u)
+        (u,) = (u,) if self._is_plain(u) else self._states(u=u)
         return bounded(self.effects, u)
 
     def M(self, q: Array) -> Array:
@@ -87,13 +88,22 @@ class Plant:
             QueryError: If an argument has another shape or is not finite; OverflowedError if the result is not.
             EffectError: If an effect does not fit the joints.
         """
+        if t.__class__ is float and isfinite(t) and self._is_plain(q) and self._is_plain(v):
+            total = self._sum(t, q, v, np.zeros(self.dynamics.n))
+            if is_moderate(total):
+                return total
         t, (q, v) = number("t", t), self._states(q=q, v=v)
-        shape = (*check_batches(q=q, v=v), self.dynamics.n)
+        zeros = np.zeros((*check_batches(q=q, v=v), self.dynamics.n))
         with self._arithmetic.scope(), np.errstate(all="ignore"):  # what overflows is told in words
-            total = np.zeros(shape) if q.dtype != object else self._arithmetic.array(np.zeros(shape))
-            for force in self.forces:
-                total = total + _torque(force, self.dynamics, t, q, v)
-            return self._finite(total)
+            zeros = zeros if q.dtype != object else self._arithmetic.array(zeros)
+            return self._finite(self._sum(t, q, v, zeros))
+
+    def _sum(self, t: float, q: Array, v: Array, zeros: Array) -> Array:
+        """Σ τ_effect of arguments that were checked."""
+        total = zeros
+        for force in self.forces:
+            total = total + _torque(force, self.dynamics, t, q, v, zeros.shape)
+        return total
 
     def inverse_dynamics(self, t: float, q: Array, v: Array, a: Array) -> Array:
         """Actuation Υ = M a + C v + N that gives the acceleration a, (..., n)."""
@@ -104,9 +114,17 @@ class Plant:
         """Acceleration under the actuation u, (..., n)."""
         return self.dynamics.forward_dynamics(q, v, self.actuation(u) + self.torque(t, q, v))
 
-    @property
+    @cached_property
     def _arithmetic(self) -> Arithmetic:
         return getattr(self.dynamics, "arithmetic", FLOAT64)
+
+    @cached_property
+    def _shape(self) -> tuple[int] | None:
+        """Shape of one state, of which the checks are short; None if it has to be made of other numbers."""
+        return (self.dynamics.n,) if self._arithmetic == FLOAT64 else None
+
+    def _is_plain(self, x: Any) -> bool:
+        return is_state(x, self._shape) and is_moderate(x)
 
     def _states(self, **given: Any) -> list[Array]:
         names = self.dynamics.joint_names
@@ -134,13 +152,13 @@ def bounded(effects: Iterable[Effect], u: Array) -> Array:
     return u
 
 
-def _torque(force: Force, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
+def _torque(force: Force, dynamics: Dynamics, t: float, q: Array, v: Array, shape: tuple[int, ...]) -> Array:
     """The torque of one effect; EffectError if it is not one number for each joint."""
-    n, batch = dynamics.n, check_batches(q=q, v=v)
     try:
-        return np.broadcast_to(force.torque(dynamics, t, q, v), (*batch, n))
+        torque = force.torque(dynamics, t, q, v)
+        return torque if np.shape(torque) == shape else np.broadcast_to(torque, shape)
     except (TypeError, ValueError) as error:
-        raise EffectError(f"{force.name} does not fit {n} joints and v of shape {v.shape}: {error}") from None
+        raise EffectError(f"{force.name} does not fit {dynamics.n} joints and v of shape {v.shape}: {error}") from None
 
 
 def stated_friction(dynamics: Any) -> tuple[Effect, ...]:

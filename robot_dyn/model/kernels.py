@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from math import hypot
 from typing import Any
 
 import numpy as np
@@ -21,7 +20,6 @@ from robot_dyn.model.ties import Ties
 from robot_dyn.spatial import block_diagonal, hat
 
 Kernel = Callable[..., Any]  # (model or Bodies, data, q, …) → a fresh array, or a number
-_F8 = np.dtype(np.float64)
 
 
 class Scratch(threading.local):
@@ -29,16 +27,6 @@ class Scratch(threading.local):
 
     def __init__(self, model: Any) -> None:
         self.data = model.createData()
-
-
-def is_state(x: Any, shape: tuple[int] | None) -> bool:
-    """Whether x has the form that goes to Pinocchio as it is: float64 of that shape."""
-    return x.__class__ is ndarray and x.dtype is _F8 and x.shape == shape
-
-
-def is_moderate(x: ndarray, most: float = 1e100) -> bool:
-    """Whether ‖x‖ < most: then x holds neither NaN nor inf, nor numbers whose products overflow."""
-    return hypot(*x.tolist()) < most  # faster than any reduction of NumPy at this size, and never warns
 
 
 def frozen(x: ndarray) -> ndarray:

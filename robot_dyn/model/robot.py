@@ -32,10 +32,10 @@ from robot_dyn.model.description import Description, check
 from robot_dyn.model.dynamics import Array, Axes, Dynamics, acceleration, entry, shape_of
 from robot_dyn.model.edits import Changes, Edits
 from robot_dyn.model.gravity import gravity_acts, no_torque
-from robot_dyn.model.kernels import Kernel, Scratch, frozen, is_moderate, is_state
+from robot_dyn.model.kernels import Kernel, Scratch, frozen
 from robot_dyn.model.structure import structure
 from robot_dyn.model.ties import Ties
-from robot_dyn.validate import instance, shaped
+from robot_dyn.validate import instance, is_moderate, is_state, shaped
 
 _DOUBTFUL = 1e10  # of ‖a‖: M may be singular at this q, which rounding hides
 
