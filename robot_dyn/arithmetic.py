@@ -17,8 +17,8 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.errors import QueryError
-from robot_dyn.validate import integer, real, shown
+from robot_dyn.errors import QueryError, shown
+from robot_dyn.validate import integer, real
 
 Array = Any  # numpy.ndarray of floats, or of flint.arb objects; NumPy's own types do not tell them apart
 

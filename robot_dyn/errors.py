@@ -113,6 +113,14 @@ def shorten(value: object, most: int = 60) -> str:
     return text if len(text) <= most else text[: most - 1] + "…"
 
 
+def shown(value: object) -> str:
+    """A value in a message."""
+    try:
+        return shorten(repr(value))
+    except Exception:  # an int of many digits, or whatever an object's own repr raises
+        return f"a value of type {type(value).__name__}"
+
+
 def nearest(name: str, names: Iterable[str]) -> str:
     """Advice after an unknown name: the nearest valid names, or the first few."""
     names = list(names)

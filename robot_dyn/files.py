@@ -18,8 +18,7 @@ from time import time
 from typing import Any, BinaryIO, final
 
 from robot_dyn.errors import RobotDynError
-from robot_dyn.reading import READ, read_start, why
-from robot_dyn.validate import file_path
+from robot_dyn.reading import READ, file_path, read_start, why
 
 _NEW_S = 10.0  # a younger file may be open and not yet locked
 # Locks tell a file that is being written from an abandoned one. Windows, where no open file can be removed, needs none.

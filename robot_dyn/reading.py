@@ -7,10 +7,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from stat import S_ISDIR, S_ISREG
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
-from robot_dyn.errors import RobotDynError
-from robot_dyn.validate import file_path
+from robot_dyn.errors import RobotDynError, shown
 
 # Opening a pipe would wait for its writer; Windows has no O_NONBLOCK, POSIX no O_BINARY.
 READ = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
@@ -61,6 +60,13 @@ def _opened(path: str | Path, error: type[RobotDynError], remedy: str) -> Binary
 def _refuse_irregular(path: Path, mode: int, error: type[RobotDynError], remedy: str) -> None:
     if not S_ISREG(mode):
         raise error(f"{path}: is {'a folder' if S_ISDIR(mode) else 'not a regular file'}; {remedy}")
+
+
+def file_path(value: Any, error: type[RobotDynError]) -> Path:
+    """The path of a file."""
+    if not isinstance(value, str | os.PathLike):
+        raise error(f"path: give the path of a file, got {shown(value)}")
+    return Path(value)
 
 
 def why(cause: Exception) -> str:

@@ -6,30 +6,20 @@ what was given. Time loops call what is behind these checks.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Collection, Sequence
 from math import hypot, inf, isfinite
 from numbers import Real
 from operator import index
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from robot_dyn.errors import NotFiniteError, QueryError, RobotDynError, nearest, shorten
+from robot_dyn.errors import NotFiniteError, QueryError, RobotDynError, nearest, shorten, shown
 
 Shape = tuple[int | str, ...]  # a length with a name, such as "n", may be any but 0
 Kind = type[RobotDynError]
 _F8 = np.dtype(np.float64)
 _PLAIN = {float, int, np.float64}  # most entries of lists; bool is another class
-
-
-def shown(value: Any) -> str:
-    """A value in a message."""
-    try:
-        return shorten(repr(value))
-    except Exception:  # an int of many digits, or whatever an object's own repr raises
-        return f"a value of type {type(value).__name__}"
 
 
 def real(values: Any) -> np.ndarray:
@@ -260,11 +250,6 @@ def choice(what: str, value: Any, known: Collection[str], *, error: Kind = Query
         told = nearest(value if isinstance(value, str) else "", known)
         raise error(f"no {what} {shown(value)}; {told}")
     return value
-
-
-def file_path(value: Any, error: Kind) -> Path:
-    """The path of a file."""
-    return Path(instance("path", value, str | os.PathLike, "give the path of a file", error=error))
 
 
 def function(what: str, value: Any, arguments: str, *, error: Kind = QueryError) -> Any:

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.errors import RobotDynError, RobotDynWarning
-from robot_dyn.validate import shown
+from robot_dyn.errors import RobotDynError, RobotDynWarning, shown
 from tests.fuzz.campaign import HangError, limited
 from tests.wrong_arguments import LAX, NOT_TEXT, Example, examples, public, wrong
 

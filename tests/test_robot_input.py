@@ -163,7 +163,7 @@ def test_unknown_frame_is_refused_with_the_nearest(method: str, frame: Any):
         getattr(robot, method)(*arguments_of(method, robot.n), frame)
 
 
-@pytest.mark.parametrize("axes", ["wrld", "locale", "WORLDS", "", None, 3, ["world"], 10**5000])
+@pytest.mark.parametrize("axes", ["wrld", "locale", "WORLDS", "", None, 3, ["world"]])
 @pytest.mark.parametrize("method", ["jacobian", "jacobian_rate"])
 def test_unknown_axes_are_refused(method: str, axes: Any):
     robot = rd.load("ur5")

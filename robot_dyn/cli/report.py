@@ -20,6 +20,7 @@ from robot_dyn.model.robot import Robot
 from robot_dyn.model.units import unit, units
 from robot_dyn.simulation.ledger import largest
 from robot_dyn.simulation.trajectory import Trajectory
+from robot_dyn.validate import joint_values
 
 Document = dict[str, Any]
 _WORDS = {"joint", "kind", "from", "quantity", "robot", "where"}  # columns of words; the others hold numbers
@@ -54,7 +55,7 @@ def query(robot: Robot, effects: str, q: np.ndarray, v: np.ndarray, a: np.ndarra
     if tau is None:
         tau = plant.inverse_dynamics(0.0, q, v, a)
     else:
-        a = plant.forward_dynamics(0.0, q, v, tau)
+        a = plant.forward_dynamics(0.0, q, v, joint_values("tau", tau, robot.joint_names))
     acting = {effect.name: effect.torque(robot, 0.0, q, v).tolist() for effect in plant.forces}
     terms = {"M": plant.M(q), "C": plant.C(q, v), "N": plant.N(0.0, q, v)}
     state = {"q": q, "v": v, "a": a, "tau": tau}

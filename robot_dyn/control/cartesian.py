@@ -15,9 +15,9 @@ from robot_dyn.arithmetic import Array
 from robot_dyn.control.controller import ControlError, number, numbers
 from robot_dyn.control.orientation import orientation_error
 from robot_dyn.control.reference import PiecewisePolynomial, hermite, quintic
+from robot_dyn.errors import shown
 from robot_dyn.spatial import rotation as rotation_about
 from robot_dyn.validate import duration as seconds
-from robot_dyn.validate import shown
 
 _MOST_TURNS = 1000
 _TURN_KNOTS, _RAMP_KNOTS = 64, 32  # per turn and per ramp: the accuracy that `circle` states

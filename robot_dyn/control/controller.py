@@ -12,7 +12,7 @@ from typing import Any
 
 from robot_dyn import validate
 from robot_dyn.arithmetic import Array
-from robot_dyn.errors import RobotDynError
+from robot_dyn.errors import RobotDynError, shown
 from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.validate import duration
 
@@ -76,7 +76,7 @@ number, numbers = partial(validate.number, error=ControlError), partial(validate
 def check_model(model: Any) -> None:
     """ControlError if it is not the dynamics of an arm."""
     if isinstance(model, type) or not isinstance(model, Dynamics):
-        raise ControlError(f"model: give a robot, such as rd.load('ur5'), got {validate.shown(model)}")
+        raise ControlError(f"model: give a robot, such as rd.load('ur5'), got {shown(model)}")
 
 
 def freeze(controller: Controller, n: int, *gains: str) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from robot_dyn.arithmetic import Array
 from robot_dyn.control.controller import ControlError, Controller, Memoryless, freeze, number, numbers
 from robot_dyn.control.reference import PiecewisePolynomial
-from robot_dyn.validate import shown
+from robot_dyn.errors import shown
 
 
 @final

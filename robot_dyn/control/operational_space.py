@@ -16,8 +16,8 @@ from robot_dyn.arithmetic import Array, apply, transpose
 from robot_dyn.control.cartesian import CartesianReference
 from robot_dyn.control.controller import ControlError, Memoryless, check_model, freeze, number, numbers
 from robot_dyn.control.orientation import orientation_error
+from robot_dyn.errors import shown
 from robot_dyn.model.dynamics import Dynamics, acceleration
-from robot_dyn.validate import shown
 
 POSITION, POSE = (0, 1, 2), (0, 1, 2, 3, 4, 5)  # rows of a twist
 

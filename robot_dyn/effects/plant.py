@@ -16,9 +16,9 @@ import numpy as np
 from robot_dyn.arithmetic import FLOAT64, Arithmetic, Array
 from robot_dyn.effects.effect import Bound, Effect, Force
 from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFriction
-from robot_dyn.errors import EffectError, OverflowedError
+from robot_dyn.errors import EffectError, OverflowedError, shown
 from robot_dyn.model.dynamics import Dynamics
-from robot_dyn.validate import check_batches, is_moderate, is_state, joint_values, number, shown
+from robot_dyn.validate import check_batches, is_moderate, is_state, joint_values, number
 
 
 @final

@@ -23,14 +23,14 @@ from robot_dyn.arithmetic import (
     in_arithmetic,
     transpose,
 )
-from robot_dyn.errors import QueryError
+from robot_dyn.errors import QueryError, shown
 from robot_dyn.lagrange.linkage import BASE, Configuration, Linkage, linkage
 from robot_dyn.model.batch import answered
 from robot_dyn.model.description import Description
 from robot_dyn.model.dynamics import Axes, Dynamics, acceleration, entry, shape_of
 from robot_dyn.model.tree import Described, tree
 from robot_dyn.spatial import adjoint, adjoint_inverse, block_diagonal, bracket, first_moment, hat, homogeneous
-from robot_dyn.validate import shaped, shown
+from robot_dyn.validate import shaped
 
 
 @final

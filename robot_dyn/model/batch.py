@@ -10,8 +10,8 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from robot_dyn.arithmetic import FLOAT64, Arithmetic, Array
-from robot_dyn.errors import NotFiniteError, OverflowedError, QueryError, RobotDynError, SingularError
-from robot_dyn.validate import check_batches, check_finite, shown
+from robot_dyn.errors import NotFiniteError, OverflowedError, QueryError, RobotDynError, SingularError, shown
+from robot_dyn.validate import check_batches, check_finite
 
 _REFUSALS = (NotFiniteError, OverflowedError, SingularError)  # of a state; all else is wrong with the query
 

@@ -10,9 +10,8 @@ from functools import cache
 from importlib import metadata
 from pathlib import Path
 
-from robot_dyn.errors import CatalogError, nearest, shorten
+from robot_dyn.errors import CatalogError, nearest, shorten, shown
 from robot_dyn.model.packages import environment_folders, package_folders
-from robot_dyn.validate import shown
 
 # Files whose own stem is shared, or says nothing.
 _RENAMED = {

@@ -9,8 +9,8 @@ from typing import Any, Protocol, TypeVar, runtime_checkable
 import numpy as np
 
 from robot_dyn.arithmetic import Array, NotPositiveDefiniteError, cholesky_solve, rounding
-from robot_dyn.errors import OverflowedError, SingularError, UndecidedError
-from robot_dyn.validate import choice, shown
+from robot_dyn.errors import OverflowedError, SingularError, UndecidedError, shown
+from robot_dyn.validate import choice
 
 T = TypeVar("T")
 

@@ -9,9 +9,9 @@ from typing import Any, TypedDict, Unpack, final
 
 import numpy as np
 
-from robot_dyn.errors import EditError, nearest
+from robot_dyn.errors import EditError, nearest, shown
 from robot_dyn.model.urdf import LARGEST
-from robot_dyn.validate import instance, numbers, shown
+from robot_dyn.validate import instance, numbers
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.80665)  # [m/s²], CGPM 1901
 

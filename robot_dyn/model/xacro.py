@@ -17,9 +17,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from robot_dyn.errors import DescriptionError, RobotDynError, nearest, shorten
+from robot_dyn.errors import DescriptionError, RobotDynError, nearest, shorten, shown
 from robot_dyn.model import catalog
-from robot_dyn.validate import shown
 
 SECONDS = 60  # of an expansion
 MEMORY = 2 << 30  # bytes

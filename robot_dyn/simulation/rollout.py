@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from robot_dyn.compiled.threads import thread_count
-from robot_dyn.errors import QueryError, nearest
+from robot_dyn.errors import QueryError, nearest, shown
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.simulation.machine.batch import LANES, Batch
 from robot_dyn.simulation.machine.making import machine
@@ -24,7 +24,7 @@ from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.rollout_result import Rollouts
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import MOST_BYTES
-from robot_dyn.validate import choice, instance, integer, joint_values, numbers, shown
+from robot_dyn.validate import choice, instance, integer, joint_values, numbers
 
 RECORDS = ("q", "v", "tau", "energy", "work")
 _SIGNED = ("rest", "wrench", "lower", "upper", "posture")  # coefficients that may be negative

@@ -16,13 +16,13 @@ import numpy as np
 
 from robot_dyn.errors import RobotDynError, shorten
 from robot_dyn.files import Kind, save, target
-from robot_dyn.reading import reading
+from robot_dyn.reading import file_path, reading
 from robot_dyn.simulation.archive import Archive, ArchiveError, Header, write
 from robot_dyn.simulation.members import MEMBERS, Member, check_headers, member
 from robot_dyn.simulation.origin import packed, unpacked
 from robot_dyn.simulation.serialise import Arrays, SerialError, build, take_apart
 from robot_dyn.simulation.trajectory import Ending, Trajectory
-from robot_dyn.validate import file_path, integer
+from robot_dyn.validate import integer
 
 FORMAT = 3
 ROLLOUTS_FORMAT = "rollouts 1"
