@@ -178,6 +178,7 @@ def examples(folder: Path) -> dict[str, Example]:
         "list_robots": (rd.list_robots, {}),
         "load": (rd.load, {"name_or_path": urdf, "package_dirs": [folder], "xacro": None}),
         "load_run": (rd.load_run, {"path": saved, "max_bytes": 2**30}),
+        "load_rollouts": (rd.load_rollouts, {"path": rd.save_rollouts(several, folder / "all"), "max_bytes": 2**30}),
         "method": (rd.method, {"name": "rk4"}),
         "midpoint": (rd.midpoint, {"x": rd.Lagrangian(robot, rd.Ball(60)).N(q)}),
         "radius": (rd.radius, {"x": rd.Lagrangian(robot, rd.Ball(60)).N(q)}),
@@ -200,6 +201,7 @@ def examples(folder: Path) -> dict[str, Example]:
             rd.save_replay,
             {"run": run, "path": folder / "page", "package_dirs": [folder], "frame": "pole", "inertia": True},
         ),
+        "save_rollouts": (rd.save_rollouts, {"runs": several, "path": folder / "many"}),
         "save_run": (rd.save_run, {"trajectory": run, "path": folder / "again"}),
         "save_show": (
             rd.save_show,

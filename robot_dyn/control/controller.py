@@ -70,7 +70,8 @@ class Memoryless(Controller):
         return z
 
 
-number, numbers = partial(validate.number, error=ControlError), partial(validate.numbers, error=ControlError)
+number = partial(validate.number, error=ControlError)
+numbers = partial(validate.numbers, error=ControlError)
 
 
 def check_model(model: Any) -> None:

@@ -88,6 +88,7 @@ def read_whole(
     path: str | Path, max_bytes: int, form: int | str, members: Mapping[str, Member], checked: Checked[Run]
 ) -> Run:
     """Read what `write_whole` wrote; errors as of `load_run`."""
+    path = file_path(path, RunFileError)
     max_bytes = integer("max_bytes", max_bytes, most=2**63 - 1, error=RunFileError)
     with reading(path, RunFileError, f"write one with robot-dyn simulate … -o {path}") as stream:
         try:

@@ -13,7 +13,19 @@ import numpy as np
 from tests.wrong_arguments import NOT_NUMBERS, NOT_OBJECTS, examples
 
 # These open files, browsers and compilers, or take long by themselves; their arguments are tried one by one elsewhere.
-SLOW = {"Compiled", "compare", "euler_lagrange", "list_robots", "load", "load_run", "plot", "read_scene", "replay"}
+SLOW = {
+    "Compiled",
+    "compare",
+    "euler_lagrange",
+    "list_robots",
+    "load",
+    "load_run",
+    "load_rollouts",
+    "save_rollouts",
+    "plot",
+    "read_scene",
+    "replay",
+}
 SLOW |= {
     "rollouts",
     "Adaptive.solve",
