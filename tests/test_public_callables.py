@@ -34,7 +34,7 @@ def test_wrong_arguments_are_refused(known: dict[str, Example], name: str) -> No
         for each in wrong(name, function, argument, value):
             result = _outcome(function, arguments | {argument: each})
             allowed = argument in LAX.get(name, ()) and (
-                each.__class__ in (float, np.ndarray, dict) or "nan" in shown(each)
+                each.__class__ in (float, np.ndarray, dict) or shown(each) == "-1" or "nan" in shown(each)
             )
             if result and not (result == "accepted" and allowed):
                 bad.append(f"{argument}={shown(each)}: {result}")

@@ -300,7 +300,7 @@ def test_what_has_no_meaning_is_refused() -> None:
         "params: kp must not be negative": {"params": {"kp": [-1.0]}},
         "params: no 'payload_mass:elbow'": {"params": {"payload_mass:elbow": np.ones(3)}},
         "no record 'torque'": {"record": ("torque",)},
-        "threads .* must be a whole number, 1 or more": {"threads": 0},
+        "threads .* must be a whole number, from 1": {"threads": 0},
         "takes 0.0 GiB, more than 0.0 GiB: take a longer record_period_s": {"q0": starts(4), "most_bytes": 100},
     }.items():
         with pytest.raises(QueryError, match=message):

@@ -36,7 +36,7 @@ LAX = {  # arguments that may be infinite or unknown, or of any shape
     "ExternalWrench.acts": {"t"},
     "Adaptive": {"max_step"}, "EffortLimit": {"limit"}, "ExternalWrench": {"start_s", "end_s"},
     "JointStopDamper": {"lower", "upper"}, "JointStopSpring": {"lower", "upper"}, "PID": {"effort_limit"},
-    "PiecewisePolynomial.at": {"t"}, "Robot.with_": {"lock", "armature"},
+    "PiecewisePolynomial.at": {"t"}, "Rollouts.outcome": {"run"}, "Robot.with_": {"lock", "armature"},
     "midpoint": {"x"}, "radius": {"x"},
     "joint_stops": {"lower", "upper"}, "plot": {"limits"},
 }  # fmt: skip
