@@ -82,15 +82,16 @@ def numbers(
         least: They must not be less than this.
         infinite: Whether ±inf is taken as well.
     """
-    wanted = " or ".join(str(shape).replace("'", "") for shape in shapes)
+    lengths = " or ".join(str(shape).replace("'", "") for shape in shapes if shape)
+    one = () in shapes
     try:
         array = np.array(float64(values))
     except ValueError as found:
-        kind = "a real number" if shapes == ((),) else f"real numbers of shape {wanted}"
+        kind = f"real numbers{', one or' if one else ''} of shape {lengths}" if lengths else "a real number"
         raise error(f"{what} must be {kind}, got {found}") from None
     if not any(_fits(array.shape, shape) for shape in shapes):
-        raise error(f"{what} must be one number, got shape {array.shape}" if shapes == ((),) else
-                    f"{what} must have shape {wanted}, got {array.shape}")  # fmt: skip
+        kind = ("be one number or of shape" if one else "have shape") + f" {lengths}" if lengths else "be one number"
+        raise error(f"{what} must {kind}, got {'' if lengths else 'shape '}{array.shape}")
     good = ~np.isnan(array) if infinite else np.isfinite(array)
     if not good.all():
         raise error(f"{what} must be {'a number' if infinite else 'finite'}, got {array[~good][0]}")
@@ -214,6 +215,20 @@ def one_state(what: str, values: Any, joint_names: Sequence[str]) -> np.ndarray:
         raise QueryError(f"{what} must be one state of shape ({len(joint_names)},), got {array.shape}")
     array.setflags(write=False)
     return array
+
+
+def returned(what: str, values: Any, n: int, *, error: Kind) -> None:
+    """Raise the error unless a function returned n finite numbers, shape (n,); `what` is its name."""
+    try:
+        array = float64(values)
+        found = f"shape {array.shape}" if array.shape != (n,) else ""
+        if not (found or np.isfinite(array).all()):
+            found = str(array[~np.isfinite(array)][0])
+    except ValueError as problem:
+        found = str(problem)
+    if found:
+        joints = f"{n} joint{'s' if n > 1 else ''}"
+        raise error(f"{what} returned {found} for {joints} at the start; it must be finite numbers of shape ({n},)")
 
 
 def check_batches(**arrays: Any) -> tuple[int, ...]:

@@ -73,6 +73,7 @@ def test_a_road_that_says_nan_disagrees_in_valid_json(monkeypatch: pytest.Monkey
         ([], r"nothing to compare; give the names of robots, or --all"),
         (["ur5", "--all"], r"give the names of robots or --all, not both"),
         (["ur5", "ur6", "--samples", "1"], r"no robot 'ur6'; nearest: ur5.*"),
+        (["pendulum", "--seed", "-1"], r"seed must be a whole number, from 0 to \d+, got -1"),
     ],
 )
 def test_compare_without_meaning_is_refused_in_one_line(args: list[str], message: str):

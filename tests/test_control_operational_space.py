@@ -232,7 +232,10 @@ FREE = line([0.1, 0.2, 0.3], [0.4, 0.5, 0.6], 1.0)
         (lambda: OperationalSpace(PANDA, "panda_hand", FREE, 1.0, 1.0, rows=POSE), "which the reference leaves free"),
         (lambda: OperationalSpace(PANDA, "panda_hand", FREE, 1.0, 1.0, rows=(1, 0)), "rows must be increasing"),
         (lambda: OperationalSpace(PANDA, "panda_hand", FREE, 1.0, 1.0, rows=(0.5,)), "rows must be increasing"),
-        (lambda: OperationalSpace(PANDA, "panda_hand", R_HOLD, [1.0] * 3, 1.0), r"kp must have shape \(\) or \(6,\)"),
+        (
+            lambda: OperationalSpace(PANDA, "panda_hand", R_HOLD, [1.0] * 3, 1.0),
+            r"kp must be one number or of shape \(6,\)",
+        ),
         (lambda: OperationalSpace(PANDA, "panda_hand", FREE, 1.0, -1.0), "kd must not be negative"),
         (lambda: OperationalSpace(PANDA, "panda_hand", FREE, 1.0, 1.0, posture_kp=2.0), "posture_kp needs a posture"),
         (lambda: OperationalSpace(PANDA, "panda_hand", FREE, 1.0, 1.0, posture=[0.0]), "posture must have shape"),

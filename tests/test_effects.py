@@ -241,3 +241,21 @@ def test_coefficients_are_copied_and_frozen() -> None:
     assert effect.damping[0] == 1.0
     with pytest.raises(ValueError, match="read-only"):
         effect.damping[0] = 3.0
+
+
+@pytest.mark.parametrize(
+    ("effect", "coefficient"),
+    [
+        (rd.ViscousFriction([1.0, 2.0, 3.0]), "damping"),
+        (rd.RegularisedCoulombFriction(1.0, [1.0, 2.0, 3.0]), "velocity_scale"),
+        (rd.Spring(1.0, [1.0, 2.0, 3.0]), "rest"),
+        (rd.JointStopSpring([-1.0, -1.0, -1.0], 1.0, 1.0), "lower"),
+        (rd.JointStopDamper(-1.0, [1.0, 1.0, 1.0], 1.0), "upper"),
+        (rd.EffortLimit([1.0, 2.0, 3.0]), "limit"),
+        (rd.ViscousFriction([1.0]), "damping"),
+    ],
+    ids=lambda each: getattr(each, "name", each),
+)
+def test_coefficients_of_another_number_of_joints_are_told_at_the_plant(effect: Effect, coefficient: str) -> None:
+    with pytest.raises(EffectError, match=f"{effect.name}: {coefficient} is of [13] joints?, the arm has 2"):
+        rd.Plant(rd.load("cart_pole"), [effect])

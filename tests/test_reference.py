@@ -216,7 +216,7 @@ def test_references_are_copied_and_frozen() -> None:
         (lambda: hold([[1.0], [1.0, 2.0]]), "q must be real numbers"),
         (lambda: quintic(Q0, Q1[:2], 1.0), r"q1 must have shape \(3,\), got \(2,\)"),
         (lambda: quintic(Q0, Q1, 0.0), "duration must be a positive number of seconds"),
-        (lambda: quintic(Q0, Q1, 1.0, v0=[1.0]), "v0 must have shape"),
+        (lambda: quintic(Q0, Q1, 1.0, v0=[1.0]), r"v0 must be one number or of shape \(3,\)"),
         (lambda: via_points([0.0, 1.0], POINTS), r"times must have shape \(6,\)"),
         (lambda: via_points(TIMES[::-1], POINTS), "times must increase"),
         (lambda: via_points(TIMES, POINTS, kind="linear"), "known: cubic, quintic"),

@@ -103,7 +103,7 @@ def test_payload_is_a_link_fastened_by_a_fixed_joint(tmp_path: Path):
         ({"lock": 0.5}, "lock"),
         ({"lock": ["elbow_joint"]}, "lock"),
         ({"armature": -0.1}, "armature of 'shoulder_pan_joint' must not be negative"),
-        ({"armature": [0.1, 0.2]}, r"armature must have shape \(\) or \(6,\)"),
+        ({"armature": [0.1, 0.2]}, r"armature must be one number or of shape \(6,\)"),
         ({"armature": "big"}, "armature"),
         ({"armature": {"wrist_4_joint": 0.1}}, "armature: no joint 'wrist_4_joint' .*nearest: wrist_"),
         ({"gravity": (0, -9.8)}, r"gravity must have shape \(3,\)"),

@@ -86,7 +86,7 @@ def test_operational_space_takes_gains_of_the_frame(tmp_path) -> None:
     circle += "\nto_centre = [1.0, 0.0, 0.0]"
     law = built(tmp_path, "operational_space", f"kp = 100.0\nkd = 20.0\n{circle}")
     assert (law.kp, law.kd, law.posture_kp) == (100.0, 20.0, 10.0)
-    with pytest.raises(SceneError, match="kp must be an array of numbers"):
+    with pytest.raises(SceneError, match=r"kp must be real numbers, one or of shape \(n,\), got {'joint_1': 1.0}"):
         built(tmp_path, "operational_space", f"kp = {{joint_1 = 1.0}}\nkd = 20.0\n{circle}")
 
 

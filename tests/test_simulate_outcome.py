@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.control.controller import Memoryless
+from robot_dyn.control.controller import ControlError, Memoryless
 from robot_dyn.effects.effect import Active, Conservative
-from robot_dyn.errors import QueryError
+from robot_dyn.errors import EffectError, QueryError
 from robot_dyn.simulation import record
 from robot_dyn.simulation.machine.machine import Machine
 
@@ -155,14 +155,14 @@ GOOD = {**START, "duration_s": 0.1}
     [
         ({"q0": [0.1, 0.2, 0.3]}, r"q0 must have shape \(2,\).*got \(3,\)"),
         ({"q0": [[0.1, 0.2]]}, r"q0 must be one state of shape \(2,\)"),
-        ({"q0": "up"}, "q0 must be an array of 2 numbers"),
+        ({"q0": "up"}, "q0 must be an array of 2 real numbers, got 'up'"),
         ({"v0": [0.1, np.nan]}, "v0 must be finite, got nan for joint 'joint_2'"),
         ({"v0": 0.0}, r"v0 must have shape \(2,\)"),
-        ({"duration_s": -1.0}, "duration_s must be a positive number of seconds, got -1.0"),
-        ({"duration_s": np.nan}, "duration_s must be a positive"),
-        ({"duration_s": np.inf}, "duration_s must be a positive"),
-        ({"step_s": 0}, "step_s must be a positive number of seconds, got 0"),
-        ({"step_s": "fine"}, "step_s must be a positive"),
+        ({"duration_s": -1.0}, "duration_s must be a positive number of seconds, 1e-12 at least; got -1"),
+        ({"duration_s": np.nan}, "duration_s must be finite, got nan"),
+        ({"duration_s": np.inf}, "duration_s must be finite, got inf"),
+        ({"step_s": 0}, "step_s must be a positive number of seconds, 1e-12 at least; got 0"),
+        ({"step_s": "fine"}, "step_s must be a real number, got 'fine'"),
         ({"record_period_s": -0.1}, "record_period_s must"),
         ({"controller": rd.PD(rd.hold([0.0, 0.0, 0.0]), 1.0, 1.0)}, "drives 3 joints, the plant has 2"),
         ({"controller": 3}, "controller"),
@@ -187,9 +187,9 @@ def test_a_robot_alone_is_a_plant_without_effects() -> None:
 @pytest.mark.parametrize(
     ("effect", "message"),
     [
-        (rd.ViscousFriction([0.1, 0.2, 0.3]), "fit|shape"),
-        (rd.Spring([0.1, 0.2, 0.3]), "fit|shape"),
-        (rd.EffortLimit([0.1, 0.2, 0.3]), "fit|shape"),
+        (rd.ViscousFriction([0.1, 0.2, 0.3]), "viscous_friction: damping is of 3 joints, the arm has 2"),
+        (rd.Spring([0.1, 0.2, 0.3]), "spring: stiffness is of 3 joints, the arm has 2"),
+        (rd.EffortLimit([0.1, 0.2, 0.3]), "effort_limit: limit is of 3 joints, the arm has 2"),
         (rd.ExternalWrench("tipp", np.ones(6)), "no frame 'tipp'; nearest: tip"),
     ],
     ids=lambda each: getattr(each, "name", ""),
@@ -200,6 +200,64 @@ def test_an_effect_that_does_not_fit_the_robot_is_refused(method, effect, messag
     law = rd.PD(rd.hold([0.1, 0.2]), 3.0, 1.0)
     with pytest.raises(rd.RobotDynError, match=message):
         rd.simulate(rd.Plant(DOUBLE, [effect]), **GOOD, controller=law, integrator=method)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Blow(Active):
+    """An effect that returns what it is told to."""
+
+    given: object
+
+    def torque(self, dynamics, t, q, v):
+        return self.given
+
+
+@final
+class Law(Memoryless):
+    """A controller that returns what it is told to."""
+
+    n = 2
+
+    def __init__(self, given: object = None, period_s: object = 0.0) -> None:
+        self.given, self.period_s = given, period_s
+
+    def torque(self, t, q, v, z):
+        return self.given
+
+
+@pytest.mark.parametrize(
+    ("given", "found"),
+    [
+        (np.ones(3), r"shape \(3,\)"),
+        (np.ones((1, 2)), r"shape \(1, 2\)"),
+        (0.3, r"shape \(\)"),
+        ([0.1, np.nan], "nan"),
+        ([0.1, -np.inf], "-inf"),
+        ([0.1, 1j], r"\[0.1, 1j\]"),
+        (None, "None"),
+        ("much", "'much'"),
+    ],
+    ids=str,
+)
+def test_code_of_ones_own_returns_one_number_for_each_joint(given: object, found: str) -> None:
+    """Told with the name of its class; a scalar or (1, n) would else be broadcast without a word."""
+    with pytest.raises(EffectError, match=rf"Blow\.torque returned {found} for 2 joints"):
+        rd.Setup(rd.Plant(DOUBLE, [Blow(given)]), [0.3, -0.4])
+    with pytest.raises(ControlError, match=rf"Law\.torque returned {found} for 2 joints"):
+        rd.Setup(rd.Plant(DOUBLE), [0.3, -0.4], controller=Law(given))
+
+
+@pytest.mark.parametrize("period", [-0.1, np.nan, np.inf, 1e-15, "often", None, True, [0.1, 0.2]], ids=str)
+def test_a_period_of_ones_own_controller_is_a_time(period: object) -> None:
+    with pytest.raises(QueryError, match="period_s of the controller must be"):
+        rd.Setup(rd.Plant(DOUBLE), [0.3, -0.4], controller=Law(np.ones(2), period))
+
+
+def test_a_plant_in_ball_arithmetic_is_refused() -> None:
+    """Runs are floats: balls in a float array are not numbers at all."""
+    with pytest.raises(QueryError, match="plant: runs are computed in floats"):
+        rd.Setup(rd.Plant(rd.Lagrangian(DOUBLE, rd.Ball(60))), [0.3, -0.4])
 
 
 def test_a_companion_whose_energy_overflows_is_no_end_of_the_run() -> None:

@@ -59,7 +59,7 @@ def unit_mass(t, q, v):
         (lambda: box(1.0, 0.1, -0.2, 0.3), "ly must be positive"),
         (lambda: box(1.0, 1e200, 0.2, 0.3), "inertia must be finite"),
         (lambda: cylinder(np.nan, 0.1, 0.2), "mass must be finite"),
-        (lambda: from_density(lambda x: x, np.zeros(3), np.ones(3)), r"must have shape \(\) or"),
+        (lambda: from_density(lambda x: x, np.zeros(3), np.ones(3)), r"must be one number or of shape"),
         (lambda: from_density(lambda x: x[:, 0] - 1, np.zeros(3), np.ones(3)), "must not be negative"),
         (lambda: from_density(lambda x: 0.0, np.zeros(3), np.ones(3)), "no centre of mass"),
         (lambda: from_density(lambda x: 1.0, np.ones(3), np.ones(3)), "lower < upper"),

@@ -36,7 +36,8 @@ LAX = {  # arguments that may be infinite or unknown, or of any shape
     "ExternalWrench.acts": {"t"},
     "Adaptive": {"max_step"}, "EffortLimit": {"limit"}, "ExternalWrench": {"start_s", "end_s"},
     "JointStopDamper": {"lower", "upper"}, "JointStopSpring": {"lower", "upper"}, "PID": {"effort_limit"},
-    "PiecewisePolynomial.at": {"t"}, "Rollouts.outcome": {"run"}, "Robot.with_": {"lock", "armature"},
+    "PiecewisePolynomial.at": {"t"}, "Samples.at": {"t"},
+    "Rollouts.outcome": {"run"}, "Robot.with_": {"lock", "armature"},
     "midpoint": {"x"}, "radius": {"x"},
     "joint_stops": {"lower", "upper"}, "plot": {"limits"},
 }  # fmt: skip
@@ -73,6 +74,8 @@ def examples(folder: Path) -> dict[str, Example]:
     saved, scene, urdf = rd.save_run(run, folder / "run"), folder / "scene.toml", folder / "arm.urdf"
     scene.write_text('robot = "cart_pole"\nduration_s = 0.01\n', encoding="utf-8")
     urdf.write_bytes(robot.description.xml)
+    table = folder / "samples.csv"
+    table.write_text("t [s],q x [m],q y [rad]\n0,0.1,0.2\n1,0.3,0.5\n", encoding="utf-8")
     adaptive = rd.Adaptive()
     system = System(lambda t, y: -y, 1)
     linked = {"frame": "pole", "expressed_in": "body"}
@@ -146,6 +149,9 @@ def examples(folder: Path) -> dict[str, Example]:
              "mass_scale": 1.1},
         ),
         "Rollouts.outcome": (several.outcome, {"run": 1}),
+        "Samples": (rd.Samples, {"t": [0.0, 0.5, 1.0], "q": points, "v": points, "a": points}),
+        "Samples.at": (rd.Samples([0.0, 0.5, 1.0], points).at, {"t": 0.1}),
+        "Samples.from_csv": (rd.Samples.from_csv, {"path": table, "joint_names": ["y", "x"]}),
         "Setup": (
             rd.Setup,
             {"plant": plant, "q0": q, "v0": v, "duration_s": 0.1, "controller": rd.PD(hold, 1.0, 1.0),

@@ -22,10 +22,12 @@ from robot_dyn.control.controller import ControlError, numbers
 from robot_dyn.control.reference import PiecewisePolynomial, hermite, increasing
 from robot_dyn.errors import nearest, shorten
 from robot_dyn.reading import read
+from robot_dyn.validate import instance
 
 MAX_BYTES = 2**28  # of a table
 _HEAD = re.compile(r"\s*(t|[qva]|tau|power|energy|residual)(?:\s+(.*?))?(?:\s*\[[^]]*\])?\s*")
 _GIVEN = "t", "q", "v", "a"
+_NAMES = "give names of joints, such as robot.joint_names"
 
 
 @final
@@ -47,6 +49,7 @@ class Samples(PiecewisePolynomial):
         ControlError: If times do not increase, shapes do not match or accelerations are given without velocities.
     """
 
+    @np.errstate(all="ignore")  # what overflows is refused as not finite
     def __init__(self, t: Any, q: Any, v: Any = None, a: Any = None) -> None:
         q = numbers("q", q, ("m", "n"))
         if len(q) < 2:
@@ -76,6 +79,9 @@ class Samples(PiecewisePolynomial):
         Raises:
             ControlError: If it cannot be read, a column or a joint is unknown or missing, or an entry is not a number.
         """
+        if joint_names is not None:
+            for name in instance("joint_names", joint_names, list | tuple, _NAMES, error=ControlError):
+                instance("joint_names", name, str, _NAMES, error=ControlError)
         data = read(path, MAX_BYTES, ControlError, "give a CSV file with columns t, q …")
         try:
             lines = csv.reader(data.decode("utf-8-sig").splitlines(), strict=True)

@@ -24,6 +24,8 @@ class EffortLimit(Bound):
 
     limit: Any
 
+    coefficients = ("limit",)
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "limit", coefficient("limit", self.limit, least=0, infinite=True))
 

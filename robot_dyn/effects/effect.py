@@ -11,7 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
 from math import inf
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -29,7 +29,12 @@ class Effect:
     """Something that acts on the joints: a `Force` or a `Bound`; a plant refuses anything else.
 
     Subclass one of the four kinds below.
+
+    Attributes:
+        coefficients: Names of those of its attributes that are one number, or one for each joint.
     """
+
+    coefficients: ClassVar[tuple[str, ...]] = ()
 
     @property
     def name(self) -> str:
@@ -40,8 +45,16 @@ class Effect:
         """This effect with coefficients given by joint name, or "urdf", made arrays (n,) of these joints.
 
         Raises:
-            EffectError: If a joint is unknown, or no file states the coefficient.
+            EffectError: If a joint is unknown, no file states the coefficient, or one is of another number of joints.
         """
+        for key in self.coefficients:
+            values = getattr(self, key)
+            if isinstance(values, np.ndarray) and values.ndim and values.shape != (dynamics.n,):
+                count = f"{len(values)} joint{'s' if len(values) > 1 else ''}"
+                raise EffectError(
+                    f"{self.name}: {key} is of {count}, the arm has {dynamics.n}; give one number for all, or one for"
+                    " each joint"
+                )
         if not is_dataclass(self):
             return self
         named = {field.name: getattr(self, field.name) for field in fields(self) if field.init}

@@ -25,6 +25,8 @@ class ViscousFriction(Dissipative):
 
     damping: Any
 
+    coefficients = ("damping",)
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "damping", coefficient("damping", self.damping, least=0))
 
@@ -46,6 +48,8 @@ class RegularisedCoulombFriction(Dissipative):
 
     friction: Any
     velocity_scale: Any = 0.01
+
+    coefficients = "friction", "velocity_scale"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "friction", coefficient("friction", self.friction, least=0))

@@ -35,6 +35,8 @@ class JointStopSpring(Conservative):
     upper: Any
     stiffness: Any
 
+    coefficients = "lower", "upper", "stiffness"
+
     def __post_init__(self) -> None:
         _check_stops(self)
         object.__setattr__(self, "stiffness", coefficient("stiffness", self.stiffness, least=0))
@@ -69,6 +71,8 @@ class JointStopDamper(Dissipative):
     lower: Any
     upper: Any
     damping: Any
+
+    coefficients = "lower", "upper", "damping"
 
     def __post_init__(self) -> None:
         _check_stops(self)

@@ -102,7 +102,7 @@ class Plant:
         """Σ τ_effect of arguments that were checked."""
         total = zeros
         for force in self.forces:
-            total = total + _torque(force, self.dynamics, t, q, v, zeros.shape)
+            total = total + torque_of(force, self.dynamics, t, q, v, zeros.shape)
         return total
 
     def inverse_dynamics(self, t: float, q: Array, v: Array, a: Array) -> Array:
@@ -152,11 +152,13 @@ def bounded(effects: Iterable[Effect], u: Array) -> Array:
     return u
 
 
-def _torque(force: Force, dynamics: Dynamics, t: float, q: Array, v: Array, shape: tuple[int, ...]) -> Array:
-    """The torque of one effect; EffectError if it is not one number for each joint."""
+def torque_of(
+    force: Force, dynamics: Dynamics, t: float, q: Array, v: Array, shape: tuple[int, ...] | None = None
+) -> Array:
+    """The torque of one effect, of the shape if one is given; EffectError if it does not fit the joints."""
     try:
         torque = force.torque(dynamics, t, q, v)
-        return torque if np.shape(torque) == shape else np.broadcast_to(torque, shape)
+        return torque if shape is None or np.shape(torque) == shape else np.broadcast_to(torque, shape)
     except (TypeError, ValueError) as error:
         raise EffectError(f"{force.name} does not fit {dynamics.n} joints and v of shape {v.shape}: {error}") from None
 

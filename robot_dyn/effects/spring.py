@@ -23,6 +23,8 @@ class Spring(Conservative):
     stiffness: Any
     rest: Any = 0.0
 
+    coefficients = "stiffness", "rest"
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "stiffness", coefficient("stiffness", self.stiffness, least=0))
         object.__setattr__(self, "rest", coefficient("rest", self.rest))

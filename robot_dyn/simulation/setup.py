@@ -10,17 +10,17 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
-from robot_dyn.control.controller import Controller
-from robot_dyn.effects.plant import Plant
-from robot_dyn.errors import OverflowedError, QueryError
+from robot_dyn.arithmetic import Array, Ball
+from robot_dyn.control.controller import ControlError, Controller
+from robot_dyn.effects.plant import Plant, torque_of
+from robot_dyn.errors import EffectError, OverflowedError, QueryError
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.integrate.explicit import RK4
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.simulation.schedule import LEAST_STEPS, Stretch, cuts, steps_on
 from robot_dyn.simulation.size import check_segments
 from robot_dyn.simulation.smoothness import may_switch
-from robot_dyn.validate import choice, duration, instance, one_state, truth
+from robot_dyn.validate import choice, duration, instance, integer, one_state, returned, truth
 
 ENGINES = ("auto", "interpreted", "compiled")
 _LONGEST_STEP_S, _LEAST_STEPS = 0.01, 200  # where something may switch between steps
@@ -62,6 +62,10 @@ class Setup:
 
     def __post_init__(self) -> None:
         instance("plant", self.plant, Plant, "give one, as rd.Plant(robot)")
+        if isinstance(getattr(self.plant.dynamics, "arithmetic", None), Ball):
+            raise QueryError(
+                "plant: runs are computed in floats, got dynamics in ball arithmetic; give rd.Plant(robot)"
+            )
         names = self.plant.dynamics.joint_names
         if self.v0 is None:
             object.__setattr__(self, "v0", np.zeros(len(names)))
@@ -84,12 +88,26 @@ class Setup:
             duration("period_s of the controller", self.controller.period_s, zero=True)
             if self.controller.n != len(names):
                 raise QueryError(f"the controller drives {self.controller.n} joints, the plant has {len(names)}")
+            integer("memory_size of the controller", self.controller.memory_size)
         self._check_model()
         check_segments(self)
-        self.plant.torque(0.0, self.q0, self.v0)  # so that an effect that does not fit is told now
+        self._check_torques()
         self.plant.actuation(np.zeros(len(names)))
         with suppress(OverflowedError):  # a start so far out is the outcome of a run
             self.plant.forward_dynamics(0.0, self.q0, self.v0, np.zeros(len(names)))  # a singular M is told at once
+
+    def _check_torques(self) -> None:
+        """That what the controller and each effect return at the start is one number for each joint."""
+        dynamics, controller = self.plant.dynamics, self.controller
+        with np.errstate(all="ignore"):
+            for force in self.plant.forces:
+                torque = torque_of(force, dynamics, 0.0, self.q0, self.v0)
+                returned(f"{type(force).__name__}.torque", torque, dynamics.n, error=EffectError)
+        if controller is None:
+            return
+        with np.errstate(all="ignore"), suppress(OverflowedError):  # of its model: the outcome of a run
+            torque = controller.torque(0.0, self.q0, self.v0, np.zeros(controller.memory_size))
+            returned(f"{type(controller).__name__}.torque", torque, dynamics.n, error=ControlError)
 
     def _check_model(self) -> None:
         """That the controller means the joints and links of the plant; a file with other names all over may fit too."""
