@@ -19,7 +19,7 @@ import numpy as np
 from robot_dyn.errors import RobotDynError, RobotDynWarning
 
 FUZZERS = ("urdf", "run_files", "scenes", "arguments", "queries", "cache")
-CASES = int(os.environ.get("ROBOT_DYN_FUZZ_CASES", "300"))  # of each fuzzer in the suite
+CASES = int(os.environ.get("ROBOT_DYN_FUZZ_CASES", "334"))  # of each of six fuzzers in the suite
 MEMORY_BYTES = 4 * 2**30  # of a campaign by hand
 
 
