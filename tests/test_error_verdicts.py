@@ -45,6 +45,13 @@ def test_estimates_of_smooth_runs_are_within_a_factor_of_three() -> None:
     assert len(outside) <= 1, outside
 
 
+@pytest.mark.parametrize("index", [292, 460])
+def test_steps_that_ticks_bound_and_no_tolerance_are_made_shorter_by_companions(index: int) -> None:
+    """Sampled control, whose every period is one step of DOP853 at any of the tolerances."""
+    judged = judge(1, index)
+    assert not judged.misleads, str(judged)
+
+
 def toss(gap: float, stiffness: float, speed: float = 10.0, **options) -> rd.Trajectory:
     """1 kg tossed up, a stop `gap` below its apex."""
     apex = speed**2 / (2 * 9.80665)

@@ -145,7 +145,10 @@ def _adaptively(
     key: int, counter: Counter, watch: Watch,
 ) -> Iterator[Sample]:  # fmt: skip
     n, factor, period = system.n, float(pace), setup.record_period_s or setup.duration_s / _SAMPLES
-    longest = min(method.max_step, setup.longest_step_s) * factor ** (1 / _LOCAL_ORDER)
+    longest = min(method.max_step, setup.longest_step_s)
+    if factor < 1:  # where the ends of segments bound the steps, a tolerance by itself changes nothing
+        longest = min(longest, stretch.end - stretch.start)
+    longest *= factor ** (1 / _LOCAL_ORDER)
     method = replace(method, rtol=method.rtol * factor, atol=method.atol * factor, max_step=longest)
 
     def sane(_: float, y: Array) -> float:
