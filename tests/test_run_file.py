@@ -159,6 +159,7 @@ def said(text: np.ndarray, **changes) -> np.ndarray:
         ("about", lambda text: np.array([str(text)]), "'about' holds .*not one text"),
         ("about", lambda text: said(text, format=2), "it has format 2, this version reads 3; simulate again"),
         ("about", lambda text: said(text, format="3"), "it has format '3'"),
+        ("about", lambda text: said(text, format={"a": 3}), "it has format {'a': 3}"),
         ("about", lambda text: said(text, novelty=3), "'novelty' is not known to this version"),
         ("about", lambda text: said(text, about__urdf=3), "'about/urdf' holds 3, not str"),
         ("about", lambda text: said(text, about__urdf="\ud800"), "'about/urdf' holds half a character"),

@@ -117,7 +117,7 @@ def _about(archive: Archive, form: int | str) -> dict[str, Any]:
         raise ArchiveError(f"member 'about' is not the JSON of a run ({type(error).__name__})") from None
     if found != form:
         other = "; rd.load_rollouts reads it" if found == ROLLOUTS_FORMAT else "; rd.load_run reads it"
-        also = other if {found, form} == {FORMAT, ROLLOUTS_FORMAT} else ""
+        also = other if found in (FORMAT, ROLLOUTS_FORMAT) else ""
         raise ArchiveError(f"it has format {shorten(repr(found))}, this version reads {form!r}{also}")
     return about
 
