@@ -93,10 +93,6 @@ class CompiledDynamics(Dynamics):
     def _ones(self) -> OnFirstUse:
         return self.engine.ones
 
-    @cached_property
-    def _like(self) -> np.ndarray:
-        return self.engine.like
-
     @property
     def instructions(self) -> dict[str, dict[str, int]]:
         """Instructions by formulation, of each quantity used so far; the first is the one that won."""
@@ -145,7 +141,7 @@ class CompiledDynamics(Dynamics):
         self, q: Array, v: Array, a: Array, *, out: np.ndarray | None = None, errors: str = "raise"
     ) -> Any:
         y = empty(*self._vector) if out is None else out
-        if not self._ones["inverse_dynamics"](q, v, a, y, self._like):
+        if not self._ones["inverse_dynamics"](q, v, a, y):
             return y
         return self._ask("inverse_dynamics", (q, v, a), out, errors)
 
@@ -153,7 +149,7 @@ class CompiledDynamics(Dynamics):
         self, q: Array, v: Array, tau: Array, *, out: np.ndarray | None = None, errors: str = "raise"
     ) -> Any:
         y = empty(*self._vector) if out is None else out
-        if not self._ones["forward_dynamics"](q, v, tau, y, self._like):
+        if not self._ones["forward_dynamics"](q, v, tau, y):
             return y
         return self._ask("forward_dynamics", (q, v, tau), out, errors)
 
@@ -192,7 +188,7 @@ class CompiledDynamics(Dynamics):
 
     def _fast(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None, errors: str, shape: Any) -> Any:
         y = empty(shape, self._vector[1]) if out is None else out
-        if not self._ones[quantity](*arguments, y, self._like):
+        if not self._ones[quantity](*arguments, y):
             return y
         return self._ask(quantity, arguments, out, errors)
 

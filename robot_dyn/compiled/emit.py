@@ -8,8 +8,8 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
+from robot_dyn.compiled.from_casadi import OperationError
 from robot_dyn.compiled.source import Line, Source
-from robot_dyn.errors import RobotDynError
 
 _BINARY = {ca.OP_ADD: "+", ca.OP_SUB: "-", ca.OP_MUL: "*", ca.OP_DIV: "/"}
 _COMPARE = {ca.OP_LT: "<", ca.OP_LE: "<=", ca.OP_EQ: "==", ca.OP_NE: "!="}
@@ -51,10 +51,6 @@ _OF_TWO = {
 _MOVES = {ca.OP_INPUT, ca.OP_OUTPUT, ca.OP_CONST}
 
 
-class EmitError(RobotDynError):
-    """A CasADi Function that cannot be written as straight-line code."""
-
-
 def emit(function: ca.Function) -> Source:
     """The straight-line code of a Function of dense vectors.
 
@@ -62,10 +58,10 @@ def emit(function: ca.Function) -> Source:
         function: Of SX; each input and output a dense column.
 
     Raises:
-        EmitError: If an operation has no code here, or a result is sparse.
+        OperationError: If an operation has no code here, or a result is sparse.
     """
     if not all(function.sparsity_out(i).is_dense() for i in range(function.n_out())):
-        raise EmitError("a result is sparse: its instructions would number what is stored; densify it")
+        raise OperationError("a result is sparse: its instructions would number what is stored; densify it")
     inputs = tuple(function.numel_in(i) for i in range(function.n_in()))
     starts = np.concatenate([[0], np.cumsum([function.numel_out(i) for i in range(function.n_out())])]).tolist()
     names: dict[int, str] = {}  # of what each place of CasADi's work vector holds now
@@ -106,10 +102,5 @@ def _expression(operation: int, names: tuple[str, ...]) -> str:
         return f"(one if {names[0]} {_COMPARE[operation]} {names[1]} else zero)"
     template = _UNARY.get(operation) or _OF_TWO.get(operation)
     if template is None:
-        raise EmitError(f"CasADi operation {operation} has no machine code here; write the function without it")
+        raise OperationError(f"CasADi operation {operation} has no machine code here; write the function without it")
     return template.format(*names)
-
-
-def instructions(function: ca.Function) -> int:
-    """Number of operations of a Function, loads and stores apart."""
-    return sum(function.instruction_id(i) not in _MOVES for i in range(function.n_instructions()))

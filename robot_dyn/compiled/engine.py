@@ -9,18 +9,18 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any, final
 
 import numpy as np
 
 from robot_dyn.arithmetic import Float
 from robot_dyn.compiled.arguments import into
-from robot_dyn.compiled.emit import emit
-from robot_dyn.compiled.kernel import Kernel, Status
+from robot_dyn.compiled.from_casadi import program_of
+from robot_dyn.compiled.kernel import Kernel
 from robot_dyn.compiled.on_first_use import OnFirstUse
-from robot_dyn.compiled.overload import Store
 from robot_dyn.compiled.referee import STATES, Referee
+from robot_dyn.compiled.status import Status
+from robot_dyn.compiled.store import Store
 from robot_dyn.compiled.trace import Traced
 from robot_dyn.errors import RobotDynWarning
 from robot_dyn.model.batch import DoubtError, answered
@@ -80,11 +80,6 @@ class Engine:
             ("many", self._many),
         ):
             object.__setattr__(self, name, OnFirstUse(make))
-
-    @cached_property
-    def like(self) -> np.ndarray:
-        """An array of the kernels' dtype: the last argument of `ones`."""
-        return np.empty(0, self.dtype)
 
     def pays(self, quantity: str) -> bool:
         """Whether a quantity is small enough to be compiled."""
@@ -186,22 +181,22 @@ class Engine:
         return max(self._single(quantity, *row, results[i]) for i, row in enumerate(rows))
 
     def _single(self, quantity: str, *arguments: Any) -> Status:
-        status = Status(self.ones[quantity](*arguments, self.like))
-        return self.kernels[quantity].far(*arguments) if status is Status.FAR else status
+        status = Status(self.ones[quantity](*arguments))
+        return Status(self.kernels[quantity].any_angle(*arguments)) if status is Status.FAR else status
 
     def _kernel(self, quantity: str) -> Kernel:
         doubtful = _DOUBTFUL if quantity == "forward_dynamics" else np.inf
         times = self.arguments[quantity][0] == "t"
-        source = emit(self.traces[quantity].function)
+        program = program_of(self.traces[quantity].function)
         about = f"{self.referee.dynamics.name}: {quantity}, {self.dtype}"
-        return Kernel(source, self.shape(quantity), self.dtype, times, doubtful, self.store, about)
+        return Kernel(program, self.shape(quantity), self.dtype, times, doubtful, self.store, about)
 
     def _one(self, quantity: str) -> Any:
         """The checked kernel for one state."""
         if not self.pays(quantity):
             return _never
         kernel = self.kernels[quantity]
-        self._judge(quantity, lambda inputs, y: [kernel.call(*row, y[i], self.like) for i, row in enumerate(inputs)])
+        self._judge(quantity, lambda inputs, y: [kernel.call(*row, y[i]) for i, row in enumerate(inputs)])
         return kernel.call
 
     def _many(self, quantity: str) -> Any:

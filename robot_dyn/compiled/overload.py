@@ -1,38 +1,31 @@
 """Compiled code that survives its process: a Numba overload, taken from a store or compiled and put there.
 
 Numba never frees machine code, so a process loads each key once and keeps it: to load it again would lose memory.
-The key is the SHA-256 of all that the machine code depends on: the straight-line code and its constants, the signature,
-the versions of what made it, and the processor with its features.
+Numba has no public way to keep an overload; what is used of its inner parts stands here alone.
 """
 
 from __future__ import annotations
 
-import hashlib
+import inspect
 import pickle
-import platform
 from collections.abc import Callable
-from importlib.metadata import PackageNotFoundError, version
-from typing import Any, Protocol
+from typing import Any
 
+from robot_dyn.compiled.identity import digest, version_of
 from robot_dyn.compiled.interrupts import interrupts_later
+from robot_dyn.compiled.store import Store
+from robot_dyn.errors import RobotDynError
 
+TESTED = "0.61 to 0.68"  # versions of Numba
 _loaded: dict[str, Any] = {}  # functions by key
 
 
-class Store(Protocol):
-    """Where payloads are kept by key; see `robot_dyn.compiled.cache`."""
-
-    def load(self, key: str) -> bytes | None:
-        """The payload of a key; None if there is no such key."""
-        ...
-
-    def save(self, key: str, payload: bytes, about: str = "") -> None:
-        """Keep a payload, with a text about it."""
-        ...
+class NumbaStructureError(RobotDynError):
+    """Numba lacks an inner part that keeps machine code."""
 
 
 def compiled(
-    make: Callable[[], Any], arguments: list[str], store: Store | None, identity: list[str], about: str = ""
+    make: Callable[[], Any], arguments: list[Any], store: Store | None, identity: list[str], about: str = ""
 ) -> Any:
     """A Numba function with one overload, restored from the store if it is there.
 
@@ -61,44 +54,56 @@ def compiled(
     return _loaded.setdefault(key, function)
 
 
-def digest(identity: list[str]) -> str:
-    """The key of what these texts, this processor and these versions determine."""
-    import llvmlite.binding as llvm
-
-    versions = [f"{name} {version_of(name)}" for name in ("robot-dyn", "numba", "llvmlite", "casadi", "numpy")]
-    machine = [platform.python_version(), llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()]
-    parts = [*identity, *versions, *machine]
-    return hashlib.sha256("\0".join(f"{len(part)} {part}" for part in parts).encode()).hexdigest()
-
-
-def version_of(name: str) -> str:
-    """The version of an installed distribution, or "unknown"."""
-    try:
-        return version(name)
-    except PackageNotFoundError:  # run from its folder
-        return "unknown"
-
-
 def _payload(function: Any) -> bytes:
-    from numba.core.serialize import dumps
-
     (overload,) = function.overloads.values()
-    return dumps(overload._reduce())
+    reduce = _inner(overload, "_reduce")
+    return _inner(_module("numba.core.serialize"), "dumps")(reduce())
 
 
 def _restored(payload: bytes, count: int) -> Any:
     """The function of a payload, or None if this Numba cannot take it."""
-    import numba as nb
-    from numba.core.compiler import CompileResult
-
-    function: Any = nb.njit(eval(f"lambda {', '.join(f'x{i}' for i in range(count))}: None"))  # hung upon, never run
-    context = function.targetctx
+    function = _empty(count)
+    context = _inner(function, "targetctx")
+    rebuild = _inner(_inner(_module("numba.core.compiler"), "CompileResult"), "_rebuild")
+    enter, add = _inner(context, "insert_user_function"), _inner(function, "add_overload")
     try:
         context.refresh()
-        overload = CompileResult._rebuild(context, *pickle.loads(payload))
+        overload = rebuild(context, *pickle.loads(payload))
     except (pickle.UnpicklingError, ValueError, TypeError, AttributeError, EOFError, RuntimeError):
         return None
-    context.insert_user_function(overload.entry_point, overload.fndesc, [overload.library])
-    function.add_overload(overload)
+    enter(overload.entry_point, overload.fndesc, [overload.library])
+    add(overload)
     function.disable_compile()
     return function
+
+
+def _empty(count: int) -> Any:
+    """A Numba function of so many arguments for an overload to be hung upon; it is never run itself."""
+    import numba as nb
+
+    def nothing(*_: Any) -> None: ...
+
+    kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
+    nothing.__signature__ = inspect.Signature([inspect.Parameter(f"x{i}", kind) for i in range(count)])  # pyright: ignore[reportFunctionMemberAccess]
+    return nb.njit(nothing)
+
+
+def _module(name: str) -> Any:
+    from importlib import import_module
+
+    return import_module(name)
+
+
+def _inner(owner: Any, name: str) -> Any:
+    """An inner part of Numba.
+
+    Raises:
+        NumbaStructureError: If it is not there.
+    """
+    try:
+        return getattr(owner, name)
+    except AttributeError:
+        raise NumbaStructureError(
+            f"Numba {version_of('numba')} has no {name} in {type(owner).__name__}, which versions {TESTED} have;"
+            ' install one of these, or take engine="interpreted"'
+        ) from None

@@ -16,8 +16,8 @@ import numpy as np
 from robot_dyn.arithmetic import Array
 from robot_dyn.compiled.cache import default_store
 from robot_dyn.compiled.dynamics import CompiledDynamics
-from robot_dyn.compiled.emit import instructions
 from robot_dyn.compiled.engine import Engine
+from robot_dyn.compiled.from_casadi import instructions
 from robot_dyn.compiled.referee import Referee
 from robot_dyn.compiled.symbolic import Symbols, TraceError, column, every_branch, inputs
 from robot_dyn.compiled.trace import Trace, Traced
@@ -142,11 +142,8 @@ class CompiledPlant:
     def _ask(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None, errors: str) -> Any:
         if arguments[0].__class__ in _TIMES:
             y = np.empty(self.n, self.dynamics.dtype) if out is None else out
-            try:
-                if not self.engine.ones[quantity](*arguments, y, self.engine.like):
-                    return y
-            except TypeError:  # an int too large for a float
-                pass
+            if not self.engine.ones[quantity](*arguments, y):
+                return y
         return self.engine.ask(quantity, arguments, out, errors, getattr(self.interpreted, quantity))
 
     # --- the trace

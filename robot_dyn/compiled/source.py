@@ -1,29 +1,27 @@
-"""Straight-line code: a list of instructions as text, for one state and for a tile of W states side by side.
-
-    scalar(x0, x1, …, y)    one state: each input an array (nᵢ,), y (m,)
-    tile(x, y)              W states side by side: number k of state b is x[k W + b], inputs one after the other;
-                            y likewise, and one row more, in which the largest |angle| is left
-
-One flat array in, one out and constant offsets let LLVM vectorise the loop over b: it need not ask whether many rows
-overlap. Both are plain Numba functions that other compiled code may call: a rollout is a loop around them.
-"""
+"""Straight-line code as text, for one state: what `simulation.machine` puts into the Numba functions of a march."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, final
 
+import numba as nb
 import numpy as np
+from llvmlite import ir
+from numba.core import types
+from numba.core.errors import TypingError
+from numba.extending import intrinsic
 
-from robot_dyn.compiled.sincos import GROUP
+from robot_dyn.compiled.llvm.lanes import F32, F64, Lanes, wide
+from robot_dyn.compiled.llvm.sincos import RANGE, sincos_lanes
+from robot_dyn.compiled.llvm.sine_groups import GROUP
+from robot_dyn.compiled.llvm.tanh import tanh_lanes
 
 _MATH = ("sqrt", "exp", "log", "tan", "asin", "acos", "atan", "sinh", "cosh", "floor", "ceil", "atan2")
 LIBRARY: dict[str, Any] = {name: getattr(math, name) for name in (*_MATH, "copysign", "hypot")}
 LIBRARY |= {"fmod": np.fmod}  # Numba has no math.fmod
-WIDTH = 64  # states in a tile: 8 vectors of 8 numbers, and the rows of a 7-joint arm stay in the first-level cache
 FASTMATH = {"contract", "nsz", "reassoc", "arcp", "afn"}  # not nnan, ninf: NaN and inf must come through
 
 
@@ -91,48 +89,12 @@ class Source:
             code += _group([line]) if line.trigonometric else [str(line)]
         return [*code, *(f"{result}[{k}] = {name}" for k, name in enumerate(self.results))]
 
-    def tile_lines(self, x: str = "x", y: str = "y") -> list[str]:
-        """The loop over a tile x, y."""
-        start = np.concatenate([[0], np.cumsum(self.inputs)]).tolist()
-        code = [f"{name} = {x}[{WIDTH * (start[i] + k)} + b]" for name, i, k in self.loads]
-        code += [*map(str, self.lines), "far = zero"]
-        for line in self.lines:
-            if line.trigonometric:
-                code += [f"turn = abs({line.read[0]})", "far = turn if turn > far else far"]
-        code += [f"{y}[{WIDTH * k} + b] = {name}" for k, name in enumerate((*self.results, "far"))]
-        return [f"for b in range({WIDTH}):", *(f"    {line}" for line in code)]
-
-    @cached_property
-    def scalar(self) -> str:
-        """Text of `scalar(x0, …, y)`; y may be an input."""
-        arguments = ", ".join(f"x{i}" for i in range(len(self.inputs)))
-        return _function(f"scalar({arguments}, y)", self.scalar_lines(lambda i, k: f"x{i}[{k}]", "y"))
-
-    @cached_property
-    def tile(self) -> str:
-        """Text of `tile(x, y)`."""
-        return _function("tile(x, y)", self.tile_lines())
-
-    def functions(self, dtype: str = "float64") -> tuple[Callable[..., None], Callable[..., None]]:
-        """`scalar` and `tile` as Numba functions, not yet compiled. Only `scalar` takes angles beyond RANGE."""
-        import numba as nb
-
-        made = []
-        for text, name in ((self.scalar, "scalar"), (self.tile, "tile")):
-            namespace = self.namespace(dtype)
-            exec(compile(text, f"<robot_dyn {name}>", "exec"), namespace)
-            made.append(nb.njit(fastmath=FASTMATH, error_model="numpy", nogil=True)(namespace[name]))
-        return made[0], made[1]
-
     def namespace(self, dtype: str) -> dict[str, Any]:
         """What the names in the lines mean; numbers in the precision of the kernel, lest it compute in another."""
-        from robot_dyn.compiled import sincos
-        from robot_dyn.compiled.tanh import tanh
-
         number = np.dtype(dtype).type
-        library = sincos.library_sincos if np.dtype(dtype) == np.float64 else sincos.library_sincos32
+        library = library_sincos if np.dtype(dtype) == np.float64 else library_sincos32
         numbers = {f"k{i}": number(x) for i, x in enumerate(self.constants)}
-        trigonometry = {"sincos": sincos.sincos, "library_sincos": library, "limit": number(sincos.RANGE), "tanh": tanh}
+        trigonometry = {"sincos": sincos, "library_sincos": library, "limit": number(RANGE), "tanh": tanh}
         home = {"__name__": __name__}  # Numba keeps a function's module by name, and looks for it when code is restored
         return LIBRARY | numbers | trigonometry | {"zero": number(0), "one": number(1)} | home
 
@@ -170,5 +132,67 @@ def _group(lines: list[Line]) -> list[str]:
     ]
 
 
-def _function(head: str, body: list[str]) -> str:
-    return "\n".join([f"def {head}:", *(f"    {line}" for line in body), ""])
+@intrinsic
+def _sincos_of(typingctx: Any, angles: Any) -> Any:
+    """(sin x₁, cos x₁, sin x₂, …) of a tuple of angles."""
+    if not isinstance(angles, types.UniTuple):
+        raise TypingError("the angles must be of one type")
+
+    def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        kind, count = (F64 if angles.dtype == types.float64 else F32), len(angles)
+        each = [builder.extract_value(args[0], i) for i in range(count)]
+        if count == 1:
+            sine, cosine = sincos_lanes(Lanes(builder, each[0], kind, 1))
+            return context.make_tuple(builder, signature.return_type, (sine.value, cosine.value))
+        vector = _undefined(wide(kind, count))
+        for i, angle in enumerate(each):
+            vector = builder.insert_element(vector, angle, _index(i))
+        both = sincos_lanes(Lanes(builder, vector, kind, count))
+        values = [builder.extract_element(half.value, _index(i)) for i in range(count) for half in both]
+        return context.make_tuple(builder, signature.return_type, values)
+
+    return types.UniTuple(angles.dtype, 2 * len(angles))(angles), code
+
+
+def _undefined(type_: Any) -> Any:
+    """A value of a type before its lanes are set."""
+    return ir.Constant(type_, ir.Undefined)
+
+
+def _index(i: int) -> Any:
+    return ir.Constant(ir.IntType(32), i)
+
+
+# A function of its own, so that the fast-math flags of what calls it do not reach its lines.
+@nb.njit(error_model="numpy")
+def sincos(*angles: Any) -> Any:
+    """(sin x₁, cos x₁, sin x₂, …) of angles of one float type with |x| ≤ RANGE, without a branch."""
+    return _sincos_of(angles)  # pyright: ignore[reportCallIssue] — Numba gives the context
+
+
+@nb.njit(error_model="numpy")
+def library_sincos(x: Any) -> Any:
+    """(sin x, cos x) of any float64 by the C library, for angles beyond RANGE."""
+    return math.sin(x), math.cos(x)
+
+
+@nb.njit(error_model="numpy")
+def library_sincos32(x: Any) -> Any:
+    """The same of a float32, rounded once."""
+    return np.float32(math.sin(np.float64(x))), np.float32(math.cos(np.float64(x)))
+
+
+def _tanh_typed(typingctx: Any, x: Any) -> Any:
+    def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return tanh_lanes(Lanes(builder, args[0], F64 if signature.args[0] == types.float64 else F32, 1)).value
+
+    return x(x), code
+
+
+_tanh_of: Any = intrinsic(_tanh_typed)
+
+
+@nb.njit(error_model="numpy")
+def tanh(x: Any) -> Any:
+    """The hyperbolic tangent of a float64 or float32."""
+    return _tanh_of(x)

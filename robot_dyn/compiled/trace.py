@@ -18,7 +18,7 @@ import numpy as np
 from robot_dyn.arithmetic import Array, in_arithmetic
 from robot_dyn.compiled.base_parameters import regrouped
 from robot_dyn.compiled.condition import Node
-from robot_dyn.compiled.emit import instructions
+from robot_dyn.compiled.from_casadi import instructions
 from robot_dyn.compiled.origins import slid
 from robot_dyn.compiled.symbol import symbol
 from robot_dyn.compiled.symbolic import Symbolic, array_of, column, inputs

@@ -5,6 +5,7 @@ ratio = t(Pinocchio) / t(compiled), both in µs per state
 
 from __future__ import annotations
 
+import ctypes
 import os
 import subprocess
 import sys
@@ -21,17 +22,18 @@ from benchmarks.measure import BATCH, Effort, alternate, arms, row, table
 QUERIES = ("forward_dynamics", "inverse_dynamics", "M")
 
 
-def looped(one: Any, arguments: int) -> Callable[..., int]:
-    """A compiled loop over the kernel for one state: one call a row, nothing of Python between."""
+def looped(state: int, arguments: int) -> Callable[..., int]:
+    """A compiled loop over the kernel for one state, by its address: one call a row, nothing of Python between."""
     import numba as nb
 
+    one = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * (arguments + 1))(state)
     if arguments == 1:
 
         @nb.njit(nogil=True)
         def of_one(q: Any, y: Any) -> int:
             status = 0
             for i in range(len(q)):
-                status |= one(q[i], y[i])
+                status |= one(q[i].ctypes, y[i].ctypes)
             return status
 
         return of_one
@@ -40,7 +42,7 @@ def looped(one: Any, arguments: int) -> Callable[..., int]:
     def of_three(q: Any, v: Any, a: Any, y: Any) -> int:
         status = 0
         for i in range(len(q)):
-            status |= one(q[i], v[i], a[i], y[i])
+            status |= one(q[i].ctypes, v[i].ctypes, a[i].ctypes, y[i].ctypes)
         return status
 
     return of_three
@@ -87,7 +89,7 @@ def kernels(effort: Effort) -> None:
         for name, cpp in in_cpp(robot, batch).items():
             ours, single = rd.Compiled(robot), rd.Compiled(robot, dtype="float32")
             arguments = tuple(batch[: 1 if name == "M" else 3])
-            loop, y = looped(ours.engine.kernels[name].one, len(arguments)), np.empty((BATCH, *_shape(name, robot.n)))
+            loop, y = looped(ours.engine.kernels[name].state, len(arguments)), np.empty((BATCH, *_shape(name, robot.n)))
             small, z = [x.astype(np.float32) for x in arguments], np.empty(y.shape, np.float32)
             sides = {
                 "C++": cpp,
@@ -138,34 +140,29 @@ def threads(effort: Effort) -> None:
 
 
 _FIRST = """
-import time, numpy as np, numba, casadi, pinocchio, robot_dyn as rd
-import robot_dyn.compiled.dynamics, robot_dyn.compiled.plant, numba.core.registry, yourdfpy
+import time, numpy as np, casadi, llvmlite.binding, pinocchio, robot_dyn as rd
+import robot_dyn.compiled.dynamics, robot_dyn.compiled.plant, yourdfpy
 arm = rd.load("panda").with_(lock={"panda_finger_joint1": 0.0})
 q = np.linspace(-0.5, 0.6, 7)
 arm.forward_dynamics(q, q, q)
 began = time.perf_counter()
-numba.core.registry.cpu_target.target_context.refresh()  # imports that Numba puts off until something is compiled
-loaded = time.perf_counter()
 rd.Compiled(arm).forward_dynamics(q, q, q)
-print(loaded - began, time.perf_counter() - loaded)
+print(time.perf_counter() - began)
 """
 
 
 def first_use(effort: Effort) -> None:
     """The first forward dynamics of a 7-joint arm after imports: cold, and from the cache."""
-    cold, warm, registries = [], [], []
+    cold, warm = [], []
     for _ in range(1 if effort.quick else 5):
         with tempfile.TemporaryDirectory() as folder:
             place = os.environ | {"ROBOT_DYN_CACHE": os.path.join(folder, "kernels")}
             for times in (cold, warm):
                 done = subprocess.run([sys.executable, "-c", _FIRST], env=place, check=True, capture_output=True)
-                before, taken = map(float, done.stdout.split())
-                times.append(taken)
-                registries.append(before)
+                times.append(float(done.stdout))
     table("what", "s")
     row("first forward dynamics, Panda-7, nothing in the cache", f"{np.median(cold):.2f}")
     row("the same in a second process, from the cache", f"{np.median(warm):.3f}")
-    row("imports that Numba puts off until then, in both not counted", f"{np.median(registries):.3f}")
 
 
 def _shape(name: str, n: int) -> tuple[int, ...]:

@@ -14,13 +14,14 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from robot_dyn.compiled import overload
-from robot_dyn.compiled.emit import emit
-from robot_dyn.compiled.kernel import Kernel, Status
+from robot_dyn.compiled.from_casadi import program_of
+from robot_dyn.compiled.kernel import Kernel
+from robot_dyn.compiled.llvm import machine_code
+from robot_dyn.compiled.llvm.sine_groups import in_groups
+from robot_dyn.compiled.program import Kind
+from robot_dyn.compiled.status import Status
 from robot_dyn.compiled.threads import shared
 from tests.compiled.arms import compiled, states
-
-LIKE = np.empty(0)
 
 
 class Own(np.ndarray):
@@ -31,7 +32,7 @@ class Own(np.ndarray):
 def double() -> Kernel:
     """Y = 2 x of three numbers."""
     x = ca.SX.sym("x", 3)
-    return Kernel(emit(ca.Function("f", [x], [2 * x])), (3,))
+    return Kernel(program_of(ca.Function("f", [x], [2 * x])), (3,))
 
 
 STRANGE: dict[str, Any] = {
@@ -56,18 +57,18 @@ STRANGE: dict[str, Any] = {
 def test_what_is_no_plain_array_is_reported(double: Kernel, what: str) -> None:
     """Each is left to the general way, as an argument and as a result, and nothing is written."""
     y = np.zeros(3)
-    assert double.call(STRANGE[what], y, LIKE) == Status.SHAPE
+    assert double.call(STRANGE[what], y) == Status.SHAPE
     assert not y.any()
-    assert double.call(np.ones(3), STRANGE[what], LIKE) == Status.SHAPE
+    assert double.call(np.ones(3), STRANGE[what]) == Status.SHAPE
 
 
 def test_read_only_arrays_are_read_and_not_written(double: Kernel) -> None:
     """The writeable flag counts for the result alone."""
     x, y = np.ones(3), np.zeros(3)
     x.flags.writeable = False
-    assert double.call(x, y, LIKE) == Status.FINE
+    assert double.call(x, y) == Status.FINE
     assert np.array_equal(y, 2 * x)
-    assert double.call(y, x, LIKE) == Status.SHAPE
+    assert double.call(y, x) == Status.SHAPE
     assert np.array_equal(x, np.ones(3))
 
 
@@ -77,18 +78,8 @@ def test_numbers_that_are_not_finite_are_reported(double: Kernel) -> None:
         for bad in (np.nan, np.inf, -np.inf, 1e101):
             x = np.ones((20, 3))
             x[13, k] = bad
-            assert double.call(x[13], np.empty(3), LIKE) == Status.ARGUMENT
+            assert double.call(x[13], np.empty(3)) == Status.ARGUMENT
             assert double.many([x], np.empty((20, 3))) is Status.ARGUMENT
-
-
-def test_numpy_keeps_its_fields_where_they_are_read() -> None:
-    """PyArrayObject: data, nd and flags at the offsets of NumPy's ABI."""
-    x, head = np.ones((2, 3)), object.__basicsize__
-    assert ctypes.c_void_p.from_address(id(x) + head).value == x.ctypes.data
-    assert ctypes.c_int.from_address(id(x) + head + 8).value == 2
-    assert ctypes.c_void_p.from_address(id(x) + head + 40).value == id(x.dtype)
-    assert ctypes.c_int.from_address(id(x) + head + 48).value == x.flags.num
-    assert ctypes.c_void_p.from_address(id(x) + head - 8).value == id(np.ndarray)
 
 
 @pytest.mark.parametrize("width", [1, 2, 7, 8, 9, 15, 17, 36])
@@ -96,7 +87,7 @@ def test_numpy_keeps_its_fields_where_they_are_read() -> None:
 def test_rows_of_any_width_and_number_are_transposed(width: int, dtype: str) -> None:
     """Blocks of 8 × 8 with a part of one at the end, overlapping last vectors: y = x − 2 exactly, nothing beside it."""
     x = ca.SX.sym("x", width)
-    kernel = Kernel(emit(ca.Function("f", [x], [x - 2])), (width,), dtype)
+    kernel = Kernel(program_of(ca.Function("f", [x], [x - 2])), (width,), dtype)
     for count in (1, 7, 8, 9, 16, 17, 31, 100):
         data = np.arange(count * width, dtype=dtype).reshape(count, width)
         around = np.full((count + 2, width), -5, dtype)
@@ -122,14 +113,14 @@ def test_functions_without_a_vector_instruction_go_lane_by_lane() -> None:
     """exp, atan2 and powers in a vector: to 2 ulp of NumPy's."""
     x = ca.SX.sym("x", 2)
     expressions = [ca.exp(x[0]), ca.atan2(x[0], x[1]), x[0] ** x[1], ca.floor(x[0]), ca.fmod(x[0], x[1]), ca.log(x[1])]
-    kernel = Kernel(emit(ca.Function("f", [x], [ca.vertcat(*expressions)])), (6,))
+    kernel = Kernel(program_of(ca.Function("f", [x], [ca.vertcat(*expressions)])), (6,))
     data = np.random.default_rng(2).uniform(0.1, 3, (20, 2))
     a, b = data.T
     expected = np.array([np.exp(a), np.arctan2(a, b), a**b, np.floor(a), np.fmod(a, b), np.log(b)]).T
     y = np.empty((20, 6))
     assert kernel.many([data], y) is Status.FINE
     assert np.allclose(y, expected, rtol=5e-16, atol=0)
-    assert kernel.call(data[3], y[0], LIKE) == Status.FINE
+    assert kernel.call(data[3], y[0]) == Status.FINE
     assert np.allclose(y[0], expected[3], rtol=5e-16, atol=0)
 
 
@@ -174,8 +165,8 @@ def test_a_call_is_restored_from_a_store(double: Kernel, monkeypatch: pytest.Mon
     """In the same machine code, without the function that was compiled."""
     memory, y = Memory(), np.empty(3)
     for _ in range(2):
-        monkeypatch.setattr(overload, "_loaded", {})  # as in another process
-        assert Kernel(double.source, (3,), store=memory).call(np.arange(3.0), y, LIKE) == Status.FINE
+        monkeypatch.setattr(machine_code, "_loaded", {})  # as in another process
+        assert Kernel(double.program, (3,), store=memory).call(np.arange(3.0), y) == Status.FINE
         assert np.array_equal(y, [0, 2, 4])
     assert len(memory) == 1
 
@@ -188,12 +179,12 @@ def test_what_is_loaded_is_kept_once(double: Kernel) -> None:
 
     def load(count: int) -> tuple[int, int]:
         for _ in range(count):
-            kernel = Kernel(double.source, (3,), store=memory)
-            assert kernel.call(np.arange(3.0), np.empty(3), LIKE) == Status.FINE
+            kernel = Kernel(double.program, (3,), store=memory)
+            assert kernel.call(np.arange(3.0), np.empty(3)) == Status.FINE
         del kernel
         gc.collect()
         kinds = [type(each).__name__ for each in gc.get_objects()]
-        return kinds.count("ModuleRef") + kinds.count("CPUDispatcher"), len(memory)
+        return kinds.count("ModuleRef") + kinds.count("builtin_function_or_method"), len(memory)
 
     memory = Memory()
     first = load(20)
@@ -220,3 +211,64 @@ def test_numbers_of_threads_share_one_pool() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], check=True, timeout=60, capture_output=True, text=True)
     assert int(done.stdout) == 1 + 5  # this one, and the five that six need besides
+
+
+def test_other_machine_code_may_call_it_by_its_address(double: Kernel) -> None:
+    """A C function of pointers, which reports what is not finite and then writes nothing."""
+    function = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p)(double.state)
+    x, y = np.arange(3.0), np.zeros(3)
+    assert function(x.ctypes.data, y.ctypes.data) == Status.FINE
+    assert np.array_equal(y, 2 * x)
+    x[1] = np.nan
+    assert function(x.ctypes.data, y.ctypes.data) == Status.ARGUMENT
+    assert np.array_equal(y, [0, 2, 4])
+
+
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+def test_a_time_is_any_number_of_python(dtype: str) -> None:
+    """What cannot become a float is reported, and leaves no exception behind; −1 is a number."""
+    t, x = ca.SX.sym("t", 1), ca.SX.sym("x", 2)
+    kernel = Kernel(program_of(ca.Function("f", [t, x], [t * x])), (2,), dtype, times=True)
+    one, y = np.ones(2, dtype), np.zeros(2, dtype)
+    for time in (-1, -1.0, 0.5, np.float64(3), True):
+        assert kernel.call(time, one, y) == Status.FINE
+        assert np.array_equal(y, [time, time])
+    for wrong in ("1", None, 1j, 10**400, [1.0], np.ones(2)):
+        assert kernel.call(wrong, one, y) == Status.SHAPE
+        assert np.array_equal(y, [True, True])
+    assert kernel.call(np.nan, one, y) == Status.ARGUMENT
+
+
+def test_a_wrong_number_of_arguments_is_reported(double: Kernel) -> None:
+    y = np.zeros(3)
+    for arguments in ((), (y,), (y, y, y)):
+        assert double.call(*arguments) == Status.SHAPE
+    assert double.batch(y, y) == Status.SHAPE
+
+
+def test_batches_of_other_arrays_are_reported() -> None:
+    """Strides, dtypes, lengths, axes, and results that are read-only; nothing is written."""
+    x = ca.SX.sym("x", 3)
+    kernel = Kernel(program_of(ca.Function("f", [x], [2 * x])), (3,))
+    right, y = np.ones((20, 3)), np.zeros((20, 3))
+    wrong: list[Any] = [right[:, ::-1], right.astype(np.float32), np.ones((19, 3)), np.ones((20, 4)), np.ones(60)]
+    wrong += [right.view(Own), np.asfortranarray(right), right.tolist()]
+    for other in wrong:
+        assert kernel.batch(other, y, 0, 20) == Status.SHAPE
+    assert not y.any()
+    y.flags.writeable = False
+    assert kernel.batch(right, y, 0, 20) == Status.SHAPE
+
+
+def test_sines_of_one_state_come_together_after_what_they_need() -> None:
+    """Eight at a time; those of other sines alone; each value is made before it is read, and once."""
+    x = ca.SX.sym("x", 12)
+    sines = ca.sin(x * 2 + 1)
+    program = program_of(ca.Function("f", [x], [ca.cos(sines[0] + x[1]) + ca.sum1(sines)]))
+    groups = list(in_groups(program))
+    assert [len(group) for group in groups if group[0].kind is Kind.SINE_COSINE] == [8, 4, 1]
+    known = set(range(sum(program.inputs) + len(program.constants)))
+    for group in groups:
+        assert known.issuperset(value for op in group for value in op.of)
+        known.update(value for op in group for value in op.made)
+    assert sorted(map(str, (op for group in groups for op in group))) == sorted(map(str, program.ops))

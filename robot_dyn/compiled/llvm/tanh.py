@@ -7,13 +7,7 @@ The rational functions are those of Cephes, tanh.c and exp.c [Moshier 1984]; mea
 
 from __future__ import annotations
 
-from typing import Any
-
-import numba as nb
-from numba.core import types
-from numba.extending import intrinsic
-
-from robot_dyn.compiled.lanes import F32, F64, Lanes, polynomial
+from robot_dyn.compiled.llvm.lanes import F32, Lanes, polynomial
 
 _SMALL, _LARGE = 0.625, 22.0  # below, 1 − 2/(…) would cancel; beyond, the result is 1
 _P = (-1.61468768441708447952e3, -9.92877231001918586564e1, -9.64399179425052238628e-1)
@@ -49,19 +43,3 @@ def tanh_lanes(x: Lanes) -> Lanes:
     result = near.choose(size.below(_SMALL), 1.0 - 2.0 * (1.0 / (_exp(size * 2.0) + 1.0)))
     result = (result * -1.0).choose(negative, result)
     return result.single() if narrow else result
-
-
-def _typed(typingctx: Any, x: Any) -> Any:
-    def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return tanh_lanes(Lanes(builder, args[0], F64 if signature.args[0] == types.float64 else F32, 1)).value
-
-    return x(x), code
-
-
-_tanh_of: Any = intrinsic(_typed)
-
-
-@nb.njit(error_model="numpy")
-def tanh(x: Any) -> Any:
-    """The hyperbolic tangent of a float64 or float32."""
-    return _tanh_of(x)

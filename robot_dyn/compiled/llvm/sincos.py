@@ -10,19 +10,10 @@ balls; beyond it the C library serves. `reassoc` must not reach these lines: it 
 from __future__ import annotations
 
 import math
-from typing import Any
 
-import numba as nb
-import numpy as np
-from llvmlite import ir
-from numba.core import types
-from numba.core.errors import TypingError
-from numba.extending import intrinsic
-
-from robot_dyn.compiled.lanes import F32, F64, Lanes, polynomial, wide
+from robot_dyn.compiled.llvm.lanes import F32, Lanes, polynomial
 
 RANGE = 1e5  # [rad]: k has 16 bits there, and 33 bits of π/2 times 16 bits are exact in 53
-GROUP = 8  # angles of one state in a vector: a 512-bit register, or two or four smaller ones
 _TURN = 2 / math.pi
 _MAGIC = 1.5 * 2.0**52  # added to |x| < 2⁵¹, it leaves the nearest integer in the low bits
 _P1, _P2 = 1.57079632673412561417e00, 6.07710050630396597660e-11  # 33 bits of π/2 each
@@ -79,53 +70,3 @@ def _signed(x: Lanes, turns: Lanes, narrow: bool) -> Lanes:
         zero = Lanes(x.builder, turns.of(0), turns.kind, turns.count)
         return (x * -1.0).choose(x.builder.icmp_signed("!=", (turns & 2).value, zero.value), x)
     return (x.bits() ^ ((turns & 2) << 62)).number()
-
-
-@intrinsic
-def _sincos_of(typingctx: Any, angles: Any) -> Any:
-    """(sin x₁, cos x₁, sin x₂, …) of a tuple of angles."""
-    if not isinstance(angles, types.UniTuple):
-        raise TypingError("the angles must be of one type")
-
-    def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        kind, count = (F64 if angles.dtype == types.float64 else F32), len(angles)
-        each = [builder.extract_value(args[0], i) for i in range(count)]
-        if count == 1:
-            sine, cosine = sincos_lanes(Lanes(builder, each[0], kind, 1))
-            return context.make_tuple(builder, signature.return_type, (sine.value, cosine.value))
-        vector = _undefined(wide(kind, count))
-        for i, angle in enumerate(each):
-            vector = builder.insert_element(vector, angle, _index(i))
-        both = sincos_lanes(Lanes(builder, vector, kind, count))
-        values = [builder.extract_element(half.value, _index(i)) for i in range(count) for half in both]
-        return context.make_tuple(builder, signature.return_type, values)
-
-    return types.UniTuple(angles.dtype, 2 * len(angles))(angles), code
-
-
-def _undefined(type_: Any) -> Any:
-    """A value of a type before its lanes are set."""
-    return ir.Constant(type_, ir.Undefined)
-
-
-def _index(i: int) -> Any:
-    return ir.Constant(ir.IntType(32), i)
-
-
-# A function of its own, so that the fast-math flags of what calls it do not reach its lines.
-@nb.njit(error_model="numpy")
-def sincos(*angles: Any) -> Any:
-    """(sin x₁, cos x₁, sin x₂, …) of angles of one float type with |x| ≤ RANGE, without a branch."""
-    return _sincos_of(angles)  # pyright: ignore[reportCallIssue] — Numba gives the context
-
-
-@nb.njit(error_model="numpy")
-def library_sincos(x: Any) -> Any:
-    """(sin x, cos x) of any float64 by the C library, for angles beyond RANGE."""
-    return math.sin(x), math.cos(x)
-
-
-@nb.njit(error_model="numpy")
-def library_sincos32(x: Any) -> Any:
-    """The same of a float32, rounded once."""
-    return np.float32(math.sin(np.float64(x))), np.float32(math.cos(np.float64(x)))

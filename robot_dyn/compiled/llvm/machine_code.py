@@ -1,0 +1,95 @@
+"""Machine code that survives its process: a module of LLVM compiled to an object file, kept in a store, and loaded.
+
+Machine code is not freed, so a process loads each key once and keeps it: to load it again would lose memory.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from functools import cache
+from hashlib import sha256
+from typing import Any
+
+import llvmlite.binding as binding
+from llvmlite import ir
+
+from robot_dyn.compiled.llvm.python_function import addresses
+from robot_dyn.compiled.store import Store
+
+_lock = threading.RLock()
+_loaded: dict[str, bytes] = {}  # object files by key
+
+
+def address(function: str, key: str, write: Callable[[Any, str], None], store: Store | None, about: str = "") -> int:
+    """The address of a function of a module, which is restored from the store if it is there.
+
+    Args:
+        function: Its name, without the module's.
+        key: What `identity.digest` gives of all that determines the module.
+        write: Writes the functions into a module, each by its name after the module's.
+        store: Where to look and keep; None for nowhere.
+        about: What it is of, for a reader of the store.
+    """
+    name = f"robot_dyn_{key}_"
+    with _lock:
+        kept = _opened(store.load(key)) if store is not None else None
+        if key not in _loaded:
+            made = object_file(write, name) if kept is None else kept
+            _engine().add_object_file(binding.ObjectFileRef.from_data(made))
+            _engine().finalize_object()
+            _loaded[key] = made
+        if store is not None and kept is None:
+            store.save(key, _sealed(_loaded[key]), about)
+        return _engine().get_function_address(name + function)
+
+
+def object_file(write: Callable[[Any, str], None], name: str) -> bytes:
+    """The object file of a module."""
+    return _machine().emit_object(_optimised(write, name))
+
+
+def assembly(write: Callable[[Any, str], None], name: str) -> str:
+    """The instructions of a module's machine code, as text."""
+    return _machine().emit_assembly(_optimised(write, name))
+
+
+def _optimised(write: Callable[[Any, str], None], name: str) -> Any:
+    module, machine = ir.Module(name), _machine()
+    module.triple, module.data_layout = machine.triple, str(machine.target_data)
+    write(module, name)
+    parsed = binding.parse_assembly(str(module))
+    options = binding.create_pipeline_tuning_options(speed_level=3)
+    options.loop_vectorization = options.slp_vectorization = options.loop_unrolling = False  # it is in vectors
+    builder = binding.create_pass_builder(machine, options)
+    builder.getModulePassManager().run(parsed, builder)
+    return parsed
+
+
+def _sealed(made: bytes) -> bytes:
+    """An object file after its SHA-256: LLVM does not survive a damaged one."""
+    return sha256(made).digest() + made
+
+
+def _opened(payload: bytes | None) -> bytes | None:
+    """The object file of a payload; None if it is damaged or there is none."""
+    made = (payload or b"")[len(_sealed(b"")) :]
+    return made if payload == _sealed(made) else None
+
+
+def _machine() -> Any:
+    """LLVM's view of this processor."""
+    binding.initialize_native_target()
+    binding.initialize_native_asmprinter()
+    features = binding.get_host_cpu_features().flatten()
+    return binding.Target.from_default_triple().create_target_machine(
+        cpu=binding.get_host_cpu_name(), features=features, opt=3, reloc="static", codemodel="jitdefault", jit=True
+    )
+
+
+@cache
+def _engine() -> Any:
+    """What holds the machine code of this process."""
+    for name, place in addresses().items():
+        binding.add_symbol(name, place)
+    return binding.create_mcjit_compiler(binding.parse_assembly(""), _machine())

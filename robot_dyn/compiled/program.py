@@ -1,0 +1,104 @@
+"""Programs: y = f(x₁, x₂, …) as a list of typed instructions without branches, each value made once.
+
+Values are numbered: those of the inputs one after the other, then the constants, then what the instructions make.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum, auto
+from itertools import chain
+from typing import final
+
+
+class Kind(Enum):
+    """What an instruction computes of one value x or two, x and y; conditions are 1 or 0."""
+
+    ADD = auto()
+    SUBTRACT = auto()
+    MULTIPLY = auto()
+    DIVIDE = auto()
+    NEGATE = auto()
+    SQUARE = auto()
+    TWICE = auto()
+    RECIPROCAL = auto()
+    ABSOLUTE = auto()
+    SIGN = auto()  # x itself where it is 0 or NaN
+    FLOOR = auto()
+    CEILING = auto()
+    MINIMUM = auto()
+    MAXIMUM = auto()
+    COPY_SIGN = auto()
+    REMAINDER = auto()  # of x / y, with the sign of x
+    SQUARE_ROOT = auto()
+    HYPOTENUSE = auto()
+    POWER = auto()
+    EXPONENTIAL = auto()
+    LOGARITHM = auto()
+    SINE_COSINE = auto()  # two values
+    TANGENT = auto()
+    ARC_SINE = auto()
+    ARC_COSINE = auto()
+    ARC_TANGENT = auto()
+    ARC_TANGENT_OF_TWO = auto()  # of y / x, x the second
+    HYPERBOLIC_SINE = auto()
+    HYPERBOLIC_COSINE = auto()
+    HYPERBOLIC_TANGENT = auto()
+    LESS = auto()
+    LESS_OR_EQUAL = auto()
+    EQUAL = auto()
+    NOT_EQUAL = auto()
+    NOT = auto()
+    AND = auto()
+    OR = auto()
+    WHERE = auto()  # y where the condition x holds, else 0
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Op:
+    """One instruction.
+
+    Attributes:
+        kind: What it computes.
+        made: Numbers of the values it makes: one, or the sine and the cosine of an angle.
+        of: Numbers of the values it is made of.
+    """
+
+    kind: Kind
+    made: tuple[int, ...]
+    of: tuple[int, ...]
+
+    def __str__(self) -> str:
+        return f"{_list(self.made)} = {self.kind.name.lower()} {_list(self.of)}"
+
+
+@final
+@dataclass(frozen=True)
+class Program:
+    """The instructions of a function.
+
+    Attributes:
+        inputs: Length of each input.
+        constants: Numbers that are known.
+        ops: The instructions, each after those that it needs.
+        outputs: Numbers of the values that are the results.
+    """
+
+    inputs: tuple[int, ...]
+    constants: tuple[float, ...]
+    ops: tuple[Op, ...]
+    outputs: tuple[int, ...]
+
+    def __len__(self) -> int:
+        return len(self.ops)
+
+    def __str__(self) -> str:
+        first = sum(self.inputs)
+        constants = (f"v{first + i} = {x!r}" for i, x in enumerate(self.constants))
+        head, end = f"inputs {' '.join(map(str, self.inputs))}", f"outputs {_list(self.outputs)}"
+        return "\n".join(chain([head], constants, map(str, self.ops), [end]))
+
+
+def _list(values: tuple[int, ...]) -> str:
+    return " ".join(f"v{i}" for i in values)
