@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
 from dataclasses import dataclass
 from typing import Any
 
@@ -100,3 +102,15 @@ def test_an_effect_that_cannot_be_traced_is_named() -> None:
     """And the remedy is said."""
     with pytest.raises(TraceError, match="effect opaque cannot be traced"):
         plant([Opaque()]).forward_dynamics(0.0, *np.ones((3, 2)))
+
+
+def test_machine_code_does_not_keep_the_plant_that_it_was_made_for() -> None:
+    """What stays loaded is known by its instructions alone."""
+    made = plant([rd.ViscousFriction([0.31, 0.12])])
+    q, v, u = states(2, 12)
+    made.forward_dynamics(0.0, q[0], v[0], u[0])
+    made.forward_dynamics(0.0, q, v, u)
+    left = weakref.ref(made.plant), weakref.ref(made.plant.effects[0]), weakref.ref(made.engine)
+    del made
+    gc.collect()
+    assert [each() for each in left] == [None, None, None]

@@ -81,9 +81,11 @@ def _machine() -> Any:
     """LLVM's view of this processor."""
     binding.initialize_native_target()
     binding.initialize_native_asmprinter()
+    target = binding.Target.from_triple(binding.get_process_triple())
+    reloc = "static" if target.name.startswith("x86") else "default"
     features = binding.get_host_cpu_features().flatten()
-    return binding.Target.from_default_triple().create_target_machine(
-        cpu=binding.get_host_cpu_name(), features=features, opt=3, reloc="static", codemodel="jitdefault", jit=True
+    return target.create_target_machine(
+        cpu=binding.get_host_cpu_name(), features=features, opt=3, reloc=reloc, codemodel="jitdefault", jit=True
     )
 
 
