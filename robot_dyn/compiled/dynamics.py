@@ -157,7 +157,7 @@ class CompiledDynamics(Dynamics):
         self, q: Array, v: Array, tau: Array, *, errors: str = "raise"
     ) -> tuple[Any, Any, Any]:
         """∂a/∂q, ∂a/∂v, ∂a/∂τ of forward dynamics, each (..., n, n): −M⁻¹ ∂ID/∂q, −M⁻¹ ∂ID/∂v, M⁻¹."""
-        three = self.engine.ask(_DERIVATIVES, (q, v, tau), None, errors, self._otherwise(_DERIVATIVES))
+        three = self._fast(_DERIVATIVES, (q, v, tau), None, errors, (3, self.n, self.n))
         return three[..., 0, :, :], three[..., 1, :, :], three[..., 2, :, :]
 
     def kinetic_energy(self, q: Array, v: Array, *, errors: str = "raise") -> Any:
