@@ -152,8 +152,10 @@ def test_derivatives_agree_with_pinocchio(arm: str) -> None:
     data = engine.robot.model.createData()
     for i in range(3):
         theirs = pin.computeABADerivatives(engine.robot.model, data, q[i], v[i], tau[i])
-        for one, other in zip(ours, theirs, strict=True):
+        alone = engine.forward_dynamics_derivatives(q[i], v[i], tau[i])
+        for one, same, other in zip(ours, alone, theirs, strict=True):
             assert np.max(np.abs(one[i] - other)) <= 1e-10 * np.max(np.abs(other))
+            assert np.max(np.abs(same - other)) <= 1e-10 * np.max(np.abs(other))
 
 
 def test_derivatives_of_tied_joints_are_differences_of_forward_dynamics() -> None:
