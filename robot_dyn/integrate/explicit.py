@@ -10,17 +10,40 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cache
-from typing import Any, final
+from typing import Any, NamedTuple, final
 
-from robot_dyn.arithmetic import Array
+import numpy as np
+
+from robot_dyn.arithmetic import Arithmetic, Array
 from robot_dyn.errors import QueryError
-from robot_dyn.integrate.integrator import Integrator, System, arithmetic_like
-from robot_dyn.integrate.tableau import ButcherTableau, combine
+from robot_dyn.integrate.integrator import PlainMethod, Stepper
+from robot_dyn.integrate.primitives import combination, evaluate
+from robot_dyn.integrate.tableau import ButcherTableau, Coefficients
+
+
+class Stages(NamedTuple):
+    """The stages K_j of a step, (s, r, W)."""
+
+    K: Array
+
+
+def explicit_step(
+    rate: Any, tableau: Coefficients, t: Any, h: Any, y: Array, p: Array, own: Array, after: Array, work: Stages,
+    lost: Array,
+) -> int:  # fmt: skip
+    """A step of an explicit Runge–Kutta method; arguments as of `Stepper`."""
+    K, s = work.K, len(tableau.c)
+    evaluate(rate, t, y, p, own, K[0])
+    for i in range(1, s):
+        combination(after, y, h, tableau.a[i], K, i)
+        evaluate(rate, t + tableau.c[i] * h, after, p, own, K[i])
+    combination(after, y, h, tableau.b, K, s)
+    return s
 
 
 @final
 @dataclass(frozen=True)
-class ExplicitRungeKutta(Integrator):
+class ExplicitRungeKutta(PlainMethod):
     """The explicit Runge–Kutta method of a tableau, in float, longdouble or balls.
 
     In balls it encloses the exact result of the step, not the flow.
@@ -35,23 +58,37 @@ class ExplicitRungeKutta(Integrator):
     evaluations_per_step: int | None = field(init=False)
 
     def __post_init__(self) -> None:
-        if not self.tableau.explicit:
+        if not self.tableau.explicit or float(self.tableau.c[0]) != 0:
             raise QueryError(f"{self.name}: a tableau of an explicit method has i entries at most in row i")
         object.__setattr__(self, "order", self.tableau.order)
         object.__setattr__(self, "evaluations_per_step", len(self.tableau.b))
 
-    def step(self, system: System, t: Any, y: Array, h: Any) -> Array:
-        kind, a, b, c = self.tableau.numbers(y)
-        h = kind.number(h)
-        k: list[Array] = []
-        for row, node in zip(a, c, strict=True):
-            k.append(system.rate(t + node * h, y + combine(row, k) * h if row else y))
-        return y + combine(b, k) * h
+    def stepper(self, kind: Arithmetic, m: int, n: int, rows: int, runs: int) -> Stepper:
+        K = np.empty((len(self.tableau.b), rows, runs), kind.dtype)
+        return Stepper(explicit_step, self.tableau.arrays(kind), Stages(K))
+
+
+class Start(NamedTuple):
+    """The coefficients of semi-implicit Euler: the number n of positions, and b₁ = 1."""
+
+    n: int
+    b: Array
+
+
+def semi_implicit_step(
+    rate: Any, start: Start, t: Any, h: Any, y: Array, p: Array, own: Array, after: Array, work: Stages, lost: Array
+) -> int:
+    """A step of semi-implicit Euler; arguments as of `Stepper`."""
+    n = start.n
+    evaluate(rate, t, y, p, own, work.K[0])
+    combination(after, y, h, start.b, work.K, 1)
+    combination(after[:n], y[:n], h, start.b, after[n : 2 * n].reshape((1, n, y.shape[1])), 1)
+    return 1
 
 
 @final
 @dataclass(frozen=True)
-class SemiImplicitEuler(Integrator):
+class SemiImplicitEuler(PlainMethod):
     """Euler's method with the new velocity in the position: v⁺ = v + h a(t, q, v), then q⁺ = q + h v⁺.
 
     Needs y = (q, v, quadratures) with q' = v; quadratures advance with the explicit rate. It is symplectic for a
@@ -65,11 +102,8 @@ class SemiImplicitEuler(Integrator):
     order: int = field(default=1, init=False)
     evaluations_per_step: int | None = field(default=1, init=False)
 
-    def step(self, system: System, t: Any, y: Array, h: Any) -> Array:
-        n, h = system.n, arithmetic_like(y).number(h)
-        after = y + system.rate(t, y) * h
-        after[..., :n] = y[..., :n] + after[..., n : 2 * n] * h
-        return after
+    def stepper(self, kind: Arithmetic, m: int, n: int, rows: int, runs: int) -> Stepper:
+        return Stepper(semi_implicit_step, Start(n, kind.array([1])), Stages(np.empty((1, rows, runs), kind.dtype)))
 
 
 _HALF, _THIRD, _SIXTH = Fraction(1, 2), Fraction(1, 3), Fraction(1, 6)

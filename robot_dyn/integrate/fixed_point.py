@@ -7,53 +7,40 @@ Wanner, Geometric Numerical Integration, 2nd ed., 2006, VIII.6]
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import inf, isfinite
 from typing import Any
 
 import numpy as np
 
 from robot_dyn.arithmetic import Array, midpoint, radius
 from robot_dyn.errors import OverflowedError
+from robot_dyn.integrate.primitives import GOING, MOST_ITERATIONS, SETTLED, settle
 
-MOST_ITERATIONS = 100  # so the iteration must gain a binary digit in two rounds, to end in float64
-PATIENCE = 2  # rounds: where q' = v and v' = −k q, increments shrink only every second one
-NOISE = 1e3  # roundings of the largest entry that an increment may keep, as where forces cancel
-INFLATED_ROUNDING = float(np.finfo(np.float64).eps) ** (2 / 3)  # see below; in float64
 _INFLATION = 1.1  # Rump's ε-inflation: more than the rounding, less than 1 / the rate of contraction
 
 
 def fixed_point(update: Callable[[Array], Array], x: Array, y: Array) -> Array | None:
-    """Iterate x ← Φ(x) until the increments of no entry shrink any more.
-
-    Entries count apart, so that one in a large unit does not end the iteration of the others.
+    """Iterate x ← Φ(x) until the increments of no entry shrink any more, by the rule of `settle`.
 
     Args:
-        update: Φ. In balls, only the midpoints of what it returns are used.
-        x: Where to start, floats or exact balls, shape (..., m).
+        update: Φ.
+        x: Where to start, shape (..., m).
         y: The state that x is a change of, shape (..., m); taken to be of size 1 at least in some entry.
 
     Returns:
         The last iterate; None if increments overflow, or do not stagnate at rounding size within MOST_ITERATIONS.
     """
-    u = _unit_roundoff(x)
-    size = _sizes(y)
-    slack = NOISE * u * max(1.0, size.max())
-    least, stale = np.full(x.shape[-1], inf), 0
+    m = x.shape[-1]
+    Z = x.reshape(-1, m).T[None].copy()
+    least, stale, state = np.full(Z.shape[1:], np.inf), np.zeros(Z.shape[2], np.int64), np.full(Z.shape[2], GOING)
     for _ in range(MOST_ITERATIONS):
         try:
-            new = _exact(update(x))
+            new = update(x).reshape(-1, m).T[None]
         except OverflowedError:
             return None
-        increment, x = _sizes(new - x), new
-        largest = increment.max()
-        if not isfinite(largest):
-            return None
-        own = _sizes(x)
-        stale = 0 if ((increment < least) & (increment > u * own)).any() else stale + 1
-        least = np.minimum(increment, least)
-        # an increment of some power of u between 1/2 and 1 is rounding of Φ: far below any error that matters
-        if largest == 0 or (stale >= PATIENCE and (increment <= slack + u ** (2 / 3) * (size + own)).all()):
-            return x
+        going = settle(Z, new, y.reshape(-1, m).T, least, stale, state, unit_roundoff(x))
+        x = Z[0].T.reshape(x.shape)
+        if not going:
+            return x if (state == SETTLED).all() else None
     return None
 
 
@@ -91,16 +78,10 @@ def _inflate(box: Array) -> Array:
     """Each ball a little wider, and an exact one no longer so."""
     from flint import arb
 
-    least = 8 * _unit_roundoff(box) * max(_sizes(box).max(), 1e-300)
+    least = 8 * unit_roundoff(box) * max(_sizes(box).max(), 1e-300)
     result = np.empty_like(box)
     result.flat = [arb(ball.mid(), _INFLATION * float(ball.rad().upper()) + least) for ball in box.flat]
     return result
-
-
-def _exact(x: Array) -> Array:
-    if x.dtype != object:
-        return x
-    return np.vectorize(lambda ball: ball.mid(), otypes=[object])(x)
 
 
 def _sizes(x: Array) -> np.ndarray:
@@ -108,7 +89,8 @@ def _sizes(x: Array) -> np.ndarray:
     return np.abs(x if x.dtype != object else midpoint(x)).reshape(-1, x.shape[-1]).max(axis=0)
 
 
-def _unit_roundoff(x: Array) -> Any:
+def unit_roundoff(x: Array) -> Any:
+    """Of the arithmetic of an array."""
     if x.dtype != object:
         return np.finfo(x.dtype).eps
     from flint import ctx

@@ -10,15 +10,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any, ClassVar, final
+from typing import Any, ClassVar, NamedTuple, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
-from robot_dyn.errors import QueryError
-from robot_dyn.integrate.fixed_point import MOST_ITERATIONS, enclose_fixed_point, fixed_point
-from robot_dyn.integrate.integrator import IntegrationError, Integrator, System
-from robot_dyn.integrate.tableau import ButcherTableau, Surd, combine
+from robot_dyn.arithmetic import Arithmetic, Array
+from robot_dyn.errors import OverflowedError, QueryError
+from robot_dyn.integrate.fixed_point import enclose_fixed_point, unit_roundoff
+from robot_dyn.integrate.integrator import IntegrationError, PlainMethod, Stepper, System
+from robot_dyn.integrate.primitives import GOING, MOST_ITERATIONS, SETTLED, combination, evaluate, settle
+from robot_dyn.integrate.tableau import ButcherTableau, Coefficients, Surd, combine
 from robot_dyn.validate import integer
 
 
@@ -53,9 +54,43 @@ _TABLEAUS = {
 }
 
 
+class Increments(NamedTuple):
+    """The increments Z_i = h k_i of a step, (s, m, W), as they are iterated; see `settle`."""
+
+    K: Array
+    Z: Array
+    new: Array
+    least: Array
+    stale: Array
+    state: Array
+    epsilon: float
+
+
+def gauss_step(
+    rate: Any, tableau: Coefficients, t: Any, h: Any, y: Array, p: Array, own: Array, after: Array, work: Increments,
+    lost: Array,
+) -> int:  # fmt: skip
+    """A step of a Gauss method; arguments as of `Stepper`."""
+    Z, m, s = work.Z, len(y), len(tableau.c)
+    Z[...] = tableau.zero
+    work.least[...], work.stale[...], work.state[...] = np.inf, 0, GOING
+    rounds, going = 0, 1
+    while going > 0 and rounds < MOST_ITERATIONS:
+        for i in range(s):
+            combination(after, y, tableau.one, tableau.a[i], Z, s)
+            evaluate(rate, t + tableau.c[i] * h, after, p, own, work.K[0])
+            np.multiply(work.K[0, :m], h, work.new[i])
+        going = settle(Z, work.new, y, work.least, work.stale, work.state, work.epsilon)
+        rounds += 1
+    combination(after, y, tableau.one, tableau.b, Z, s)
+    for run in range(len(lost)):
+        lost[run] = work.state[run] != SETTLED
+    return s * rounds
+
+
 @final
 @dataclass(frozen=True)
-class Gauss(Integrator):
+class Gauss(PlainMethod):
     """Gauss–Legendre collocation of order 2, 4 or 6, its stages solved by fixed-point iteration until rounding ends it.
 
     The iteration converges where h is small against the fastest motion, h L ‖A‖ < 1 with L the Lipschitz constant of f,
@@ -84,23 +119,39 @@ class Gauss(Integrator):
         """Its coefficients."""
         return _TABLEAUS[self.order]
 
+    def stepper(self, kind: Arithmetic, m: int, n: int, rows: int, runs: int) -> Stepper:
+        s = len(self.tableau.b)
+        K, Z, new = (np.empty(shape, kind.dtype) for shape in ((1, rows, runs), (s, m, runs), (s, m, runs)))
+        stale, state = np.empty(runs, np.int64), np.empty(runs, np.int64)
+        work = Increments(K, Z, new, np.empty((m, runs)), stale, state, float(unit_roundoff(K)))
+        return Stepper(gauss_step, self.tableau.arrays(kind), work)
+
     def step(self, system: System, t: Any, y: Array, h: Any) -> Array:
+        try:
+            with np.errstate(over="ignore", invalid="ignore"):  # an iteration that diverges is reported
+                after, lost, work = self.stepped(system, t, y, h)
+        except OverflowedError:
+            raise self.not_found(t, h) from None
+        if lost.any():
+            raise self.not_found(t, h)
+        return after if y.dtype != object else self._enclosed(system, t, y, h, work.Z)
+
+    def _enclosed(self, system: System, t: Any, y: Array, h: Any, Z: Array) -> Array:
+        """The step in balls, from approximate increments (s, m, B): around them lies a solution of the stages."""
         kind, a, b, c = self.tableau.numbers(y)
-        h = kind.number(h)
-        times = [t + node * h for node in c]
+        h, times = kind.number(h), [t + node * kind.number(h) for node in c]
 
         def update(x: Array) -> Array:
-            """The increments h k_i of all stages, shape (s, ..., m), from those of the round before."""
             return np.stack([system.rate(at, y + combine(row, x)) * h for at, row in zip(times, a, strict=True)])
 
-        with np.errstate(over="ignore", invalid="ignore"):  # a diverging iteration is reported below
-            x = fixed_point(update, kind.array(np.zeros((len(c), *y.shape))), y)
-            if x is not None and y.dtype == object:
-                x = enclose_fixed_point(update, x)
+        x = enclose_fixed_point(update, np.stack([each.T.reshape(y.shape) for each in Z]))
         if x is None:
-            raise IntegrationError(
-                f"{self.name}: the stages of the step {float(h)} at t = {float(t)} do not converge in "
-                f"{MOST_ITERATIONS} iterations: take a smaller step, or a method for stiff systems",
-                t,
-            )
+            raise self.not_found(t, h)
         return y + combine(b, x)
+
+    def not_found(self, t: Any, h: Any) -> IntegrationError:
+        return IntegrationError(
+            f"{self.name}: the stages of the step {float(h)} at t = {float(t)} do not converge in "
+            f"{MOST_ITERATIONS} iterations: take a smaller step, or a method for stiff systems",
+            t,
+        )

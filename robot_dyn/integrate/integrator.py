@@ -1,5 +1,7 @@
 """What a fixed-step method is: a map y ↦ y⁺ of one step h that approximates the flow of y' = f(t, y).
 
+A `PlainMethod` writes it as a plain function of arrays, which the time loop calls as it stands or as machine code.
+
 A method of order p errs by O(hᵖ⁺¹) in one step and by O(hᵖ) after a fixed time. [Hairer, Nørsett, Wanner, Solving
 Ordinary Differential Equations I, 2nd ed., 1993, II.3]
 """
@@ -9,7 +11,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar, final
+from typing import Any, ClassVar, NamedTuple, final
 
 import numpy as np
 
@@ -86,6 +88,60 @@ class Integrator(ABC):
             IntegrationError: If the stages of an implicit method cannot be solved for.
             QueryError: If y is of a kind of number that the method cannot take.
         """
+
+
+class Stepper(NamedTuple):
+    """A method made ready for a time loop, for states (m, W).
+
+    Attributes:
+        step: The plain function (rate, coefficients, t, h, y, p, own, after, work, lost) → evaluations. It writes
+            y(t + h) into `after`, and 1 into `lost` (W,) where stages are not found; rate, p, own as of `evaluate`.
+        coefficients: Its numbers.
+        work: Its arrays; work.K[-1], (r, W), is the latest rate.
+    """
+
+    step: Callable[..., int]
+    coefficients: Any
+    work: Any
+
+
+class PlainMethod(Integrator):
+    """A method whose step is a plain function."""
+
+    @abstractmethod
+    def stepper(self, kind: Arithmetic, m: int, n: int, rows: int, runs: int) -> Stepper:
+        """The method for a time loop.
+
+        Args:
+            kind: Arithmetic of the state.
+            m: Entries of the state of a run.
+            n: Number of positions among them.
+            rows: Numbers that a rate gives, m or more.
+            runs: W.
+        """
+
+    def step(self, system: System, t: Any, y: Array, h: Any) -> Array:
+        after, lost, _ = self.stepped(system, t, y, h)
+        if lost.any():
+            raise self.not_found(t, h)
+        return after
+
+    def stepped(self, system: System, t: Any, y: Array, h: Any) -> tuple[Array, Array, Any]:
+        """A step, whether stages were found, (B,), and the arrays of the stepper."""
+        m, kind = y.shape[-1], arithmetic_like(y)
+        x, h = y.reshape(-1, m).T, kind.number(h)
+        step, coefficients, work = self.stepper(kind, m, system.n, m, x.shape[1])
+        after, lost = np.empty_like(x), np.zeros(x.shape[1], np.int64)
+
+        def rate(t: Any, x: Array, p: Any, own: Any, out: Array) -> None:
+            out[...] = system.rate(t, x.T.reshape(y.shape)).reshape(-1, m).T
+
+        step(rate, coefficients, t, h, x, None, None, after, work, lost)
+        return after.T.reshape(y.shape), lost, work
+
+    def not_found(self, t: Any, h: Any) -> IntegrationError:
+        """The error of a step whose stages are not found."""
+        return IntegrationError(f"{self.name}: the stages of the step {float(h)} at t = {float(t)} are not found", t)
 
 
 def arithmetic_like(y: Array) -> Arithmetic:

@@ -48,6 +48,16 @@ class Numbers(NamedTuple):
     c: tuple[Any, ...]
 
 
+class Coefficients(NamedTuple):
+    """A tableau as arrays (s, s), (s,), (s,) of one arithmetic, for plain functions; and its 0 and 1."""
+
+    a: Array
+    b: Array
+    c: Array
+    zero: Any
+    one: Any
+
+
 @final
 @dataclass(frozen=True)
 class ButcherTableau:
@@ -68,6 +78,7 @@ class ButcherTableau:
     c: tuple[Coefficient, ...]
     order: int
     _in_floats: dict[np.dtype, Numbers] = field(default_factory=dict, init=False, repr=False, compare=False)
+    _arrays: dict[np.dtype, Coefficients] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         stages = len(self.b)
@@ -102,6 +113,20 @@ class ButcherTableau:
         )
         if y.dtype != object:  # balls change with the precision, which is the caller's
             self._in_floats[y.dtype] = made
+        return made
+
+
+    def arrays(self, kind: Arithmetic) -> Coefficients:
+        """The coefficients in an arithmetic, with their zeros."""
+        known = self._arrays.get(kind.dtype)
+        if known is not None:
+            return known
+        s, zero = len(self.b), kind.number(0)
+        rows = [[*(_number(kind, x) for x in row), *[zero] * (s - len(row))] for row in self.a]
+        b, c = ([_number(kind, x) for x in each] for each in (self.b, self.c))
+        made = Coefficients(kind.array(rows).reshape(s, s), kind.array(b), kind.array(c), zero, kind.number(1))
+        if kind.dtype != object:  # balls change with the precision, which is the caller's
+            self._arrays[kind.dtype] = made
         return made
 
 

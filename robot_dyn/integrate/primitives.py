@@ -1,0 +1,91 @@
+"""Primitives of steps and loops: the few operations that stand twice, as NumPy and as loops of machine code.
+
+    x = y + h Σ_j w_j K_j
+
+Here they are NumPy, in any arithmetic; `compiled.loops` has their machine code. All that is above them stands once. A
+state is (m, W), entry by run: one run, or W of them in lock step.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array, midpoint
+
+MOST_ITERATIONS = 100  # so the iteration must gain a binary digit in two rounds, to end in float64
+PATIENCE = 2  # rounds: where q' = v and v' = −k q, increments shrink only every second one
+NOISE = 1e3  # roundings of the largest entry that an increment may keep, as where forces cancel
+GOING, SETTLED, LOST = 1, 0, 2  # an iteration: not yet ended; at rounding; overflowed
+
+
+def evaluate(function: Any, t: Any, y: Array, p: Array, own: Array, out: Array) -> None:
+    """Write a function of (t, y, p, own) into `out`; in machine code the function is an address.
+
+    Args:
+        function: Such as the rate y' = f(t, y).
+        t: Time.
+        y: State, (m, W).
+        p: Numbers that all runs share, (P,).
+        own: Numbers of each run, (O, W).
+        out: Where the result goes, (r, W).
+    """
+    function(t, y, p, own, out)
+
+
+def combination(x: Array, y: Array, h: Any, weights: Array, K: Array, count: int) -> None:
+    """x = y + h Σ_{j < count} w_j K_j, of the first m rows of each K_j, (s, r, W)."""
+    total, m = None, len(y)
+    for j in range(count):
+        if weights[j] != 0:
+            term = K[j, :m] * weights[j]
+            total = term if total is None else total + term
+    x[...] = y if total is None else y + total * h
+
+
+def sizes(x: Array, out: Array) -> None:
+    """Σ |x_e| of each run."""
+    out[...] = np.abs(x).sum(axis=0)
+
+
+def settle(Z: Array, new: Array, y: Array, least: Array, stale: Array, state: Array, epsilon: Any) -> int:
+    """Take the next iterate of a fixed-point iteration for the runs that are going; how many go on.
+
+    It ends where the increments of no entry shrink any more and are of the size of rounding. Entries count apart, so
+    that one in a large unit does not end the iteration of the others. In balls midpoints count.
+
+    Args:
+        Z: Iterate, (s, m, W); becomes the next one.
+        new: Next iterate.
+        y: The state that it is a change of, (m, W); taken to be of size 1 at least in some entry.
+        least: Smallest increment so far, (m, W).
+        stale: Rounds since one shrank, (W,).
+        state: GOING, SETTLED or LOST, (W,).
+        epsilon: Unit of rounding.
+    """
+    going = state == GOING
+    new = _exact(new)
+    change, own, size = (np.abs(_middle(x)).max(axis=0) for x in (new - Z, new, y[None]))
+    Z[..., going] = new[..., going]
+    shrinks = ((change < least) & (change > epsilon * own)).any(axis=0)
+    np.minimum(least, change, out=least)
+    stale[going] = np.where(shrinks, 0, stale + 1)[going]
+    # an increment of some power of epsilon between 1/2 and 1 is rounding of Φ: far below any error that matters
+    slack = NOISE * epsilon * np.maximum(1.0, size.max(axis=0))
+    rounding = (change <= slack + epsilon ** (2 / 3) * (size + own)).all(axis=0)
+    largest = change.max(axis=0)
+    ended = (largest == 0) | ((stale >= PATIENCE) & rounding)
+    state[going] = np.where(~np.isfinite(largest), LOST, np.where(ended, SETTLED, GOING))[going]
+    return int((state == GOING).sum())
+
+
+def _exact(x: Array) -> Array:
+    """Balls without their radius; floats as they are."""
+    if x.dtype != object:
+        return x
+    return np.vectorize(lambda ball: ball.mid(), otypes=[object])(x)
+
+
+def _middle(x: Array) -> Array:
+    return x if x.dtype != object else midpoint(x)
