@@ -71,7 +71,7 @@ def test_a_run_that_diverges_leaves_the_others_as_they_are(method: str) -> None:
     setup = replace(SETUP, integrator=rd.method(method), record_period_s=0.0)
     q0, v0 = starts(40), np.broadcast_to(V, (40, 2)).copy()
     wild = [3, 17]
-    quiet = rd.rollouts(setup, q0, v0)
+    quiet = rd.rollouts(setup, q0, v0, record=EVERYTHING)
     v0[wild] = 1e5, 3e7
     runs = rd.rollouts(setup, q0, v0, record=EVERYTHING)
     others = np.setdiff1d(np.arange(40), wild)
@@ -327,7 +327,7 @@ def test_an_interrupt_ends_the_batch_and_keeps_what_there_is(monkeypatch) -> Non
     runs = rd.rollouts(setup, starts(200), threads=2)
     assert runs.stopped.any() and not runs.diverged.any()
     i = int(np.flatnonzero(runs.stopped)[-1])
-    assert runs.outcome(i).ending == "stopped" and np.isnan(runs.q[i, -1]).all()
+    assert runs.outcome(i).ending == "stopped" and runs.t[-1] < 100.0
 
 
 def test_params_are_held_to_what_their_effect_takes() -> None:

@@ -13,8 +13,8 @@ import robot_dyn as rd
 from robot_dyn.control.controller import ControlError, Memoryless
 from robot_dyn.effects.effect import Active, Conservative
 from robot_dyn.errors import EffectError, QueryError
-from robot_dyn.simulation import record
-from robot_dyn.simulation.machine.machine import Machine
+from robot_dyn.simulation.error_controlled import ErrorControlled
+from robot_dyn.simulation.fixed_step import FixedStep
 
 DOUBLE = rd.load("planar_2r")
 UR5 = rd.load("ur5")
@@ -296,14 +296,17 @@ def test_an_interrupt_in_a_companion_run_ends_the_estimate_and_keeps_the_run(met
     """All samples are there, no other companion starts, and the outcome says where the interrupt came."""
     ran = []
 
-    def interrupted(*arguments):
-        ran.append(arguments[2])
-        if len(ran) == 2:
-            raise KeyboardInterrupt
-        return march(*arguments)
+    def on_second(march):
+        def interrupted(self, *arguments):
+            ran.append(self)
+            if len(ran) == 2:
+                raise KeyboardInterrupt
+            return march(self, *arguments)
 
-    march = record.march
-    monkeypatch.setattr(record, "march", interrupted)
+        return interrupted
+
+    monkeypatch.setattr(FixedStep, "_march", on_second(FixedStep._march))
+    monkeypatch.setattr(ErrorControlled, "_segment", on_second(ErrorControlled._segment))
     run = rd.simulate(rd.Plant(DOUBLE), **START, duration_s=0.2, integrator=method, engine="interpreted")
     assert len(ran) == 2
     assert (run.outcome.ending, run.outcome.t) == ("stopped", 0.2)
@@ -323,11 +326,7 @@ def test_an_interrupt_before_the_first_step_leaves_the_start(engine: str, period
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(record, "march", interrupted)
-    monkeypatch.setattr(Machine, "run", interrupted)
-    monkeypatch.setattr(Machine, "check", lambda *_: None)
-    look = Machine.look
-    monkeypatch.setattr(Machine, "look", lambda self, *given: (monkeypatch.undo(), look(self, *given))[1])
+    monkeypatch.setattr(FixedStep, "_march", interrupted)
     run = rd.simulate(setup)
     assert (run.outcome.ending, run.outcome.t) == ("stopped", 0.0)
     np.testing.assert_array_equal(run.t, [0.0])

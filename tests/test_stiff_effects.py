@@ -34,7 +34,9 @@ def test_the_jacobian_of_a_motion_knows_its_friction(width: float) -> None:
     """∂a/∂v of −f tanh(v / v_s) at v = 0 is −M⁻¹ f / v_s beside terms of order one; it errs by (1/100)² / 3."""
     motion = Motion(rd.Plant(ARM, [rd.RegularisedCoulombFriction([3.0, 2.0], width)]), None)
     q = np.array([0.4, -0.7])
-    J = jacobian(motion.system(None, Stretch(0.0, 1.0, False)), 0.5, motion.start(q, np.zeros(2)))
+    setup = rd.Setup(motion.plant, q)
+    functions, bounds = interpreted(motion, Watch(setup, motion)), np.array([0.0, 1.0])
+    J = jacobian(system(functions, motion, bounds, np.zeros((0, 1))), 0.5, motion.start(q, np.zeros(2)))
     expected = -np.linalg.inv(ARM.M(q)) * [3.0, 2.0] / width
     np.testing.assert_allclose(J[2:4, 2:4], expected, rtol=1e-4)
 

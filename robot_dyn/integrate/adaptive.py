@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from math import inf
-from typing import Any, cast, final
+from typing import Any, ClassVar, cast, final
 
 import numpy as np
 
@@ -94,6 +94,7 @@ class Adaptive:
     rtol: float = 1e-10
     atol: float = 1e-12
     max_step: float = inf
+    plain: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         choice("adaptive method", self.method, ("DOP853", "Radau"))

@@ -63,7 +63,9 @@ class ExplicitRungeKutta(PlainMethod):
         object.__setattr__(self, "order", self.tableau.order)
         object.__setattr__(self, "evaluations_per_step", len(self.tableau.b))
 
-    def stepper(self, kind: Arithmetic, m: int, n: int, rows: int, runs: int) -> Stepper:
+    def stepper(
+        self, kind: Arithmetic, m: int, n: int, rows: int, runs: int = 1, widths: Array | None = None
+    ) -> Stepper:
         K = np.empty((len(self.tableau.b), rows, runs), kind.dtype)
         return Stepper(explicit_step, self.tableau.arrays(kind), Stages(K))
 
@@ -102,7 +104,9 @@ class SemiImplicitEuler(PlainMethod):
     order: int = field(default=1, init=False)
     evaluations_per_step: int | None = field(default=1, init=False)
 
-    def stepper(self, kind: Arithmetic, m: int, n: int, rows: int, runs: int) -> Stepper:
+    def stepper(
+        self, kind: Arithmetic, m: int, n: int, rows: int, runs: int = 1, widths: Array | None = None
+    ) -> Stepper:
         return Stepper(semi_implicit_step, Start(n, kind.array([1])), Stages(np.empty((1, rows, runs), kind.dtype)))
 
 

@@ -119,7 +119,9 @@ class Gauss(PlainMethod):
         """Its coefficients."""
         return _TABLEAUS[self.order]
 
-    def stepper(self, kind: Arithmetic, m: int, n: int, rows: int, runs: int) -> Stepper:
+    def stepper(
+        self, kind: Arithmetic, m: int, n: int, rows: int, runs: int = 1, widths: Array | None = None
+    ) -> Stepper:
         s = len(self.tableau.b)
         K, Z, new = (np.empty(shape, kind.dtype) for shape in ((1, rows, runs), (s, m, runs), (s, m, runs)))
         stale, state = np.empty(runs, np.int64), np.empty(runs, np.int64)

@@ -17,6 +17,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import Arithmetic, Array, Ball, Float
 from robot_dyn.errors import QueryError, RobotDynError
+from robot_dyn.integrate.primitives import evaluate
 
 _FLOATS = {np.dtype(kind): Float(np.dtype(kind)) for kind in (np.float32, np.float64, np.longdouble)}
 _BALL = Ball()  # makes its numbers in the precision of the caller's scope
@@ -54,6 +55,27 @@ class System:
     widths: Array | None = None
 
 
+class Stepper(NamedTuple):
+    """A method made ready for a time loop, for states (m, W).
+
+    Attributes:
+        step: The plain function (rate, coefficients, t, h, y, p, own, after, work, lost) → evaluations. It writes
+            y(t + h) into `after`, and 1 into `lost` (W,) where stages are not found; rate, p, own as of `evaluate`.
+        coefficients: Its numbers.
+        work: Its arrays; work.K[-1], (r, W), is the latest rate.
+    """
+
+    step: Callable[..., int]
+    coefficients: Any
+    work: Any
+
+
+class Latest(NamedTuple):
+    """The latest rate, (1, r, W)."""
+
+    K: Array
+
+
 class Integrator(ABC):
     """A method that makes one step of given size. A value without state: two runs share nothing.
 
@@ -63,6 +85,7 @@ class Integrator(ABC):
         evaluations_per_step: Of the rate in a step, or None where it depends on the state.
         canonical: Whether it keeps the structure of a Hamiltonian system, which has to be given in (q, p), p = M v.
         stiff: Whether its step is not bounded by the fastest decay of the system.
+        plain: Whether its step is a plain function, which machine code and runs in lock step take.
     """
 
     name: str
@@ -70,6 +93,7 @@ class Integrator(ABC):
     evaluations_per_step: int | None
     canonical: ClassVar[bool] = False
     stiff: ClassVar[bool] = False
+    plain: ClassVar[bool] = False
 
     @abstractmethod
     def step(self, system: System, t: Any, y: Array, h: Any) -> Array:
@@ -89,27 +113,9 @@ class Integrator(ABC):
             QueryError: If y is of a kind of number that the method cannot take.
         """
 
-
-class Stepper(NamedTuple):
-    """A method made ready for a time loop, for states (m, W).
-
-    Attributes:
-        step: The plain function (rate, coefficients, t, h, y, p, own, after, work, lost) → evaluations. It writes
-            y(t + h) into `after`, and 1 into `lost` (W,) where stages are not found; rate, p, own as of `evaluate`.
-        coefficients: Its numbers.
-        work: Its arrays; work.K[-1], (r, W), is the latest rate.
-    """
-
-    step: Callable[..., int]
-    coefficients: Any
-    work: Any
-
-
-class PlainMethod(Integrator):
-    """A method whose step is a plain function."""
-
-    @abstractmethod
-    def stepper(self, kind: Arithmetic, m: int, n: int, rows: int, runs: int) -> Stepper:
+    def stepper(
+        self, kind: Arithmetic, m: int, n: int, rows: int, runs: int = 1, widths: Array | None = None
+    ) -> Stepper:
         """The method for a time loop.
 
         Args:
@@ -117,8 +123,42 @@ class PlainMethod(Integrator):
             m: Entries of the state of a run.
             n: Number of positions among them.
             rows: Numbers that a rate gives, m or more.
-            runs: W.
+            runs: W; 1 unless the method is `plain`.
+            widths: As of `System`.
         """
+        K = np.empty((1, rows, 1), kind.dtype)
+
+        def step(
+            rate: Any, _: Any, t: Any, h: Any, y: Array, p: Array, own: Array, after: Array, work: Latest, lost: Array
+        ) -> int:
+            evaluations = 0
+
+            def one(t: Any, x: Array) -> Array:
+                nonlocal evaluations
+                evaluations += 1
+                evaluate(rate, t, x[:, None], p, own, K[0])
+                return K[0, :m, 0].copy()
+
+            def f(t: Any, x: Array) -> Array:
+                return (
+                    one(t, x) if x.ndim == 1 else np.array([one(t, each) for each in x.reshape(-1, m)]).reshape(x.shape)
+                )
+
+            after[:, 0] = self.step(System(f, n, widths), t, y[:, 0].copy(), h)
+            return evaluations
+
+        return Stepper(step, None, Latest(K))
+
+
+class PlainMethod(Integrator):
+    """A method whose step is a plain function: the one of its `stepper`."""
+
+    plain: ClassVar[bool] = True
+
+    @abstractmethod
+    def stepper(
+        self, kind: Arithmetic, m: int, n: int, rows: int, runs: int = 1, widths: Array | None = None
+    ) -> Stepper: ...
 
     def step(self, system: System, t: Any, y: Array, h: Any) -> Array:
         after, lost, _ = self.stepped(system, t, y, h)

@@ -35,13 +35,18 @@ def evaluate(function: Any, t: Any, y: Array, p: Array, own: Array, out: Array) 
 
 
 def combination(x: Array, y: Array, h: Any, weights: Array, K: Array, count: int) -> None:
-    """x = y + h Σ_{j < count} w_j K_j, of the first m rows of each K_j, (s, r, W)."""
+    """X = y + h Σ_{j < count} w_j K_j, of the first m rows of each K_j, (s, r, W)."""
     total, m = None, len(y)
     for j in range(count):
         if weights[j] != 0:
             term = K[j, :m] * weights[j]
             total = term if total is None else total + term
     x[...] = y if total is None else y + total * h
+
+
+def copy(to: Array, x: Array) -> None:
+    """Write the numbers of an array into another of its shape."""
+    to[...] = x
 
 
 def sizes(x: Array, out: Array) -> None:

@@ -115,7 +115,6 @@ class ButcherTableau:
             self._in_floats[y.dtype] = made
         return made
 
-
     def arrays(self, kind: Arithmetic) -> Coefficients:
         """The coefficients in an arithmetic, with their zeros."""
         known = self._arrays.get(kind.dtype)

@@ -32,7 +32,7 @@ def choose(setup: Setup, motion: Motion) -> tuple[Machine | None, str]:
 
     Raises:
         TraceError: If engine is "compiled" and a part cannot be; names it.
-        MarchError: If the machine code does not agree with the interpreted engine.
+        MachineError: If the machine code does not agree with the interpreted engine.
     """
     if setup.engine == "interpreted":
         return None, "interpreted"
@@ -45,7 +45,7 @@ def choose(setup: Setup, motion: Motion) -> tuple[Machine | None, str]:
         return None, "interpreted (short: compiling does not pay)"
     try:
         made = _made(setup, motion)
-        if not made.ready and seconds < _COMPILE_S + _COMPILE_S_PER_JOINT * motion.plant.dynamics.n:
+        if not made.equations.ready and seconds < _COMPILE_S + _COMPILE_S_PER_JOINT * motion.plant.dynamics.n:
             return None, "interpreted (short: compiling does not pay)"
         made.check(setup)
     except (ImportError, RobotDynError) as error:
@@ -61,16 +61,13 @@ def _machine(setup: Setup, motion: Motion) -> Machine:
 
 def _made(setup: Setup, motion: Motion) -> Machine:
     from robot_dyn.simulation.machine.making import machine
-    from robot_dyn.simulation.machine.stages import steps_whole
 
     method: Any = setup.integrator
-    return machine(motion, method if steps_whole(method) else None)
+    return machine(motion, method if method.plain else None)
 
 
 def _label(setup: Setup) -> str:
-    from robot_dyn.simulation.machine.stages import steps_whole
-
-    return "compiled" if steps_whole(setup.integrator) else "compiled (the equation of motion; steps in Python)"
+    return "compiled" if setup.integrator.plain else "compiled (the equation of motion; steps in Python)"
 
 
 def _evaluations(setup: Setup) -> float:
@@ -85,13 +82,13 @@ def _evaluations(setup: Setup) -> float:
 
 def _cost(setup: Setup, motion: Motion) -> float:
     """Time of one evaluation in the interpreted engine, in [s]."""
-    y = motion.start(setup.q0, setup.v0)
-    system, best = motion.system(np.zeros(len(setup.q0)) if motion.sampled else None, setup.stretches[0]), np.inf
+    y, held = motion.start(setup.q0, setup.v0), np.zeros(len(setup.q0)) if motion.sampled else None
+    best = np.inf
     try:
         with np.errstate(all="ignore"):
             for _ in range(3):
                 began = perf_counter()
-                system.rate(0.0, y)
+                motion.rate(0.0, y, held)
                 best = min(best, perf_counter() - began)
     except RobotDynError:  # the run will tell
         return 0.0

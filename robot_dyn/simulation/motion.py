@@ -10,17 +10,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, final
+from typing import final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array, apply
+from robot_dyn.arithmetic import Array
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.effect import Conservative, Force
 from robot_dyn.effects.plant import Plant, bounded
-from robot_dyn.integrate.integrator import System
 from robot_dyn.model.dynamics import acceleration
-from robot_dyn.simulation.schedule import Stretch
 
 CONTROL = "control"
 
@@ -59,11 +57,16 @@ class Motion:
         """Number of states of the controller."""
         return self.controller.memory_size if self.controller else 0
 
+    @property
+    def size(self) -> int:
+        """Number m of entries of y."""
+        return 2 * self.plant.dynamics.n + self.memory_size + len(self.sources)
+
     @cached_property
     def widths(self) -> np.ndarray:
         """Change of each entry of y over which the rate bends, (m,): the least of the effects, inf where none says."""
         n = self.plant.dynamics.n
-        widths = np.full(2 * n + self.memory_size + len(self.sources), np.inf)
+        widths = np.full(self.size, np.inf)
         for effect in self.plant.effects:
             for part, width in zip((slice(0, n), slice(n, 2 * n)), effect.widths, strict=True):
                 widths[part] = np.minimum(widths[part], width)
@@ -108,36 +111,13 @@ class Motion:
             y[2 * n : 2 * n + self.memory_size] = self.controller.next_memory(t, q, v, z)
         return y, held
 
-    def system(self, held: Array | None, stretch: Stretch, seen: Array | None = None) -> System:
-        """The equation on one stretch of time.
-
-        Args:
-            held: The actuation that a sampled controller holds; None if it acts continuously.
-            stretch: What switches at its ends acts as it does between them.
-            seen: Where the velocity and the actuation of each evaluation are written, (2n,).
-        """
-        n = self.plant.dynamics.n
-        first, last = np.nextafter(stretch.start, np.inf), np.nextafter(stretch.end, -np.inf)
-
-        def rate(t: float, y: Array) -> Array:
-            if y.ndim > 1:  # an implicit method asks for its Jacobian
-                return np.array([rate(t, row) for row in y.reshape(-1, y.shape[-1])]).reshape(y.shape)
-            y = y.view()
-            y.setflags(write=False)  # code of a user's own that changes its arguments would change the run
-            made, u = self.rate(min(max(t, first), last), y, held)
-            if seen is not None:
-                seen[:n], seen[n:] = made[:n], u
-            return made
-
-        return System(rate, n, self.widths)
-
     def rate(self, t: float, y: Array, held: Array | None) -> tuple[Array, Array]:
         """f(t, y), and the actuation u; in floats or, for the compiled engine, in symbols.
 
         Args:
             t: In [s].
             y: One state of the motion.
-            held: As of `system`.
+            held: The actuation that a sampled controller holds; None if it acts continuously.
         """
         dynamics, controller, forces = self.plant.dynamics, self.controller, self.plant.forces
         n = dynamics.n
@@ -154,9 +134,8 @@ class Motion:
         end = 2 * n + self.memory_size
         remembers = held is None and controller is not None and self.memory_size > 0
         result[2 * n : end] = controller.memory_rate(t, q, v, z) if remembers and controller else 0.0
-        result[end] = u @ v
         working = [x for x, force in zip(torques, forces, strict=True) if not isinstance(force, Conservative)]
-        result[end + 1 :] = [x @ v for x in working]
+        result[end:] = [x @ v for x in (u, *working)]
         return result, u
 
     def energy(self, t: Array, q: Array, v: Array) -> tuple[Array, Array]:
@@ -168,7 +147,6 @@ class Motion:
                 potential = potential + force.potential(dynamics, t, q)
         return dynamics.kinetic_energy(q, v), potential
 
-    def powers(self, t: float, q: Array, v: Array, u: Any) -> list[float]:
+    def powers(self, t: float, q: Array, v: Array, u: Array) -> list[float]:
         """Power of the control and of the effects that work, in the order of `sources`."""
-        torques = [force.torque(self.plant.dynamics, t, q, v) for force in self.working]
-        return [float(apply(v[None], x)[0]) for x in (u, *torques)]
+        return [u @ v, *(force.torque(self.plant.dynamics, t, q, v) @ v for force in self.working)]

@@ -19,7 +19,6 @@ from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.simulation.machine.batch import LANES, Batch
 from robot_dyn.simulation.machine.making import machine
 from robot_dyn.simulation.machine.payloads import masses
-from robot_dyn.simulation.machine.stages import steps_whole
 from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.rollout_result import Rollouts
 from robot_dyn.simulation.setup import Setup
@@ -68,7 +67,7 @@ def rollouts(
     """
     setup = replace(instance("setup", setup, Setup, "give an rd.Setup"), estimate_error=False)
     most_bytes = integer("most_bytes", most_bytes, most=2**63 - 1)
-    if not steps_whole(setup.integrator):
+    if not setup.integrator.plain:
         raise QueryError("rollouts take an explicit or a Gauss method, such as rd.method('rk4'); simulate takes any")
     if params is not None and not (isinstance(params, Mapping) and all(isinstance(name, str) for name in params)):
         raise QueryError(f"params must give values by name, such as {{'kp': …}}, got {shown(params)}")
@@ -77,15 +76,11 @@ def rollouts(
     q, v, free = _starts(setup, q0, v0, params or {})
     motion = Motion(setup.plant, setup.controller, getattr(setup.integrator, "canonical", False))
     assert isinstance(setup.integrator, Integrator)
-    made = machine(
-        motion,
-        setup.integrator,
-        lanes=LANES,
-        free={name: x[0] for name, x in free.items()},
-        tau="tau" in wanted or (motion.canonical and "v" in wanted),
-    )
+    asked = {"u": "tau" in wanted, "v": motion.canonical and "v" in wanted, "energy": "energy" in wanted}
+    kept, nominal = tuple(name for name, yes in asked.items() if yes), {name: x[0] for name, x in free.items()}
+    made = machine(motion, setup.integrator, lanes=LANES, free=nominal, kept=kept)
     made.check(setup)
-    return Batch(setup, motion, made, q, v, free, wanted, most_bytes).run(thread_count(threads), on_progress)
+    return Batch(setup, made, q, v, free, wanted, kept, most_bytes).run(thread_count(threads), on_progress)
 
 
 def _starts(

@@ -15,8 +15,9 @@ from robot_dyn.simulation.acting import acting
 from robot_dyn.simulation.ledger import Ledger
 from robot_dyn.simulation.loads import at_stop, wrenches
 from robot_dyn.simulation.motion import Motion
-from robot_dyn.simulation.samples import columns, row
+from robot_dyn.simulation.samples import columns
 from robot_dyn.simulation.setup import Setup
+from robot_dyn.simulation.state_functions import sample
 from robot_dyn.simulation.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -77,8 +78,10 @@ def _follows(
     motion = Motion(setup.plant, setup.controller)
     if tau is None and (motion.sampled or motion.memory_size):
         tau = np.full_like(q, np.nan)  # it depends on what was before
-    held = [None] * len(t) if tau is None else tau
-    rest = np.zeros(motion.memory_size + len(motion.sources))
-    made = [row(motion, at, np.concatenate([*y, rest]), u) for at, *y, u in zip(t.tolist(), q, v, held, strict=True)]
-    _, _, a, u, _, power, energy = columns(motion, np.array(made))
+    made = np.full((len(t), motion.size + q.shape[1] + 2), np.nan)
+    rest = np.zeros((len(t), motion.size - 2 * q.shape[1]))
+    y = np.hstack([q, v, rest])
+    for i in range(len(t)):
+        sample(motion, float(t[i]), y[i], None if tau is None else tau[i], made[i])
+    _, _, a, u, _, power, energy = columns(motion, t, y, made)
     return a, u, power, energy

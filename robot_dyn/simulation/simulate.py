@@ -9,8 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
-from functools import partial
-from math import ceil
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
@@ -25,18 +23,22 @@ from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.simulation.acting import acting
 from robot_dyn.simulation.choice import choose
 from robot_dyn.simulation.error import ErrorEstimate, no_estimate
+from robot_dyn.simulation.error_controlled import ErrorControlled
 from robot_dyn.simulation.estimate import estimate
+from robot_dyn.simulation.fixed_step import FixedStep
 from robot_dyn.simulation.ledger import Ledger
 from robot_dyn.simulation.loads import at_stop, link_of, wrenches
 from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.observed import observer_of, remarks
 from robot_dyn.simulation.observer import Observer
 from robot_dyn.simulation.origin import origin
-from robot_dyn.simulation.record import MOST_SHARED, Record, collect
-from robot_dyn.simulation.samples import columns, compiled_rows
+from robot_dyn.simulation.record import Record
+from robot_dyn.simulation.samples import columns
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import check_record
+from robot_dyn.simulation.state_functions import interpreted
 from robot_dyn.simulation.trajectory import Ending, Outcome, Statistics, Trajectory
+from robot_dyn.simulation.watch import Watch
 from robot_dyn.validate import function
 
 if TYPE_CHECKING:
@@ -96,7 +98,7 @@ def simulate(
     step = 0.0 if adaptive else record.outcome.t / max(record.steps, 1)
     statistics = Statistics(name, step, record.steps, record.evaluations, wall, companions, engine, compiling)
     observer.close()
-    made = _trajectory(setup, motion, machine, record, statistics, error, observer)
+    made = _trajectory(setup, motion, record, statistics, error, observer)
     return replace(made, statistics=replace(statistics, samples_s=perf_counter() - clock[-1]))
 
 
@@ -109,16 +111,17 @@ def _run(
     observer: Observer | None = None,
     companion: bool = False,
 ) -> Record:
-    """March in machine code, in the interpreted engine, or in that with its rate in machine code."""
-    few = isinstance(setup.integrator, Adaptive) or setup.steps <= MOST_SHARED
-    thin = 1 if few else 30 * ceil(setup.steps / MOST_SHARED)  # steps of 2, 3 and 5 meet at every 30th
-    if machine is not None and machine.whole:
-        from robot_dyn.simulation.machine.follow import follow
-
-        record = follow(setup, motion, machine, pace, thin, on_progress, observer)
+    """The run of a setup, or of a companion with another pace."""
+    advance = None if machine is None else machine.loop
+    if machine is None:
+        functions = interpreted(motion, Watch(setup, motion))
     else:
-        systems = partial(machine.system, setup=setup) if machine is not None else None
-        record = collect(setup, motion, pace, thin, systems, on_progress, observer)
+        functions = machine.in_python if advance is None else machine.equations.functions
+    if isinstance(setup.integrator, Adaptive):
+        run: Any = ErrorControlled(setup, motion, functions, pace, on_progress, observer)
+    else:
+        run = FixedStep(setup, motion, functions, pace, advance, on_progress, observer)
+    record = run.record()
     if companion and record.outcome.ending is Ending.STOPPED:
         raise KeyboardInterrupt
     return record
@@ -138,7 +141,6 @@ def _kinetic_peak(motion: Motion, record: Record) -> float:
 def _trajectory(
     setup: Setup,
     motion: Motion,
-    machine: Machine | None,
     record: Record,
     statistics: Statistics,
     error: ErrorEstimate | None,
@@ -146,11 +148,7 @@ def _trajectory(
 ) -> Trajectory:
     """The samples with what follows from them."""
     t = record.t
-    if record.rows is not None:
-        q, v, a, tau, W, P, E = columns(motion, record.rows)
-    else:
-        assert machine is not None
-        q, v, a, tau, W, P, E = compiled_rows(motion, machine, record)
+    q, v, a, tau, W, P, E = columns(motion, t, record.y, record.made)
     wanted, deviation = deviation_of(setup, t, q)
     peak = _kinetic_peak(motion, record)
     ledger = Ledger(E[:, 0], E[:, 1], dict(zip(motion.sources, W.T, strict=True)), peak)

@@ -1,30 +1,82 @@
-"""The machine code of a setup: its motion traced, its march compiled, and held to the interpreted engine before use.
+"""The state equation of a setup as machine code, held to the interpreted one before use.
 
-|y⁺ − y⁺_interpreted| ≤ 1e-13 · scale   after one step from random states, or it is refused
+|y' − y'_interpreted| ≤ 1e-13 · cond(M) · scale   at random states, or it is refused
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import ctypes
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, final
 
 import numpy as np
 
+from robot_dyn.compiled.cache import default_store
+from robot_dyn.compiled.identity import digest
+from robot_dyn.compiled.llvm import machine_code
+from robot_dyn.compiled.llvm.lock_step import write_function
+from robot_dyn.compiled.program import Program
 from robot_dyn.errors import RobotDynError
-from robot_dyn.integrate.integrator import Integrator, System
-from robot_dyn.simulation.machine.places import Ended, Lane, Now
-from robot_dyn.simulation.machine.program import Program
-from robot_dyn.simulation.machine.timetable import Timetable, at_times, pieces, timetable
 from robot_dyn.simulation.motion import Motion
-from robot_dyn.simulation.schedule import Stretch
+from robot_dyn.simulation.plan import plan_of
 from robot_dyn.simulation.setup import Setup
+from robot_dyn.simulation.state_functions import sample
+from robot_dyn.simulation.time_loop import Functions
 
 _STATES = 4
 _AGREES = 1e-13
+_POINTER = ctypes.POINTER(ctypes.c_double)
+_FUNCTION = ctypes.CFUNCTYPE(None, ctypes.c_double, *[ctypes.c_void_p] * 4)
 
 
-class MarchError(RobotDynError):
-    """A compiled march that does not agree with the interpreted engine; nothing of it is used."""
+class MachineError(RobotDynError):
+    """Machine code that does not agree with the interpreted equations; nothing of it is used."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """The functions of a state equation, as programs and machine code.
+
+    Attributes:
+        programs: rate, energy and sample, and tick where there is one.
+        runs: W.
+        name: What moves, for people.
+    """
+
+    programs: Mapping[str, Program]
+    runs: int
+    name: str
+    checked: set[bool] = field(default_factory=set, repr=False)
+
+    @property
+    def instructions(self) -> int:
+        """Operations in all."""
+        return sum(len(program) for program in self.programs.values())
+
+    @cached_property
+    def _key(self) -> str:
+        return digest([str(self.runs), *(f"{name} {program}" for name, program in self.programs.items())])
+
+    @property
+    def ready(self) -> bool:
+        """Whether the machine code is in the store, or here already."""
+        return "functions" in vars(self) or machine_code.known(self._key, default_store())
+
+    @cached_property
+    def functions(self) -> Functions:
+        """The addresses; compiled if they are not in the store."""
+
+        def write(module: Any, prefix: str) -> None:
+            for name, program in self.programs.items():
+                write_function(module, f"{prefix}{name}", program, self.runs)
+
+        def address(name: str) -> int:
+            return machine_code.address(name, self._key, write, default_store(), f"the motion of {self.name}")
+
+        return Functions(*(address(name) if name in self.programs else 0 for name in Functions._fields))
 
 
 @final
@@ -34,156 +86,62 @@ class Machine:
 
     Attributes:
         motion: The interpreted motion whose equations it has: that of the setup, with right angles written out in full.
-        program: Its text and machine code.
-        whole: Whether steps run in machine code too, not the rate alone.
+        equations: Its machine code.
         free: Values of what differs from run to run, as the setup has them.
+        loop: The time loop as machine code; None if steps are made in Python.
     """
 
     motion: Motion
-    program: Program
-    whole: bool
+    equations: Equations
     free: np.ndarray
+    loop: Callable[..., int] | None
 
-    @property
-    def ready(self) -> bool:
-        """Whether there is nothing left to compile."""
-        return self.program.known if self.whole else "rate" in vars(self.program)
-
-    def work(self, y: np.ndarray) -> np.ndarray:
-        """The array of work at a state (m,), or at those of all lanes (W, m)."""
-        places = self.program.places
-        made, x = np.zeros(places.size), places.x + (places.state + places.held) * places.lanes
-        made[: places.x] = y.T.ravel()
-        made[x : places.k] = np.repeat(self.free, places.lanes)
-        return made
-
-    def hold(self, work: np.ndarray, held: np.ndarray | None) -> None:
-        """Put what a sampled controller holds, (n,) or (W, n), in its place."""
-        places = self.program.places
-        if held is not None:
-            at = places.x + places.x
-            work[at : at + places.held * places.lanes] = held.T.ravel()
-
-    def run(self, work: np.ndarray, table: Timetable, **arrays: Any) -> Ended:
-        """March; `arrays` are those of the program that matter, the others are empty."""
-        m, lanes, empty = self.program.places.state, self.program.lanes, np.empty
-        given: dict[str, Any] = {
-            "lanes": np.zeros((len(Lane), lanes)), "alive": np.ones(lanes, np.int64), "given": empty((0, 0)),
-            "which": empty(0, np.int64), "out_step": empty((0, 2), np.int64), "out_y": empty((0, 0, lanes)),
-            "out_u": empty((0, 0, 0)), "out_e": empty((0, 2, lanes)), "out_shared": empty((0, m + 2)),
-            "columns": empty((0, 0)), "clock": np.array([np.inf, 0.0, 0.0]), "stop": np.zeros(1, np.int64),
-        } | arrays  # fmt: skip
-        order = (
-            "given",
-            "which",
-            "out_step",
-            "out_y",
-            "out_u",
-            "out_e",
-            "out_shared",
-            "columns",
-            "now",
-            "clock",
-            "stop",
-        )
-        return Ended(
-            self.program.march(work, given["lanes"], given["alive"], *table.arrays, *(given[name] for name in order))
-        )
-
-    def look(self, t: np.ndarray, y: np.ndarray, held: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
-        """Rate with actuation (k, m + n), and energies (k, 2), of states y (k, m) at times t."""
-        there = at_times(getattr(self.motion.controller, "reference", None), t)
-        made, energies = np.empty((len(t), self.program.places.made)), np.empty((len(t), 2))
-        work = self.work(np.zeros(self.program.places.state))
-        if not self.whole:
-            for i in range(len(t)):
-                work = self.work(y[i])
-                self.hold(work, None if held is None else held[i])
-                work[len(y[i]) : 2 * len(y[i])] = y[i]
-                self.program.rate(t[i], work, there[i], made[i])
-                self.program.energy(t[i], work, there[i], energies[i])
-            return made, energies
-        rest, ones = np.zeros(len(t)), np.ones(len(t), dtype=np.int64)
-        table = Timetable(t, rest, np.full(len(t), np.inf), ones, 0 * ones, there, there)
-        now = np.zeros(len(Now), dtype=np.int64)
-        now[Now.SAMPLING], now[Now.BUDGET], now[Now.EVERY], now[Now.THIN] = 1, len(t) + 1, 1, 1
-        given = y if held is None else np.column_stack([y, held])
-        self.run(
-            work, table, given=np.ascontiguousarray(given), now=now,
-            out_u=made[:, None], out_e=energies[:, :, None],
-        )  # fmt: skip
-        return made, energies
-
-    def system(self, held: np.ndarray | None, stretch: Stretch, setup: Setup, seen: np.ndarray | None = None) -> System:
-        """The equation on one stretch, as `Motion.system`, its rate in machine code."""
-        part = pieces(setup.controller, np.array([stretch.start]), np.array([stretch.end]))[0]
-        work, rate, m = self.work(np.zeros(self.program.places.state)), self.program.rate, self.program.places.state
-        self.hold(work, held)
-        made, last, n = np.empty(self.program.places.made), np.nextafter(stretch.end, -np.inf), self.program.n
-
-        def one(t: float, y: np.ndarray) -> np.ndarray:
-            if y.ndim > 1:
-                return np.array([one(t, row) for row in y.reshape(-1, m)]).reshape(y.shape)
-            work[m : 2 * m] = y
-            rate(min(float(t), last), work, part, made)
-            if seen is not None:
-                seen[:n], seen[n:] = made[:n], made[m : m + n]
-            return made[:m].copy()
-
-        return System(one, n, self.motion.widths)
+    @cached_property
+    def in_python(self) -> Functions:
+        """The functions as Python calls them."""
+        return Functions(*(_callable(address) for address in self.equations.functions))
 
     def check(self, setup: Setup) -> None:
-        """Hold one step from random states to the interpreted engine.
+        """Hold the functions to the interpreted equations at random states, the first time.
 
         Raises:
-            MarchError: If they differ by more than rounding.
+            MachineError: If they differ by more than rounding.
         """
-        rng, n = np.random.default_rng(20), self.program.n
-        table, stretches, lanes = timetable(setup), setup.stretches, self.program.lanes
-        for i in range(_STATES if lanes == 1 else 1):
-            s = int(rng.integers(len(table.starts)))
-            y = rng.normal(size=(lanes, self.program.places.state))
-            held = rng.normal(size=(lanes, n)) if self.motion.sampled else None
-            t, method, first = stretches[s].start, setup.integrator, None if held is None else held[0]
-            with np.errstate(all="ignore"):
-                f = self.motion.system(first, stretches[s]).rate(t, y[0])
-            # so that neither engine's rounding is multiplied, as by gains of an unstable control
-            h = min(1e-3, setup.step_s, 0.01 / max(1.0, float(np.nan_to_num(np.abs(f[: 2 * n]).max()))))
-            stretch = Stretch(t, max(stretches[s].end, t + 2 * h), False)
-            ours = self._one_step(table, s, h, y, held) if self.whole else None
-            for lane in range(min(lanes, _STATES)):
-                own = None if held is None else held[lane]
-                system = self.motion.system(own, stretch)
-                if ours is None:
-                    one, theirs = self.system(own, stretch, setup).rate(t, y[lane]), system.rate(t, y[lane])
-                    allowed = _AGREES * max(1.0, float(np.linalg.cond(self.motion.plant.M(y[lane, :n]))))
-                else:
-                    assert isinstance(method, Integrator)
-                    one, theirs, allowed = ours[lane], method.step(system, t, y[lane], h), _AGREES
-                error = _difference(one, theirs, y[lane], n)
-                if not error <= allowed:
-                    raise MarchError(
-                        f"a compiled step of {self.program.name} differs from the interpreted one by {error:.1e} of "
-                        f"its size, {allowed:.1e} allowed: take engine='interpreted', and report it (random state {i})"
+        if self.equations.checked:
+            return
+        rng, n, m, W = np.random.default_rng(20), self.motion.plant.dynamics.n, self.motion.size, self.equations.runs
+        plan, held = plan_of(setup), n * self.motion.sampled
+        made = {name: np.empty((len(program.outputs), W)) for name, program in self.equations.programs.items()}
+        for i in range(_STATES):
+            s = int(rng.integers(len(plan.counts) - 1))
+            t, y = float(plan.starts[s] + plan.lengths[s]), rng.normal(size=(m, W))
+            own = np.vstack([rng.normal(size=(held, W)), np.repeat(self.free[:, None], W, axis=1)])
+            for name, out in made.items():
+                getattr(self.in_python, name)(t, y, plan.parameters[s], own, out)
+            for lane in range(min(W, _STATES)):
+                theirs = np.empty(m + n + 2)
+                sample(self.motion, t, y[:, lane], own[:n, lane] if held else None, theirs)
+                allowed = _AGREES * max(1.0, float(np.linalg.cond(self.motion.plant.M(y[:n, lane]))))
+                pairs = (("rate", theirs[:m]), ("energy", theirs[m + n :]))
+                worst = max(_difference(made[name][: len(x), lane], x, y[:, lane]) for name, x in pairs)
+                if not worst <= allowed:
+                    raise MachineError(
+                        f"the compiled motion of {self.equations.name} differs from the interpreted one by {worst:.1e} "
+                        f"of its size, {allowed:.1e} allowed: take engine='interpreted', and report it (random state {i})"
                     )
-
-    def _one_step(self, table: Timetable, s: int, h: float, y: np.ndarray, held: np.ndarray | None) -> np.ndarray:
-        one = slice(s, s + 1)
-        part = Timetable(
-            table.starts[one], np.array([h]), table.lasts[one], np.ones(1, np.int64), np.zeros(1, np.int64),
-            table.pieces[one], table.at_ticks[one],
-        )  # fmt: skip
-        work, now = self.work(y), np.zeros(len(Now), dtype=np.int64)
-        self.hold(work, held)
-        now[Now.BUDGET], now[Now.EVERY], now[Now.THIN] = 2, 2, 2
-        self.run(work, part, now=now, out_shared=np.empty((1, self.program.places.state + 2)))
-        places = self.program.places
-        return work[places.x : 2 * places.x].reshape(places.state, places.lanes).T
+        self.equations.checked.add(True)
 
 
-def _difference(x: np.ndarray, y: np.ndarray, start: np.ndarray, n: int) -> float:
-    """Largest difference of two states, of positions, velocities and the rest each by its own size."""
-    size = np.maximum(np.abs(y), np.abs(start))
-    parts = [part for part in (slice(0, n), slice(n, 2 * n), slice(2 * n, None)) if len(size[part])]
-    worst = [np.abs(x[part] - y[part]).max() / size[part].max() for part in parts]
-    return float(max(worst)) if np.isfinite(worst).all() else np.inf
+def _callable(address: int) -> Callable[..., None]:
+    function = _FUNCTION(address)
+
+    def call(t: float, y: np.ndarray, p: np.ndarray, own: np.ndarray, out: np.ndarray) -> None:
+        function(t, y.ctypes.data, p.ctypes.data, own.ctypes.data, out.ctypes.data)
+
+    return call
+
+
+def _difference(x: np.ndarray, y: np.ndarray, start: np.ndarray) -> float:
+    """Largest difference of two results, by the size of theirs and of the state."""
+    size = max(1.0, float(np.abs(y).max()), float(np.abs(start).max()))
+    return float(np.abs(x - y).max() / size) if np.isfinite(x).all() and np.isfinite(y).all() else np.inf

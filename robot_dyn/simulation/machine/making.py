@@ -1,70 +1,75 @@
-"""The making of machines: motions traced and kept, so that a second run of the same parts compiles nothing.
+"""The making of machines: motions traced and compiled, so that a second run of the same parts does neither again.
 
 machine(motion, method) → Machine
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
-from functools import lru_cache
+import weakref
+from collections.abc import Callable
 from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.compiled.cache import default_store
+from robot_dyn.arithmetic import FLOAT64
+from robot_dyn.compiled.from_casadi import program_of
 from robot_dyn.compiled.symbolic import TraceError
 from robot_dyn.effects.plant import Plant
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.model.robot import Robot
-from robot_dyn.simulation.machine.machine import Machine
-from robot_dyn.simulation.machine.program import Program
+from robot_dyn.simulation.machine.machine import Equations, Machine
+from robot_dyn.simulation.machine.payloads import Carrying
 from robot_dyn.simulation.machine.traced import SymbolicDynamics, robot_of, trace, with_values
 from robot_dyn.simulation.motion import Motion
 
-# Of a march, which goes through Numba line by line: about a minute of compiling, by estimate.
-_MOST_INSTRUCTIONS = 40_000
+_MOST_INSTRUCTIONS = 100_000  # some ten seconds of compiling
+_MOST = 64  # values that are kept
 
 
 @final
-class Same:
-    """A key that stands for one object, and keeps it."""
+class ByIdentity:
+    """Values kept by the identity of objects, for as long as all of these live; the latest ones."""
 
-    def __init__(self, what: Any) -> None:
-        self.what = what
+    def __init__(self) -> None:
+        self._kept: dict[tuple[Any, ...], tuple[list[weakref.ref[Any]], Any]] = {}
 
-    def __hash__(self) -> int:
-        return id(self.what)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Same) and self.what is other.what
-
-
-@lru_cache(maxsize=8)
-def _robot(dynamics: Same) -> tuple[Robot, SymbolicDynamics]:
-    robot = robot_of(dynamics.what)
-    if robot is None:
-        raise TraceError(
-            f"{type(dynamics.what).__name__} comes from no robot's file and cannot be compiled: take a Robot, "
-            "or engine='interpreted'"
-        )
-    if robot.joint_without_inertia is not None:
-        raise TraceError(f"joint {robot.joint_without_inertia!r} carries no inertia: take engine='interpreted'")
-    return robot, SymbolicDynamics(robot)
+    def get(self, objects: tuple[Any, ...], more: tuple[Any, ...], make: Callable[[], Any]) -> Any:
+        """The value of objects and of further, hashable values; it must not hold on to the objects."""
+        key = (*map(id, objects), *more)
+        references, value = self._kept.pop(key, ([], None))
+        if not references or any(ref() is not each for ref, each in zip(references, objects, strict=True)):
+            references, value = [weakref.ref(each) for each in objects], make()
+        self._kept[key] = references, value
+        while len(self._kept) > _MOST or any(ref() is None for ref in next(iter(self._kept.values()))[0]):
+            del self._kept[next(iter(self._kept))]
+        return value
 
 
-@lru_cache(maxsize=16)
-def _program(
-    dynamics: Same, effects: tuple[Same, ...], controller: Same, canonical: bool, method: Integrator | None,
-    lanes: int, free: tuple[tuple[str, int], ...], tau: bool,
-) -> tuple[Motion, Program]:  # fmt: skip
-    robot, _ = _robot(dynamics)
-    kinds = tuple(each.what for each in effects)
-    motion = Motion(Plant(robot, kinds), controller.what, canonical)
-    equations = trace(motion, lambda body: _robot(Same(body))[1], dict(free), tile=lanes > 1)
-    if not tau:
-        equations = replace(equations, actuation=None)
-    name = f"{robot.name} by {method.name}" if method is not None else robot.name
-    return motion, Program(equations, method, lanes, robot.n, motion.memory_size, name, default_store())
+_robots, _symbols, _equations = ByIdentity(), ByIdentity(), ByIdentity()
+
+
+def _robot(dynamics: Any) -> Robot:
+    """The robot whose equations are compiled, its right angles written out in full."""
+
+    def make() -> Robot | None:
+        robot = robot_of(dynamics)
+        if robot is None:
+            raise TraceError(
+                f"{type(dynamics).__name__} comes from no robot's file and cannot be compiled: take a Robot, "
+                "or engine='interpreted'"
+            )
+        if robot.joint_without_inertia is not None:
+            raise TraceError(f"joint {robot.joint_without_inertia!r} carries no inertia: take engine='interpreted'")
+        return None if robot is dynamics else robot
+
+    return _robots.get((dynamics,), (), make) or dynamics
+
+
+def _symbolic(dynamics: Any) -> SymbolicDynamics:
+    """Its equations in symbols; of what describes it, so that it is not held on to."""
+    robot = _robot(dynamics)
+    described = Carrying(robot.description, robot.edits, robot.joint_names)
+    return _symbols.get((dynamics,), (), lambda: SymbolicDynamics(described))
 
 
 def machine(
@@ -73,30 +78,41 @@ def machine(
     *,
     lanes: int = 1,
     free: dict[str, np.ndarray] | None = None,
-    tau: bool = False,
+    kept: tuple[str, ...] | None = None,
 ) -> Machine:
     """The machine of a motion, from the latest ones if it is among them; not compiled yet.
 
     Args:
         motion: What to compile.
-        method: One whose steps run whole in machine code; None for the rate alone.
-        lanes: Runs side by side.
+        method: One whose steps are machine code too; None for the state equation alone.
+        lanes: Runs in lock step.
         free: What differs from run to run, by name, with values to check it at.
-        tau: Whether runs side by side record their actuation.
+        kept: As of `trace`.
 
     Raises:
         TraceError: If a part of the motion cannot be compiled; names it, with the remedy.
     """
-    values = free or {}
-    made, program = _program(
-        Same(motion.plant.dynamics), tuple(map(Same, motion.plant.effects)), Same(motion.controller), motion.canonical,
-        method, lanes, tuple((name, len(x)) for name, x in values.items()), tau,
-    )  # fmt: skip
-    if program.instructions > _MOST_INSTRUCTIONS:
+    values, plant, controller = free or {}, motion.plant, motion.controller
+    robot = _robot(plant.dynamics)
+    own = motion if robot is plant.dynamics else Motion(Plant(robot, plant.effects), controller, motion.canonical)
+    lengths = tuple((name, len(x)) for name, x in values.items())
+
+    def make() -> Equations:
+        functions = trace(own, _symbolic, dict(lengths), kept)
+        return Equations({name: program_of(each) for name, each in functions.items()}, lanes, robot.name)
+
+    parts = (plant.dynamics, *plant.effects, *([] if controller is None else [controller]))
+    equations = _equations.get(parts, (motion.canonical, lanes, lengths, kept), make)
+    if equations.instructions > _MOST_INSTRUCTIONS:
         raise TraceError(
-            f"the run takes {program.instructions} instructions, more than the {_MOST_INSTRUCTIONS} worth compiling;"
+            f"the run takes {equations.instructions} instructions, more than the {_MOST_INSTRUCTIONS} worth compiling;"
             " simulate it with engine='interpreted'"
         )
-    return Machine(
-        with_values(made, values), program, method is not None, np.concatenate([*values.values(), np.zeros(0)])
-    )
+    numbers = np.concatenate([*values.values(), np.zeros(0)])
+    return Machine(with_values(own, values), equations, numbers, None if method is None else _loop(method))
+
+
+def _loop(method: Integrator) -> Callable[..., int]:
+    from robot_dyn.simulation.machine.loop import loop
+
+    return loop(method.stepper(FLOAT64, 1, 0, 1).step)

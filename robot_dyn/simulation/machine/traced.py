@@ -1,15 +1,14 @@
-"""The motion of a plant in symbols: the lines of `Motion` traced to functions of (t, y), for the compiled engine.
+"""The motion of a plant in symbols: the lines of `Motion` traced to functions of (t, y, p, own).
 
-    rate(t, y, p, held, free) = (y', u),   tick = (u, z⁺),   energy = (K, V)
+    rate = (y', u),   tick = (u, z⁺),   energy = (K, V),   sample = what is kept beside the state
 
-Within a stretch of time a reference is one polynomial, so that p, its coefficients, are inputs; so are what a sampled
-controller holds, and the values that differ from run to run.
+Within a segment a reference is one polynomial, so that p, its coefficients, are inputs; so are the numbers that are
+each run's own: what a sampled controller holds, and the values that differ from run to run.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any, final
 
 import casadi as ca
@@ -37,26 +36,7 @@ from robot_dyn.simulation.machine.parts import (
 )
 from robot_dyn.simulation.machine.payloads import carrying, of_links, others
 from robot_dyn.simulation.motion import Motion
-
-
-@final
-@dataclass(frozen=True)
-class Equations:
-    """A motion as CasADi Functions of t (1), y (m), p (P), held (n or 0) and free (F).
-
-    Attributes:
-        rate: y', and for one state the actuation u as well: (m,) or (m + n,).
-        energy: K and V, (2,).
-        tick: What a sampled controller holds from now on, and its next memory; None for any other.
-        actuation: u by itself, (n,), if it is asked for; with v, where y has the momentum in its place.
-        sizes: Of the inputs.
-    """
-
-    rate: ca.Function
-    energy: ca.Function
-    tick: ca.Function | None
-    actuation: ca.Function | None
-    sizes: tuple[int, int, int, int, int]
+from robot_dyn.simulation.plan import BOUNDS
 
 
 @final
@@ -113,42 +93,43 @@ def degree(controller: Controller | None) -> int | None:
 
 
 def trace(
-    motion: Motion, dynamics: Callable[[Any], SymbolicDynamics], free: Mapping[str, int], tile: bool = False
-) -> Equations:
-    """The equations of a motion.
+    motion: Motion, dynamics: Callable[[Any], SymbolicDynamics], free: Mapping[str, int], kept: tuple[str, ...] | None
+) -> dict[str, ca.Function]:
+    """The equations of a motion as CasADi Functions: rate, energy, tick if it is sampled, and sample.
 
     Args:
         motion: What to trace.
         dynamics: Gives the symbols of the plant's and of the controller's rigid bodies.
-        free: Names of values that are inputs, with their lengths: "kp", "viscous_friction.damping", or
+        free: Names of values that are each run's own, with their lengths: "kp", "viscous_friction.damping", or
             "payload_mass:tool0".
-        tile: Whether the actuation is to stand by itself.
+        kept: Which of "u", "v" and "energy" a sample of runs in lock step holds; None for a single run, whose rate
+            gives u as well and whose samples hold y', u, K and V.
 
     Raises:
         TraceError: If a part cannot be traced; names it.
     """
-    n, m = motion.plant.dynamics.n, 2 * motion.plant.dynamics.n + motion.memory_size + len(motion.sources)
-    d = degree(motion.controller)
-    sizes = 1, m, 0 if d is None else 1 + (d + 1) * n, n if motion.sampled else 0, sum(free.values())
-    (t, ts), (y, ys), (p, ps), (held, helds), (given, values) = (
-        inputs(name, size) for name, size in zip(("t", "y", "p", "held", "free"), sizes, strict=True)
+    n, d, held = motion.plant.dynamics.n, degree(motion.controller), motion.plant.dynamics.n * motion.sampled
+    sizes = 1, motion.size, BOUNDS + (0 if d is None else 1 + (d + 1) * n), held + sum(free.values())
+    (t, ts), (y, ys), (p, ps), (own, owns) = (
+        inputs(name, size) for name, size in zip(("t", "y", "p", "own"), sizes, strict=True)
     )
-    ends = np.cumsum([0, *free.values()])
-    chosen = {name: values[a:b].view(Symbols) for name, a, b in zip(free, ends, ends[1:], strict=False)}
-    everything, time, state = [t, y, p, held, given], ts[0], ys.view(Symbols)
+    ends = np.cumsum([held, *free.values()])
+    chosen = {name: owns[a:b].view(Symbols) for name, a, b in zip(free, ends, ends[1:], strict=False)}
+    state, time = ys.view(Symbols), np.minimum(np.maximum(ts.view(Symbols), ps[:1]), ps[1:2])[0]
     with Symbolic().scope():
-        symbolic = _symbolic(motion, dynamics, ps, chosen)
-        rate, u = symbolic.rate(time, state, helds.view(Symbols) if motion.sampled else None)
+        symbolic = _symbolic(motion, dynamics, ps[BOUNDS:], chosen)
+        rate, u = symbolic.rate(time, state, owns[:held].view(Symbols) if motion.sampled else None)
         q, v, z, _ = symbolic.state(state)
-        K, V = symbolic.energy(time, q, v)
-        made = {"rate": rate if tile else np.concatenate([rate, wide(u, n)]), "energy": [K, V]}
-        if tile:
-            made["actuation"] = np.concatenate([wide(u, n), v]) if motion.canonical else wide(u, n)
+        parts = {"u": wide(u, n), "v": v, "energy": symbolic.energy(time, q, v)}
+        single = kept is None
+        made = {"rate": np.concatenate([rate, parts["u"]]) if single else rate, "energy": parts["energy"]}
+        made["sample"] = np.concatenate(
+            [rate, parts["u"], parts["energy"]] if single else [parts[x] for x in kept] or [[]]
+        )
         if motion.sampled and symbolic.controller is not None:
             after = symbolic.controller.next_memory(time, q, v, z) if motion.memory_size else z
             made["tick"] = np.concatenate([wide(symbolic.command(time, q, v, z), n), after])
-    functions = {name: ca.Function("f", everything, [ca.cse(column(x))]) for name, x in made.items()}
-    return Equations(functions["rate"], functions["energy"], functions.get("tick"), functions.get("actuation"), sizes)
+    return {name: ca.Function("f", [t, y, p, own], [ca.cse(ca.densify(column(x)))]) for name, x in made.items()}
 
 
 def with_values(motion: Motion, free: Mapping[str, Array]) -> Motion:

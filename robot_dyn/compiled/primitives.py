@@ -1,0 +1,168 @@
+"""The primitives of steps and loops as machine code; what they compute is told in `integrate.primitives`.
+
+A function of the state equation is an address there: (t, y, p, own, out), of pointers to float64.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import njit
+from numba.core import types
+from numba.extending import intrinsic, overload, register_jitable
+
+from robot_dyn.integrate import primitives
+from robot_dyn.integrate.primitives import GOING, LOST, NOISE, PATIENCE, SETTLED
+
+_DOUBLE, _I64 = ir.DoubleType(), ir.IntType(64)
+
+
+def _typed_call(typingctx: Any, address: Any, t: Any, y: Any, p: Any, own: Any, out: Any) -> Any:
+    """The function at an address, of a time and of the first numbers of arrays."""
+
+    def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        arrays = [context.make_array(kind)(context, builder, x) for kind, x in zip(signature.args[2:], args[2:])]
+        pointer = _DOUBLE.as_pointer()
+        shape = ir.FunctionType(ir.VoidType(), [_DOUBLE, *[pointer] * len(arrays)])
+        function = builder.inttoptr(args[0], shape.as_pointer())
+        builder.call(function, [args[1], *(builder.bitcast(x.data, pointer) for x in arrays)])
+        return context.get_dummy_value()
+
+    return types.void(types.int64, types.float64, y, p, own, out), code
+
+
+_call: Any = intrinsic(_typed_call)
+
+
+def _typed_flat(typingctx: Any, array: Any) -> Any:
+    """All numbers of an array one after the other; to compile `reshape` takes as long as a step."""
+    kind = types.Array(array.dtype, 1, "C")
+
+    def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        of = context.make_array(signature.args[0])(context, builder, args[0])
+        made = context.make_array(kind)(context, builder)
+        one = builder.insert_value(ir.Constant(ir.ArrayType(_I64, 1), ir.Undefined), of.nitems, 0)
+        stride = builder.insert_value(ir.Constant(ir.ArrayType(_I64, 1), ir.Undefined), of.itemsize, 0)
+        made.data, made.itemsize, made.nitems, made.shape, made.strides = of.data, of.itemsize, of.nitems, one, stride
+        made.meminfo = ir.Constant(made.meminfo.type, None)
+        made.parent = ir.Constant(made.parent.type, None)
+        return made._getvalue()
+
+    return kind(array), code
+
+
+_flat: Any = intrinsic(_typed_flat)
+
+
+@overload(primitives.evaluate, strict=False)
+def _evaluate(function: Any, t: Any, y: Any, p: Any, own: Any, out: Any) -> Any:
+    return lambda function, t, y, p, own, out: _call(function, t, y, p, own, out)
+
+
+@overload(primitives.combination, strict=False)
+def _combination(x: Any, y: Any, h: Any, weights: Any, K: Any, count: Any) -> Any:
+    def loops(x, y, h, weights, K, count):
+        size = y.size
+        to, start = _flat(x), _flat(y)
+        first = True
+        for j in range(count):
+            w = weights[j]
+            if w != 0.0:
+                k = _flat(K[j])
+                if first:
+                    for e in range(size):
+                        to[e] = w * k[e]
+                else:
+                    for e in range(size):
+                        to[e] += w * k[e]
+                first = False
+        if first:
+            for e in range(size):
+                to[e] = start[e]
+        else:
+            for e in range(size):
+                to[e] = start[e] + to[e] * h
+
+    return loops
+
+
+@overload(primitives.copy, strict=False)
+def _copy(to: Any, x: Any) -> Any:
+    if to.ndim == 1:
+
+        def loops(to, x):
+            for i in range(to.shape[0]):
+                to[i] = x[i]
+
+    else:
+
+        def loops(to, x):
+            for i in range(to.shape[0]):
+                for j in range(to.shape[1]):
+                    to[i, j] = x[i, j]
+
+    return loops
+
+
+@overload(primitives.sizes, strict=False)
+def _sizes(x: Any, out: Any) -> Any:
+    def loops(x, out):
+        out[:] = 0.0
+        for e in range(x.shape[0]):
+            for b in range(x.shape[1]):
+                out[b] += abs(x[e, b])
+
+    return loops
+
+
+@overload(primitives.settle, strict=False)
+def _settle(Z: Any, new: Any, y: Any, least: Any, stale: Any, state: Any, epsilon: Any) -> Any:
+    def loops(Z, new, y, least, stale, state, epsilon):
+        going = 0
+        for b in range(y.shape[1]):
+            if state[b] != GOING:
+                continue
+            slack = 1.0
+            for e in range(y.shape[0]):
+                slack = max(slack, abs(y[e, b]))
+            shrinks, rounding, largest = False, True, 0.0
+            for e in range(y.shape[0]):
+                change = own = 0.0
+                for i in range(Z.shape[0]):
+                    step = abs(new[i, e, b] - Z[i, e, b])
+                    change = step if not step <= change else change
+                    own = max(own, abs(new[i, e, b]))
+                    Z[i, e, b] = new[i, e, b]
+                shrinks |= (change < least[e, b]) & (change > epsilon * own)
+                least[e, b] = min(change, least[e, b])
+                bound = NOISE * epsilon * slack + epsilon ** (2 / 3) * (abs(y[e, b]) + own)
+                rounding &= change <= bound
+                largest = change if not change <= largest else largest
+            stale[b] = 0 if shrinks else stale[b] + 1
+            if not largest < np.inf:
+                state[b] = LOST
+            elif largest == 0.0 or (stale[b] >= PATIENCE and rounding):
+                state[b] = SETTLED
+            else:
+                going += 1
+        return going
+
+    return loops
+
+
+# Nothing is allocated, so arrays need no reference counts, which would take longer than a step; Numba's own name.
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": False}
+
+
+def plain(*functions: Callable[..., Any]) -> None:
+    """Let machine code call these functions, as they stand."""
+    for function in functions:
+        register_jitable(**_OPTIONS)(function)
+
+
+def machine_code(function: Callable[..., Any]) -> Any:
+    """A function for Numba to compile, as it stands; it must not allocate."""
+    return njit(**_OPTIONS)(function)

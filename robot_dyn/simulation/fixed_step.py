@@ -1,0 +1,223 @@
+"""A run of fixed steps, followed by Python: the time loop comes back for progress, for Ctrl-C, and for what it doubts.
+
+What the loop finds doubtful (a number that overflows, stages that are not found, energy that grows) is done again by
+the interpreted state equation, which alone ends a run, and words why.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+from math import ceil, inf
+from time import perf_counter
+from typing import final
+
+import numpy as np
+
+from robot_dyn.arithmetic import FLOAT64
+from robot_dyn.errors import RobotDynError
+from robot_dyn.integrate.integrator import Integrator
+from robot_dyn.simulation.motion import Motion
+from robot_dyn.simulation.observer import Observer
+from robot_dyn.simulation.plan import plan_of
+from robot_dyn.simulation.record import MOST_SHARED, Path, Record
+from robot_dyn.simulation.schedule import paced
+from robot_dyn.simulation.setup import Setup
+from robot_dyn.simulation.state_functions import interpreted, system
+from robot_dyn.simulation.time_loop import WATCHED, Ended, Functions, Now, Records, Rules, Runs, time_loop
+from robot_dyn.simulation.trajectory import Ending, Outcome
+from robot_dyn.simulation.watch import DivergedError, Watch, one_step
+
+_PAUSE_S = 0.1  # between looks at the keyboard
+_FIRST = 1000  # steps before the speed is known
+_DOUBTFUL = 1e6  # of Σ |y| in machine code, which does not see that M becomes singular
+
+Advance = Callable[..., int]
+
+
+@final
+class FixedStep:
+    """A run on its way.
+
+    Args:
+        setup: What to run.
+        motion: Its equation of motion.
+        functions: The same, for the loop.
+        pace: Length of a step, in steps of the setup; 1 keeps samples.
+        machine_code: The time loop of the method as machine code; then the functions are, too.
+        on_progress: Called with the time reached, at each step or some ten times a second.
+        observer: Sees each step.
+    """
+
+    def __init__(
+        self, setup: Setup, motion: Motion, functions: Functions, pace: Fraction, machine_code: Advance | None = None,
+        on_progress: Callable[[float], object] | None = None, observer: Observer | None = None,
+    ) -> None:  # fmt: skip
+        method = setup.integrator
+        assert isinstance(method, Integrator)
+        self.setup, self.motion, self.functions, self.compiled = setup, motion, functions, machine_code is not None
+        self.on_progress, self.observer = on_progress, observer
+        self.segments, self.plan, self.watch = paced(setup.stretches, pace), plan_of(setup, pace), Watch(setup, motion)
+        n, m = motion.plant.dynamics.n, motion.size
+        held = n if motion.sampled else 0
+        self.start = motion.start(setup.q0, setup.v0)
+        self.runs = runs_of(self.start[:, None], np.full((held, 1), np.nan), n, held, motion.memory_size, m + n + 2)
+        self.runs.energy[0], self.runs.scale[0] = self.watch.energy, self.watch.scale
+        self.stepper = method.stepper(FLOAT64, m, n, m + n, 1, motion.widths)
+        self.advance = machine_code or time_loop(self.stepper.step)
+        every, thin = self._shared(pace)
+        self.rules = Rules(
+            n, len(motion.sources), motion.memory_size, held, motion.canonical, True, _DOUBTFUL if self.compiled else inf,
+            every, thin, 0,
+        )  # fmt: skip
+        rows = samples_at_most(setup, self.plan.counts) if pace == 1 else 1
+        states = int((-(-self.plan.counts // every)).sum()) // thin + 2
+        columns = np.empty((2 + 3 * n, 0)) if observer is None else observer.columns
+        self.records = Records(
+            np.arange(m), np.empty((rows, 2), np.int64), np.empty((rows, m, 1)), np.empty((rows, m + n + 2, 1)),
+            np.empty((states, m + 2)), columns,
+        )  # fmt: skip
+        self.now, self.stop = np.zeros(len(Now), np.int64), np.zeros(1, np.int64)
+        self.clock = np.array([0.0 if pace == 1 else inf, setup.record_period_s, 1e-9 * setup.step_s])
+
+    def _shared(self, pace: Fraction) -> tuple[int, int]:
+        """Steps between states that companions share, and how many of these to one that is kept."""
+        counts = self.plan.counts
+        few = self.setup.steps <= MOST_SHARED
+        thin = 1 if few else 30 * ceil(self.setup.steps / MOST_SHARED)  # steps of 2, 3 and 5 meet at every 30th
+        among = 2 * ceil(len(counts) / MOST_SHARED) if len(counts) > MOST_SHARED else 1
+        return max(1, int(thin / pace)), among
+
+    @property
+    def time(self) -> float:
+        """The time reached, in [s]."""
+        s, k = min(int(self.now[Now.SEGMENT]), len(self.plan.starts) - 1), int(self.now[Now.STEP])
+        if k == self.plan.counts[s]:
+            return float(self.plan.starts[min(s + 1, len(self.plan.starts) - 1)])
+        return float(self.plan.starts[s] + k * self.plan.lengths[s])
+
+    @property
+    def y(self) -> np.ndarray:
+        """The state reached."""
+        return self.runs.y[:, 0].copy()
+
+    def record(self) -> Record:
+        """March to the end, however the run ends."""
+        try:
+            with np.errstate(all="ignore"):
+                self._march()
+            outcome = Outcome(Ending.FINISHED, self.setup.duration_s)
+        except DivergedError as end:
+            outcome = Outcome(Ending.DIVERGED, end.t, str(end))
+        except KeyboardInterrupt:
+            outcome = Outcome(Ending.STOPPED, self.time, "interrupted; all samples up to here are kept")
+        return self._record(outcome)
+
+    def _march(self) -> None:
+        budget, told = _FIRST if self.compiled else 1, -1.0
+        while True:
+            if self.on_progress is not None and self.time > told:
+                told = self.time
+                self.on_progress(told)
+            began = perf_counter()
+            ended = self._go(budget)
+            if ended is Ended.DONE:
+                break
+            if ended is not Ended.PAUSED:
+                self._judge(ended)
+            elif self.compiled:
+                spent = perf_counter() - began
+                budget = int(np.clip(budget * _PAUSE_S / max(spent, 1e-9), _FIRST // 10, 100 * budget))
+        if self.on_progress is not None and self.time > told:
+            self.on_progress(self.time)
+
+    def _go(self, budget: int) -> Ended:
+        """So many steps, or fewer, with a rest whenever the observer has all columns to look at."""
+        observer = self.observer
+        while True:
+            self.now[Now.BUDGET] = steps = budget if observer is None else min(budget, observer.room)
+            if observer is not None:
+                self.now[Now.COLUMN] = observer.filled
+            ended = self._advance()
+            if observer is not None:
+                observer.filled = int(self.now[Now.COLUMN])
+                observer.look()
+            budget -= steps
+            if ended is not Ended.PAUSED or budget <= 0:
+                return ended
+
+    def _advance(self) -> Ended:
+        _, coefficients, work = self.stepper
+        arguments = self.functions, self.plan, self.runs, self.records, self.rules, coefficients, work
+        try:
+            return Ended(self.advance(*arguments, self.now, self.clock, self.stop))
+        except RobotDynError:  # of a step; y is the state before it
+            return Ended.DOUBTFUL
+
+    def _judge(self, ended: Ended) -> None:
+        """Do a doubtful step, tick or look at the energy by the interpreted equation; DivergedError ends the run."""
+        s, t, y = int(self.now[Now.SEGMENT]), self.time, self.y
+        if ended is Ended.TICK:
+            y, held = self.watch.tick(t, y)
+            self.runs.y[:, 0], self.runs.own[:, 0] = y, held
+            self.plan.ticks[s] = 0
+        elif ended is Ended.DOUBTFUL:
+            self._step(s, t, y)
+        else:
+            self.watch.look(t, y)
+
+    def _step(self, s: int, t: float, y: np.ndarray) -> None:
+        """One step by the interpreted equation."""
+        h, method, observer = float(self.plan.lengths[s]), self.setup.integrator, self.observer
+        assert isinstance(method, Integrator)
+        seen = None if observer is None else observer.seen
+        equation = system(
+            interpreted(self.motion, self.watch), self.motion, self.plan.parameters[s], self.runs.own, seen
+        )
+        self.runs.y[:, 0] = y = one_step(method, equation, t, y, h, self.watch)
+        if observer is not None:
+            held = self.runs.own[:, 0] if self.motion.sampled else None
+            observer.step(t + h, y, held, held is None or (self.now[Now.STEP] == 0 and self.segments[s].tick))
+        self.now[Now.STEP] += 1
+        self.now[Now.STEPS] += 1
+        if self.now[Now.STEPS] % WATCHED == 0:
+            self.watch.look(t + h, y)
+
+    def _times(self, places: np.ndarray) -> np.ndarray:
+        """Times of (segment, step), in [s]."""
+        return self.plan.starts[places[:, 0]] + places[:, 1] * self.plan.lengths[places[:, 0]]
+
+    def _keys(self, places: np.ndarray) -> np.ndarray:
+        """Steps of the setup before (segment, step)."""
+        first = np.array([*(each.first for each in self.segments), self.setup.steps])[places[:, 0]]
+        pace = np.array([*(float(each.pace) for each in self.segments), 1.0])[places[:, 0]]
+        return first + np.rint(places[:, 1] * pace).astype(np.int64)
+
+    def _record(self, outcome: Outcome) -> Record:
+        rows, m, kept = int(self.now[Now.ROW]), self.motion.size, self.records
+        if not rows:  # interrupted, or without a tick, at once
+            kept.place[0], kept.y[0, :, 0], kept.made[0] = 0, self.start, np.nan
+            rows = 1
+        shared = kept.shared[: int(self.now[Now.SHARED])]
+        at = shared[:, m:].astype(np.int64)
+        path = Path(self._keys(at), self._times(at), shared[:, :m])
+        return Record(
+            outcome, self._times(kept.place[:rows]), kept.y[:rows, :, 0], kept.made[:rows, :, 0], path, path,
+            int(self.now[Now.STEPS]), int(self.now[Now.EVALUATIONS]),
+        )  # fmt: skip
+
+
+def runs_of(y: np.ndarray, own: np.ndarray, n: int, held: int, memory: int, made: int) -> Runs:
+    """Runs at the states y (m, W) with their own numbers (O, W)."""
+    m, W = y.shape
+    return Runs(
+        np.ascontiguousarray(y), np.ascontiguousarray(own), np.empty((m, W)), np.empty((made, W)),
+        np.empty((held + memory, W)), np.empty((2, W)), np.empty(W), np.zeros(W, np.int64), np.ones(W, np.int64),
+        np.zeros(W, np.int64), np.zeros(W), np.zeros(W, np.int64), np.zeros(W), np.ones(W),
+    )  # fmt: skip
+
+
+def samples_at_most(setup: Setup, counts: np.ndarray) -> int:
+    """At most so many samples."""
+    steps = int(counts.sum())
+    return min(steps, int(setup.duration_s / setup.record_period_s) + 2) if setup.record_period_s else steps

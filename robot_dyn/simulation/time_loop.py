@@ -1,0 +1,314 @@
+"""The time loop: segments, ticks, samples, steps and the watch over divergence, for one run or W in lock step.
+
+It is plain functions of arrays, called as they stand with Python functions of the state equation, or as machine code
+with addresses of them. What ends a single run is looked at by its driver, which knows the words; in lock step a run
+that has ended is nan from there on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import IntEnum
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.integrate.primitives import copy, evaluate, sizes
+
+WATCHED = 64  # steps between looks at the energy
+RUNAWAY = 1e3  # times all the energy there was, that may come from nowhere
+
+
+class Ended(IntEnum):
+    """Why the loop came back."""
+
+    DONE = 0
+    PAUSED = 1  # its budget of steps is spent
+    DOUBTFUL = 2  # the next step is to be looked at; y is the state before it
+    TICK = 3  # the controller asks for no finite torque
+    GAINS = 4  # energy may grow without a source; y is the state after the step
+
+
+class Why(IntEnum):
+    """Why a run in lock step ended."""
+
+    GOES_ON = 0
+    OVERFLOWED = 1
+    GAINED = 2
+    NOT_FOUND = 3  # the stages of a step
+
+
+class Now(IntEnum):
+    """Where the loop is: the entries of `now`."""
+
+    SEGMENT = 0
+    STEP = 1  # of the segment
+    ROW = 2  # of the samples, next
+    STEPS = 3  # done in all
+    SEEN = 4  # states shared with companions, in all
+    SHARED = 5  # row of these, next
+    BUDGET = 6  # steps to do before it comes back
+    EVALUATIONS = 7  # of the rate, in all
+    COLUMN = 8  # of what an observer sees, next
+
+
+class Functions(NamedTuple):
+    """The state equation, each as of `evaluate`: y' and u; the next own numbers; K and V; what a sample holds."""
+
+    rate: Any
+    tick: Any
+    energy: Any
+    sample: Any
+
+
+class Plan(NamedTuple):
+    """Segments without ticks or switches inside, S of them; the last is the end of the run, of no length.
+
+    Attributes:
+        starts, lengths: When it starts and its step, (S,), in [s].
+        counts, ticks: Its steps, and 1 where a sampled controller acts at its start, (S,).
+        parameters: p of the state equation on it, (S, P).
+        at_ticks: The same at its start alone.
+    """
+
+    starts: Array
+    lengths: Array
+    counts: Array
+    ticks: Array
+    parameters: Array
+    at_ticks: Array
+
+
+class Runs(NamedTuple):
+    """W runs: their states (m, W), own numbers (O, W), and what is known of each (W,); the rest is room to work.
+
+    Attributes:
+        y, own: State, and numbers of each run: first what a sampled controller holds.
+        after, made, command, energies, size, lost: y⁺, a sample, a tick, K and V, Σ |y⁺|, stages not found.
+        alive, why, ended, fastest: 1 while it goes on; then the reason, the time and the fastest joint.
+        energy, scale: E(0), and 1 + |K(0)| + |V(0)|.
+    """
+
+    y: Array
+    own: Array
+    after: Array
+    made: Array
+    command: Array
+    energies: Array
+    size: Array
+    lost: Array
+    alive: Array
+    why: Array
+    ended: Array
+    fastest: Array
+    energy: Array
+    scale: Array
+
+
+class Records(NamedTuple):
+    """What is kept.
+
+    Attributes:
+        which: Entries of y that samples hold, (c,).
+        place: Segment and step of each sample, (R, 2).
+        y, made: Those entries, and what else a sample holds, (R, c, B) and (R, d, B).
+        shared: States that companion runs share, with segment and step, (K, m + 2).
+        columns: As of `Observer.columns`; without any, no step is shown.
+    """
+
+    which: Array
+    place: Array
+    y: Array
+    made: Array
+    shared: Array
+    columns: Array
+
+
+class Rules(NamedTuple):
+    """What the loop does, beside the steps.
+
+    Attributes:
+        n, works: Number of joints, and of works at the end of y.
+        memory: Number of states of the controller, behind q and v.
+        held: Number of numbers that a sampled controller holds; 0 for any other.
+        canonical: Whether y has momenta in place of velocities.
+        alone: Whether what may end a run is looked at by its driver.
+        largest: Σ |y| beyond which a step is doubtful, or a run in lock step ends.
+        every, thin: Steps between shared states, 0 for none; and how many of these to one that is kept.
+        base: First run of the records.
+    """
+
+    n: int
+    works: int
+    memory: int
+    held: int
+    canonical: bool
+    alone: bool
+    largest: float
+    every: int
+    thin: int
+    base: int
+
+
+def time_loop(step: Callable[..., int]) -> Callable[..., int]:
+    """The time loop of a step function; see `Stepper`.
+
+    advance(functions, plan, runs, records, rules, coefficients, work, now, clock, stop) → Ended, with `clock` the time
+    of the next sample, the record period, and what a sample may be early by; `stop[0]` other than 0 ends it.
+    """
+
+    def advance(
+        functions: Functions, plan: Plan, runs: Runs, records: Records, rules: Rules, coefficients: Any, work: Any,
+        now: Array, clock: Array, stop: Array,
+    ) -> int:  # fmt: skip
+        last = len(plan.counts) - 1
+        while now[Now.SEGMENT] <= last:
+            s = now[Now.SEGMENT]
+            start, h, p = plan.starts[s], plan.lengths[s], plan.parameters[s]
+            if now[Now.STEP] == 0 and plan.ticks[s] == 1 and not act(functions, runs, rules, start, plan.at_ticks[s]):
+                return Ended.TICK
+            while now[Now.STEP] < plan.counts[s]:
+                k = now[Now.STEP]
+                t = start + k * h
+                share(runs, records, rules, now, s == last)
+                if t >= clock[0] - clock[2] or (s == last and clock[0] < np.inf):
+                    sample(functions, runs, records, rules, now, clock, t, p)
+                if s == last:
+                    now[Now.STEP] += 1
+                    continue
+                rate, own = functions.rate, runs.own
+                now[Now.EVALUATIONS] += step(rate, coefficients, t, h, runs.y, p, own, runs.after, work, runs.lost)
+                if not take(runs, rules, t):
+                    return Ended.DOUBTFUL
+                now[Now.STEP] += 1
+                now[Now.STEPS] += 1
+                now[Now.BUDGET] -= 1
+                show(runs, records, rules, work.K, now, t + h, rules.held == 0 or (k == 0 and plan.ticks[s] == 1))
+                if now[Now.STEPS] % WATCHED == 0 and not conserve(functions, runs, rules, t + h, p):
+                    return Ended.GAINS
+                if now[Now.BUDGET] <= 0 or stop[0] != 0:
+                    return Ended.PAUSED
+            now[Now.SEGMENT] += 1
+            now[Now.STEP] = 0
+        return Ended.DONE
+
+    return advance
+
+
+def act(functions: Functions, runs: Runs, rules: Rules, t: float, p: Array) -> bool:
+    """A tick: what the controller holds from now on, and its next states; whether a single run may go on."""
+    n, held, z = rules.n, rules.held, rules.memory
+    evaluate(functions.tick, t, runs.y, p, runs.own, runs.command)
+    sizes(runs.command, runs.size)
+    if rules.alone and not runs.size[0] < np.inf:
+        return False
+    copy(runs.own[:held], runs.command[:held])
+    copy(runs.y[2 * n : 2 * n + z], runs.command[held:])
+    return True
+
+
+def share(runs: Runs, records: Records, rules: Rules, now: Array, last: bool) -> None:
+    """Keep the state for companion runs, at each `every`-th step of a segment, and at the end."""
+    if rules.every == 0 or now[Now.STEP] % rules.every != 0:
+        return
+    if now[Now.SEEN] % rules.thin == 0 or last:
+        row, m = now[Now.SHARED], len(runs.y)
+        copy(records.shared[row, :m], runs.y[:, 0])
+        records.shared[row, m] = now[Now.SEGMENT]
+        records.shared[row, m + 1] = now[Now.STEP]
+        now[Now.SHARED] += 1
+    now[Now.SEEN] += 1
+
+
+def sample(
+    functions: Functions, runs: Runs, records: Records, rules: Rules, now: Array, clock: Array, t: float, p: Array
+) -> None:
+    """Keep a sample."""
+    row, W = now[Now.ROW], runs.y.shape[1]
+    records.place[row, 0], records.place[row, 1] = now[Now.SEGMENT], now[Now.STEP]
+    base = rules.base
+    for j in range(len(records.which)):
+        copy(records.y[row, j, base : base + W], runs.y[records.which[j]])
+    if len(runs.made) > 0:
+        evaluate(functions.sample, t, runs.y, p, runs.own, runs.made)
+        for b in range(W):
+            if runs.alive[b] == 0:
+                erase(runs.made, b)
+        copy(records.made[row, :, base : base + W], runs.made)
+    now[Now.ROW] += 1
+    clock[0] += clock[1]
+
+
+def take(runs: Runs, rules: Rules, t: float) -> bool:
+    """Take y⁺; whether a single run may go on. In lock step, end the runs whose y⁺ is no number, or not found."""
+    sizes(runs.after, runs.size)
+    ill = False
+    for b in range(len(runs.size)):
+        ill |= runs.lost[b] != 0 or not runs.size[b] < rules.largest
+    if ill and rules.alone:
+        return False
+    if ill:
+        for b in range(len(runs.size)):
+            if runs.alive[b] == 1 and (runs.lost[b] != 0 or not runs.size[b] < rules.largest):
+                end(runs, rules, b, t, Why.NOT_FOUND if runs.lost[b] != 0 else Why.OVERFLOWED)
+    copy(runs.y, runs.after)
+    if ill:
+        bury(runs)
+    return True
+
+
+def conserve(functions: Functions, runs: Runs, rules: Rules, t: float, p: Array) -> bool:
+    """Whether no energy came from nowhere in a single run; in lock step, end the runs where it did.
+
+    E − E(0) − Σ W beyond a thousand times all energy there was is no error of a step: the steps are unstable.
+    """
+    evaluate(functions.energy, t, runs.y, p, runs.own, runs.energies)
+    ended = False
+    for b in range(len(runs.size)):
+        came, moved = runs.energies[0, b] + runs.energies[1, b] - runs.energy[b], runs.scale[b]
+        for w in range(len(runs.y) - rules.works, len(runs.y)):
+            came -= runs.y[w, b]
+            moved += abs(runs.y[w, b])
+        if runs.alive[b] == 1 and came > RUNAWAY * moved:
+            if rules.alone:
+                return False
+            end(runs, rules, b, t, Why.GAINED)
+            ended = True
+    if ended:
+        bury(runs)
+    return True
+
+
+def end(runs: Runs, rules: Rules, b: int, t: float, why: int) -> None:
+    """End a run in lock step."""
+    runs.alive[b], runs.why[b], runs.ended[b] = 0, why, t
+    for e in range(rules.n):
+        if abs(runs.y[rules.n + e, b]) > abs(runs.y[rules.n + runs.fastest[b], b]):
+            runs.fastest[b] = e
+
+
+def bury(runs: Runs) -> None:
+    """Nan for the runs that have ended."""
+    for b in range(len(runs.size)):
+        if runs.alive[b] == 0:
+            erase(runs.y, b)
+
+
+def erase(x: Array, b: int) -> None:
+    """Nan in place of the numbers of a run."""
+    for e in range(len(x)):
+        x[e, b] = np.nan
+
+
+def show(runs: Runs, records: Records, rules: Rules, K: Array, now: Array, t: float, acted: bool) -> None:
+    """A column for the observer, as of `Observer.step`; there is one while the driver leaves room for it."""
+    if records.columns.shape[1] == 0:
+        return
+    c, n, m = now[Now.COLUMN], rules.n, len(runs.y)
+    records.columns[0, c], records.columns[1, c] = t, acted
+    latest = K[len(K) - 1]
+    copy(records.columns[2 : 2 + n, c], runs.y[:n, 0])
+    copy(records.columns[2 + n : 2 + 2 * n, c], latest[:n, 0] if rules.canonical else runs.y[n : 2 * n, 0])
+    copy(records.columns[2 + 2 * n :, c], runs.own[:n, 0] if rules.held > 0 else latest[m : m + n, 0])
+    now[Now.COLUMN] += 1

@@ -1,0 +1,106 @@
+"""The watch over a run: what ends it before its time, and the words for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar, final
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.errors import RobotDynError
+from robot_dyn.integrate.integrator import IntegrationError, Integrator, System
+from robot_dyn.simulation.motion import Motion
+from robot_dyn.simulation.setup import Setup
+from robot_dyn.simulation.trajectory import diverged_advice
+
+_PACED = 2000  # steps between looks at the pace of an adaptive method
+_MOST_AHEAD = 1e7  # steps that such a run may have before it at the pace it has: about an hour
+_STEEP = 1e-3  # of q or v: an effect that bends within less makes a system stiff
+
+T = TypeVar("T")
+
+
+class DivergedError(Exception):
+    """Internal: the run cannot go on from `t`; the message is advice."""
+
+    def __init__(self, t: float, advice: str) -> None:
+        super().__init__(advice)
+        self.t = t
+
+
+def one_step(method: Integrator, system: System, t: float, y: Array, h: float, watch: Watch) -> Array:
+    """The state after a step; DivergedError if there is none, or it is not finite."""
+    after = watch.answer(t, y, lambda: method.step(system, t, y, h))
+    if not np.isfinite(after).all():
+        raise watch.diverged(t, y, "a number overflowed")
+    return after
+
+
+@final
+class Watch:
+    """Tells when energy grows without a source: the ledger's residual exceeds all there was and came a thousandfold."""
+
+    def __init__(self, setup: Setup, motion: Motion) -> None:
+        self.setup, self.motion = setup, motion
+        K, V = (float(x[0]) for x in motion.energy(np.zeros(1), setup.q0[None], setup.v0[None]))
+        self.energy, self.scale = K + V, 1.0 + abs(K) + abs(V)
+        self.paced = 0.0
+
+    def tick(self, t: float, y: Array) -> tuple[Array, Array | None]:
+        """A tick of the controller; DivergedError if it fails, or asks for no finite torque."""
+        y, held = self.answer(t, y, lambda: self.motion.tick(t, y))
+        if held is not None and not np.isfinite(held).all():
+            raise self.diverged(t, y, "the controller asks for a torque that is not finite")
+        return y, held
+
+    def look(self, t: float, y: Array) -> None:
+        """DivergedError if energy grows without a source."""
+        if self.answer(t, y, lambda: self.gains(t, y)):
+            raise self.diverged(t, y, "energy grows without a source")
+
+    def answer(self, t: float, y: Array, ask: Callable[[], T]) -> T:
+        """What the equations answer; DivergedError if they have no answer."""
+        try:
+            return ask()
+        except IntegrationError as error:  # it names its own remedy
+            raise DivergedError(t, str(error) + self._steepest()) from None
+        except RobotDynError as error:
+            raise self.diverged(t, y, str(error)) from None
+
+    def pace(self, t: float, steps: int) -> None:
+        """DivergedError if the steps of an adaptive method have become so short that the run would not end."""
+        if steps % _PACED:
+            return
+        made, self.paced = t - self.paced, t
+        ahead = (self.setup.duration_s - t) / max(made, 1e-300) * _PACED
+        if ahead > _MOST_AHEAD:
+            radau = "" if getattr(self.setup.integrator, "method", "") == "Radau" else "Radau, "
+            raise DivergedError(
+                t, f"the last {_PACED} steps led {made:.1e} s on, at which pace {ahead:.0e} more are left: the system "
+                f"is stiff; take {radau}softer effects or a larger tolerance{self._steepest()}"
+            )  # fmt: skip
+
+    def _steepest(self) -> str:
+        """Words for the effect that bends within the least change of q or v, if that is small."""
+        names, found = self.motion.plant.dynamics.joint_names, (_STEEP, "")
+        for effect in self.motion.plant.effects:
+            for width, unit in zip(effect.widths, ("rad or m", "rad/s or m/s"), strict=True):
+                at = np.broadcast_to(width, (len(names),))
+                i = int(np.argmin(at))
+                found = min(
+                    found, (float(at[i]), f"{effect.name} of joint {names[i]!r} bends within {at[i]:.1e} {unit}")
+                )
+        return found[1] and f" ({found[1]})"
+
+    def gains(self, t: float, y: Array) -> bool:
+        """Whether the ledger's residual says so."""
+        q, v, _, W = self.motion.state(y)
+        K, V = self.motion.energy(np.array([t]), q[None], v[None])
+        return bool((K + V)[0] - self.energy - W.sum() > 1e3 * (self.scale + np.abs(W).sum()))
+
+    def diverged(self, t: float, y: Array, why: str) -> DivergedError:
+        """The end of a run at time t and state y, with the fastest joint and the remedy."""
+        names = self.motion.plant.dynamics.joint_names
+        fastest = names[int(np.argmax(np.abs(y[len(names) : 2 * len(names)])))]
+        return DivergedError(t, diverged_advice(why, fastest, self.setup.taken_step_s))
