@@ -11,7 +11,8 @@ import robot_dyn as rd
 from robot_dyn.integrate.implicit import jacobian
 from robot_dyn.integrate.integrator import System
 from robot_dyn.simulation.motion import Motion
-from robot_dyn.simulation.setup import Stretch
+from robot_dyn.simulation.state_functions import interpreted, system
+from robot_dyn.simulation.watch import Watch
 
 ARM = rd.load("planar_2r")
 START = {"q0": [0.4, -0.7], "v0": [0.3, 0.5], "engine": "interpreted", "estimate_error": False}

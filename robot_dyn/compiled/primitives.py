@@ -18,13 +18,16 @@ from robot_dyn.integrate import primitives
 from robot_dyn.integrate.primitives import GOING, LOST, NOISE, PATIENCE, SETTLED
 
 _DOUBLE, _I64 = ir.DoubleType(), ir.IntType(64)
+_BLOCK = 512  # numbers of a sum at a time
 
 
 def _typed_call(typingctx: Any, address: Any, t: Any, y: Any, p: Any, own: Any, out: Any) -> Any:
     """The function at an address, of a time and of the first numbers of arrays."""
 
     def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        arrays = [context.make_array(kind)(context, builder, x) for kind, x in zip(signature.args[2:], args[2:])]
+        arrays = [
+            context.make_array(kind)(context, builder, x) for kind, x in zip(signature.args[2:], args[2:], strict=True)
+        ]
         pointer = _DOUBLE.as_pointer()
         shape = ir.FunctionType(ir.VoidType(), [_DOUBLE, *[pointer] * len(arrays)])
         function = builder.inttoptr(args[0], shape.as_pointer())
@@ -37,24 +40,27 @@ def _typed_call(typingctx: Any, address: Any, t: Any, y: Any, p: Any, own: Any, 
 _call: Any = intrinsic(_typed_call)
 
 
-def _typed_flat(typingctx: Any, array: Any) -> Any:
-    """All numbers of an array one after the other; to compile `reshape` takes as long as a step."""
+def _typed_part(typingctx: Any, array: Any, first: Any, count: Any) -> Any:
+    """So many numbers of a C-contiguous array; to compile `reshape` and slices takes as long as a step."""
     kind = types.Array(array.dtype, 1, "C")
 
     def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        of = context.make_array(signature.args[0])(context, builder, args[0])
-        made = context.make_array(kind)(context, builder)
-        one = builder.insert_value(ir.Constant(ir.ArrayType(_I64, 1), ir.Undefined), of.nitems, 0)
-        stride = builder.insert_value(ir.Constant(ir.ArrayType(_I64, 1), ir.Undefined), of.itemsize, 0)
-        made.data, made.itemsize, made.nitems, made.shape, made.strides = of.data, of.itemsize, of.nitems, one, stride
-        made.meminfo = ir.Constant(made.meminfo.type, None)
-        made.parent = ir.Constant(made.parent.type, None)
+        of, made = (
+            context.make_array(signature.args[0])(context, builder, args[0]),
+            context.make_array(kind)(context, builder),
+        )
+        shape, strides = (
+            builder.insert_value(ir.Constant(ir.ArrayType(_I64, 1), ir.Undefined), x, 0) for x in (args[2], of.itemsize)
+        )
+        made.data, made.shape, made.strides = builder.gep(of.data, [args[1]]), shape, strides
+        made.itemsize, made.nitems = of.itemsize, args[2]
+        made.meminfo, made.parent = (ir.Constant(x.type, None) for x in (made.meminfo, made.parent))
         return made._getvalue()
 
-    return kind(array), code
+    return kind(array, types.int64, types.int64), code
 
 
-_flat: Any = intrinsic(_typed_flat)
+_part: Any = intrinsic(_typed_part)
 
 
 @overload(primitives.evaluate, strict=False)
@@ -65,26 +71,26 @@ def _evaluate(function: Any, t: Any, y: Any, p: Any, own: Any, out: Any) -> Any:
 @overload(primitives.combination, strict=False)
 def _combination(x: Any, y: Any, h: Any, weights: Any, K: Any, count: Any) -> Any:
     def loops(x, y, h, weights, K, count):
-        size = y.size
-        to, start = _flat(x), _flat(y)
-        first = True
-        for j in range(count):
-            w = weights[j]
-            if w != 0.0:
-                k = _flat(K[j])
-                if first:
-                    for e in range(size):
-                        to[e] = w * k[e]
-                else:
-                    for e in range(size):
-                        to[e] += w * k[e]
-                first = False
-        if first:
-            for e in range(size):
-                to[e] = start[e]
-        else:
-            for e in range(size):
-                to[e] = start[e] + to[e] * h
+        for low in range(0, y.size, _BLOCK):  # so that sums stay in the nearest cache
+            n, first = min(_BLOCK, y.size - low), True
+            to, start = _part(x, low, n), _part(y, low, n)
+            for j in range(count):
+                w = weights[j]
+                if w != 0.0:
+                    k = _part(K[j], low, n)
+                    if first:
+                        for e in range(n):
+                            to[e] = w * k[e]
+                    else:
+                        for e in range(n):
+                            to[e] += w * k[e]
+                    first = False
+            if first:
+                for e in range(n):
+                    to[e] = start[e]
+            else:
+                for e in range(n):
+                    to[e] = start[e] + to[e] * h
 
     return loops
 

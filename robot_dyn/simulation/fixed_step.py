@@ -66,10 +66,10 @@ class FixedStep:
         self.stepper = method.stepper(FLOAT64, m, n, m + n, 1, motion.widths)
         self.advance = machine_code or time_loop(self.stepper.step)
         every, thin = self._shared(pace)
+        largest = _DOUBTFUL if self.compiled else inf
         self.rules = Rules(
-            n, len(motion.sources), motion.memory_size, held, motion.canonical, True, _DOUBTFUL if self.compiled else inf,
-            every, thin, 0,
-        )  # fmt: skip
+            n, len(motion.sources), motion.memory_size, held, motion.canonical, True, largest, every, thin, 0
+        )
         rows = samples_at_most(setup, self.plan.counts) if pace == 1 else 1
         states = int((-(-self.plan.counts // every)).sum()) // thin + 2
         columns = np.empty((2 + 3 * n, 0)) if observer is None else observer.columns

@@ -1,7 +1,7 @@
 """Functions (t, y, p, own, out) of a state equation as machine code, of one run or of W in lock step.
 
-Number k of run b is y[k W + b]; t and p are shared. Where an angle is beyond the range of the vectors' sine and cosine,
-the C library's serve.
+Number k of run b is y[k W + b]; t and p are shared. A run with an angle beyond the range of the vectors' sine and
+cosine is computed once more with the C library's, so that no run depends on the others.
 """
 
 from __future__ import annotations
@@ -10,57 +10,75 @@ from typing import Any
 
 from llvmlite import ir
 
-from robot_dyn.compiled.llvm.lanes import F64
-from robot_dyn.compiled.llvm.vectors import I64, Vectors
+from robot_dyn.compiled.llvm.lanes import F64, wide
+from robot_dyn.compiled.llvm.vectors import I1, I64, Vectors
 from robot_dyn.compiled.llvm.writer import Writer
 from robot_dyn.compiled.program import Program
 
 SIDE = 8  # runs in a vector: a 512-bit register, or two or four smaller ones
-_POINTER = F64.as_pointer()
+_ARGUMENTS = [F64, *[F64.as_pointer()] * 4]
 
 
 def write_function(module: Any, name: str, program: Program, runs: int) -> None:
     """A function of a program with the inputs t (1,), y, p and own; `runs` is 1 or a multiple of SIDE."""
-    function = ir.Function(module, ir.FunctionType(ir.VoidType(), [F64, *[_POINTER] * 4]), name)
+    any_angle = _any_angle(module, f"{name}_any_angle", program, runs)
+    function = ir.Function(module, ir.FunctionType(ir.VoidType(), _ARGUMENTS), name)
     builder = ir.IRBuilder(function.append_basic_block())
     before, body, end = builder.block, function.append_basic_block(), function.append_basic_block()
     builder.branch(body)
     builder.position_at_end(body)
     at = builder.phi(I64)
     at.add_incoming(ir.Constant(I64, 0), before)
-    _vector(builder, function, program, runs, at)
-    following = builder.add(at, ir.Constant(I64, min(SIDE, runs)))
+    writer = Writer(builder, F64, min(SIDE, runs))
+    written = writer.write(program, _inputs(writer.vectors, function.args, program, runs, at))
+    for k, value in enumerate(written.results):
+        builder.store(value, _place(writer.vectors, function.args[-1], k, runs, at), align=8)
+    with builder.if_then(writer.vectors.any(written.beyond), likely=False):
+        builder.call(any_angle, [*function.args, at, builder.bitcast(written.beyond, ir.IntType(writer.count))])
+    following = builder.add(at, ir.Constant(I64, writer.count))
     at.add_incoming(following, builder.block)
     builder.cbranch(builder.icmp_signed("<", following, ir.Constant(I64, runs)), body, end)
     builder.position_at_end(end)
     builder.ret_void()
 
 
-def _vector(builder: Any, function: Any, program: Program, runs: int, at: Any) -> None:
-    """The runs from `at` on that share a vector."""
-    t, y, p, own, out = function.args
-    writer = Writer(builder, F64, min(SIDE, runs), completed=True)
-    vectors = writer.vectors
+def _any_angle(module: Any, name: str, program: Program, runs: int) -> Any:
+    """The same for the runs from a number on that share a vector, and stored of those alone whose bit is set."""
+    side = min(SIDE, runs)
+    shape = ir.FunctionType(ir.VoidType(), [*_ARGUMENTS, I64, ir.IntType(side)])
+    function = ir.Function(module, shape, name)
+    function.linkage = "internal"
+    function.attributes.add("noinline")
+    function.attributes.add("optnone")  # it is hardly ever called, and soon compiled
+    builder = ir.IRBuilder(function.append_basic_block())
+    *arguments, at, bits = function.args
+    writer = Writer(builder, F64, side, any_angle=True)
+    mask = builder.bitcast(bits, wide(I1, side))
+    for k, value in enumerate(writer.write(program, _inputs(writer.vectors, arguments, program, runs, at)).results):
+        place = _place(writer.vectors, arguments[-1], k, runs, at)
+        builder.store(builder.select(mask, value, builder.load(place, align=8)), place, align=8)
+    builder.ret_void()
+    return function
+
+
+def _inputs(vectors: Vectors, arguments: Any, program: Program, runs: int, at: Any) -> list[list[Any]]:
+    """The vectors of t, y, p and own, of the runs from `at` on."""
+    t, y, p, own, _ = arguments
     _, m, shared, each = program.inputs
-    inputs = [
+    builder = vectors.builder
+    return [
         [_spread(vectors, t)],
-        [_loaded(vectors, y, k, runs, at) for k in range(m)],
+        [builder.load(_place(vectors, y, k, runs, at), align=8) for k in range(m)],
         [_spread(vectors, builder.load(builder.gep(p, [ir.Constant(I64, k)]))) for k in range(shared)],
-        [_loaded(vectors, own, k, runs, at) for k in range(each)],
+        [builder.load(_place(vectors, own, k, runs, at), align=8) for k in range(each)],
     ]
-    for k, value in enumerate(writer.write(program, inputs).results):
-        builder.store(value, _number(vectors, out, k, runs, at), align=8)
 
 
-def _number(vectors: Vectors, array: Any, k: int, runs: int, at: Any) -> Any:
+def _place(vectors: Vectors, array: Any, k: int, runs: int, at: Any) -> Any:
     """Where the numbers k of the runs from `at` on stand."""
     builder = vectors.builder
     place = builder.gep(array, [builder.add(at, ir.Constant(I64, k * runs))])
     return builder.bitcast(place, vectors.type.as_pointer())
-
-
-def _loaded(vectors: Vectors, array: Any, k: int, runs: int, at: Any) -> Any:
-    return vectors.builder.load(_number(vectors, array, k, runs, at), align=8)
 
 
 def _spread(vectors: Vectors, x: Any) -> Any:

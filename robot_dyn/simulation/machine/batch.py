@@ -167,10 +167,11 @@ class Batch:
         works = [y[..., i - len(motion.sources)] for i in range(len(motion.sources))] if "work" in self.wanted else []
         energy = made.get("energy")
         K, V = (None, None) if energy is None else (energy[..., 0], energy[..., 1])
+        named = dict(zip(motion.sources, works, strict=True)) if works else None
         return Rollouts(
-            motion.plant.dynamics.joint_names, t, q, v if "v" in self.wanted else None, made.get("u"), K, V,
-            dict(zip(motion.sources, works, strict=True)) if works else None, ended, why > 0, stopped, self._advice(why, self.fastest[:B]),
-            self._steps(ended), np.repeat(self.evaluations, LANES)[:B], self._statistics(), tuple(motion.sources),
+            motion.plant.dynamics.joint_names, t, q, v if "v" in self.wanted else None, made.get("u"), K, V, named,
+            ended, why > 0, stopped, self._advice(why, self.fastest[:B]), self._steps(ended),
+            np.repeat(self.evaluations, LANES)[:B], self._statistics(), tuple(motion.sources),
             origin(self.setup.plant.dynamics) | self.setup.about, dict(self.values), self._compiled(),
         )  # fmt: skip
 

@@ -126,8 +126,9 @@ class Machine:
                 worst = max(_difference(made[name][: len(x), lane], x, y[:, lane]) for name, x in pairs)
                 if not worst <= allowed:
                     raise MachineError(
-                        f"the compiled motion of {self.equations.name} differs from the interpreted one by {worst:.1e} "
-                        f"of its size, {allowed:.1e} allowed: take engine='interpreted', and report it (random state {i})"
+                        f"the compiled motion of {self.equations.name} differs from the interpreted one by"
+                        f" {worst:.1e} of its size, {allowed:.1e} allowed: take engine='interpreted', and report it"
+                        f" (random state {i})"
                     )
         self.equations.checked.add(True)
 
