@@ -148,20 +148,19 @@ def test_a_run_that_diverges_says_when_and_what_to_do(scene) -> None:
 
 
 WATCHED = """
-import signal, sys
-import robot_dyn.simulation.record as simulation
+import sys
 from robot_dyn.cli import main
+from robot_dyn.simulation.fixed_step import FixedStep
 
-signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where the suite runs in the background
-march = simulation.march
+advance, calls = FixedStep._advance, []
 
-def watched(*arguments):
-    for count, sample in enumerate(march(*arguments)):
-        if count == 20:
-            print("at work", file=sys.stderr, flush=True)
-        yield sample
+def watched(self):
+    calls.append(1)
+    if len(calls) == 20:
+        print("at work", file=sys.stderr, flush=True)
+    return advance(self)
 
-simulation.march = watched
+FixedStep._advance = watched
 main()
 """
 
