@@ -103,7 +103,7 @@ def test_a_comparison_is_repeatable() -> None:
 
 
 def test_samples_must_be_positive() -> None:
-    with pytest.raises(QueryError, match="samples must be a whole number, 1 or more, got 0"):
+    with pytest.raises(QueryError, match="samples must be a whole number, from 1 to 1000000, got 0"):
         compare(rd.load("ur5"), samples=0)
 
 

@@ -79,7 +79,7 @@ def test_random_configurations_fill_the_limits_and_keep_them(name: str) -> None:
 def test_a_random_configuration_needs_a_generator_and_repeats_with_its_seed() -> None:
     one, two = (rd.load("ur5").random_configuration(np.random.default_rng(3)) for _ in range(2))
     np.testing.assert_array_equal(one, two)
-    with pytest.raises(QueryError, match="rng must be a numpy"):
+    with pytest.raises(QueryError, match="rng: give one, such as numpy"):
         rd.load("ur5").random_configuration(3)  # pyright: ignore[reportArgumentType]
 
 
@@ -129,7 +129,7 @@ def test_axes_are_those_of_pinocchio_by_their_names(engine, name: str) -> None:
 def test_other_axes_are_refused(axes) -> None:
     robot = rd.load("pendulum")
     for engine in (robot, rd.Lagrangian(robot)):
-        with pytest.raises(QueryError, match="expressed_in="):
+        with pytest.raises(QueryError, match="no expressed_in"):
             engine.jacobian([0.3], robot.frame_names[-1], expressed_in=axes)
 
 

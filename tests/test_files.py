@@ -203,7 +203,7 @@ def test_names_of_other_kinds_and_missing_folders_are_refused(old: Path, tmp_pat
     refused("too long", tmp_path / ("x" * 5000))
     assert target(tmp_path / "y", NOTE, QueryError) == tmp_path / "y.note"
     assert target(tmp_path / "Y.NOTE", NOTE, QueryError) == tmp_path / "Y.NOTE"
-    with pytest.raises(QueryError, match="cannot be written"):
+    with pytest.raises(QueryError, match="give the path of a file"):
         target(None, NOTE, QueryError)  # type: ignore[arg-type]
 
 
@@ -273,8 +273,8 @@ def test_the_public_functions_replace_their_own_kind_and_no_other(run, tmp_path:
         ("/dev/zero", "is not a regular file; help"),
         (".", "is a folder; help"),
         ("\0", "null"),
-        (None, "cannot be read"),
-        (3, "cannot be read"),
+        (None, "give the path of a file, got None"),
+        (3, "give the path of a file, got 3"),
         ("x" * 5000, "cannot be read"),
     ],
 )

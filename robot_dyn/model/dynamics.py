@@ -32,7 +32,7 @@ class Axes(StrEnum):
     @classmethod
     def of(cls, name: Any) -> Axes:
         """The axes of that name; raises QueryError for any other."""
-        text = name if isinstance(name, str) else shown(name).rpartition(".")[2]  # of Pinocchio's enumeration its name
+        text = name if isinstance(name, str) else str(getattr(name, "name", shown(name)))  # Pinocchio's have names
         return cls(choice("expressed_in", _OF_PINOCCHIO.get(text, text), list(cls)))
 
 

@@ -28,6 +28,7 @@ from robot_dyn.simulation.watch import DivergedError, Watch
 _RUNAWAY = 1e6  # [rad/s] or [m/s]: such a method would follow an exploding state without end
 _SAMPLES = 1000  # of a run without a record period
 _COMPARED = 1000  # times at which a run is compared with runs of other tolerances
+_PEAKS = 200  # states at which the kinetic energy of a run is looked at
 _LOCAL_ORDER = 8  # of DOP853: its steps grow as this root of the tolerance
 
 
@@ -185,8 +186,19 @@ class ErrorControlled:
         made = np.array(kept.made).reshape(len(kept.made), m + self.motion.plant.dynamics.n + 2)
         return Record(
             outcome, np.array(kept.place), np.array(kept.y).reshape(-1, m), made, _path(kept.shared, m),
-            _path(walked, m), self.steps, self.evaluations,
+            _path(walked, m), self.steps, self.evaluations, self._kinetic_peak(walked),
         )  # fmt: skip
+
+    def _kinetic_peak(self, walked: list[tuple[int, float, Array]]) -> float:
+        """Largest kinetic energy at some states of the run, which its samples may all miss; 0 if it is not known."""
+        some = walked[:: max(1, len(walked) // _PEAKS)]
+        y = np.array([each[2] for each in some]).reshape(-1, self.motion.size)
+        try:
+            q = y[:, : self.motion.plant.dynamics.n]
+            energies = self.motion.plant.dynamics.kinetic_energy(q, self.motion.velocities(y))
+            return float(np.max(energies, initial=0.0))
+        except RobotDynError:  # a run that diverges may overflow
+            return 0.0
 
 
 def _path(states: list[tuple[int, float, Array]], m: int) -> Path:

@@ -203,7 +203,7 @@ class FixedStep:
         path = Path(self._keys(at), self._times(at), shared[:, :m])
         return Record(
             outcome, self._times(kept.place[:rows]), kept.y[:rows, :, 0], kept.made[:rows, :, 0], path, path,
-            int(self.now[Now.STEPS]), int(self.now[Now.EVALUATIONS]),
+            int(self.now[Now.STEPS]), int(self.now[Now.EVALUATIONS]), float(self.runs.peak[0]),
         )  # fmt: skip
 
 
@@ -213,7 +213,7 @@ def runs_of(y: np.ndarray, own: np.ndarray, n: int, held: int, memory: int, made
     return Runs(
         np.ascontiguousarray(y), np.ascontiguousarray(own), np.empty((m, W)), np.empty((made, W)),
         np.empty((held + memory, W)), np.empty((2, W)), np.empty(W), np.zeros(W, np.int64), np.ones(W, np.int64),
-        np.zeros(W, np.int64), np.zeros(W), np.zeros(W, np.int64), np.zeros(W), np.ones(W),
+        np.zeros(W, np.int64), np.zeros(W), np.zeros(W, np.int64), np.zeros(W), np.ones(W), np.zeros(W),
     )  # fmt: skip
 
 

@@ -42,6 +42,7 @@ class Record:
         walked: States at the ends of all steps; the same, unless the method chooses its steps.
         steps: Number of steps.
         evaluations: Of the equation of motion.
+        kinetic_peak: Largest kinetic energy that is known, beside that of the samples, in [J].
     """
 
     outcome: Outcome
@@ -52,3 +53,4 @@ class Record:
     walked: Path
     steps: int
     evaluations: int
+    kinetic_peak: float

@@ -17,7 +17,7 @@ import numpy as np
 from robot_dyn.control.cartesian import CartesianReference
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.effects.plant import Plant
-from robot_dyn.errors import QueryError, RobotDynError, nearest
+from robot_dyn.errors import QueryError, nearest
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.simulation.acting import acting
@@ -43,8 +43,6 @@ from robot_dyn.validate import function
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.machine.machine import Machine
-
-_PEAKS = 200  # states at which the kinetic energy of a run is looked at
 
 
 def simulate(
@@ -127,17 +125,6 @@ def _run(
     return record
 
 
-def _kinetic_peak(motion: Motion, record: Record) -> float:
-    """Largest kinetic energy at some states of a run, which its samples may all miss; 0 if it is not known."""
-    walked = record.walked
-    rows = np.unique(np.linspace(0, len(walked.t) - 1, min(len(walked.t), _PEAKS)).astype(int))
-    try:
-        q = walked.y[rows, : motion.plant.dynamics.n]
-        return float(np.max(motion.plant.dynamics.kinetic_energy(q, motion.velocities(walked.y[rows])), initial=0.0))
-    except RobotDynError:  # a run that diverges may overflow
-        return 0.0
-
-
 def _trajectory(
     setup: Setup,
     motion: Motion,
@@ -150,8 +137,7 @@ def _trajectory(
     t = record.t
     q, v, a, tau, W, P, E = columns(motion, t, record.y, record.made)
     wanted, deviation = deviation_of(setup, t, q)
-    peak = _kinetic_peak(motion, record)
-    ledger = Ledger(E[:, 0], E[:, 1], dict(zip(motion.sources, W.T, strict=True)), peak)
+    ledger = Ledger(E[:, 0], E[:, 1], dict(zip(motion.sources, W.T, strict=True)), record.kinetic_peak)
     power = dict(zip(motion.sources, P.T, strict=True))
     plant = setup.plant
     names, about = plant.dynamics.joint_names, origin(plant.dynamics) | setup.about

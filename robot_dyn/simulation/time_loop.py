@@ -88,6 +88,7 @@ class Runs(NamedTuple):
         after, made, command, energies, size, lost: y⁺, a sample, a tick, K and V, Σ |y⁺|, stages not found.
         alive, why, ended, fastest: 1 while it goes on; then the reason, the time and the fastest joint.
         energy, scale: E(0), and 1 + |K(0)| + |V(0)|.
+        peak: Largest K at the looks at the energy.
     """
 
     y: Array
@@ -104,6 +105,7 @@ class Runs(NamedTuple):
     fastest: Array
     energy: Array
     scale: Array
+    peak: Array
 
 
 class Records(NamedTuple):
@@ -266,6 +268,7 @@ def conserve(functions: Functions, runs: Runs, rules: Rules, t: float, p: Array)
     evaluate(functions.energy, t, runs.y, p, runs.own, runs.energies)
     ended = False
     for b in range(len(runs.size)):
+        runs.peak[b] = max(runs.peak[b], runs.energies[0, b])
         came, moved = runs.energies[0, b] + runs.energies[1, b] - runs.energy[b], runs.scale[b]
         for w in range(len(runs.y) - rules.works, len(runs.y)):
             came -= runs.y[w, b]
