@@ -15,7 +15,7 @@ from numba.core import types
 from numba.extending import intrinsic, overload, register_jitable
 
 from robot_dyn.integrate import primitives
-from robot_dyn.integrate.primitives import GOING, LOST, NOISE, PATIENCE, SETTLED
+from robot_dyn.integrate.primitives import GOING, LOST, NOISE, PATIENCE, SETTLED, copy
 
 _DOUBLE, _I64 = ir.DoubleType(), ir.IntType(64)
 _BLOCK = 512  # numbers of a sum at a time
@@ -71,26 +71,33 @@ def _evaluate(function: Any, t: Any, y: Any, p: Any, own: Any, out: Any) -> Any:
 @overload(primitives.combination, strict=False)
 def _combination(x: Any, y: Any, h: Any, weights: Any, K: Any, count: Any) -> Any:
     def loops(x, y, h, weights, K, count):
+        terms, last = 0, -1
+        for j in range(count):
+            if weights[j] != 0.0:
+                terms, last = terms + 1, j
+        if terms == 0:
+            copy(x, y)
+            return
         for low in range(0, y.size, _BLOCK):  # so that sums stay in the nearest cache
-            n, first = min(_BLOCK, y.size - low), True
-            to, start = _part(x, low, n), _part(y, low, n)
-            for j in range(count):
+            n, done, w_last = min(_BLOCK, y.size - low), 0, weights[last]
+            to, start, k_last = _part(x, low, n), _part(y, low, n), _part(K[last], low, n)
+            if terms == 1:
+                for e in range(n):
+                    to[e] = start[e] + (w_last * k_last[e]) * h
+                continue
+            for j in range(last):
                 w = weights[j]
                 if w != 0.0:
                     k = _part(K[j], low, n)
-                    if first:
+                    if done == 0:
                         for e in range(n):
                             to[e] = w * k[e]
                     else:
                         for e in range(n):
                             to[e] += w * k[e]
-                    first = False
-            if first:
-                for e in range(n):
-                    to[e] = start[e]
-            else:
-                for e in range(n):
-                    to[e] = start[e] + to[e] * h
+                    done += 1
+            for e in range(n):
+                to[e] = start[e] + (to[e] + w_last * k_last[e]) * h
 
     return loops
 
