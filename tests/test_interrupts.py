@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+import robot_dyn as rd
 from robot_dyn.compiled.interrupts import interrupts_later
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
@@ -76,3 +77,25 @@ def test_an_interrupt_while_machine_code_is_made_comes_after_it() -> None:
     finally:
         signal.signal(signal.SIGINT, handler)
     assert seen == ["made"]
+
+
+def test_an_interrupt_during_a_trace_comes_after_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """NumPy calls the operators of symbols back from C, where no exception can be raised."""
+    from robot_dyn.compiled import symbol
+
+    made, calls = symbol._symbol, []
+
+    def interrupting(x: object) -> object:
+        calls.append(x)
+        if len(calls) == 20:
+            signal.raise_signal(signal.SIGINT)
+        return made(x)
+
+    monkeypatch.setattr(symbol, "_symbol", interrupting)
+    handler = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            rd.simulate(rd.Plant(rd.load("planar_2r")), q0=[0.3, -0.4], duration_s=0.01, engine="compiled")
+    finally:
+        signal.signal(signal.SIGINT, handler)
+    assert len(calls) > 20

@@ -1,4 +1,4 @@
-"""Ctrl-C while machine code is made: it waits, for the compiler's callbacks from C cannot raise."""
+"""Ctrl-C while machine code is made: it waits, for what compiler and NumPy call back from C cannot raise."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def interrupts_later() -> Iterator[None]:
-    """Hold Ctrl-C back until the end of the block; in another thread than the main one it never comes."""
+    """Hold Ctrl-C back until the end of the block, or function; in another thread than the main one it never comes."""
     handler = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or not callable(handler):
         yield

@@ -18,6 +18,7 @@ from robot_dyn.compiled.cache import default_store
 from robot_dyn.compiled.dynamics import CompiledDynamics
 from robot_dyn.compiled.engine import Engine
 from robot_dyn.compiled.from_casadi import instructions
+from robot_dyn.compiled.interrupts import interrupts_later
 from robot_dyn.compiled.referee import Referee
 from robot_dyn.compiled.symbolic import Symbols, TraceError, column, every_branch, inputs
 from robot_dyn.compiled.trace import Trace, Traced
@@ -158,6 +159,7 @@ class CompiledPlant:
         """The rigid bodies in symbols."""
         return Trace(self.dynamics.robot)
 
+    @interrupts_later()
     def _traced(self, quantity: str) -> Traced:
         t, q, v, u = self._inputs
         torque = self._effects()

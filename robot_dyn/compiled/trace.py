@@ -19,6 +19,7 @@ from robot_dyn.arithmetic import Array, in_arithmetic
 from robot_dyn.compiled.base_parameters import regrouped
 from robot_dyn.compiled.condition import Node
 from robot_dyn.compiled.from_casadi import instructions
+from robot_dyn.compiled.interrupts import interrupts_later
 from robot_dyn.compiled.origins import slid
 from robot_dyn.compiled.symbol import symbol
 from robot_dyn.compiled.symbolic import Symbolic, array_of, column, inputs
@@ -111,6 +112,7 @@ class Trace:
             return 3, n, n
         return (1,) if quantity in energies else (n, n) if quantity in matrices else (n,)
 
+    @interrupts_later()
     @in_arithmetic
     def quantity(self, name: str) -> Traced:
         """A quantity of the `Dynamics` protocol, or "forward_dynamics_derivatives": ∂a/∂q, ∂a/∂v, ∂a/∂τ."""

@@ -1,14 +1,11 @@
-"""The choice of the loop that runs a setup: machine code, or Python where compiling does not pay or cannot be.
+"""The choice of the engine that runs a setup: machine code, or Python where compiling does not pay or cannot be.
 
-evaluations · cost of one, interpreted  >  time to compile
+It is made by a count, about how often the equation of motion is evaluated: the same for a setup on every machine.
 """
 
 from __future__ import annotations
 
-from time import perf_counter
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from robot_dyn.errors import RobotDynError
 from robot_dyn.integrate.adaptive import Adaptive
@@ -19,12 +16,11 @@ from robot_dyn.simulation.smoothness import foreign
 if TYPE_CHECKING:
     from robot_dyn.simulation.machine.machine import Machine
 
-# Measured on two cores at about 3 GHz: imports and the trace take 1 to 1.5 s, Numba 3 s for 7 joints and RK4, and more
-# with more joints. Below the first a machine is not even looked for in the store, below the second none is made.
-_TRACE_S = 1.5
-_COMPILE_S, _COMPILE_S_PER_JOINT = 1.5, 0.4
+# Interpreted, an evaluation takes some 0.1 ms: these take about as long as imports, trace and LLVM, 1 to 2 s. The time
+# loop takes 3 s more, once for a version of this library.
+_COMPILED = 20_000
 _GUESSED = 10  # evaluations in a step of an implicit method, beside those of its Jacobian
-_PER_SECOND = 4000  # evaluations of an adaptive method, for each second of the run
+_PER_SECOND = 1000  # evaluations of an adaptive method, for each second of the run
 
 
 def choose(setup: Setup, motion: Motion) -> tuple[Machine | None, str]:
@@ -40,17 +36,12 @@ def choose(setup: Setup, motion: Motion) -> tuple[Machine | None, str]:
         return _machine(setup, motion), _label(setup)
     if parts := foreign(setup):  # they may have effects of their own, which a trace would lose
         return None, f"interpreted ({type(parts[0]).__name__} is not the library's own)"
-    seconds = _evaluations(setup) * _cost(setup, motion)
-    if seconds < _TRACE_S:
+    if _evaluations(setup) < _COMPILED:
         return None, "interpreted (short: compiling does not pay)"
     try:
-        made = _made(setup, motion)
-        if not made.equations.ready and seconds < _COMPILE_S + _COMPILE_S_PER_JOINT * motion.plant.dynamics.n:
-            return None, "interpreted (short: compiling does not pay)"
-        made.check(setup)
+        return _machine(setup, motion), _label(setup)
     except (ImportError, RobotDynError) as error:
         return None, f"interpreted ({error})"
-    return made, _label(setup)
 
 
 def _machine(setup: Setup, motion: Motion) -> Machine:
@@ -78,18 +69,3 @@ def _evaluations(setup: Setup) -> float:
     return (
         setup.steps * (2 if setup.estimate_error else 1) * (method.evaluations_per_step or _GUESSED + 2 * len(setup.q0))
     )
-
-
-def _cost(setup: Setup, motion: Motion) -> float:
-    """Time of one evaluation in the interpreted engine, in [s]."""
-    y, held = motion.start(setup.q0, setup.v0), np.zeros(len(setup.q0)) if motion.sampled else None
-    best = np.inf
-    try:
-        with np.errstate(all="ignore"):
-            for _ in range(3):
-                began = perf_counter()
-                motion.rate(0.0, y, held)
-                best = min(best, perf_counter() - began)
-    except RobotDynError:  # the run will tell
-        return 0.0
-    return best

@@ -95,8 +95,3 @@ def _engine() -> Any:
     for name, place in addresses().items():
         binding.add_symbol(name, place)
     return binding.create_mcjit_compiler(binding.parse_assembly(""), _machine())
-
-
-def known(key: str, store: Store | None) -> bool:
-    """Whether a module is loaded, or whole in the store."""
-    return key in _loaded or (store is not None and _opened(store.load(key)) is not None)

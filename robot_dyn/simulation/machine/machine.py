@@ -60,11 +60,6 @@ class Equations:
     def _key(self) -> str:
         return digest([str(self.runs), *(f"{name} {program}" for name, program in self.programs.items())])
 
-    @property
-    def ready(self) -> bool:
-        """Whether the machine code is in the store, or here already."""
-        return "functions" in vars(self) or machine_code.known(self._key, default_store())
-
     @cached_property
     def functions(self) -> Functions:
         """The addresses; compiled if they are not in the store."""

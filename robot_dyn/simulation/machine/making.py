@@ -13,6 +13,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.compiled.from_casadi import program_of
+from robot_dyn.compiled.interrupts import interrupts_later
 from robot_dyn.compiled.symbolic import TraceError
 from robot_dyn.effects.plant import Plant
 from robot_dyn.integrate.integrator import Integrator
@@ -97,6 +98,7 @@ def machine(
     own = motion if robot is plant.dynamics else Motion(Plant(robot, plant.effects), controller, motion.canonical)
     lengths = tuple((name, len(x)) for name, x in values.items())
 
+    @interrupts_later()
     def make() -> Equations:
         functions = trace(own, _symbolic, dict(lengths), kept)
         return Equations({name: program_of(each) for name, each in functions.items()}, lanes, robot.name)
