@@ -168,27 +168,27 @@ class Robot(Dynamics):
         """Acceleration of free fall, (3,) in base axes, in [m/s²]; `with_(gravity=…)` changes it."""
         return frozen(np.array(self.edits.gravity))
 
-    @property
+    @cached_property
     def lower(self) -> ndarray:
         """Lower position limits, −inf where none is stated, (n,) in [rad] or [m]."""
         return self._per_joint(self.model.lowerPositionLimit)
 
-    @property
+    @cached_property
     def upper(self) -> ndarray:
         """Upper position limits, inf where none is stated, (n,) in [rad] or [m]."""
         return self._per_joint(self.model.upperPositionLimit)
 
-    @property
+    @cached_property
     def effort_limit(self) -> ndarray:
         """Effort limits, inf where none is stated, (n,) in [N m] or [N]."""
         return self._per_joint(self.model.effortLimit)
 
-    @property
+    @cached_property
     def velocity_limit(self) -> ndarray:
         """Velocity limits, inf where none is stated, (n,) in [rad/s] or [m/s]."""
         return self._per_joint(self.model.velocityLimit)
 
-    @property
+    @cached_property
     def armature(self) -> ndarray:
         """Inertia of the drives felt at the joints, (n,) in [kg m²] or [kg]; part of M."""
         return self._per_joint(self.model.armature)
