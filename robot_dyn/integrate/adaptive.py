@@ -94,7 +94,19 @@ class Adaptive:
     rtol: float = 1e-10
     atol: float = 1e-12
     max_step: float = inf
+    canonical: ClassVar[bool] = False
     plain: ClassVar[bool] = False
+    controls_error: ClassVar[bool] = True
+    evaluations_per_step: ClassVar[int | None] = None
+
+    @property
+    def name(self) -> str:
+        """As a scene file says it."""
+        return self.method
+
+    def with_tolerances(self, factor: float, longest: float) -> Adaptive:
+        """The same with tolerances times a factor, and steps of at most `longest`."""
+        return replace(self, rtol=self.rtol * factor, atol=self.atol * factor, max_step=longest)
 
     def __post_init__(self) -> None:
         choice("adaptive method", self.method, ("DOP853", "Radau"))

@@ -86,6 +86,7 @@ class Integrator(ABC):
         canonical: Whether it keeps the structure of a Hamiltonian system, which has to be given in (q, p), p = M v.
         stiff: Whether its step is not bounded by the fastest decay of the system.
         plain: Whether its step is a plain function, which machine code and runs in lock step take.
+        controls_error: Whether it chooses its steps, as `Adaptive` does.
     """
 
     name: str
@@ -94,6 +95,7 @@ class Integrator(ABC):
     canonical: ClassVar[bool] = False
     stiff: ClassVar[bool] = False
     plain: ClassVar[bool] = False
+    controls_error: ClassVar[bool] = False
 
     @abstractmethod
     def step(self, system: System, t: Any, y: Array, h: Any) -> Array:

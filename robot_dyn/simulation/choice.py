@@ -8,7 +8,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from robot_dyn.errors import RobotDynError
-from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.smoothness import foreign
@@ -64,7 +63,7 @@ def _label(setup: Setup) -> str:
 def _evaluations(setup: Setup) -> float:
     """About how many evaluations of the equation of motion a run takes, with its companions."""
     method: Any = setup.integrator
-    if isinstance(method, Adaptive):
+    if method.controls_error:
         return _PER_SECOND * setup.duration_s * (3 if setup.estimate_error else 1)
     return (
         setup.steps * (2 if setup.estimate_error else 1) * (method.evaluations_per_step or _GUESSED + 2 * len(setup.q0))

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from math import ceil
-from typing import final
+from typing import cast, final
 
 import numpy as np
 
@@ -136,13 +136,12 @@ class ErrorControlled:
 
     def _method(self, length: float) -> Adaptive:
         """The method with the tolerances of this run, on a segment."""
-        method, factor = self.setup.integrator, float(self.pace)
-        assert isinstance(method, Adaptive)
+        method, factor = cast(Adaptive, self.setup.integrator), float(self.pace)
         longest = min(method.max_step, self.setup.longest_step_s)
         if factor < 1:  # where the ends of segments bound the steps, a tolerance by itself changes nothing
             longest = min(longest, length)
         longest *= factor ** (1 / _LOCAL_ORDER)
-        return replace(method, rtol=method.rtol * factor, atol=method.atol * factor, max_step=longest)
+        return method.with_tolerances(factor, longest)
 
     def _counted(self, equation: System) -> System:
         def rate(t: float, y: Array) -> Array:

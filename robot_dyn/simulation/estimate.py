@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 
@@ -46,10 +47,11 @@ def estimate(setup: Setup, motion: Motion, run: Record, companion: Companion) ->
     n = motion.plant.dynamics.n
     kink, why = first_kink(setup, motion, run.walked)
     estimated = Estimated(run.shared, n, kink, rounding(run.shared, n), meaningless(run.walked, n))
-    if isinstance(setup.integrator, Adaptive):
-        made = _by_tolerances(setup, setup.integrator, estimated, companion)
+    method: Any = setup.integrator
+    if method.controls_error:
+        made = _by_tolerances(setup, method, estimated, companion)
     else:
-        made = _by_steps(setup, setup.integrator, estimated, companion, _turn(motion, run.walked))
+        made = _by_steps(setup, method, estimated, companion, _turn(motion, run.walked))
     return _advised(setup, _looked_between(setup, motion, run, made), why)
 
 
@@ -118,8 +120,6 @@ def _advised(setup: Setup, made: ErrorEstimate, why: str) -> ErrorEstimate:
         return made
     if made.note == ROUNDED:
         return replace(made, note=f"{made.note}; take a shorter run")
-    method = setup.integrator
-    finer = (
-        f"rtol = {method.rtol / 100:.0e}" if isinstance(method, Adaptive) else f"step_s = {setup.taken_step_s / 4:.0e}"
-    )
+    method: Any = setup.integrator
+    finer = f"rtol = {method.rtol / 100:.0e}" if method.controls_error else f"step_s = {setup.taken_step_s / 4:.0e}"
     return replace(made, note=f"{made.note}; take {finer}, or a shorter run")

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from fractions import Fraction
 from math import ceil, inf
 from time import perf_counter
-from typing import final
+from typing import cast, final
 
 import numpy as np
 
@@ -53,8 +53,7 @@ class FixedStep:
         self, setup: Setup, motion: Motion, functions: Functions, pace: Fraction, machine_code: Advance | None = None,
         on_progress: Callable[[float], object] | None = None, observer: Observer | None = None,
     ) -> None:  # fmt: skip
-        method = setup.integrator
-        assert isinstance(method, Integrator)
+        method = cast(Integrator, setup.integrator)
         self.setup, self.motion, self.functions, self.compiled = setup, motion, functions, machine_code is not None
         self.on_progress, self.observer = on_progress, observer
         self.segments, self.plan, self.watch = paced(setup.stretches, pace), plan_of(setup, pace), Watch(setup, motion)
@@ -168,8 +167,7 @@ class FixedStep:
 
     def _step(self, s: int, t: float, y: np.ndarray) -> None:
         """One step by the interpreted equation."""
-        h, method, observer = float(self.plan.lengths[s]), self.setup.integrator, self.observer
-        assert isinstance(method, Integrator)
+        h, method, observer = float(self.plan.lengths[s]), cast(Integrator, self.setup.integrator), self.observer
         seen = None if observer is None else observer.seen
         equation = system(
             interpreted(self.motion, self.watch), self.motion, self.plan.parameters[s], self.runs.own, seen

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from robot_dyn.errors import RobotDynError
-from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.model.robot import Robot
 from robot_dyn.model.units import unit
 from robot_dyn.simulation.levels import Level, levels
@@ -127,7 +126,7 @@ def _coarse(
 ) -> Iterator[Remark]:
     """Where q, v or u left the hull of the samples around it by a good part of its range; the worst for each joint."""
     edges, low, high = observer.windows
-    every = not setup.record_period_s and not isinstance(setup.integrator, Adaptive)
+    every = not setup.record_period_s and not setup.integrator.controls_error
     if every or not len(low) or not len(t):
         return
     spacing = 1e-9 * (t[-1] - t[0])

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -74,11 +74,10 @@ def rollouts(
     instance("record", record, Iterable, f"give names of {', '.join(RECORDS)}")
     wanted = tuple(choice("record", name, RECORDS) for name in record)
     q, v, free = _starts(setup, q0, v0, params or {})
-    motion = Motion(setup.plant, setup.controller, getattr(setup.integrator, "canonical", False))
-    assert isinstance(setup.integrator, Integrator)
+    motion = Motion(setup.plant, setup.controller, setup.integrator.canonical)
     asked = {"u": "tau" in wanted, "v": motion.canonical and "v" in wanted, "energy": "energy" in wanted}
     kept, nominal = tuple(name for name, yes in asked.items() if yes), {name: x[0] for name, x in free.items()}
-    made = machine(motion, setup.integrator, lanes=LANES, free=nominal, kept=kept)
+    made = machine(motion, cast(Integrator, setup.integrator), lanes=LANES, free=nominal, kept=kept)
     made.check(setup)
     return Batch(setup, made, q, v, free, wanted, kept, most_bytes).run(thread_count(threads), on_progress)
 

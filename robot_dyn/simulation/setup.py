@@ -80,7 +80,7 @@ class Setup:
             text for pair in instance("about", self.about, dict, "give texts by name").items() for text in pair
         ):
             instance("about", text, str, "give texts by name")
-        if isinstance(self.integrator, Adaptive) and self.step_s != Setup.step_s:
+        if self.integrator.controls_error and self.step_s != Setup.step_s:
             raise QueryError("step_s has no effect on an Adaptive method; leave it out, or give Adaptive(max_step=…)")
         choice("engine", self.engine, ENGINES)
         instance("controller", self.controller, Controller | None, "give one, such as rd.PD(…), or None")

@@ -18,7 +18,6 @@ from robot_dyn.control.cartesian import CartesianReference
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import QueryError, nearest
-from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.simulation.acting import acting
 from robot_dyn.simulation.choice import choose
@@ -62,7 +61,7 @@ def simulate(
     function("on_progress", on_progress, "the time reached")
     for name in options.keys() - Setup.__dataclass_fields__.keys():
         raise QueryError(f"simulate: no option {name!r}; {nearest(name, Setup.__dataclass_fields__)}")
-    if isinstance(options.get("integrator"), Adaptive):
+    if getattr(options.get("integrator"), "controls_error", False):
         options = {"step_s": Setup.step_s} | options  # a step that was given for another method means nothing to it
     if isinstance(what, Setup):
         setup = replace(what, **options)
@@ -71,7 +70,7 @@ def simulate(
         if "q0" not in options:
             raise QueryError(f"simulate: give q0, the position at the start, ({plant.dynamics.n},)")
         setup = Setup(plant, **options)
-    motion = Motion(setup.plant, setup.controller, getattr(setup.integrator, "canonical", False))
+    motion = Motion(setup.plant, setup.controller, setup.integrator.canonical)
     check_record(setup, motion)
     clock = [perf_counter()]
     machine, engine = choose(setup, motion)
@@ -91,10 +90,10 @@ def simulate(
     clock.append(perf_counter())
     compiling, wall, companions = np.diff(clock).tolist()
     companions = 0.0 if error is None else companions
-    adaptive = isinstance(setup.integrator, Adaptive)
-    name = setup.integrator.method if isinstance(setup.integrator, Adaptive) else setup.integrator.name
-    step = 0.0 if adaptive else record.outcome.t / max(record.steps, 1)
-    statistics = Statistics(name, step, record.steps, record.evaluations, wall, companions, engine, compiling)
+    step = 0.0 if setup.integrator.controls_error else record.outcome.t / max(record.steps, 1)
+    statistics = Statistics(
+        setup.integrator.name, step, record.steps, record.evaluations, wall, companions, engine, compiling
+    )
     observer.close()
     made = _trajectory(setup, motion, record, statistics, error, observer)
     return replace(made, statistics=replace(statistics, samples_s=perf_counter() - clock[-1]))
@@ -115,7 +114,7 @@ def _run(
         functions = interpreted(motion, Watch(setup, motion))
     else:
         functions = machine.in_python if advance is None else machine.equations.functions
-    if isinstance(setup.integrator, Adaptive):
+    if setup.integrator.controls_error:
         run: Any = ErrorControlled(setup, motion, functions, pace, on_progress, observer)
     else:
         run = FixedStep(setup, motion, functions, pace, advance, on_progress, observer)

@@ -9,7 +9,6 @@ from math import inf
 from typing import TYPE_CHECKING
 
 from robot_dyn.errors import QueryError
-from robot_dyn.integrate.adaptive import Adaptive
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.motion import Motion
@@ -69,7 +68,7 @@ def segments(setup: Setup) -> float:
 
 def steps(setup: Setup) -> float:
     """About so many steps of a fixed-step method; 0 for an adaptive one, which chooses them."""
-    if isinstance(setup.integrator, Adaptive):
+    if setup.integrator.controls_error:
         return 0.0
     step = min(setup.step_s, setup.record_period_s or inf)  # samples lie on steps
     return setup.duration_s / step + 4 * segments(setup)
@@ -78,7 +77,7 @@ def steps(setup: Setup) -> float:
 def samples(setup: Setup) -> float:
     """At most so many samples."""
     periods = setup.duration_s / setup.record_period_s + 2 if setup.record_period_s else inf
-    adaptive = isinstance(setup.integrator, Adaptive)
+    adaptive = setup.integrator.controls_error
     return min(periods, 1000 + segments(setup) if adaptive and periods == inf else inf, steps(setup) or inf)
 
 

@@ -10,13 +10,13 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import replace
 from time import perf_counter
-from typing import final
+from typing import cast, final
 
 import numpy as np
 
 from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.effects.plant import Plant
-from robot_dyn.integrate.integrator import Integrator
+from robot_dyn.integrate.integrator import PlainMethod
 from robot_dyn.simulation.fixed_step import runs_of, samples_at_most
 from robot_dyn.simulation.machine.machine import Machine
 from robot_dyn.simulation.machine.parts import with_
@@ -127,8 +127,9 @@ class Batch:
 
     def _tile(self, tile: int) -> None:
         motion, n = self.machine.motion, self.machine.motion.plant.dynamics.n
-        own, runs, method = slice(tile * LANES, (tile + 1) * LANES), self._runs(tile), self.setup.integrator
-        assert isinstance(method, Integrator) and self.machine.loop is not None
+        own, runs = slice(tile * LANES, (tile + 1) * LANES), self._runs(tile)
+        method = cast(PlainMethod, self.setup.integrator)
+        assert self.machine.loop is not None
         stepper = method.stepper(FLOAT64, motion.size, n, motion.size, LANES)
         functions, now = self.machine.equations.functions, np.zeros(len(Now), dtype=np.int64)
         now[Now.BUDGET] = np.iinfo(np.int64).max
@@ -201,7 +202,6 @@ class Batch:
     def _statistics(self) -> Statistics:
         """Of the batch; its steps and evaluations are those of one run to the end."""
         method, steps = self.setup.integrator, int(self.plan.counts[:-1].sum())
-        assert isinstance(method, Integrator)
         runs = f"compiled, {len(self.y)} runs side by side"
         most = int(self.evaluations.max())
         return Statistics(method.name, self.setup.duration_s / steps, steps, most, 0.0, engine=runs)

@@ -111,7 +111,9 @@ def machine(
             " simulate it with engine='interpreted'"
         )
     numbers = np.concatenate([*values.values(), np.zeros(0)])
-    return Machine(with_values(own, values) if values else own, equations, numbers, None if method is None else _loop(method))
+    return Machine(
+        with_values(own, values) if values else own, equations, numbers, None if method is None else _loop(method)
+    )
 
 
 def _loop(method: Integrator) -> Callable[..., int]:
