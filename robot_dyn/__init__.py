@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from robot_dyn.control.computed_torque import ComputedTorque as ComputedTorque
     from robot_dyn.control.computed_torque import FeedForward as FeedForward
     from robot_dyn.control.computed_torque import PDGravity as PDGravity
+    from robot_dyn.control.controller import Controller as Controller
+    from robot_dyn.control.controller import Memoryless as Memoryless
     from robot_dyn.control.independent_joint import PD as PD
     from robot_dyn.control.independent_joint import PID as PID
     from robot_dyn.control.independent_joint import gains_from as gains_from
@@ -30,6 +32,10 @@ if TYPE_CHECKING:
     from robot_dyn.control.reference import via_points as via_points
     from robot_dyn.control.samples import Samples as Samples
     from robot_dyn.effects.actuator import EffortLimit as EffortLimit
+    from robot_dyn.effects.effect import Active as Active
+    from robot_dyn.effects.effect import Bound as Bound
+    from robot_dyn.effects.effect import Conservative as Conservative
+    from robot_dyn.effects.effect import Dissipative as Dissipative
     from robot_dyn.effects.friction import RegularisedCoulombFriction as RegularisedCoulombFriction
     from robot_dyn.effects.friction import ViscousFriction as ViscousFriction
     from robot_dyn.effects.joint_limit import JointStopDamper as JointStopDamper
@@ -70,11 +76,16 @@ if TYPE_CHECKING:
 
 # Public names and where they live; imported when first used, so that `import robot_dyn` stays light (PEP 562).
 _HOME = {
+    "Active": "effects.effect",
     "Adaptive": "integrate.adaptive",
     "Ball": "arithmetic",
+    "Bound": "effects.effect",
     "Comparison": "accuracy.compare",
     "Compiled": "compiled.plant",
     "ComputedTorque": "control.computed_torque",
+    "Conservative": "effects.effect",
+    "Controller": "control.controller",
+    "Dissipative": "effects.effect",
     "Dynamics": "model.dynamics",
     "EffortLimit": "effects.actuator",
     "ExternalWrench": "effects.wrench",
@@ -82,6 +93,7 @@ _HOME = {
     "JointStopDamper": "effects.joint_limit",
     "JointStopSpring": "effects.joint_limit",
     "Lagrangian": "lagrange.manipulator",
+    "Memoryless": "control.controller",
     "ModelWarning": "errors",
     "OperationalSpace": "control.operational_space",
     "PD": "control.independent_joint",

@@ -217,7 +217,7 @@ def one_state(what: str, values: Any, joint_names: Sequence[str]) -> np.ndarray:
     return array
 
 
-def returned(what: str, values: Any, n: int, *, error: Kind) -> None:
+def returned(what: str, values: Any, n: int, of: str = "joint", *, error: Kind) -> None:
     """Raise the error unless a function returned n finite numbers, shape (n,); `what` is its name."""
     try:
         array = float64(values)
@@ -227,8 +227,8 @@ def returned(what: str, values: Any, n: int, *, error: Kind) -> None:
     except ValueError as problem:
         found = str(problem)
     if found:
-        joints = f"{n} joint{'s' if n > 1 else ''}"
-        raise error(f"{what} returned {found} for {joints} at the start; it must be finite numbers of shape ({n},)")
+        count = f"{n} {of}{'s' if n > 1 else ''}"
+        raise error(f"{what} returned {found} for {count} at the start; it must be finite numbers of shape ({n},)")
 
 
 def check_batches(**arrays: Any) -> tuple[int, ...]:

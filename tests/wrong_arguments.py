@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from inspect import isclass, signature
+from inspect import isabstract, isclass, signature
 from pathlib import Path
 from socket import socket
 from typing import Any
@@ -51,9 +51,10 @@ def public() -> Iterator[str]:
         if (
             not callable(thing)
             or thing is rd.Dynamics
+            or isabstract(thing)
             or (isclass(thing) and issubclass(thing, BaseException | Warning))
         ):
-            continue  # the protocol is held by Robot and Lagrangian
+            continue  # interfaces are held by what implements them
         if name not in RESULTS:
             yield name
         for method in dir(thing) if isclass(thing) else ():

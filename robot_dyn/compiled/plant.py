@@ -24,6 +24,7 @@ from robot_dyn.compiled.symbolic import Symbols, TraceError, column, every_branc
 from robot_dyn.compiled.trace import Trace, Traced
 from robot_dyn.effects.effect import Bound
 from robot_dyn.effects.plant import Plant
+from robot_dyn.foreign import because
 from robot_dyn.model.robot import Robot
 
 _ARGUMENTS = {
@@ -205,9 +206,9 @@ def _traced(effect: Any, function: Callable[[], Any]) -> np.ndarray:
         made = every_branch(function)
         column(made)  # of what is no number it says so
         return made
-    except (TypeError, ValueError, AttributeError, IndexError, TraceError) as error:
+    except Exception as error:  # whatever a user's code raises on symbols
         raise TraceError(
-            f"effect {effect.name} cannot be traced ({error}); write it in robot_dyn.arithmetic, or run it interpreted"
+            f"effect {effect.name} cannot be traced ({because(error)}); write it in robot_dyn.arithmetic, or run it interpreted"
         ) from error
 
 

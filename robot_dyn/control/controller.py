@@ -1,6 +1,6 @@
-"""What a controller is: τ = τ(t, q, v, z), with a memory ż = rate(t, q, v, z) where it needs one.
+"""What a controller is: τ = τ(t, q, v, z), with states ż = rate(t, q, v, z) where it needs some.
 
-The memory is a state like q and v: a continuous controller (`period_s` 0) has it integrated with the plant, a sampled
+The controller states z are states like q and v: a continuous controller (`period_s` 0) has them integrated with the plant, a sampled
 one takes z⁺ = z + period · rate at its ticks and holds its torque between them. [Siciliano et al. 2009, ch. 8]
 """
 
@@ -22,13 +22,29 @@ class ControlError(RobotDynError):
 
 
 class Controller(ABC):
-    """A control law: a pure function of time, state and memory. Subclass `Memoryless` if it has no memory.
+    """A control law τ = τ(t, q, v, z) with controller states, ż = rate(t, q, v, z), z(0) = 0.
+
+    Subclass `Memoryless` if it has no states. Its methods are pure functions, called with
+
+        t: time, a number, in [s]
+        q: position, (n,), in [rad] or [m] by joint
+        v: velocity, (n,), in [rad/s] or [m/s]
+        z: controller states, (memory_size,)
+
+    and with symbols in place of these numbers where it is compiled: written in `robot_dyn.arithmetic` and NumPy's
+    operators it runs in both engines. An attribute `reference` that is a `PiecewisePolynomial` is what a run is
+    compared with, and an attribute `model` is the controller's own model of the arm.
 
     Attributes:
         period_s: Time between samples in [s], with the torque constant between them; 0 for continuous control.
     """
 
     period_s: float = 0.0
+
+    @property
+    def name(self) -> str:
+        """Its name in messages: that of its class."""
+        return type(self).__name__
 
     @property
     @abstractmethod
@@ -38,7 +54,7 @@ class Controller(ABC):
     @property
     @abstractmethod
     def memory_size(self) -> int:
-        """Number of states in the memory z, which starts at zero."""
+        """Number of controller states z, which start at zero."""
 
     @property
     def knots(self) -> tuple[float, ...]:
@@ -48,19 +64,19 @@ class Controller(ABC):
 
     @abstractmethod
     def torque(self, t: float, q: Array, v: Array, z: Array) -> Array:
-        """Torque it asks of the joints, shape (n,), in [N m] or [N]; z has shape (memory_size,)."""
+        """Torque it asks of the joints, shape (n,), in [N m] or [N]."""
 
     @abstractmethod
     def memory_rate(self, t: float, q: Array, v: Array, z: Array) -> Array:
-        """Rate ż of the memory, shape (memory_size,)."""
+        """Rate ż of the controller states, shape (memory_size,), in the unit of z per [s]."""
 
     def next_memory(self, t: float, q: Array, v: Array, z: Array) -> Array:
-        """Memory of a sampled controller after its tick at t: z⁺ = z + period · ż, shape (memory_size,)."""
+        """States of a sampled controller after its tick at t: z⁺ = z + period · ż, shape (memory_size,)."""
         return z + self.period_s * self.memory_rate(t, q, v, z)
 
 
 class Memoryless(Controller):
-    """A controller whose torque depends on time and state alone."""
+    """A controller without states of its own: τ = τ(t, q, v); z is empty. Contract as of `Controller`."""
 
     @property
     def memory_size(self) -> int:

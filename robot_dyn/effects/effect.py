@@ -28,7 +28,15 @@ _STATED = {"limit": "effort_limit"}  # the attribute of a Robot, where it is not
 class Effect:
     """Something that acts on the joints: a `Force` or a `Bound`; a plant refuses anything else.
 
-    Subclass one of the four kinds below.
+    Subclass one of the four kinds below. Its methods are pure functions, called with
+
+        dynamics: the rigid bodies of the plant, a `Dynamics`
+        t: time, a number, in [s]
+        q: position, (..., n), in [rad] or [m] by joint
+        v: velocity, (..., n), in [rad/s] or [m/s]
+
+    and with symbols in place of these numbers where it is compiled: written in `robot_dyn.arithmetic` and NumPy's
+    operators it runs in both engines.
 
     Attributes:
         coefficients: Names of those of its attributes that are one number, or one for each joint.
@@ -84,27 +92,27 @@ class Force(Effect, ABC):
 
 
 class Conservative(Force):
-    """An effect with a potential: torque = −∂E/∂q."""
+    """An effect with a potential E(t, q), which the energy ledger counts: torque = −∂E/∂q. Contract as of `Effect`."""
 
     @abstractmethod
     def potential(self, dynamics: Dynamics, t: float, q: Array) -> Array:
-        """Its energy E(q), shape (...), in [J]."""
+        """Its energy E(t, q), shape (...), in [J]."""
 
 
 class Dissipative(Force):
-    """An effect that only takes energy: torqueᵀ v ≤ 0."""
+    """An effect that only takes energy: torqueᵀ v ≤ 0 at all t, q, v. Contract as of `Effect`."""
 
 
 class Active(Force):
-    """An effect whose power has no sign."""
+    """An effect whose power torqueᵀ v may have either sign. Contract as of `Effect`."""
 
 
 class Bound(Effect, ABC):
-    """An effect that bounds the actuation."""
+    """An effect that bounds the actuation, by the order of a plant's effects. Contract as of `Effect`."""
 
     @abstractmethod
     def actuation(self, u: Array) -> Array:
-        """What is left of the actuation u, (..., n)."""
+        """What is left of the actuation u, (..., n), in [N m] or [N]; same shape and unit."""
 
 
 def coefficient(name: str, values: Any, *, least: float | None = None, infinite: bool = False) -> np.ndarray:

@@ -17,6 +17,7 @@ from robot_dyn.arithmetic import FLOAT64, Arithmetic, Array
 from robot_dyn.effects.effect import Bound, Effect, Force
 from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFriction
 from robot_dyn.errors import EffectError, OverflowedError, shown
+from robot_dyn.foreign import call, users_line
 from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.validate import check_batches, is_moderate, is_state, joint_values, number
 
@@ -146,8 +147,10 @@ def bounded(effects: Iterable[Effect], u: Array) -> Array:
     for effect in effects:
         if isinstance(effect, Bound):
             try:
-                u = effect.actuation(u)
+                u = call(effect.actuation, u)
             except (TypeError, ValueError) as error:
+                if users_line(error):
+                    raise
                 raise EffectError(f"{effect.name} does not fit an actuation of shape {shape}: {error}") from None
     return u
 
@@ -157,9 +160,11 @@ def torque_of(
 ) -> Array:
     """The torque of one effect, of the shape if one is given; EffectError if it does not fit the joints."""
     try:
-        torque = force.torque(dynamics, t, q, v)
+        torque = call(force.torque, dynamics, t, q, v)
         return torque if shape is None or np.shape(torque) == shape else np.broadcast_to(torque, shape)
     except (TypeError, ValueError) as error:
+        if users_line(error):
+            raise
         raise EffectError(f"{force.name} does not fit {dynamics.n} joints and v of shape {v.shape}: {error}") from None
 
 

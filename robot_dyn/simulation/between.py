@@ -15,10 +15,11 @@ from robot_dyn.control.controller import Controller
 from robot_dyn.effects.effect import Force
 from robot_dyn.effects.joint_limit import JointStopSpring
 from robot_dyn.errors import RobotDynError
+from robot_dyn.foreign import call
 from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.record import Path
 from robot_dyn.simulation.setup import Setup
-from robot_dyn.simulation.smoothness import LOOKS, extremes, foreign
+from robot_dyn.simulation.smoothness import LOOKS, extremes, foreign, named
 
 _STANDS_OUT = 50.0  # times the change of the torque from step to step
 
@@ -75,8 +76,8 @@ def _code(motion: Motion, part: Any, path: Path, q: np.ndarray, v: np.ndarray, e
 
     def torque(t: float, q: np.ndarray, v: np.ndarray, z: np.ndarray) -> np.ndarray:
         if isinstance(part, Controller):
-            return np.asarray(part.torque(t, q, v, z), dtype=float)
-        return np.broadcast_to(np.asarray(part.torque(dynamics, t, q, v), dtype=float), (n,))
+            return np.asarray(call(part.torque, t, q, v, z), dtype=float)
+        return np.broadcast_to(np.asarray(call(part.torque, dynamics, t, q, v), dtype=float), (n,))
 
     every = max(1, len(path.t) // LOOKS)
     t, q, v, z = path.t[::every], q[::every], v[::every], path.y[::every, 2 * n : 2 * n + m]
@@ -94,7 +95,7 @@ def _code(motion: Motion, part: Any, path: Path, q: np.ndarray, v: np.ndarray, e
     around = np.abs(np.diff(ends, axis=0))
     for k in np.flatnonzero((jump > _STANDS_OUT * around + 1e-9).any(axis=1)).tolist():
         if _displacement(motion, path, path.y[:, :n], k * every, jump[k]) > error:
-            why = f"{type(part).__name__} acts between steps after t = {t[k]:g} s and not at their ends"
+            why = f"{named(part)} acts between steps after t = {t[k]:g} s and not at their ends"
             return Missed(float(t[k]), f"{why}; declare its times as `switches`")
     return None
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from robot_dyn.errors import RobotDynError
 from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.setup import Setup
-from robot_dyn.simulation.smoothness import foreign
+from robot_dyn.simulation.smoothness import foreign, named
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.machine.machine import Machine
@@ -34,7 +34,7 @@ def choose(setup: Setup, motion: Motion) -> tuple[Machine | None, str]:
     if setup.engine == "compiled":
         return _machine(setup, motion), _label(setup)
     if parts := foreign(setup):  # they may have effects of their own, which a trace would lose
-        return None, f"interpreted ({type(parts[0]).__name__} is not the library's own)"
+        return None, f"interpreted ({named(parts[0])} is not the library's own)"
     if _evaluations(setup) < _COMPILED:
         return None, "interpreted (short: compiling does not pay)"
     try:

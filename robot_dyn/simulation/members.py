@@ -44,6 +44,7 @@ MEMBERS: Mapping[str, Member] = MappingProxyType(
         "ledger/potential": Member(("m",), absent=True),
         "ledger/work/*": Member(("m",), absent=True),
         "wanted": Member(("m", "n")),
+        "controller_states": Member(("m", "z")),
         "deviation": Member(("m", ("n", 3))),
         "at_stop": Member(("m", "n"), "bool"),
         "wrenches/*": Member((None, 7)),

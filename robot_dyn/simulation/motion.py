@@ -18,6 +18,7 @@ from robot_dyn.arithmetic import Array
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.effect import Conservative, Force
 from robot_dyn.effects.plant import Plant, bounded
+from robot_dyn.foreign import call
 from robot_dyn.model.dynamics import acceleration
 
 CONTROL = "control"
@@ -84,6 +85,11 @@ class Motion:
         v = acceleration(self.plant.M(q), second, self.plant.dynamics.joint_names) if self.canonical else second
         return q, v, y[2 * n : 2 * n + m], y[2 * n + m :]
 
+    def controller_states(self, y: Array) -> Array | None:
+        """Controller states in states y (k, m), (k, memory_size); None without any."""
+        n, m = self.plant.dynamics.n, self.memory_size
+        return y[:, 2 * n : 2 * n + m].copy() if m else None
+
     def velocities(self, y: Array) -> Array:
         """V of states y (k, m), (k, n)."""
         n = self.plant.dynamics.n
@@ -93,7 +99,7 @@ class Motion:
         """The actuation that the controller asks for, within the bounds of the plant."""
         if self.controller is None:
             return np.zeros_like(v)
-        return bounded(self.plant.effects, self.controller.torque(t, q, v, z))
+        return bounded(self.plant.effects, call(self.controller.torque, t, q, v, z))
 
     @property
     def sampled(self) -> bool:
@@ -108,7 +114,7 @@ class Motion:
         held, n = self.command(t, q, v, z), self.plant.dynamics.n
         if self.memory_size:
             y = y.copy()
-            y[2 * n : 2 * n + self.memory_size] = self.controller.next_memory(t, q, v, z)
+            y[2 * n : 2 * n + self.memory_size] = call(self.controller.next_memory, t, q, v, z)
         return y, held
 
     def rate(self, t: float, y: Array, held: Array | None) -> tuple[Array, Array]:
@@ -123,7 +129,7 @@ class Motion:
         n = dynamics.n
         q, v, z, _ = self.state(y)
         u = self.command(t, q, v, z) if held is None else held
-        torques = [force.torque(dynamics, t, q, v) for force in forces]
+        torques = [call(force.torque, dynamics, t, q, v) for force in forces]
         tau = sum(torques, start=u)
         result = np.empty_like(y)
         result[:n] = v
@@ -133,7 +139,7 @@ class Motion:
             result[n : 2 * n] = dynamics.forward_dynamics(q, v, tau)
         end = 2 * n + self.memory_size
         remembers = held is None and controller is not None and self.memory_size > 0
-        result[2 * n : end] = controller.memory_rate(t, q, v, z) if remembers and controller else 0.0
+        result[2 * n : end] = call(controller.memory_rate, t, q, v, z) if remembers and controller else 0.0
         working = [x for x, force in zip(torques, forces, strict=True) if not isinstance(force, Conservative)]
         result[end:] = [x @ v for x in (u, *working)]
         return result, u
@@ -144,9 +150,9 @@ class Motion:
         potential = dynamics.potential_energy(q)
         for force in self.plant.forces:
             if isinstance(force, Conservative):
-                potential = potential + force.potential(dynamics, t, q)
+                potential = potential + call(force.potential, dynamics, t, q)
         return dynamics.kinetic_energy(q, v), potential
 
     def powers(self, t: float, q: Array, v: Array, u: Array) -> list[float]:
         """Power of the control and of the effects that work, in the order of `sources`."""
-        return [u @ v, *(force.torque(self.plant.dynamics, t, q, v) @ v for force in self.working)]
+        return [u @ v, *(call(force.torque, self.plant.dynamics, t, q, v) @ v for force in self.working)]

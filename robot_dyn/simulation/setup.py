@@ -6,14 +6,16 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf
-from typing import final
+from typing import Any, final
 
 import numpy as np
 
 from robot_dyn.arithmetic import Array, Ball
+from robot_dyn.control.control_law import ControlLaw
 from robot_dyn.control.controller import ControlError, Controller
 from robot_dyn.effects.plant import Plant, torque_of
 from robot_dyn.errors import EffectError, OverflowedError, QueryError
+from robot_dyn.foreign import call
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.integrate.explicit import RK4
 from robot_dyn.integrate.integrator import Integrator
@@ -36,7 +38,7 @@ class Setup:
         q0: Position at the start, (n,).
         v0: Velocity at the start, (n,); 0 if not given.
         duration_s: In [s].
-        controller: What drives it, or None.
+        controller: What drives it: a `Controller`; a function (t, q, v) → torque (n,), which is made one; or None.
         integrator: A method of fixed step, or an `Adaptive` one.
         step_s: Fixed step; made smaller where samples, ticks, switches and the end ask for it. Not to be given
             for an Adaptive method.
@@ -52,7 +54,7 @@ class Setup:
     q0: Array
     v0: Array = None
     duration_s: float = 1.0
-    controller: Controller | None = None
+    controller: Any = None
     integrator: Integrator | Adaptive = RK4
     step_s: float = 1e-3
     record_period_s: float = 0.0
@@ -83,7 +85,14 @@ class Setup:
         if self.integrator.controls_error and self.step_s != Setup.step_s:
             raise QueryError("step_s has no effect on an Adaptive method; leave it out, or give Adaptive(max_step=…)")
         choice("engine", self.engine, ENGINES)
-        instance("controller", self.controller, Controller | None, "give one, such as rd.PD(…), or None")
+        if callable(self.controller) and not isinstance(self.controller, Controller | type):
+            object.__setattr__(self, "controller", ControlLaw(self.controller, len(names)))
+        instance(
+            "controller",
+            self.controller,
+            Controller | None,
+            "give one, such as rd.PD(…), a function of (t, q, v), or None",
+        )
         if self.controller is not None:
             duration("period_s of the controller", self.controller.period_s, zero=True)
             if self.controller.n != len(names):
@@ -106,8 +115,13 @@ class Setup:
         if controller is None:
             return
         with np.errstate(all="ignore"), suppress(OverflowedError):  # of its model: the outcome of a run
-            torque = controller.torque(0.0, self.q0, self.v0, np.zeros(controller.memory_size))
-            returned(f"{type(controller).__name__}.torque", torque, dynamics.n, error=ControlError)
+            start = 0.0, self.q0, self.v0, np.zeros(controller.memory_size)
+            torque = call(controller.torque, *start)
+            returned(f"{controller.name}.torque", torque, dynamics.n, error=ControlError)
+            if controller.memory_size:
+                after = controller.next_memory if controller.period_s else controller.memory_rate
+                made = f"{controller.name}.{after.__name__}"
+                returned(made, call(after, *start), controller.memory_size, "state", error=ControlError)
 
     def _check_model(self) -> None:
         """That the controller means the joints and links of the plant; a file with other names all over may fit too."""

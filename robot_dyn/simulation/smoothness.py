@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from robot_dyn.control.control_law import ControlLaw
+from robot_dyn.control.controller import Controller
 from robot_dyn.effects.actuator import EffortLimit
 from robot_dyn.effects.friction import RegularisedCoulombFriction
 from robot_dyn.effects.joint_limit import JointStopDamper, JointStopSpring
@@ -31,9 +33,16 @@ def foreign(setup: Setup) -> tuple[Any, ...]:
     """The parts of a setup that are not of this library's classes."""
     parts = (setup.plant.dynamics, *setup.plant.effects, setup.controller, setup.integrator)
     model = getattr(setup.controller, "model", None)
-    return tuple(
-        part for part in (*parts, model) if part is not None and not type(part).__module__.startswith("robot_dyn.")
-    )
+    return tuple(part for part in (*parts, model) if part is not None and _is_foreign(part))
+
+
+def _is_foreign(part: Any) -> bool:
+    return isinstance(part, ControlLaw) or not type(part).__module__.startswith("robot_dyn.")
+
+
+def named(part: Any) -> str:
+    """Its name for people: that of its class, or of the function that it is."""
+    return part.name if isinstance(part, Controller) else type(part).__name__
 
 
 def looked_s(setup: Setup) -> float:
@@ -59,7 +68,7 @@ def first_kink(setup: Setup, motion: Motion, path: Path) -> tuple[float, str]:
     if parts := foreign(setup):
         return (
             0.0,
-            f"{type(parts[0]).__name__} may switch, and what is shorter than {looked_s(setup):.1g} s is not seen",
+            f"{named(parts[0])} may switch, and what is shorter than {looked_s(setup):.1g} s is not seen",
         )
     if len(path.t) < 2:
         return np.inf, ""

@@ -97,6 +97,8 @@ class Trajectory:
         remarks: What was seen at every step that the samples need not show.
         extremes: The least and the largest of q, v and tau over all steps, (3, 2, n); None if it was not watched.
         acting: What acted, in words: gravity, payloads, effects, limits, control; None if it is not known.
+        controller_states: z of the controller, (m, z), of a sampled one after its tick; None if it has none, or they
+            were not recorded.
     """
 
     joint_names: tuple[str, ...]
@@ -118,6 +120,7 @@ class Trajectory:
     remarks: tuple[Remark, ...] = ()
     extremes: np.ndarray | None = None
     acting: tuple[str, ...] | None = None
+    controller_states: np.ndarray | None = None
 
     @property
     def tracking_error(self) -> float | None:

@@ -16,7 +16,7 @@ from robot_dyn.arithmetic import Array
 from robot_dyn.compiled.symbolic import Symbols, TraceError, every_branch
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.effect import Active, Bound, Conservative
-from robot_dyn.errors import RobotDynError
+from robot_dyn.foreign import because
 
 REMEDY = "write it in robot_dyn.arithmetic and NumPy's operators, or take engine='interpreted'"
 
@@ -40,8 +40,8 @@ def _followed(name: str, function: Callable[[], Any]) -> Any:
     """What a part gives, whichever way its comparisons turn out; TraceError names the part."""
     try:
         return every_branch(function).view(Symbols)
-    except (TypeError, ValueError, AttributeError, IndexError, RobotDynError) as error:
-        raise TraceError(f"{name} cannot be compiled ({error}): {REMEDY}") from None
+    except Exception as error:  # whatever a user's code raises on symbols
+        raise TraceError(f"{name} cannot be compiled ({because(error)}): {REMEDY}") from error
 
 
 @final
@@ -123,4 +123,4 @@ class TracedController(Controller):
         return self._traced(lambda: self.inner.next_memory(t, q, v, z), self.memory_size)
 
     def _traced(self, function: Callable[[], Any], length: int) -> Array:
-        return _followed(f"controller {type(self.original).__name__}", lambda: wide(function(), length))
+        return _followed(f"controller {self.original.name}", lambda: wide(function(), length))
