@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import ast
 import os
 import re
 import shlex
 import subprocess
 import sys
-from itertools import takewhile
 from pathlib import Path
 
 import pytest
 
 from tests.browser import chromium
+from tests.printed import check_prints
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
@@ -43,19 +42,11 @@ def test_readme_has_blocks_to_run() -> None:
 
 
 def test_python_of_the_readme_prints_what_it_says(capsys) -> None:
-    """One after the other in one session; comments `# → text` state the first lines that the statement above prints."""
-    names: dict[str, object] = {}
-    held = 0
-    for block in PYTHON:
-        lines = block.splitlines()
-        for statement in ast.parse(block).body:
-            exec(compile(ast.Module([statement], []), "README.md", "exec"), names)
-            printed = capsys.readouterr().out.splitlines()
-            after = takewhile(lambda line: line.startswith("# → "), lines[statement.end_lineno :])
-            expected = [line.removeprefix("# → ") for line in after]
-            assert printed[: len(expected)] == expected
-            held += len(expected)
-    assert held == sum(block.count("# →") for block in PYTHON) > 8  # none stands where it is not looked for
+    assert check_prints(ROOT / "README.md", capsys) > 8
+
+
+def test_python_of_the_page_on_extending_prints_what_it_says(capsys) -> None:
+    assert check_prints(ROOT / "docs" / "extending.md", capsys) > 8
 
 
 def test_no_block_of_the_readme_says_no_more_than_true() -> None:

@@ -208,7 +208,8 @@ def _traced(effect: Any, function: Callable[[], Any]) -> np.ndarray:
         return made
     except Exception as error:  # whatever a user's code raises on symbols
         raise TraceError(
-            f"effect {effect.name} cannot be traced ({because(error)}); write it in robot_dyn.arithmetic, or run it interpreted"
+            f"effect {effect.name} cannot be traced ({because(error)}); write it in robot_dyn.arithmetic, or run it"
+            " interpreted"
         ) from error
 
 

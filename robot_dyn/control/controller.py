@@ -1,7 +1,8 @@
 """What a controller is: τ = τ(t, q, v, z), with states ż = rate(t, q, v, z) where it needs some.
 
-The controller states z are states like q and v: a continuous controller (`period_s` 0) has them integrated with the plant, a sampled
-one takes z⁺ = z + period · rate at its ticks and holds its torque between them. [Siciliano et al. 2009, ch. 8]
+The controller states z are states like q and v: a continuous controller (`period_s` 0) has them integrated with the
+plant, a sampled one takes z⁺ = z + period · rate at its ticks and holds its torque between them.
+[Siciliano et al. 2009, ch. 8]
 """
 
 from __future__ import annotations

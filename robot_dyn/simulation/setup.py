@@ -85,19 +85,7 @@ class Setup:
         if self.integrator.controls_error and self.step_s != Setup.step_s:
             raise QueryError("step_s has no effect on an Adaptive method; leave it out, or give Adaptive(max_step=…)")
         choice("engine", self.engine, ENGINES)
-        if callable(self.controller) and not isinstance(self.controller, Controller | type):
-            object.__setattr__(self, "controller", ControlLaw(self.controller, len(names)))
-        instance(
-            "controller",
-            self.controller,
-            Controller | None,
-            "give one, such as rd.PD(…), a function of (t, q, v), or None",
-        )
-        if self.controller is not None:
-            duration("period_s of the controller", self.controller.period_s, zero=True)
-            if self.controller.n != len(names):
-                raise QueryError(f"the controller drives {self.controller.n} joints, the plant has {len(names)}")
-            integer("memory_size of the controller", self.controller.memory_size)
+        object.__setattr__(self, "controller", _controller(self.controller, len(names)))
         self._check_model()
         check_segments(self)
         self._check_torques()
@@ -178,3 +166,17 @@ class Setup:
         error control does not see what no stage meets. A fixed step is the user's.
         """
         return min(_LONGEST_STEP_S, self.duration_s / _LEAST_STEPS) if may_switch(self) else inf
+
+
+def _controller(given: Any, n: int) -> Controller | None:
+    """The controller of n joints that is meant; QueryError if there is none."""
+    made: Any = given
+    if callable(given) and not isinstance(given, Controller) and not isinstance(given, type):
+        made = ControlLaw(given, n)
+    instance("controller", made, Controller | None, "give one, such as rd.PD(…), a function of (t, q, v), or None")
+    if made is not None:
+        duration("period_s of the controller", made.period_s, zero=True)
+        if made.n != n:
+            raise QueryError(f"the controller drives {made.n} joints, the plant has {n}")
+        integer("memory_size of the controller", made.memory_size)
+    return made
