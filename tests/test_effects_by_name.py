@@ -7,7 +7,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.errors import EffectError
-from robot_dyn.scene.explain import kinds
+from robot_dyn.scene.effects import kinds
 
 ROBOT = rd.load("cart_pole")
 

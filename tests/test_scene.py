@@ -7,7 +7,8 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.errors import SceneError
-from robot_dyn.scene.explain import explain, kinds
+from robot_dyn.scene.effects import kinds
+from robot_dyn.scene.explain import explain
 from robot_dyn.scene.scene import parse_scene, read_both
 from robot_dyn.scene.starters import starter, starters
 

@@ -10,7 +10,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.errors import SceneError
 from robot_dyn.scene import control, effects, scene
-from robot_dyn.scene.explain import kinds
+from robot_dyn.scene.effects import kinds
 from robot_dyn.scene.manual import manual
 from robot_dyn.scene.schema import Part
 from robot_dyn.scene.starters import starter, starters

@@ -12,7 +12,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.compiled.symbolic import TraceError
 from robot_dyn.control.controller import ControlError
-from robot_dyn.errors import EffectError, QueryError
+from robot_dyn.errors import EffectError, QueryError, SceneError
 from robot_dyn.simulation.table import export_csv
 
 ARM = rd.load("planar_2r")
@@ -247,3 +247,49 @@ def test_interfaces_state_their_contract(kind: type) -> None:
     said = "\n".join(each.__doc__ or "" for each in kind.__mro__ if each.__module__.startswith("robot_dyn"))
     assert kind.__name__ in rd.__all__
     assert all(word in said for word in ("t: time", "q: position", "v: velocity", "in [s]", "[rad/s]", "symbols"))
+
+
+class Drag(rd.Dissipative):
+    """τ = −c |v| v."""
+
+    def __init__(self, c: Any, on: bool = True) -> None:
+        self.c, self.on_ = c, on
+
+    def torque(self, dynamics, t, q, v):
+        return -self.c * abs(v) * v if self.on_ else 0 * v
+
+
+SCENE = 'robot = "planar_2r"\nduration_s = 0.1\n[start]\nq = [0.4, -0.7]\nv = [0.3, 0.9]\n'
+
+
+@pytest.mark.parametrize(
+    ("keys", "c"),
+    [("c = 2", 2.0), ("c = [2.0, 3]", np.array([2.0, 3.0])), ("c = {joint_2 = 3.0}", np.array([0.0, 3.0]))],
+)
+def test_a_scene_names_effects_that_its_reader_names(keys: str, c: Any, tmp_path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(f'{SCENE}[[effect]]\nkind = "gravity"\n[[effect]]\nkind = "drag"\n{keys}\n', encoding="utf-8")
+    own = rd.read_scene(path, effects={"drag": Drag})
+    setup = rd.Setup(rd.Plant(ARM, [Drag(c)]), Q, V, 0.1, integrator=rd.Adaptive(rtol=1e-10, atol=1e-12))
+    expected = rd.simulate(setup, record_period_s=0.01, engine="interpreted")
+    assert np.array_equal(rd.simulate(own).q, expected.q)
+    with pytest.raises(SceneError, match=r"line 8: effect 2 \(drag\): kind: no kind 'drag'"):
+        rd.read_scene(path)
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ("", r"line 6: effect 1 \(drag\): drag: missing a required argument: 'c'; keys: c, on"),
+        ("c = 1.0\nd = 2.0", "unexpected keyword argument 'd'"),
+        ("c = inf", "c must be"),
+        ("c = {elbow = 1.0}", "elbow"),
+    ],
+)
+def test_wrong_keys_of_an_effect_of_a_users_own_are_told(keys: str, said: str, tmp_path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(f'{SCENE}[[effect]]\nkind = "drag"\n{keys}\n', encoding="utf-8")
+    with pytest.raises(SceneError, match=said):
+        rd.read_scene(path, effects={"drag": Drag})
+    with pytest.raises(SceneError, match="'spring' is a kind that scenes have"):
+        rd.read_scene(path, effects={"spring": Drag})

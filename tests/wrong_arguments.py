@@ -194,7 +194,7 @@ def examples(folder: Path) -> dict[str, Example]:
             rd.quintic,
             {"q0": q, "q1": v, "duration": 1.0, "start": 0.1, "v0": 0.1, "v1": u, "a0": u, "a1": 0.0},
         ),
-        "read_scene": (rd.read_scene, {"path": scene}),
+        "read_scene": (rd.read_scene, {"path": scene, "effects": {"own": rd.Spring}}),
         "replay": (
             rd.replay, {"run": run, "package_dirs": [folder], "frame": "pole", "inertia": True, "port": free_port()},
         ),

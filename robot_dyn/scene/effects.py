@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import inf
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 from pydantic import Field
 
@@ -178,3 +178,10 @@ class Effort(Part):
 Edit = Gravity | Lock | Load | Armature
 Acting = Viscous | RegularisedCoulomb | JointSpring | JointStops | Wrench | Effort
 AnyEffect = Annotated[Edit | Acting, Field(discriminator="kind")]
+
+
+def kinds() -> tuple[str, ...]:
+    """All kinds of effects that a scene can name."""
+    return tuple(
+        str(get_args(part.model_fields["kind"].annotation)[0]) for part in (*get_args(Edit), *get_args(Acting))
+    )

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import RobotDynError
 from robot_dyn.scene.control import LAWS, Control
-from robot_dyn.scene.effects import Acting, Edit
 from robot_dyn.scene.scene import ADAPTIVE, Scene
 from robot_dyn.scene.schema import Part
 from robot_dyn.simulation.setup import Setup
@@ -79,13 +78,6 @@ def _machine_code(plant: Plant) -> Iterator[str]:
     whole = which.counts[which.formulation]
     parts = ", ".join(f"{name} {count}" for name, count in by_effect.items()) or "none"
     yield f"\nmachine code of the acceleration, by the {which.formulation}: {whole} instructions; of effects: {parts}"
-
-
-def kinds() -> tuple[str, ...]:
-    """All kinds of effects that a scene can name."""
-    return tuple(
-        str(get_args(part.model_fields["kind"].annotation)[0]) for part in (*get_args(Edit), *get_args(Acting))
-    )
 
 
 def _numbers(part: Part, indent: str) -> Iterator[str]:

@@ -6,9 +6,9 @@ import os
 import re
 import tomllib
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import ValidationError
+from pydantic import ValidationError, WrapValidator
 
 from robot_dyn.effects.effect import Effect
 from robot_dyn.effects.plant import Plant
@@ -22,7 +22,8 @@ from robot_dyn.model.robot import Robot
 from robot_dyn.reading import read
 from robot_dyn.scene.complaint import complaint, located, where
 from robot_dyn.scene.control import AnyReference, Control, Hold, Sampled
-from robot_dyn.scene.effects import Acting, AnyEffect, Edit
+from robot_dyn.scene.effects import Acting, AnyEffect, Edit, kinds
+from robot_dyn.scene.own_effects import Makers, OwnEffect, check_makers, own_or
 from robot_dyn.scene.schema import NotNegative, Part, PerJoint, PlacedError, Positive, Truth, per_joint, placed
 from robot_dyn.simulation.setup import Setup
 
@@ -63,7 +64,7 @@ class Scene(Part):
     """Which loop runs; "auto" compiles where that pays."""
     start: Start = Start()
     """The state at the start."""
-    effect: tuple[AnyEffect, ...] = ()
+    effect: tuple[Annotated[AnyEffect, WrapValidator(own_or)], ...] = ()
     """What acts, gravity included; nothing by default."""
     control: Control | None = None
     """What drives the joints; nothing by default."""
@@ -85,7 +86,7 @@ class Scene(Part):
                     robot = effect.edit(robot)
         acting: list[Effect] = []
         for k, effect in enumerate(self.effect):
-            if isinstance(effect, Acting):
+            if isinstance(effect, Acting | OwnEffect):
                 with placed("effect", k):
                     acting += effect.build(robot)
         with placed("start"):
@@ -107,23 +108,28 @@ class Scene(Part):
         return method(self.method)
 
 
-def read_scene(path: str | Path) -> Setup:
+def read_scene(path: str | Path, *, effects: Makers | None = None) -> Setup:
     """The setup of a scene file.
+
+    Args:
+        path: Of the file.
+        effects: Effects of your own that it may name: a class, or a function that returns an effect, by its kind. The
+            keys of such a table are its arguments: numbers, arrays from lists, arrays (n,) from tables by joint.
 
     Raises:
         SceneError: If the file cannot be read, or a key or value of it is not allowed.
     """
-    return read_both(path)[1]
+    return read_both(path, {} if effects is None else check_makers(effects, set(kinds())))[1]
 
 
-def read_both(path: str | Path) -> tuple[Scene, Setup]:
+def read_both(path: str | Path, effects: Makers | None = None) -> tuple[Scene, Setup]:
     """A scene file as it is written, and the setup it describes; SceneError as `read_scene`."""
     data = read(path, MAX_BYTES, SceneError, "see robot-dyn scene for one to start from")
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError:
         raise SceneError(f"{path}: is not UTF-8 text; save it as TOML in UTF-8") from None
-    scene, table = _parsed(text, str(path))
+    scene, table = _parsed(text, str(path), effects)
     try:
         return scene, scene.setup(Path(path).parent, {"scene": text})
     except PlacedError as error:
@@ -142,13 +148,13 @@ def parse_scene(text: str, source: str) -> Scene:
     return _parsed(text, source)[0]
 
 
-def _parsed(text: str, source: str) -> tuple[Scene, dict[str, Any]]:
+def _parsed(text: str, source: str, effects: Makers | None = None) -> tuple[Scene, dict[str, Any]]:
     try:
         table = tomllib.loads(text.removeprefix("\ufeff"))  # the mark of some editors for UTF-8
     except (ValueError, RecursionError) as error:
         raise SceneError(f"{source}: {_syntax(error)}; correct the file") from None
     try:
-        scene = Scene.model_validate(table)
+        scene = Scene.model_validate(table, context=dict(effects or {}))
     except ValidationError as error:
         raise SceneError(f"{source}: {complaint(error, table, text, Scene)}") from None
     if scene.control is None and "reference" in scene.model_fields_set:
