@@ -34,7 +34,8 @@ FOR_LOOPS = {name for kind in (Force, Conservative, Bound, Controller, Arithmeti
 FOR_LOOPS |= {"task_acceleration"}
 LAX = {  # arguments that may be infinite or unknown, or of any shape
     "ExternalWrench.acts": {"t"},
-    "Adaptive": {"max_step"}, "EffortLimit": {"limit"}, "ExternalWrench": {"start_s", "end_s"},
+    "Adaptive": {"max_step"}, "Adaptive.with_tolerances": {"longest"},
+    "EffortLimit": {"limit"}, "ExternalWrench": {"start_s", "end_s"},
     "JointStopDamper": {"lower", "upper"}, "JointStopSpring": {"lower", "upper"}, "PID": {"effort_limit"},
     "PiecewisePolynomial.at": {"t"}, "Samples.at": {"t"},
     "Rollouts.outcome": {"run"}, "Robot.with_": {"lock", "armature"},
@@ -101,6 +102,7 @@ def examples(folder: Path) -> dict[str, Example]:
         "Adaptive": (rd.Adaptive, {"method": "Radau", "rtol": 1e-8, "atol": 1e-9, "max_step": 0.5}),
         "Adaptive.solve": (adaptive.solve, {"system": system, "t0": 0.0, "y0": q, "t1": 1.0, "stop": lambda t, y: 1.0}),
         "Adaptive.steps": (adaptive.steps, {"system": system, "t0": 0.0, "y0": q, "t1": 1.0, "stop": lambda t, y: 1.0}),
+        "Adaptive.with_tolerances": (adaptive.with_tolerances, {"factor": 10.0, "longest": 0.5}),
         "Ball": (rd.Ball, {"bits": 53}),
         "Compiled": (rd.Compiled, {"robot_or_plant": robot, "dtype": "float64", "threads": 1, "cache": False}),
         "ComputedTorque": (rd.ComputedTorque, pair),

@@ -106,6 +106,7 @@ class Adaptive:
 
     def with_tolerances(self, factor: float, longest: float) -> Adaptive:
         """The same with tolerances times a factor, and steps of at most `longest`."""
+        factor = number("factor", factor, above=0)
         return replace(self, rtol=self.rtol * factor, atol=self.atol * factor, max_step=longest)
 
     def __post_init__(self) -> None:
