@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -190,6 +190,27 @@ def test_a_record_that_hides_an_oscillation_is_said(joint, per_turn: int, said: 
         assert np.ptp(run.q) < 1e-3
         assert run.remarks[0].quantity in ("q", "v")
         assert run.extremes[0, 0, 0] == pytest.approx(-0.4, abs=1e-3)
+
+
+@dataclass(frozen=True, eq=False)
+class Push(rd.Dissipative):
+    """A torque along the velocity, declared against it."""
+
+    damping: float
+
+    def torque(self, dynamics, t, q, v):
+        return -self.damping * v
+
+
+@pytest.mark.parametrize("damping", [0.2, 0.0, -0.2])
+def test_an_effect_declared_dissipative_that_does_work_is_said(joint, damping: float) -> None:
+    """P = τᵀ v = −b v² is positive for b < 0; v = v₀ exp(−b t / I), so the largest is at the end."""
+    run = rd.simulate(rd.Plant(joint, [Push(damping)]), q0=[0.2], v0=[1.5], duration_s=0.5)
+    said = [remark for remark in run.remarks if remark.kind is Kind.GAINS]
+    assert bool(said) == (damping < 0)
+    if said:
+        assert said[0].value == pytest.approx(-damping * (1.5 * np.exp(-damping * 0.5 / INERTIA)) ** 2, rel=1e-6)
+        assert "a dissipative effect does positive work: push" in run.summary
 
 
 def test_memory_does_not_grow_with_the_run() -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from robot_dyn.effects.effect import Dissipative
 from robot_dyn.errors import RobotDynError
 from robot_dyn.model.robot import Robot
 from robot_dyn.model.units import unit
@@ -32,7 +33,9 @@ def observer_of(setup: Setup, motion: Motion) -> Observer:
     return Observer(start, levels(setup.plant, setup.controller), motion.canonical)
 
 
-def remarks(setup: Setup, observer: Observer, t: np.ndarray, samples: np.ndarray) -> tuple[Remark, ...]:
+def remarks(
+    setup: Setup, observer: Observer, t: np.ndarray, samples: np.ndarray, power: dict[str, np.ndarray]
+) -> tuple[Remark, ...]:
     """All remarks on a run, chatter first.
 
     Args:
@@ -40,13 +43,28 @@ def remarks(setup: Setup, observer: Observer, t: np.ndarray, samples: np.ndarray
         observer: Closed, at the end of the run.
         t: Times of its samples, (m,), in [s].
         samples: q, v and tau beside each other, (m, 3n).
+        power: Of each source, (m,), in [W].
     """
     units = _units(setup)
     found = [*_chatter(setup, observer, t, samples, units)]
     for kind in (Kind.EFFORT_REACHED, Kind.STOP_REACHED, Kind.BEYOND):
         visits = {level: visit for level, visit in observer.visits.items() if level.kind is kind}
         found += _passed(setup, visits, units)
-    return (*found, *_coarse(setup, observer, t, samples, units))
+    return (*found, *_coarse(setup, observer, t, samples, units), *_gaining(setup, t, power))
+
+
+def _gaining(setup: Setup, t: np.ndarray, power: dict[str, np.ndarray]) -> Iterator[Remark]:
+    """Effects declared dissipative with τᵀv > 0 at a sample, by more than rounding."""
+    declared = {effect.name for effect in setup.plant.effects if isinstance(effect, Dissipative)}
+    for name, P in power.items():
+        if name.partition(" ")[0] not in declared or not (np.nan_to_num(P) > _ROUNDING * np.nanmax(np.abs(P))).any():
+            continue
+        at = int(np.nanargmax(P))
+        text = f"{name} {P[at]:.4g} W at {t[at]:.4g} s"
+        yield Remark(
+            Kind.GAINS, name, "power", float(t[at]), 0.0, float(t[at]), float(P[at]), 0.0, text,
+            "declare it Active, or see to the sign of its torque",
+        )  # fmt: skip
 
 
 def _units(setup: Setup) -> list[tuple[str, str, str]]:

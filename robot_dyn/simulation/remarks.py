@@ -1,6 +1,7 @@
 """Remarks on a run: what its samples need not show, seen at the end of every step.
 
-chatter · an effort limit or a stop reached · beyond a limit that the file states · a record coarser than the motion
+chatter · an effort limit or a stop reached · beyond a limit that the file states · a record coarser than the motion ·
+an effect declared dissipative that does positive work
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ class Kind(StrEnum):
     STOP_REACHED = "joint_stop_reached"
     BEYOND = "beyond_limit_of_file"
     COARSE = "record_too_coarse"
+    GAINS = "dissipative_effect_gains"
 
 
 _HEADINGS = {
@@ -29,6 +31,7 @@ _HEADINGS = {
     Kind.STOP_REACHED: "joint stop reached",
     Kind.BEYOND: "beyond the file's limits",
     Kind.COARSE: "record too coarse",
+    Kind.GAINS: "a dissipative effect does positive work",
 }
 
 
@@ -39,8 +42,8 @@ class Remark:
 
     Attributes:
         kind: What it is about.
-        joint: Name of the joint.
-        quantity: "q", "v" or "tau", of which value and limit are.
+        joint: Name of the joint; of the effect, if it is about one.
+        quantity: "q", "v", "tau" or "power", of which value and limit are.
         start: When it began, in [s].
         duration: How long it lasted in all, in [s].
         at: When the value was reached, in [s].

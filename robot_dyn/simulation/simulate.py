@@ -145,7 +145,7 @@ def _trajectory(
     return Trajectory(
         names, t, q, v, a, tau, power, ledger, wanted, deviation, record.outcome, statistics, error, about,
         wrenches(plant, t, q), at_stop(plant, q),
-        remarks(setup, observer, t, np.hstack([q, v, tau])), observer.extremes, acting(setup),
+        remarks(setup, observer, t, np.hstack([q, v, tau]), power), observer.extremes, acting(setup),
         motion.controller_states(record.y),
     )  # fmt: skip
 
