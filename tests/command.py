@@ -8,7 +8,8 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -22,6 +23,17 @@ def spawn(*args: str | Path, code: str = MAIN, **environment: str) -> Done[bytes
     """The command in a process of its own, its output in pipes."""
     command = [sys.executable, "-c", code, *map(str, args)]
     return subprocess.run(command, capture_output=True, timeout=60, env=os.environ | environment)
+
+
+@contextmanager
+def started(*args: str | Path, code: str = MAIN) -> Iterator[subprocess.Popen[str]]:
+    """The command at work in a process of its own, which ends with the block, whatever happens there."""
+    command = [sys.executable, "-c", code, *map(str, args)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, encoding="utf-8") as process:
+        try:
+            yield process
+        finally:
+            process.kill()
 
 
 def run(*args: str | Path) -> Done[str]:

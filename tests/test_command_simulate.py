@@ -14,7 +14,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.scene.starters import starter, starters
-from tests.command import refusal
+from tests.command import refusal, started
 
 COMMAND = [sys.executable, "-c", "from robot_dyn.cli import main; main()"]
 DOCUMENT = (Path(__file__).parents[1] / "docs" / "json.md").read_text(encoding="utf-8")
@@ -169,12 +169,11 @@ def test_ctrl_c_ends_a_run_and_keeps_it(scene, tmp_path) -> None:
     text = starter("ur5_circle").replace("3.0", "3000.0", 1).replace("duration_s", 'method = "rk4"\nduration_s', 1)
     scene.write_text(text + "turns = 1000.0\n")  # it would run for hours
     output = tmp_path / "run.npz"
-    command = [sys.executable, "-c", WATCHED, "simulate", str(scene), "-o", str(output)]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    assert process.stderr is not None
-    assert process.stderr.readline() == "at work\n"
-    process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=60)
+    with started("simulate", scene, "-o", output, code=WATCHED) as process:
+        assert process.stderr is not None
+        assert process.stderr.readline() == "at work\n"
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
     assert process.returncode == 130, err
     assert "stopped at t = " in out
     assert "Traceback" not in err

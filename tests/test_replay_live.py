@@ -6,8 +6,6 @@ import json
 import os
 import signal
 import socket
-import subprocess
-import sys
 import urllib.error
 import urllib.request
 from urllib.parse import urlparse
@@ -17,7 +15,7 @@ import pytest
 
 import robot_dyn as rd
 from tests.browser import opened, until
-from tests.command import MAIN, run
+from tests.command import run, started
 
 
 @pytest.fixture(scope="module")
@@ -108,14 +106,12 @@ def test_two_replays_stand_side_by_side(swing) -> None:
 def test_the_command_serves_until_interrupted(swing, tmp_path) -> None:
     """It says where, serves, and Ctrl-C ends it with exit code 0, a free port and nothing on stderr."""
     file = rd.save_run(swing, tmp_path / "run.npz")
-    command = subprocess.Popen(
-        [sys.executable, "-c", MAIN, "replay", file], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
-    assert command.stdout is not None
-    url = command.stdout.readline().split()[0]
-    assert b"meshcat" in urllib.request.urlopen(url, timeout=10).read().lower()
-    command.send_signal(signal.SIGINT)
-    _, errors = command.communicate(timeout=20)
+    with started("replay", file) as command:
+        assert command.stdout is not None
+        url = command.stdout.readline().split()[0]
+        assert b"meshcat" in urllib.request.urlopen(url, timeout=10).read().lower()
+        command.send_signal(signal.SIGINT)
+        _, errors = command.communicate(timeout=20)
     assert (command.returncode, errors) == (0, "")
     assert refused("127.0.0.1", urlparse(url).port)
 

@@ -6,8 +6,6 @@ import asyncio
 import io
 import signal
 import socket
-import subprocess
-import sys
 import urllib.error
 import urllib.request
 from concurrent.futures import ThreadPoolExecutor
@@ -21,7 +19,7 @@ import zmq
 import robot_dyn as rd
 from robot_dyn.view.bridge import Scene
 from tests.browser import opened, until
-from tests.command import MAIN
+from tests.command import started
 
 JUNK = [
     [b""],
@@ -143,20 +141,19 @@ def test_the_root_leads_to_the_page_and_nothing_else_is_there(swing) -> None:
 def test_nothing_of_it_reaches_the_terminal(swing, tmp_path) -> None:
     """All of the above, and raw bytes, at the command: its stderr stays empty, and Ctrl-C ends it."""
     file = rd.save_run(swing, tmp_path / "run.npz")
-    command = subprocess.Popen(
-        [sys.executable, "-c", MAIN, "replay", file], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
-    assert command.stdout is not None
-    url = command.stdout.readline().split()[0]
-    junk_over_the_socket(url)
-    for head in (b"GET / HTTP/1.1\r\nHost: x\r\n\r\n", b"\x00\xff\r\n\r\n", b"POST /static/ HTTP/9\r\n\r\n", b"GET"):
-        with socket.create_connection(("127.0.0.1", urlparse(url).port or 0), timeout=10) as raw:
-            raw.sendall(head)
-            raw.shutdown(socket.SHUT_WR)
-            raw.recv(100)
-    assert urllib.request.urlopen(url, timeout=10).status == 200
-    command.send_signal(signal.SIGINT)
-    _, errors = command.communicate(timeout=20)
+    heads = (b"GET / HTTP/1.1\r\nHost: x\r\n\r\n", b"\x00\xff\r\n\r\n", b"POST /static/ HTTP/9\r\n\r\n", b"GET")
+    with started("replay", file) as command:
+        assert command.stdout is not None
+        url = command.stdout.readline().split()[0]
+        junk_over_the_socket(url)
+        for head in heads:
+            with socket.create_connection(("127.0.0.1", urlparse(url).port or 0), timeout=10) as raw:
+                raw.sendall(head)
+                raw.shutdown(socket.SHUT_WR)
+                raw.recv(100)
+        assert urllib.request.urlopen(url, timeout=10).status == 200
+        command.send_signal(signal.SIGINT)
+        _, errors = command.communicate(timeout=20)
     assert (command.returncode, errors) == (0, "")
 
 
