@@ -8,7 +8,7 @@ from pathlib import Path
 from traceback import walk_tb
 from typing import Any
 
-from robot_dyn.errors import RobotDynError
+from robot_dyn.errors import NotFiniteError, OverflowedError, QueryError, RobotDynError
 
 _NOT_A_USERS = {"robot_dyn", "numpy", "scipy", "casadi", *sys.stdlib_module_names}
 
@@ -35,6 +35,15 @@ def users_line(error: BaseException) -> str:
         if str(frame.f_globals.get("__name__", "")).partition(".")[0] not in _NOT_A_USERS:
             found = f"line {line} of {Path(frame.f_code.co_filename).name}"
     return found
+
+
+def is_mistake(error: RobotDynError) -> bool:
+    """Whether a user's code gave the library an argument that it refuses, such as one of a wrong shape.
+
+    Other errors of the library, raised or met there, are outcomes of a run: numbers that overflow, a singular M.
+    """
+    refused = isinstance(error, QueryError) and not isinstance(error, NotFiniteError | OverflowedError)
+    return refused and bool(users_line(error))
 
 
 def because(error: BaseException) -> str:

@@ -17,6 +17,7 @@ from robot_dyn.simulation.table import export_csv
 
 ARM = rd.load("planar_2r")
 Q, V = np.array([0.4, -0.7]), np.array([0.3, 0.9])
+METHODS = (rd.method("rk4"), rd.method("gauss_4"), rd.Adaptive())
 KINDS = (rd.Controller, rd.Memoryless, rd.Conservative, rd.Dissipative, rd.Active, rd.Bound)
 
 
@@ -92,9 +93,7 @@ PARTS = [
 
 
 @pytest.mark.parametrize(("named", "parts"), [x[1:] for x in PARTS], ids=[x[0] for x in PARTS])
-@pytest.mark.parametrize(
-    "integrator", [rd.method("rk4"), rd.method("gauss_4"), rd.Adaptive()], ids=lambda m: str(m)[:5]
-)
+@pytest.mark.parametrize("integrator", METHODS, ids=lambda m: str(m)[:5])
 def test_an_exception_of_a_users_code_reaches_the_user_with_its_line_and_the_parts_name(
     named, parts, integrator
 ) -> None:
@@ -113,6 +112,32 @@ def test_an_exception_at_the_start_and_in_a_query_is_the_users(error: type[Excep
     for ask in (lambda: rd.Setup(plant, Q), lambda: plant.torque(0.0, Q, V), lambda: plant.N(0.0, Q, V)):
         with pytest.raises(error, match="own"):
             ask()
+
+
+class Mistaken(rd.Memoryless):
+    n, period_s = 2, 0.0
+
+    def __init__(self, period_s: float) -> None:
+        self.period_s = period_s
+
+    def torque(self, t, q, v, z):
+        return ARM.N(q) if t < 0.05 else ARM.N(q[:1])
+
+
+@pytest.mark.parametrize("period_s", [0.0, 0.01])
+@pytest.mark.parametrize("integrator", METHODS, ids=lambda m: str(m)[:5])
+def test_what_the_library_refuses_a_users_code_is_no_divergence(period_s: float, integrator) -> None:
+    setup = rd.Setup(rd.Plant(ARM), Q, V, 0.2, Mistaken(period_s), integrator)
+    with pytest.raises(QueryError, match=r"q must have shape .* got \(1,\)"):
+        rd.simulate(setup)
+
+
+def test_an_overflow_in_a_users_code_is_an_outcome_of_the_run() -> None:
+    def runaway(t, q, v):
+        return ARM.inverse_dynamics(q, v, 1e4 * v)
+
+    run = rd.simulate(rd.Plant(ARM), q0=Q, v0=V, duration_s=0.2, controller=runaway, integrator=rd.method("rk4"))
+    assert run.outcome.ending == "diverged" and len(run.t) > 1
 
 
 def test_a_torque_of_a_wrong_shape_is_an_error_of_the_library() -> None:

@@ -16,6 +16,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.errors import OverflowedError, QueryError, RobotDynError
+from robot_dyn.foreign import is_mistake
 from robot_dyn.integrate.implicit import jacobian
 from robot_dyn.integrate.integrator import System
 from robot_dyn.validate import choice, function, instance, number, numbers, rows
@@ -226,6 +227,8 @@ class Steps:
         except _NotFiniteError:
             self._failed("the rate is not finite")
         except RobotDynError as error:
+            if is_mistake(error):
+                raise
             self.status, self.message = Status.FAILED, f"{error}, at t = {self.t}"
         else:
             self.message = f"finished at t = {self.t}"

@@ -16,6 +16,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.errors import RobotDynError
+from robot_dyn.foreign import is_mistake
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.observer import Observer
@@ -150,7 +151,9 @@ class FixedStep:
         arguments = self.functions, self.plan, self.runs, self.records, self.rules, coefficients, work
         try:
             return Ended(self.advance(*arguments, self.now, self.clock, self.stop))
-        except RobotDynError:  # of a step; y is the state before it
+        except RobotDynError as error:  # of a step; y is the state before it
+            if is_mistake(error):
+                raise
             return Ended.DOUBTFUL
 
     def _judge(self, ended: Ended) -> None:

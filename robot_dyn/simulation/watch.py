@@ -9,6 +9,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.errors import RobotDynError
+from robot_dyn.foreign import is_mistake
 from robot_dyn.integrate.integrator import IntegrationError, Integrator, System
 from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.setup import Setup
@@ -66,6 +67,8 @@ class Watch:
         except IntegrationError as error:  # it names its own remedy
             raise DivergedError(t, str(error) + self._steepest()) from None
         except RobotDynError as error:
+            if is_mistake(error):
+                raise
             raise self.diverged(t, y, str(error)) from None
 
     def pace(self, t: float, steps: int) -> None:
