@@ -19,12 +19,18 @@ settings.register_profile(
 )
 settings.load_profile("robot_dyn")
 
-# A shell ignores Ctrl-C for what it runs in the background, and programs hand that on: the commands under test obey it.
-signal.signal(signal.SIGINT, signal.default_int_handler)
-
 if "ROBOT_DYN_CACHE" not in os.environ:  # kernels of a test run are its own; workers inherit the folder
     os.environ["ROBOT_DYN_CACHE"] = tempfile.mkdtemp(prefix="robot_dyn-kernels-")
     atexit.register(shutil.rmtree, os.environ["ROBOT_DYN_CACHE"], ignore_errors=True)
+
+
+@pytest.fixture(autouse=True)
+def obeyed_interrupts() -> None:
+    """Ctrl-C as in a terminal: shells ignore it for what runs in the background, a command that ended in this process.
+
+    Programs hand that on to those that they start.
+    """
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")

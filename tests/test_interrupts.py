@@ -99,3 +99,14 @@ def test_an_interrupt_during_a_trace_comes_after_it(monkeypatch: pytest.MonkeyPa
     finally:
         signal.signal(signal.SIGINT, handler)
     assert len(calls) > 20
+
+
+def test_an_interrupt_comes_too_where_nothing_can_be_made() -> None:
+    """Machine code that ends in an error, as of a part that cannot be traced, does not take the interrupt with it."""
+    handler = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt), interrupts_later():
+            signal.raise_signal(signal.SIGINT)
+            raise rd.RobotDynError("cannot be traced")
+    finally:
+        signal.signal(signal.SIGINT, handler)

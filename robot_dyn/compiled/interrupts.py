@@ -21,5 +21,5 @@ def interrupts_later() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, handler)
-    if noticed:
-        signal.raise_signal(signal.SIGINT)
+        if noticed:
+            signal.raise_signal(signal.SIGINT)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+import signal
 import sys
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
@@ -83,7 +84,7 @@ def attempt(mutant: list[str], folder: Path) -> str:
     from robot_dyn.cli import main
 
     out, err = (io.TextIOWrapper(io.BytesIO(), "utf-8", write_through=True) for _ in range(2))
-    before = Path.cwd()
+    before, handler = Path.cwd(), signal.getsignal(signal.SIGINT)
     os.chdir(folder)
     scene = (folder / "scene.toml").read_bytes()
     try:
@@ -93,6 +94,7 @@ def attempt(mutant: list[str], folder: Path) -> str:
         code = end.code or 0
     finally:
         os.chdir(before)
+        signal.signal(signal.SIGINT, handler)  # the command leaves it ignored, as the last act of a process
     told = err.buffer.getvalue().decode()
     assert code in CODES, (code, mutant)
     assert "Traceback" not in told, (told, mutant)
