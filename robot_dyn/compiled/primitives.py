@@ -110,6 +110,13 @@ def _copy(to: Any, x: Any) -> Any:
             for i in range(to.shape[0]):
                 to[i] = x[i]
 
+    elif to.layout == x.layout == "C":
+
+        def loops(to, x):
+            all_of_it, numbers = _part(to, 0, to.size), _part(x, 0, x.size)
+            for i in range(to.size):
+                all_of_it[i] = numbers[i]
+
     else:
 
         def loops(to, x):
@@ -123,6 +130,12 @@ def _copy(to: Any, x: Any) -> Any:
 @overload(primitives.sizes, strict=False)
 def _sizes(x: Any, out: Any) -> Any:
     def loops(x, out):
+        if out.size == 1:
+            total = 0.0
+            for e in range(x.shape[0]):
+                total += abs(x[e, 0])
+            out[0] = total
+            return
         out[:] = 0.0
         for e in range(x.shape[0]):
             for b in range(x.shape[1]):
