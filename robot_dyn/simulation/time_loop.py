@@ -39,18 +39,21 @@ class Why(IntEnum):
     NOT_FOUND = 3  # the stages of a step
 
 
-class Now(IntEnum):
-    """Where the loop is: the entries of `now`."""
+class _Entries(NamedTuple):
+    """Entries of `now`, where the loop is."""
 
-    SEGMENT = 0
-    STEP = 1  # of the segment
-    ROW = 2  # of the samples, next
-    STEPS = 3  # done in all
-    SEEN = 4  # states shared with companions, in all
-    SHARED = 5  # row of these, next
-    BUDGET = 6  # steps to do before it comes back
-    EVALUATIONS = 7  # of the rate, in all
-    COLUMN = 8  # of what an observer sees, next
+    SEGMENT: int = 0
+    STEP: int = 1  # of the segment
+    ROW: int = 2  # of the samples, next
+    STEPS: int = 3  # done in all
+    SEEN: int = 4  # states shared with companions, in all
+    SHARED: int = 5  # row of these, next
+    BUDGET: int = 6  # steps to do before it comes back
+    EVALUATIONS: int = 7  # of the rate, in all
+    COLUMN: int = 8  # of what an observer sees, next
+
+
+Now = _Entries()  # no enumeration: Numba before 0.62 takes none as an index
 
 
 class Functions(NamedTuple):
