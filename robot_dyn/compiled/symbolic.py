@@ -56,7 +56,8 @@ class Symbols(np.ndarray):
             options["out"] = tuple(np.asarray(x) if isinstance(x, Symbols) else x for x in options["out"])
         if method == "__call__" and ufunc in _OF_SYMBOLS:
             function, arguments = _OF_SYMBOLS[ufunc]
-            return _symbols(np.frompyfunc(function, arguments, 1)(*plain))
+            with np.errstate(all="ignore"):  # NumPy takes flags of the processor that CasADi leaves for its own
+                return _symbols(np.frompyfunc(function, arguments, 1)(*plain))
         return _symbols(getattr(ufunc, method)(*plain, **options))
 
     def __array_function__(self, function: Any, kinds: Any, args: Any, options: Any) -> Any:
