@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from dataclasses import dataclass, replace
+from inspect import getattr_static
 from typing import final
 
 import numpy as np
@@ -17,8 +18,10 @@ from robot_dyn.control.controller import Memoryless
 from robot_dyn.effects.effect import Active
 from robot_dyn.errors import QueryError
 from robot_dyn.integrate.methods import METHODS
+from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.simulation.choice import choose
 from robot_dyn.simulation.machine.machine import MachineError
+from robot_dyn.simulation.machine.traced import SymbolicDynamics
 from robot_dyn.simulation.motion import Motion
 
 ARM = rd.load("planar_2r")
@@ -240,3 +243,11 @@ def test_interpreted_runs_import_no_compiler() -> None:
         "assert not {'numba', 'casadi', 'llvmlite'} & set(sys.modules), 'imported'"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_symbols_are_a_dynamics_by_their_class() -> None:
+    """From Python 3.12 on, a check of a protocol sees attributes of the class alone, none that `__getattr__` makes."""
+    names = [name for name in vars(Dynamics) if not name.startswith("_")] + ["n", "joint_names"]
+    assert {"M", "C", "N", "forward_dynamics"} < set(names)
+    for name in names:
+        getattr_static(SymbolicDynamics, name)

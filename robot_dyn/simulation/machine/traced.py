@@ -17,7 +17,7 @@ import numpy as np
 from robot_dyn.arithmetic import Array
 from robot_dyn.compiled.right_angles import completed
 from robot_dyn.compiled.symbolic import Symbolic, Symbols, array_of, column, inputs
-from robot_dyn.compiled.trace import ARGUMENTS, Trace
+from robot_dyn.compiled.trace import Trace
 from robot_dyn.control.controller import Controller
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.effects.effect import Bound, Conservative, Effect, Force
@@ -39,9 +39,26 @@ from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.plan import BOUNDS
 
 
+def _least(name: str) -> Any:
+    """A quantity from the formulation of fewest instructions, as a method."""
+    return lambda self, *arguments: self._ask(name, arguments)
+
+
+def _closed_form(name: str) -> Any:
+    """An attribute of the closed form."""
+    return property(lambda self: getattr(self._trace.lagrangian, name))
+
+
 @final
 class SymbolicDynamics:
     """A `Dynamics` of symbols; each quantity from the formulation of fewest instructions."""
+
+    M, N, coriolis_torque, coriolis_transpose = map(_least, ("M", "N", "coriolis_torque", "coriolis_transpose"))
+    inverse_dynamics, forward_dynamics, momentum = map(_least, ("inverse_dynamics", "forward_dynamics", "momentum"))
+    kinetic_energy, potential_energy = map(_least, ("kinetic_energy", "potential_energy"))
+    C, total_energy, n, joint_names = map(_closed_form, ("C", "total_energy", "n", "joint_names"))
+    placement, jacobian, jacobian_rate = map(_closed_form, ("placement", "jacobian", "jacobian_rate"))
+    arithmetic = _closed_form("arithmetic")
 
     def __init__(self, robot: Described, parameters: tuple[Any, ...] = ()) -> None:
         self._trace = Trace(robot, parameters)
@@ -52,23 +69,6 @@ class SymbolicDynamics:
         if not masses:
             return self
         return SymbolicDynamics(carrying(self._trace.robot, masses), tuple(m.expression for m in masses.values()))
-
-    @property
-    def n(self) -> int:
-        """Number of degrees of freedom."""
-        return self._trace.lagrangian.n
-
-    @property
-    def joint_names(self) -> tuple[str, ...]:
-        """Names of the n joints."""
-        return self._trace.lagrangian.joint_names
-
-    def __getattr__(self, name: str) -> Callable[..., Any]:
-        if name.startswith("_"):
-            raise AttributeError(name)
-        if name == "C" or name not in ARGUMENTS:
-            return getattr(self._trace.lagrangian, name)
-        return lambda *arguments: self._ask(name, arguments)
 
     def _ask(self, name: str, arguments: tuple[Array, ...]) -> Any:
         if name not in self._functions:
