@@ -9,6 +9,7 @@ each run's own: what a sampled controller holds, and the values that differ from
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from inspect import getdoc
 from typing import Any, final
 
 import casadi as ca
@@ -22,7 +23,9 @@ from robot_dyn.control.controller import Controller
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.effects.effect import Bound, Conservative, Effect, Force
 from robot_dyn.effects.plant import Plant
+from robot_dyn.lagrange.manipulator import Lagrangian
 from robot_dyn.model.description import Description
+from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.model.robot import Robot
 from robot_dyn.model.tree import Described
 from robot_dyn.simulation.machine.parts import (
@@ -41,12 +44,17 @@ from robot_dyn.simulation.plan import BOUNDS
 
 def _least(name: str) -> Any:
     """A quantity from the formulation of fewest instructions, as a method."""
-    return lambda self, *arguments: self._ask(name, arguments)
+
+    def ask(self: SymbolicDynamics, *arguments: Array) -> Any:
+        return self._ask(name, arguments)
+
+    ask.__doc__ = getattr(Dynamics, name).__doc__
+    return ask
 
 
 def _closed_form(name: str) -> Any:
     """An attribute of the closed form."""
-    return property(lambda self: getattr(self._trace.lagrangian, name))
+    return property(lambda self: getattr(self._trace.lagrangian, name), doc=getdoc(getattr(Lagrangian, name)))
 
 
 @final
