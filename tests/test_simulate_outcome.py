@@ -305,7 +305,7 @@ def test_an_interrupt_in_a_companion_run_ends_the_estimate_and_keeps_the_run(met
 
         return interrupted
 
-    monkeypatch.setattr(FixedStep, "_march", on_second(FixedStep._march))
+    monkeypatch.setattr(FixedStep, "_loop", on_second(FixedStep._loop))
     monkeypatch.setattr(ErrorControlled, "_segment", on_second(ErrorControlled._segment))
     run = rd.simulate(rd.Plant(DOUBLE), **START, duration_s=0.2, integrator=method, engine="interpreted")
     assert len(ran) == 2
@@ -326,7 +326,7 @@ def test_an_interrupt_before_the_first_step_leaves_the_start(engine: str, period
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(FixedStep, "_march", interrupted)
+    monkeypatch.setattr(FixedStep, "_loop", interrupted)
     run = rd.simulate(setup)
     assert (run.outcome.ending, run.outcome.t) == ("stopped", 0.0)
     np.testing.assert_array_equal(run.t, [0.0])

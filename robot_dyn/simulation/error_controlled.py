@@ -71,7 +71,7 @@ class ErrorControlled:
         self.samples = _Samples()
 
     def record(self) -> Record:
-        """March to the end, however the run ends."""
+        """Run to the end, however the run ends."""
         try:
             with np.errstate(all="ignore"):  # what overflows ends the run
                 for s in range(len(self.plan.counts) - 1):

@@ -102,10 +102,10 @@ class FixedStep:
         return self.runs.y[:, 0].copy()
 
     def record(self) -> Record:
-        """March to the end, however the run ends."""
+        """Run to the end, however the run ends."""
         try:
             with np.errstate(all="ignore"):
-                self._march()
+                self._loop()
             outcome = Outcome(Ending.FINISHED, self.setup.duration_s)
         except DivergedError as end:
             outcome = Outcome(Ending.DIVERGED, end.t, str(end))
@@ -113,7 +113,7 @@ class FixedStep:
             outcome = Outcome(Ending.STOPPED, self.time, "interrupted; all samples up to here are kept")
         return self._record(outcome)
 
-    def _march(self) -> None:
+    def _loop(self) -> None:
         budget, told = _FIRST if self.compiled else 1, -1.0
         while True:
             if self.on_progress is not None and self.time > told:

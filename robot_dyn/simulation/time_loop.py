@@ -246,7 +246,7 @@ def sample(
 
 
 def take(runs: Runs, rules: Rules, t: float) -> bool:
-    """Take y⁺; whether a single run may go on. In lock step, end the runs whose y⁺ is no number, or not found."""
+    """Take y⁺; whether a single run may go on. In lock step, end the runs whose y⁺ is not finite, or not found."""
     sizes(runs.after, runs.size)
     ill = False
     for b in range(len(runs.size)):
@@ -259,7 +259,7 @@ def take(runs: Runs, rules: Rules, t: float) -> bool:
                 end(runs, rules, b, t, Why.NOT_FOUND if runs.lost[b] != 0 else Why.OVERFLOWED)
     copy(runs.y, runs.after)
     if ill:
-        bury(runs)
+        erase_ended(runs)
     return True
 
 
@@ -282,7 +282,7 @@ def conserve(functions: Functions, runs: Runs, rules: Rules, t: float, p: Array)
             end(runs, rules, b, t, Why.GAINED)
             ended = True
     if ended:
-        bury(runs)
+        erase_ended(runs)
     return True
 
 
@@ -294,7 +294,7 @@ def end(runs: Runs, rules: Rules, b: int, t: float, why: int) -> None:
             runs.fastest[b] = e
 
 
-def bury(runs: Runs) -> None:
+def erase_ended(runs: Runs) -> None:
     """Nan for the runs that have ended."""
     for b in range(len(runs.size)):
         if runs.alive[b] == 0:

@@ -66,7 +66,8 @@ class Batch:
         self.plan = plan_of(setup)
         most = samples_at_most(setup, self.plan.counts)
         self.out_y, self.made = np.empty((most, len(self.columns), width)), np.empty((most, rows, width))
-        self.place = np.zeros((0, 2), np.int64)  # segment and step of each sample
+        self.place = np.zeros((0, 2), np.int64)  # segment and step of each sample, of the tile that has most
+        self.lock = threading.Lock()
         self.unfinished = np.ones(tiles, dtype=bool)
         self.why, self.fastest = np.zeros(width, np.int64), np.zeros(width, np.int64)
         self.ended = np.full(width, setup.duration_s)
@@ -76,11 +77,11 @@ class Batch:
     def run(self, threads: int, on_progress: Callable[[float], object] | None = None) -> Rollouts:
         """All tiles, each by one thread; Ctrl-C ends them at their next step, and an error of `on_progress`."""
         began = perf_counter()
-        tiles, turn = iter(range(len(self.unfinished))), threading.Lock()
+        tiles = iter(range(len(self.unfinished)))
 
         def work() -> None:
             while True:
-                with turn:
+                with self.lock:
                     tile = next(tiles, None)
                 if tile is None:
                     return
@@ -142,8 +143,9 @@ class Batch:
             self.clocks[tile], self.stop,
         )  # fmt: skip
         self.unfinished[tile], self.evaluations[tile] = ended != Ended.DONE, now[Now.EVALUATIONS]
-        if now[Now.ROW] > len(self.place):
-            self.place = records.place[: now[Now.ROW]]
+        with self.lock:
+            if now[Now.ROW] > len(self.place):
+                self.place = records.place[: now[Now.ROW]]
         self.why[own], self.fastest[own] = runs.why, runs.fastest
         self.ended[own] = np.where(runs.why > 0, runs.ended, self.setup.duration_s)
         if ended != Ended.DONE:

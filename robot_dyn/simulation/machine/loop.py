@@ -8,20 +8,18 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from functools import cache
+from inspect import getsource
 from typing import Any
 
 from robot_dyn.compiled.cache import default_store
 from robot_dyn.compiled.overload import compiled
 from robot_dyn.compiled.primitives import machine_code, plain
-from robot_dyn.integrate.explicit import explicit_step, semi_implicit_step
-from robot_dyn.integrate.gauss import gauss_step
 from robot_dyn.simulation import time_loop
 
-plain(explicit_step, semi_implicit_step, gauss_step)
 plain(
     *(
         getattr(time_loop, name)
-        for name in ("act", "share", "sample", "take", "conserve", "end", "bury", "erase", "show")
+        for name in ("act", "share", "sample", "take", "conserve", "end", "erase_ended", "erase", "show")
     )
 )
 
@@ -44,11 +42,10 @@ def loop(step: Callable[..., int]) -> Callable[..., int]:
 def _compiled(step: Callable[..., int], arguments: tuple[Any, ...]) -> Any:
     import numba as nb
 
+    def make() -> Any:
+        plain(step)
+        return machine_code(time_loop.time_loop(step))
+
     types = [nb.typeof(each) for each in arguments]
-    return compiled(
-        lambda: machine_code(time_loop.time_loop(step)),
-        types,
-        default_store(),
-        [step.__name__],
-        f"the time loop of {step.__name__}",
-    )
+    identity = [f"{step.__module__}.{step.__qualname__}", getsource(step)]  # it may be of a user's own
+    return compiled(make, types, default_store(), identity, f"the time loop of {step.__name__}")

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Callable
+from threading import RLock
 from typing import Any, final
 
 import numpy as np
@@ -33,17 +34,19 @@ class ByIdentity:
 
     def __init__(self) -> None:
         self._kept: dict[tuple[Any, ...], tuple[list[weakref.ref[Any]], Any]] = {}
+        self._lock = RLock()  # runs may start in several threads
 
     def get(self, objects: tuple[Any, ...], more: tuple[Any, ...], make: Callable[[], Any]) -> Any:
         """The value of objects and of further, hashable values; it must not hold on to the objects."""
         key = (*map(id, objects), *more)
-        references, value = self._kept.pop(key, ([], None))
-        if not references or any(ref() is not each for ref, each in zip(references, objects, strict=True)):
-            references, value = [weakref.ref(each) for each in objects], make()
-        self._kept[key] = references, value
-        while len(self._kept) > _MOST or any(ref() is None for ref in next(iter(self._kept.values()))[0]):
-            del self._kept[next(iter(self._kept))]
-        return value
+        with self._lock:
+            references, value = self._kept.pop(key, ([], None))
+            if not references or any(ref() is not each for ref, each in zip(references, objects, strict=True)):
+                references, value = [weakref.ref(each) for each in objects], make()
+            self._kept[key] = references, value
+            while len(self._kept) > _MOST or any(ref() is None for ref in next(iter(self._kept.values()))[0]):
+                del self._kept[next(iter(self._kept))]
+            return value
 
 
 _robots, _symbols, _equations = ByIdentity(), ByIdentity(), ByIdentity()
