@@ -222,15 +222,16 @@ def comparison_tables(results: Sequence[tuple[str, Comparison]], refused: dict[s
         table = _table("robot", "n", "worst error", "allowed", "quantity", "where")
         for name, result in results:
             worst = result.worst
-            n, error, allowed = len(worst.state["q"]), _mark(result.ok, worst.error), f"{worst.tolerance:.1e}"
-            table.add_row(name, str(n), error, allowed, worst.quantity, worst.entry)
+            error, allowed = _mark(result.ok, worst.error), f"{worst.tolerance:.1e}"
+            table.add_row(name, str(result.n), error, allowed, worst.quantity, worst.entry)
         yield table
-        yield from (f"{name}: {note}" for name, result in results for note in result.notes if "forward" in note)
+        notes = ((name, note) for name, result in results for note in result.notes)
+        yield from (f"{name}: {note}" for name, note in notes if "forward" in note or "yourdfpy" in note)
         yield from (f"{name} refused: {why}" for name, why in refused.items())
     agreed = sum(result.ok for _, result in results)
     yield f"{agreed} of {len(results)} agree"
     if results:
-        name, result = max(results, key=lambda pair: pair[1].worst.error / pair[1].worst.tolerance)
+        name, result = max(results, key=lambda pair: pair[1].worst.share)
         worst = result.worst
         yield f"worst: {name}, {worst.quantity}, {worst.error:.2e} of {worst.tolerance:.1e} allowed, at {worst.entry}"
         if not result.ok:

@@ -1,7 +1,7 @@
 """The hardened read of a URDF file: bytes in, checked bytes out, or a refusal.
 
-It stands before both parsers. Pinocchio and yourdfpy only ever see the canonical bytes written here, in which each
-element occurs once, every number is a finite decimal literal, and links and joints form one tree; what dynamics does
+It stands before both roads, which only ever see the canonical bytes written here, in which each element occurs
+once, every number is a finite decimal literal, and links and joints form one tree; what dynamics does
 not need (meshes, materials, simulator extensions) is left out.
 """
 

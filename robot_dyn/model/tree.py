@@ -1,13 +1,12 @@
 """The Tree: joints and links as the file states them, in literals, for the library's own road.
 
-yourdfpy parses the structure; numbers stay the decimal literals of the file, so that each arithmetic makes its own
-numbers of them. No line is shared with Pinocchio or its URDF parser.
+Numbers stay the decimal literals of the file, so that each arithmetic makes its own numbers of them. No line is shared
+with Pinocchio or its URDF parser; that the checked file says what the file says, `accuracy.second_reading` looks at.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from io import BytesIO
 from typing import Any, Protocol, final
 
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
@@ -71,7 +70,7 @@ class Joint:
     """A joint: the child link's frame is that of the parent, moved by (xyz, rpy), then along or about the axis by q.
 
     Attributes:
-        kind: "revolute", "continuous", "prismatic" or "fixed", as yourdfpy reads it.
+        kind: "revolute", "continuous", "prismatic" or "fixed".
         mimic: The joint it follows, or None.
         locked: The value it is held at, or None.
         armature: [kg m²] or [kg].
@@ -107,16 +106,9 @@ class Tree:
 
 def tree(description: Description, edits: Edits) -> Tree:
     """The tree of a description, edited."""
-    from yourdfpy import URDF  # heavy: it takes trimesh along
-
-    structure = URDF.load(
-        BytesIO(description.xml), build_scene_graph=False, build_collision_scene_graph=False, load_meshes=False
-    ).robot
     file = description.element
-    link_elements = {element.get("name"): element for element in file.iterfind("link")}
-    joint_elements = {element.get("name"): element for element in file.iterfind("joint")}
-    links = (Link(link.name, _inertials(link_elements[link.name])) for link in structure.links)
-    joints = (_joint(joint, joint_elements[joint.name]) for joint in structure.joints)
+    links = (Link(link.get("name"), _inertials(link)) for link in file.iterfind("link"))
+    joints = (_joint(joint) for joint in file.iterfind("joint"))
     root, ordered = _from_the_root({joint.child: joint for joint in joints})
     return Tree(
         root,
@@ -140,17 +132,16 @@ def _inertials(link: etree._Element) -> tuple[Inertial, ...]:
     )
 
 
-def _joint(joint: Any, element: etree._Element) -> Joint:
-    axis = element.find("axis")
-    mimic = element.find("mimic")
+def _joint(joint: etree._Element) -> Joint:
+    axis, mimic = joint.find("axis"), joint.find("mimic")
     return Joint(
-        joint.name,
-        joint.type,
-        joint.parent,
-        joint.child,
-        *_origin(element),
+        joint.get("name"),
+        joint.get("type"),
+        joint.find("parent").get("link"),
+        joint.find("child").get("link"),
+        *_origin(joint),
         _ZERO if axis is None else _triple(axis, "xyz"),
-        Mimic(joint.mimic.joint, mimic.get("multiplier"), mimic.get("offset")) if joint.mimic else None,
+        None if mimic is None else Mimic(mimic.get("joint"), mimic.get("multiplier"), mimic.get("offset")),
     )
 
 

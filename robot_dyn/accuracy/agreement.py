@@ -1,0 +1,114 @@
+"""Agreements: how far two values of one quantity differ on its scale, the worst kept with its entry and its state."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.lagrange.magnitude import floored, scaled
+
+
+@final
+@dataclass(frozen=True)
+class Agreement:
+    """How well Pinocchio and the own Lagrangian agree on one quantity, at the worst of all states and entries.
+
+    Attributes:
+        quantity: Its name in the `Dynamics` protocol, or the identity that was checked.
+        error: Difference on its scale.
+        tolerance: What is allowed.
+        entry: Joints or frame of the entry.
+        pinocchio, own: The two values; of the file, the number that both roads are given, and yourdfpy's.
+        state: q, v, a, tau, by name; nothing for what stands in the file.
+    """
+
+    quantity: str
+    error: float
+    tolerance: float
+    entry: str
+    pinocchio: float
+    own: float
+    state: dict[str, list[float]] = field(hash=False)
+
+    @property
+    def ok(self) -> bool:
+        """Whether the error is within the tolerance."""
+        return bool(self.error <= self.tolerance)
+
+    @property
+    def share(self) -> float:
+        """The error as a part of the tolerance."""
+        return self.error / self.tolerance
+
+
+@final
+@dataclass(frozen=True)
+class Comparison:
+    """The outcome of `compare`.
+
+    Attributes:
+        robot: Its name.
+        n: Number of its degrees of freedom.
+        samples: Number of random states.
+        agreements: One for each quantity.
+        notes: What could not be compared, and why.
+    """
+
+    robot: str
+    n: int
+    samples: int
+    agreements: tuple[Agreement, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def ok(self) -> bool:
+        """Whether both agree on every quantity."""
+        return all(agreement.ok for agreement in self.agreements)
+
+    @property
+    def worst(self) -> Agreement:
+        """The quantity nearest to its tolerance, or farthest beyond it."""
+        return max(self.agreements, key=lambda agreement: agreement.share)
+
+
+@final
+@dataclass(frozen=True)
+class Pair:
+    """One quantity twice at one state; `scale` of the shape of the values."""
+
+    quantity: str
+    pinocchio: Any
+    own: Any
+    scale: Any
+    tolerance: float
+    axes: tuple[tuple[str, ...], ...] = ()
+    frame: str = ""
+
+    def worst(self, state: dict[str, np.ndarray]) -> Agreement:
+        """The entry where the two differ most on their scale."""
+        errors = scaled(np.asarray(self.pinocchio) - self.own, floored(np.asarray(self.scale)))
+        errors = np.where(np.isnan(errors), np.inf, errors)
+        index = np.unravel_index(np.argmax(errors), errors.shape)
+        names = [axis[i] for axis, i in zip(self.axes, index, strict=False)]
+        return Agreement(
+            self.quantity,
+            float(errors[index]),
+            self.tolerance,
+            ", ".join([self.frame] * bool(self.frame) + names),
+            float(np.broadcast_to(self.pinocchio, errors.shape)[index]),
+            float(np.broadcast_to(self.own, errors.shape)[index]),
+            {name: x.tolist() for name, x in state.items()},
+        )
+
+
+def worst_by_quantity(agreements: Iterable[Agreement]) -> tuple[Agreement, ...]:
+    """Of each quantity the agreement nearest to its tolerance, or farthest beyond it."""
+    worst: dict[str, Agreement] = {}
+    for each in agreements:
+        known = worst.get(each.quantity)
+        if known is None or each.share > known.share:
+            worst[each.quantity] = each
+    return tuple(worst.values())
