@@ -52,7 +52,7 @@ for name, controller in controllers.items():
         record_period_s=0.01,
     )
     print(f"--- {name}\n{trajectory.summary}\n")
-    error = np.abs(trajectory.q - trajectory.wanted).max(axis=1)
+    error = np.abs(trajectory.q - trajectory.desired).max(axis=1)
     rows.append((name, trajectory.tracking_error, error.max(), error[-1]))
 
 print(f"{'':<16} {'rms [rad]':>12} {'largest [rad]':>14} {'at the end [rad]':>17}")

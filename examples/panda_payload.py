@@ -46,7 +46,7 @@ for carried, arm in arms.items():
             record_period_s=0.01,
         )
         print(f"--- {name}, {carried}\n{trajectory.summary}\n")
-        error = np.abs(trajectory.q - trajectory.wanted).max(axis=1)
+        error = np.abs(trajectory.q - trajectory.desired).max(axis=1)
         rows.append((f"{name}, {carried}", trajectory.tracking_error, error[-1]))
 
 print(f"what the payload costs at rest: {(arms['2 kg in the hand'].N(q_end) - model.N(q_end)).round(2)} N m")

@@ -42,9 +42,9 @@ for name, model in (("exact model", arm), ("model 20 % too heavy", arm.with_(mas
     print(f"--- {name}\n{trajectory.summary}")
 
     p = arm.placement(trajectory.q, frame)[:, :3, 3]
-    wanted, _, _ = circle.position.at(trajectory.t)
+    desired, _, _ = circle.position.at(trajectory.t)
     off_radius = np.abs(np.linalg.norm((p - centre)[:, :2], axis=1) - radius).max()
     off_plane = np.abs((p - centre) @ normal).max()
-    tracking = np.sqrt(np.mean(np.sum((p - wanted) ** 2, axis=1)))
+    tracking = np.sqrt(np.mean(np.sum((p - desired) ** 2, axis=1)))
     print(f"tracking error of the tool: {tracking:.3e} m rms, off the plane by {off_plane:.3e} m")
     print(f"radius error, {name}: {off_radius:.3e} m\n")

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from robot_dyn.control.computed_torque import FeedForward as FeedForward
     from robot_dyn.control.computed_torque import PDGravity as PDGravity
     from robot_dyn.control.controller import Controller as Controller
-    from robot_dyn.control.controller import Memoryless as Memoryless
+    from robot_dyn.control.controller import Stateless as Stateless
     from robot_dyn.control.independent_joint import PD as PD
     from robot_dyn.control.independent_joint import PID as PID
     from robot_dyn.control.independent_joint import gains_from as gains_from
@@ -93,7 +93,6 @@ _HOME = {
     "JointStopDamper": "effects.joint_limit",
     "JointStopSpring": "effects.joint_limit",
     "Lagrangian": "lagrange.manipulator",
-    "Memoryless": "control.controller",
     "ModelWarning": "errors",
     "OperationalSpace": "control.operational_space",
     "PD": "control.independent_joint",
@@ -110,6 +109,7 @@ _HOME = {
     "Samples": "control.samples",
     "Setup": "simulation.setup",
     "Spring": "effects.spring",
+    "Stateless": "control.controller",
     "Trajectory": "simulation.trajectory",
     "ViscousFriction": "effects.friction",
     "circle": "control.cartesian",
@@ -143,6 +143,8 @@ _HOME = {
     "via_points": "control.reference",
 }
 
+_FORMER = {"Memoryless": "Stateless"}
+
 __all__ = sorted(_HOME)  # pyright: ignore[reportUnsupportedDunderAll]
 
 
@@ -151,6 +153,11 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version
 
         return version("robot-dyn")
+    if name in _FORMER:
+        from robot_dyn.former import tell
+
+        tell(f"robot_dyn.{name}", _FORMER[name], up=2)
+        name = _FORMER[name]
     if name not in _HOME:
         raise AttributeError(f"module 'robot_dyn' has no attribute {name!r}")
     return getattr(import_module(f"robot_dyn.{_HOME[name]}"), name)

@@ -42,7 +42,7 @@ class Arithmetic(ABC):
 
     @abstractmethod
     def asarray(self, values: Any) -> Array:
-        """Array of numbers; TypeError or ValueError if some are none. Not copied if they are of this kind already."""
+        """Array of numbers; TypeError or ValueError if one is not a number. Not copied if of this kind already."""
 
     @abstractmethod
     def finite(self, x: Array) -> np.ndarray:

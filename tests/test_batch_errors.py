@@ -80,7 +80,7 @@ def test_no_answer_is_ever_other_than_finite(engine: Any) -> None:
                 assert speed > 1e100
 
 
-def test_forward_dynamics_of_tied_joints_overflows_in_words() -> None:
+def test_forward_dynamics_of_coupled_joints_overflows_in_words() -> None:
     robot = rd.load("mimic_chain")
     q, tau = np.full(robot.n, 0.4), np.full(robot.n, 0.3)
     for v in (np.full(robot.n, 1e160), np.full((2, robot.n), 1e200)):

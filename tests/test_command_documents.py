@@ -35,7 +35,8 @@ def test_info():
     for joint in panda["joints"]:
         assert joint.keys() == names(keys["joints"])
         assert joint["kind"] in ("revolute", "continuous", "prismatic")
-    assert [tie.keys() for tie in panda["ties"]] == [names(keys["ties"])]
+    assert [coupling.keys() for coupling in panda["couplings"]] == [names(keys["couplings"])]
+    assert panda["ties"] == panda["couplings"]  # the former name
 
 
 def test_query():

@@ -1,4 +1,4 @@
-"""What `info` and `query` answer: the numbers of the library, ties and locks as stated, shares that add up."""
+"""What `info` and `query` answer: the numbers of the library, couplings and locks as stated, shares that add up."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ def numbers(text: str) -> list[float]:
 # --- info
 
 
-def test_info_shows_joints_ties_and_locks():
+def test_info_shows_joints_couplings_and_locks():
     text = said("info", "panda", "--lock", "panda_joint2=0.25")
     robot = rd.load("panda")
     for name in set(robot.joint_names) - {"panda_joint2"}:
         assert re.search(rf"^{name} +(revolute|prismatic) ", text, re.M)
-    assert re.search(r"^tied: panda_finger_joint2 = 1 · panda_finger_joint1 \+ 0$", text, re.M)
+    assert re.search(r"^coupled: panda_finger_joint2 = 1 · panda_finger_joint1 \+ 0$", text, re.M)
     assert re.search(r"^locked: panda_joint2 = 0\.25$", text, re.M)
     assert robot.description.source in text.splitlines()
 
@@ -43,18 +43,20 @@ def test_info_has_the_numbers_of_the_library():
     assert [document("info", "pendulum")["joints"][0][key] for key in ("lower", "upper", "effort_limit")] == [None] * 3
 
 
-def test_ties_are_those_that_the_file_states(tmp_path: Path):
+def test_couplings_are_those_that_the_file_states(tmp_path: Path):
     """Each with the joint it names, not composed; a ratio of 0 and the defaults of URDF included."""
     keys = ("joint", "source", "multiplier", "offset")
-    stated = [tuple(tie[key] for key in keys) for tie in document("info", "mimic_chain")["ties"]]
+    stated = [tuple(coupling[key] for key in keys) for coupling in document("info", "mimic_chain")["couplings"]]
     assert stated == [("flex_1", "spread", 0.5, 0.1), ("flex_2", "flex_1", -0.75, 0.2)]
     text = (ROOT / "urdf" / "mimic_chain.urdf").read_text()
     text = text.replace('<mimic joint="flex_1" multiplier="-0.75"', '<mimic joint="twist" multiplier="0"')
     text = text.replace('<mimic joint="spread" multiplier="0.5" offset="0.1"', '<mimic joint="spread"')
     (tmp_path / "other.urdf").write_text(text)
-    ties = [tuple(tie[key] for key in keys) for tie in document("info", tmp_path / "other.urdf")["ties"]]
-    assert ties == [("flex_1", "spread", 1, 0), ("flex_2", "twist", 0, 0.2)]
-    assert document("info", "mimic_chain", "--lock", "spread=0.1")["ties"] == []  # what follows it is held too
+    couplings = [
+        tuple(coupling[key] for key in keys) for coupling in document("info", tmp_path / "other.urdf")["couplings"]
+    ]
+    assert couplings == [("flex_1", "spread", 1, 0), ("flex_2", "twist", 0, 0.2)]
+    assert document("info", "mimic_chain", "--lock", "spread=0.1")["couplings"] == []  # what follows it is held too
 
 
 @pytest.mark.parametrize("name", ["[red]x[/red]", "[/]", ":smile:"])

@@ -1,4 +1,4 @@
-"""Independent joint control: PD, PID and its memory, and what every controller refuses."""
+"""Independent joint control: PD, PID and its states, and what every controller refuses."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from robot_dyn.control.controller import ControlError, Controller
 from robot_dyn.control.independent_joint import PD, PID, gains_from
 from robot_dyn.control.reference import hold, quintic
 
-NONE = np.zeros(0)  # no memory
+NONE = np.zeros(0)  # no states
 Q, V, T = np.array([0.4, -0.9, 1.3]), np.array([-0.7, 0.2, 1.1]), 0.6
 MOTION = quintic([0.1, -0.2, 0.3], [1.0, -1.4, 2.0], 1.5)
 KP, KI, KD = np.array([30.0, 20.0, 10.0]), np.array([12.0, 9.0, 4.0]), 5.0
@@ -32,17 +32,17 @@ def test_pid_below_its_limit_is_pd_and_the_integral_of_the_error() -> None:
     q_d = MOTION.at(T)[0]
     expected = PD(MOTION, KP, KD).torque(T, Q, V, NONE) + z
     np.testing.assert_allclose(controller.torque(T, Q, V, z), expected, rtol=1e-15)
-    np.testing.assert_allclose(controller.memory_rate(T, Q, V, z), KI * (q_d - Q), rtol=1e-15)
-    assert controller.memory_size == 3
+    np.testing.assert_allclose(controller.state_rate(T, Q, V, z), KI * (q_d - Q), rtol=1e-15)
+    assert controller.state_size == 3
 
 
 def test_pid_above_its_limit_gives_the_limit_and_lets_the_excess_flow_back() -> None:
     limit, z = np.array([2.0, 1.0, np.inf]), np.array([40.0, -50.0, 3.0])
     controller = PID(MOTION, KP, KI, KD, effort_limit=limit, tracking_time_s=0.25)
-    wanted = PD(MOTION, KP, KD).torque(T, Q, V, NONE) + z
-    np.testing.assert_allclose(controller.torque(T, Q, V, z), [2.0, -1.0, wanted[2]], rtol=1e-15)
-    expected = KI * (MOTION.at(T)[0] - Q) - np.array([wanted[0] - 2, wanted[1] + 1, 0]) / 0.25
-    np.testing.assert_allclose(controller.memory_rate(T, Q, V, z), expected, rtol=1e-14)
+    desired = PD(MOTION, KP, KD).torque(T, Q, V, NONE) + z
+    np.testing.assert_allclose(controller.torque(T, Q, V, z), [2.0, -1.0, desired[2]], rtol=1e-15)
+    expected = KI * (MOTION.at(T)[0] - Q) - np.array([desired[0] - 2, desired[1] + 1, 0]) / 0.25
+    np.testing.assert_allclose(controller.state_rate(T, Q, V, z), expected, rtol=1e-14)
 
 
 def test_gains_place_the_poles_of_a_joint() -> None:
@@ -64,9 +64,9 @@ def one_joint(controller: Controller, until: float, *, push: float = PUSH, limit
     def rate(t: float, x: np.ndarray) -> np.ndarray:
         q, v, z = x[:1], x[1:2], x[2:]
         tau = np.clip(controller.torque(t, q, v, z), -limit, limit)
-        return np.concatenate([v, (tau + push) / MASS, controller.memory_rate(t, q, v, z)])
+        return np.concatenate([v, (tau + push) / MASS, controller.state_rate(t, q, v, z)])
 
-    x0 = np.zeros(2 + controller.memory_size)
+    x0 = np.zeros(2 + controller.state_size)
     run = solve_ivp(rate, (0, until), x0, method="DOP853", rtol=1e-10, atol=1e-12, t_eval=at)
     assert run.success
     return run.t, *run.y
@@ -95,7 +95,7 @@ def test_the_integral_of_a_blocked_joint_settles() -> None:
         (free, 60 * e * 3),
     ]:
         run = solve_ivp(
-            lambda t, z, c=controller: c.memory_rate(t, still, still, z), (0, 3), [0.0], rtol=1e-10, atol=1e-12
+            lambda t, z, c=controller: c.state_rate(t, still, still, z), (0, 3), [0.0], rtol=1e-10, atol=1e-12
         )
         np.testing.assert_allclose(run.y[0, -1], expected, rtol=1e-8)
 
@@ -117,7 +117,7 @@ def test_anti_windup_bounds_the_integral_and_the_overshoot() -> None:
     assert abs(q[-1] - step) < 1e-3 * step
 
 
-def test_sampled_memory_tends_to_the_continuous_one() -> None:
+def test_sampled_states_tend_to_the_continuous_ones() -> None:
     """The rule z ← z + period · rate is of first order: a quarter of the period, a quarter of the error."""
     errors = []
     for period in (0.008, 0.002):
@@ -125,17 +125,17 @@ def test_sampled_memory_tends_to_the_continuous_one() -> None:
         for k in range(round(0.8 / period)):
             q, v, t = x[:1], x[1:], k * period
             a = (controller.torque(t, q, v, z)[0] + PUSH) / MASS
-            z = controller.next_memory(t, q, v, z)
+            z = controller.next_state(t, q, v, z)
             x = x + period * np.array([x[1] + period * a / 2, a])  # exact for a held torque
         continuous = one_joint(PID(hold([1.0]), 40.0, 60.0, 9.0), 0.8)
         errors.append([x[0] - continuous[1][-1], z[0] - continuous[3][-1]])
     np.testing.assert_allclose(np.divide(*errors), 4, rtol=0.15)  # the next order: period · ω is some 5 %
 
 
-def test_a_controller_without_memory_has_none() -> None:
+def test_a_stateless_controller_has_no_states() -> None:
     controller = PD(MOTION, 1.0, 1.0, period_s=0.01)
-    assert controller.memory_size == 0
-    assert controller.next_memory(T, Q, V, NONE).shape == (0,)
+    assert controller.state_size == 0
+    assert controller.next_state(T, Q, V, NONE).shape == (0,)
     assert controller.n == 3
 
 

@@ -173,18 +173,18 @@ def test_torque_is_bounded_near_the_straight_arm(robot: rd.Robot, frame: str, ro
 
     At the straight arm the smallest eigenvalue is 0 to rounding; towards it the torque has a limit.
     """
-    epsilon, v, wanted = 0.01, np.linspace(0.5, -0.4, robot.n), np.linspace(3.0, -5.0, len(rows))
+    epsilon, v, desired = 0.01, np.linspace(0.5, -0.4, robot.n), np.linspace(3.0, -5.0, len(rows))
     assert task_dynamics(robot, straight, v, frame, rows=rows).smallest < 1e-10
     torques, undamped = [], []
     for angle in [0.0, 1e-12, 1e-8, 1e-5, 1e-3, 1e-2, 0.05, 0.1, 0.3]:
         q = np.array(straight) + angle * np.array(bend)
         task = task_dynamics(robot, q, v, frame, rows=rows, threshold=epsilon)
-        tau = task.J.T @ task.Lambda @ (wanted - task.drift)
-        assert tau @ np.linalg.solve(robot.M(q), tau) <= (1 + 1e-9) * ((wanted - task.drift) ** 2).sum() / epsilon
+        tau = task.J.T @ task.Lambda @ (desired - task.drift)
+        assert tau @ np.linalg.solve(robot.M(q), tau) <= (1 + 1e-9) * ((desired - task.drift) ** 2).sum() / epsilon
         assert np.linalg.eigvalsh(task.Lambda).max() <= (1 + 1e-9) / epsilon
         plain = task_dynamics(robot, q, v, frame, rows=rows, threshold=1e-30)
         torques.append(tau)
-        undamped.append(plain.J.T @ plain.Lambda @ (wanted - plain.drift))
+        undamped.append(plain.J.T @ plain.Lambda @ (desired - plain.drift))
     assert np.abs(undamped[3]).max() > 100 * np.abs(torques).max()
     np.testing.assert_allclose(torques[2], torques[0], atol=1e-3 * np.abs(torques).max())
 
@@ -195,10 +195,10 @@ def test_controller_near_the_straight_arm_asks_for_no_more_than_its_task(angle: 
     q, v = np.array([0.4, angle]), np.array([0.5, -0.4])
     reference = line([0.3, 0.2, 0.0], [-0.5, 0.9, 0.0], 1.0)
     controller = OperationalSpace(PLANAR, "tip", reference, 50.0, 10.0, rows=(0, 1))
-    task, wanted = task_dynamics(PLANAR, q, v, "tip", rows=(0, 1)), controller.task_acceleration(0.5, q, v)
+    task, desired = task_dynamics(PLANAR, q, v, "tip", rows=(0, 1)), controller.task_acceleration(0.5, q, v)
     tau = controller.torque(0.5, q, v, NONE) - PLANAR.inverse_dynamics(q, v, 0 * q)
-    np.testing.assert_allclose(tau, task.J.T @ task.Lambda @ (wanted - task.drift), atol=1e-9 * np.abs(tau).max())
-    assert tau @ np.linalg.solve(PLANAR.M(q), tau) <= ((wanted - task.drift) ** 2).sum() / 0.01
+    np.testing.assert_allclose(tau, task.J.T @ task.Lambda @ (desired - task.drift), atol=1e-9 * np.abs(tau).max())
+    assert tau @ np.linalg.solve(PLANAR.M(q), tau) <= ((desired - task.drift) ** 2).sum() / 0.01
 
 
 def test_away_from_the_singularity_nothing_is_damped() -> None:

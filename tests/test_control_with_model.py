@@ -11,7 +11,7 @@ from robot_dyn.control.computed_torque import ComputedTorque, FeedForward, PDGra
 from robot_dyn.control.independent_joint import PD, PID, gains_from
 from robot_dyn.control.reference import hold, quintic
 
-NONE = np.zeros(0)  # no memory
+NONE = np.zeros(0)  # no states
 Q, V, T = np.array([0.4, -0.9, 1.3]), np.array([-0.7, 0.2, 1.1]), 0.6
 
 

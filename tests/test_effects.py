@@ -198,7 +198,7 @@ def test_urdf_effects_are_what_the_file_states() -> None:
     assert Plant(rd.load("ur5"), effects="urdf").effects == ()
 
 
-def test_friction_of_tied_joints_counts_by_virtual_work() -> None:
+def test_friction_of_coupled_joints_counts_by_virtual_work() -> None:
     """mimic_chain: q2 = q1/2 + …, q3 = −3/8 q1 + …; b = Σ s² b_i and f = Σ |s| f_i, from the file's 0.01 and 0.02."""
     finger = rd.load("mimic_chain")
     np.testing.assert_allclose(finger.damping, [0.01 * (1 + 0.25 + 0.375**2), 0.0], rtol=1e-15)

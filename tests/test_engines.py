@@ -14,7 +14,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.compiled.right_angles import completed
 from robot_dyn.compiled.symbolic import TraceError
-from robot_dyn.control.controller import Memoryless
+from robot_dyn.control.controller import Stateless
 from robot_dyn.effects.effect import Active
 from robot_dyn.errors import QueryError
 from robot_dyn.integrate.methods import METHODS
@@ -22,7 +22,7 @@ from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.simulation.choice import choose
 from robot_dyn.simulation.machine.machine import MachineError
 from robot_dyn.simulation.machine.traced import SymbolicDynamics
-from robot_dyn.simulation.motion import Motion
+from robot_dyn.simulation.state_equation import StateEquation
 
 ARM = rd.load("planar_2r")
 UR5 = completed(rd.load("ur5"))[0]  # its file states right angles with too few digits
@@ -166,7 +166,7 @@ def test_progress_is_told_and_an_interrupt_keeps_the_samples() -> None:
 
 @final
 @dataclass(frozen=True)
-class Elsewhere(Memoryless):
+class Elsewhere(Stateless):
     """A controller written elsewhere, which traces nonetheless."""
 
     n: int = 2
@@ -215,21 +215,23 @@ def test_what_cannot_be_compiled_is_named() -> None:
 def test_auto_compiles_where_it_pays() -> None:
     """Evaluations times their cost: a second of motion is short, an hour is not."""
     setup = rd.Setup(rd.Plant(ARM), Q, duration_s=1.0)
-    assert choose(setup, Motion(setup.plant, None))[1] == "interpreted (short: compiling does not pay)"
+    assert choose(setup, StateEquation(setup.plant, None))[1] == "interpreted (short: compiling does not pay)"
     long = replace(setup, duration_s=3600.0)
-    machine, words = choose(long, Motion(setup.plant, None))
+    machine, words = choose(long, StateEquation(setup.plant, None))
     assert machine is not None and words == "compiled"
 
 
 def test_a_machine_that_disagrees_is_refused(monkeypatch) -> None:
-    """A referee that cannot refuse is none: the interpreted motion is given another gravity behind its back."""
+    """The interpreted equation has another gravity than the compiled one: the self check refuses it."""
     from robot_dyn.simulation.machine import making
 
     setup = rd.Setup(rd.Plant(ARM), Q)
-    made = making.machine(Motion(setup.plant, None), rd.method("rk4"))
+    made = making.machine(StateEquation(setup.plant, None), rd.method("rk4"))
     made.check(setup)
     equations = replace(made.equations, checked=set())
-    other = replace(made, motion=Motion(rd.Plant(ARM.with_(gravity=(0.0, 0.0, -9.80664))), None), equations=equations)
+    other = replace(
+        made, equation=StateEquation(rd.Plant(ARM.with_(gravity=(0.0, 0.0, -9.80664))), None), equations=equations
+    )
     with pytest.raises(
         MachineError, match=r"differs from the interpreted one by .* allowed: take engine='interpreted'"
     ):

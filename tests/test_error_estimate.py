@@ -48,7 +48,7 @@ def test_estimate_is_within_a_factor_of_ten_of_the_true_error(scene) -> None:
     tight = rd.simulate(setup(*scene), integrator=rd.Adaptive(rtol=1e-13, atol=1e-14), estimate_error=False)
     error, estimate = true_error(run, reference), run.error
     assert estimate is not None
-    assert np.abs(reference.q[-1] - tight.q[-1]).max() < 1e-3 * error[-1]  # the referees agree
+    assert np.abs(reference.q[-1] - tight.q[-1]).max() < 1e-3 * error[-1]  # the references agree
     assert estimate.resolved_until == scene[-2]
     assert estimate.note == ""
     assert 0.1 < estimate.final / error[-1] < 10

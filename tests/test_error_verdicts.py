@@ -126,12 +126,12 @@ def test_a_tick_within_rounding_of_a_switch_moves_onto_it() -> None:
     """3 · 0.1 is not 0.3: one end of a segment, at the switch, and the controller acts there."""
     push = rd.ExternalWrench("block", np.ones(6), start_s=0.3, end_s=0.7)
     law = rd.PD(rd.hold([0.0]), 1.0, 1.0, period_s=0.1)
-    stretches = rd.Setup(rd.Plant(RAIL, [push]), [0.1], duration_s=1.0, controller=law).stretches
-    starts = [each.start for each in stretches]
+    segments = rd.Setup(rd.Plant(RAIL, [push]), [0.1], duration_s=1.0, controller=law).segments
+    starts = [each.start for each in segments]
     assert len(starts) == 10
     assert 0.3 in starts
     assert 0.7 in starts
-    assert all(each.tick for each in stretches)
+    assert all(each.tick for each in segments)
 
 
 def test_control_at_the_default_step_is_estimated() -> None:
@@ -248,7 +248,7 @@ class Pulse(Active):
     "method", [rd.method("rk4"), rd.method("gauss_6"), rd.method("semi_implicit_euler"), rd.Adaptive()]
 )
 def test_code_that_acts_between_steps_is_looked_at_there(method) -> None:
-    """A pulse of 1 ms inside steps of 10 ms, at no node: nothing that marches sees it."""
+    """A pulse of 1 ms inside steps of 10 ms, at no node: no method sees it."""
     options = {} if isinstance(method, rd.Adaptive) else {"step_s": 0.01}
     run = rd.simulate(
         rd.Plant(RAIL, [Pulse(0.5016, 1e-3, 1e3)]), q0=[0.0], v0=[0.2], duration_s=2.0, integrator=method, **options

@@ -63,7 +63,7 @@ def test_a_diverged_run_shows_how_it_began_and_how_it_ended(cart, tmp_path) -> N
     energy = Ledger(growth[:, 0], growth[:, 1], {"control": growth[:, 0]})
     end = Outcome(Ending.DIVERGED, 5.0, "take a smaller step")
     fast = {"q": growth, "v": growth, "tau": growth, "ledger": energy, "outcome": end}
-    run = stretched(cart, 200, **fast, deviation=growth, wanted=growth)
+    run = stretched(cart, 200, **fast, deviation=growth, desired=growth)
     save_plot(run, tmp_path / "diverged.png", dpi=40)
     figure = plot(run)
     assert all(np.isfinite([*axes.get_xlim(), *axes.get_ylim()]).all() for axes in figure.axes)

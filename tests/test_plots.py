@@ -34,7 +34,7 @@ def test_positions_and_velocities_are_the_runs(run) -> None:
 
 
 def test_desired_positions_are_dashed(run, cart) -> None:
-    for axes, column in zip(cells(plot(run, "joints"), "q"), run.wanted.T, strict=True):
+    for axes, column in zip(cells(plot(run, "joints"), "q"), run.desired.T, strict=True):
         (line,) = lines(axes, "desired")
         assert line.is_dashed()
         np.testing.assert_array_equal(line.get_ydata(), column)
@@ -97,7 +97,7 @@ def test_tracking_is_the_deviation_with_its_rms(run, cart) -> None:
     for axes, column in zip(figure.axes, run.deviation.T, strict=True):
         np.testing.assert_array_equal(axes.lines[0].get_ydata(), column)
     assert any(f"rms {run.tracking_error:.2e} rad" in text.get_text() for text in figure.texts)
-    frame = plot(replace(run, wanted=None, deviation=run.deviation[:, :3]), "tracking")
+    frame = plot(replace(run, desired=None, deviation=run.deviation[:, :3]), "tracking")
     assert [axes.get_title(loc="left") for axes in frame.axes] == ["frame, x", "frame, y", "frame, z"]
     assert {axes.get_ylabel() for axes in frame.axes} == {"error [m]"}
     with pytest.raises(PlotError, match="no reference"):

@@ -1,4 +1,4 @@
-"""What is wanted at time t: piecewise polynomials, their ends and joints, lines, circles and turns."""
+"""What is desired at time t: piecewise polynomials, their ends and joints, lines, circles and turns."""
 
 from __future__ import annotations
 

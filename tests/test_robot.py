@@ -21,7 +21,7 @@ every_robot = pytest.mark.parametrize("name", ("pendulum", "ur5", "panda", "skew
 # --- what Pinocchio says
 
 
-def test_untied_robot_says_what_pinocchio_says():
+def test_uncoupled_robot_says_what_pinocchio_says():
     robot = rd.load("ur5")
     model = robot.model
     data = model.createData()

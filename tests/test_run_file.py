@@ -53,6 +53,20 @@ def test_a_run_comes_back_as_it_was(run, tmp_path) -> None:
     assert back.summary == run.summary
 
 
+def test_a_file_of_the_format_before_is_read(run, tmp_path) -> None:
+    """Format 3 had `desired` under another name."""
+    run = replace(run, desired=run.q + 0.1, deviation=run.q - 0.1)
+
+    def third(text: np.ndarray) -> np.ndarray:
+        return said(text, format=3)
+
+    path = resaved(run, tmp_path / "a.npz", about=third, desired=lambda _: None, wanted=lambda _: run.desired)
+    assert_same(replace(rd.load_run(path), about=run.about), run)
+    path = resaved(run, tmp_path / "b.npz", about=third)
+    with pytest.raises(RunFileError, match="'desired' is not known to the format of the file"):
+        rd.load_run(path)
+
+
 def test_a_run_file_needs_nothing_else(run, tmp_path) -> None:
     """The URDF, the edits, the scene and the versions travel with the numbers."""
     about = rd.load_run(rd.save_run(run, tmp_path / "run.npz")).about
@@ -147,7 +161,7 @@ def said(text: np.ndarray, **changes) -> np.ndarray:
         ("q", lambda q: np.where(q > 0, np.inf, q), "member 'q' of a run that did not diverge holds nan or inf"),
         ("ledger/kinetic", lambda K: K[:5], "member 'ledger/kinetic' holds"),
         ("power/control", lambda _: None, "have different names"),
-        ("wanted", lambda _: np.zeros(3), "member 'wanted' holds"),
+        ("desired", lambda _: np.zeros(3), "member 'desired' holds"),
         ("deviation", lambda _: np.zeros((2, 2)), "member 'deviation' holds"),
         ("at_stop", lambda _: np.zeros((10, 2), bool), "member 'at_stop' holds"),
         ("wrenches/tip", lambda _: np.full((3, 7), np.nan), "member 'wrenches/tip' .*nan"),
@@ -157,9 +171,10 @@ def said(text: np.ndarray, **changes) -> np.ndarray:
         ("about", lambda _: None, "'about' is missing"),
         ("about", lambda text: np.array("[" * 100_000), "'about' is not the JSON"),
         ("about", lambda text: np.array([str(text)]), "'about' holds .*not one text"),
-        ("about", lambda text: said(text, format=2), "it has format 2, this version reads 3; simulate again"),
+        ("about", lambda text: said(text, format=2), "it has format 2, this version reads 4; simulate again"),
         ("about", lambda text: said(text, format="3"), "it has format '3'"),
         ("about", lambda text: said(text, format={"a": 3}), "it has format {'a': 3}"),
+        ("wanted", lambda _: np.zeros((21, 2)), "'wanted' is not known to this version"),
         ("about", lambda text: said(text, novelty=3), "'novelty' is not known to this version"),
         ("about", lambda text: said(text, about__urdf=3), "'about/urdf' holds 3, not str"),
         ("about", lambda text: said(text, about__urdf="\ud800"), "'about/urdf' holds half a character"),

@@ -6,8 +6,8 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.errors import QueryError
-from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.size import check_record, samples, segments, steps
+from robot_dyn.simulation.state_equation import StateEquation
 
 ARM = rd.Plant(rd.load("planar_2r"), [rd.ExternalWrench("tip", [1.0] * 6, start_s=0.3, end_s=0.7)])
 LAW = rd.PD(rd.hold([0.1, 0.2]), 3.0, 1.0, period_s=0.01)
@@ -48,7 +48,7 @@ def test_the_size_that_is_told_bounds_the_run(method, law, period: float) -> Non
     )
     run = rd.simulate(setup, engine="interpreted")
     many = segments(setup)
-    assert len(setup.stretches) <= many <= len(setup.stretches) + 6
+    assert len(setup.segments) <= many <= len(setup.segments) + 6
     assert len(run.t) <= samples(setup) <= len(run.t) + 4 * many + 3
     if not isinstance(method, rd.Adaptive):
         assert run.statistics.steps <= steps(setup) <= run.statistics.steps + 4 * many
@@ -58,4 +58,4 @@ def test_what_fits_is_not_refused() -> None:
     """An hour of 1 kHz control with samples of 10 ms: 3.6e6 ticks, 3.6e5 samples."""
     law = rd.PD(rd.hold([0.1, 0.2]), 3.0, 1.0, period_s=0.001)
     setup = rd.Setup(ARM, [0.1, 0.2], duration_s=3600.0, controller=law, record_period_s=0.01)
-    check_record(setup, Motion(setup.plant, setup.controller))
+    check_record(setup, StateEquation(setup.plant, setup.controller))

@@ -178,10 +178,10 @@ def test_a_frame_that_follows_a_circle_has_a_deviation_in_metres() -> None:
     path = rd.circle(g[:3, 3] + [0.0, 0.05, 0.0], 0.05, [0, 0, 1], 1.0, toward=[0, -1, 0], rotation=g[:3, :3])
     law = rd.OperationalSpace(arm, "tool0", path, 400.0, 40.0)
     run = rd.simulate(arm, q0=q0, duration_s=0.2, controller=law, step_s=4e-3, estimate_error=False)
-    wanted, p = path.at(run.t)[0], arm.placement(run.q, "tool0")[:, :3, 3]
-    assert run.wanted is None
-    np.testing.assert_allclose(run.deviation, p - wanted, atol=1e-15)
-    assert run.tracking_error == pytest.approx(np.sqrt(np.mean((p - wanted) ** 2)))
+    desired, p = path.at(run.t)[0], arm.placement(run.q, "tool0")[:, :3, 3]
+    assert run.desired is None
+    np.testing.assert_allclose(run.deviation, p - desired, atol=1e-15)
+    assert run.tracking_error == pytest.approx(np.sqrt(np.mean((p - desired) ** 2)))
     assert "tracking error of the frame [m]: " in run.summary
 
 

@@ -1,4 +1,4 @@
-"""Runs under control: zero-order hold, ticks, memory, effort limits; and what a run evaluates."""
+"""Runs under control: zero-order hold, ticks, controller states, effort limits; and what a run evaluates."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_torque_of_a_sampled_controller_is_held_between_its_ticks(method) -> Non
 
 @pytest.mark.parametrize("method", METHODS, ids=name)
 @pytest.mark.parametrize("step", [0.012, 1e-3], ids=["a step a tick", "twelve steps a tick"])
-def test_memory_of_a_sampled_pid_advances_once_a_tick(method, step: float) -> None:
+def test_states_of_a_sampled_pid_advance_once_a_tick(method, step: float) -> None:
     """z⁺ = z + period · ż at the tick, z = 0 at the first: τ at each tick is that of the recursion, to rounding."""
     law = rd.PID(GOAL, [80.0, 20.0], [900.0, 400.0], [9.0, 2.0], effort_limit=[25.0, 8.0], period_s=0.012)
     run = rd.simulate(PLANT, **START, duration_s=0.24, controller=law, **stepped(method, step))
@@ -70,7 +70,7 @@ def test_memory_of_a_sampled_pid_advances_once_a_tick(method, step: float) -> No
     for i in ticks:
         t, q, v = run.t[i], run.q[i], run.v[i]
         np.testing.assert_allclose(run.tau[i], law.torque(t, q, v, z), rtol=1e-11)
-        z = z + 0.012 * law.memory_rate(t, q, v, z)
+        z = z + 0.012 * law.state_rate(t, q, v, z)
     assert (np.abs(z) > 1.0).all()  # an integral that matters
 
 
@@ -96,8 +96,8 @@ def test_exact_computed_torque_makes_each_joint_a_linear_oscillator() -> None:
     damped, t = omega * np.sqrt(1 - zeta**2), run.t[:, None]
     wave = e0 * np.cos(damped * t) + (de0 + decay * e0) / damped * np.sin(damped * t)
     np.testing.assert_allclose([0.9, 0.2] - run.q, np.exp(-decay * t) * wave, atol=1e-10)
-    assert run.wanted is not None
-    np.testing.assert_array_equal(run.wanted, np.tile([0.9, 0.2], (len(run.t), 1)))
+    assert run.desired is not None
+    np.testing.assert_array_equal(run.desired, np.tile([0.9, 0.2], (len(run.t), 1)))
     rms = np.sqrt(np.mean((np.exp(-decay * t) * wave) ** 2))
     assert run.tracking_error == pytest.approx(rms, rel=1e-8)
 

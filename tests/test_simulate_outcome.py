@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.control.controller import ControlError, Memoryless
+from robot_dyn.control.controller import ControlError, Stateless
 from robot_dyn.effects.effect import Active, Conservative
 from robot_dyn.errors import EffectError, QueryError
 from robot_dyn.simulation.error_controlled import ErrorControlled
@@ -28,7 +28,7 @@ def name(each) -> str:
 
 @final
 @dataclass(frozen=True)
-class Interrupted(Memoryless):
+class Interrupted(Stateless):
     """No torque up to `until`; then `ending` is raised, or returned."""
 
     ending: BaseException | float
@@ -214,7 +214,7 @@ class Blow(Active):
 
 
 @final
-class Law(Memoryless):
+class Law(Stateless):
     """A controller that returns what it is told to."""
 
     n = 2
@@ -296,12 +296,12 @@ def test_an_interrupt_in_a_companion_run_ends_the_estimate_and_keeps_the_run(met
     """All samples are there, no other companion starts, and the outcome says where the interrupt came."""
     ran = []
 
-    def on_second(march):
+    def on_second(advance):
         def interrupted(self, *arguments):
             ran.append(self)
             if len(ran) == 2:
                 raise KeyboardInterrupt
-            return march(self, *arguments)
+            return advance(self, *arguments)
 
         return interrupted
 

@@ -10,7 +10,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.integrate.implicit import jacobian
 from robot_dyn.integrate.integrator import System
-from robot_dyn.simulation.motion import Motion
+from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.state_functions import interpreted, system
 from robot_dyn.simulation.watch import Watch
 
@@ -33,11 +33,11 @@ def test_a_jacobian_is_taken_inside_the_width_of_the_rate(width: float) -> None:
 @pytest.mark.parametrize("width", [1e-5, 1e-7, 1e-9])
 def test_the_jacobian_of_a_motion_knows_its_friction(width: float) -> None:
     """∂a/∂v of −f tanh(v / v_s) at v = 0 is −M⁻¹ f / v_s beside terms of order one; it errs by (1/100)² / 3."""
-    motion = Motion(rd.Plant(ARM, [rd.RegularisedCoulombFriction([3.0, 2.0], width)]), None)
+    equation = StateEquation(rd.Plant(ARM, [rd.RegularisedCoulombFriction([3.0, 2.0], width)]), None)
     q = np.array([0.4, -0.7])
-    setup = rd.Setup(motion.plant, q)
-    functions, bounds = interpreted(motion, Watch(setup, motion)), np.array([0.0, 1.0])
-    J = jacobian(system(functions, motion, bounds, np.zeros((0, 1))), 0.5, motion.start(q, np.zeros(2)))
+    setup = rd.Setup(equation.plant, q)
+    functions, bounds = interpreted(equation, Watch(setup, equation)), np.array([0.0, 1.0])
+    J = jacobian(system(functions, equation, bounds, np.zeros((0, 1))), 0.5, equation.start(q, np.zeros(2)))
     expected = -np.linalg.inv(ARM.M(q)) * [3.0, 2.0] / width
     np.testing.assert_allclose(J[2:4, 2:4], expected, rtol=1e-4)
 

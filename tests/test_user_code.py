@@ -19,7 +19,7 @@ from robot_dyn.simulation.table import export_csv
 ARM = rd.load("planar_2r")
 Q, V = np.array([0.4, -0.7]), np.array([0.3, 0.9])
 METHODS = (rd.method("rk4"), rd.method("gauss_4"), rd.Adaptive())
-KINDS = (rd.Controller, rd.Memoryless, rd.Conservative, rd.Dissipative, rd.Active, rd.Bound)
+KINDS = (rd.Controller, rd.Stateless, rd.Conservative, rd.Dissipative, rd.Active, rd.Bound)
 
 
 class LateError(Exception):
@@ -60,12 +60,12 @@ class FailingBound(rd.Bound):
 
 
 class FailingController(Fails, rd.Controller):
-    n, memory_size = 2, 1
+    n, state_size = 2, 1
 
     def torque(self, t, q, v, z):
         return np.array([t, z[0]])
 
-    def memory_rate(self, t, q, v, z):
+    def state_rate(self, t, q, v, z):
         return self._maybe(t, np.ones(1))
 
 
@@ -87,8 +87,8 @@ PARTS = [
       for error in ERRORS),
     ("potential", "potential of failing_potential", {"effects": [FailingPotential(LateError)]}),
     ("bound", "actuation of failing_bound", {"effects": [FailingBound()], "controller": ramp}),
-    ("states", "memory_rate of FailingController", {"controller": FailingController(ValueError)}),
-    ("sampled", "next_memory of FailingSampled", {"controller": FailingSampled(TypeError)}),
+    ("states", "state_rate of FailingController", {"controller": FailingController(ValueError)}),
+    ("sampled", "next_state of FailingSampled", {"controller": FailingSampled(TypeError)}),
     ("function", "torque of fails", {"controller": fails}),
 ]  # fmt: skip
 
@@ -115,7 +115,7 @@ def test_an_exception_at_the_start_and_in_a_query_is_the_users(error: type[Excep
             ask()
 
 
-class Mistaken(rd.Memoryless):
+class Mistaken(rd.Stateless):
     n, period_s = 2, 0.0
 
     def __init__(self, period_s: float) -> None:
@@ -147,7 +147,7 @@ def test_a_torque_of_a_wrong_shape_is_an_error_of_the_library() -> None:
             return np.ones(3)
 
     class States(FailingController):
-        def memory_rate(self, t, q, v, z):
+        def state_rate(self, t, q, v, z):
             return np.ones(2)
 
     with pytest.raises(EffectError, match="wide does not fit 2 joints"):
@@ -159,7 +159,7 @@ def test_a_torque_of_a_wrong_shape_is_an_error_of_the_library() -> None:
     object.__setattr__(plant, "effects", (broken,))
     with pytest.raises(EffectError, match="viscous_friction does not fit"):
         plant.torque(0.0, Q, V)
-    with pytest.raises(ControlError, match=r"States.memory_rate returned shape \(2,\) for 1 state"):
+    with pytest.raises(ControlError, match=r"States.state_rate returned shape \(2,\) for 1 state"):
         rd.Setup(rd.Plant(ARM), Q, controller=States(LateError))
 
 
@@ -173,7 +173,7 @@ class Opaque(rd.Active):
         return table[int(q[0])] * v
 
 
-class Raises(rd.Memoryless):
+class Raises(rd.Stateless):
     n = 2
 
     def torque(self, t, q, v, z):

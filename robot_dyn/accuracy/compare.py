@@ -134,7 +134,7 @@ def _forward_pairs(robot: Robot, own: Lagrangian, state: dict[str, np.ndarray], 
     size, pairs = magnitudes(own.linkage, q), []
     try:
         roads = {"forward_dynamics": own.forward_dynamics(q, v, tau)}
-        if robot.ties.trivial:
+        if robot.couplings.trivial:
             roads["forward_dynamics (articulated body)"] = articulated_body(own.linkage, q, v, tau)
     except SingularError:
         return []

@@ -27,7 +27,7 @@ _WORDS = {"joint", "kind", "from", "quantity", "robot", "where"}  # columns of w
 
 
 def info(robot: Robot) -> Document:
-    """A robot's joints, ties, mass and findings."""
+    """A robot's joints, couplings, mass and findings."""
     columns = ("lower", "upper", "effort_limit", "velocity_limit", "damping", "friction", "armature")
     values = np.column_stack([getattr(robot, column) for column in columns])
     joints = [
@@ -42,7 +42,8 @@ def info(robot: Robot) -> Document:
         "gravity": list(robot.edits.gravity),
         "gravity_acts": gravity_acts(robot),
         "joints": joints,
-        "ties": _ties(robot),
+        "couplings": _couplings(robot),
+        "ties": _couplings(robot),  # the former name
         "locked": dict(robot.edits.lock),
         "links": list(robot.frame_names),
         "findings": list(robot.findings),
@@ -168,8 +169,8 @@ def info_tables(robot: Robot) -> Iterator[Any]:
         table.add_row(name, kind, *("—" if x is None else f"{x:.4g}" for x in numbers))
     yield table
     yield "units: rad and N m for a joint that turns, m and N for one that slides; — is not stated"
-    for tie in document["ties"]:
-        yield f"tied: {tie['joint']} = {tie['multiplier']:g} · {tie['source']} + {tie['offset']:g}"
+    for each in document["couplings"]:
+        yield f"coupled: {each['joint']} = {each['multiplier']:g} · {each['source']} + {each['offset']:g}"
     for name, value in document["locked"].items():
         yield f"locked: {name} = {value:g}"
     for finding in robot.findings:
@@ -248,7 +249,7 @@ def demo_tables(robot: Robot) -> Iterator[Any]:
     yield from comparison_tables([(robot.name, compare(robot, samples=20))], {})
 
 
-def _ties(robot: Robot) -> list[Document]:
+def _couplings(robot: Robot) -> list[Document]:
     """Joints that follow another one, as the file states them."""
     return [
         {

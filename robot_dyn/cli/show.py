@@ -158,8 +158,8 @@ def _tell_file(file: Path, browse: bool) -> None:
     _open(file.absolute().as_uri(), browse)
 
 
-def _open(address: str, wanted: bool) -> None:
-    if wanted:
+def _open(address: str, browser: bool) -> None:
+    if browser:
         import webbrowser
 
         webbrowser.open(address)

@@ -34,7 +34,7 @@ def open_streams() -> None:
 def say(*renderables: Any) -> None:
     """Print texts, whose lines stay lines, and tables.
 
-    A reader of a pipe that has seen enough is no error: the rest is dropped.
+    A reader of a pipe that has seen enough is not an error: the rest is dropped.
 
     Raises:
         OutputError: If standard output cannot be written.

@@ -1,1 +1,1 @@
-"""The same equations as machine code: traced from the library's own lines, emitted, compiled, refereed."""
+"""The same equations as machine code: traced from the library's own lines, emitted, compiled, checked."""

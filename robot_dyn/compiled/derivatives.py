@@ -1,4 +1,4 @@
-"""Derivatives of forward dynamics: ∂a/∂q = −M⁻¹ ∂ID/∂q, ∂a/∂v = −M⁻¹ ∂ID/∂v, ∂a/∂τ = M⁻¹, tied joints too.
+"""Derivatives of forward dynamics: ∂a/∂q = −M⁻¹ ∂ID/∂q, ∂a/∂v = −M⁻¹ ∂ID/∂v, ∂a/∂τ = M⁻¹, coupled joints too.
 
 In the axes of body b, with V_<j and A_<j its twist and acceleration by the joints before j, and F = 𝓜 A − ad_Vᵀ 𝓜 V:
 
@@ -41,8 +41,8 @@ def forward_dynamics_derivatives(robot: Robot, q: Array, v: Array, tau: Array) -
 
 
 def _one(robot: Robot, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
-    ties = robot.ties
-    by_q = ties.matrix(_by_position(robot, ties.position(q), ties.velocity(v), ties.velocity(a)))
+    couplings = robot.couplings
+    by_q = couplings.matrix(_by_position(robot, couplings.position(q), couplings.velocity(v), couplings.velocity(a)))
     columns = [-by_q, -2 * robot.C(q, v), np.eye(robot.n)]
     return np.linalg.solve(robot.M(q)[None], np.stack(columns))
 

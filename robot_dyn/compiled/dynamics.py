@@ -15,8 +15,8 @@ from robot_dyn.compiled.cache import default_store
 from robot_dyn.compiled.derivatives import forward_dynamics_derivatives
 from robot_dyn.compiled.engine import Engine
 from robot_dyn.compiled.on_first_use import OnFirstUse
-from robot_dyn.compiled.referee import Referee
 from robot_dyn.compiled.right_angles import completed
+from robot_dyn.compiled.self_check import SelfCheck
 from robot_dyn.compiled.threads import thread_count
 from robot_dyn.compiled.trace import ARGUMENTS, Trace
 from robot_dyn.model.dynamics import Axes, Dynamics
@@ -80,7 +80,7 @@ class CompiledDynamics(Dynamics):
             trace.quantity,
             trace.shape,
             ARGUMENTS,
-            Referee(robot, "Pinocchio"),
+            SelfCheck(robot, "Pinocchio"),
             truth,
             self.joint_names,
             self.dtype,

@@ -1,4 +1,4 @@
-"""The engine of a compiled robot or plant: each quantity is traced, compiled and refereed when it is first asked for.
+"""The engine of a compiled robot or plant: each quantity is traced, compiled and checked when it is first asked for.
 
 A quantity of one state costs one call of machine code; what that reports, and lists, batches and errors, go the general
 way, `ask`.
@@ -18,7 +18,7 @@ from robot_dyn.compiled.arguments import into
 from robot_dyn.compiled.from_casadi import program_of
 from robot_dyn.compiled.kernel import Kernel
 from robot_dyn.compiled.on_first_use import OnFirstUse
-from robot_dyn.compiled.referee import STATES, Referee
+from robot_dyn.compiled.self_check import STATES, SelfCheck
 from robot_dyn.compiled.status import Status
 from robot_dyn.compiled.store import Store
 from robot_dyn.compiled.trace import Traced
@@ -46,8 +46,8 @@ class Engine:
         traced: Gives the trace of a quantity.
         shape: Gives the shape of a quantity for one state.
         arguments: Names of the arguments by quantity; "t" is a time.
-        referee: What kernels must agree with.
-        truth: The referee's answer: (quantity, states) → (STATES, …), and the torque of effects, a term.
+        self_check: What kernels must agree with.
+        truth: The independent answer: (quantity, states) → (STATES, …), and the torque of effects, a term.
         joint_names: For messages.
         dtype: "float64" or "float32".
         threads: For batches.
@@ -58,7 +58,7 @@ class Engine:
     traced: Callable[[str], Traced]
     shape: Callable[[str], tuple[int, ...]]
     arguments: dict[str, tuple[str, ...]]
-    referee: Referee
+    self_check: SelfCheck
     truth: Callable[[str, dict[str, np.ndarray]], tuple[np.ndarray, Any]]
     joint_names: tuple[str, ...]
     dtype: str
@@ -94,7 +94,7 @@ class Engine:
             return True
         warnings.warn(
             f"{quantity} takes {count} instructions, more than the {LARGEST_KERNEL} that are worth compiling;"
-            f" {self.referee.name} answers, at its own speed",
+            f" {self.self_check.name} answers, at its own speed",
             SizeWarning,
             stacklevel=2,
         )
@@ -188,7 +188,7 @@ class Engine:
         doubtful = _DOUBTFUL if quantity == "forward_dynamics" else np.inf
         times = self.arguments[quantity][0] == "t"
         program = program_of(self.traces[quantity].function)
-        about = f"{self.referee.dynamics.name}: {quantity}, {self.dtype}"
+        about = f"{self.self_check.dynamics.name}: {quantity}, {self.dtype}"
         return Kernel(program, self.shape(quantity), self.dtype, times, doubtful, self.store, about)
 
     def _one(self, quantity: str) -> Any:
@@ -214,16 +214,16 @@ class Engine:
         return kernel.many
 
     def _judge(self, quantity: str, run: Callable[[list[list[Any]], np.ndarray], Any]) -> None:
-        """Hold what `run` writes, and reports by one Status or one a state, to the referee."""
+        """Hold what `run` writes, and reports by one Status or one a state, to the independent answer."""
         names = self.arguments[quantity]
-        state = {name: x.astype(self.dtype).astype(float) for name, x in self.referee.states().items()}
+        state = {name: x.astype(self.dtype).astype(float) for name, x in self.self_check.states().items()}
         rows = [
             [float(state[n][i]) if n == "t" else state[n][i].astype(self.dtype) for n in names] for i in range(STATES)
         ]
         ours = np.full((STATES, *self.shape(quantity)), np.nan, self.dtype)  # a state in doubt is not written
         answered = np.broadcast_to(np.equal(run(rows, ours), Status.FINE), STATES)
         theirs, effects = self.truth(quantity, state)
-        self.referee.judge(quantity, ours.reshape(theirs.shape), theirs, self.dtype, effects, answered)
+        self.self_check.judge(quantity, ours.reshape(theirs.shape), theirs, self.dtype, effects, answered)
 
 
 def _never(*_: Any) -> int:

@@ -58,7 +58,7 @@ class Kernel:
     def call(self) -> Callable[..., int]:
         """For one state, (x₁, …, y) → Status: arrays (nᵢ,), y of the shape of the result, C-contiguous.
 
-        It takes any objects; those that are no such arrays it reports.
+        It takes any objects; those that are not such arrays it reports.
         """
         return python_function(self._address("call", "one state", self._write_state), self.dtype)
 

@@ -33,7 +33,7 @@ def slid(linkage: Linkage) -> Linkage:
 
 
 def of_bodies(linkage: Linkage, bodies: Sequence[Body], inertias: Sequence[Array]) -> Linkage:
-    """A linkage of other bodies, each with its 𝓜 (6, 6), its joints and their ties as they are."""
+    """A linkage of other bodies, each with its 𝓜 (6, 6), its joints and their couplings as they are."""
     at = Pose(np.eye(3, dtype=linkage.gravity.dtype), np.zeros_like(linkage.gravity))
     links = {body.joint: (i, at, inertia) for i, (body, inertia) in enumerate(zip(bodies, inertias, strict=True))}
     return replace(linkage, bodies=tuple(bodies), links=links)

@@ -19,7 +19,7 @@ from robot_dyn.compiled.dynamics import CompiledDynamics
 from robot_dyn.compiled.engine import Engine
 from robot_dyn.compiled.from_casadi import instructions
 from robot_dyn.compiled.interrupts import interrupts_later
-from robot_dyn.compiled.referee import Referee
+from robot_dyn.compiled.self_check import SelfCheck
 from robot_dyn.compiled.symbolic import Symbols, TraceError, column, every_branch, inputs
 from robot_dyn.compiled.trace import Trace, Traced
 from robot_dyn.effects.effect import Bound
@@ -75,7 +75,7 @@ class CompiledPlant:
             self._traced,
             lambda quantity: (robot.n,),
             _ARGUMENTS,
-            Referee(robot, "the interpreted plant"),
+            SelfCheck(robot, "the interpreted plant"),
             truth,
             robot.joint_names,
             self.dynamics.dtype,
@@ -204,7 +204,7 @@ class CompiledPlant:
 def _traced(effect: Any, function: Callable[[], Any]) -> np.ndarray:
     try:
         made = every_branch(function)
-        column(made)  # of what is no number it says so
+        column(made)  # reports what is not a number
         return made
     except Exception as error:  # whatever a user's code raises on symbols
         raise TraceError(

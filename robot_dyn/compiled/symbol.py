@@ -181,7 +181,7 @@ def select(condition: Any, yes: Any, no: Any) -> Symbol:
 
 
 def symbol(x: Any) -> Symbol:
-    """A number or symbol as a symbol; TypeError if it is no number."""
+    """A number or symbol as a symbol; TypeError if it is not a number."""
     if (made := _symbol(x)) is None:
         raise TypeError(f"not a number: {x!r}")
     return made

@@ -127,11 +127,11 @@ class Trace:
 
     def _roads(self, name: str) -> Iterator[tuple[str, Callable[[], Node]]]:
         """The formulations of a quantity."""
-        own, tied = self.lagrangian, self.lagrangian.linkage.ties.S.shape[0] != self.lagrangian.n
+        own, coupled = self.lagrangian, self.lagrangian.linkage.couplings.S.shape[0] != self.lagrangian.n
         if name != "forward_dynamics_derivatives" and (own.n <= _CLOSED_FORM_MOST or name == "C"):
             arrays = [self.symbols[argument][1] for argument in ARGUMENTS[name]]
             yield "closed form", lambda: column(getattr(own, name)(*arrays))
-        if name == "forward_dynamics" and not tied:
+        if name == "forward_dynamics" and not coupled:
             yield "articulated body", lambda: self._forward
             depth = max(len(body.path) for body in own.linkage.bodies)
             yield from self._of_recursion(name) if depth <= _SOLVED_MOST else ()

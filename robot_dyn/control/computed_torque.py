@@ -10,14 +10,14 @@ from dataclasses import dataclass
 from typing import Any, final
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.control.controller import ControlError, Memoryless, check_model, freeze
+from robot_dyn.control.controller import ControlError, Stateless, check_model, freeze
 from robot_dyn.control.independent_joint import joint_count
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.model.dynamics import Dynamics
 
 
 @dataclass(frozen=True, eq=False)
-class ModelBased(Memoryless):
+class ModelBased(Stateless):
     """A controller with a model of the arm and a plan.
 
     Attributes:

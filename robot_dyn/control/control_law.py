@@ -11,12 +11,12 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.control.controller import ControlError, Memoryless
+from robot_dyn.control.controller import ControlError, Stateless
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class ControlLaw(Memoryless):
+class ControlLaw(Stateless):
     """A function (t, q, v) → τ as a continuous controller.
 
     Attributes:

@@ -1,7 +1,7 @@
 """What a controller is: τ = τ(t, q, v, z), with states ż = rate(t, q, v, z) where it needs some.
 
 The controller states z are states like q and v: a continuous controller (`period_s` 0) has them integrated with the
-plant, a sampled one takes z⁺ = z + period · rate at its ticks and holds its torque between them.
+plant, a sampled one takes z⁺ = z + period · rate at its ticks and keeps its torque between them (zero-order hold).
 [Siciliano et al. 2009, ch. 8]
 """
 
@@ -11,7 +11,7 @@ from abc import ABC, abstractmethod
 from functools import partial
 from typing import Any
 
-from robot_dyn import validate
+from robot_dyn import former, validate
 from robot_dyn.arithmetic import Array
 from robot_dyn.errors import RobotDynError, shown
 from robot_dyn.model.dynamics import Dynamics
@@ -25,12 +25,12 @@ class ControlError(RobotDynError):
 class Controller(ABC):
     """A control law τ = τ(t, q, v, z) with controller states, ż = rate(t, q, v, z), z(0) = 0.
 
-    Subclass `Memoryless` if it has no states. Its methods are pure functions, called with
+    Subclass `Stateless` if it has no states. Its methods are pure functions, called with
 
         t: time, a number, in [s]
         q: position, (n,), in [rad] or [m] by joint
         v: velocity, (n,), in [rad/s] or [m/s]
-        z: controller states, (memory_size,)
+        z: controller states, (state_size,)
 
     and with symbols in place of these numbers where it is compiled: written in `robot_dyn.arithmetic` and NumPy's
     operators it runs in both engines. An attribute `reference` that is a `PiecewisePolynomial` is what a run is
@@ -41,6 +41,12 @@ class Controller(ABC):
     """
 
     period_s: float = 0.0
+
+    memory_size, memory_rate, next_memory = map(former.Attribute, ("state_size", "state_rate", "next_state"))
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        former.adopt(cls, {"memory_size": "state_size", "memory_rate": "state_rate", "next_memory": "next_state"})
 
     @property
     def name(self) -> str:
@@ -54,7 +60,7 @@ class Controller(ABC):
 
     @property
     @abstractmethod
-    def memory_size(self) -> int:
+    def state_size(self) -> int:
         """Number of controller states z, which start at zero."""
 
     @property
@@ -68,23 +74,26 @@ class Controller(ABC):
         """Torque it asks of the joints, shape (n,), in [N m] or [N]."""
 
     @abstractmethod
-    def memory_rate(self, t: float, q: Array, v: Array, z: Array) -> Array:
-        """Rate ż of the controller states, shape (memory_size,), in the unit of z per [s]."""
+    def state_rate(self, t: float, q: Array, v: Array, z: Array) -> Array:
+        """Rate ż of the controller states, shape (state_size,), in the unit of z per [s]."""
 
-    def next_memory(self, t: float, q: Array, v: Array, z: Array) -> Array:
-        """States of a sampled controller after its tick at t: z⁺ = z + period · ż, shape (memory_size,)."""
-        return z + self.period_s * self.memory_rate(t, q, v, z)
+    def next_state(self, t: float, q: Array, v: Array, z: Array) -> Array:
+        """States of a sampled controller after its tick at t: z⁺ = z + period · ż, shape (state_size,)."""
+        return z + self.period_s * self.state_rate(t, q, v, z)
 
 
-class Memoryless(Controller):
+class Stateless(Controller):
     """A controller without states of its own: τ = τ(t, q, v); z is empty. Contract as of `Controller`."""
 
     @property
-    def memory_size(self) -> int:
+    def state_size(self) -> int:
         return 0
 
-    def memory_rate(self, t: float, q: Array, v: Array, z: Array) -> Array:
+    def state_rate(self, t: float, q: Array, v: Array, z: Array) -> Array:
         return z
+
+
+__getattr__ = former.module_names(globals(), Memoryless="Stateless")
 
 
 number = partial(validate.number, error=ControlError)

@@ -11,14 +11,14 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.control.controller import ControlError, Controller, Memoryless, freeze, number, numbers
+from robot_dyn.control.controller import ControlError, Controller, Stateless, freeze, number, numbers
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.errors import shown
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class PD(Memoryless):
+class PD(Stateless):
     """Spring and damper toward the reference: τ = kp (q_d − q) + kd (v_d − v).
 
     Attributes:
@@ -50,11 +50,11 @@ class PD(Memoryless):
 class PID(Controller):
     """PD and an integral that a limit on the effort does not wind up.
 
-    The memory z is the integral's torque. Where the wanted torque u exceeds the limit, the excess flows back:
+    The state z is the integral's torque. Where the desired torque u exceeds the limit, the excess flows back:
 
         τ = sat(u),   u = kp e + kd ė + z,   ż = ki e + (sat(u) − u)/T_t
 
-    so that at a held error z settles at sat(u) + T_t ki e − kp e − kd ė instead of growing. Sampled, this is stable
+    so that at a constant error z settles at sat(u) + T_t ki e − kp e − kd ė instead of growing. Sampled, this is stable
     for period < 2 T_t.
 
     Attributes:
@@ -96,17 +96,17 @@ class PID(Controller):
         return joint_count(self.reference)
 
     @property
-    def memory_size(self) -> int:
+    def state_size(self) -> int:
         return self.n
 
     def torque(self, t: float, q: Array, v: Array, z: Array) -> Array:
-        return self._saturated(self._wanted(t, q, v, z)[0])
+        return self._saturated(self._desired(t, q, v, z)[0])
 
-    def memory_rate(self, t: float, q: Array, v: Array, z: Array) -> Array:
-        u, e = self._wanted(t, q, v, z)
+    def state_rate(self, t: float, q: Array, v: Array, z: Array) -> Array:
+        u, e = self._desired(t, q, v, z)
         return self.ki * e + (self._saturated(u) - u) / self.tracking_time_s
 
-    def _wanted(self, t: float, q: Array, v: Array, z: Array) -> tuple[Array, Array]:
+    def _desired(self, t: float, q: Array, v: Array, z: Array) -> tuple[Array, Array]:
         q_d, v_d, _ = self.reference.at(t)
         e = q_d - q
         return self.kp * e + self.kd * (v_d - v) + z, e
@@ -142,7 +142,7 @@ def gains_from(inertia_diagonal: Any, frequency: Any, damping_ratio: Any = 1.0) 
 
 
 def joint_count(reference: Any) -> int:
-    """Number of joints of a joint reference; ControlError if it is none."""
+    """Number of joints of a joint reference; raises ControlError if it is not one."""
     if not isinstance(reference, PiecewisePolynomial):
         raise ControlError(f"reference must be a PiecewisePolynomial, such as hold(q), got {shown(reference)}")
     return reference.n

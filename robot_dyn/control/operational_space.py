@@ -14,7 +14,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array, apply, transpose
 from robot_dyn.control.cartesian import CartesianReference
-from robot_dyn.control.controller import ControlError, Memoryless, check_model, freeze, number, numbers
+from robot_dyn.control.controller import ControlError, Stateless, check_model, freeze, number, numbers
 from robot_dyn.control.orientation import orientation_error
 from robot_dyn.errors import shown
 from robot_dyn.model.dynamics import Dynamics, acceleration
@@ -97,7 +97,7 @@ def task_dynamics(
 
 @final
 @dataclass(frozen=True, eq=False)
-class OperationalSpace(Memoryless):
+class OperationalSpace(Stateless):
     """Computed torque for a frame, and a posture in the motions the task leaves free.
 
         F = Λ (ẍ_d + kd ė + kp e) + μ + p
@@ -169,7 +169,7 @@ class OperationalSpace(Memoryless):
         return apply(transpose(task.J), F) + apply(task.projector, free)
 
     def task_acceleration(self, t: float, q: Array, v: Array) -> Array:
-        """Wanted acceleration ẍ_d + kd ė + kp e of the task, shape (m,), in [m/s²] and [rad/s²]."""
+        """Desired acceleration ẍ_d + kd ė + kp e of the task, shape (m,), in [m/s²] and [rad/s²]."""
         rows = self.rows
         p_d, R_d, twist_d, rate_d = self.reference.at(t)
         g = self.model.placement(q, self.frame)
@@ -181,7 +181,7 @@ class OperationalSpace(Memoryless):
 
 
 def _rows(rows: Any) -> tuple[int, ...]:
-    """Rows of a twist, increasing; ControlError if they are none."""
+    """Rows of a twist, increasing; raises ControlError if they are not."""
     try:
         chosen = tuple(index(row) for row in rows if not isinstance(row, bool))
     except (TypeError, OverflowError):

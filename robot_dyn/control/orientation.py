@@ -32,9 +32,9 @@ def rotation_vector(R: Array) -> Array:
     return (np.where(w < 0, -1, 1) * ratio)[..., None] * x
 
 
-def orientation_error(R_wanted: Array, R: Array) -> Array:
-    """The turn in base axes that takes R to the wanted orientation: φ with R_wanted = exp(φ̂) R, shape (..., 3)."""
-    return rotation_vector(R_wanted @ transpose(R))
+def orientation_error(R_desired: Array, R: Array) -> Array:
+    """The turn in base axes that takes R to the desired orientation: φ with R_desired = exp(φ̂) R, shape (..., 3)."""
+    return rotation_vector(R_desired @ transpose(R))
 
 
 def _quaternion(R: Array) -> tuple[Array, Array]:

@@ -1,4 +1,4 @@
-"""What is wanted at time t, as a piecewise polynomial: q(t) = Σⱼ cᵢⱼ (t − tᵢ)ʲ on tᵢ ≤ t ≤ tᵢ₊₁.
+"""What is desired at time t, as a piecewise polynomial: q(t) = Σⱼ cᵢⱼ (t − tᵢ)ʲ on tᵢ ≤ t ≤ tᵢ₊₁.
 
 Every reference is such a table, whatever made it, so one evaluator serves them all, traced or not.
 Each piece is Hermite's polynomial of what is given at its two ends. [Siciliano et al. 2009, ch. 4]
@@ -211,7 +211,7 @@ def _smooth_derivatives(h: np.ndarray, points: np.ndarray, m: int, ends: np.ndar
 
 
 def increasing(name: str, values: Any, count: int) -> np.ndarray:
-    """Increasing times, shape (count,), frozen; ControlError if they are none."""
+    """Increasing times, shape (count,), frozen; raises ControlError if they are not."""
     times = numbers(name, values, (count,))
     if not (np.diff(times) > 0).all():
         raise ControlError(f"{name} must increase, got {values!r}")

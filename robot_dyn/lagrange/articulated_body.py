@@ -20,21 +20,21 @@ def articulated_body(linkage: Linkage, q: Array, v: Array, tau: Array) -> Array:
     """Acceleration a = M⁻¹ (τ − C v − N), shape (..., n).
 
     Args:
-        linkage: Its joints must not be tied; `Lagrangian.forward_dynamics` takes those that are.
+        linkage: Its joints must not be coupled; `Lagrangian.forward_dynamics` takes those that are.
         q: Positions, (..., n), numbers of the linkage's arithmetic.
         v: Velocities, (..., n).
         tau: Torques, (..., n).
 
     Raises:
-        QueryError: If joints are tied.
+        QueryError: If joints are coupled.
         SingularError: If a joint carries no inertia; UndecidedError if rounding hides whether it does.
     """
-    if linkage.ties.S.shape[0] != linkage.ties.S.shape[1]:
-        raise QueryError("the articulated-body algorithm takes no tied joints; use Lagrangian.forward_dynamics")
-    S = linkage.ties.S  # at most an exchange of joints
+    if linkage.couplings.S.shape[0] != linkage.couplings.S.shape[1]:
+        raise QueryError("the articulated-body algorithm takes no coupled joints; use Lagrangian.forward_dynamics")
+    S = linkage.couplings.S  # at most an exchange of joints
     X = linkage.steps(q)
     batch = np.broadcast_shapes(q.shape[:-1], v.shape[:-1], tau.shape[:-1])
-    v, tau = linkage.ties.velocity(v), tau @ S.T
+    v, tau = linkage.couplings.velocity(v), tau @ S.T
     coriolis, inertia, force = _outward(linkage, X, v, batch)
 
     U, d, u = {}, {}, {}

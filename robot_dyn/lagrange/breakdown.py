@@ -46,8 +46,8 @@ def torque_breakdown(lagrangian: Lagrangian, q: np.ndarray, v: np.ndarray, a: np
     """
     names = lagrangian.joint_names
     q, v, a = (joint_values(name, x, names, lagrangian.arithmetic) for name, x in zip("qva", (q, v, a), strict=True))
-    linkage, ties = lagrangian.linkage, lagrangian.linkage.ties
-    at, full_v, full_a = linkage.at(q), ties.velocity(v), ties.velocity(a)
+    linkage, couplings = lagrangian.linkage, lagrangian.linkage.couplings
+    at, full_v, full_a = linkage.at(q), couplings.velocity(v), couplings.velocity(a)
     shares = []
     for name, (index, _, inertia) in linkage.links.items():
         if index == BASE or not np.any(inertia):
@@ -57,8 +57,8 @@ def torque_breakdown(lagrangian: Lagrangian, q: np.ndarray, v: np.ndarray, a: np
         terms[0, path] = transpose(J) @ inertia @ J @ full_a[path]
         terms[1, path] = apply(christoffel(inertia_derivative(J, inertia), full_v[path]), full_v[path])
         terms[2, path] = -transpose(J) @ inertia[:, :3] @ (linkage.gravity @ R)
-        shares.append(Share(name, *ties.torque(terms)))
+        shares.append(Share(name, *couplings.torque(terms)))
     if linkage.armature.any():
         zero = np.zeros(lagrangian.n, dtype=q.dtype)
-        shares.append(Share("(armature)", ties.torque(linkage.armature * full_a), zero, zero))
+        shares.append(Share("(armature)", couplings.torque(linkage.armature * full_a), zero, zero))
     return tuple(shares)

@@ -17,7 +17,7 @@ def composite_body(linkage: Linkage, q: Array) -> Array:
     """Mass matrix M at one configuration, (n, n).
 
     Args:
-        linkage: The bodies; joints may be tied.
+        linkage: The bodies; joints may be coupled.
         q: Positions, (n,), numbers of the linkage's arithmetic.
     """
     X, inertia = linkage.steps(q), list(linkage.inertias)
@@ -31,4 +31,4 @@ def composite_body(linkage: Linkage, q: Array) -> Array:
         for j, below in zip(body.path[-2::-1], body.path[:0:-1], strict=True):
             F = X[below].wrench(F)
             M[i, j] = M[j, i] = F @ linkage.bodies[j].screw
-    return linkage.ties.matrix(M)
+    return linkage.couplings.matrix(M)

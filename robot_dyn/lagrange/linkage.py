@@ -14,7 +14,7 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.arithmetic import Arithmetic, Array, apply, sqrt, symmetric, transpose
-from robot_dyn.model.ties import Ties, resolve
+from robot_dyn.model.couplings import Couplings, resolve
 from robot_dyn.model.tree import Joint, Link, Tree
 from robot_dyn.spatial import adjoint_inverse, rotation, rotation_rpy, spatial_inertia
 
@@ -114,14 +114,14 @@ class Linkage:
     Attributes:
         bodies: Each with its joint.
         links: By name: the body a link belongs to, its placement in that body's frame, its own 𝓜 in that frame (6, 6).
-        ties: q_full = S q + s₀, from the coordinates that the user sees to the N joints.
+        couplings: q_full = S q + s₀, from the coordinates that the user sees to the N joints.
         gravity: (3,) in [m/s²].
         armature: Of the N joints, (N,).
     """
 
     bodies: tuple[Body, ...]
     links: dict[str, tuple[int, Pose, Array]]
-    ties: Ties
+    couplings: Couplings
     gravity: Array
     armature: Array
 
@@ -136,12 +136,12 @@ class Linkage:
 
     def steps(self, q: Array) -> list[Step]:
         """The change of frame from each body's parent at coordinates q (..., n)."""
-        q = self.ties.position(q)
+        q = self.couplings.position(q)
         return [body.step(q[..., i]) for i, body in enumerate(self.bodies)]
 
     def at(self, q: Array) -> Configuration:
         """The linkage at coordinates q (..., n)."""
-        q = self.ties.position(q)
+        q = self.couplings.position(q)
         in_parent = [body.moved(q[..., i]) for i, body in enumerate(self.bodies)]
         return Configuration(self, q.shape[:-1], in_parent)
 
@@ -218,7 +218,7 @@ def linkage(tree: Tree, joint_names: tuple[str, ...], arithmetic: Arithmetic) ->
     return Linkage(
         tuple(bodies),
         links,
-        _ties(bodies, followed, joint_names, arithmetic),
+        _couplings(bodies, followed, joint_names, arithmetic),
         arithmetic.array(tree.gravity),
         arithmetic.array([armature[body.joint] for body in bodies]),
     )
@@ -241,10 +241,12 @@ def _inertia(link: Link, pose: Pose, arithmetic: Arithmetic) -> Array:
     return total
 
 
-def _ties(bodies: list[Body], followed: dict[str, Any], joint_names: tuple[str, ...], arithmetic: Arithmetic) -> Ties:
+def _couplings(
+    bodies: list[Body], followed: dict[str, Any], joint_names: tuple[str, ...], arithmetic: Arithmetic
+) -> Couplings:
     S = np.zeros((len(bodies), len(joint_names)), dtype=arithmetic.dtype)
     s0 = np.zeros(len(bodies), dtype=arithmetic.dtype)
     for row, body in enumerate(bodies):
         source, ratio, s0[row] = followed[body.joint]
         S[row, joint_names.index(source)] = ratio
-    return Ties(S, s0)
+    return Couplings(S, s0)

@@ -17,7 +17,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import apply
 from robot_dyn.lagrange.linkage import BASE, Body, Linkage
-from robot_dyn.model.ties import Ties
+from robot_dyn.model.couplings import Couplings
 from robot_dyn.spatial import first_moment
 
 
@@ -55,8 +55,8 @@ class Magnitudes:
 
 def magnitudes(linkage: Linkage, q: np.ndarray) -> Magnitudes:
     """The magnitudes of a linkage at q."""
-    N, ties = len(linkage.bodies), Ties(np.abs(linkage.ties.S), np.abs(linkage.ties.s0))
-    steps = np.abs(linkage.ties.position(q))
+    N, couplings = len(linkage.bodies), Couplings(np.abs(linkage.couplings.S), np.abs(linkage.couplings.s0))
+    steps = np.abs(linkage.couplings.position(q))
     M, dM, gravity, V = np.diag(linkage.armature), np.zeros((N, N, N)), np.zeros(N), 0.0
     g = float(np.linalg.norm(linkage.gravity))
     columns = [_columns(linkage.bodies, body, steps) for body in linkage.bodies]
@@ -77,8 +77,8 @@ def magnitudes(linkage: Linkage, q: np.ndarray) -> Magnitudes:
             lin, ang = columns[index]
             lever[name][list(body.path)] = lin + ang * reach[name]
             reach[name] += _reach(linkage.bodies, body, steps)
-        lever[name] = ties.torque(lever[name])
-    return Magnitudes(ties.matrix(M), ties.cube(dM), ties.torque(gravity), V, lever, reach)
+        lever[name] = couplings.torque(lever[name])
+    return Magnitudes(couplings.matrix(M), couplings.cube(dM), couplings.torque(gravity), V, lever, reach)
 
 
 def _blocks(linkage: Linkage) -> np.ndarray:

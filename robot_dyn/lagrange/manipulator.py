@@ -135,7 +135,7 @@ class Lagrangian(Dynamics):
 
         def equation(q: Array) -> Array:
             at = self.linkage.at(q)
-            return self.linkage.ties.columns(self._change(at, frame, axes) @ self._body_jacobian(at, frame))
+            return self.linkage.couplings.columns(self._change(at, frame, axes) @ self._body_jacobian(at, frame))
 
         return self._answer("jacobian", errors, equation, q=q)
 
@@ -145,14 +145,14 @@ class Lagrangian(Dynamics):
         frame, axes = self._link(frame), Axes.of(expressed_in)
 
         def equation(q: Array, v: Array) -> Array:
-            at, v = self.linkage.at(q), self.linkage.ties.velocity(v)
+            at, v = self.linkage.at(q), self.linkage.couplings.velocity(v)
             J, rate = self._body_jacobian(at, frame), self._body_jacobian(at, frame, v)
             V = apply(J, v)
             if axes is Axes.WORLD_ALIGNED:  # d/dt diag(R, R) = diag(R, R) diag(ω̂, ω̂)
                 rate = rate + block_diagonal(hat(V[..., 3:])) @ J
             elif axes is Axes.WORLD:  # d/dt Ad_g = Ad_g ad_V
                 rate = rate + bracket(V) @ J
-            return self.linkage.ties.columns(self._change(at, frame, axes) @ rate)
+            return self.linkage.couplings.columns(self._change(at, frame, axes) @ rate)
 
         return self._answer("jacobian_rate", errors, equation, q=q, v=v)
 
@@ -162,22 +162,22 @@ class Lagrangian(Dynamics):
         M = self._zeros(at, 2) + np.diag(self.linkage.armature)
         for body, inertia, J in at.bodies():
             M[body.block] = M[body.block] + transpose(J) @ inertia @ J
-        return self.linkage.ties.matrix(M)
+        return self.linkage.couplings.matrix(M)
 
     def _C(self, at: Configuration, v: Array) -> Array:
-        v = self.linkage.ties.velocity(v)
+        v = self.linkage.couplings.velocity(v)
         C = self._zeros(at, 2)
         C = np.broadcast_to(C, np.broadcast_shapes(C.shape, (*v.shape[:-1], 1, 1))).copy()
         for body, inertia, J in at.bodies():
             C[body.block] = C[body.block] + christoffel(inertia_derivative(J, inertia), v[..., body.path])
-        return self.linkage.ties.matrix(C)
+        return self.linkage.couplings.matrix(C)
 
     def _N(self, at: Configuration) -> Array:
         N = self._zeros(at, 1)
         for (body, inertia, J), (R, _) in zip(at.bodies(), at.in_base, strict=True):
             weight = (self.linkage.gravity @ R) @ transpose(inertia[:, :3])  # 𝓜 (Rᵀ g, 0)
             N[..., body.path] = N[..., body.path] - apply(transpose(J), weight)
-        return self.linkage.ties.torque(N)
+        return self.linkage.couplings.torque(N)
 
     def _V(self, at: Configuration) -> Array:
         V, g = 0, self.linkage.gravity
@@ -190,7 +190,7 @@ class Lagrangian(Dynamics):
         for body, inertia, J in at.bodies():
             block = (..., *np.ix_(body.path, body.path, body.path))
             total[block] = total[block] + inertia_derivative(J, inertia)
-        return self.linkage.ties.cube(total)
+        return self.linkage.couplings.cube(total)
 
     # --- frames
 

@@ -24,14 +24,14 @@ def newton_euler(linkage: Linkage, q: Array, v: Array, a: Array, *, gravity: boo
     """Torque τ = M a + C v + N at one state, (n,); without gravity τ = M a + C v.
 
     Args:
-        linkage: The bodies; joints may be tied.
+        linkage: The bodies; joints may be coupled.
         q: Positions, (n,), numbers of the linkage's arithmetic.
         v: Velocities, (n,).
         a: Accelerations, (n,).
         gravity: Whether it acts.
     """
     X, zero = linkage.steps(q), np.zeros_like(linkage.gravity)
-    position, v, a = linkage.ties.position(q), linkage.ties.velocity(v), linkage.ties.velocity(a)
+    position, v, a = linkage.couplings.position(q), linkage.couplings.velocity(v), linkage.couplings.velocity(a)
     free_fall = -linkage.gravity if gravity else zero
     rates, force = [], []
     for i, body in enumerate(linkage.bodies):
@@ -43,7 +43,7 @@ def newton_euler(linkage: Linkage, q: Array, v: Array, a: Array, *, gravity: boo
         tau[i] = force[i] @ body.screw + linkage.armature[i] * a[i]
         if body.parent != BASE:
             force[body.parent] = force[body.parent] + X[i].wrench(force[i])
-    return linkage.ties.torque(tau)
+    return linkage.couplings.torque(tau)
 
 
 def _moved(body: Body, X: Step, before: _Rates, q: Any, v: Any, a: Any) -> _Rates:
@@ -78,7 +78,7 @@ def _spread(omega: Array, alpha: Array) -> Array:
 
 def kinetic_energy(linkage: Linkage, q: Array, v: Array) -> Array:
     """K = ½ Σ V_iᵀ 𝓜_i V_i at one state, a number; arguments as of `newton_euler`."""
-    v = linkage.ties.velocity(v)
+    v = linkage.couplings.velocity(v)
     K = linkage.armature @ (v * v)
     for V, inertia in zip(_twists(linkage, linkage.steps(q), v), linkage.inertias, strict=True):
         K = K + V @ apply(inertia, V)

@@ -41,18 +41,18 @@ def one_tree(links: list[str], robot: etree._Element, refuse: Refuse) -> None:
 def mimics(robot: etree._Element, refuse: Refuse) -> None:
     """Every mimic follows a joint that moves, none follows itself, and no chain of them grows without bound."""
     kinds = {joint.get("name"): joint.get("type") for joint in robot.iterfind("joint")}
-    ties = {joint.get("name"): joint.find("mimic") for joint in robot.iterfind("joint[mimic]")}
-    for follower, tie in ties.items():
-        where, source = f"joint {follower!r}", tie.get("joint")
+    couplings = {joint.get("name"): joint.find("mimic") for joint in robot.iterfind("joint[mimic]")}
+    for follower, coupling in couplings.items():
+        where, source = f"joint {follower!r}", coupling.get("joint")
         if source not in kinds:
             refuse(where, f"mimics {shorten(source)!r}, which is not defined; {nearest(source, kinds)}")
         if kinds[source] == "fixed":
             refuse(where, f"mimics {source!r}, which is fixed and never moves; make {follower!r} fixed too")
-    for follower in ties:
+    for follower in couplings:
         where, chain, ratio = f"joint {follower!r}", {follower: None}, 1.0  # a dict: ordered, quick to look up
-        while (name := next(reversed(chain))) in ties:
-            ratio *= float(ties[name].get("multiplier"))
-            source = ties[name].get("joint")
+        while (name := next(reversed(chain))) in couplings:
+            ratio *= float(couplings[name].get("multiplier"))
+            source = couplings[name].get("joint")
             if source in chain:
                 refuse(where, f"mimics itself: {_loop([*chain, source])}; remove one <mimic>")
             if abs(ratio) > LARGEST:

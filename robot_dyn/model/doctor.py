@@ -14,10 +14,10 @@ import numpy as np
 
 from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.errors import shorten
+from robot_dyn.model.couplings import resolve
 from robot_dyn.model.inertia import implausibility
 from robot_dyn.model.mobile_base import stands_on
 from robot_dyn.model.structure import StatedLink, Structure
-from robot_dyn.model.ties import resolve
 
 LONGEST = 1e4  # [m], and of a mimic's multiplier: the digits that a sum of lengths of 1e-12 of it leaves
 LIGHTEST = 1e-12  # [kg]

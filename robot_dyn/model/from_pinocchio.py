@@ -97,7 +97,7 @@ class _Writer:
         if kind not in _KINDS:
             remedy = "only revolute, continuous and prismatic joints are taken"
             if kind == "JointModelMimic":
-                remedy = "load its URDF by rd.load, which ties joints itself"
+                remedy = "load its URDF by rd.load, which couples joints itself"
             self.refuse(where, f"is a {kind.removeprefix('JointModel')} joint; {remedy}")
         kind = _KINDS[kind]
         data = joint.createData()

@@ -1,4 +1,4 @@
-"""Kernels: calls of Pinocchio for one state of all joints, and how they are asked for a batch of tied ones.
+"""Kernels: calls of Pinocchio for one state of all joints, and how they are asked for a batch of coupled ones.
 
 x = reduce(kernel(S q + s₀, S v, …))  for each state of a batch
 """
@@ -15,8 +15,8 @@ from numpy import ndarray
 
 from robot_dyn.model.coriolis import Bodies
 from robot_dyn.model.coriolis import jacobian_rate as rate_of
+from robot_dyn.model.couplings import Couplings
 from robot_dyn.model.dynamics import Axes
-from robot_dyn.model.ties import Ties
 from robot_dyn.spatial import block_diagonal, hat
 
 Kernel = Callable[..., Any]  # (model or Bodies, data, q, …) → a fresh array, or a number
@@ -56,7 +56,7 @@ def momentum(model: Any, data: Any, q: ndarray, v: ndarray) -> ndarray:
 
 
 def kinetic_energy(model: Any, data: Any, q: ndarray, v: ndarray) -> float:
-    """½ vᵀ M v; pin.computeKineticEnergy leaves out the armature of joints whose axis is none of x, y, z."""
+    """½ vᵀ M v; pin.computeKineticEnergy leaves out the armature of joints whose axis is not x, y or z."""
     return v @ pin.crba(model, data, q) @ v / 2
 
 
@@ -112,20 +112,20 @@ def _turned(data: Any, frame: int, J: ndarray) -> ndarray:
 
 
 def by_state(
-    kernel: Kernel, reduce: Callable[[Any], Any] | None, model: Any, data: Any, ties: Ties
+    kernel: Kernel, reduce: Callable[[Any], Any] | None, model: Any, data: Any, couplings: Couplings
 ) -> Callable[..., ndarray]:
-    """The equation (q, …) → answers of a kernel, which goes through a batch state by state: untied, asked, tied again.
+    """The equation (q, …) → answers of a kernel, asked state by state of a batch, with the positions of all joints.
 
     Args:
         kernel: The call of Pinocchio for one state of all joints.
-        reduce: How its result is tied, or None if it has no axis of joints.
+        reduce: How its result is reduced to q, or None if it has no axis of joints.
         model: The model of all joints, or what else the kernel takes.
         data: Its scratch memory.
-        ties: How all joints follow q.
+        couplings: How all joints follow q.
     """
 
     def equation(q: ndarray, *rates: ndarray) -> ndarray:
-        full = [ties.position(q), *(ties.velocity(x) for x in rates)]
+        full = [couplings.position(q), *(couplings.velocity(x) for x in rates)]
         batch = np.broadcast_shapes(*(x.shape[:-1] for x in full))
         rows = [np.broadcast_to(x, (*batch, x.shape[-1])).reshape(-1, x.shape[-1]) for x in full]
         answers = np.array([kernel(model, data, *row) for row in zip(*rows, strict=True)])

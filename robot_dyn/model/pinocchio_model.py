@@ -10,18 +10,18 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.errors import DescriptionError, EditError, nearest
+from robot_dyn.model.couplings import Couplings, Mimic, resolve
 from robot_dyn.model.description import Description
 from robot_dyn.model.edits import Edits
 from robot_dyn.model.structure import stated_mimics
-from robot_dyn.model.ties import Mimic, Ties, resolve
 from robot_dyn.model.urdf import UNBOUNDED
 
 MAX_MOVING = 250  # Pinocchio's scratch memory for n joints has 63 n³ bytes: 1 GB
 _MARK = "joint:"  # while Pinocchio works by name: a joint may share its name with a link, or be called "universe"
 
 
-def build(description: Description, edits: Edits) -> tuple[Any, Ties, tuple[str, ...]]:
-    """The Pinocchio model of all joints that move, the ties between them, and the names of the independent ones.
+def build(description: Description, edits: Edits) -> tuple[Any, Couplings, tuple[str, ...]]:
+    """The Pinocchio model of all joints that move, the couplings between them, and the names of the independent ones.
 
     Raises:
         DescriptionError: If Pinocchio refuses it, or no joint moves.
@@ -50,7 +50,7 @@ def build(description: Description, edits: Edits) -> tuple[Any, Ties, tuple[str,
     _apply(edits, model)
     model = _locked(model, edits, mimics)
     _unmark(model)
-    return model, *_ties(tuple(model.names[1:]), mimics)
+    return model, *_couplings(tuple(model.names[1:]), mimics)
 
 
 def _unmark(model: Any) -> None:
@@ -98,13 +98,13 @@ def _locked(model: Any, edits: Edits, mimics: dict[str, Mimic]) -> Any:
     return pin.buildReducedModel(model, held, q) if held else model
 
 
-def _ties(joints: tuple[str, ...], mimics: dict[str, Mimic]) -> tuple[Ties, tuple[str, ...]]:
+def _couplings(joints: tuple[str, ...], mimics: dict[str, Mimic]) -> tuple[Couplings, tuple[str, ...]]:
     independent = tuple(name for name in joints if name not in mimics)
     S, s0 = np.zeros((len(joints), len(independent))), np.zeros(len(joints))
     for row, name in enumerate(joints):
         source, ratio, s0[row] = resolve(name, mimics, FLOAT64)
         S[row, independent.index(source)] = ratio
-    return Ties(S, s0), independent
+    return Couplings(S, s0), independent
 
 
 def link_frames(model: Any) -> dict[str, int]:

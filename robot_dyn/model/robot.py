@@ -1,7 +1,7 @@
 """Robot: a URDF arm behind the Dynamics protocol, M(q) a + C(q, v) v + N(q) = τ, computed by Pinocchio.
 
 A thin layer over CRBA, RNEA and ABA [Featherstone 2008, ch. 5–7], and C by `coriolis`. One state of float64 goes
-straight to Pinocchio, after checks that cost a fraction of a microsecond; lists, batches and tied joints take the
+straight to Pinocchio, after checks that cost a fraction of a microsecond; lists, batches and coupled joints take the
 general way, `answered`.
 """
 
@@ -17,6 +17,7 @@ import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy import ndarray
 
+from robot_dyn import former
 from robot_dyn.errors import (
     DescriptionError,
     EditError,
@@ -28,13 +29,13 @@ from robot_dyn.errors import (
 from robot_dyn.model import doctor, kernels, pinocchio_model
 from robot_dyn.model.batch import answered
 from robot_dyn.model.coriolis import Bodies
+from robot_dyn.model.couplings import Couplings
 from robot_dyn.model.description import Description, check
 from robot_dyn.model.dynamics import Array, Axes, Dynamics, acceleration, entry, shape_of
 from robot_dyn.model.edits import Changes, Edits
 from robot_dyn.model.gravity import gravity_acts, no_torque
 from robot_dyn.model.kernels import Kernel, Scratch, frozen
 from robot_dyn.model.structure import structure
-from robot_dyn.model.ties import Ties
 from robot_dyn.validate import instance, is_moderate, is_state, shaped
 
 _DOUBTFUL = 1e10  # of ‖a‖: M may be singular at this q, which rounding hides
@@ -129,13 +130,15 @@ class Robot(Dynamics):
 
     @cached_property
     def model(self) -> Any:
-        """The `pinocchio.Model` of all joints that move, tied ones included. Read it, do not change it."""
+        """The `pinocchio.Model` of all joints that move, coupled ones included. Read it, do not change it."""
         return self._built[0]
 
     @cached_property
-    def ties(self) -> Ties:
+    def couplings(self) -> Couplings:
         """How the joints of `model` follow q."""
         return self._built[1]
+
+    ties = former.Attribute("couplings")
 
     @cached_property
     def bodies(self) -> Bodies:
@@ -195,13 +198,13 @@ class Robot(Dynamics):
 
     @property
     def damping(self) -> ndarray:
-        """Viscous friction the file states, with tied joints Σ s² b, (n,) in [N m s/rad] or [N s/m]; see `Plant`."""
-        return frozen(self.model.damping @ self.ties.S**2)
+        """Viscous friction the file states, with coupled joints Σ s² b, (n,) in [N m s/rad] or [N s/m]; see `Plant`."""
+        return frozen(self.model.damping @ self.couplings.S**2)
 
     @property
     def friction(self) -> ndarray:
-        """Dry friction the file states, with tied joints Σ |s| f, (n,) in [N m] or [N]; see `Plant`."""
-        return frozen(self.model.friction @ np.abs(self.ties.S))
+        """Dry friction the file states, with coupled joints Σ |s| f, (n,) in [N m] or [N]; see `Plant`."""
+        return frozen(self.model.friction @ np.abs(self.couplings.S))
 
     @property
     def total_mass(self) -> float:
@@ -240,25 +243,25 @@ class Robot(Dynamics):
     def M(self, q: Array, *, errors: str = "raise") -> ndarray:
         if is_state(q, self._shape) and is_moderate(q):
             return pin.crba(self.model, self._scratch.data, q)
-        return self._ask("M", errors, pin.crba, self.ties.matrix, q=q)
+        return self._ask("M", errors, pin.crba, self.couplings.matrix, q=q)
 
     def C(self, q: Array, v: Array, *, errors: str = "raise") -> ndarray:
         shape = self._shape
         if is_state(q, shape) and is_state(v, shape) and is_moderate(q) and is_moderate(v):
             return kernels.coriolis_matrix(self.bodies, self._scratch.data, q, v)
-        return self._ask("C", errors, kernels.coriolis_matrix, self.ties.matrix, self.bodies, q=q, v=v)
+        return self._ask("C", errors, kernels.coriolis_matrix, self.couplings.matrix, self.bodies, q=q, v=v)
 
     def N(self, q: Array, *, errors: str = "raise") -> ndarray:
         if is_state(q, self._shape) and is_moderate(q):
             return pin.computeGeneralizedGravity(self.model, self._scratch.data, q)
-        return self._ask("N", errors, pin.computeGeneralizedGravity, self.ties.torque, q=q)
+        return self._ask("N", errors, pin.computeGeneralizedGravity, self.couplings.torque, q=q)
 
     def coriolis_torque(self, q: Array, v: Array, *, errors: str = "raise") -> ndarray:
         shape = self._shape
         if is_state(q, shape) and is_state(v, shape) and is_moderate(q) and is_moderate(v):
             return kernels.coriolis_torque(self._weightless, self._scratch.data, q, v)
         return self._ask(
-            "coriolis_torque", errors, kernels.coriolis_torque, self.ties.torque, self._weightless, q=q, v=v
+            "coriolis_torque", errors, kernels.coriolis_torque, self.couplings.torque, self._weightless, q=q, v=v
         )
 
     def coriolis_transpose(self, q: Array, v: Array, *, errors: str = "raise") -> ndarray:
@@ -266,7 +269,7 @@ class Robot(Dynamics):
         if is_state(q, shape) and is_state(v, shape) and is_moderate(q) and is_moderate(v):
             return kernels.coriolis_transpose(self.bodies, self._scratch.data, q, v)
         return self._ask(
-            "coriolis_transpose", errors, kernels.coriolis_transpose, self.ties.torque, self.bodies, q=q, v=v
+            "coriolis_transpose", errors, kernels.coriolis_transpose, self.couplings.torque, self.bodies, q=q, v=v
         )
 
     def inverse_dynamics(self, q: Array, v: Array, a: Array, *, errors: str = "raise") -> ndarray:
@@ -275,7 +278,7 @@ class Robot(Dynamics):
             tau = pin.rnea(self.model, self._scratch.data, q, v, a)
             if is_moderate(tau):  # NaN and inf, in any argument, show in tau
                 return tau
-        return self._ask("inverse_dynamics", errors, pin.rnea, self.ties.torque, q=q, v=v, a=a)
+        return self._ask("inverse_dynamics", errors, pin.rnea, self.couplings.torque, q=q, v=v, a=a)
 
     def forward_dynamics(self, q: Array, v: Array, tau: Array, *, errors: str = "raise") -> ndarray:
         shape = self._shape if self._singular is None else None
@@ -292,7 +295,7 @@ class Robot(Dynamics):
         return self._ask("potential_energy", errors, pin.computePotentialEnergy, None, q=q)
 
     def momentum(self, q: Array, v: Array, *, errors: str = "raise") -> ndarray:
-        return self._ask("momentum", errors, kernels.momentum, self.ties.torque, q=q, v=v)
+        return self._ask("momentum", errors, kernels.momentum, self.couplings.torque, q=q, v=v)
 
     def placement(self, q: Array, frame: str, *, errors: str = "raise") -> ndarray:
         return self._ask("placement", errors, kernels.placement(entry(self._frames, frame)), None, q=q)
@@ -301,16 +304,16 @@ class Robot(Dynamics):
         self, q: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, errors: str = "raise"
     ) -> ndarray:
         kernel = kernels.jacobian(entry(self._frames, frame), Axes.of(expressed_in))
-        return self._ask("jacobian", errors, kernel, self.ties.columns, q=q)
+        return self._ask("jacobian", errors, kernel, self.couplings.columns, q=q)
 
     def jacobian_rate(
         self, q: Array, v: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, errors: str = "raise"
     ) -> ndarray:
         kernel = kernels.jacobian_rate(entry(self._frames, frame), Axes.of(expressed_in))
-        return self._ask("jacobian_rate", errors, kernel, self.ties.columns, q=q, v=v)
+        return self._ask("jacobian_rate", errors, kernel, self.couplings.columns, q=q, v=v)
 
     @cached_property
-    def _built(self) -> tuple[Any, Ties, tuple[str, ...]]:
+    def _built(self) -> tuple[Any, Couplings, tuple[str, ...]]:
         return pinocchio_model.build(self.description, self.edits)
 
     @cached_property
@@ -326,8 +329,8 @@ class Robot(Dynamics):
 
     @cached_property
     def _shape(self) -> tuple[int] | None:
-        """Shape of a state that goes straight to Pinocchio; None if joints are tied."""
-        return (self.n,) if self.ties.trivial else None
+        """Shape of a state that goes straight to Pinocchio; None if joints are coupled."""
+        return (self.n,) if self.couplings.trivial else None
 
     @property
     def joint_without_inertia(self) -> str | None:
@@ -358,7 +361,7 @@ class Robot(Dynamics):
         return self._answered(quantity, errors, self._equation(kernel, reduce, of), state)
 
     def _equation(self, kernel: Kernel, reduce: Callable[[Any], Any] | None, of: Any = None) -> Callable[..., ndarray]:
-        return kernels.by_state(kernel, reduce, self.model if of is None else of, self._scratch.data, self.ties)
+        return kernels.by_state(kernel, reduce, self.model if of is None else of, self._scratch.data, self.couplings)
 
     def _answered(self, quantity: str, errors: str, equation: Callable[..., ndarray], state: dict[str, Array]) -> Any:
         arrays = {name: shaped(name, x, self.joint_names) for name, x in state.items()}
@@ -366,15 +369,15 @@ class Robot(Dynamics):
         return answer if answer.ndim else float(answer)
 
     def _forward_dynamics(self, errors: str, q: Array, v: Array, tau: Array) -> ndarray:
-        """Forward dynamics in general: tied joints by the factorisation of M, which also tells where M is singular."""
+        """Forward dynamics in general: coupled joints by factorising M, which also tells where M is singular."""
         if self._singular is not None:
             raise self._singular()
-        M = self._equation(pin.crba, self.ties.matrix)
-        bias = self._equation(pin.nonLinearEffects, self.ties.torque)
+        M = self._equation(pin.crba, self.couplings.matrix)
+        bias = self._equation(pin.nonLinearEffects, self.couplings.torque)
         solved = self._equation(pin.aba, None)
 
         def equation(q: ndarray, v: ndarray, tau: ndarray) -> ndarray:
-            a = solved(q, v, tau) if self.ties.trivial else acceleration(M(q), tau - bias(q, v), self.joint_names)
+            a = solved(q, v, tau) if self.couplings.trivial else acceleration(M(q), tau - bias(q, v), self.joint_names)
             if not np.all(np.abs(a) <= _DOUBTFUL) and np.isfinite(here := M(q)).all():
                 acceleration(here, tau, self.joint_names)  # tells if M is singular at this q
             return a

@@ -10,9 +10,9 @@ from typing import Any, final
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 from robot_dyn.arithmetic import FLOAT64
+from robot_dyn.model.couplings import Mimic, resolve
 from robot_dyn.model.description import Description
 from robot_dyn.model.edits import Edits
-from robot_dyn.model.ties import Mimic, resolve
 
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 Triple = tuple[float, ...]

@@ -11,9 +11,9 @@ from typing import Any, Protocol, final
 
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
+from robot_dyn.model.couplings import Mimic
 from robot_dyn.model.description import Description
 from robot_dyn.model.edits import Edits
-from robot_dyn.model.ties import Mimic
 
 
 class Described(Protocol):

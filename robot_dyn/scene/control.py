@@ -216,26 +216,26 @@ class Control(Part):
         for key, kinds in _OF_ONE_KIND.items():
             if key in self.model_fields_set and self.kind not in kinds:
                 raise SceneError(f"control.{key}: has no effect on {self.kind}, only on {', '.join(kinds)}; remove it")
-        model, wanted = self.model.build(described, robot), reference.build(robot, q0, self.frame)
-        cartesian = isinstance(wanted, CartesianReference)
+        model, desired = self.model.build(described, robot), reference.build(robot, q0, self.frame)
+        cartesian = isinstance(desired, CartesianReference)
         if cartesian != (self.kind == "operational_space"):
             need = "line or circle" if self.kind == "operational_space" else "hold, quintic, via_points or samples"
             raise SceneError(f"reference.kind: {self.kind} follows {need}, got {reference.kind!r}")
         kp, kd = self._gains(model, q0)
         if cartesian:
             return OperationalSpace(
-                model, _frame(self.frame), wanted, kp, kd, q0, kp.max() / 10, 2 * np.sqrt(kp.max() / 10),
+                model, _frame(self.frame), desired, kp, kd, q0, kp.max() / 10, 2 * np.sqrt(kp.max() / 10),
                 period_s=self.period_s,
             )  # fmt: skip
         if self.kind == "computed_torque":
-            return ComputedTorque(model, wanted, kp, kd, self.period_s)
+            return ComputedTorque(model, desired, kp, kd, self.period_s)
         if self.kind == "pid":
             limit = per_joint("effort_limit_N_m", self.effort_limit_N_m, robot, elsewhere=np.inf)
             limit = stated_efforts(robot) if limit is URDF else limit
-            return PID(wanted, kp, kp * self.integral_rate_per_s, kd, limit, period_s=self.period_s)
+            return PID(desired, kp, kp * self.integral_rate_per_s, kd, limit, period_s=self.period_s)
         if self.kind == "pd":
-            return PD(wanted, kp, kd, self.period_s)
-        return (PDGravity if self.kind == "pd_gravity" else FeedForward)(model, wanted, kp, kd, self.period_s)
+            return PD(desired, kp, kd, self.period_s)
+        return (PDGravity if self.kind == "pd_gravity" else FeedForward)(model, desired, kp, kd, self.period_s)
 
     def _gains(self, model: Robot, q0: np.ndarray) -> tuple[Any, Any]:
         """Stiffness and damping, as stated or of ω and ζ."""

@@ -16,10 +16,10 @@ from robot_dyn.effects.effect import Force
 from robot_dyn.effects.joint_limit import JointStopSpring
 from robot_dyn.errors import RobotDynError
 from robot_dyn.foreign import call
-from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.record import Path
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.smoothness import LOOKS, extremes, foreign, named
+from robot_dyn.simulation.state_equation import StateEquation
 
 _STANDS_OUT = 50.0  # times the change of the torque from step to step
 
@@ -33,24 +33,26 @@ class Missed:
     why: str
 
 
-def stepped_over(setup: Setup, motion: Motion, path: Path, error: float) -> Missed | None:
+def stepped_over(setup: Setup, equation: StateEquation, path: Path, error: float) -> Missed | None:
     """The first thing that acted between two steps and would move a joint by more than the estimated error.
 
     Args:
         setup: What was run.
-        motion: Its equation of motion.
+        equation: Its state equation.
         path: The states at the ends of its steps.
         error: Estimated error of q, in [rad] or [m].
     """
     if len(path.t) < 2:
         return None
-    q, v = path.y[:, : motion.plant.dynamics.n], motion.velocities(path.y)
-    found = [_stop(motion, effect, path, q, v, error) for effect in setup.plant.effects]
-    found += [_code(motion, part, path, q, v, error) for part in foreign(setup)]
+    q, v = path.y[:, : equation.plant.dynamics.n], equation.velocities(path.y)
+    found = [_stop(equation, effect, path, q, v, error) for effect in setup.plant.effects]
+    found += [_code(equation, part, path, q, v, error) for part in foreign(setup)]
     return min((each for each in found if each is not None), key=lambda each: each.t, default=None)
 
 
-def _stop(motion: Motion, effect: Any, path: Path, q: np.ndarray, v: np.ndarray, error: float) -> Missed | None:
+def _stop(
+    equation: StateEquation, effect: Any, path: Path, q: np.ndarray, v: np.ndarray, error: float
+) -> Missed | None:
     """A stop that a joint passed and left again within a step."""
     if not isinstance(effect, JointStopSpring):
         return None
@@ -61,17 +63,17 @@ def _stop(motion: Motion, effect: Any, path: Path, q: np.ndarray, v: np.ndarray,
     torque = np.broadcast_to(effect.stiffness, depth.shape) * np.maximum(depth, 0.0)
     for k in np.flatnonzero(torque.any(axis=1)):
         joint = int(torque[k].argmax())
-        if _displacement(motion, path, q, int(k), torque[k]) > error:
-            name, h = motion.plant.dynamics.joint_names[joint], path.t[k + 1] - path.t[k]
+        if _displacement(equation, path, q, int(k), torque[k]) > error:
+            name, h = equation.plant.dynamics.joint_names[joint], path.t[k + 1] - path.t[k]
             why = f"joint {name!r} passes its stop by {depth[k, joint]:.1e} and leaves it within one step of {h:.1e} s"
             return Missed(float(path.t[k]), why)
     return None
 
 
-def _code(motion: Motion, part: Any, path: Path, q: np.ndarray, v: np.ndarray, error: float) -> Missed | None:
+def _code(equation: StateEquation, part: Any, path: Path, q: np.ndarray, v: np.ndarray, error: float) -> Missed | None:
     """A torque that stands out between two steps from what it is at their ends."""
-    n, m, dynamics = motion.plant.dynamics.n, motion.memory_size, motion.plant.dynamics
-    if not isinstance(part, Force | Controller) or (isinstance(part, Controller) and motion.sampled):
+    n, m, dynamics = equation.plant.dynamics.n, equation.state_size, equation.plant.dynamics
+    if not isinstance(part, Force | Controller) or (isinstance(part, Controller) and equation.sampled):
         return None
 
     def torque(t: float, q: np.ndarray, v: np.ndarray, z: np.ndarray) -> np.ndarray:
@@ -94,16 +96,16 @@ def _code(motion: Motion, part: Any, path: Path, q: np.ndarray, v: np.ndarray, e
         return None  # the run itself says what is wrong
     around = np.abs(np.diff(ends, axis=0))
     for k in np.flatnonzero((jump > _STANDS_OUT * around + 1e-9).any(axis=1)).tolist():
-        if _displacement(motion, path, path.y[:, :n], k * every, jump[k]) > error:
+        if _displacement(equation, path, path.y[:, :n], k * every, jump[k]) > error:
             why = f"{named(part)} acts between steps after t = {t[k]:g} s and not at their ends"
             return Missed(float(t[k]), f"{why}; declare its times as `switches`")
     return None
 
 
-def _displacement(motion: Motion, path: Path, q: np.ndarray, k: int, torque: np.ndarray) -> float:
+def _displacement(equation: StateEquation, path: Path, q: np.ndarray, k: int, torque: np.ndarray) -> float:
     """How far, at the end of the run, a torque during step k moves a joint: M⁻¹ τ h (T − t), in [rad] or [m]."""
     try:
-        a = np.linalg.solve(motion.plant.M(q[k]), torque)
+        a = np.linalg.solve(equation.plant.M(q[k]), torque)
     except (RobotDynError, np.linalg.LinAlgError):
         return np.inf
     return float(np.abs(a).max() * (path.t[k + 1] - path.t[k]) * (path.t[-1] - path.t[k]))

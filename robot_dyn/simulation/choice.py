@@ -8,9 +8,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from robot_dyn.errors import RobotDynError
-from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.smoothness import foreign, named
+from robot_dyn.simulation.state_equation import StateEquation
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.machine.machine import Machine
@@ -22,7 +22,7 @@ _GUESSED = 10  # evaluations in a step of an implicit method, beside those of it
 _PER_SECOND = 1000  # evaluations of an adaptive method, for each second of the run
 
 
-def choose(setup: Setup, motion: Motion) -> tuple[Machine | None, str]:
+def choose(setup: Setup, equation: StateEquation) -> tuple[Machine | None, str]:
     """The machine that runs a setup, or None for the interpreted engine; and words for the summary.
 
     Raises:
@@ -32,28 +32,28 @@ def choose(setup: Setup, motion: Motion) -> tuple[Machine | None, str]:
     if setup.engine == "interpreted":
         return None, "interpreted"
     if setup.engine == "compiled":
-        return _machine(setup, motion), _label(setup)
+        return _machine(setup, equation), _label(setup)
     if parts := foreign(setup):  # they may have effects of their own, which a trace would lose
         return None, f"interpreted ({named(parts[0])} is not the library's own)"
     if _evaluations(setup) < _COMPILED:
         return None, "interpreted (short: compiling does not pay)"
     try:
-        return _machine(setup, motion), _label(setup)
+        return _machine(setup, equation), _label(setup)
     except (ImportError, RobotDynError) as error:
         return None, f"interpreted ({error})"
 
 
-def _machine(setup: Setup, motion: Motion) -> Machine:
-    made = _made(setup, motion)
+def _machine(setup: Setup, equation: StateEquation) -> Machine:
+    made = _made(setup, equation)
     made.check(setup)
     return made
 
 
-def _made(setup: Setup, motion: Motion) -> Machine:
+def _made(setup: Setup, equation: StateEquation) -> Machine:
     from robot_dyn.simulation.machine.making import machine
 
     method: Any = setup.integrator
-    return machine(motion, method if method.plain else None)
+    return machine(equation, method if method.plain else None)
 
 
 def _label(setup: Setup) -> str:

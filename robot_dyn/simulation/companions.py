@@ -23,7 +23,7 @@ from robot_dyn.simulation.error import ErrorEstimate, Verdict, no_estimate
 from robot_dyn.simulation.record import Path
 
 ROUNDED = "what rounding leaves of q, as the motion magnifies it, is as large as the motion itself"
-ROUNDING = 4500  # units of rounding of q, or as many as steps if there are more: differences below are no error
+ROUNDING = 4500  # units of rounding of q, or as many as steps if there are more: differences below are not an error
 COARSE = (Fraction(2), Fraction(3), Fraction(5))
 FINE = (Fraction(1, 2), Fraction(1, 3))
 _BAND = 2.0  # a ratio of differences may be this factor off the one of the method's order

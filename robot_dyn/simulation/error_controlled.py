@@ -15,11 +15,11 @@ from robot_dyn.errors import RobotDynError
 from robot_dyn.integrate.adaptive import Adaptive, Status
 from robot_dyn.integrate.integrator import System
 from robot_dyn.integrate.primitives import evaluate
-from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.observer import Observer
 from robot_dyn.simulation.plan import plan_of
 from robot_dyn.simulation.record import MOST_SHARED, Path, Record
 from robot_dyn.simulation.setup import Setup
+from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.state_functions import system
 from robot_dyn.simulation.time_loop import Functions
 from robot_dyn.simulation.trajectory import Ending, Outcome
@@ -50,7 +50,7 @@ class ErrorControlled:
 
     Args:
         setup: What to run.
-        motion: Its equation of motion.
+        equation: Its state equation.
         functions: The same, in Python.
         pace: Factor of the tolerances; 1 keeps samples.
         on_progress: Called with the time reached at each step.
@@ -58,14 +58,14 @@ class ErrorControlled:
     """
 
     def __init__(
-        self, setup: Setup, motion: Motion, functions: Functions, pace: Fraction,
+        self, setup: Setup, equation: StateEquation, functions: Functions, pace: Fraction,
         on_progress: Callable[[float], object] | None = None, observer: Observer | None = None,
     ) -> None:  # fmt: skip
-        self.setup, self.motion, self.functions, self.pace = setup, motion, functions, pace
+        self.setup, self.equation, self.functions, self.pace = setup, equation, functions, pace
         self.on_progress, self.observer = on_progress, observer
-        self.watch, self.plan = Watch(setup, motion), plan_of(setup)
-        self.t, self.y = 0.0, motion.start(setup.q0, setup.v0)
-        self.own = np.full((motion.plant.dynamics.n if motion.sampled else 0, 1), np.nan)
+        self.watch, self.plan = Watch(setup, equation), plan_of(setup)
+        self.t, self.y = 0.0, equation.start(setup.q0, setup.v0)
+        self.own = np.full((equation.plant.dynamics.n if equation.sampled else 0, 1), np.nan)
         self.key = self.steps = self.evaluations = 0
         self.due = 0.0  # time of the next sample
         self.samples = _Samples()
@@ -89,8 +89,8 @@ class ErrorControlled:
     def _segment(self, s: int) -> None:
         start, end, p = float(self.plan.starts[s]), float(self.plan.starts[s + 1]), self.plan.parameters[s]
         self._tick(s)
-        equation = system(self.functions, self.motion, p, self.own, self.observer and self.observer.seen)
-        steps = self._method(end - start).steps(self._counted(equation), start, self.y, end, stop=self._sane)
+        right_side = system(self.functions, self.equation, p, self.own, self.observer and self.observer.seen)
+        steps = self._method(end - start).steps(self._counted(right_side), start, self.y, end, stop=self._sane)
         self._keep(start, self.y, p)
         self._share(start, self.y)
         period, compared = (
@@ -143,21 +143,21 @@ class ErrorControlled:
         longest *= factor ** (1 / _LOCAL_ORDER)
         return method.with_tolerances(factor, longest)
 
-    def _counted(self, equation: System) -> System:
+    def _counted(self, right_side: System) -> System:
         def rate(t: float, y: Array) -> Array:
             self.evaluations += 1
-            return equation.rate(t, y)
+            return right_side.rate(t, y)
 
-        return replace(equation, rate=rate)
+        return replace(right_side, rate=rate)
 
     def _sane(self, _: float, y: Array) -> float:
-        n = self.motion.plant.dynamics.n
+        n = self.equation.plant.dynamics.n
         return 1.0 if np.abs(y[n : 2 * n]).max() < _RUNAWAY else -1.0
 
     def _keep(self, t: float, y: Array, p: Array) -> None:
         if self.pace == 1 and (t >= self.due - 1e-9 * self.setup.step_s or t == self.setup.duration_s):
             self.due += self.setup.record_period_s
-            made = np.empty((self.motion.size + self.motion.plant.dynamics.n + 2, 1))
+            made = np.empty((self.equation.size + self.equation.plant.dynamics.n + 2, 1))
             evaluate(self.functions.sample, t, np.ascontiguousarray(y)[:, None], p, self.own, made)
             self.samples.place.append(t)
             self.samples.y.append(y)
@@ -171,18 +171,18 @@ class ErrorControlled:
         """Show a step; the actuation of continuous control is that at its end."""
         if self.observer is None:
             return
-        if not self.motion.sampled:
+        if not self.equation.sampled:
             try:
-                q, v, z, _ = self.motion.state(y)
-                self.observer.seen[len(q) :] = self.motion.command(t, q, v, z)
+                q, v, z, _ = self.equation.state(y)
+                self.observer.seen[len(q) :] = self.equation.command(t, q, v, z)
             except RobotDynError:  # y may be far off where a run fails
                 return
-        self.observer.step(t, y, self.own[:, 0] if self.motion.sampled else None, ticked)
+        self.observer.step(t, y, self.own[:, 0] if self.equation.sampled else None, ticked)
 
     def _record(self, outcome: Outcome) -> Record:
-        kept, m = self.samples, self.motion.size
+        kept, m = self.samples, self.equation.size
         walked = sorted([*kept.walked, *kept.shared], key=lambda each: each[1])
-        made = np.array(kept.made).reshape(len(kept.made), m + self.motion.plant.dynamics.n + 2)
+        made = np.array(kept.made).reshape(len(kept.made), m + self.equation.plant.dynamics.n + 2)
         return Record(
             outcome, np.array(kept.place), np.array(kept.y).reshape(-1, m), made, _path(kept.shared, m),
             _path(walked, m), self.steps, self.evaluations, self._kinetic_peak(walked),
@@ -191,10 +191,10 @@ class ErrorControlled:
     def _kinetic_peak(self, walked: list[tuple[int, float, Array]]) -> float:
         """Largest kinetic energy at some states of the run, which its samples may all miss; 0 if it is not known."""
         some = walked[:: max(1, len(walked) // _PEAKS)]
-        y = np.array([each[2] for each in some]).reshape(-1, self.motion.size)
+        y = np.array([each[2] for each in some]).reshape(-1, self.equation.size)
         try:
-            q = y[:, : self.motion.plant.dynamics.n]
-            energies = self.motion.plant.dynamics.kinetic_energy(q, self.motion.velocities(y))
+            q = y[:, : self.equation.plant.dynamics.n]
+            energies = self.equation.plant.dynamics.kinetic_energy(q, self.equation.velocities(y))
             return float(np.max(energies, initial=0.0))
         except RobotDynError:  # a run that diverges may overflow
             return 0.0

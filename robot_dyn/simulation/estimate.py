@@ -18,11 +18,11 @@ from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.simulation.between import stepped_over
 from robot_dyn.simulation.companions import COARSE, FINE, ROUNDED, Estimated, differences, meaningless, rounding
 from robot_dyn.simulation.error import ErrorEstimate, Verdict, no_estimate
-from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.record import Path, Record
 from robot_dyn.simulation.schedule import LEAST_STEPS
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.smoothness import first_kink
+from robot_dyn.simulation.state_equation import StateEquation
 
 _GAIN = 1.3  # in the time resolved, that a shorter step must bring
 _TENTH, _TENFOLD = Fraction(1, 10), Fraction(10)
@@ -33,26 +33,26 @@ _PUSH = 4.0  # units of rounding by which a start is moved, to see what the moti
 Companion = Callable[[Fraction, Setup], Record]
 
 
-def estimate(setup: Setup, motion: Motion, run: Record, companion: Companion) -> ErrorEstimate:
+def estimate(setup: Setup, equation: StateEquation, run: Record, companion: Companion) -> ErrorEstimate:
     """The estimated error of a run.
 
     Args:
         setup: What was run.
-        motion: Its equation of motion.
+        equation: Its state equation.
         run: What it left behind.
         companion: Runs a setup with steps, or tolerances, multiplied by a factor.
     """
     if len(run.shared.t) < 2:
         return no_estimate("it ended in its first step")
-    n = motion.plant.dynamics.n
-    kink, why = first_kink(setup, motion, run.walked)
+    n = equation.plant.dynamics.n
+    kink, why = first_kink(setup, equation, run.walked)
     estimated = Estimated(run.shared, n, kink, rounding(run.shared, n), meaningless(run.walked, n))
     method: Any = setup.integrator
     if method.controls_error:
         made = _by_tolerances(setup, method, estimated, companion)
     else:
-        made = _by_steps(setup, method, estimated, companion, _turn(motion, run.walked))
-    return _advised(setup, _looked_between(setup, motion, run, made), why)
+        made = _by_steps(setup, method, estimated, companion, _turn(equation, run.walked))
+    return _advised(setup, _looked_between(setup, equation, run, made), why)
 
 
 def _by_steps(
@@ -64,7 +64,7 @@ def _by_steps(
             f"a joint turns by {turn:.3g} rad in a step, so that runs with other steps may meet the same angles"
         )
     made = no_estimate("fewer than 3 steps between ticks, switches or breaks")
-    if turn < _FAR_TURN and min(each.steps for each in setup.stretches) >= LEAST_STEPS:
+    if turn < _FAR_TURN and min(each.steps for each in setup.segments) >= LEAST_STEPS:
         paths = {pace: companion(pace, setup).shared for pace in COARSE}
         pushed = differences(paths[COARSE[1]], companion(COARSE[1], _pushed(setup)).shared, estimated.n)
         rows = np.searchsorted(paths[COARSE[1]].key[:-1], estimated.path.key)
@@ -95,18 +95,18 @@ def _pushed(setup: Setup) -> Setup:
     )
 
 
-def _turn(motion: Motion, walked: Path) -> float:
+def _turn(equation: StateEquation, walked: Path) -> float:
     """Largest angle by which a joint turns in a step, in [rad]; joints that slide do not count."""
-    dynamics = motion.plant.dynamics
+    dynamics = equation.plant.dynamics
     kinds = getattr(dynamics, "joint_types", ("revolute",) * dynamics.n)
     turns = np.array([kind != "prismatic" for kind in kinds])
     steps = np.maximum(1, np.diff(walked.key))[:, None]
     return float((np.abs(np.diff(walked.y[:, : dynamics.n], axis=0)) / steps)[:, turns].max(initial=0.0))
 
 
-def _looked_between(setup: Setup, motion: Motion, run: Record, made: ErrorEstimate) -> ErrorEstimate:
+def _looked_between(setup: Setup, equation: StateEquation, run: Record, made: ErrorEstimate) -> ErrorEstimate:
     """The estimate up to where something acted between two steps only, if that matters beside it."""
-    missed = stepped_over(setup, motion, run.walked, made.final)
+    missed = stepped_over(setup, equation, run.walked, made.final)
     if missed is None or missed.t >= made.resolved_until:
         return made
     return replace(made, resolved_until=missed.t, note=missed.why)

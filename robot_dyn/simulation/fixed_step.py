@@ -18,12 +18,12 @@ from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.errors import RobotDynError
 from robot_dyn.foreign import is_mistake
 from robot_dyn.integrate.integrator import Integrator
-from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.observer import Observer
 from robot_dyn.simulation.plan import plan_of
 from robot_dyn.simulation.record import MOST_SHARED, Path, Record
 from robot_dyn.simulation.schedule import paced
 from robot_dyn.simulation.setup import Setup
+from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.state_functions import interpreted, system
 from robot_dyn.simulation.time_loop import WATCHED, Ended, Functions, Now, Records, Rules, Runs, time_loop
 from robot_dyn.simulation.trajectory import Ending, Outcome
@@ -51,24 +51,25 @@ class FixedStep:
     """
 
     def __init__(
-        self, setup: Setup, motion: Motion, functions: Functions, pace: Fraction, machine_code: Advance | None = None,
-        on_progress: Callable[[float], object] | None = None, observer: Observer | None = None,
+        self, setup: Setup, equation: StateEquation, functions: Functions, pace: Fraction,
+        machine_code: Advance | None = None, on_progress: Callable[[float], object] | None = None,
+        observer: Observer | None = None,
     ) -> None:  # fmt: skip
         method = cast(Integrator, setup.integrator)
-        self.setup, self.motion, self.functions, self.compiled = setup, motion, functions, machine_code is not None
+        self.setup, self.equation, self.functions, self.compiled = setup, equation, functions, machine_code is not None
         self.on_progress, self.observer = on_progress, observer
-        self.segments, self.plan, self.watch = paced(setup.stretches, pace), plan_of(setup, pace), Watch(setup, motion)
-        n, m = motion.plant.dynamics.n, motion.size
-        held = n if motion.sampled else 0
-        self.start = motion.start(setup.q0, setup.v0)
-        self.runs = runs_of(self.start[:, None], np.full((held, 1), np.nan), n, held, motion.memory_size, m + n + 2)
+        self.segments, self.plan, self.watch = paced(setup.segments, pace), plan_of(setup, pace), Watch(setup, equation)
+        n, m = equation.plant.dynamics.n, equation.size
+        held = n if equation.sampled else 0
+        self.start = equation.start(setup.q0, setup.v0)
+        self.runs = runs_of(self.start[:, None], np.full((held, 1), np.nan), n, held, equation.state_size, m + n + 2)
         self.runs.energy[0], self.runs.scale[0] = self.watch.energy, self.watch.scale
-        self.stepper = method.stepper(FLOAT64, m, n, m + n, 1, motion.widths)
+        self.stepper = method.stepper(FLOAT64, m, n, m + n, 1, equation.widths)
         self.advance = machine_code or time_loop(self.stepper.step)
         every, thin = self._shared(pace)
         largest = _DOUBTFUL if self.compiled else inf
         self.rules = Rules(
-            n, len(motion.sources), motion.memory_size, held, motion.canonical, True, largest, every, thin, 0
+            n, len(equation.sources), equation.state_size, held, equation.canonical, True, largest, every, thin, 0
         )
         rows = samples_at_most(setup, self.plan.counts) if pace == 1 else 1
         states = int((-(-self.plan.counts // every)).sum()) // thin + 2
@@ -172,12 +173,12 @@ class FixedStep:
         """One step by the interpreted equation."""
         h, method, observer = float(self.plan.lengths[s]), cast(Integrator, self.setup.integrator), self.observer
         seen = None if observer is None else observer.seen
-        equation = system(
-            interpreted(self.motion, self.watch), self.motion, self.plan.parameters[s], self.runs.own, seen
+        right_side = system(
+            interpreted(self.equation, self.watch), self.equation, self.plan.parameters[s], self.runs.own, seen
         )
-        self.runs.y[:, 0] = y = one_step(method, equation, t, y, h, self.watch)
+        self.runs.y[:, 0] = y = one_step(method, right_side, t, y, h, self.watch)
         if observer is not None:
-            held = self.runs.own[:, 0] if self.motion.sampled else None
+            held = self.runs.own[:, 0] if self.equation.sampled else None
             observer.step(t + h, y, held, held is None or (self.now[Now.STEP] == 0 and self.segments[s].tick))
         self.now[Now.STEP] += 1
         self.now[Now.STEPS] += 1
@@ -195,7 +196,7 @@ class FixedStep:
         return first + np.rint(places[:, 1] * pace).astype(np.int64)
 
     def _record(self, outcome: Outcome) -> Record:
-        rows, m, kept = int(self.now[Now.ROW]), self.motion.size, self.records
+        rows, m, kept = int(self.now[Now.ROW]), self.equation.size, self.records
         if not rows:  # interrupted, or without a tick, at once
             kept.place[0], kept.y[0, :, 0], kept.made[0] = 0, self.start, np.nan
             rows = 1
@@ -208,12 +209,12 @@ class FixedStep:
         )  # fmt: skip
 
 
-def runs_of(y: np.ndarray, own: np.ndarray, n: int, held: int, memory: int, made: int) -> Runs:
+def runs_of(y: np.ndarray, own: np.ndarray, n: int, held: int, states: int, made: int) -> Runs:
     """Runs at the states y (m, W) with their own numbers (O, W)."""
     m, W = y.shape
     return Runs(
         np.ascontiguousarray(y), np.ascontiguousarray(own), np.empty((m, W)), np.empty((made, W)),
-        np.empty((held + memory, W)), np.empty((2, W)), np.empty(W), np.zeros(W, np.int64), np.ones(W, np.int64),
+        np.empty((held + states, W)), np.empty((2, W)), np.empty(W), np.zeros(W, np.int64), np.ones(W, np.int64),
         np.zeros(W, np.int64), np.zeros(W), np.zeros(W, np.int64), np.zeros(W), np.ones(W), np.zeros(W),
     )  # fmt: skip
 

@@ -43,7 +43,7 @@ MEMBERS: Mapping[str, Member] = MappingProxyType(
         "ledger/kinetic": Member(("m",), absent=True),
         "ledger/potential": Member(("m",), absent=True),
         "ledger/work/*": Member(("m",), absent=True),
-        "wanted": Member(("m", "n")),
+        "desired": Member(("m", "n")),
         "controller_states": Member(("m", "z")),
         "deviation": Member(("m", ("n", 3))),
         "at_stop": Member(("m", "n"), "bool"),

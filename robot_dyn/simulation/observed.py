@@ -13,24 +13,24 @@ from robot_dyn.errors import RobotDynError
 from robot_dyn.model.robot import Robot
 from robot_dyn.model.units import unit
 from robot_dyn.simulation.levels import Level, levels
-from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.observer import Observer, Visit
 from robot_dyn.simulation.remarks import Kind, Remark
 from robot_dyn.simulation.setup import Setup
+from robot_dyn.simulation.state_equation import StateEquation
 
 QUANTITIES = ("q", "v", "tau")
 _HIDDEN = 0.1  # of the range of a quantity: what the samples beside a window leave out
 _ROUNDING = 1e-9  # of a quantity: a smaller range is noise
 
 
-def observer_of(setup: Setup, motion: Motion) -> Observer:
+def observer_of(setup: Setup, equation: StateEquation) -> Observer:
     """An observer of a run that has not begun."""
     u = np.full(len(setup.q0), np.nan)
-    if not motion.sampled:
+    if not equation.sampled:
         with suppress(RobotDynError):  # the run will tell
-            u = motion.command(0.0, setup.q0, setup.v0, np.zeros(motion.memory_size))
+            u = equation.command(0.0, setup.q0, setup.v0, np.zeros(equation.state_size))
     start = np.concatenate([setup.q0, setup.v0, u])
-    return Observer(start, levels(setup.plant, setup.controller), motion.canonical)
+    return Observer(start, levels(setup.plant, setup.controller), equation.canonical)
 
 
 def remarks(
@@ -123,7 +123,7 @@ def _remedy(setup: Setup, t: float, q: np.ndarray, period: float) -> str:
     general = "take a shorter period_s or less damping: it reverses where an eigenvalue of M⁻¹ kd period_s is above 1"
     controller, n = setup.controller, len(q)
     assert controller is not None
-    z, v = np.zeros(controller.memory_size), np.zeros(n)
+    z, v = np.zeros(controller.state_size), np.zeros(n)
     try:
         with np.errstate(all="ignore"):
             u = [controller.torque(t, q, v + side * dv, z) for dv in 1e-6 * np.eye(n) for side in (1, -1)]

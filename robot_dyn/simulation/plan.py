@@ -21,7 +21,7 @@ BOUNDS = 2  # numbers of p before the reference: time is kept between them, so t
 
 def plan_of(setup: Setup, pace: Fraction = Fraction(1)) -> Plan:
     """The segments of a setup, with steps `pace` times as long, and its end."""
-    segments = paced(setup.stretches, pace)
+    segments = paced(setup.segments, pace)
     counts = np.array([each.steps for each in segments])
     starts, ends = (np.array([getattr(each, name) for each in segments]) for name in ("start", "end"))
     ticks = np.array([each.tick and _sampled(setup) for each in segments])

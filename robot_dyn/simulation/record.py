@@ -20,7 +20,7 @@ class Path:
     Attributes:
         key: Steps of the run before each, (k,), by which the states of a run and of its companions are matched.
         t: In [s], (k,).
-        y: States of the motion, (k, m).
+        y: States of the state equation, (k, m).
     """
 
     key: np.ndarray
@@ -36,7 +36,7 @@ class Record:
     Attributes:
         outcome: How it ended.
         t: Of the samples, (k,), in [s].
-        y: States of the motion, (k, m).
+        y: States of the state equation, (k, m).
         made: What follows from them: y', u, K and V, (k, m + n + 2).
         shared: States at which runs of other steps are compared.
         walked: States at the ends of all steps; the same, unless the method chooses its steps.

@@ -19,10 +19,10 @@ from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.simulation.machine.batch import LANES, Batch
 from robot_dyn.simulation.machine.making import machine
 from robot_dyn.simulation.machine.payloads import masses
-from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.rollout_result import Rollouts
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import MOST_BYTES
+from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.validate import choice, instance, integer, joint_values, numbers
 
 RECORDS = ("q", "v", "tau", "energy", "work")
@@ -59,7 +59,7 @@ def rollouts(
     Runs are not watched at every step, as those of `simulate` are: they carry no remarks.
 
     Returns:
-        The runs, in the order given. Ctrl-C while they march ends them, and keeps what there is.
+        The runs, in the order given. Ctrl-C ends them, and keeps what there is.
 
     Raises:
         QueryError: If an argument is not allowed or has the wrong shape, or the record would exceed `most_bytes`.
@@ -72,14 +72,14 @@ def rollouts(
     if params is not None and not (isinstance(params, Mapping) and all(isinstance(name, str) for name in params)):
         raise QueryError(f"params must give values by name, such as {{'kp': …}}, got {shown(params)}")
     instance("record", record, Iterable, f"give names of {', '.join(RECORDS)}")
-    wanted = tuple(choice("record", name, RECORDS) for name in record)
-    q, v, free = _starts(setup, q0, v0, params or {})
-    motion = Motion(setup.plant, setup.controller, setup.integrator.canonical)
-    asked = {"u": "tau" in wanted, "v": motion.canonical and "v" in wanted, "energy": "energy" in wanted}
-    kept, nominal = tuple(name for name, yes in asked.items() if yes), {name: x[0] for name, x in free.items()}
-    made = machine(motion, cast(Integrator, setup.integrator), lanes=LANES, free=nominal, kept=kept)
+    recorded = tuple(choice("record", name, RECORDS) for name in record)
+    q, v, sweep = _starts(setup, q0, v0, params or {})
+    equation = StateEquation(setup.plant, setup.controller, setup.integrator.canonical)
+    asked = {"u": "tau" in recorded, "v": equation.canonical and "v" in recorded, "energy": "energy" in recorded}
+    kept, nominal = tuple(name for name, yes in asked.items() if yes), {name: x[0] for name, x in sweep.items()}
+    made = machine(equation, cast(Integrator, setup.integrator), lanes=LANES, sweep=nominal, kept=kept)
     made.check(setup)
-    return Batch(setup, made, q, v, free, wanted, kept, most_bytes).run(thread_count(threads), on_progress)
+    return Batch(setup, made, q, v, sweep, recorded, kept, most_bytes).run(thread_count(threads), on_progress)
 
 
 def _starts(
@@ -90,13 +90,13 @@ def _starts(
     n = len(names)
     q = joint_values("q0", setup.q0 if q0 is None else q0, names)
     v = joint_values("v0", setup.v0 if v0 is None else v0, names)
-    free = {name: _values(setup, name, x) for name, x in params.items()}
-    counts = {len(x) for x in (q, v, *free.values()) if x.ndim > 1} or {1}
+    sweep = {name: _values(setup, name, x) for name, x in params.items()}
+    counts = {len(x) for x in (q, v, *sweep.values()) if x.ndim > 1} or {1}
     if len(counts) > 1 or max(q.ndim, v.ndim) > 2 or counts == {0}:
-        shapes = {"q0": q.shape, "v0": v.shape} | {name: x.shape for name, x in free.items()}
+        shapes = {"q0": q.shape, "v0": v.shape} | {name: x.shape for name, x in sweep.items()}
         raise QueryError(f"starts and params must be of one number of runs, (B, {n}), got {shapes}")
     B = counts.pop()
-    return np.broadcast_to(q, (B, n)), np.broadcast_to(v, (B, n)), free
+    return np.broadcast_to(q, (B, n)), np.broadcast_to(v, (B, n)), sweep
 
 
 def _values(setup: Setup, name: str, values: Any) -> np.ndarray:

@@ -14,9 +14,9 @@ from robot_dyn.errors import QueryError
 from robot_dyn.simulation.acting import acting
 from robot_dyn.simulation.ledger import Ledger
 from robot_dyn.simulation.loads import at_stop, wrenches
-from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.samples import columns
 from robot_dyn.simulation.setup import Setup
+from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.state_functions import sample
 from robot_dyn.simulation.trajectory import Trajectory
 
@@ -45,17 +45,17 @@ def trajectory(runs: Rollouts, run: int) -> Trajectory:
     work = {name: np.full(len(t), np.nan) for name in runs.sources}
     if runs.work is not None:
         work = {name: x[run, known] for name, x in runs.work.items()}
-    wanted, deviation, loads, stops, acts = None, None, {}, None, None
+    desired, deviation, loads, stops, acts = None, None, {}, None, None
     if setup is not None:
         from robot_dyn.simulation.simulate import deviation_of
 
-        wanted, deviation = deviation_of(setup, t, q)
+        desired, deviation = deviation_of(setup, t, q)
         loads, stops, acts = wrenches(setup.plant, t, q), at_stop(setup.plant, q), acting(setup)
     steps, evaluations = int(runs.steps[run]), int(runs.evaluations[run])
     about = runs.about | {"run": f"{run} of {len(runs)}"}
     return Trajectory(
         runs.joint_names, t, q, v, a, tau, dict(zip(runs.sources, power.T, strict=True)),
-        Ledger(energy[:, 0], energy[:, 1], work), wanted, deviation, runs.outcome(run),
+        Ledger(energy[:, 0], energy[:, 1], work), desired, deviation, runs.outcome(run),
         replace(runs.statistics, steps=steps, evaluations=evaluations), None, about, loads, stops,
         acting=acts,
     )  # fmt: skip
@@ -66,8 +66,10 @@ def _own(runs: Rollouts, setup: Setup, run: int) -> Setup:
     if runs.params:
         from robot_dyn.simulation.machine.traced import with_values
 
-        motion = with_values(Motion(setup.plant, setup.controller), {name: x[run] for name, x in runs.params.items()})
-        setup = replace(setup, plant=motion.plant, controller=motion.controller)
+        equation = with_values(
+            StateEquation(setup.plant, setup.controller), {name: x[run] for name, x in runs.params.items()}
+        )
+        setup = replace(setup, plant=equation.plant, controller=equation.controller)
     return setup
 
 
@@ -75,13 +77,13 @@ def _follows(
     setup: Setup, t: np.ndarray, q: np.ndarray, v: np.ndarray, tau: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Acceleration, torque, powers and energies at the samples."""
-    motion = Motion(setup.plant, setup.controller)
-    if tau is None and (motion.sampled or motion.memory_size):
+    equation = StateEquation(setup.plant, setup.controller)
+    if tau is None and (equation.sampled or equation.state_size):
         tau = np.full_like(q, np.nan)  # it depends on what was before
-    made = np.full((len(t), motion.size + q.shape[1] + 2), np.nan)
-    rest = np.zeros((len(t), motion.size - 2 * q.shape[1]))
+    made = np.full((len(t), equation.size + q.shape[1] + 2), np.nan)
+    rest = np.zeros((len(t), equation.size - 2 * q.shape[1]))
     y = np.hstack([q, v, rest])
     for i in range(len(t)):
-        sample(motion, float(t[i]), y[i], None if tau is None else tau[i], made[i])
-    _, _, a, u, _, power, energy = columns(motion, t, y, made)
+        sample(equation, float(t[i]), y[i], None if tau is None else tau[i], made[i])
+    _, _, a, u, _, power, energy = columns(equation, t, y, made)
     return a, u, power, energy

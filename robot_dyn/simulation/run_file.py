@@ -24,14 +24,17 @@ from robot_dyn.simulation.serialise import Arrays, SerialError, build, take_apar
 from robot_dyn.simulation.trajectory import Ending, Trajectory
 from robot_dyn.validate import integer
 
-FORMAT = 3
+FORMAT = 4
 ROLLOUTS_FORMAT = "rollouts 1"
+# The formats before, which are read as well, and what some members were called there.
+_BEFORE: Mapping[int | str, Mapping[int | str, Mapping[str, str]]] = {FORMAT: {3: {"wanted": "desired"}}}
 RUN = Kind("a run file", ".npz", b"PK\x03\x04")
 MAX_BYTES = 4 * 2**30  # of the arrays of a run that is read without being asked for more
 _MAX_TEXT = 2**28  # bytes of `about`, 4 a character; the largest URDF that loads has 2^24
 
 
 Run = TypeVar("Run", bound=Any)
+Part = TypeVar("Part")
 RunOf = TypeVar("RunOf", covariant=True)
 
 
@@ -94,11 +97,12 @@ def read_whole(
         try:
             archive = Archive(stream)
             about = _about(archive, form)
-            check_headers(archive.headers, about, members)
+            names = _BEFORE.get(form, {}).get(about["format"], {})
+            check_headers(_renamed(archive.headers, names), about, members)
             if archive.size > max_bytes:
                 held = f"{archive.size / 2**30:.3g} GiB, more than {max_bytes / 2**30:.3g} GiB"
                 raise RunFileError(f"{path}: holds {held}; if you trust it, raise max_bytes of the load")
-            arrays = archive.arrays()
+            arrays = _renamed(archive.arrays(), names)
             del arrays["about"]
             run = checked(arrays, about)
             return replace(run, about=unpacked(run.about, Path(path).parent))
@@ -107,7 +111,7 @@ def read_whole(
 
 
 def _about(archive: Archive, form: int | str) -> dict[str, Any]:
-    """The plain data, of this format."""
+    """The plain data, of this format or one before it."""
     if "about" in archive.headers and archive.headers["about"].size > _MAX_TEXT:
         raise ArchiveError(f"member 'about' is larger than {_MAX_TEXT >> 20} MiB")
     try:
@@ -115,11 +119,18 @@ def _about(archive: Archive, form: int | str) -> dict[str, Any]:
         found = about["format"]
     except (ValueError, TypeError, KeyError, RecursionError, MemoryError) as error:
         raise ArchiveError(f"member 'about' is not the JSON of a run ({type(error).__name__})") from None
-    if found != form:
+    if found not in (form, *_BEFORE.get(form, {})):
         other = "; rd.load_rollouts reads it" if found == ROLLOUTS_FORMAT else "; rd.load_run reads it"
         also = other if found in (FORMAT, ROLLOUTS_FORMAT) else ""
         raise ArchiveError(f"it has format {shorten(repr(found))}, this version reads {form!r}{also}")
     return about
+
+
+def _renamed(members: Mapping[str, Part], names: Mapping[str, str]) -> dict[str, Part]:
+    """Members of a format before under the names of this one."""
+    if unknown := members.keys() & names.values():
+        raise ArchiveError(f"member {min(unknown)!r} is not known to the format of the file")
+    return {names.get(name, name): part for name, part in members.items()}
 
 
 def _checked(arrays: Arrays, about: dict[str, Any]) -> Trajectory:
@@ -139,8 +150,8 @@ def _checked(arrays: Arrays, about: dict[str, Any]) -> Trajectory:
             raise ArchiveError(f"the times of member {shorten(name)!r} are not finite, or do not grow")
     if run.power.keys() != run.ledger.work.keys():
         raise ArchiveError("members 'power/…' and 'ledger/work/…' have different names")
-    if run.wanted is not None and run.deviation is not None and run.deviation.shape != run.wanted.shape:
-        raise ArchiveError("members 'wanted' and 'deviation' differ in shape")
+    if run.desired is not None and run.deviation is not None and run.deviation.shape != run.desired.shape:
+        raise ArchiveError("members 'desired' and 'deviation' differ in shape")
     if not 0 <= run.outcome.t < np.inf:
         raise ArchiveError(f"'outcome/t' holds {run.outcome.t!r}, not a time in [s]")
     return run

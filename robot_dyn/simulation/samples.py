@@ -8,28 +8,28 @@ from __future__ import annotations
 import numpy as np
 
 from robot_dyn.errors import RobotDynError
-from robot_dyn.simulation.motion import Motion
+from robot_dyn.simulation.state_equation import StateEquation
 
 
-def columns(motion: Motion, t: np.ndarray, y: np.ndarray, made: np.ndarray) -> tuple[np.ndarray, ...]:
+def columns(equation: StateEquation, t: np.ndarray, y: np.ndarray, made: np.ndarray) -> tuple[np.ndarray, ...]:
     """q, v, a, u, work, power (k, …) and energies (k, 2) of samples.
 
     Args:
-        motion: What moved.
+        equation: State equation of the run.
         t: Times, (k,).
         y: States, (k, m).
         made: y', u, K and V, (k, m + n + 2): y' holds v, a and the powers.
     """
-    n, m, works = motion.plant.dynamics.n, motion.size, motion.size - len(motion.sources)
+    n, m, works = equation.plant.dynamics.n, equation.size, equation.size - len(equation.sources)
     q, v, a, u = y[:, :n], y[:, n : 2 * n], made[:, n : 2 * n], made[:, m : m + n]
-    if motion.canonical:  # y holds the momentum, and y' its rate
+    if equation.canonical:  # y holds the momentum, and y' its rate
         v = made[:, :n]
-        a = np.array([_acceleration(motion, *each) for each in zip(t, q, v, u, strict=True)]).reshape(q.shape)
+        a = np.array([_acceleration(equation, *each) for each in zip(t, q, v, u, strict=True)]).reshape(q.shape)
     return q, v, a, u, y[:, works:], made[:, works:m], made[:, m + n :]
 
 
-def _acceleration(motion: Motion, t: float, q: np.ndarray, v: np.ndarray, u: np.ndarray) -> np.ndarray:
+def _acceleration(equation: StateEquation, t: float, q: np.ndarray, v: np.ndarray, u: np.ndarray) -> np.ndarray:
     try:
-        return motion.plant.forward_dynamics(float(t), q, v, u)
+        return equation.plant.forward_dynamics(float(t), q, v, u)
     except RobotDynError:
         return np.full_like(q, np.nan)

@@ -24,7 +24,7 @@ _ROUNDED = 1e-9  # of the period: k · period, as computed, is the time that the
 
 @final
 @dataclass(frozen=True)
-class Stretch:
+class Segment:
     """A segment of the run without ticks or switches inside.
 
     Attributes:
@@ -87,20 +87,20 @@ def steps_on(length: float, step_s: float, record_period_s: float) -> int:
     return max(1, ceil(length / step_s - _ROUNDED))
 
 
-def paced(stretches: tuple[Stretch, ...], pace: Fraction) -> tuple[Stretch, ...]:
+def paced(segments: tuple[Segment, ...], pace: Fraction) -> tuple[Segment, ...]:
     """The schedule of a companion run, whose steps are `pace` times as long.
 
     A segment that does not hold a whole number of longer steps ends with one step of what is left.
     """
     if pace == 1:
-        return stretches
-    result: list[Stretch] = []
-    for each in stretches:
+        return segments
+    result: list[Segment] = []
+    for each in segments:
         whole = int(each.steps / pace)
         rest = each.steps - whole * pace
         middle = each.end if not rest else each.start + float(whole * pace) * (each.end - each.start) / each.steps
         if whole:
-            result.append(Stretch(each.start, middle, each.tick, whole, each.first, pace))
+            result.append(Segment(each.start, middle, each.tick, whole, each.first, pace))
         if rest:
-            result.append(Stretch(middle, each.end, each.tick and not whole, 1, each.first + int(whole * pace), rest))
+            result.append(Segment(middle, each.end, each.tick and not whole, 1, each.first + int(whole * pace), rest))
     return tuple(result)

@@ -10,6 +10,7 @@ from typing import Any, final
 
 import numpy as np
 
+from robot_dyn import former
 from robot_dyn.arithmetic import Array, Ball
 from robot_dyn.control.control_law import ControlLaw
 from robot_dyn.control.controller import ControlError, Controller
@@ -19,7 +20,7 @@ from robot_dyn.foreign import call
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.integrate.explicit import RK4
 from robot_dyn.integrate.integrator import Integrator
-from robot_dyn.simulation.schedule import LEAST_STEPS, Stretch, cuts, steps_on
+from robot_dyn.simulation.schedule import LEAST_STEPS, Segment, cuts, steps_on
 from robot_dyn.simulation.size import check_segments
 from robot_dyn.simulation.smoothness import may_switch
 from robot_dyn.validate import choice, duration, instance, integer, one_state, returned, truth
@@ -103,13 +104,13 @@ class Setup:
         if controller is None:
             return
         with np.errstate(all="ignore"), suppress(OverflowedError):  # of its model: the outcome of a run
-            start = 0.0, self.q0, self.v0, np.zeros(controller.memory_size)
+            start = 0.0, self.q0, self.v0, np.zeros(controller.state_size)
             torque = call(controller.torque, *start)
             returned(f"{controller.name}.torque", torque, dynamics.n, error=ControlError)
-            if controller.memory_size:
-                after = controller.next_memory if controller.period_s else controller.memory_rate
+            if controller.state_size:
+                after = controller.next_state if controller.period_s else controller.state_rate
                 made = f"{controller.name}.{after.__name__}"
-                returned(made, call(after, *start), controller.memory_size, "state", error=ControlError)
+                returned(made, call(after, *start), controller.state_size, "state", error=ControlError)
 
     def _check_model(self) -> None:
         """That the controller means the joints and links of the plant; a file with other names all over may fit too."""
@@ -126,7 +127,7 @@ class Setup:
             plant.placement(self.q0, frame)  # so that an unknown link is told now
 
     @cached_property
-    def stretches(self) -> tuple[Stretch, ...]:
+    def segments(self) -> tuple[Segment, ...]:
         """The run cut at the ticks of the controller, the breaks of its reference and the switches of effects.
 
         Raises:
@@ -144,19 +145,21 @@ class Setup:
             counts = [max(count, LEAST_STEPS) for count in counts]
         firsts = np.cumsum([0, *counts[:-1]]).tolist()
         return tuple(
-            Stretch(start, end, tick, count, first)
+            Segment(start, end, tick, count, first)
             for (start, tick), end, count, first in zip(starts, ends, counts, firsts, strict=True)
         )
+
+    stretches = former.Attribute("segments")
 
     @property
     def steps(self) -> int:
         """Number of steps of a method of fixed step."""
-        return self.stretches[-1].first + self.stretches[-1].steps
+        return self.segments[-1].first + self.segments[-1].steps
 
     @property
     def taken_step_s(self) -> float:
         """Longest step that a method of fixed step takes, in [s]: at most `step_s` and the record period."""
-        return max((each.end - each.start) / each.steps for each in self.stretches)
+        return max((each.end - each.start) / each.steps for each in self.segments)
 
     @property
     def longest_step_s(self) -> float:
@@ -169,7 +172,7 @@ class Setup:
 
 
 def _controller(given: Any, n: int) -> Controller | None:
-    """The controller of n joints that is meant; QueryError if there is none."""
+    """The controller of n joints that is meant; raises QueryError if it is not one."""
     made: Any = given
     if callable(given) and not isinstance(given, Controller) and not isinstance(given, type):
         made = ControlLaw(given, n)
@@ -178,5 +181,5 @@ def _controller(given: Any, n: int) -> Controller | None:
         duration("period_s of the controller", made.period_s, zero=True)
         if made.n != n:
             raise QueryError(f"the controller drives {made.n} joints, the plant has {n}")
-        integer("memory_size of the controller", made.memory_size)
+        integer("state_size of the controller", made.state_size)
     return made

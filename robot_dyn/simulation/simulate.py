@@ -1,7 +1,7 @@
 """Simulate: a setup → a Trajectory with its energy ledger and an estimate of its error.
 
-The plant moves in continuous time. A controller with a period acts at its ticks and is held between them; steps end at
-ticks, at the switches of effects, and at the end. A run keeps all its samples, however it ends.
+The plant moves in continuous time. A controller with a period acts at its ticks, with a zero-order hold between them;
+steps end at ticks, at the switches of effects, and at the end. A run keeps all its samples, however it ends.
 """
 
 from __future__ import annotations
@@ -27,7 +27,6 @@ from robot_dyn.simulation.estimate import estimate
 from robot_dyn.simulation.fixed_step import FixedStep
 from robot_dyn.simulation.ledger import Ledger
 from robot_dyn.simulation.loads import at_stop, link_of, wrenches
-from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.observed import observer_of, remarks
 from robot_dyn.simulation.observer import Observer
 from robot_dyn.simulation.origin import origin
@@ -35,6 +34,7 @@ from robot_dyn.simulation.record import Record
 from robot_dyn.simulation.samples import columns
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import check_record
+from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.state_functions import interpreted
 from robot_dyn.simulation.trajectory import Ending, Outcome, Statistics, Trajectory
 from robot_dyn.simulation.watch import Watch
@@ -70,18 +70,20 @@ def simulate(
         if "q0" not in options:
             raise QueryError(f"simulate: give q0, the position at the start, ({plant.dynamics.n},)")
         setup = Setup(plant, **options)
-    motion = Motion(setup.plant, setup.controller, setup.integrator.canonical)
-    check_record(setup, motion)
+    equation = StateEquation(setup.plant, setup.controller, setup.integrator.canonical)
+    check_record(setup, equation)
     clock = [perf_counter()]
-    machine, engine = choose(setup, motion)
+    machine, engine = choose(setup, equation)
     clock.append(perf_counter())
-    observer = observer_of(setup, motion)
-    record = _run(setup, motion, machine, on_progress=on_progress, observer=observer)
+    observer = observer_of(setup, equation)
+    record = _run(setup, equation, machine, on_progress=on_progress, observer=observer)
     clock.append(perf_counter())
     error = None
     if setup.estimate_error and record.outcome.ending is not Ending.STOPPED:
         try:
-            error = estimate(setup, motion, record, lambda pace, of: _run(of, motion, machine, pace, companion=True))
+            error = estimate(
+                setup, equation, record, lambda pace, of: _run(of, equation, machine, pace, companion=True)
+            )
         except KeyboardInterrupt:
             error = no_estimate("it was interrupted")
             if record.outcome.ending is Ending.FINISHED:
@@ -95,13 +97,13 @@ def simulate(
         setup.integrator.name, step, record.steps, record.evaluations, wall, companions, engine, compiling
     )
     observer.close()
-    made = _trajectory(setup, motion, record, statistics, error, observer)
+    made = _trajectory(setup, equation, record, statistics, error, observer)
     return replace(made, statistics=replace(statistics, samples_s=perf_counter() - clock[-1]))
 
 
 def _run(
     setup: Setup,
-    motion: Motion,
+    equation: StateEquation,
     machine: Machine | None,
     pace: Fraction = Fraction(1),
     on_progress: Callable[[float], object] | None = None,
@@ -111,13 +113,13 @@ def _run(
     """The run of a setup, or of a companion with another pace."""
     advance = None if machine is None else machine.loop
     if machine is None:
-        functions = interpreted(motion, Watch(setup, motion))
+        functions = interpreted(equation, Watch(setup, equation))
     else:
         functions = machine.in_python if advance is None else machine.equations.functions
     if setup.integrator.controls_error:
-        run: Any = ErrorControlled(setup, motion, functions, pace, on_progress, observer)
+        run: Any = ErrorControlled(setup, equation, functions, pace, on_progress, observer)
     else:
-        run = FixedStep(setup, motion, functions, pace, advance, on_progress, observer)
+        run = FixedStep(setup, equation, functions, pace, advance, on_progress, observer)
     record = run.record()
     if companion and record.outcome.ending is Ending.STOPPED:
         raise KeyboardInterrupt
@@ -126,7 +128,7 @@ def _run(
 
 def _trajectory(
     setup: Setup,
-    motion: Motion,
+    equation: StateEquation,
     record: Record,
     statistics: Statistics,
     error: ErrorEstimate | None,
@@ -134,29 +136,29 @@ def _trajectory(
 ) -> Trajectory:
     """The samples with what follows from them."""
     t = record.t
-    q, v, a, tau, W, P, E = columns(motion, t, record.y, record.made)
-    wanted, deviation = deviation_of(setup, t, q)
-    ledger = Ledger(E[:, 0], E[:, 1], dict(zip(motion.sources, W.T, strict=True)), record.kinetic_peak)
-    power = dict(zip(motion.sources, P.T, strict=True))
+    q, v, a, tau, W, P, E = columns(equation, t, record.y, record.made)
+    desired, deviation = deviation_of(setup, t, q)
+    ledger = Ledger(E[:, 0], E[:, 1], dict(zip(equation.sources, W.T, strict=True)), record.kinetic_peak)
+    power = dict(zip(equation.sources, P.T, strict=True))
     plant = setup.plant
     names, about = plant.dynamics.joint_names, origin(plant.dynamics) | setup.about
     if isinstance(frame := getattr(setup.controller, "frame", None), str):
         about = {"frame": link_of(plant.dynamics, frame)} | about
     return Trajectory(
-        names, t, q, v, a, tau, power, ledger, wanted, deviation, record.outcome, statistics, error, about,
+        names, t, q, v, a, tau, power, ledger, desired, deviation, record.outcome, statistics, error, about,
         wrenches(plant, t, q), at_stop(plant, q),
         remarks(setup, observer, t, np.hstack([q, v, tau]), power), observer.extremes, acting(setup),
-        motion.controller_states(record.y),
+        equation.controller_states(record.y),
     )  # fmt: skip
 
 
 def deviation_of(setup: Setup, t: np.ndarray, q: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:
-    """Wanted positions, and how far the joints, or the frame, are from what the reference wants."""
+    """Desired positions, and how far the joints, or the frame, are from the reference."""
     controller: Any = setup.controller
     reference = getattr(controller, "reference", None)
     if isinstance(reference, PiecewisePolynomial):
-        wanted = reference.at(t)[0]
-        return wanted, q - wanted
+        desired = reference.at(t)[0]
+        return desired, q - desired
     if isinstance(reference, CartesianReference):
         return None, setup.plant.dynamics.placement(q, controller.frame)[:, :3, 3] - reference.at(t)[0]
     return None, None

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 from robot_dyn.errors import QueryError
 
 if TYPE_CHECKING:
-    from robot_dyn.simulation.motion import Motion
     from robot_dyn.simulation.setup import Setup
+    from robot_dyn.simulation.state_equation import StateEquation
 
 MOST_BYTES = 8 * 2**30  # of all that is recorded, unless said
 MOST_STEPS = 1e11  # about a day of the fastest machine code
@@ -39,14 +39,14 @@ def check_segments(setup: Setup) -> None:
         )
 
 
-def check_record(setup: Setup, motion: Motion) -> None:
+def check_record(setup: Setup, equation: StateEquation) -> None:
     """Refuse a run whose samples take more than MOST_BYTES.
 
     Raises:
         QueryError: If they do; says how much and the remedy.
     """
-    n, s, m = motion.plant.dynamics.n, len(motion.sources), len(motion.widths)
-    # t, y and what is held; q, v, a, u, work, power, energies; wanted and deviation; and copies of all while it is made
+    n, s, m = equation.plant.dynamics.n, len(equation.sources), len(equation.widths)
+    # t, y, zero-order hold; q, v, a, u, work, power, energies; desired, deviation; and copies of all while it is made
     size = 2 * 8 * samples(setup) * (1 + m + n + 4 * n + 2 * s + 2 + 2 * n)
     if size > MOST_BYTES:
         raise too_large(f"{samples(setup):.3g} samples", size, MOST_BYTES)

@@ -18,9 +18,9 @@ from robot_dyn.effects.friction import RegularisedCoulombFriction
 from robot_dyn.effects.joint_limit import JointStopDamper, JointStopSpring
 
 if TYPE_CHECKING:
-    from robot_dyn.simulation.motion import Motion
     from robot_dyn.simulation.record import Path
     from robot_dyn.simulation.setup import Setup
+    from robot_dyn.simulation.state_equation import StateEquation
 
 STOPS = (JointStopSpring, JointStopDamper)
 _IN_LAYER = 4  # steps within |v| < v_s that show a method's order
@@ -57,12 +57,12 @@ def may_switch(setup: Setup) -> bool:
     return windows or any(isinstance(effect, STOPS) for effect in effects) or bool(foreign(setup))
 
 
-def first_kink(setup: Setup, motion: Motion, path: Path) -> tuple[float, str]:
+def first_kink(setup: Setup, equation: StateEquation, path: Path) -> tuple[float, str]:
     """Time in [s] from which the right-hand side may not be smooth, and why; inf and "" if it is to the end.
 
     Args:
         setup: What was run.
-        motion: Its equation of motion.
+        equation: Its state equation.
         path: Its states, step by step.
     """
     if parts := foreign(setup):
@@ -72,8 +72,8 @@ def first_kink(setup: Setup, motion: Motion, path: Path) -> tuple[float, str]:
         )
     if len(path.t) < 2:
         return np.inf, ""
-    n = motion.plant.dynamics.n
-    q, v = path.y[:, :n], motion.velocities(path.y)
+    n = equation.plant.dynamics.n
+    q, v = path.y[:, :n], equation.velocities(path.y)
     found = [(np.inf, "")]
     for effect in setup.plant.effects:
         if isinstance(effect, STOPS):
@@ -84,7 +84,7 @@ def first_kink(setup: Setup, motion: Motion, path: Path) -> tuple[float, str]:
             crosses = (v[:-1] * v[1:] <= 0) & (np.abs(np.diff(v, axis=0)) * _IN_LAYER > effect.velocity_scale * steps)
             crosses &= np.broadcast_to(np.asarray(effect.friction) > 0, crosses.shape)
             found.append(_first(path.t, crosses, "dry friction reverses within a few steps"))
-    found.append(_saturation(setup, motion, path, q, v))
+    found.append(_saturation(setup, equation, path, q, v))
     return min(found)
 
 
@@ -113,15 +113,15 @@ def extremes(t: np.ndarray, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, n
     return low, high
 
 
-def _saturation(setup: Setup, motion: Motion, path: Path, q: np.ndarray, v: np.ndarray) -> tuple[float, str]:
+def _saturation(setup: Setup, equation: StateEquation, path: Path, q: np.ndarray, v: np.ndarray) -> tuple[float, str]:
     """When a continuous control comes near an effort limit."""
     limits = [np.asarray(x.limit) for x in setup.plant.effects if isinstance(x, EffortLimit)]
     limits += [np.asarray(x) for x in (getattr(setup.controller, "effort_limit", None),) if x is not None]
-    if motion.sampled or setup.controller is None or not any(np.isfinite(x).any() for x in limits):
+    if equation.sampled or setup.controller is None or not any(np.isfinite(x).any() for x in limits):
         return np.inf, ""
-    n, m = motion.plant.dynamics.n, motion.memory_size
+    n, m = equation.plant.dynamics.n, equation.state_size
     rows = np.unique(np.linspace(0, len(path.t) - 1, _LOOKS).astype(int))
-    u = np.array([motion.command(float(path.t[i]), q[i], v[i], path.y[i, 2 * n : 2 * n + m]) for i in rows])
+    u = np.array([equation.command(float(path.t[i]), q[i], v[i], path.y[i, 2 * n : 2 * n + m]) for i in rows])
     least = np.min([np.broadcast_to(x, (n,)) for x in limits], axis=0)
     return _first(path.t[rows], np.abs(u[1:]) > _NEAR_LIMIT * least, "an effort limit cuts the control")
 

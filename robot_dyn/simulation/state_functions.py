@@ -1,6 +1,6 @@
-"""The state equation as functions for a time loop, (t, y, p, own, out), of one run: interpreted, from a `Motion`.
+"""The state equation as functions for a time loop, (t, y, p, own, out), of one interpreted run.
 
-rate: y' and u    tick: the u that is held, and the next states of the controller    energy: K and V
+rate: y' and u    tick: u, in zero-order hold from then on, and the next states of the controller    energy: K and V
 sample: y', u, K and V
 """
 
@@ -14,48 +14,48 @@ from robot_dyn.arithmetic import Array
 from robot_dyn.errors import RobotDynError
 from robot_dyn.integrate.integrator import System
 from robot_dyn.integrate.primitives import evaluate
-from robot_dyn.simulation.motion import Motion
+from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.time_loop import Functions
 from robot_dyn.simulation.watch import Watch
 
 
-def interpreted(motion: Motion, watch: Watch) -> Functions:
-    """The functions of a motion, in Python.
+def interpreted(equation: StateEquation, watch: Watch) -> Functions:
+    """The functions of a state equation, in Python.
 
-    `rate` raises what the motion raises, `tick` and `energy` the DivergedError of the watch; `sample` gives nan.
+    `rate` raises what the equation raises, `tick` and `energy` the DivergedError of the watch; `sample` gives nan.
     """
-    n, m = motion.plant.dynamics.n, motion.size
+    n, m = equation.plant.dynamics.n, equation.size
 
     def rate(t: float, y: Array, p: Array, own: Array, out: Array) -> None:
-        made, u = motion.rate(min(max(t, p[0]), p[1]), _state(y), own[:n, 0].copy() if motion.sampled else None)
+        made, u = equation.rate(min(max(t, p[0]), p[1]), _state(y), own[:n, 0].copy() if equation.sampled else None)
         out[:m, 0], out[m:, 0] = made, u
 
     def tick(t: float, y: Array, p: Array, own: Array, out: Array) -> None:
         after, held = watch.tick(t, _state(y))
-        out[:n, 0], out[n:, 0] = held, after[2 * n : 2 * n + motion.memory_size]
+        out[:n, 0], out[n:, 0] = held, after[2 * n : 2 * n + equation.state_size]
 
     def energy(t: float, y: Array, p: Array, own: Array, out: Array) -> None:
         x = _state(y)
-        q, v, _, _ = watch.answer(t, x, lambda: motion.state(x))
-        out[:, 0] = watch.answer(t, x, lambda: motion.energy(t, q, v))
+        q, v, _, _ = watch.answer(t, x, lambda: equation.state(x))
+        out[:, 0] = watch.answer(t, x, lambda: equation.energy(t, q, v))
 
     def sampled(t: float, y: Array, p: Array, own: Array, out: Array) -> None:
-        sample(motion, min(max(t, p[0]), p[1]), _state(y), own[:n, 0] if motion.sampled else None, out[:, 0])
+        sample(equation, min(max(t, p[0]), p[1]), _state(y), own[:n, 0] if equation.sampled else None, out[:, 0])
 
     return Functions(rate, tick, energy, sampled)
 
 
-def sample(motion: Motion, t: float, y: Array, held: Array | None, out: Array) -> None:
+def sample(equation: StateEquation, t: float, y: Array, held: Array | None, out: Array) -> None:
     """What a sample holds: y', u, K and V, (m + n + 2,); nan for what has no value just before a run diverges."""
-    n, m = motion.plant.dynamics.n, motion.size
+    n, m = equation.plant.dynamics.n, equation.size
     out[...] = np.nan
     try:
         with np.errstate(all="ignore"):
-            q, v, z, _ = motion.state(y)
-            out[:n], out[m + n :] = v, motion.energy(t, q, v)
-            out[m : m + n] = u = motion.command(t, q, v, z) if held is None else held
-            out[m - len(motion.sources) : m] = motion.powers(t, q, v, u)
-            out[:m], _ = motion.rate(t, y, held)
+            q, v, z, _ = equation.state(y)
+            out[:n], out[m + n :] = v, equation.energy(t, q, v)
+            out[m : m + n] = u = equation.command(t, q, v, z) if held is None else held
+            out[m - len(equation.sources) : m] = equation.powers(t, q, v, u)
+            out[:m], _ = equation.rate(t, y, held)
     except RobotDynError:
         pass
 
@@ -67,17 +67,17 @@ def _state(y: Array) -> Array:
     return x
 
 
-def system(functions: Functions, motion: Motion, p: Array, own: Array, seen: Array | None = None) -> System:
+def system(functions: Functions, equation: StateEquation, p: Array, own: Array, seen: Array | None = None) -> System:
     """The equation y' = f(t, y) on one segment.
 
     Args:
-        functions: Of the motion, in Python.
-        motion: What moves.
+        functions: Of the state equation, in Python.
+        equation: The state equation.
         p: Of the segment.
-        own: What a sampled controller holds, (n, 1), or nothing, (0, 1).
+        own: u of a sampled controller, in zero-order hold, (n, 1), or nothing, (0, 1).
         seen: Where the velocity and the actuation of each evaluation are written, (2n,).
     """
-    n, m = motion.plant.dynamics.n, motion.size
+    n, m = equation.plant.dynamics.n, equation.size
     out = np.empty((m + n, 1))
 
     def rate(t: Any, y: Array) -> Array:
@@ -88,4 +88,4 @@ def system(functions: Functions, motion: Motion, p: Array, own: Array, seen: Arr
             seen[:n], seen[n:] = out[:n, 0], out[m:, 0]
         return out[:m, 0].copy()
 
-    return System(rate, n, motion.widths)
+    return System(rate, n, equation.widths)

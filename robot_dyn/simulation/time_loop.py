@@ -135,8 +135,8 @@ class Rules(NamedTuple):
 
     Attributes:
         n, works: Number of joints, and of works at the end of y.
-        memory: Number of states of the controller, behind q and v.
-        held: Number of numbers that a sampled controller holds; 0 for any other.
+        states: Number of states of the controller, behind q and v.
+        held: Number of torques in the zero-order hold of a sampled controller; 0 for any other.
         canonical: Whether y has momenta in place of velocities.
         alone: Whether what may end a run is looked at by its driver.
         largest: Σ |y| beyond which a step is doubtful, or a run in lock step ends.
@@ -146,7 +146,7 @@ class Rules(NamedTuple):
 
     n: int
     works: int
-    memory: int
+    states: int
     held: int
     canonical: bool
     alone: bool
@@ -203,7 +203,7 @@ def time_loop(step: Callable[..., int]) -> Callable[..., int]:
 
 def act(functions: Functions, runs: Runs, rules: Rules, t: float, p: Array) -> bool:
     """A tick: what the controller holds from now on, and its next states; whether a single run may go on."""
-    n, held, z = rules.n, rules.held, rules.memory
+    n, held, z = rules.n, rules.held, rules.states
     evaluate(functions.tick, t, runs.y, p, runs.own, runs.command)
     sizes(runs.command, runs.size)
     if rules.alone and not runs.size[0] < np.inf:
@@ -266,7 +266,7 @@ def take(runs: Runs, rules: Rules, t: float) -> bool:
 def conserve(functions: Functions, runs: Runs, rules: Rules, t: float, p: Array) -> bool:
     """Whether no energy came from nowhere in a single run; in lock step, end the runs where it did.
 
-    E − E(0) − Σ W beyond a thousand times all energy there was is no error of a step: the steps are unstable.
+    E − E(0) − Σ W beyond a thousand times all energy there was is not an error of a step: the steps are unstable.
     """
     evaluate(functions.energy, t, runs.y, p, runs.own, runs.energies)
     ended = False

@@ -8,6 +8,7 @@ from typing import final
 
 import numpy as np
 
+from robot_dyn import former
 from robot_dyn.model.units import units
 from robot_dyn.simulation.error import ErrorEstimate
 from robot_dyn.simulation.ledger import Ledger, largest
@@ -84,8 +85,8 @@ class Trajectory:
         tau: Actuation within its bounds, in [N m] or [N].
         power: Of the control and of each effect without a potential, by name, in [W].
         ledger: Energy and work.
-        wanted: Positions of a joint reference, or None.
-        deviation: q − q wanted, (m, n); or p − p wanted of a frame that follows a Cartesian reference, (m, 3) in [m];
+        desired: Positions of a joint reference, or None.
+        deviation: q − q_d, (m, n); or p − p_d of a frame that follows a Cartesian reference, (m, 3) in [m];
             None without a reference.
         outcome: How it ended.
         statistics: What it took.
@@ -109,7 +110,7 @@ class Trajectory:
     tau: np.ndarray
     power: dict[str, np.ndarray]
     ledger: Ledger
-    wanted: np.ndarray | None
+    desired: np.ndarray | None
     deviation: np.ndarray | None
     outcome: Outcome
     statistics: Statistics
@@ -121,6 +122,8 @@ class Trajectory:
     extremes: np.ndarray | None = None
     acting: tuple[str, ...] | None = None
     controller_states: np.ndarray | None = None
+
+    wanted = former.Attribute("desired")
 
     @property
     def tracking_error(self) -> float | None:
@@ -156,7 +159,7 @@ class Trajectory:
         lines += ["between samples: not watched"] if self.extremes is None else []
         lines += said(self.remarks)
         if self.tracking_error is not None:
-            what = "the frame [m]" if self.wanted is None else f"q [{unit}]"
+            what = "the frame [m]" if self.desired is None else f"q [{unit}]"
             lines.append(f"tracking error of {what}: {self.tracking_error:.3e} rms")
         step = f"step {s.step_s:.4g} s, " if s.step_s else ""
         lines.append(f"{s.method}: {step}{s.steps} steps, {s.evaluations} evaluations, {s.engine}")

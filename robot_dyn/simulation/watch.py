@@ -11,8 +11,8 @@ from robot_dyn.arithmetic import Array
 from robot_dyn.errors import RobotDynError
 from robot_dyn.foreign import is_mistake
 from robot_dyn.integrate.integrator import IntegrationError, Integrator, System
-from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.setup import Setup
+from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.trajectory import diverged_advice
 
 _PACED = 2000  # steps between looks at the pace of an adaptive method
@@ -42,15 +42,15 @@ def one_step(method: Integrator, system: System, t: float, y: Array, h: float, w
 class Watch:
     """Tells when energy grows without a source: the ledger's residual exceeds all there was and came a thousandfold."""
 
-    def __init__(self, setup: Setup, motion: Motion) -> None:
-        self.setup, self.motion = setup, motion
-        K, V = (float(x[0]) for x in motion.energy(np.zeros(1), setup.q0[None], setup.v0[None]))
+    def __init__(self, setup: Setup, equation: StateEquation) -> None:
+        self.setup, self.equation = setup, equation
+        K, V = (float(x[0]) for x in equation.energy(np.zeros(1), setup.q0[None], setup.v0[None]))
         self.energy, self.scale = K + V, 1.0 + abs(K) + abs(V)
         self.paced = 0.0
 
     def tick(self, t: float, y: Array) -> tuple[Array, Array | None]:
         """A tick of the controller; DivergedError if it fails, or asks for no finite torque."""
-        y, held = self.answer(t, y, lambda: self.motion.tick(t, y))
+        y, held = self.answer(t, y, lambda: self.equation.tick(t, y))
         if held is not None and not np.isfinite(held).all():
             raise self.diverged(t, y, "the controller asks for a torque that is not finite")
         return y, held
@@ -86,8 +86,8 @@ class Watch:
 
     def _steepest(self) -> str:
         """Words for the effect that bends within the least change of q or v, if that is small."""
-        names, found = self.motion.plant.dynamics.joint_names, (_STEEP, "")
-        for effect in self.motion.plant.effects:
+        names, found = self.equation.plant.dynamics.joint_names, (_STEEP, "")
+        for effect in self.equation.plant.effects:
             for width, unit in zip(effect.widths, ("rad or m", "rad/s or m/s"), strict=True):
                 at = np.broadcast_to(width, (len(names),))
                 i = int(np.argmin(at))
@@ -98,12 +98,12 @@ class Watch:
 
     def gains(self, t: float, y: Array) -> bool:
         """Whether the ledger's residual says so."""
-        q, v, _, W = self.motion.state(y)
-        K, V = self.motion.energy(np.array([t]), q[None], v[None])
+        q, v, _, W = self.equation.state(y)
+        K, V = self.equation.energy(np.array([t]), q[None], v[None])
         return bool((K + V)[0] - self.energy - W.sum() > 1e3 * (self.scale + np.abs(W).sum()))
 
     def diverged(self, t: float, y: Array, why: str) -> DivergedError:
         """The end of a run at time t and state y, with the fastest joint and the remedy."""
-        names = self.motion.plant.dynamics.joint_names
+        names = self.equation.plant.dynamics.joint_names
         fastest = names[int(np.argmax(np.abs(y[len(names) : 2 * len(names)])))]
         return DivergedError(t, diverged_advice(why, fastest, self.setup.taken_step_s))

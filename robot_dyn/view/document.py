@@ -122,7 +122,7 @@ def _shown(number: int, run: Trajectory, count: int, package_dirs: tuple[Path, .
     stage = Stage("run" if number == 0 else f"ghost {number}", robot)
     if unknown := run.wrenches.keys() - stage.linkage.links.keys():
         raise QueryError(f"the run has a wrench on {min(unknown)!r}, which is not a link of its robot; simulate again")
-    keys = keyframes(run.t, stage.linkage.ties.position(run.q))
+    keys = keyframes(run.t, stage.linkage.couplings.position(run.q))
     problems = []
     if len(run.t) < whole:
         problems.append(f"the last {whole - len(run.t)} samples are not shown: not finite, or beyond {_FAR:g}")

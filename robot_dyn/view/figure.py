@@ -30,7 +30,7 @@ THEMES: dict[str, dict[str, Any]] = {  # colours of Okabe and Ito, told apart by
     | {"lines": ("#56b4e9", "#e69f00", "#00b886", "#cc79a7", "#ffffff", "#f0e442", "#ff7f2a")},
 }
 _DASHES = ("-", (0, (4, 2)), (0, (1, 1.2)), (0, (6, 2, 1, 2)))
-WANTED, _LIMIT = (1, 1), (1, 1)  # colour and dashes of what is asked for, and of what is allowed
+DESIRED, _LIMIT = (1, 1), (1, 1)  # colour and dashes of what is asked for, and of what is allowed
 
 
 @final

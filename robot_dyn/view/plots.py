@@ -20,7 +20,7 @@ from robot_dyn.model import description
 from robot_dyn.model.units import unit
 from robot_dyn.simulation.trajectory import Trajectory
 from robot_dyn.validate import choice, instance, number, shaped
-from robot_dyn.view.figure import NEAR, THEMES, WANTED, Cell, Curve, Panel, draw
+from robot_dyn.view.figure import DESIRED, NEAR, THEMES, Cell, Curve, Panel, draw
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -55,12 +55,12 @@ class View:
 
 
 def joints(view: View) -> Panel:
-    """Position and velocity of each joint, with the wanted position where there is a reference."""
+    """Position and velocity of each joint, with the desired position where there is a reference."""
     run, cells = view.run, []
     for i, name in zip(view.joints, view.names, strict=True):
         q = [Curve("actual", run.t, run.q[:, i])]
-        if run.wanted is not None:
-            q.append(Curve("desired", run.t, run.wanted[:, i], WANTED))
+        if run.desired is not None:
+            q.append(Curve("desired", run.t, run.desired[:, i], DESIRED))
         cells.append(Cell(name, "", f"q [{view.units[i]}]", tuple(q)))
         cells.append(Cell("", "t [s]", f"v [{_rate(view.units[i])}]", (Curve("actual", run.t, run.v[:, i]),)))
     pairs = zip(_grid(cells[::2]), _grid(cells[1::2]), strict=True)
@@ -127,7 +127,7 @@ def tracking(view: View) -> Panel:
             "the run has no tracking error, since it followed no reference; simulate with a controller that has one"
         )
     names, units, columns = view.names, [view.units[i] for i in view.joints], list(view.joints)
-    if run.wanted is None:
+    if run.desired is None:
         names, units, columns = [f"frame, {axis}" for axis in "xyz"], ["m"] * 3, [0, 1, 2]
     off = run.deviation[:, columns]
     each = zip(names, units, off.T, strict=True)

@@ -65,7 +65,7 @@ def thinned(columns: np.ndarray, buckets: int = _BUCKETS) -> np.ndarray:
     m = len(columns)
     if m <= 4 * buckets:
         return np.arange(m)
-    columns = np.nan_to_num(columns)  # what has no value is no extreme
+    columns = np.nan_to_num(columns)  # what has no value is not an extreme
     edges = np.linspace(0, m, buckets + 1).astype(int)
     kept = [np.array([0, m - 1])]
     for a, b in pairwise(edges):

@@ -38,7 +38,7 @@ def still(robot: Robot, q: Array | None, package_dirs: Iterable[str | Path], ine
     gravity = robot.edits.gravity
     turn = upright(gravity)
     seen = scenery(stage.corners(look.pieces, at[None]) @ turn.T)
-    keys = keyframes(np.zeros(1), stage.linkage.ties.position(at[None]))
+    keys = keyframes(np.zeros(1), stage.linkage.couplings.position(at[None]))
     bodies = {body.joint: body for body in stage.linkage.bodies}
     units = ["rad" if bodies[name].revolute else "m" for name in robot.joint_names]
     values = zip(robot.joint_names, at, units, strict=True)

@@ -19,13 +19,13 @@ from robot_dyn.lagrange.magnitude import magnitudes
 from robot_dyn.lagrange.newton_euler import kinetic_energy, newton_euler
 from tests.random_trees import RandomTree, trees
 
-# prismatic: cart_pole, panda; tied: mimic_chain, panda; branches and any axis: skew_tree
+# prismatic: cart_pole, panda; coupled: mimic_chain, panda; branches and any axis: skew_tree
 ROBOTS = ("ur5", "panda", "kinova", "cart_pole", "mimic_chain", "skew_tree", "planar_2r")
 
 
 def assert_same(given: Linkage, made: Linkage, seed: int) -> None:
     """M, M a + C v + N, N and K, to 1e-12 of the terms added into them: some hundred roundings."""
-    n = given.ties.S.shape[1]
+    n = given.couplings.S.shape[1]
     rng = np.random.default_rng(seed)
     q, (v, a) = rng.uniform(-np.pi, np.pi, n), rng.normal(size=(2, n))
     size = magnitudes(given, q)
@@ -51,7 +51,7 @@ def test_the_equations_stay_the_same(name: str) -> None:
 @settings(max_examples=40)
 @given(trees(), st.integers(0, 2**32 - 1))
 def test_of_random_trees_too(tree: RandomTree, seed: int) -> None:
-    """Any axis, branches, ties, up to twelve joints."""
+    """Any axis, branches, couplings, up to twelve joints."""
     linkage = rd.Lagrangian(tree.robot).linkage
     assert_same(linkage, regrouped(slid(linkage)), seed)
 

@@ -17,7 +17,7 @@ import robot_dyn as rd
 from robot_dyn.compiled.dynamics import CompiledDynamics
 from robot_dyn.compiled.engine import SizeWarning
 from robot_dyn.compiled.kernel import Kernel
-from robot_dyn.compiled.referee import RefereeError
+from robot_dyn.compiled.self_check import SelfCheckError
 from robot_dyn.compiled.trace import ARGUMENTS, Trace
 from robot_dyn.errors import OverflowedError, QueryError, SingularError
 from robot_dyn.lagrange.magnitude import magnitudes
@@ -158,7 +158,7 @@ def test_derivatives_agree_with_pinocchio(arm: str) -> None:
             assert np.max(np.abs(same - other)) <= 1e-10 * np.max(np.abs(other))
 
 
-def test_derivatives_of_tied_joints_are_differences_of_forward_dynamics() -> None:
+def test_derivatives_of_coupled_joints_are_differences_of_forward_dynamics() -> None:
     """∂a/∂x to the O(h²) and u/h of central differences, h = 1e-6: so 1e-8 of a."""
     engine = compiled("mimic_chain")
     q, v, tau = states(engine.n, 1)[:, 0]
@@ -224,7 +224,7 @@ def test_a_wrong_kernel_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Trace, "quantity", wrong)
     engine = CompiledDynamics(compiled("ur5").original, cache=False)
     for q in (np.ones(6), np.ones((100, 6))):
-        with pytest.raises(RefereeError, match=r"compiled N .* is not Pinocchio's .* of its terms"):
+        with pytest.raises(SelfCheckError, match=r"compiled N .* is not Pinocchio's .* of its terms"):
             engine.N(q)
 
 
@@ -261,7 +261,7 @@ def test_a_compiled_robot_can_be_pickled() -> None:
 @settings(max_examples=6)
 @given(trees(most_joints=4), st.integers(0, 2**32 - 1))
 def test_random_trees_agree(tree: RandomTree, seed: int) -> None:
-    """Any axis, branches, ties: each kernel passes its referee, and a state of our own agrees."""
+    """Any axis, branches, couplings: each kernel passes its self check, and a state of our own agrees."""
     robot = tree.robot
     engine = CompiledDynamics(robot, cache=False)
     q, v, a = np.random.default_rng(seed).normal(size=(3, robot.n))

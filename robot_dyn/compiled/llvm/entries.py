@@ -1,6 +1,6 @@
 """Entries for Python: (x₁, …, y) → Status, of NumPy's arrays as they stand.
 
-They take any objects; what is no array of the right form is reported. The `self` of the function is an array of the
+They take any objects; what is not an array of the right form is reported. The `self` of the function is an array of the
 dtype that the others must have.
 """
 
@@ -84,7 +84,7 @@ def _require(builder: Any, conditions: list[Any], refuse: Any) -> None:
 
 
 def _number(builder: Any, value: Any, kind: Any, refuse: Any) -> Any:
-    """A number of Python's; what is none is refused."""
+    """A number of Python's; what is not one is refused."""
     x = api(builder, "PyFloat_AsDouble", value)
     with builder.if_then(builder.fcmp_ordered("==", x, ir.Constant(F64, -1.0)), likely=False):
         error = builder.ptrtoint(api(builder, "PyErr_Occurred"), I64)

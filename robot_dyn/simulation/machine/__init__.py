@@ -1,1 +1,1 @@
-"""A run as machine code: its motion traced, its march compiled, and held to the interpreted engine before use."""
+"""A run as machine code: state equation traced, time loop compiled, compared with the interpreted engine before use."""

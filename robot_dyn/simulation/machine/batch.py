@@ -21,12 +21,12 @@ from robot_dyn.simulation.fixed_step import runs_of, samples_at_most
 from robot_dyn.simulation.machine.machine import Machine
 from robot_dyn.simulation.machine.parts import with_
 from robot_dyn.simulation.machine.traced import robot_of
-from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.origin import origin
 from robot_dyn.simulation.plan import plan_of
 from robot_dyn.simulation.rollout_result import Rollouts
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import samples, too_large
+from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.time_loop import Ended, Now, Records, Rules, Runs, Why
 from robot_dyn.simulation.trajectory import Statistics, diverged_advice
 
@@ -46,17 +46,17 @@ class Batch:
 
     def __init__(
         self, setup: Setup, machine: Machine, q0: np.ndarray, v0: np.ndarray,
-        free: dict[str, np.ndarray], wanted: tuple[str, ...], kept: tuple[str, ...], most: int,
+        sweep: dict[str, np.ndarray], recorded: tuple[str, ...], kept: tuple[str, ...], most: int,
     ) -> None:  # fmt: skip
-        motion, n = machine.motion, machine.motion.plant.dynamics.n
-        self.setup, self.machine, self.wanted, self.kept, self.values = setup, machine, wanted, kept, free
-        self.y = _starts(motion, q0, v0)
-        self.free = np.column_stack([*free.values(), np.zeros((len(q0), 0))])
-        self.columns = [*range(n)] * ("q" in wanted)
-        if "v" in wanted and not motion.canonical:
+        equation, n = machine.equation, machine.equation.plant.dynamics.n
+        self.setup, self.machine, self.recorded, self.kept, self.values = setup, machine, recorded, kept, sweep
+        self.y = _starts(equation, q0, v0)
+        self.sweep = np.column_stack([*sweep.values(), np.zeros((len(q0), 0))])
+        self.columns = [*range(n)] * ("q" in recorded)
+        if "v" in recorded and not equation.canonical:
             self.columns += range(n, 2 * n)
-        if "work" in wanted:
-            self.columns += range(motion.size - len(motion.sources), motion.size)
+        if "work" in recorded:
+            self.columns += range(equation.size - len(equation.sources), equation.size)
         tiles = -(-len(self.y) // LANES)
         width, rows = tiles * LANES, sum({"u": n, "v": n, "energy": 2}[name] for name in kept)
         size = 8 * samples(setup) * width * (len(self.columns) + rows)
@@ -113,30 +113,30 @@ class Batch:
 
     def _runs(self, tile: int) -> Runs:
         """The runs of a tile at their start; a tile that is not full repeats a run."""
-        motion, n = self.machine.motion, self.machine.motion.plant.dynamics.n
+        equation, n = self.machine.equation, self.machine.equation.plant.dynamics.n
         index = np.minimum(np.arange(tile * LANES, (tile + 1) * LANES), len(self.y) - 1)
-        held = n * motion.sampled
-        own = np.vstack([np.zeros((held, LANES)), self.free[index].T])
-        return runs_of(self.y[index].T, own, n, held, motion.memory_size, self.made.shape[1])
+        held = n * equation.sampled
+        own = np.vstack([np.zeros((held, LANES)), self.sweep[index].T])
+        return runs_of(self.y[index].T, own, n, held, equation.state_size, self.made.shape[1])
 
     def _rules(self, base: int) -> Rules:
-        motion, n = self.machine.motion, self.machine.motion.plant.dynamics.n
-        held = n * motion.sampled
+        equation, n = self.machine.equation, self.machine.equation.plant.dynamics.n
+        held = n * equation.sampled
         return Rules(
-            n, len(motion.sources), motion.memory_size, held, motion.canonical, False, _LARGEST, 0, 1, base
+            n, len(equation.sources), equation.state_size, held, equation.canonical, False, _LARGEST, 0, 1, base
         )  # fmt: skip
 
     def _tile(self, tile: int) -> None:
-        motion, n = self.machine.motion, self.machine.motion.plant.dynamics.n
+        equation, n = self.machine.equation, self.machine.equation.plant.dynamics.n
         own, runs = slice(tile * LANES, (tile + 1) * LANES), self._runs(tile)
         method = cast(PlainMethod, self.setup.integrator)
         assert self.machine.loop is not None
-        stepper = method.stepper(FLOAT64, motion.size, n, motion.size, LANES)
+        stepper = method.stepper(FLOAT64, equation.size, n, equation.size, LANES)
         functions, now = self.machine.equations.functions, np.zeros(len(Now), dtype=np.int64)
         now[Now.BUDGET] = np.iinfo(np.int64).max
         records = Records(
             np.array(self.columns, np.int64), np.empty((len(self.out_y), 2), np.int64), self.out_y, self.made,
-            np.empty((0, motion.size + 2)), np.empty((2 + 3 * n, 0)),
+            np.empty((0, equation.size + 2)), np.empty((2 + 3 * n, 0)),
         )  # fmt: skip
         ended = self.machine.loop(
             functions, self.plan, runs, records, self._rules(own.start), stepper.coefficients, stepper.work, now,
@@ -155,7 +155,7 @@ class Batch:
                 array[int(now[Now.ROW]) :, :, own] = np.nan
 
     def _result(self) -> Rollouts:
-        B, motion, n = len(self.y), self.machine.motion, self.machine.motion.plant.dynamics.n
+        B, equation, n = len(self.y), self.machine.equation, self.machine.equation.plant.dynamics.n
         segment, step = self.place.T
         t = self.plan.starts[segment] + step * self.plan.lengths[segment]
         why, ended = self.why[:B], self.ended[:B].copy()
@@ -165,16 +165,18 @@ class Batch:
         for name in self.kept:
             made[name] = np.moveaxis(self.made[: len(t), at : at + lengths[name], :B], -1, 0)
             at += lengths[name]
-        q = y[..., :n] if "q" in self.wanted else None
-        v = made.get("v") if motion.canonical else y[..., n * ("q" in self.wanted) :][..., :n]
-        works = [y[..., i - len(motion.sources)] for i in range(len(motion.sources))] if "work" in self.wanted else []
+        q = y[..., :n] if "q" in self.recorded else None
+        v = made.get("v") if equation.canonical else y[..., n * ("q" in self.recorded) :][..., :n]
+        works = (
+            [y[..., i - len(equation.sources)] for i in range(len(equation.sources))] if "work" in self.recorded else []
+        )
         energy = made.get("energy")
         K, V = (None, None) if energy is None else (energy[..., 0], energy[..., 1])
-        named = dict(zip(motion.sources, works, strict=True)) if works else None
+        named = dict(zip(equation.sources, works, strict=True)) if works else None
         return Rollouts(
-            motion.plant.dynamics.joint_names, t, q, v if "v" in self.wanted else None, made.get("u"), K, V, named,
+            equation.plant.dynamics.joint_names, t, q, v if "v" in self.recorded else None, made.get("u"), K, V, named,
             ended, why > 0, stopped, self._advice(why, self.fastest[:B]), self._steps(ended),
-            np.repeat(self.evaluations, LANES)[:B], self._statistics(), tuple(motion.sources),
+            np.repeat(self.evaluations, LANES)[:B], self._statistics(), tuple(equation.sources),
             origin(self.setup.plant.dynamics) | self.setup.about, dict(self.values), self._compiled(),
         )  # fmt: skip
 
@@ -188,7 +190,7 @@ class Batch:
 
     def _advice(self, why: np.ndarray, fastest: np.ndarray) -> tuple[str, ...]:
         """Why runs diverged and what to do; nothing for the others."""
-        advice, names = [""] * len(why), self.machine.motion.plant.dynamics.joint_names
+        advice, names = [""] * len(why), self.machine.equation.plant.dynamics.joint_names
         for run in np.flatnonzero(why).tolist():
             advice[run] = diverged_advice(_REASONS[Why(why[run])], names[fastest[run]], self.setup.taken_step_s)
         return tuple(advice)
@@ -209,8 +211,8 @@ class Batch:
         return Statistics(method.name, self.setup.duration_s / steps, steps, most, 0.0, engine=runs)
 
 
-def _starts(motion: Motion, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+def _starts(equation: StateEquation, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """The states at the starts of runs, (B, m)."""
-    if motion.canonical:
-        return np.stack([motion.start(*each) for each in zip(q, v, strict=True)])
-    return np.column_stack([q, v, np.zeros((len(q), motion.size - 2 * q.shape[1]))])
+    if equation.canonical:
+        return np.stack([equation.start(*each) for each in zip(q, v, strict=True)])
+    return np.column_stack([q, v, np.zeros((len(q), equation.size - 2 * q.shape[1]))])

@@ -1,4 +1,4 @@
-"""The state equation of a setup as machine code, held to the interpreted one before use.
+"""The state equation of a setup as machine code, compared with the interpreted one before use.
 
 |y' − y'_interpreted| ≤ 1e-13 · cond(M) · scale   at random states, or it is refused
 """
@@ -19,10 +19,10 @@ from robot_dyn.compiled.llvm import machine_code
 from robot_dyn.compiled.llvm.lock_step import write_function
 from robot_dyn.compiled.program import Program
 from robot_dyn.errors import RobotDynError
-from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.plan import plan_of
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.smoothness import foreign
+from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.state_functions import sample
 from robot_dyn.simulation.time_loop import Functions
 
@@ -69,7 +69,7 @@ class Equations:
                 write_function(module, f"{prefix}{name}", program, self.runs)
 
         def address(name: str) -> int:
-            return machine_code.address(name, self._key, write, default_store(), f"the motion of {self.name}")
+            return machine_code.address(name, self._key, write, default_store(), f"the state equation of {self.name}")
 
         return Functions(*(address(name) if name in self.programs else 0 for name in Functions._fields))
 
@@ -77,18 +77,18 @@ class Equations:
 @final
 @dataclass(frozen=True, eq=False)
 class Machine:
-    """A motion as machine code.
+    """A state equation as machine code.
 
     Attributes:
-        motion: The interpreted motion whose equations it has: that of the setup, with right angles written out in full.
+        equation: The interpreted state equation: that of the setup, with right angles written out in full.
         equations: Its machine code.
-        free: Values of what differs from run to run, as the setup has them.
+        sweep: Values of the sweep parameters, as the setup has them.
         loop: The time loop as machine code; None if steps are made in Python.
     """
 
-    motion: Motion
+    equation: StateEquation
     equations: Equations
-    free: np.ndarray
+    sweep: np.ndarray
     loop: Callable[..., int] | None
 
     @cached_property
@@ -106,23 +106,28 @@ class Machine:
         """
         if self.equations.checked and not foreign(setup):
             return
-        rng, n, m, W = np.random.default_rng(20), self.motion.plant.dynamics.n, self.motion.size, self.equations.runs
-        plan, held = plan_of(setup), n * self.motion.sampled
+        rng, n, m, W = (
+            np.random.default_rng(20),
+            self.equation.plant.dynamics.n,
+            self.equation.size,
+            self.equations.runs,
+        )
+        plan, held = plan_of(setup), n * self.equation.sampled
         made = {name: np.empty((len(program.outputs), W)) for name, program in self.equations.programs.items()}
         for i in range(_STATES):
             s = int(rng.integers(len(plan.counts) - 1))
             t, y = float(plan.starts[s] + plan.lengths[s]), rng.normal(size=(m, W))
-            own = np.vstack([rng.normal(size=(held, W)), np.repeat(self.free[:, None], W, axis=1)])
+            own = np.vstack([rng.normal(size=(held, W)), np.repeat(self.sweep[:, None], W, axis=1)])
             for name, out in made.items():
                 getattr(self.in_python, name)(t, y, plan.parameters[s], own, out)
             for lane in range(min(W, _STATES)):
                 ours = {name: out[:, lane] for name, out in made.items()}
                 pairs = self._pairs(t, y[:, lane], own[:n, lane] if held else None, ours)
-                allowed = _AGREES * max(1.0, float(np.linalg.cond(self.motion.plant.M(y[:n, lane]))))
+                allowed = _AGREES * max(1.0, float(np.linalg.cond(self.equation.plant.M(y[:n, lane]))))
                 worst = max(_difference(mine, theirs, y[:, lane]) for mine, theirs in pairs)
                 if not worst <= allowed:
                     raise MachineError(
-                        f"the compiled motion of {self.equations.name} differs from the interpreted one by"
+                        f"the compiled state equation of {self.equations.name} differs from the interpreted one by"
                         f" {worst:.1e} of its size, {allowed:.1e} allowed: take engine='interpreted', or make"
                         f" a part anew that was changed after a run; if none was, report it (random state {i})"
                     )
@@ -131,10 +136,10 @@ class Machine:
     def _pairs(
         self, t: float, y: np.ndarray, held: np.ndarray | None, ours: dict[str, np.ndarray]
     ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """What the functions gave, quantity by quantity, beside what the motion gives."""
-        n, m = self.motion.plant.dynamics.n, self.motion.size
+        """What the functions gave, quantity by quantity, beside what the equation gives."""
+        n, m = self.equation.plant.dynamics.n, self.equation.size
         theirs = np.empty(m + n + 2)
-        sample(self.motion, t, y, held, theirs)
+        sample(self.equation, t, y, held, theirs)
         rate, u, energy = np.split(theirs, [m, m + n])
         yield ours["rate"][:m], rate
         yield ours["energy"], energy
@@ -142,9 +147,9 @@ class Machine:
             yield ours["rate"][m:], u
             yield from zip(np.split(ours["sample"], [m, m + n]), (rate, u, energy), strict=True)
         if "tick" in ours:
-            after, command = self.motion.tick(t, y)
+            after, command = self.equation.tick(t, y)
             yield ours["tick"][:n], np.asarray(command)
-            yield ours["tick"][n:], after[2 * n : 2 * n + self.motion.memory_size]
+            yield ours["tick"][n:], after[2 * n : 2 * n + self.equation.state_size]
 
 
 def _callable(address: int) -> Callable[..., None]:

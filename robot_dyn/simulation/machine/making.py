@@ -1,6 +1,6 @@
-"""The making of machines: motions traced and compiled, so that a second run of the same parts does neither again.
+"""The making of machines: state equations traced and compiled, once for all runs of the same parts.
 
-machine(motion, method) → Machine
+machine(equation, method) → Machine
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.machine.machine import Equations, Machine
 from robot_dyn.simulation.machine.payloads import Carrying
 from robot_dyn.simulation.machine.traced import SymbolicDynamics, robot_of, trace, with_values
-from robot_dyn.simulation.motion import Motion
+from robot_dyn.simulation.state_equation import StateEquation
 
 _MOST_INSTRUCTIONS = 100_000  # some ten seconds of compiling
 _MOST = 64  # values that are kept
@@ -77,28 +77,32 @@ def _symbolic(dynamics: Any) -> SymbolicDynamics:
 
 
 def machine(
-    motion: Motion,
+    equation: StateEquation,
     method: Integrator | None,
     *,
     lanes: int = 1,
-    free: dict[str, np.ndarray] | None = None,
+    sweep: dict[str, np.ndarray] | None = None,
     kept: tuple[str, ...] | None = None,
 ) -> Machine:
-    """The machine of a motion, from the latest ones if it is among them; not compiled yet.
+    """The machine of a state equation, from the latest ones if it is among them; not compiled yet.
 
     Args:
-        motion: What to compile.
+        equation: What to compile.
         method: One whose steps are machine code too; None for the state equation alone.
         lanes: Runs in lock step.
-        free: What differs from run to run, by name, with values to check it at.
+        sweep: The sweep parameters by name, with values to check them at.
         kept: As of `trace`.
 
     Raises:
-        TraceError: If a part of the motion cannot be compiled; names it, with the remedy.
+        TraceError: If a part of the equation cannot be compiled; names it, with the remedy.
     """
-    values, plant, controller = free or {}, motion.plant, motion.controller
+    values, plant, controller = sweep or {}, equation.plant, equation.controller
     robot = _robot(plant.dynamics)
-    own = motion if robot is plant.dynamics else Motion(Plant(robot, plant.effects), controller, motion.canonical)
+    own = (
+        equation
+        if robot is plant.dynamics
+        else StateEquation(Plant(robot, plant.effects), controller, equation.canonical)
+    )
     lengths = tuple((name, len(x)) for name, x in values.items())
 
     @interrupts_later()
@@ -107,7 +111,7 @@ def machine(
         return Equations({name: program_of(each) for name, each in functions.items()}, lanes, robot.name)
 
     parts = (plant.dynamics, *plant.effects, *([] if controller is None else [controller]))
-    equations = _equations.get(parts, (motion.canonical, lanes, lengths, kept), make)
+    equations = _equations.get(parts, (equation.canonical, lanes, lengths, kept), make)
     if equations.instructions > _MOST_INSTRUCTIONS:
         raise TraceError(
             f"the run takes {equations.instructions} instructions, more than the {_MOST_INSTRUCTIONS} worth compiling;"

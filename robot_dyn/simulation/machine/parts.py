@@ -1,4 +1,4 @@
-"""The parts of a motion run on symbols: effects, bounds, controllers and their references, whichever way they branch.
+"""The parts of a state equation on symbols: effects, bounds, controllers, references, whichever way they branch.
 
 Each wraps the part it traces, and names it where that cannot be traced.
 """
@@ -109,18 +109,18 @@ class TracedController(Controller):
         return self.original.n
 
     @cached_property
-    def memory_size(self) -> int:  # pyright: ignore[reportIncompatibleMethodOverride]
+    def state_size(self) -> int:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Number of states of the controller."""
-        return self.original.memory_size
+        return self.original.state_size
 
     def torque(self, t: Any, q: Array, v: Array, z: Array) -> Array:
         return self._traced(lambda: self.inner.torque(t, q, v, z), self.n)
 
-    def memory_rate(self, t: Any, q: Array, v: Array, z: Array) -> Array:
-        return self._traced(lambda: self.inner.memory_rate(t, q, v, z), self.memory_size)
+    def state_rate(self, t: Any, q: Array, v: Array, z: Array) -> Array:
+        return self._traced(lambda: self.inner.state_rate(t, q, v, z), self.state_size)
 
-    def next_memory(self, t: Any, q: Array, v: Array, z: Array) -> Array:
-        return self._traced(lambda: self.inner.next_memory(t, q, v, z), self.memory_size)
+    def next_state(self, t: Any, q: Array, v: Array, z: Array) -> Array:
+        return self._traced(lambda: self.inner.next_state(t, q, v, z), self.state_size)
 
     def _traced(self, function: Callable[[], Any], length: int) -> Array:
         return _followed(f"controller {self.original.name}", lambda: wide(function(), length))

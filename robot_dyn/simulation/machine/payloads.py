@@ -44,14 +44,14 @@ def masses(dynamics: Any) -> dict[str, np.ndarray]:
     return {f"{_PREFIX}{each.frame}": np.array([each.mass]) for each in payloads if frames.count(each.frame) == 1}
 
 
-def of_links(free: Mapping[str, Any]) -> dict[str, Any]:
+def of_links(sweep: Mapping[str, Any]) -> dict[str, Any]:
     """The one number of each of these values that is a payload's mass, by link."""
-    return {name.removeprefix(_PREFIX): x[0] for name, x in free.items() if name.startswith(_PREFIX)}
+    return {name.removeprefix(_PREFIX): x[0] for name, x in sweep.items() if name.startswith(_PREFIX)}
 
 
-def others(free: Mapping[str, Any]) -> dict[str, Any]:
-    """The values that are no masses of payloads."""
-    return {name: x for name, x in free.items() if not name.startswith(_PREFIX)}
+def others(sweep: Mapping[str, Any]) -> dict[str, Any]:
+    """The values that are not masses of payloads."""
+    return {name: x for name, x in sweep.items() if not name.startswith(_PREFIX)}
 
 
 def carrying(robot: Described, by_link: Mapping[str, Any]) -> Carrying:

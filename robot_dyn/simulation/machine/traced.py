@@ -1,9 +1,9 @@
-"""The motion of a plant in symbols: the lines of `Motion` traced to functions of (t, y, p, own).
+"""The state equation of a plant in symbols: the lines of `StateEquation` traced to functions of (t, y, p, own).
 
     rate = (y', u),   tick = (u, z⁺),   energy = (K, V),   sample = what is kept beside the state
 
 Within a segment a reference is one polynomial, so that p, its coefficients, are inputs; so are the numbers that are
-each run's own: what a sampled controller holds, and the values that differ from run to run.
+each run's own: the zero-order hold of a sampled controller, and the sweep parameters.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ from robot_dyn.simulation.machine.parts import (
     with_,
 )
 from robot_dyn.simulation.machine.payloads import carrying, of_links, others
-from robot_dyn.simulation.motion import Motion
 from robot_dyn.simulation.plan import BOUNDS
+from robot_dyn.simulation.state_equation import StateEquation
 
 
 def _least(name: str) -> Any:
@@ -101,14 +101,17 @@ def degree(controller: Controller | None) -> int | None:
 
 
 def trace(
-    motion: Motion, dynamics: Callable[[Any], SymbolicDynamics], free: Mapping[str, int], kept: tuple[str, ...] | None
+    equation: StateEquation,
+    dynamics: Callable[[Any], SymbolicDynamics],
+    sweep: Mapping[str, int],
+    kept: tuple[str, ...] | None,
 ) -> dict[str, ca.Function]:
-    """The equations of a motion as CasADi Functions: rate, energy, tick if it is sampled, and sample.
+    """The state equation as CasADi Functions: rate, energy, tick if it is sampled, and sample.
 
     Args:
-        motion: What to trace.
+        equation: What to trace.
         dynamics: Gives the symbols of the plant's and of the controller's rigid bodies.
-        free: Names of values that are each run's own, with their lengths: "kp", "viscous_friction.damping", or
+        sweep: Names of the sweep parameters, each run's own, with their lengths: "kp", "viscous_friction.damping", or
             "payload_mass:tool0".
         kept: Which of "u", "v" and "energy" a sample of runs in lock step holds; None for a single run, whose rate
             gives u as well and whose samples hold y', u, K and V.
@@ -116,17 +119,17 @@ def trace(
     Raises:
         TraceError: If a part cannot be traced; names it.
     """
-    n, d, held = motion.plant.dynamics.n, degree(motion.controller), motion.plant.dynamics.n * motion.sampled
-    sizes = 1, motion.size, BOUNDS + (0 if d is None else 1 + (d + 1) * n), held + sum(free.values())
+    n, d, held = equation.plant.dynamics.n, degree(equation.controller), equation.plant.dynamics.n * equation.sampled
+    sizes = 1, equation.size, BOUNDS + (0 if d is None else 1 + (d + 1) * n), held + sum(sweep.values())
     (t, ts), (y, ys), (p, ps), (own, owns) = (
         inputs(name, size) for name, size in zip(("t", "y", "p", "own"), sizes, strict=True)
     )
-    ends = np.cumsum([held, *free.values()])
-    chosen = {name: owns[a:b].view(Symbols) for name, a, b in zip(free, ends, ends[1:], strict=False)}
+    ends = np.cumsum([held, *sweep.values()])
+    chosen = {name: owns[a:b].view(Symbols) for name, a, b in zip(sweep, ends, ends[1:], strict=False)}
     state, time = ys.view(Symbols), np.minimum(np.maximum(ts.view(Symbols), ps[:1]), ps[1:2])[0]
     with Symbolic().scope():
-        symbolic = _symbolic(motion, dynamics, ps[BOUNDS:], chosen)
-        rate, u = symbolic.rate(time, state, owns[:held].view(Symbols) if motion.sampled else None)
+        symbolic = _symbolic(equation, dynamics, ps[BOUNDS:], chosen)
+        rate, u = symbolic.rate(time, state, owns[:held].view(Symbols) if equation.sampled else None)
         q, v, z, _ = symbolic.state(state)
         parts = {"u": wide(u, n), "v": v, "energy": symbolic.energy(time, q, v)}
         single = kept is None
@@ -134,46 +137,46 @@ def trace(
         made["sample"] = np.concatenate(
             [rate, parts["u"], parts["energy"]] if single else [parts[x] for x in kept] or [[]]
         )
-        if motion.sampled and symbolic.controller is not None:
-            after = symbolic.controller.next_memory(time, q, v, z) if motion.memory_size else z
+        if equation.sampled and symbolic.controller is not None:
+            after = symbolic.controller.next_state(time, q, v, z) if equation.state_size else z
             made["tick"] = np.concatenate([wide(symbolic.command(time, q, v, z), n), after])
     return {name: ca.Function("f", [t, y, p, own], [ca.cse(ca.densify(column(x)))]) for name, x in made.items()}
 
 
-def with_values(motion: Motion, free: Mapping[str, Array]) -> Motion:
-    """The same motion with other values of what is free."""
-    effects = [with_(effect, _own(effect, free)) for effect in motion.plant.effects]
-    dynamics: Any = motion.plant.dynamics
-    if loads := {link: float(mass) for link, mass in of_links(free).items()}:
+def with_values(equation: StateEquation, sweep: Mapping[str, Array]) -> StateEquation:
+    """The same state equation with other values of the sweep parameters."""
+    effects = [with_(effect, _own(effect, sweep)) for effect in equation.plant.effects]
+    dynamics: Any = equation.plant.dynamics
+    if loads := {link: float(mass) for link, mass in of_links(sweep).items()}:
         dynamics = Robot(dynamics.description, carrying(dynamics, loads).edits)
-    return Motion(Plant(dynamics, effects), with_(motion.controller, _gains(free)), motion.canonical)
+    return StateEquation(Plant(dynamics, effects), with_(equation.controller, _gains(sweep)), equation.canonical)
 
 
-def _own(effect: Effect, free: Mapping[str, Array]) -> dict[str, Array]:
-    named = ((*name.partition(".")[::2], x) for name, x in others(free).items())
+def _own(effect: Effect, sweep: Mapping[str, Array]) -> dict[str, Array]:
+    named = ((*name.partition(".")[::2], x) for name, x in others(sweep).items())
     return {key: x for of, key, x in named if of == effect.name and key in vars(effect)}
 
 
-def _gains(free: Mapping[str, Array]) -> dict[str, Array]:
-    return {name: x for name, x in others(free).items() if "." not in name}
+def _gains(sweep: Mapping[str, Array]) -> dict[str, Array]:
+    return {name: x for name, x in others(sweep).items() if "." not in name}
 
 
 def _symbolic(
-    motion: Motion, dynamics: Callable[[Any], SymbolicDynamics], p: Array, free: Mapping[str, Array]
-) -> Motion:
-    """The same motion with symbols in place of its numbers."""
-    bodies: Any = dynamics(motion.plant.dynamics).carrying(of_links(free))  # a controller's model does not know them
+    equation: StateEquation, dynamics: Callable[[Any], SymbolicDynamics], p: Array, sweep: Mapping[str, Array]
+) -> StateEquation:
+    """The same state equation with symbols in place of its numbers."""
+    bodies: Any = dynamics(equation.plant.dynamics).carrying(of_links(sweep))  # a controller's model does not know them
     effects: list[Effect] = []
-    for effect in motion.plant.effects:
-        own = with_(effect, _own(effect, free))
+    for effect in equation.plant.effects:
+        own = with_(effect, _own(effect, sweep))
         kinds = {Bound: TracedBound, Conservative: TracedConservative, Force: TracedForce}
         effects.append(next(made for kind, made in kinds.items() if isinstance(effect, kind))(own))
     controller = None
-    if motion.controller is not None:
-        values = _gains(free)
+    if equation.controller is not None:
+        values = _gains(sweep)
         if p.size:
-            values["reference"] = Piece(p, motion.plant.dynamics.n)
-        if hasattr(motion.controller, "model"):
-            values["model"] = dynamics(getattr(motion.controller, "model"))  # noqa: B009
-        controller = TracedController(with_(motion.controller, values), motion.controller)
-    return Motion(Plant(bodies, effects), controller, motion.canonical)
+            values["reference"] = Piece(p, equation.plant.dynamics.n)
+        if hasattr(equation.controller, "model"):
+            values["model"] = dynamics(getattr(equation.controller, "model"))  # noqa: B009
+        controller = TracedController(with_(equation.controller, values), equation.controller)
+    return StateEquation(Plant(bodies, effects), controller, equation.canonical)

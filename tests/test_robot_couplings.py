@@ -16,15 +16,15 @@ CHAIN = np.array([[1, 0], [0.5, 0], [-0.375, 0], [0, 1]]), np.array([0, 0.1, 0.1
 
 
 @pytest.mark.parametrize(("name", "S", "s0"), [("panda", *FINGERS), ("mimic_chain", *CHAIN)])
-def test_tied_joints_are_those_of_the_full_model_by_virtual_work(name: str, S: np.ndarray, s0: np.ndarray):
+def test_coupled_joints_are_those_of_the_full_model_by_virtual_work(name: str, S: np.ndarray, s0: np.ndarray):
     """The full model read by Pinocchio alone; 1e-14, and 1e-13 for torques of some 10 N m, for the order of sums."""
     robot = rd.load(name)
     full = pin.buildModelFromUrdf(robot.description.source)
     full.gravity.linear = np.array(rd.STANDARD_GRAVITY)
     data = full.createData()
     assert (full.nv, robot.n) == S.shape and list(robot.model.names) == list(full.names)
-    assert_allclose(robot.ties.S, S, rtol=0, atol=1e-16)
-    assert_allclose(robot.ties.s0, s0, rtol=0, atol=1e-16)
+    assert_allclose(robot.couplings.S, S, rtol=0, atol=1e-16)
+    assert_allclose(robot.couplings.s0, s0, rtol=0, atol=1e-16)
     q, v, a = general(robot, 3)
     Q, V, A = S @ q + s0, S @ v, S @ a
     assert_allclose(robot.M(q), S.T @ pin.crba(full, data, Q) @ S, rtol=0, atol=1e-14)
@@ -38,7 +38,7 @@ def test_tied_joints_are_those_of_the_full_model_by_virtual_work(name: str, S: n
     assert_allclose(robot.placement(q, frame), data.oMf[index].homogeneous, rtol=0, atol=1e-14)
 
 
-def test_chain_of_ties_composes():
+def test_chain_of_couplings_composes():
     """flex_1 = 0.5 spread + 0.1 and flex_2 = −0.75 (0.5 spread + 0.1) + 0.2; friction by virtual work."""
     robot = rd.load("mimic_chain")
     assert robot.joint_names == ("spread", "twist")
@@ -61,9 +61,9 @@ def test_a_joint_that_is_held_or_follows_cannot_be_locked():
             robot.with_(lock={name: 0.2})
 
 
-def test_ties_are_read_only():
+def test_couplings_are_read_only():
     """Every query goes through S and s₀."""
-    ties = rd.load("panda").ties
-    for array in (ties.S, ties.s0):
+    couplings = rd.load("panda").couplings
+    for array in (couplings.S, couplings.s0):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 1.0

@@ -1,7 +1,7 @@
-"""The motion of a plant as a first-order system y' = f(t, y), with y = (q, v or p, z, W).
+"""The state equation: the motion of a plant as a first-order system y' = f(t, y), with y = (q, v or p, z, W).
 
     q' = v,   v' = M⁻¹ (u + Σ τ − C v − N)   or   p' = u + Σ τ + Cᵀ v − N with p = M v,
-    z' = memory of the controller,   W_k' = τ_kᵀ v: the work of the control and of each effect without a potential
+    z' = rate of the controller states,   W_k' = τ_kᵀ v: the work of the control and of each effect without a potential
 
 [Murray, Li, Sastry 1994, ch. 4; Hairer, Lubich, Wanner 2006, §VI.1 for canonical coordinates]
 """
@@ -26,8 +26,8 @@ CONTROL = "control"
 
 @final
 @dataclass(frozen=True)
-class Motion:
-    """The equation of motion of a plant under a controller.
+class StateEquation:
+    """The state equation of a plant under a controller.
 
     Attributes:
         plant: What moves.
@@ -54,14 +54,14 @@ class Motion:
         return tuple(names)
 
     @cached_property
-    def memory_size(self) -> int:
+    def state_size(self) -> int:
         """Number of states of the controller."""
-        return self.controller.memory_size if self.controller else 0
+        return self.controller.state_size if self.controller else 0
 
     @property
     def size(self) -> int:
         """Number m of entries of y."""
-        return 2 * self.plant.dynamics.n + self.memory_size + len(self.sources)
+        return 2 * self.plant.dynamics.n + self.state_size + len(self.sources)
 
     @cached_property
     def widths(self) -> np.ndarray:
@@ -74,20 +74,20 @@ class Motion:
         return widths
 
     def start(self, q: Array, v: Array) -> Array:
-        """Y at the start: no work done, no memory."""
+        """Y at the start: controller states and works are zero."""
         second = self.plant.dynamics.momentum(q, v) if self.canonical else v
-        return np.concatenate([q, second, np.zeros(self.memory_size + len(self.sources))])
+        return np.concatenate([q, second, np.zeros(self.state_size + len(self.sources))])
 
     def state(self, y: Array) -> tuple[Array, Array, Array, Array]:
         """q, v, z, W of y."""
-        n, m = self.plant.dynamics.n, self.memory_size
+        n, m = self.plant.dynamics.n, self.state_size
         q, second = y[:n], y[n : 2 * n]
         v = acceleration(self.plant.M(q), second, self.plant.dynamics.joint_names) if self.canonical else second
         return q, v, y[2 * n : 2 * n + m], y[2 * n + m :]
 
     def controller_states(self, y: Array) -> Array | None:
-        """Controller states in states y (k, m), (k, memory_size); None without any."""
-        n, m = self.plant.dynamics.n, self.memory_size
+        """Controller states in states y (k, m), (k, state_size); None without any."""
+        n, m = self.plant.dynamics.n, self.state_size
         return y[:, 2 * n : 2 * n + m].copy() if m else None
 
     def velocities(self, y: Array) -> Array:
@@ -103,18 +103,18 @@ class Motion:
 
     @property
     def sampled(self) -> bool:
-        """Whether the controller acts at ticks and is held between them."""
+        """Whether the controller acts at ticks, with a zero-order hold between them."""
         return self.controller is not None and self.controller.period_s > 0
 
     def tick(self, t: float, y: Array) -> tuple[Array, Array | None]:
-        """A tick of a sampled controller: y with its next memory, and what it holds; y and None for any other."""
+        """A tick of a sampled controller: y with the next controller states, and u; y and None for any other."""
         if self.controller is None or not self.sampled:
             return y, None
         q, v, z, _ = self.state(y)
         held, n = self.command(t, q, v, z), self.plant.dynamics.n
-        if self.memory_size:
+        if self.state_size:
             y = y.copy()
-            y[2 * n : 2 * n + self.memory_size] = call(self.controller.next_memory, t, q, v, z)
+            y[2 * n : 2 * n + self.state_size] = call(self.controller.next_state, t, q, v, z)
         return y, held
 
     def rate(self, t: float, y: Array, held: Array | None) -> tuple[Array, Array]:
@@ -122,8 +122,8 @@ class Motion:
 
         Args:
             t: In [s].
-            y: One state of the motion.
-            held: The actuation that a sampled controller holds; None if it acts continuously.
+            y: One state.
+            held: The actuation in zero-order hold of a sampled controller; None if it acts continuously.
         """
         dynamics, controller, forces = self.plant.dynamics, self.controller, self.plant.forces
         n = dynamics.n
@@ -137,9 +137,9 @@ class Motion:
             result[n : 2 * n] = tau + dynamics.coriolis_transpose(q, v) - dynamics.N(q)
         else:
             result[n : 2 * n] = dynamics.forward_dynamics(q, v, tau)
-        end = 2 * n + self.memory_size
-        remembers = held is None and controller is not None and self.memory_size > 0
-        result[2 * n : end] = call(controller.memory_rate, t, q, v, z) if remembers and controller else 0.0
+        end = 2 * n + self.state_size
+        advances = held is None and controller is not None and self.state_size > 0
+        result[2 * n : end] = call(controller.state_rate, t, q, v, z) if advances and controller else 0.0
         working = [x for x, force in zip(torques, forces, strict=True) if not isinstance(force, Conservative)]
         result[end:] = [x @ v for x in (u, *working)]
         return result, u

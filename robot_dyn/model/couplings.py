@@ -15,7 +15,7 @@ from robot_dyn.arithmetic import Arithmetic, Array
 @final
 @dataclass(frozen=True)
 class Mimic:
-    """The tie of a joint to another: q = multiplier · q_source + offset, in literals."""
+    """The coupling of a joint to another: q = multiplier · q_source + offset, in literals."""
 
     source: str
     multiplier: Any
@@ -26,16 +26,16 @@ def resolve(name: str, mimics: Mapping[str, Mimic], arithmetic: Arithmetic) -> t
     """The independent joint that `name` follows through a chain of mimics, with the composed multiplier and offset."""
     ratio, offset = arithmetic.number("1"), arithmetic.number("0")
     while name in mimics:
-        tie = mimics[name]
-        offset = offset + ratio * arithmetic.number(tie.offset)
-        ratio = ratio * arithmetic.number(tie.multiplier)
-        name = tie.source
+        coupling = mimics[name]
+        offset = offset + ratio * arithmetic.number(coupling.offset)
+        ratio = ratio * arithmetic.number(coupling.multiplier)
+        name = coupling.source
     return name, ratio, offset
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class Ties:
+class Couplings:
     """The map q_full = S q + s₀ from n independent coordinates to all N joints that move.
 
     Attributes:

@@ -1,6 +1,6 @@
-"""The referee: a fresh kernel is held to an engine that shares no line with it, at random states, or is refused.
+"""The self check: a fresh kernel is compared with an independent engine at random states, or refused.
 
-    |x_kernel − x_referee| ≤ tolerance · (Σ of the absolute values of the terms added into x)
+    |x_kernel − x_independent| ≤ tolerance · (Σ of the absolute values of the terms added into x)
 
 Accelerations are held in the units d_i = √M_ii of the joints, to the terms of the torque they are solved from.
 """
@@ -21,13 +21,13 @@ STATES = 16
 _LEAST = {"float64": 1e-12, "float32": 2e-5}  # the library's tolerance; its rounding times that of float32 over float64
 
 
-class RefereeError(RobotDynError):
-    """A compiled kernel that does not agree with its referee; nothing of it is used."""
+class SelfCheckError(RobotDynError):
+    """A compiled kernel that does not agree with its self check; nothing of it is used."""
 
 
 @final
 @dataclass(frozen=True)
-class Referee:
+class SelfCheck:
     """An engine that kernels must agree with.
 
     Attributes:
@@ -58,21 +58,21 @@ class Referee:
         effects: np.ndarray | float = 0.0,
         answered: np.ndarray | None = None,
     ) -> None:
-        """Hold results at `states()` to the referee's.
+        """Hold results at `states()` to the independent ones.
 
         Args:
             quantity: Its name.
             ours: Results of the kernel, (STATES, …).
-            theirs: Those of the referee.
+            theirs: The independent ones.
             dtype: That of the kernel.
             effects: Torques of effects, terms of the sum.
             answered: At which states the kernel gives a result rather than reports a doubt, (STATES,).
 
         Raises:
-            RefereeError: If they differ by more than rounding, or there is no result at all.
+            SelfCheckError: If they differ by more than rounding, or there is no result at all.
         """
         if answered is not None and not answered.any():
-            raise RefereeError(f"compiled {quantity} gives no result at any of {STATES} random states")
+            raise SelfCheckError(f"compiled {quantity} gives no result at any of {STATES} random states")
         scale = self._scale(quantity, theirs, effects)
         error = scaled(np.asarray(ours, dtype=float) - theirs, np.broadcast_to(scale, theirs.shape))
         error = np.where(np.isnan(error), np.inf, error)
@@ -81,7 +81,7 @@ class Referee:
         worst, tolerance = np.unravel_index(np.argmax(error), error.shape), self._tolerance(quantity, dtype)
         if not error[worst] <= tolerance:
             state = {name: x[worst[0]].tolist() for name, x in self.states().items()}
-            raise RefereeError(
+            raise SelfCheckError(
                 f"compiled {quantity} {np.asarray(ours)[worst]:.17g} is not {self.name}'s {theirs[worst]:.17g} at entry"
                 f" {tuple(map(int, worst[1:]))}: {error[worst]:.1e} of its terms, {tolerance:.1e} allowed;"
                 f" state {state}"
