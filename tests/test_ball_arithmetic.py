@@ -8,8 +8,8 @@ from flint import arb, ctx
 
 import robot_dyn as rd
 from robot_dyn.arithmetic import Ball
-from robot_dyn.lagrange.articulated_body import articulated_body
 from robot_dyn.lagrange.magnitude import magnitudes
+from robot_dyn.recursive.articulated_body import articulated_body
 
 U = np.finfo(np.float64).eps / 2
 ARMS = ["ur5", "panda"]

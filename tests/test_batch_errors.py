@@ -10,8 +10,8 @@ from numpy.testing import assert_array_equal
 
 import robot_dyn as rd
 from robot_dyn.errors import EditError, NotFiniteError, OverflowedError, QueryError, SingularError, UndecidedError
-from robot_dyn.lagrange.articulated_body import articulated_body
 from robot_dyn.model.description import check
+from robot_dyn.recursive.articulated_body import articulated_body
 from tests.compiled.arms import compiled
 from tests.queries import ARGUMENTS, FRAMED
 

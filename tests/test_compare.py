@@ -11,9 +11,8 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.accuracy.compare import compare, random_state
 from robot_dyn.errors import DescriptionError, ModelWarning, QueryError
-from robot_dyn.lagrange.breakdown import torque_breakdown
-from robot_dyn.lagrange.linkage import Linkage
 from robot_dyn.lagrange.manipulator import Lagrangian
+from robot_dyn.model.linkage import Linkage
 
 REFUSED = {"alex_psyonic_hands", "hector", "iris_simple", "ur3_empty"}  # a mimic of nothing; nothing moves; no link
 
@@ -116,20 +115,6 @@ def test_states_lie_within_the_limits_and_have_no_zeros() -> None:
         state = random_state(robot, rng)
         assert np.all((state["q"] >= robot.lower) & (state["q"] <= robot.upper))
         assert all(np.all(x != 0) for x in state.values())
-
-
-@pytest.mark.parametrize("name", ["ur5", "panda", "mimic_chain", "skew_tree", "cart_pole"])
-def test_shares_of_the_links_add_up_to_the_torque(name: str) -> None:
-    """Σ over links of inertia, Coriolis and gravity is the inverse dynamics; a few roundings of the largest share."""
-    robot = rd.load(name).with_(armature=0.1)
-    q, v, a = np.random.default_rng(4).uniform(-1, 1, (3, robot.n))
-    shares = torque_breakdown(rd.Lagrangian(robot), q, v, a)
-    total = sum(share.total for share in shares)
-    size = sum(np.abs(share.inertia) + np.abs(share.coriolis) + np.abs(share.gravity) for share in shares)
-    assert np.all(np.abs(total - robot.inverse_dynamics(q, v, a)) <= 1e-14 * size)
-    np.testing.assert_allclose(sum(s.gravity for s in shares), robot.N(q), atol=1e-14 * size.max())
-    (armature,) = (share for share in shares if share.source == "(armature)")
-    np.testing.assert_allclose(armature.inertia, 0.1 * a, rtol=1e-15)
 
 
 @pytest.mark.parametrize(

@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.lagrange.composite_body import composite_body
-from robot_dyn.lagrange.newton_euler import kinetic_energy, newton_euler
+from robot_dyn.recursive.composite_body import composite_body
+from robot_dyn.recursive.kinetic_energy import kinetic_energy
+from robot_dyn.recursive.newton_euler import newton_euler
+from robot_dyn.recursive.propagation import accelerations, twists
+from robot_dyn.spatial import block_diagonal
 
 ROBOTS = ("planar_2r", "ur5", "mimic_chain", "skew_tree", "cart_pole")
 
@@ -21,6 +24,20 @@ def lagrangian(request: pytest.FixtureRequest) -> rd.Lagrangian:
 def state(lagrangian: rd.Lagrangian) -> np.ndarray:
     """q, v, a without zeros."""
     return np.random.default_rng(3).uniform(0.2, 1.5, (3, lagrangian.n)) * [[1], [-1], [1]]
+
+
+def test_velocities_and_accelerations_are_those_of_the_jacobians(lagrangian: rd.Lagrangian, state: np.ndarray) -> None:
+    """V_i = Jᵢ v, and R A_i = J a + J̇ v of the joint's frame along the base's axes; 1e-13 of the largest."""
+    q, v, a = state
+    linkage = lagrangian.linkage
+    X, full_v, full_a = linkage.steps(q), linkage.couplings.velocity(v), linkage.couplings.velocity(a)
+    V = twists(linkage, X, full_v)
+    A = accelerations(linkage, X, V, full_v, full_a, np.zeros(6))
+    for body, twist, acceleration in zip(linkage.bodies, V, A, strict=True):
+        assert np.allclose(twist, lagrangian.jacobian(q, body.joint, expressed_in="body") @ v, rtol=0, atol=1e-13)
+        R = block_diagonal(lagrangian.placement(q, body.joint)[:3, :3])
+        of_frame = lagrangian.jacobian(q, body.joint) @ a + lagrangian.jacobian_rate(q, v, body.joint) @ v
+        assert np.allclose(R @ acceleration, of_frame, rtol=0, atol=1e-13 * (1 + np.max(np.abs(of_frame))))
 
 
 def test_newton_euler_is_the_closed_form(lagrangian: rd.Lagrangian, state: np.ndarray) -> None:

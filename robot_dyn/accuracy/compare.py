@@ -17,11 +17,11 @@ import numpy as np
 from robot_dyn.accuracy.agreement import Agreement, Comparison, Pair, worst_by_quantity
 from robot_dyn.accuracy.second_reading import second_reading
 from robot_dyn.errors import SingularError
-from robot_dyn.lagrange.articulated_body import articulated_body
 from robot_dyn.lagrange.magnitude import Magnitudes, magnitudes, mass_norm
 from robot_dyn.lagrange.manipulator import Lagrangian
 from robot_dyn.model.dynamics import Axes
 from robot_dyn.model.robot import Robot
+from robot_dyn.recursive.articulated_body import articulated_body
 from robot_dyn.validate import function, instance, integer, number
 
 TOLERANCE = 1e-12

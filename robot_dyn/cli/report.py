@@ -13,7 +13,7 @@ from rich.table import Table
 from robot_dyn.accuracy.compare import Comparison, compare
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import QueryError, nearest
-from robot_dyn.lagrange.breakdown import torque_breakdown
+from robot_dyn.lagrange.breakdown import breakdown
 from robot_dyn.lagrange.manipulator import Lagrangian
 from robot_dyn.model.gravity import gravity_acts, no_torque
 from robot_dyn.model.robot import Robot
@@ -81,11 +81,10 @@ def why(robot: Robot, answer: Document, joint: str) -> Document:
     if joint not in joints:
         raise QueryError(f"--why: no joint {joint!r}; {nearest(joint, joints)}")
     i = joints.index(joint)
-    state = (np.array(answer[name]) for name in "qva")
+    q, v, a = (np.array(answer[name]) for name in "qva")
     shares = [
-        {"source": share.source}
-        | {cause: float(getattr(share, cause)[i]) for cause in ("inertia", "coriolis", "gravity")}
-        for share in torque_breakdown(Lagrangian(robot), *state)
+        {"source": part.source, "inertia": part.M[i] @ a, "coriolis": part.C[i] @ v, "gravity": float(part.N[i])}
+        for part in breakdown(Lagrangian(robot), q, v)
     ]
     effects = {name: -torque[i] for name, torque in answer["effects"].items()}
     share = {"joint": joint, "tau": answer["tau"][i], "unit": unit("tau", answer["types"][i])}

@@ -13,7 +13,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array, sqrt, symmetric
 from robot_dyn.compiled.origins import of_bodies
-from robot_dyn.lagrange.linkage import BASE, Body, Linkage
+from robot_dyn.model.linkage import BASE, Body, Linkage
 from robot_dyn.spatial import adjoint_inverse, first_moment, hat
 
 

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.lagrange.linkage import BASE, Body, Linkage, Pose
+from robot_dyn.model.linkage import BASE, Body, Linkage, Pose
 from robot_dyn.spatial import adjoint
 
 

@@ -23,13 +23,15 @@ from robot_dyn.compiled.interrupts import interrupts_later
 from robot_dyn.compiled.origins import slid
 from robot_dyn.compiled.symbol import symbol
 from robot_dyn.compiled.symbolic import Symbolic, array_of, column, inputs
-from robot_dyn.lagrange.articulated_body import articulated_body
-from robot_dyn.lagrange.composite_body import composite_body
-from robot_dyn.lagrange.linkage import Linkage
-from robot_dyn.lagrange.manipulator import Lagrangian, christoffel
-from robot_dyn.lagrange.newton_euler import kinetic_energy, newton_euler
+from robot_dyn.lagrange.christoffel import christoffel
+from robot_dyn.lagrange.manipulator import Lagrangian
 from robot_dyn.model.dynamics import acceleration
+from robot_dyn.model.linkage import Linkage
 from robot_dyn.model.tree import Described
+from robot_dyn.recursive.articulated_body import articulated_body
+from robot_dyn.recursive.composite_body import composite_body
+from robot_dyn.recursive.kinetic_energy import kinetic_energy
+from robot_dyn.recursive.newton_euler import newton_euler
 
 ARGUMENTS = {
     "M": ("q",),

@@ -1,6 +1,6 @@
-"""The breakdown of a torque: what each link adds to τ = M a + C v + N, by inertia, Coriolis and gravity.
+"""The breakdown of M, C and N: each as a sum over the links and the armature.
 
-τ = Σ_links (J_lᵀ 𝓜_l J_l a  +  C_l v  −  J_lᵀ 𝓜_l (Rᵀ g, 0))  +  armature · a
+M = Σ M_l,  C = Σ C_l,  N = Σ N_l:   τ = Σ (M_l a + C_l v + N_l)
 """
 
 from __future__ import annotations
@@ -8,57 +8,42 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import final
 
-import numpy as np
-
-from robot_dyn.arithmetic import apply, transpose
-from robot_dyn.lagrange.linkage import BASE
-from robot_dyn.lagrange.manipulator import Lagrangian, christoffel, inertia_derivative
+from robot_dyn.arithmetic import Array
+from robot_dyn.lagrange.manipulator import Lagrangian
+from robot_dyn.lagrange.summand import coriolis_matrix, gravity_torque, mass_matrix, of_links
 from robot_dyn.validate import joint_values
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class Share:
-    """What one link, or the armature, adds to the torque of each joint; arrays of shape (n,), in [N m] or [N]."""
+class Part:
+    """What one link, or the armature, adds to M, C (n, n) and N (n,)."""
 
     source: str
-    inertia: np.ndarray
-    coriolis: np.ndarray
-    gravity: np.ndarray
-
-    @property
-    def total(self) -> np.ndarray:
-        """Sum of the three."""
-        return self.inertia + self.coriolis + self.gravity
+    M: Array
+    C: Array
+    N: Array
 
 
-def torque_breakdown(lagrangian: Lagrangian, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> tuple[Share, ...]:
-    """The shares of all links that move and have mass, and of the armature; they add up to the inverse dynamics.
+def breakdown(lagrangian: Lagrangian, q: Array, v: Array) -> tuple[Part, ...]:
+    """The parts of all links that move and have mass, and of the armature; they add up to M, C and N.
 
     Args:
-        lagrangian: In a float arithmetic.
+        lagrangian: The robot, in any arithmetic.
         q: Positions, (n,).
         v: Velocities, (n,).
-        a: Accelerations, (n,).
 
     Raises:
         QueryError: If a shape is wrong or a value is not finite.
     """
-    names = lagrangian.joint_names
-    q, v, a = (joint_values(name, x, names, lagrangian.arithmetic) for name, x in zip("qva", (q, v, a), strict=True))
-    linkage, couplings = lagrangian.linkage, lagrangian.linkage.couplings
-    at, full_v, full_a = linkage.at(q), couplings.velocity(v), couplings.velocity(a)
-    shares = []
-    for name, (index, _, inertia) in linkage.links.items():
-        if index == BASE or not np.any(inertia):
-            continue
-        path, J, R = list(linkage.bodies[index].path), at.jacobians[index], at.in_base[index][0]
-        terms = np.zeros((3, len(linkage.bodies)), dtype=q.dtype)
-        terms[0, path] = transpose(J) @ inertia @ J @ full_a[path]
-        terms[1, path] = apply(christoffel(inertia_derivative(J, inertia), full_v[path]), full_v[path])
-        terms[2, path] = -transpose(J) @ inertia[:, :3] @ (linkage.gravity @ R)
-        shares.append(Share(name, *couplings.torque(terms)))
-    if linkage.armature.any():
-        zero = np.zeros(lagrangian.n, dtype=q.dtype)
-        shares.append(Share("(armature)", couplings.torque(linkage.armature * full_a), zero, zero))
-    return tuple(shares)
+    names, arithmetic = lagrangian.joint_names, lagrangian.arithmetic
+    with arithmetic.scope():
+        q, v = (joint_values(name, x, names, arithmetic) for name, x in (("q", q), ("v", v)))
+        at, armature = lagrangian.linkage.at(q), lagrangian.linkage.armature
+        parts = [(name, (summand,), 0 * armature) for name, summand in of_links(at)]
+        if armature.any():
+            parts.append(("(armature)", (), armature))
+        return tuple(
+            Part(name, mass_matrix(at, own, drives), coriolis_matrix(at, own, v), gravity_torque(at, own))
+            for name, own, drives in parts
+        )

@@ -16,8 +16,8 @@ from typing import final
 import numpy as np
 
 from robot_dyn.arithmetic import apply
-from robot_dyn.lagrange.linkage import BASE, Body, Linkage
 from robot_dyn.model.couplings import Couplings
+from robot_dyn.model.linkage import BASE, Body, Linkage
 from robot_dyn.spatial import first_moment
 
 

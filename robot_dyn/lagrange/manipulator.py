@@ -24,10 +24,12 @@ from robot_dyn.arithmetic import (
     transpose,
 )
 from robot_dyn.errors import QueryError, shown
-from robot_dyn.lagrange.linkage import BASE, Configuration, Linkage, linkage
+from robot_dyn.lagrange.christoffel import jacobian_derivative
+from robot_dyn.lagrange.summand import coriolis_matrix, gravity_torque, mass_matrix, mass_matrix_derivative, of_bodies
 from robot_dyn.model.batch import answered
 from robot_dyn.model.description import Description
 from robot_dyn.model.dynamics import Axes, Dynamics, acceleration, entry, shape_of
+from robot_dyn.model.linkage import BASE, Configuration, Linkage, linkage
 from robot_dyn.model.tree import Described, tree
 from robot_dyn.spatial import adjoint, adjoint_inverse, block_diagonal, bracket, first_moment, hat, homogeneous
 from robot_dyn.validate import shaped
@@ -86,7 +88,12 @@ class Lagrangian(Dynamics):
 
     def mass_matrix_derivative(self, q: Array, *, errors: str = "raise") -> Array:
         """∂M_ij/∂q_k at index [..., i, j, k], exact; shape (..., n, n, n)."""
-        return self._answer("mass_matrix_derivative", errors, lambda q: self._dM(self.linkage.at(q)), q=q)
+
+        def equation(q: Array) -> Array:
+            at = self.linkage.at(q)
+            return mass_matrix_derivative(at, of_bodies(at))
+
+        return self._answer("mass_matrix_derivative", errors, equation, q=q)
 
     def coriolis_torque(self, q: Array, v: Array, *, errors: str = "raise") -> Array:
         return self._answer("coriolis_torque", errors, lambda q, v: apply(self._C(self.linkage.at(q), v), v), q=q, v=v)
@@ -159,38 +166,19 @@ class Lagrangian(Dynamics):
     # --- the equations, at a configuration
 
     def _M(self, at: Configuration) -> Array:
-        M = self._zeros(at, 2) + np.diag(self.linkage.armature)
-        for body, inertia, J in at.bodies():
-            M[body.block] = M[body.block] + transpose(J) @ inertia @ J
-        return self.linkage.couplings.matrix(M)
+        return mass_matrix(at, of_bodies(at), self.linkage.armature)
 
     def _C(self, at: Configuration, v: Array) -> Array:
-        v = self.linkage.couplings.velocity(v)
-        C = self._zeros(at, 2)
-        C = np.broadcast_to(C, np.broadcast_shapes(C.shape, (*v.shape[:-1], 1, 1))).copy()
-        for body, inertia, J in at.bodies():
-            C[body.block] = C[body.block] + christoffel(inertia_derivative(J, inertia), v[..., body.path])
-        return self.linkage.couplings.matrix(C)
+        return coriolis_matrix(at, of_bodies(at), v)
 
     def _N(self, at: Configuration) -> Array:
-        N = self._zeros(at, 1)
-        for (body, inertia, J), (R, _) in zip(at.bodies(), at.in_base, strict=True):
-            weight = (self.linkage.gravity @ R) @ transpose(inertia[:, :3])  # 𝓜 (Rᵀ g, 0)
-            N[..., body.path] = N[..., body.path] - apply(transpose(J), weight)
-        return self.linkage.couplings.torque(N)
+        return gravity_torque(at, of_bodies(at))
 
     def _V(self, at: Configuration) -> Array:
         V, g = 0, self.linkage.gravity
         for inertia, (R, p) in zip(self.linkage.inertias, at.in_base, strict=True):
             V = V - (inertia[0, 0] * p + R @ first_moment(inertia)) @ g
         return V
-
-    def _dM(self, at: Configuration) -> Array:
-        total = self._zeros(at, 3)
-        for body, inertia, J in at.bodies():
-            block = (..., *np.ix_(body.path, body.path, body.path))
-            total[block] = total[block] + inertia_derivative(J, inertia)
-        return self.linkage.couplings.cube(total)
 
     # --- frames
 
@@ -210,7 +198,7 @@ class Lagrangian(Dynamics):
     def _body_jacobian(self, at: Configuration, frame: str, v: Array | None = None) -> Array:
         """Body Jacobian of a frame over all N joints, or its rate along the full velocity v."""
         body, pose, _ = self.linkage.links[frame]
-        J = self._zeros(at, 1)[..., None, :] + np.zeros((6, 1), dtype=self.arithmetic.dtype)
+        J = np.zeros((*at.batch, 6, len(self.linkage.bodies)), dtype=self.arithmetic.dtype)
         if body == BASE:
             return J
         path, columns = self.linkage.bodies[body].path, at.jacobians[body]
@@ -233,28 +221,3 @@ class Lagrangian(Dynamics):
     def _answer(self, quantity: str, errors: str, equation: Callable[..., Array], **state: Array) -> Array:
         arrays = {name: shaped(name, x, self.joint_names, self.arithmetic) for name, x in state.items()}
         return answered(equation, arrays, shape_of(quantity, self.n), self.joint_names, errors, self.arithmetic)
-
-    def _zeros(self, at: Configuration, axes: int) -> Array:
-        return np.zeros((*at.batch, *(len(self.linkage.bodies),) * axes), dtype=self.arithmetic.dtype)
-
-
-def jacobian_derivative(J: Array) -> Array:
-    """∂J_j/∂q_k = [J_j, J_k] for j < k, else 0, at index [..., :, j, k]; from columns J (..., 6, p) of one path."""
-    p = J.shape[-1]
-    brackets = bracket(transpose(J)) @ J[..., None, :, :]  # at index [..., j, :, k]
-    return np.swapaxes(brackets, -3, -2) * np.triu(np.ones((p, p), dtype=J.dtype), 1)
-
-
-def inertia_derivative(J: Array, inertia: Array) -> Array:
-    """∂(Jᵀ 𝓜 J)_ij/∂q_k at index [..., i, j, k], shape (..., p, p, p)."""
-    dJ = np.moveaxis(jacobian_derivative(J), -3, -1)  # [..., i, k, :]
-    half = np.swapaxes(dJ @ (inertia @ J)[..., None, :, :], -1, -2)  # ∂J_iᵀ/∂q_k 𝓜 J_j at [..., i, j, k]
-    return half + np.swapaxes(half, -3, -2)
-
-
-def christoffel(dM: Array, v: Array) -> Array:
-    """C_ij = Σ_k ½ (∂M_ij/∂q_k + ∂M_ik/∂q_j − ∂M_kj/∂q_i) v_k, from ∂M (..., n, n, n) and v (..., n)."""
-    v = v[..., None, :, None]
-    rate = (dM @ v)[..., 0]  # Ṁ
-    W = (transpose(dM) @ v)[..., 0]  # W_ij = Σ_k ∂M_ik/∂q_j v_k, and its transpose is the last term
-    return (rate + W - transpose(W)) / 2

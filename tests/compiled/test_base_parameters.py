@@ -12,11 +12,12 @@ from robot_dyn.compiled.base_parameters import regrouped
 from robot_dyn.compiled.origins import slid
 from robot_dyn.compiled.right_angles import completed
 from robot_dyn.compiled.trace import Trace
-from robot_dyn.lagrange.articulated_body import articulated_body
-from robot_dyn.lagrange.composite_body import composite_body
-from robot_dyn.lagrange.linkage import Linkage
 from robot_dyn.lagrange.magnitude import magnitudes
-from robot_dyn.lagrange.newton_euler import kinetic_energy, newton_euler
+from robot_dyn.model.linkage import Linkage
+from robot_dyn.recursive.articulated_body import articulated_body
+from robot_dyn.recursive.composite_body import composite_body
+from robot_dyn.recursive.kinetic_energy import kinetic_energy
+from robot_dyn.recursive.newton_euler import newton_euler
 from tests.random_trees import RandomTree, trees
 
 # prismatic: cart_pole, panda; coupled: mimic_chain, panda; branches and any axis: skew_tree

@@ -6,7 +6,6 @@ frame of the joint that carries it. [Murray, Li, Sastry 1994, ch. 3 and 4]
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, final
@@ -59,16 +58,13 @@ class Body:
         """ξ, the body twist at unit rate, (6,)."""
         return np.concatenate((np.zeros_like(self.axis), self.axis)[:: 1 if self.revolute else -1])
 
-    @cached_property
-    def block(self) -> tuple[Any, ...]:
-        """Index of the entries of a matrix (..., N, N) that couple the joints of the path."""
-        return (..., *np.ix_(self.path, self.path))
-
     def step(self, q: Array) -> Step:
         """The change of frame from the parent at the joint's coordinate q (...,)."""
         zero, one = np.zeros_like(self.axis), np.eye(3, dtype=self.axis.dtype)
-        motion = (rotation(self.axis, q), zero) if self.revolute else (one, q[..., None] * self.axis)
-        return Step(adjoint_inverse(self.pose.R, self.pose.p), adjoint_inverse(*motion))
+        slide = q[..., None] * self.axis
+        motion = (rotation(self.axis, q), zero) if self.revolute else (one, slide)
+        origin = self.pose.p if self.revolute else self.pose.p + apply(self.pose.R, slide)
+        return Step(adjoint_inverse(self.pose.R, self.pose.p), adjoint_inverse(*motion), origin)
 
     def moved(self, q: Array) -> tuple[Array, Array]:
         """(R, p) in the parent's frame at the joint's coordinate q (...,)."""
@@ -86,10 +82,16 @@ class Step:
     Attributes:
         pose: Ad⁻¹ of the joint's constant placement, (6, 6).
         joint: Ad⁻¹ of the joint's own motion, (..., 6, 6).
+        origin: Of the body's frame in its parent's, (3,) or (..., 3).
     """
 
     pose: Array
     joint: Array
+    origin: Array
+
+    def turned(self, x: Array) -> Array:
+        """A vector in the parent's axes, in the body's: Rᵀ x."""
+        return apply(self.joint[..., 3:, 3:], apply(self.pose[3:, 3:], x))
 
     def twist(self, V: Array) -> Array:
         """The parent's twist, as the body's: Ad⁻¹ V."""
@@ -184,10 +186,6 @@ class Configuration:
                 own = np.concatenate([adjoint_inverse(R, p) @ J[body.parent], own], axis=-1)
             J.append(own)
         return J
-
-    def bodies(self) -> Iterator[tuple[Body, Array, Array]]:
-        """Each body with its generalised inertia and its Jacobian."""
-        return zip(self.linkage.bodies, self.linkage.inertias, self.jacobians, strict=True)
 
 
 def linkage(tree: Tree, joint_names: tuple[str, ...], arithmetic: Arithmetic) -> Linkage:

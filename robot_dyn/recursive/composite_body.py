@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from robot_dyn.arithmetic import Array, apply
-from robot_dyn.lagrange.linkage import BASE, Linkage
+from robot_dyn.model.linkage import BASE, Linkage
 
 
 def composite_body(linkage: Linkage, q: Array) -> Array:

@@ -1,19 +1,20 @@
 """Forward dynamics in O(n): the articulated-body algorithm, in body coordinates and any arithmetic.
 
-    V_i = Ad⁻¹ V_λ + ξ_i v_i,   c_i = [V_i, ξ_i v_i],   𝓜ᴬ = 𝓜 + Σ Adᵀ (𝓜ᴬ − U Uᵀ / d) Ad,   U = 𝓜ᴬ ξ,   d = ξᵀ U
-    a_i = (u_i − U_iᵀ A') / d_i  with  A' = Ad⁻¹ A_λ + c_i,   u_i = τ_i − ξᵀ Fᴬ,   A_0 = −g
+    𝓜ᴬ = 𝓜 + Σ Adᵀ (𝓜ᴬ − U Uᵀ / d) Ad,   U = 𝓜ᴬ ξ,   d = ξᵀ U,   u_i = τ_i − ξᵀ Fᴬ
+    a_i = (u_i − U_iᵀ A') / d_i  with  A' = Ad⁻¹ A_λ + c_i,   A_0 = −g
 
-[Featherstone 2008, §7.3]
+c_i is the acceleration that the rates alone give the body, `carried` from a parent at rest; as A, it is that of the
+frame's origin, (p̈, α), with fewer products than Featherstone's spatial one. [Featherstone 2008, §7.3]
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array, apply, rounding, symmetric, transpose
+from robot_dyn.arithmetic import Array, apply, rounding, symmetric
 from robot_dyn.errors import QueryError, SingularError, UndecidedError
-from robot_dyn.lagrange.linkage import BASE, Linkage, Step
-from robot_dyn.spatial import bracket
+from robot_dyn.model.linkage import BASE, Linkage, Step
+from robot_dyn.recursive.propagation import carried, twists, wrench
 
 
 def articulated_body(linkage: Linkage, q: Array, v: Array, tau: Array) -> Array:
@@ -35,7 +36,7 @@ def articulated_body(linkage: Linkage, q: Array, v: Array, tau: Array) -> Array:
     X = linkage.steps(q)
     batch = np.broadcast_shapes(q.shape[:-1], v.shape[:-1], tau.shape[:-1])
     v, tau = linkage.couplings.velocity(v), tau @ S.T
-    coriolis, inertia, force = _outward(linkage, X, v, batch)
+    bias, inertia, force = _outward(linkage, X, v, batch)
 
     U, d, u = {}, {}, {}
     for i, body in reversed(list(enumerate(linkage.bodies))):
@@ -48,17 +49,17 @@ def articulated_body(linkage: Linkage, q: Array, v: Array, tau: Array) -> Array:
         u[i] = tau[..., i, None] - force[i][..., None, :] @ body.screw
         if body.parent != BASE:
             left = symmetric(inertia[i] - U[i][..., :, None] * (U[i] / d[i])[..., None, :])
-            pushed = force[i] + apply(left, coriolis[i]) + U[i] * (u[i] / d[i])
+            pushed = force[i] + apply(left, bias[i]) + U[i] * (u[i] / d[i])
             inertia[body.parent] = inertia[body.parent] + X[i].inertia(left)
             force[body.parent] = force[body.parent] + X[i].wrench(pushed)
 
-    acceleration: list[Array] = []
+    A: list[Array] = []
     a = np.zeros((*batch, len(linkage.bodies)), dtype=linkage.gravity.dtype)
     free_fall = np.concatenate([-linkage.gravity, np.zeros_like(linkage.gravity)])
     for i, body in enumerate(linkage.bodies):
-        carried = X[i].twist(free_fall if body.parent == BASE else acceleration[body.parent]) + coriolis[i]
-        own = (u[i] - apply(U[i][..., None, :], carried)) / d[i]
-        acceleration.append(carried + own * body.screw)
+        given = X[i].twist(free_fall if body.parent == BASE else A[body.parent]) + bias[i]
+        own = (u[i] - apply(U[i][..., None, :], given)) / d[i]
+        A.append(given + own * body.screw)
         a[..., i] = own[..., 0]
     return a @ S
 
@@ -66,13 +67,12 @@ def articulated_body(linkage: Linkage, q: Array, v: Array, tau: Array) -> Array:
 def _outward(
     linkage: Linkage, X: list[Step], v: Array, batch: tuple[int, ...]
 ) -> tuple[list[Array], list[Array], list[Array]]:
-    """For each body c = [V, ξ v], 𝓜, and the bias wrench −ad_Vᵀ 𝓜 V, base to tips."""
-    twist, coriolis, inertia, force = [], [], [], []
+    """For each body c, its acceleration by the rates alone, 𝓜, and the wrench that keeps ω; base to tips."""
+    zero = np.zeros((*batch, 6), dtype=linkage.gravity.dtype)
+    V, bias, inertia, force = twists(linkage, X, v), [], [], []
     for i, body in enumerate(linkage.bodies):
-        own = v[..., i, None] * body.screw
-        V = np.broadcast_to(own if body.parent == BASE else X[i].twist(twist[body.parent]) + own, (*batch, 6))
-        twist.append(V)
-        coriolis.append(apply(bracket(V), own))
+        before = zero if body.parent == BASE else V[body.parent]
+        bias.append(carried(body, X[i], zero, before[..., 3:], v[..., i, None]))
         inertia.append(np.broadcast_to(linkage.inertias[i], (*batch, 6, 6)))
-        force.append(-apply(transpose(bracket(V)), apply(linkage.inertias[i], V)))
-    return coriolis, inertia, force
+        force.append(wrench(linkage.inertias[i], zero, V[i][..., 3:]))
+    return bias, inertia, force
