@@ -40,9 +40,9 @@ def breakdown(lagrangian: Lagrangian, q: Array, v: Array) -> tuple[Part, ...]:
     with arithmetic.scope():
         q, v = (joint_values(name, x, names, arithmetic) for name, x in (("q", q), ("v", v)))
         at, armature = lagrangian.linkage.at(q), lagrangian.linkage.armature
-        parts = [(name, (summand,), 0 * armature) for name, summand in of_links(at)]
+        parts = [(name, [summand], 0 * armature) for name, summand in of_links(at)]
         if armature.any():
-            parts.append(("(armature)", (), armature))
+            parts.append(("(armature)", [], armature))
         return tuple(
             Part(name, mass_matrix(at, own, drives), coriolis_matrix(at, own, v), gravity_torque(at, own))
             for name, own, drives in parts
