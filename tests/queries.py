@@ -7,23 +7,10 @@ from typing import Any
 import numpy as np
 
 import robot_dyn as rd
+from robot_dyn.model.quantity import EQUATION, FRAMES
 
-ARGUMENTS = {
-    "M": ("q",),
-    "C": ("q", "v"),
-    "N": ("q",),
-    "coriolis_torque": ("q", "v"),
-    "coriolis_transpose": ("q", "v"),
-    "inverse_dynamics": ("q", "v", "a"),
-    "forward_dynamics": ("q", "v", "tau"),
-    "kinetic_energy": ("q", "v"),
-    "potential_energy": ("q",),
-    "momentum": ("q", "v"),
-    "placement": ("q",),
-    "jacobian": ("q",),
-    "jacobian_rate": ("q", "v"),
-}
-FRAMED = ("placement", "jacobian", "jacobian_rate")
+ARGUMENTS = {quantity.name: quantity.arguments for quantity in (EQUATION | FRAMES).values()}
+FRAMED = tuple(FRAMES)
 SEVERAL = [method for method, names in ARGUMENTS.items() if len(names) > 1]
 
 

@@ -7,8 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import robot_dyn as rd
-from robot_dyn.accuracy.compare import random_state, unit_diagonal_condition
+from robot_dyn.accuracy.compare import random_state
 from robot_dyn.lagrange.magnitude import magnitudes
+from robot_dyn.lagrange.scale import unit_diagonal_condition
 from tests.random_trees import RandomTree, trees
 
 U = np.finfo(float).eps / 2

@@ -11,7 +11,8 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.accuracy.compare import random_state
-from robot_dyn.lagrange.magnitude import floored, magnitudes, scaled
+from robot_dyn.lagrange.magnitude import magnitudes
+from robot_dyn.lagrange.scale import floored, scaled
 from robot_dyn.model.description import check
 from tests.queries import ARGUMENTS, FRAMED, general
 

@@ -8,7 +8,7 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.lagrange.magnitude import floored, scaled
+from robot_dyn.lagrange.scale import floored, scaled
 
 
 @final

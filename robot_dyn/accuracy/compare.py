@@ -17,15 +17,16 @@ import numpy as np
 from robot_dyn.accuracy.agreement import Agreement, Comparison, Pair, worst_by_quantity
 from robot_dyn.accuracy.second_reading import second_reading
 from robot_dyn.errors import SingularError
-from robot_dyn.lagrange.magnitude import Magnitudes, magnitudes, mass_norm
+from robot_dyn.lagrange.magnitude import Magnitudes, magnitudes
 from robot_dyn.lagrange.manipulator import Lagrangian
+from robot_dyn.lagrange.scale import acceleration_norm, diagonal_scale, mass_norm, solved_tolerance
 from robot_dyn.model.dynamics import Axes
+from robot_dyn.model.quantity import EQUATION, FORWARD_DYNAMICS, INVERSE_DYNAMICS
 from robot_dyn.model.robot import Robot
 from robot_dyn.recursive.articulated_body import articulated_body
 from robot_dyn.validate import function, instance, integer, number
 
 TOLERANCE = 1e-12
-_U = np.finfo(float).eps / 2
 
 
 def compare(
@@ -82,26 +83,18 @@ def _pairs(
     robot: Robot, own: Lagrangian, state: dict[str, np.ndarray], frames: tuple[str, ...], tolerance: float
 ) -> Iterator[Pair]:
     q, v, a = (state[name] for name in ("q", "v", "a"))
-    one, two = (robot.joint_names,), (robot.joint_names,) * 2
-    size = magnitudes(own.linkage, q)
-    M, C, N, dM = own.M(q), own.C(q, v), own.N(q), own.mass_matrix_derivative(q)
-    diagonal = np.sqrt(np.abs(np.diagonal(M)))
-    Cv, Mv = size.C(v) @ np.abs(v), size.M @ np.abs(v)
-    pin_C = robot.C(q, v)
-    ID = robot.inverse_dynamics(q, v, a)
-
-    yield Pair("M", robot.M(q), M, np.outer(diagonal, diagonal), tolerance, two)
-    yield Pair("C", pin_C, C, size.C(v), tolerance, two)
-    yield Pair("N", robot.N(q), N, size.N, tolerance, one)
-    yield Pair("coriolis_torque", robot.coriolis_torque(q, v), C @ v, Cv, tolerance, one)
-    transposed = size.C(v).T @ np.abs(v)
-    yield Pair("coriolis_transpose", robot.coriolis_transpose(q, v), C.T @ v, transposed, tolerance, one)
-    yield Pair("inverse_dynamics", ID, own.inverse_dynamics(q, v, a), size.inverse_dynamics(v, a), tolerance, one)
-    yield Pair("kinetic_energy", robot.kinetic_energy(q, v), own.kinetic_energy(q, v), np.abs(v) @ Mv / 2, tolerance)
-    yield Pair("potential_energy", robot.potential_energy(q), own.potential_energy(q), size.V, tolerance)
-    yield Pair("momentum", robot.momentum(q, v), own.momentum(q, v), Mv, tolerance, one)
-    yield Pair("Ṁ = C + Cᵀ", pin_C + pin_C.T, dM @ v, size.C(v) + size.C(v).T, tolerance, two)
-    yield Pair("M a + C v + N = ID", ID, M @ a + C @ v + N, size.inverse_dynamics(v, a), tolerance, one)
+    size, absolute = magnitudes(own.linkage, q), {name: np.abs(x) for name, x in state.items()}
+    known: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+    for quantity in EQUATION.values():
+        if not quantity.solves:
+            one, two = known[quantity.name] = quantity.ask(robot, state), quantity.ask(own, state)
+            scale = diagonal_scale(two) if quantity.definite else quantity.terms(size, absolute)
+            yield Pair(quantity.name, one, two, scale, tolerance, (robot.joint_names,) * len(quantity.axes))
+    (M, C, N), pin_C, ID = (known[name][1] for name in "MCN"), known["C"][0], known[INVERSE_DYNAMICS.name][0]
+    rate, both = own.mass_matrix_derivative(q) @ v, size.C(v) + size.C(v).T
+    yield Pair("Ṁ = C + Cᵀ", pin_C + pin_C.T, rate, both, tolerance, (robot.joint_names,) * 2)
+    terms = INVERSE_DYNAMICS.terms(size, absolute)
+    yield Pair("M a + C v + N = ID", ID, M @ a + C @ v + N, terms, tolerance, (robot.joint_names,))
     for frame in frames:
         yield from _frame_pairs(robot, own, q, v, frame, size, tolerance)
 
@@ -139,12 +132,10 @@ def _forward_pairs(robot: Robot, own: Lagrangian, state: dict[str, np.ndarray], 
     except SingularError:
         return []
     M = own.M(q)
-    tolerance = max(tolerance, 8 * robot.n * _U * unit_diagonal_condition(M))
+    tolerance = solved_tolerance(tolerance, M)
     a, C, N = robot.forward_dynamics(q, v, tau), own.C(q, v), own.N(q)
-    terms = sum(mass_norm(M, np.linalg.solve(M, term)) for term in (tau, C @ v, N))
-    # of the sums C v and N only their terms keep the digits
-    rounded = (size.inverse_dynamics(v, np.zeros(robot.n)) + np.abs(tau)) / np.sqrt(np.diagonal(M))
-    terms = max(terms, float(np.linalg.norm(rounded)))
+    of_torque = FORWARD_DYNAMICS.terms(size, {"v": np.abs(v), "tau": np.abs(tau)})
+    terms = acceleration_norm(M, (tau, C @ v, N), of_torque)
     for quantity, b in roads.items():
         weight = np.abs(a - b) * np.sqrt(np.diagonal(M))
         joint = int(np.argmax(weight))  # names the joint; the error is that of the whole vector, in the norm of M
@@ -155,12 +146,6 @@ def _forward_pairs(robot: Robot, own: Lagrangian, state: dict[str, np.ndarray], 
     there_and_back = robot.inverse_dynamics(q, v, a)
     scale = size.inverse_dynamics(v, a) + np.abs(tau)
     return [*pairs, Pair("ID(FD(τ)) = τ", there_and_back, tau, scale, tolerance, (robot.joint_names,))]
-
-
-def unit_diagonal_condition(M: np.ndarray) -> float:
-    """κ(D M D), D scaling the diagonal of M to 1."""
-    scale = 1 / np.sqrt(np.diagonal(M))
-    return float(np.linalg.cond(M * np.outer(scale, scale)))
 
 
 def _notes(robot: Robot, unsolved: int, samples: int) -> tuple[str, ...]:

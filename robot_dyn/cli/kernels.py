@@ -11,7 +11,7 @@ from rich.table import Table
 
 from robot_dyn.compiled.cache import Store
 from robot_dyn.compiled.dynamics import CompiledDynamics
-from robot_dyn.compiled.trace import ARGUMENTS
+from robot_dyn.compiled.trace import QUANTITIES
 from robot_dyn.model.robot import Robot
 
 Document = dict[str, Any]
@@ -20,7 +20,7 @@ Document = dict[str, Any]
 def formulations(robot: Robot) -> Document:
     """For each quantity the instructions of each formulation, and what serves it."""
     compiled = CompiledDynamics(robot)
-    quantities = {name: {"served_by": compiled.served_by(name)} for name in ARGUMENTS}
+    quantities = {name: {"served_by": compiled.served_by(name)} for name in QUANTITIES}
     return {name: row | {"instructions": compiled.instructions.get(name, {})} for name, row in quantities.items()}
 
 

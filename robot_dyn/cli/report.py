@@ -16,6 +16,7 @@ from robot_dyn.errors import QueryError, nearest
 from robot_dyn.lagrange.breakdown import breakdown
 from robot_dyn.lagrange.manipulator import Lagrangian
 from robot_dyn.model.gravity import gravity_acts, no_torque
+from robot_dyn.model.quantity import PLANT, C, M
 from robot_dyn.model.robot import Robot
 from robot_dyn.model.units import unit, units
 from robot_dyn.simulation.ledger import largest
@@ -58,8 +59,8 @@ def query(robot: Robot, effects: str, q: np.ndarray, v: np.ndarray, a: np.ndarra
     else:
         a = plant.forward_dynamics(0.0, q, v, joint_values("tau", tau, robot.joint_names))
     acting = {effect.name: effect.torque(robot, 0.0, q, v).tolist() for effect in plant.forces}
-    terms = {"M": plant.M(q), "C": plant.C(q, v), "N": plant.N(0.0, q, v)}
     state = {"q": q, "v": v, "a": a, "tau": tau}
+    terms = {each.name: each.ask(plant, state | {"t": 0.0}) for each in (M, C, PLANT["N"])}
     return {
         "robot": robot.name,
         "gravity": list(robot.edits.gravity),

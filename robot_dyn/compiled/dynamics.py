@@ -18,12 +18,13 @@ from robot_dyn.compiled.on_first_use import OnFirstUse
 from robot_dyn.compiled.right_angles import completed
 from robot_dyn.compiled.self_check import SelfCheck
 from robot_dyn.compiled.threads import thread_count
-from robot_dyn.compiled.trace import ARGUMENTS, Trace
+from robot_dyn.compiled.trace import QUANTITIES, Trace
 from robot_dyn.model.dynamics import Axes, Dynamics
+from robot_dyn.model.quantity import FORWARD_DYNAMICS_DERIVATIVES
 from robot_dyn.model.robot import Robot
 from robot_dyn.validate import choice, instance, truth
 
-_DERIVATIVES = "forward_dynamics_derivatives"
+_DERIVATIVES = FORWARD_DYNAMICS_DERIVATIVES.name
 
 
 @final
@@ -74,19 +75,19 @@ class CompiledDynamics(Dynamics):
         trace, robot = Trace(self.robot), self.robot
 
         def truth(quantity: str, state: dict[str, np.ndarray]) -> tuple[np.ndarray, Any]:
-            return np.asarray(self._otherwise(quantity)(*(state[name] for name in ARGUMENTS[quantity]))), 0.0
+            return np.asarray(self._otherwise(quantity)(*(state[name] for name in QUANTITIES[quantity].arguments))), 0.0
 
         return Engine(
             trace.quantity,
-            trace.shape,
-            ARGUMENTS,
+            QUANTITIES,
+            robot.sizes,
             SelfCheck(robot, "Pinocchio"),
             truth,
             self.joint_names,
             self.dtype,
             thread_count(self.threads),
             default_store() if self.cache else None,
-            frozenset(("forward_dynamics", _DERIVATIVES) if robot.joint_without_inertia is not None else ()),
+            robot.joint_without_inertia is not None,
         )
 
     @cached_property
@@ -103,7 +104,7 @@ class CompiledDynamics(Dynamics):
 
     def served_by(self, quantity: str) -> str:
         """The formulation whose machine code answers a quantity, or "Pinocchio" past the size where compiling pays."""
-        if quantity not in ARGUMENTS or not self.engine.pays(quantity):
+        if quantity not in QUANTITIES or not self.engine.pays(quantity):
             return "Pinocchio"
         return self.engine.traces[quantity].formulation
 

@@ -7,7 +7,7 @@ way, `ask`.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, final
 
@@ -24,13 +24,13 @@ from robot_dyn.compiled.store import Store
 from robot_dyn.compiled.trace import Traced
 from robot_dyn.errors import RobotDynWarning
 from robot_dyn.model.batch import DoubtError, answered
+from robot_dyn.model.quantity import Quantity
 from robot_dyn.validate import shaped, times
 
 # Measured on chains: forward dynamics of 64 joints, 48 875 instructions, takes 8 s to compile; a batch is then 13 times
 # as fast as Pinocchio, one state from Python twice. The time grows as the count: above this, a quarter of a minute.
 LARGEST_KERNEL = 100_000
 _FEW = 8  # states of a batch that do not pay a batch kernel
-_DOUBTFUL = 1e10  # of |a|, as Robot: M may be singular
 
 
 class SizeWarning(RobotDynWarning):
@@ -44,27 +44,27 @@ class Engine:
 
     Attributes:
         traced: Gives the trace of a quantity.
-        shape: Gives the shape of a quantity for one state.
-        arguments: Names of the arguments by quantity; "t" is a time.
+        quantities: Those it answers, by name.
+        sizes: What letters in their shapes stand for.
         self_check: What kernels must agree with.
         truth: The independent answer: (quantity, states) → (STATES, …), and the torque of effects, a term.
         joint_names: For messages.
         dtype: "float64" or "float32".
         threads: For batches.
         store: Where compiled code is kept, or None.
-        without: Quantities that have no answer, whose errors are for others to word.
+        singular: Whether M is singular everywhere: what is solved has no answer, and its errors are for others to word.
     """
 
     traced: Callable[[str], Traced]
-    shape: Callable[[str], tuple[int, ...]]
-    arguments: dict[str, tuple[str, ...]]
+    quantities: Mapping[str, Quantity]
+    sizes: Mapping[str, int]
     self_check: SelfCheck
     truth: Callable[[str, dict[str, np.ndarray]], tuple[np.ndarray, Any]]
     joint_names: tuple[str, ...]
     dtype: str
     threads: int
     store: Store | None
-    without: frozenset[str] = frozenset()
+    singular: bool = False
     traces: OnFirstUse = field(init=False, repr=False)
     paying: OnFirstUse = field(init=False, repr=False)
     kernels: OnFirstUse = field(init=False, repr=False)
@@ -81,13 +81,17 @@ class Engine:
         ):
             object.__setattr__(self, name, OnFirstUse(make))
 
+    def shape(self, quantity: str) -> tuple[int, ...]:
+        """Shape of a quantity for one state, (1,) of a number."""
+        return self.quantities[quantity].shape(self.sizes) or (1,)
+
     def pays(self, quantity: str) -> bool:
         """Whether a quantity is small enough to be compiled."""
         return self.paying[quantity]
 
     def _pays(self, quantity: str) -> bool:
         """Whether it is, with a SizeWarning if it is not."""
-        if quantity in self.without:
+        if self.singular and self.quantities[quantity].solves:
             return False
         trace = self.traces[quantity]
         if (count := trace.counts[trace.formulation]) <= LARGEST_KERNEL:
@@ -115,8 +119,9 @@ class Engine:
         """
         if (quick := self._plainly(quantity, arguments, out)) is not None:
             return quick
-        arrays = {name: self._array(name, x) for name, x in zip(self.arguments[quantity], arguments, strict=True)}
-        shape, timed = self.shape(quantity), self.arguments[quantity][0] == "t"
+        asked, shape = self.quantities[quantity], self.shape(quantity)
+        timed = asked.arguments[0] == "t"
+        arrays = {name: self._array(name, x) for name, x in zip(asked.arguments, arguments, strict=True)}
 
         def equation(*given: np.ndarray) -> np.ndarray:
             batch = np.broadcast_shapes(*(x.shape[:-1] for x in given))
@@ -133,7 +138,7 @@ class Engine:
             return np.broadcast_to(np.asarray(otherwise(*state), self.dtype), (*batch, *shape))
 
         answer = answered(equation, arrays, shape, self.joint_names, errors, Float(np.dtype(self.dtype)))
-        return into(out, answer[..., 0] if quantity.endswith("energy") else answer)
+        return into(out, answer if asked.axes else answer[..., 0])
 
     def _computed(self, quantity: str, given: tuple[np.ndarray, ...], batch: tuple[int, ...]) -> np.ndarray | None:
         """The kernel's results for a batch of states, or None if it reports a doubt."""
@@ -146,10 +151,11 @@ class Engine:
 
     def _plainly(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None) -> Any:
         """The result for arrays (B, n) that the kernel takes as they are, in which it finds nothing; else None."""
-        shape, states = self.shape(quantity), getattr(arguments[-1], "shape", ())[:-1]
-        if len(states) != 1 or states[0] <= _FEW or quantity.endswith("energy"):
+        asked, states = self.quantities[quantity], getattr(arguments[-1], "shape", ())[:-1]
+        if len(states) != 1 or states[0] <= _FEW or not asked.axes:
             return None
-        if self.arguments[quantity][0] == "t":
+        shape = asked.shape(self.sizes)
+        if asked.arguments[0] == "t":
             t = arguments[0]
             if type(t) is not np.ndarray or t.dtype.kind not in "fiu" or t.shape != states:
                 return None
@@ -185,11 +191,11 @@ class Engine:
         return Status(self.kernels[quantity].any_angle(*arguments)) if status is Status.FAR else status
 
     def _kernel(self, quantity: str) -> Kernel:
-        doubtful = _DOUBTFUL if quantity == "forward_dynamics" else np.inf
-        times = self.arguments[quantity][0] == "t"
+        asked = self.quantities[quantity]
+        times = asked.arguments[0] == "t"
         program = program_of(self.traces[quantity].function)
         about = f"{self.self_check.dynamics.name}: {quantity}, {self.dtype}"
-        return Kernel(program, self.shape(quantity), self.dtype, times, doubtful, self.store, about)
+        return Kernel(program, self.shape(quantity), self.dtype, times, asked.doubtful, self.store, about)
 
     def _one(self, quantity: str) -> Any:
         """The checked kernel for one state."""
@@ -215,15 +221,16 @@ class Engine:
 
     def _judge(self, quantity: str, run: Callable[[list[list[Any]], np.ndarray], Any]) -> None:
         """Hold what `run` writes, and reports by one Status or one a state, to the independent answer."""
-        names = self.arguments[quantity]
+        asked = self.quantities[quantity]
         state = {name: x.astype(self.dtype).astype(float) for name, x in self.self_check.states().items()}
         rows = [
-            [float(state[n][i]) if n == "t" else state[n][i].astype(self.dtype) for n in names] for i in range(STATES)
+            [float(state[n][i]) if n == "t" else state[n][i].astype(self.dtype) for n in asked.arguments]
+            for i in range(STATES)
         ]
         ours = np.full((STATES, *self.shape(quantity)), np.nan, self.dtype)  # a state in doubt is not written
         answered = np.broadcast_to(np.equal(run(rows, ours), Status.FINE), STATES)
         theirs, effects = self.truth(quantity, state)
-        self.self_check.judge(quantity, ours.reshape(theirs.shape), theirs, self.dtype, effects, answered)
+        self.self_check.judge(asked, ours.reshape(theirs.shape), theirs, self.dtype, effects, answered)
 
 
 def _never(*_: Any) -> int:

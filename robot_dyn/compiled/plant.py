@@ -25,14 +25,10 @@ from robot_dyn.compiled.trace import Trace, Traced
 from robot_dyn.effects.effect import Bound
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foreign import because
+from robot_dyn.model.quantity import PLANT
 from robot_dyn.model.robot import Robot
 
-_ARGUMENTS = {
-    "N": ("t", "q", "v"),
-    "torque": ("t", "q", "v"),
-    "inverse_dynamics": ("t", "q", "v", "a"),
-    "forward_dynamics": ("t", "q", "v", "u"),
-}
+_ARGUMENTS = {quantity.name: quantity.arguments for quantity in PLANT.values()}
 _TIMES = (float, int, np.float64)  # what machine code takes for a time; others are looked at in general
 
 
@@ -73,15 +69,15 @@ class CompiledPlant:
         robot = self.dynamics.robot
         return Engine(
             self._traced,
-            lambda quantity: (robot.n,),
-            _ARGUMENTS,
+            PLANT,
+            robot.sizes,
             SelfCheck(robot, "the interpreted plant"),
             truth,
             robot.joint_names,
             self.dynamics.dtype,
             self.dynamics.engine.threads,
             default_store() if self.dynamics.cache else None,
-            frozenset(("forward_dynamics",) if robot.joint_without_inertia is not None else ()),
+            robot.joint_without_inertia is not None,
         )
 
     @property

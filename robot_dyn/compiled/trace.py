@@ -27,25 +27,14 @@ from robot_dyn.lagrange.christoffel import christoffel
 from robot_dyn.lagrange.manipulator import Lagrangian
 from robot_dyn.model.dynamics import acceleration
 from robot_dyn.model.linkage import Linkage
+from robot_dyn.model.quantity import EQUATION, FORWARD_DYNAMICS_DERIVATIVES, by_name
 from robot_dyn.model.tree import Described
 from robot_dyn.recursive.articulated_body import articulated_body
 from robot_dyn.recursive.composite_body import composite_body
 from robot_dyn.recursive.kinetic_energy import kinetic_energy
 from robot_dyn.recursive.newton_euler import newton_euler
 
-ARGUMENTS = {
-    "M": ("q",),
-    "C": ("q", "v"),
-    "N": ("q",),
-    "coriolis_torque": ("q", "v"),
-    "coriolis_transpose": ("q", "v"),
-    "inverse_dynamics": ("q", "v", "a"),
-    "forward_dynamics": ("q", "v", "tau"),
-    "kinetic_energy": ("q", "v"),
-    "potential_energy": ("q",),
-    "momentum": ("q", "v"),
-    "forward_dynamics_derivatives": ("q", "v", "tau"),
-}
+QUANTITIES = EQUATION | by_name(FORWARD_DYNAMICS_DERIVATIVES)  # what has formulations
 _SOLVED_MOST = 8  # joints one after the other; with more, to solve M a = τ − … outnumbers articulated bodies
 _DERIVED_MOST = 6  # joints; with more, to derive C v from K is longer yet, and takes as long to trace as all the rest
 _CLOSED_FORM_MOST = 4  # joints; with more its O(n³) terms outnumber the recursions' everywhere, except of C
@@ -107,18 +96,14 @@ class Trace:
         return {name: inputs(name, self.lagrangian.n) for name in ("q", "v", "a", "tau")}
 
     def shape(self, quantity: str) -> tuple[int, ...]:
-        """Shape of a quantity for one state."""
-        n = self.lagrangian.n
-        energies, matrices = ("kinetic_energy", "potential_energy"), ("M", "C")
-        if quantity == "forward_dynamics_derivatives":
-            return 3, n, n
-        return (1,) if quantity in energies else (n, n) if quantity in matrices else (n,)
+        """Shape of a quantity for one state, (1,) of a number."""
+        return QUANTITIES[quantity].shape(self.lagrangian.sizes) or (1,)
 
     @interrupts_later()
     @in_arithmetic
     def quantity(self, name: str) -> Traced:
         """A quantity of the `Dynamics` protocol, or "forward_dynamics_derivatives": ∂a/∂q, ∂a/∂v, ∂a/∂τ."""
-        arguments = [*(self.symbols[argument][0] for argument in ARGUMENTS[name]), *self.given]
+        arguments = [*(self.symbols[argument][0] for argument in QUANTITIES[name].arguments), *self.given]
         functions = {
             formulation: ca.Function("f", arguments, [ca.cse(ca.densify(make()))])
             for formulation, make in self._roads(name)
@@ -131,7 +116,7 @@ class Trace:
         """The formulations of a quantity."""
         own, coupled = self.lagrangian, self.lagrangian.linkage.couplings.S.shape[0] != self.lagrangian.n
         if name != "forward_dynamics_derivatives" and (own.n <= _CLOSED_FORM_MOST or name == "C"):
-            arrays = [self.symbols[argument][1] for argument in ARGUMENTS[name]]
+            arrays = [self.symbols[argument][1] for argument in QUANTITIES[name].arguments]
             yield "closed form", lambda: column(getattr(own, name)(*arrays))
         if name == "forward_dynamics" and not coupled:
             yield "articulated body", lambda: self._forward

@@ -15,7 +15,6 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.arithmetic import apply
 from robot_dyn.model.couplings import Couplings
 from robot_dyn.model.linkage import BASE, Body, Linkage
 from robot_dyn.spatial import first_moment
@@ -107,27 +106,3 @@ def _columns(bodies: tuple[Body, ...], body: Body, steps: np.ndarray) -> tuple[n
 
 def _reach(bodies: tuple[Body, ...], body: Body, steps: np.ndarray) -> float:
     return sum(_step(bodies[i], steps) for i in body.path)
-
-
-def scaled(error: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    """|error| / scale, with 0 / 0 = 0: no term, no error."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.abs(error) / scale
-    return np.where(np.asarray(error) == 0, 0.0, ratio)
-
-
-def floored(scale: np.ndarray) -> np.ndarray:
-    """The scale of each entry, (n,), (m, n) or a number; of one without terms, the largest in its row and column.
-
-    Where no term is, rounding of its neighbours is all that an algorithm can leave there.
-    """
-    if scale.ndim != 2:
-        return np.where(scale == 0, np.max(scale, initial=0.0), scale)
-    near = np.maximum(scale.max(axis=0)[None, :], scale.max(axis=1)[:, None])
-    near = np.where(near == 0, scale.max(), near)
-    return np.where(scale == 0, near, scale)
-
-
-def mass_norm(M: np.ndarray, x: np.ndarray) -> float:
-    """‖x‖_M = √(xᵀ M x)."""
-    return float(np.sqrt(max(x @ apply(M, x), 0.0)))

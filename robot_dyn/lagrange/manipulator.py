@@ -28,8 +28,9 @@ from robot_dyn.lagrange.christoffel import jacobian_derivative
 from robot_dyn.lagrange.summand import coriolis_matrix, gravity_torque, mass_matrix, mass_matrix_derivative, of_bodies
 from robot_dyn.model.batch import answered
 from robot_dyn.model.description import Description
-from robot_dyn.model.dynamics import Axes, Dynamics, acceleration, entry, shape_of
+from robot_dyn.model.dynamics import Axes, Dynamics, acceleration, entry
 from robot_dyn.model.linkage import BASE, Configuration, Linkage, linkage
+from robot_dyn.model.quantity import ALL
 from robot_dyn.model.tree import Described, tree
 from robot_dyn.spatial import adjoint, adjoint_inverse, block_diagonal, bracket, first_moment, hat, homogeneous
 from robot_dyn.validate import shaped
@@ -76,6 +77,11 @@ class Lagrangian(Dynamics):
     def n(self) -> int:
         """Number of degrees of freedom."""
         return len(self.joint_names)
+
+    @property
+    def sizes(self) -> dict[str, int]:
+        """The numbers that letters in the shapes of quantities stand for."""
+        return {"n": self.n}
 
     def M(self, q: Array, *, errors: str = "raise") -> Array:
         return self._answer("M", errors, lambda q: self._M(self.linkage.at(q)), q=q)
@@ -220,4 +226,4 @@ class Lagrangian(Dynamics):
     @in_arithmetic
     def _answer(self, quantity: str, errors: str, equation: Callable[..., Array], **state: Array) -> Array:
         arrays = {name: shaped(name, x, self.joint_names, self.arithmetic) for name, x in state.items()}
-        return answered(equation, arrays, shape_of(quantity, self.n), self.joint_names, errors, self.arithmetic)
+        return answered(equation, arrays, ALL[quantity].shape(self.sizes), self.joint_names, errors, self.arithmetic)

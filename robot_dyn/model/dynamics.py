@@ -308,21 +308,6 @@ class Dynamics(Protocol):
         ...
 
 
-def shape_of(quantity: str, n: int) -> tuple[int, ...]:
-    """Shape of a quantity of the protocol for one state."""
-    if quantity in ("kinetic_energy", "potential_energy"):
-        return ()
-    special = {
-        "mass_matrix_derivative": (n, n, n),
-        "M": (n, n),
-        "C": (n, n),
-        "placement": (4, 4),
-        "jacobian": (6, n),
-        "jacobian_rate": (6, n),
-    }
-    return special.get(quantity, (n,))
-
-
 def acceleration(M: Array, tau: Array, joint_names: tuple[str, ...]) -> Array:
     """Solve M a = τ for M (..., n, n) and what is left of the torque, τ (..., n).
 

@@ -31,14 +31,13 @@ from robot_dyn.model.batch import answered
 from robot_dyn.model.coriolis import Bodies
 from robot_dyn.model.couplings import Couplings
 from robot_dyn.model.description import Description, check
-from robot_dyn.model.dynamics import Array, Axes, Dynamics, acceleration, entry, shape_of
+from robot_dyn.model.dynamics import Array, Axes, Dynamics, acceleration, entry
 from robot_dyn.model.edits import Changes, Edits
 from robot_dyn.model.gravity import gravity_acts, no_torque
 from robot_dyn.model.kernels import Kernel, Scratch, frozen
+from robot_dyn.model.quantity import ALL, DOUBTFUL
 from robot_dyn.model.structure import structure
 from robot_dyn.validate import instance, is_moderate, is_state, shaped
-
-_DOUBTFUL = 1e10  # of ‖a‖: M may be singular at this q, which rounding hides
 
 
 @final
@@ -127,6 +126,11 @@ class Robot(Dynamics):
     def n(self) -> int:
         """Number of degrees of freedom."""
         return len(self.joint_names)
+
+    @property
+    def sizes(self) -> dict[str, int]:
+        """The numbers that letters in the shapes of quantities stand for."""
+        return {"n": self.n}
 
     @cached_property
     def model(self) -> Any:
@@ -284,7 +288,7 @@ class Robot(Dynamics):
         shape = self._shape if self._singular is None else None
         if is_state(q, shape) and is_state(v, shape) and is_state(tau, shape):
             a = pin.aba(self.model, self._scratch.data, q, v, tau)
-            if is_moderate(a, _DOUBTFUL):
+            if is_moderate(a, DOUBTFUL):
                 return a
         return self._forward_dynamics(errors, q, v, tau)
 
@@ -365,7 +369,7 @@ class Robot(Dynamics):
 
     def _answered(self, quantity: str, errors: str, equation: Callable[..., ndarray], state: dict[str, Array]) -> Any:
         arrays = {name: shaped(name, x, self.joint_names) for name, x in state.items()}
-        answer = answered(equation, arrays, shape_of(quantity, self.n), self.joint_names, errors)
+        answer = answered(equation, arrays, ALL[quantity].shape(self.sizes), self.joint_names, errors)
         return answer if answer.ndim else float(answer)
 
     def _forward_dynamics(self, errors: str, q: Array, v: Array, tau: Array) -> ndarray:
@@ -378,7 +382,7 @@ class Robot(Dynamics):
 
         def equation(q: ndarray, v: ndarray, tau: ndarray) -> ndarray:
             a = solved(q, v, tau) if self.couplings.trivial else acceleration(M(q), tau - bias(q, v), self.joint_names)
-            if not np.all(np.abs(a) <= _DOUBTFUL) and np.isfinite(here := M(q)).all():
+            if not np.all(np.abs(a) <= DOUBTFUL) and np.isfinite(here := M(q)).all():
                 acceleration(here, tau, self.joint_names)  # tells if M is singular at this q
             return a
 

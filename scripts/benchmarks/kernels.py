@@ -89,7 +89,8 @@ def kernels(effort: Effort) -> None:
         for name, cpp in in_cpp(robot, batch).items():
             ours, single = rd.Compiled(robot), rd.Compiled(robot, dtype="float32")
             arguments = tuple(batch[: 1 if name == "M" else 3])
-            loop, y = looped(ours.engine.kernels[name].state, len(arguments)), np.empty((BATCH, *_shape(name, robot.n)))
+            loop = looped(ours.engine.kernels[name].state, len(arguments))
+            y = np.empty((BATCH, *ours.engine.shape(name)))
             small, z = [x.astype(np.float32) for x in arguments], np.empty(y.shape, np.float32)
             sides = {
                 "C++": cpp,
@@ -163,7 +164,3 @@ def first_use(effort: Effort) -> None:
     table("what", "s")
     row("first forward dynamics, Panda-7, nothing in the cache", f"{np.median(cold):.2f}")
     row("the same in a second process, from the cache", f"{np.median(warm):.3f}")
-
-
-def _shape(name: str, n: int) -> tuple[int, ...]:
-    return (n, n) if name == "M" else (n,)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import pickle
 import platform
 import re
-from typing import Any
 
 import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
@@ -18,13 +17,15 @@ from robot_dyn.compiled.dynamics import CompiledDynamics
 from robot_dyn.compiled.engine import SizeWarning
 from robot_dyn.compiled.kernel import Kernel
 from robot_dyn.compiled.self_check import SelfCheckError
-from robot_dyn.compiled.trace import ARGUMENTS, Trace
+from robot_dyn.compiled.trace import Trace
 from robot_dyn.errors import OverflowedError, QueryError, SingularError
 from robot_dyn.lagrange.magnitude import magnitudes
+from robot_dyn.lagrange.scale import floored
+from robot_dyn.model.quantity import EQUATION
 from tests.compiled.arms import ARMS, compiled, states
 from tests.random_trees import RandomTree, trees
 
-QUANTITIES = [name for name in ARGUMENTS if not name.endswith("derivatives")]
+QUANTITIES = list(EQUATION)
 HEAVY = {
     "skew_tree": ("M", "inverse_dynamics"),
     "mimic_chain": ("C", "M", "forward_dynamics"),
@@ -36,28 +37,23 @@ CASES = [(arm, name) for arm in ARMS for name in QUANTITIES if name in HEAVY.get
 @pytest.mark.parametrize(("arm", "quantity"), CASES)
 def test_each_quantity_agrees_with_pinocchio(arm: str, quantity: str) -> None:
     """One state: to 1e-12 of the terms added into it; forward dynamics to 8 n u κ more, κ ≤ 1e4 for these."""
-    engine = compiled(arm)
-    arguments = states(engine.n, 8)[: len(ARGUMENTS[quantity])]
-    rows: Any = zip(*arguments, strict=True)
-    for row in rows:
-        theirs = np.asarray(getattr(engine.robot, quantity)(*row))
-        size = magnitudes(rd.Lagrangian(engine.robot).linkage, row[0])
-        terms = size.inverse_dynamics(*(np.abs(x) for x in (*row, np.ones(engine.n))[1:3])) if len(row) > 1 else size.N
-        ours = np.asarray(getattr(engine, quantity)(*row))
-        if quantity == "forward_dynamics":
+    engine, asked = compiled(arm), EQUATION[quantity]
+    for row in zip(*states(engine.n, 8), strict=True):
+        state = dict(zip(asked.arguments, row, strict=False))
+        ours, size = np.asarray(asked.ask(engine, state)), magnitudes(rd.Lagrangian(engine.robot).linkage, row[0])
+        terms = np.asarray(asked.terms(size, {name: np.abs(x) for name, x in state.items()}))
+        if asked.solves:
             back = engine.robot.inverse_dynamics(row[0], row[1], ours)
             assert np.all(np.abs(back - row[2]) <= 1e-11 * (size.inverse_dynamics(row[1], ours) + np.abs(row[2])))
         else:
-            scale = {"M": size.M, "potential_energy": size.V, "C": size.C(row[1]) if len(row) > 1 else 0.0}
-            allowed = scale.get(quantity, terms if quantity != "kinetic_energy" else terms @ np.abs(row[-1]))
-            assert np.all(np.abs(ours - theirs) <= 1e-12 * (allowed + 1e-300))
+            assert np.all(np.abs(ours - asked.ask(engine.robot, state)) <= 1e-12 * floored(terms))
 
 
 @pytest.mark.parametrize(("arm", "quantity"), [(arm, name) for arm, name in CASES if arm in ("ur5", "mimic_chain")])
 def test_a_batch_is_its_states_one_by_one(arm: str, quantity: str) -> None:
     """The same instructions, fused and ordered otherwise: to 1e-13 of the largest; a last tile that overlaps too."""
     engine = compiled(arm)
-    arguments = states(engine.n, 150)[: len(ARGUMENTS[quantity])]
+    arguments = states(engine.n, 150)[: len(EQUATION[quantity].arguments)]
     method = getattr(engine, quantity)
     batch = method(*(x.reshape(3, 50, -1) for x in arguments)).reshape(150, -1)
     single = np.array([np.ravel(method(*row)) for row in zip(*arguments, strict=True)])
@@ -137,7 +133,7 @@ def test_float32_agrees_to_its_precision() -> None:
     narrow, wide = compiled("ur5", "float32"), compiled("ur5")
     q, v, a = states(6, 100)
     for quantity in ("M", "inverse_dynamics"):
-        arguments = (q, v, a)[: len(ARGUMENTS[quantity])]
+        arguments = (q, v, a)[: len(EQUATION[quantity].arguments)]
         ours, theirs = getattr(narrow, quantity)(*arguments), getattr(wide, quantity)(*arguments)
         assert ours.dtype == np.float32
         assert np.max(np.abs(ours - theirs)) <= 2e-5 * np.max(np.abs(theirs))

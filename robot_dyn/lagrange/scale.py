@@ -1,0 +1,83 @@
+"""Scales of comparison: what a difference of two values of one quantity is divided by, and what may be left of it.
+
+    |x − y| ≤ tolerance · (Σ of the absolute values of the terms added into x)
+
+The terms are those of `Magnitudes`; an entry that has none is held to the largest of its row and column. A solution of
+M a = τ may differ by max(tolerance, 8 n u κ) of the terms of τ, κ the condition number of M scaled to a unit diagonal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from robot_dyn.arithmetic import apply
+
+
+def scaled(error: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """|error| / scale, with 0 / 0 = 0: no term, no error."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.abs(error) / scale
+    return np.where(np.asarray(error) == 0, 0.0, ratio)
+
+
+def floored(scale: np.ndarray) -> np.ndarray:
+    """The scale of each entry, (n,), (m, n) or a number; of one without terms, the largest in its row and column.
+
+    Where no term is, rounding of its neighbours is all that an algorithm can leave there.
+    """
+    if scale.ndim != 2:
+        return np.where(scale == 0, np.max(scale, initial=0.0), scale)
+    near = np.maximum(scale.max(axis=0)[None, :], scale.max(axis=1)[:, None])
+    near = np.where(near == 0, scale.max(), near)
+    return np.where(scale == 0, near, scale)
+
+
+def diagonal_scale(M: np.ndarray) -> np.ndarray:
+    """√(M_ii M_jj), which no |M_ij| of a positive definite matrix (n, n) exceeds."""
+    d = np.sqrt(np.abs(np.diagonal(M)))
+    return np.outer(d, d)
+
+
+def joint_units(M: np.ndarray) -> np.ndarray:
+    """D = √M_ii of matrices (..., n, n), in which accelerations of joints of all sizes are alike, (..., n)."""
+    return np.sqrt(np.maximum(np.diagonal(M, axis1=-2, axis2=-1), 1e-300))
+
+
+def mass_norm(M: np.ndarray, x: np.ndarray) -> float:
+    """‖x‖_M = √(xᵀ M x)."""
+    return float(np.sqrt(max(x @ apply(M, x), 0.0)))
+
+
+def unit_diagonal_condition(M: np.ndarray) -> float:
+    """κ of M scaled to a unit diagonal; the largest of matrices (..., n, n)."""
+    d = joint_units(M)
+    return float(np.max(np.linalg.cond(M / (d[..., :, None] * d[..., None, :]))))
+
+
+def solved_tolerance(least: float, M: np.ndarray, dtype: str = "float64") -> float:
+    """What a solution of M a = τ may err by, max(least, 8 n u κ); of matrices (..., n, n), at the worst of them."""
+    return max(least, 8 * M.shape[-1] * float(np.finfo(dtype).eps) / 2 * unit_diagonal_condition(M))
+
+
+def acceleration_norm(M: np.ndarray, torques: Sequence[np.ndarray], terms: np.ndarray) -> float:
+    """Scale of ‖a − a'‖_M at one state: Σ ‖M⁻¹ τ_k‖_M of the torques that are solved, or ‖D⁻¹ terms‖ if that is more.
+
+    Of sums such as C v and N only their terms, (n,), keep the digits.
+    """
+    whole = sum(mass_norm(M, np.linalg.solve(M, torque)) for torque in torques)
+    return max(whole, float(np.linalg.norm(terms / joint_units(M))))
+
+
+def acceleration_entries(d: np.ndarray, terms: np.ndarray, a: np.ndarray) -> np.ndarray:
+    """Scale of each entry of accelerations a (S, n) at S states, from D and the terms of τ, (S, n) each; (S, n)."""
+    return np.max([np.linalg.norm(terms / d, axis=-1), np.linalg.norm(a * d, axis=-1)]) / d
+
+
+def derivative_entries(d: np.ndarray, terms: np.ndarray, derivatives: np.ndarray) -> np.ndarray:
+    """The same of ∂a/∂q, ∂a/∂v and ∂a/∂τ, (S, 3, n, n): of each column the larger of its terms and its entries."""
+    whole = np.linalg.norm(terms / d, axis=-1)
+    sides = np.stack([np.broadcast_to(whole[:, None], d.shape)] * 2 + [1 / d], axis=1)  # by q, by v, by τ
+    columns = np.abs(derivatives * d[:, None, :, None]).max(axis=-2, keepdims=True)
+    return np.maximum(sides[:, :, None, :], columns) / d[:, None, :, None]
