@@ -65,7 +65,7 @@ def spatial_inertia(mass: Array, com: Array, inertia: Array) -> Array:
 
 def first_moment(inertia: Array) -> Array:
     """M c of 𝓜 (6, 6), whose lower left block is m ĉ; (3,)."""
-    return np.stack([inertia[5, 1], inertia[3, 2], inertia[4, 0]])
+    return inertia[(5, 3, 4), (1, 2, 0)]
 
 
 def homogeneous(R: Array, p: Array) -> Array:

@@ -21,6 +21,7 @@ from robot_dyn.lagrange.magnitude import Magnitudes, magnitudes
 from robot_dyn.lagrange.manipulator import Lagrangian
 from robot_dyn.lagrange.scale import acceleration_norm, diagonal_scale, mass_norm, solved_tolerance
 from robot_dyn.model.dynamics import Axes
+from robot_dyn.model.inertial_parameters import parameter_names
 from robot_dyn.model.quantity import EQUATION, FORWARD_DYNAMICS, INVERSE_DYNAMICS
 from robot_dyn.model.robot import Robot
 from robot_dyn.recursive.articulated_body import articulated_body
@@ -84,12 +85,13 @@ def _pairs(
 ) -> Iterator[Pair]:
     q, v, a = (state[name] for name in ("q", "v", "a"))
     size, absolute = magnitudes(own.linkage, q), {name: np.abs(x) for name, x in state.items()}
+    letters = {"n": robot.joint_names, "p": parameter_names(robot.body_names)}
     known: dict[str, tuple[np.ndarray, np.ndarray]] = {}
     for quantity in EQUATION.values():
         if not quantity.solves:
             one, two = known[quantity.name] = quantity.ask(robot, state), quantity.ask(own, state)
             scale = diagonal_scale(two) if quantity.definite else quantity.terms(size, absolute)
-            yield Pair(quantity.name, one, two, scale, tolerance, (robot.joint_names,) * len(quantity.axes))
+            yield Pair(quantity.name, one, two, scale, tolerance, tuple(letters[str(axis)] for axis in quantity.axes))
     (M, C, N), pin_C, ID = (known[name][1] for name in "MCN"), known["C"][0], known[INVERSE_DYNAMICS.name][0]
     rate, both = own.mass_matrix_derivative(q) @ v, size.C(v) + size.C(v).T
     yield Pair("Ṁ = C + Cᵀ", pin_C + pin_C.T, rate, both, tolerance, (robot.joint_names,) * 2)

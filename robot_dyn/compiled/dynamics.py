@@ -20,6 +20,7 @@ from robot_dyn.compiled.self_check import SelfCheck
 from robot_dyn.compiled.threads import thread_count
 from robot_dyn.compiled.trace import QUANTITIES, Trace
 from robot_dyn.model.dynamics import Axes, Dynamics
+from robot_dyn.model.inertial_parameters import Parametrised
 from robot_dyn.model.quantity import FORWARD_DYNAMICS_DERIVATIVES
 from robot_dyn.model.robot import Robot
 from robot_dyn.validate import choice, instance, truth
@@ -29,7 +30,7 @@ _DERIVATIVES = FORWARD_DYNAMICS_DERIVATIVES.name
 
 @final
 @dataclass(frozen=True)
-class CompiledDynamics(Dynamics):
+class CompiledDynamics(Dynamics, Parametrised):
     """A robot as machine code; each quantity is compiled, and checked against Pinocchio, when first asked for.
 
     With out= the answer goes into that array, which is left as it was if the query is refused.
@@ -169,6 +170,17 @@ class CompiledDynamics(Dynamics):
 
     def momentum(self, q: Array, v: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
         return self._torque("momentum", (q, v), out, errors)
+
+    @property
+    def body_names(self) -> tuple[str, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        return self.robot.body_names
+
+    @property
+    def inertial_parameters(self) -> np.ndarray:  # pyright: ignore[reportIncompatibleMethodOverride]
+        return self.robot.inertial_parameters
+
+    def regressor(self, q: Array, v: Array, a: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
+        return self._fast("regressor", (q, v, a), out, errors, self.engine.shape("regressor"))
 
     def placement(self, q: Array, frame: str, *, errors: str = "raise") -> Any:
         return self.robot.placement(q, frame, errors=errors)

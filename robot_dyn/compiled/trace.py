@@ -33,6 +33,7 @@ from robot_dyn.recursive.articulated_body import articulated_body
 from robot_dyn.recursive.composite_body import composite_body
 from robot_dyn.recursive.kinetic_energy import kinetic_energy
 from robot_dyn.recursive.newton_euler import newton_euler
+from robot_dyn.recursive.regressor import regressor
 
 QUANTITIES = EQUATION | by_name(FORWARD_DYNAMICS_DERIVATIVES)  # what has formulations
 _SOLVED_MOST = 8  # joints one after the other; with more, to solve M a = τ − … outnumbers articulated bodies
@@ -143,6 +144,7 @@ class Trace:
                 self._mass, tau - newton_euler(linkage, q, v, zero), self.lagrangian.joint_names
             ),
             "C": lambda: christoffel(self._mass_derivative, v),
+            "regressor": lambda: regressor(self.lagrangian.linkage, q, v, a),  # of the bodies as the file has them
         }
         if name in made:
             yield "recursion", lambda: column(made[name]())

@@ -19,6 +19,12 @@ from robot_dyn.model.couplings import Couplings
 from robot_dyn.model.linkage import BASE, Body, Linkage
 from robot_dyn.spatial import first_moment
 
+_UNITS = (  # blocks [[m, m c], [m c, I]] of unit parameters, and which of the ten have them
+    (slice(0, 1), np.array([[1.0, 0.0], [0.0, 0.0]])),
+    (slice(1, 4), np.array([[0.0, 1.0], [1.0, 0.0]])),
+    (slice(4, 10), np.array([[0.0, 0.0], [0.0, 1.0]])),
+)
+
 
 @final
 @dataclass(frozen=True, eq=False)
@@ -32,6 +38,8 @@ class Magnitudes:
         V: A number.
         lever: Of the linear part of each column of the Jacobian of each link, by name, (n,).
         reach: Distance from the base to each link along the joints, by name.
+        linkage: The linkage.
+        columns: Lengths of the linear and angular parts of the columns of each body's Jacobian, (2, p).
     """
 
     M: np.ndarray
@@ -40,34 +48,44 @@ class Magnitudes:
     V: float
     lever: dict[str, np.ndarray]
     reach: dict[str, float]
+    linkage: Linkage
+    columns: tuple[np.ndarray, ...]
 
     def C(self, v: np.ndarray) -> np.ndarray:
         """Of the Coriolis matrix, (n, n)."""
-        dM, v = self.dM, np.abs(v)
-        W = np.swapaxes(dM, -1, -2) @ v
-        return (dM @ v + W + W.T) / 2
+        return _coriolis(self.dM, np.abs(v))
 
     def inverse_dynamics(self, v: np.ndarray, a: np.ndarray) -> np.ndarray:
         """Of M a + C v + N, (n,)."""
         return self.M @ np.abs(a) + self.C(v) @ np.abs(v) + self.N
 
+    def regressor(self, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+        """Of Y, (n, 10 N)."""
+        couplings, N = _absolute(self.linkage.couplings), len(self.linkage.bodies)
+        v, a = couplings.velocity(np.abs(v)), couplings.velocity(np.abs(a))
+        g, Y = float(np.linalg.norm(self.linkage.gravity)), np.zeros((N, N, 10))
+        for i, (body, J) in enumerate(zip(self.linkage.bodies, self.columns, strict=True)):
+            path = list(body.path)
+            for parameters, block in _UNITS:
+                M, dM, weight = _terms(J, block)
+                torque = M @ a[path] + _coriolis(dM, v[path]) @ v[path] + g * weight
+                Y[path, i, parameters] = torque[:, None]
+        return couplings.rows(Y[:, self.linkage.order].reshape(N, -1))
+
 
 def magnitudes(linkage: Linkage, q: np.ndarray) -> Magnitudes:
     """The magnitudes of a linkage at q."""
-    N, couplings = len(linkage.bodies), Couplings(np.abs(linkage.couplings.S), np.abs(linkage.couplings.s0))
+    N, couplings = len(linkage.bodies), _absolute(linkage.couplings)
     steps = np.abs(linkage.couplings.position(q))
     M, dM, gravity, V = np.diag(linkage.armature), np.zeros((N, N, N)), np.zeros(N), 0.0
     g = float(np.linalg.norm(linkage.gravity))
-    columns = [_columns(linkage.bodies, body, steps) for body in linkage.bodies]
-    for body, block, (lin, ang) in zip(linkage.bodies, _blocks(linkage), columns, strict=True):
-        m, mc = block[0]
-        J = np.stack([lin, ang])
-        M[np.ix_(body.path, body.path)] += J.T @ block @ J
-        dJ = np.stack([np.outer(ang, lin) + np.outer(lin, ang), np.outer(ang, ang)])  # [:, j, k]
-        half = np.tensordot(block @ J, dJ, axes=(0, 0))  # [i, j, k]
-        dM[np.ix_(body.path, body.path, body.path)] += half + half.swapaxes(0, 1)
-        gravity[list(body.path)] += g * (block[0] @ J)
-        V += g * (m * _reach(linkage.bodies, body, steps) + mc)
+    columns = tuple(_columns(linkage.bodies, body, steps) for body in linkage.bodies)
+    for body, block, J in zip(linkage.bodies, _blocks(linkage), columns, strict=True):
+        of_M, of_dM, weight = _terms(J, block)
+        M[np.ix_(body.path, body.path)] += of_M
+        dM[np.ix_(body.path, body.path, body.path)] += of_dM
+        gravity[list(body.path)] += g * weight
+        V += g * (block[0, 0] * _reach(linkage.bodies, body, steps) + block[0, 1])
     lever, reach = {}, {}
     for name, (index, pose, _) in linkage.links.items():
         lever[name], reach[name] = np.zeros(N), float(np.linalg.norm(pose.p))
@@ -77,7 +95,26 @@ def magnitudes(linkage: Linkage, q: np.ndarray) -> Magnitudes:
             lever[name][list(body.path)] = lin + ang * reach[name]
             reach[name] += _reach(linkage.bodies, body, steps)
         lever[name] = couplings.torque(lever[name])
-    return Magnitudes(couplings.matrix(M), couplings.cube(dM), couplings.torque(gravity), V, lever, reach)
+    own = couplings.matrix(M), couplings.cube(dM), couplings.torque(gravity)
+    return Magnitudes(*own, V, lever, reach, linkage, columns)
+
+
+def _absolute(couplings: Couplings) -> Couplings:
+    return Couplings(np.abs(couplings.S), np.abs(couplings.s0))
+
+
+def _terms(J: np.ndarray, block: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of M (p, p), of ∂M (p, p, p), and of N in a unit gravity (p,): those of a body with columns J (2, p)."""
+    lin, ang = J
+    dJ = np.stack([np.outer(ang, lin) + np.outer(lin, ang), np.outer(ang, ang)])  # [:, j, k]
+    half = np.tensordot(block @ J, dJ, axes=(0, 0))  # [i, j, k]
+    return J.T @ block @ J, half + half.swapaxes(0, 1), block[0] @ J
+
+
+def _coriolis(dM: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Of the Christoffel symbols of ∂M at |v|."""
+    W = np.swapaxes(dM, -1, -2) @ v
+    return (dM @ v + W + W.T) / 2
 
 
 def _blocks(linkage: Linkage) -> np.ndarray:
@@ -96,12 +133,12 @@ def _step(body: Body, steps: np.ndarray) -> float:
     return float(np.linalg.norm(body.pose.p)) + (0.0 if body.revolute else steps[body.path[-1]])
 
 
-def _columns(bodies: tuple[Body, ...], body: Body, steps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Length of the linear and of the angular part of each column of a body's Jacobian."""
+def _columns(bodies: tuple[Body, ...], body: Body, steps: np.ndarray) -> np.ndarray:
+    """Length of the linear and of the angular part of each column of a body's Jacobian, (2, p)."""
     ang = np.array([1.0 if bodies[i].revolute else 0.0 for i in body.path])
     beyond = np.array([_step(bodies[i], steps) for i in body.path])
     lever = np.append(np.cumsum(beyond[:0:-1])[::-1], 0.0)
-    return ang * lever + (1 - ang), ang
+    return np.stack([ang * lever + (1 - ang), ang])
 
 
 def _reach(bodies: tuple[Body, ...], body: Body, steps: np.ndarray) -> float:

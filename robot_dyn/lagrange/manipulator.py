@@ -25,10 +25,19 @@ from robot_dyn.arithmetic import (
 )
 from robot_dyn.errors import QueryError, shown
 from robot_dyn.lagrange.christoffel import jacobian_derivative
-from robot_dyn.lagrange.summand import coriolis_matrix, gravity_torque, mass_matrix, mass_matrix_derivative, of_bodies
+from robot_dyn.lagrange.summand import (
+    coriolis_matrix,
+    gravity_torque,
+    mass_matrix,
+    mass_matrix_derivative,
+    of_bodies,
+    regressor,
+)
 from robot_dyn.model.batch import answered
 from robot_dyn.model.description import Description
 from robot_dyn.model.dynamics import Axes, Dynamics, acceleration, entry
+from robot_dyn.model.inertial_parameters import NAMES as PARAMETERS
+from robot_dyn.model.inertial_parameters import Parametrised, parameters
 from robot_dyn.model.linkage import BASE, Configuration, Linkage, linkage
 from robot_dyn.model.quantity import ALL
 from robot_dyn.model.tree import Described, tree
@@ -38,7 +47,7 @@ from robot_dyn.validate import shaped
 
 @final
 @dataclass(frozen=True)
-class Lagrangian(Dynamics):
+class Lagrangian(Dynamics, Parametrised):
     """The dynamics of a robot by the Lagrangian; shares neither parser nor algorithm with Pinocchio.
 
     Attributes:
@@ -81,7 +90,7 @@ class Lagrangian(Dynamics):
     @property
     def sizes(self) -> dict[str, int]:
         """The numbers that letters in the shapes of quantities stand for."""
-        return {"n": self.n}
+        return {"n": self.n, "p": len(PARAMETERS) * len(self.linkage.bodies)}
 
     def M(self, q: Array, *, errors: str = "raise") -> Array:
         return self._answer("M", errors, lambda q: self._M(self.linkage.at(q)), q=q)
@@ -136,6 +145,18 @@ class Lagrangian(Dynamics):
 
     def momentum(self, q: Array, v: Array, *, errors: str = "raise") -> Array:
         return self._answer("momentum", errors, lambda q, v: apply(self._M(self.linkage.at(q)), v), q=q, v=v)
+
+    @property
+    def body_names(self) -> tuple[str, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        return tuple(self.linkage.bodies[i].joint for i in self.linkage.order)
+
+    @property
+    @in_arithmetic
+    def inertial_parameters(self) -> Array:  # pyright: ignore[reportIncompatibleMethodOverride]
+        return np.concatenate([parameters(self.linkage.inertias[i]) for i in self.linkage.order])
+
+    def regressor(self, q: Array, v: Array, a: Array, *, errors: str = "raise") -> Array:
+        return self._answer("regressor", errors, lambda q, v, a: regressor(self.linkage.at(q), v, a), q=q, v=v, a=a)
 
     def placement(self, q: Array, frame: str, *, errors: str = "raise") -> Array:
         frame = self._link(frame)

@@ -16,6 +16,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array, apply, transpose
 from robot_dyn.lagrange.christoffel import christoffel, inertia_derivative
+from robot_dyn.model.inertial_parameters import unit_inertias
 from robot_dyn.model.linkage import BASE, Configuration
 
 
@@ -26,7 +27,7 @@ class Summand:
 
     Attributes:
         path: The p joints that carry it, from the base on.
-        inertia: 𝓜 in the frame of its last joint, (6, 6).
+        inertia: 𝓜 in the frame of its last joint, (6, 6); or several, (k, 6, 6), for J and R (..., 1, …).
         J: Body Jacobian there, (..., 6, p).
         R: Axes of that frame in the base, (..., 3, 3).
     """
@@ -50,7 +51,7 @@ class Summand:
 
     def N(self, gravity: Array) -> Array:
         """Of N in a gravity (3,), (..., p)."""
-        weight = (gravity @ self.R) @ transpose(self.inertia[:, :3])  # 𝓜 (Rᵀ g, 0)
+        weight = apply(self.inertia[..., :3], gravity @ self.R)  # 𝓜 (Rᵀ g, 0)
         return -apply(transpose(self.J), weight)
 
 
@@ -88,6 +89,20 @@ def coriolis_matrix(at: Configuration, summands: Iterable[Summand], v: Array) ->
 def gravity_torque(at: Configuration, summands: Iterable[Summand]) -> Array:
     """N of the summands, (..., n)."""
     return at.linkage.couplings.torque(_total(_zeros(at, 1), 1, summands, lambda each: each.N(at.linkage.gravity)))
+
+
+def regressor(at: Configuration, v: Array, a: Array) -> Array:
+    """Y of M a + C v + N without armature, (..., n, 10 N): the summands of unit parameters."""
+    linkage, couplings = at.linkage, at.linkage.couplings
+    v, a = couplings.velocity(v)[..., None, :], couplings.velocity(a)[..., None, :]
+    N, units = len(linkage.bodies), unit_inertias(linkage.gravity.dtype)
+    batch = np.broadcast_shapes(at.batch, v.shape[:-2], a.shape[:-2])
+    Y = np.zeros((*batch, N, N, len(units)), dtype=linkage.gravity.dtype)  # by joint, body and parameter
+    for i, each in enumerate(of_bodies(at)):
+        unit = Summand(each.path, units, each.J[..., None, :, :], each.R[..., None, :, :])
+        torque = apply(unit.M(), a[..., each.path]) + apply(unit.C(v), v[..., each.path]) + unit.N(linkage.gravity)
+        Y[..., each.path, i, :] = np.swapaxes(torque, -1, -2)
+    return couplings.rows(Y[..., linkage.order, :].reshape(*batch, N, -1))
 
 
 def _zeros(at: Configuration, axes: int) -> Array:

@@ -68,6 +68,10 @@ class Couplings:
         """τ = Sᵀ τ_full, by virtual work."""
         return tau if self.trivial else tau @ self.S
 
+    def rows(self, A: Array) -> Array:
+        """Sᵀ A, torques that are linear in the columns of A (..., N, m)."""
+        return A if self.trivial else self.S.T @ A
+
     def matrix(self, A: Array) -> Array:
         """Sᵀ A S, for quadratic forms."""
         return A if self.trivial else self.S.T @ A @ self.S

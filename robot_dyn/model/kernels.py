@@ -60,6 +60,11 @@ def kinetic_energy(model: Any, data: Any, q: ndarray, v: ndarray) -> float:
     return v @ pin.crba(model, data, q) @ v / 2
 
 
+def regressor(model: Any, data: Any, q: ndarray, v: ndarray, a: ndarray) -> ndarray:
+    """Regressor of the torques of all joints, its bodies as in the model; Pinocchio gives a flat one of one joint."""
+    return pin.computeJointTorqueRegressor(model, data, q, v, a).reshape(len(q), -1)
+
+
 def placement(frame: int) -> Kernel:
     """Homogeneous matrix of a frame."""
 

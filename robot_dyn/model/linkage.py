@@ -14,6 +14,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import Arithmetic, Array, apply, sqrt, symmetric, transpose
 from robot_dyn.model.couplings import Couplings, resolve
+from robot_dyn.model.inertial_parameters import ordered
 from robot_dyn.model.tree import Joint, Link, Tree
 from robot_dyn.spatial import adjoint_inverse, rotation, rotation_rpy, spatial_inertia
 
@@ -119,6 +120,7 @@ class Linkage:
         couplings: q_full = S q + s₀, from the coordinates that the user sees to the N joints.
         gravity: (3,) in [m/s²].
         armature: Of the N joints, (N,).
+        order: Indices of the bodies, in the order of their inertial parameters.
     """
 
     bodies: tuple[Body, ...]
@@ -126,6 +128,7 @@ class Linkage:
     couplings: Couplings
     gravity: Array
     armature: Array
+    order: tuple[int, ...]
 
     @cached_property
     def inertias(self) -> tuple[Array, ...]:
@@ -213,12 +216,14 @@ def linkage(tree: Tree, joint_names: tuple[str, ...], arithmetic: Arithmetic) ->
         where[joint.child] = parent, pose
     links = {link.name: (*where[link.name], _inertia(link, where[link.name][1], arithmetic)) for link in tree.links}
     armature = {joint.name: joint.armature for joint in tree.joints}
+    carriers = [body.joint for body in bodies]
     return Linkage(
         tuple(bodies),
         links,
         _couplings(bodies, followed, joint_names, arithmetic),
         arithmetic.array(tree.gravity),
-        arithmetic.array([armature[body.joint] for body in bodies]),
+        arithmetic.array([armature[name] for name in carriers]),
+        tuple(map(carriers.index, ordered(joint_names, carriers))),
     )
 
 

@@ -33,7 +33,8 @@ class Quantity:
     Attributes:
         name: Of the method.
         arguments: Names of its arguments, each of shape (..., n); "t" is a time.
-        axes: Its shape for one state: numbers, or letters for those of a robot (`sizes`), "n" for degrees of freedom.
+        axes: Its shape for one state: numbers, or letters for those of a robot (`sizes`), "n" its degrees of freedom,
+            "p" its inertial parameters.
         terms: Sum of the absolute values of the terms added into each entry, of `lagrange.magnitude.Magnitudes` at q
             and the absolute values of the arguments by name. Where M a = τ is solved, of the entries of that τ.
         framed: Whether it is asked of a frame.
@@ -79,6 +80,7 @@ FORWARD_DYNAMICS = Quantity(
 KINETIC_ENERGY = Quantity("kinetic_energy", ("q", "v"), (), lambda size, x: x["v"] @ size.M @ x["v"] / 2)
 POTENTIAL_ENERGY = Quantity("potential_energy", ("q",), (), lambda size, x: size.V)
 MOMENTUM = Quantity("momentum", ("q", "v"), ("n",), lambda size, x: size.M @ x["v"])
+REGRESSOR = Quantity("regressor", ("q", "v", "a"), ("n", "p"), lambda size, x: size.regressor(x["v"], x["a"]))
 PLACEMENT = Quantity("placement", ("q",), (4, 4), framed=True)
 JACOBIAN = Quantity("jacobian", ("q",), (6, "n"), framed=True)
 JACOBIAN_RATE = Quantity("jacobian_rate", ("q", "v"), (6, "n"), framed=True)
@@ -105,6 +107,7 @@ EQUATION = by_name(
     KINETIC_ENERGY,
     POTENTIAL_ENERGY,
     MOMENTUM,
+    REGRESSOR,
 )
 # what a Plant answers; its effects are terms beside those of the rigid bodies
 PLANT = by_name(

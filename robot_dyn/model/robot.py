@@ -34,6 +34,8 @@ from robot_dyn.model.description import Description, check
 from robot_dyn.model.dynamics import Array, Axes, Dynamics, acceleration, entry
 from robot_dyn.model.edits import Changes, Edits
 from robot_dyn.model.gravity import gravity_acts, no_torque
+from robot_dyn.model.inertial_parameters import NAMES as PARAMETERS
+from robot_dyn.model.inertial_parameters import Parametrised, ordered
 from robot_dyn.model.kernels import Kernel, Scratch, frozen
 from robot_dyn.model.quantity import ALL, DOUBTFUL
 from robot_dyn.model.structure import structure
@@ -42,7 +44,7 @@ from robot_dyn.validate import instance, is_moderate, is_state, shaped
 
 @final
 @dataclass(frozen=True)
-class Robot(Dynamics):
+class Robot(Dynamics, Parametrised):
     """A robot: its description and what was changed of it. Immutable; may be shared between threads and pickled.
 
     Attributes:
@@ -130,7 +132,7 @@ class Robot(Dynamics):
     @property
     def sizes(self) -> dict[str, int]:
         """The numbers that letters in the shapes of quantities stand for."""
-        return {"n": self.n}
+        return {"n": self.n, "p": len(PARAMETERS) * self.model.nv}
 
     @cached_property
     def model(self) -> Any:
@@ -300,6 +302,31 @@ class Robot(Dynamics):
 
     def momentum(self, q: Array, v: Array, *, errors: str = "raise") -> ndarray:
         return self._ask("momentum", errors, kernels.momentum, self.couplings.torque, q=q, v=v)
+
+    @cached_property
+    def body_names(self) -> tuple[str, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        return ordered(self.joint_names, self.model.names[1:])
+
+    @cached_property
+    def _order(self) -> list[int]:
+        """Indices of the bodies in `model`, in the order of their parameters."""
+        names = list(self.model.names[1:])
+        return [names.index(name) for name in self.body_names]
+
+    @cached_property
+    def inertial_parameters(self) -> ndarray:  # pyright: ignore[reportIncompatibleMethodOverride]
+        return frozen(np.concatenate([self.model.inertias[i + 1].toDynamicParameters() for i in self._order]))
+
+    def regressor(self, q: Array, v: Array, a: Array, *, errors: str = "raise") -> ndarray:
+        shape = self._shape
+        if is_state(q, shape) and is_state(v, shape) and is_state(a, shape) and all(map(is_moderate, (q, v, a))):
+            return kernels.regressor(self.model, self._scratch.data, q, v, a)
+        return self._ask("regressor", errors, kernels.regressor, self._of_bodies, q=q, v=v, a=a)
+
+    def _of_bodies(self, Y: ndarray) -> ndarray:
+        """The regressor of all joints, (..., N, 10 N) with bodies as in `model`, coupled and in the order of θ."""
+        N = self.model.nv
+        return self.couplings.rows(Y.reshape(*Y.shape[:-1], N, -1)[..., self._order, :].reshape(Y.shape))
 
     def placement(self, q: Array, frame: str, *, errors: str = "raise") -> ndarray:
         return self._ask("placement", errors, kernels.placement(entry(self._frames, frame)), None, q=q)

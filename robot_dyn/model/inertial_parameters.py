@@ -1,0 +1,89 @@
+"""Inertial parameters of a rigid body: θ = (m, m c, I) about the origin of its frame, ten numbers.
+
+    θ = (m, m cx, m cy, m cz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz),   𝓜 = Σ θ_k E_k
+
+Torques are linear in them: τ = Y(q, v, a) θ + armature · a.
+[Atkeson, An, Hollerbach 1986; Siciliano et al. 2009, §7.2.2]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Protocol
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.spatial import first_moment, hat
+
+NAMES = ("m", "m cx", "m cy", "m cz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
+_MOMENTS = (0, 0, 1, 0, 1, 2), (0, 1, 1, 2, 2, 2)  # rows and columns of I
+
+
+class Parametrised(Protocol):
+    """A robot whose torques are asked for by the inertial parameters of its bodies."""
+
+    @property
+    def body_names(self) -> tuple[str, ...]:
+        """Names of the joints that carry the N bodies, in the order of their parameters.
+
+        `joint_names`, then those of coupled joints, sorted. Links that do not move against each other are one body.
+        """
+        ...
+
+    @property
+    def inertial_parameters(self) -> Array:
+        """θ of the N bodies one after the other, (10 N,), in [kg], [kg m] and [kg m²].
+
+        Of each (m, m cx, m cy, m cz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz), about the origin of its joint's frame and in its
+        axes. Payloads and `mass_scale` are part of it, the armature is not.
+        """
+        ...
+
+    def regressor(self, q: Array, v: Array, a: Array, *, errors: str = "raise") -> Array:
+        """Regressor of the joint torques, Y(q, v, a) with M a + C v + N = Y θ + armature · a, θ `inertial_parameters`.
+
+        Y holds geometry, gravity and couplings and no mass: θ can be identified from measured torques, but for those
+        combinations that no motion tells apart, in which Y has no full rank.
+
+        Args:
+            q: Positions, shape (..., n), in [rad] or [m] by joint.
+            v: Velocities, shape (..., n), in [rad/s] or [m/s].
+            a: Accelerations, shape (..., n), in [rad/s²] or [m/s²].
+            errors: "raise", or "nan" for NaN in place of the states of a batch that have no answer.
+
+        Returns:
+            Matrix, shape (..., n, 10 N); its columns have the units of torque by parameter.
+
+        Raises:
+            QueryError: If an argument has the wrong shape or is not finite.
+            OverflowedError: If the answer would not be finite.
+
+        Source: Atkeson, An, Hollerbach 1986; Siciliano et al. 2009, §7.2.2.
+        """
+        ...
+
+
+def ordered(joint_names: Sequence[str], moving: Iterable[str]) -> tuple[str, ...]:
+    """All joints that move in the order of their bodies' parameters: the independent ones, then the coupled ones."""
+    return (*joint_names, *sorted(set(moving) - set(joint_names)))
+
+
+def parameter_names(body_names: Iterable[str]) -> tuple[str, ...]:
+    """A name of each parameter, such as "elbow m cx"."""
+    return tuple(f"{body} {name}" for body in body_names for name in NAMES)
+
+
+def parameters(inertia: Array) -> Array:
+    """θ of a generalised inertia 𝓜 (6, 6), (10,)."""
+    return np.concatenate([inertia[:1, 0], first_moment(inertia), inertia[3:, 3:][_MOMENTS]])
+
+
+def unit_inertias(dtype: np.dtype) -> Array:
+    """E_k = ∂𝓜/∂θ_k, (10, 6, 6)."""
+    E, one = np.zeros((10, 6, 6), dtype=dtype), np.eye(3, dtype=dtype)
+    E[0, :3, :3] = one
+    E[1:4, 3:, :3], E[1:4, :3, 3:] = hat(one), -hat(one)
+    for k, (i, j) in enumerate(zip(*_MOMENTS, strict=True)):
+        E[4 + k, 3 + i, 3 + j] = E[4 + k, 3 + j, 3 + i] = one[0, 0]
+    return E
