@@ -35,7 +35,8 @@ def second_reading(description: Description, tolerance: float) -> tuple[list[Pai
         robot = _by_yourdfpy(description.text)
         stated, elements = dict(_stated(robot)), set(_elements_stated(robot))
     except Exception as error:  # whatever yourdfpy raises
-        why = shorten(" ".join(str(getattr(error, "msg", error)).split()), 200)
+        said = getattr(error, "msg", f"{type(error).__name__}: {error}")  # that of a syntax error, without its place
+        why = shorten(" ".join(str(said).split()), 200)
         return [], (f"the file is not read a second time: yourdfpy cannot read it ({why})",)
     taken, known = dict(_taken(description)), set(_elements_taken(description))
     pairs = [
