@@ -41,6 +41,10 @@ class EditError(RobotDynError):
     """An edit of a robot (lock, payload, armature, gravity) that cannot be made."""
 
 
+class ControlError(RobotDynError):
+    """A controller or reference with values that are not allowed, or of the wrong shape."""
+
+
 class EffectError(RobotDynError):
     """An effect with coefficients that have no physical meaning, or of the wrong shape."""
 

@@ -200,7 +200,7 @@ def test_what_cannot_be_traced_says_which_line_stopped_it(effects, controller, p
         rd.simulate(setup)
     assert caught.value.__cause__ is not None  # with its traceback
     if effects:
-        with pytest.raises(TraceError, match=rf"cannot be traced \(line {line} of test_user_code.py"):
+        with pytest.raises(TraceError, match=rf"cannot be compiled \(line {line} of test_user_code.py"):
             rd.Compiled(setup.plant, cache=False).torque(0.0, Q, V)
 
 

@@ -46,7 +46,7 @@ def test_a_wrench_on_an_unknown_link_is_refused_also_where_its_window_is_not_ope
 @pytest.mark.parametrize(
     ("robot", "effect", "message"),
     [
-        (UR5, rd.ViscousFriction("urdf"), "damping='urdf' has no effect: the file of ur5 states no damping"),
+        (UR5, rd.ViscousFriction("urdf"), "damping='urdf' has no effect: the file of ur5 states none"),
         (UR5, rd.RegularisedCoulombFriction("urdf"), "friction='urdf' has no effect"),
         (rd.load("pendulum"), rd.EffortLimit("urdf"), "limit='urdf' has no effect"),
         (rd.load("pendulum"), rd.JointStopSpring("urdf", "urdf", 1e4), "lower='urdf' has no effect"),

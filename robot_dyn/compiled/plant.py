@@ -20,11 +20,11 @@ from robot_dyn.compiled.engine import Engine
 from robot_dyn.compiled.from_casadi import instructions
 from robot_dyn.compiled.interrupts import interrupts_later
 from robot_dyn.compiled.self_check import SelfCheck
-from robot_dyn.compiled.symbolic import Symbols, TraceError, column, every_branch, inputs
-from robot_dyn.compiled.trace import Trace, Traced
-from robot_dyn.effects.effect import Bound
+from robot_dyn.compiled.symbolic import Symbolic, Symbols, column, inputs
+from robot_dyn.compiled.symbolic_dynamics import SymbolicDynamics
+from robot_dyn.compiled.symbolic_plant import symbolic_plant
+from robot_dyn.compiled.trace import Traced
 from robot_dyn.effects.plant import Plant
-from robot_dyn.foreign import because
 from robot_dyn.model.quantity import PLANT
 from robot_dyn.model.robot import Robot
 
@@ -91,11 +91,11 @@ class CompiledPlant:
     @property
     def instructions_by_effect(self) -> dict[str, int]:
         """Instructions of each effect by itself."""
-        t, q, v, _ = self._inputs
+        (t, ts), (q, qs), (v, vs), _ = self._inputs
         counts: dict[str, int] = {}
-        for effect in self.plant.forces:
-            torque = every_branch(lambda effect=effect: self._torque_of(effect))
-            function = ca.Function("f", [t[0], q[0], v[0]], [ca.cse(ca.densify(column(self._wide(torque))))])
+        torques = self._symbolic.equation_of_motion.torques(ts[0], qs, vs)
+        for effect, torque in zip(self.plant.forces, torques, strict=True):
+            function = ca.Function("f", [t, q, v], [ca.cse(ca.densify(column(torque)))])
             counts[effect.name] = counts.get(effect.name, 0) + instructions(function)
         return counts
 
@@ -149,64 +149,36 @@ class CompiledPlant:
     @cached_property
     def _inputs(self) -> tuple[Any, ...]:
         """t, q, v, u as CasADi vectors and arrays of symbols."""
-        return tuple(inputs(name, 1 if name == "t" else self.n) for name in ("t", "q", "v", "u"))
+        made = (inputs(name, 1 if name == "t" else self.n) for name in ("t", "q", "v", "u"))
+        return tuple((vector, array.view(Symbols)) for vector, array in made)
 
     @cached_property
-    def trace(self) -> Trace:
+    def _bodies(self) -> SymbolicDynamics:
         """The rigid bodies in symbols."""
-        return Trace(self.dynamics.robot)
+        return SymbolicDynamics(self.dynamics.robot)
+
+    @cached_property
+    def _symbolic(self) -> Plant:
+        """The plant in symbols."""
+        return symbolic_plant(self.plant, self._bodies)
 
     @interrupts_later()
     def _traced(self, quantity: str) -> Traced:
-        t, q, v, u = self._inputs
-        torque = self._effects()
-        if quantity == "torque":
-            function = ca.Function("f", [t[0], q[0], v[0]], [ca.cse(ca.densify(torque))])
-            return Traced(function, "effects", {"effects": instructions(function)})
-        rigid = self.trace.quantity(quantity)
-        given = {"N": (), "inverse_dynamics": (u[0],), "forward_dynamics": (u[0],)}[quantity]
-        if quantity == "forward_dynamics":
-            answer = rigid.function(q[0], v[0], self._actuation() + torque)
-        elif quantity == "inverse_dynamics":
-            answer = rigid.function(q[0], v[0], u[0]) - torque
-        else:
-            answer = rigid.function(q[0]) - torque
-        function = ca.Function("f", [t[0], q[0], v[0], *given], [ca.cse(ca.densify(answer))])
-        return Traced(function, rigid.formulation, {rigid.formulation: instructions(function)})
-
-    def _effects(self) -> Any:
-        """Σ τ_effect as a CasADi column."""
-        total = ca.SX.zeros(self.n)
-        for effect in self.plant.forces:
-            total += column(_traced(effect, lambda effect=effect: self._wide(self._torque_of(effect))))
-        return total
-
-    def _torque_of(self, effect: Any) -> Any:
-        (_, t), (_, q), (_, v), _ = self._inputs
-        return effect.torque(self.trace.lagrangian, t[0], q.view(Symbols), v.view(Symbols))
-
-    def _actuation(self) -> Any:
-        """What the bounds leave of u, as a CasADi column."""
-        left = self._inputs[3][1].view(Symbols)
-        for effect in self.plant.effects:
-            if isinstance(effect, Bound):
-                left = _traced(effect, lambda effect=effect, u=left: self._wide(effect.actuation(u))).view(Symbols)
-        return column(left)
-
-    def _wide(self, torque: Any) -> np.ndarray:
-        return np.broadcast_to(np.asarray(torque, dtype=object), (self.n,))
-
-
-def _traced(effect: Any, function: Callable[[], Any]) -> np.ndarray:
-    try:
-        made = every_branch(function)
-        column(made)  # reports what is not a number
-        return made
-    except Exception as error:  # whatever a user's code raises on symbols
-        raise TraceError(
-            f"effect {effect.name} cannot be traced ({because(error)}); write it in robot_dyn.arithmetic, or run it"
-            " interpreted"
-        ) from error
+        (t, ts), (q, qs), (v, vs), (u, us) = self._inputs
+        with Symbolic().scope():
+            equation = self._symbolic.equation_of_motion
+            torque = sum(equation.torques(ts[0], qs, vs), start=0 * vs)
+            made: dict[str, Callable[[], Any]] = {
+                "torque": lambda: torque,
+                "N": lambda: equation.N(qs, torque),
+                "inverse_dynamics": lambda: equation.inverse_dynamics(qs, vs, us, torque),
+                "forward_dynamics": lambda: equation.acceleration(qs, vs, equation.actuation(us) + torque),
+            }
+            answer = column(made[quantity]())
+        given = [t, q, v, u][: len(_ARGUMENTS[quantity])]
+        function = ca.Function("f", given, [ca.cse(ca.densify(answer))])
+        formulation = "effects" if quantity == "torque" else self._bodies.formulation(quantity)
+        return Traced(function, formulation, {formulation: instructions(function)})
 
 
 @overload

@@ -99,6 +99,29 @@ class Program:
         head, end = f"inputs {' '.join(map(str, self.inputs))}", f"outputs {_list(self.outputs)}"
         return "\n".join(chain([head], constants, map(str, self.ops), [end]))
 
+    @classmethod
+    def read(cls, text: str) -> Program:
+        """The program of its text."""
+        head, *lines = text.split("\n")
+        constants: list[float] = []
+        ops: list[Op] = []
+        for line in lines[:-1]:
+            made, _, rest = line.partition(" = ")
+            kind, _, of = rest.partition(" ")
+            if of:
+                ops.append(Op(_KINDS[kind], _numbers(made), _numbers(of)))
+            else:
+                constants.append(float(rest))
+        inputs = tuple(map(int, head.split(" ")[1:]))
+        return cls(inputs, tuple(constants), tuple(ops), _numbers(lines[-1].partition(" ")[2]))
+
+
+_KINDS = {kind.name.lower(): kind for kind in Kind}
+
+
+def _numbers(text: str) -> tuple[int, ...]:
+    return tuple(int(each[1:]) for each in text.split(" ") if each)
+
 
 def _list(values: tuple[int, ...]) -> str:
     return " ".join(f"v{i}" for i in values)

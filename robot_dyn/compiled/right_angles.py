@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
+from robot_dyn.model.description import Description
 from robot_dyn.model.robot import Robot
 
 _LEAST_DECIMALS = 9  # with fewer, the angle meant is a guess, and the change could be seen in a comparison of roads
@@ -35,6 +37,14 @@ def completed(robot: Robot) -> tuple[Robot, tuple[str, ...]]:
     if not changes:
         return robot, ()
     return Robot(replace(robot.description, xml=etree.tostring(root)), robot.edits), tuple(changes)
+
+
+def robot_of(dynamics: Any) -> Robot | None:
+    """The robot whose equations a dynamics has, its right angles written out in full; None if there is none."""
+    robot = getattr(dynamics, "robot", dynamics)
+    if not isinstance(getattr(robot, "description", None), Description) or not isinstance(robot, Robot):
+        return None
+    return completed(robot)[0]
 
 
 def _completed(literal: str) -> str:

@@ -5,17 +5,18 @@ Position and angle are piecewise polynomials; the twist is (ṗ, φ̇ a), in bas
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from math import pi
 from typing import Any, final
 
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.control.controller import ControlError, number, numbers
+from robot_dyn.coefficient import coefficient, with_values
 from robot_dyn.control.orientation import orientation_error
-from robot_dyn.control.reference import PiecewisePolynomial, hermite, quintic
-from robot_dyn.errors import shown
+from robot_dyn.control.reference import PiecewisePolynomial, Reference, hermite, number, numbers, quintic
+from robot_dyn.errors import ControlError, shown
 from robot_dyn.spatial import rotation as rotation_about
 from robot_dyn.validate import duration as seconds
 
@@ -25,7 +26,7 @@ _TURN_KNOTS, _RAMP_KNOTS = 64, 32  # per turn and per ramp: the accuracy that `c
 
 @final
 @dataclass(frozen=True, eq=False)
-class CartesianReference:
+class CartesianReference(Reference):
     """A motion of a frame in the base.
 
     Attributes:
@@ -36,8 +37,8 @@ class CartesianReference:
     """
 
     position: PiecewisePolynomial
-    rotation: Any = None
-    axis: Any = (0.0, 0.0, 1.0)
+    rotation: Any = field(default=None, metadata=coefficient(shapes=((3, 3),), swept=False))
+    axis: Any = field(default=(0.0, 0.0, 1.0), metadata=coefficient(shapes=((3,),), swept=False))
     angle: PiecewisePolynomial | None = None
 
     def __post_init__(self) -> None:
@@ -55,6 +56,13 @@ class CartesianReference:
     def knots(self) -> np.ndarray:
         """Times in [s] at which position or angle pass to another polynomial."""
         return self.position.knots if self.angle is None else np.union1d(self.position.knots, self.angle.knots)
+
+    @property
+    def polynomials(self) -> tuple[PiecewisePolynomial, ...]:
+        return (self.position,) if self.angle is None else (self.position, self.angle)
+
+    def made_of(self, polynomials: Sequence[Any]) -> CartesianReference:
+        return with_values(self, dict(zip(("position", "angle"), polynomials, strict=False)))
 
     def at(self, t: Array) -> tuple[Array, Array | None, Array, Array]:
         """Position, orientation, twist and its rate at t.

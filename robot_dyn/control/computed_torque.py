@@ -6,13 +6,15 @@ The model is the controller's own and may be wrong: then M, C, N do not cancel, 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, final
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.control.controller import ControlError, Stateless, check_model, freeze
-from robot_dyn.control.independent_joint import joint_count
+from robot_dyn.coefficient import coefficient
+from robot_dyn.control.controller import Stateless, check_model
+from robot_dyn.control.independent_joint import DAMPING, STIFFNESS, joint_count
 from robot_dyn.control.reference import PiecewisePolynomial
+from robot_dyn.errors import ControlError
 from robot_dyn.model.dynamics import Dynamics
 
 
@@ -33,8 +35,8 @@ class ModelBased(Stateless):
 
     model: Dynamics
     reference: PiecewisePolynomial
-    kp: Any
-    kd: Any
+    kp: Any = field(metadata=STIFFNESS)
+    kd: Any = field(metadata=DAMPING)
     period_s: float = 0.0
 
     def __post_init__(self) -> None:
@@ -42,7 +44,7 @@ class ModelBased(Stateless):
         n, count = self.model.n, joint_count(self.reference)
         if n != count:
             raise ControlError(f"the model has {n} joints, the reference {count}")
-        freeze(self, n, "kp", "kd")
+        super().__post_init__()
 
     @property
     def n(self) -> int:
@@ -50,6 +52,7 @@ class ModelBased(Stateless):
 
 
 @final
+@dataclass(frozen=True, eq=False)
 class ComputedTorque(ModelBased):
     """Inverse dynamics in the loop (feedback linearisation): τ = M (a_d + kd ė + kp e) + C v + N.
 
@@ -57,6 +60,9 @@ class ComputedTorque(ModelBased):
 
     Source: Murray, Li, Sastry 1994, sec. 4.5.2; Siciliano et al. 2009, sec. 8.5.2.
     """
+
+    kp: Any = field(metadata=coefficient("1/s²", symbol="kp", least=0))
+    kd: Any = field(metadata=coefficient("1/s", symbol="kd", least=0))
 
     def torque(self, t: float, q: Array, v: Array, z: Array) -> Array:
         q_d, v_d, a_d = self.reference.at(t)

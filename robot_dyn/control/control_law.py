@@ -11,7 +11,8 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.control.controller import ControlError, Stateless
+from robot_dyn.control.controller import Stateless
+from robot_dyn.errors import ControlError
 
 
 @final
@@ -31,6 +32,7 @@ class ControlLaw(Stateless):
     joints: int
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         with suppress(ValueError):  # of some functions written in C the arguments are not known
             known = signature(self.function)
             try:

@@ -8,18 +8,17 @@ plant, a sampled one takes z⁺ = z + period · rate at its ticks and keeps its 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from functools import partial
 from typing import Any
 
-from robot_dyn import former, validate
+import numpy as np
+
+from robot_dyn import former
 from robot_dyn.arithmetic import Array
-from robot_dyn.errors import RobotDynError, shown
+from robot_dyn.coefficient import JOINTS, check_coefficients, declared
+from robot_dyn.control.reference import Reference
+from robot_dyn.errors import ControlError, shown
 from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.validate import duration
-
-
-class ControlError(RobotDynError):
-    """A controller or reference with values that are not allowed, or of the wrong shape."""
 
 
 class Controller(ABC):
@@ -33,8 +32,8 @@ class Controller(ABC):
         z: controller states, (state_size,)
 
     and with symbols in place of these numbers where it is compiled: written in `robot_dyn.arithmetic` and NumPy's
-    operators it runs in both engines. An attribute `reference` that is a `PiecewisePolynomial` is what a run is
-    compared with, and an attribute `model` is the controller's own model of the arm.
+    operators it runs in both engines. Its attributes may be references, models of the arm and numbers, whatever they
+    are called; those that are declared (`robot_dyn.coefficient`) are checked when it is made, and may be swept.
 
     Attributes:
         period_s: Time between samples in [s], with the torque constant between them; 0 for continuous control.
@@ -48,10 +47,43 @@ class Controller(ABC):
         super().__init_subclass__()
         former.adopt(cls, {"memory_size": "state_size", "memory_rate": "state_rate", "next_memory": "next_state"})
 
+    def __post_init__(self) -> None:
+        check_coefficients(self, ControlError)
+        for name, each in declared(type(self)).items():
+            if each.shapes == JOINTS and np.shape(getattr(self, name)) not in ((), (self.n,)):
+                shape = np.shape(getattr(self, name))
+                raise ControlError(f"{name} must be one number or of shape ({self.n},), got {shape}")
+        object.__setattr__(self, "period_s", duration("period_s", self.period_s, zero=True, error=ControlError))
+
     @property
     def name(self) -> str:
         """Its name in messages: that of its class."""
         return type(self).__name__
+
+    @property
+    def references(self) -> dict[str, Reference]:
+        """What it follows, by attribute."""
+        return {name: value for name, value in vars(self).items() if isinstance(value, Reference)}
+
+    @property
+    def models(self) -> dict[str, Dynamics]:
+        """Its own models of the arm, by attribute."""
+        return {name: value for name, value in vars(self).items() if isinstance(value, Dynamics)}
+
+    @property
+    def desired(self) -> Reference | None:
+        """What a run is compared with: the first of its references; None without."""
+        return next(iter(self.references.values()), None)
+
+    @property
+    def task_frame(self) -> str | None:
+        """The link whose motion is desired; None if it is that of the joints."""
+        return None
+
+    @property
+    def saturation(self) -> Array:
+        """Greatest torque that it asks for, a scalar or (n,), in [N m] or [N]; inf where nothing limits it."""
+        return np.inf
 
     @property
     @abstractmethod
@@ -65,9 +97,8 @@ class Controller(ABC):
 
     @property
     def knots(self) -> tuple[float, ...]:
-        """Times in [s] at which its reference passes to another polynomial: a step of integration ends there."""
-        reference = getattr(self, "reference", None)
-        return () if reference is None else tuple(reference.knots.tolist())
+        """Times in [s] at which a reference passes to another polynomial: a step of integration ends there."""
+        return tuple(sorted({t for each in self.references.values() for t in each.knots.tolist()}))
 
     @abstractmethod
     def torque(self, t: float, q: Array, v: Array, z: Array) -> Array:
@@ -96,22 +127,7 @@ class Stateless(Controller):
 __getattr__ = former.module_names(globals(), Memoryless="Stateless")
 
 
-number = partial(validate.number, error=ControlError)
-numbers = partial(validate.numbers, error=ControlError)
-
-
 def check_model(model: Any) -> None:
     """ControlError if it is not the dynamics of an arm."""
     if isinstance(model, type) or not isinstance(model, Dynamics):
         raise ControlError(f"model: give a robot, such as rd.load('ur5'), got {shown(model)}")
-
-
-def freeze(controller: Controller, n: int, *gains: str) -> None:
-    """Check the period and the named gains of a controller under construction, and freeze them.
-
-    Raises:
-        ControlError: If one is negative, not finite or of the wrong shape.
-    """
-    for name in gains:
-        object.__setattr__(controller, name, numbers(name, getattr(controller, name), (), (n,), least=0))
-    object.__setattr__(controller, "period_s", duration("period_s", controller.period_s, zero=True, error=ControlError))

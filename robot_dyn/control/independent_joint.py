@@ -5,15 +5,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, final
 
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.control.controller import ControlError, Controller, Stateless, freeze, number, numbers
-from robot_dyn.control.reference import PiecewisePolynomial
-from robot_dyn.errors import shown
+from robot_dyn.coefficient import coefficient
+from robot_dyn.control.controller import Controller, Stateless
+from robot_dyn.control.reference import PiecewisePolynomial, numbers
+from robot_dyn.errors import ControlError, shown
+
+STIFFNESS = coefficient("N m/rad", symbol="kp", least=0)
+DAMPING = coefficient("N m s/rad", symbol="kd", least=0)
 
 
 @final
@@ -29,12 +33,9 @@ class PD(Stateless):
     """
 
     reference: PiecewisePolynomial
-    kp: Any
-    kd: Any
+    kp: Any = field(metadata=STIFFNESS)
+    kd: Any = field(metadata=DAMPING)
     period_s: float = 0.0
-
-    def __post_init__(self) -> None:
-        freeze(self, self.n, "kp", "kd")
 
     @property
     def n(self) -> int:
@@ -70,26 +71,22 @@ class PID(Controller):
     """
 
     reference: PiecewisePolynomial
-    kp: Any
-    ki: Any
-    kd: Any
-    effort_limit: Any = np.inf
-    tracking_time_s: float | None = None
+    kp: Any = field(metadata=STIFFNESS)
+    ki: Any = field(metadata=coefficient("N m/(rad s)", symbol="ki", least=0))
+    kd: Any = field(metadata=DAMPING)
+    effort_limit: Any = field(default=np.inf, metadata=coefficient("N m", above=0, infinite=True))
+    tracking_time_s: Any = field(default=None, metadata=coefficient("s", shapes=((),), above=0, swept=False))
     period_s: float = 0.0
 
     def __post_init__(self) -> None:
-        freeze(self, self.n, "kp", "ki", "kd")
-        limit = numbers("effort_limit", self.effort_limit, (), (self.n,), above=0, infinite=True)
-        object.__setattr__(self, "effort_limit", limit)
+        super().__post_init__()
         if self.tracking_time_s is None:
             kd, ki = np.broadcast_arrays(self.kd, self.ki)
             acts = (kd > 0) & (ki > 0)
             time = np.sqrt((kd[acts] / ki[acts]).max()) if acts.any() else 1.0  # without ki nothing winds up
-        else:
-            time = number("tracking_time_s", self.tracking_time_s, above=0)
-            if np.isinf(self.effort_limit).all():
-                raise ControlError("tracking_time_s has no effect without an effort_limit; give one, or leave it out")
-        object.__setattr__(self, "tracking_time_s", float(time))
+            object.__setattr__(self, "tracking_time_s", float(time))
+        elif np.isinf(self.effort_limit).all():
+            raise ControlError("tracking_time_s has no effect without an effort_limit; give one, or leave it out")
 
     @property
     def n(self) -> int:
@@ -98,6 +95,10 @@ class PID(Controller):
     @property
     def state_size(self) -> int:
         return self.n
+
+    @property
+    def saturation(self) -> Array:
+        return self.effort_limit
 
     def torque(self, t: float, q: Array, v: Array, z: Array) -> Array:
         return self._saturated(self._desired(t, q, v, z)[0])

@@ -6,17 +6,19 @@ Automation 3(1), A unified approach for motion and force control of robot manipu
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from operator import index
 from typing import Any, final
 
 import numpy as np
 
 from robot_dyn.arithmetic import Array, apply, transpose
+from robot_dyn.coefficient import coefficient
 from robot_dyn.control.cartesian import CartesianReference
-from robot_dyn.control.controller import ControlError, Stateless, check_model, freeze, number, numbers
+from robot_dyn.control.controller import Stateless, check_model
 from robot_dyn.control.orientation import orientation_error
-from robot_dyn.errors import shown
+from robot_dyn.control.reference import number, numbers
+from robot_dyn.errors import ControlError, shown
 from robot_dyn.model.dynamics import Dynamics, acceleration
 
 POSITION, POSE = (0, 1, 2), (0, 1, 2, 3, 4, 5)  # rows of a twist
@@ -126,13 +128,13 @@ class OperationalSpace(Stateless):
     model: Dynamics
     frame: str
     reference: CartesianReference
-    kp: Any
-    kd: Any
-    posture: Any = None
-    posture_kp: Any = 0.0
-    posture_kd: Any = 0.0
+    kp: Any = field(metadata=coefficient("1/s²", shapes=((), ("m",)), least=0))
+    kd: Any = field(metadata=coefficient("1/s", shapes=((), ("m",)), least=0))
+    posture: Any = field(default=None, metadata=coefficient("rad", shapes=(("n",),)))
+    posture_kp: Any = field(default=0.0, metadata=coefficient("1/s²", least=0))
+    posture_kd: Any = field(default=0.0, metadata=coefficient("1/s", least=0))
     rows: Any = None
-    threshold: float = 0.01
+    threshold: Any = field(default=0.01, metadata=coefficient("1/kg", shapes=((),), above=0))
     period_s: float = 0.0
 
     def __post_init__(self) -> None:
@@ -144,18 +146,18 @@ class OperationalSpace(Stateless):
         if free and max(rows) > 2:
             raise ControlError(f"rows {rows} hold the orientation, which the reference leaves free")
         self.model.jacobian(np.zeros(self.n), self.frame)  # so that an unknown frame is told now
-        freeze(self, self.n, "posture_kp", "posture_kd")
-        if self.posture is None and self.posture_kp.any():
-            raise ControlError("posture_kp needs a posture")
-        values = {
-            "rows": rows,
-            "kp": numbers("kp", self.kp, (), (len(rows),), least=0),
-            "kd": numbers("kd", self.kd, (), (len(rows),), least=0),
-            "posture": numbers("posture", np.zeros(self.n) if self.posture is None else self.posture, (self.n,)),
-            "threshold": number("threshold", self.threshold, above=0),
-        }
-        for name, value in values.items():
-            object.__setattr__(self, name, value)
+        object.__setattr__(self, "rows", rows)
+        if self.posture is None:
+            object.__setattr__(self, "posture", np.zeros(self.n))
+            if np.any(self.posture_kp):
+                raise ControlError("posture_kp needs a posture")
+        super().__post_init__()
+        for name, *shapes in (("kp", (), (len(rows),)), ("kd", (), (len(rows),)), ("posture", (self.n,))):
+            numbers(name, getattr(self, name), *shapes)
+
+    @property
+    def task_frame(self) -> str | None:
+        return self.frame
 
     @property
     def n(self) -> int:

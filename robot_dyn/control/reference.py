@@ -6,15 +6,18 @@ Each piece is Hermite's polynomial of what is given at its two ends. [Siciliano 
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import factorial, isfinite, perm
 from typing import Any
 
 import numpy as np
 
+from robot_dyn import validate
 from robot_dyn.arithmetic import Array
-from robot_dyn.control.controller import ControlError, number, numbers
-from robot_dyn.errors import QueryError
+from robot_dyn.errors import ControlError, QueryError
 from robot_dyn.validate import choice
 from robot_dyn.validate import duration as seconds
 from robot_dyn.validate import times as real_times
@@ -27,10 +30,30 @@ _UPPER = {
     2: np.array([[3, -1], [-2, 1.0]]),
     3: np.array([[10, -4, 0.5], [-15, 7, -1], [6, -3, 0.5]]),
 }
+number = partial(validate.number, error=ControlError)
+numbers = partial(validate.numbers, error=ControlError)
+
+
+class Reference(ABC):
+    """What a controller follows: a function of time made of piecewise polynomials."""
+
+    @property
+    @abstractmethod
+    def knots(self) -> np.ndarray:
+        """Times in [s] at which it passes to another polynomial."""
+
+    @property
+    @abstractmethod
+    def polynomials(self) -> tuple[PiecewisePolynomial, ...]:
+        """What it is made of."""
+
+    @abstractmethod
+    def made_of(self, polynomials: Sequence[Any]) -> Any:
+        """The same of other polynomials: of one segment of a run, in symbols, where it is traced."""
 
 
 @dataclass(frozen=True, eq=False)
-class PiecewisePolynomial:
+class PiecewisePolynomial(Reference):
     """A motion q(t) with its velocity and acceleration; before its first and after its last break it rests there.
 
     Attributes:
@@ -55,6 +78,13 @@ class PiecewisePolynomial:
     def knots(self) -> np.ndarray:
         """Times in [s] at which it passes to another polynomial: its breaks, or none if it rests."""
         return self.breaks[:0] if self.coefficients.shape[:2] == (1, 1) else self.breaks
+
+    @property
+    def polynomials(self) -> tuple[PiecewisePolynomial, ...]:
+        return (self,)
+
+    def made_of(self, polynomials: Sequence[Any]) -> Any:
+        return polynomials[0]
 
     @property
     def start(self) -> float:

@@ -18,9 +18,8 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.control.controller import ControlError, numbers
-from robot_dyn.control.reference import PiecewisePolynomial, hermite, increasing
-from robot_dyn.errors import nearest, shorten
+from robot_dyn.control.reference import PiecewisePolynomial, hermite, increasing, numbers
+from robot_dyn.errors import ControlError, nearest, shorten
 from robot_dyn.reading import read
 from robot_dyn.validate import instance
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from math import inf
 from typing import Any, final
 
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.effects.effect import URDF, Bound, Effect, coefficient
+from robot_dyn.coefficient import URDF, coefficient
+from robot_dyn.effects.effect import Bound, Effect
 from robot_dyn.errors import EffectError
 
 
@@ -22,12 +24,11 @@ class EffortLimit(Bound):
             of which none may be 0.
     """
 
-    limit: Any
+    limit: Any = field(
+        metadata=coefficient("N m", symbol="u_max", least=0, infinite=True, elsewhere=inf, stated="effort_limit")
+    )
 
-    coefficients = ("limit",)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "limit", coefficient("limit", self.limit, least=0, infinite=True))
+    term = "|u| ≤ u_max"
 
     def on(self, dynamics: Any) -> Effect:
         made = super().on(dynamics)

@@ -8,21 +8,14 @@ from __future__ import annotations
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import replace
 from math import inf
 from typing import Any, ClassVar
 
-import numpy as np
-
 from robot_dyn.arithmetic import Array
-from robot_dyn.errors import EffectError, nearest
+from robot_dyn.coefficient import check_coefficients, declared
+from robot_dyn.errors import EffectError
 from robot_dyn.model.dynamics import Dynamics
-from robot_dyn.validate import numbers
-
-URDF = "urdf"  # in place of a coefficient: what the robot's file states
-_ELSEWHERE = {"limit": np.inf, "lower": -np.inf, "upper": np.inf}  # for joints not named; 0 for other coefficients
-_STATED = {"limit": "effort_limit"}  # the attribute of a Robot, where it is not called as that of the effect
 
 
 class Effect:
@@ -38,11 +31,17 @@ class Effect:
     and with symbols in place of these numbers where it is compiled: written in `robot_dyn.arithmetic` and NumPy's
     operators it runs in both engines.
 
+    Those of its numbers that are declared (`robot_dyn.coefficient`) are checked when it is made, may be given by joint
+    name, or as "urdf" where files state them, and may be swept.
+
     Attributes:
-        coefficients: Names of those of its attributes that are one number, or one for each joint.
+        term: Its equation in a few signs, for `explain`.
     """
 
-    coefficients: ClassVar[tuple[str, ...]] = ()
+    term: ClassVar[str] = ""
+
+    def __post_init__(self) -> None:
+        check_coefficients(self, EffectError)
 
     @property
     def name(self) -> str:
@@ -55,19 +54,12 @@ class Effect:
         Raises:
             EffectError: If a joint is unknown, no file states the coefficient, or one is of another number of joints.
         """
-        for key in self.coefficients:
-            values = getattr(self, key)
-            if isinstance(values, np.ndarray) and values.ndim and values.shape != (dynamics.n,):
-                count = f"{len(values)} joint{'s' if len(values) > 1 else ''}"
-                raise EffectError(
-                    f"{self.name}: {key} is of {count}, the arm has {dynamics.n}; give one number for all, or one for"
-                    " each joint"
-                )
-        if not is_dataclass(self):
-            return self
-        named = {field.name: getattr(self, field.name) for field in fields(self) if field.init}
-        made = {key: _of(dynamics, key, x) for key, x in named.items() if isinstance(x, Mapping) or x is URDF}
-        return replace(self, **made) if made else self
+        known = {
+            key: each.on(f"{self.name}: {key}", getattr(self, key), dynamics)
+            for key, each in declared(type(self)).items()
+        }
+        made: Any = {key: value for key, value in known.items() if value is not getattr(self, key)}
+        return replace(self, **made) if made else self  # pyright: ignore[reportArgumentType]  a dataclass
 
     @property
     def switches(self) -> tuple[float, ...]:
@@ -113,36 +105,3 @@ class Bound(Effect, ABC):
     @abstractmethod
     def actuation(self, u: Array) -> Array:
         """What is left of the actuation u, (..., n), in [N m] or [N]; same shape and unit."""
-
-
-def coefficient(name: str, values: Any, *, least: float | None = None, infinite: bool = False) -> np.ndarray:
-    """A parameter: a scalar or (n,), frozen; EffectError if it is anything else, or less than `least`.
-
-    Values by joint name, and "urdf", stay until the plant that the effect acts on is known.
-    """
-    if isinstance(values, Mapping):
-        if not values:
-            raise EffectError(f"{name} names no joint; give values by joint, or one for all")
-        return values  # pyright: ignore[reportReturnType]
-    if isinstance(values, str) and values == URDF:
-        return URDF  # pyright: ignore[reportReturnType]
-    return numbers(name, values, (), ("n",), error=EffectError, least=least, infinite=infinite)
-
-
-def _of(dynamics: Any, key: str, values: Any) -> Any:
-    """The n values by joint name, or of what the file states, which must not be nothing."""
-    names = dynamics.joint_names
-    if values is URDF:
-        try:
-            stated = getattr(dynamics, _STATED.get(key, key))
-        except AttributeError:
-            raise EffectError(f"{key}='urdf' needs a Robot, got {type(dynamics).__name__}") from None
-        if np.all(stated == _ELSEWHERE.get(key, 0.0)):
-            raise EffectError(
-                f"{key}='urdf' has no effect: the file of {dynamics.name} states no {key} for any joint; give numbers,"
-                " or leave the effect out"
-            )
-        return stated
-    for name in values.keys() - set(names):
-        raise EffectError(f"{key}: no joint {name!r}; {nearest(str(name), names)}")
-    return [values.get(name, _ELSEWHERE.get(key, 0.0)) for name in names]

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import inf
 from typing import Any, final
 
-import numpy as np
-
 from robot_dyn.arithmetic import Array, tanh
-from robot_dyn.effects.effect import Dissipative, coefficient
-from robot_dyn.errors import EffectError
+from robot_dyn.coefficient import coefficient
+from robot_dyn.effects.effect import Dissipative
 from robot_dyn.model.dynamics import Dynamics
 
 
@@ -23,12 +21,9 @@ class ViscousFriction(Dissipative):
         damping: b, a scalar or (n,), in [N m s/rad] or [N s/m], not negative.
     """
 
-    damping: Any
+    damping: Any = field(metadata=coefficient("N m s/rad", symbol="b", least=0, stated="damping"))
 
-    coefficients = ("damping",)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "damping", coefficient("damping", self.damping, least=0))
+    term = "−b v"
 
     def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
         return -self.damping * v
@@ -46,16 +41,10 @@ class RegularisedCoulombFriction(Dissipative):
         velocity_scale: v_s, a scalar or (n,), in [rad/s] or [m/s], positive.
     """
 
-    friction: Any
-    velocity_scale: Any = 0.01
+    friction: Any = field(metadata=coefficient("N m", symbol="f", least=0, stated="friction"))
+    velocity_scale: Any = field(default=0.01, metadata=coefficient("rad/s", symbol="v_s", above=0))
 
-    coefficients = "friction", "velocity_scale"
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "friction", coefficient("friction", self.friction, least=0))
-        object.__setattr__(self, "velocity_scale", coefficient("velocity_scale", self.velocity_scale, least=0))
-        if isinstance(self.velocity_scale, np.ndarray) and not (self.velocity_scale > 0).all():
-            raise EffectError(f"velocity_scale must be positive, got {self.velocity_scale}")
+    term = "−f tanh(v / v_s)"
 
     @property
     def widths(self) -> tuple[Any, Any]:

@@ -6,18 +6,21 @@ overrun by about v √(M/k); rigid ones are set-valued and no part of these.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import inf
 from typing import Any, final
 
 import numpy as np
 
 from robot_dyn.arithmetic import Array, positive_part
-from robot_dyn.effects.effect import Conservative, Dissipative, coefficient
+from robot_dyn.coefficient import coefficient
+from robot_dyn.effects.effect import Conservative, Dissipative
 from robot_dyn.errors import EffectError
 from robot_dyn.model.dynamics import Dynamics
 
 _NAME = "joint_stops"  # of both parts, as of the function that makes them
+_LOWER = coefficient("rad", symbol="lower stop", infinite=True, elsewhere=-inf, stated="lower")
+_UPPER = coefficient("rad", symbol="upper stop", infinite=True, elsewhere=inf, stated="upper")
 
 
 @final
@@ -31,15 +34,15 @@ class JointStopSpring(Conservative):
         stiffness: k, a scalar or (n,), in [N m/rad] or [N/m], not negative.
     """
 
-    lower: Any
-    upper: Any
-    stiffness: Any
+    lower: Any = field(metadata=_LOWER)
+    upper: Any = field(metadata=_UPPER)
+    stiffness: Any = field(metadata=coefficient("N m/rad", symbol="k", least=0))
 
-    coefficients = "lower", "upper", "stiffness"
+    term = "k (δ₋ − δ₊)"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         _check_stops(self)
-        object.__setattr__(self, "stiffness", coefficient("stiffness", self.stiffness, least=0))
 
     @property
     def name(self) -> str:
@@ -68,15 +71,15 @@ class JointStopDamper(Dissipative):
         damping: c, damping for each unit of depth, a scalar or (n,), in [N m s/rad²] or [N s/m²], not negative.
     """
 
-    lower: Any
-    upper: Any
-    damping: Any
+    lower: Any = field(metadata=_LOWER)
+    upper: Any = field(metadata=_UPPER)
+    damping: Any = field(metadata=coefficient("N m s/rad²", symbol="c, damping for each unit of depth", least=0))
 
-    coefficients = "lower", "upper", "damping"
+    term = "−c (δ₋ + δ₊) v"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         _check_stops(self)
-        object.__setattr__(self, "damping", coefficient("damping", self.damping, least=0))
 
     @property
     def name(self) -> str:
@@ -105,7 +108,7 @@ def _depth(coefficient: Any) -> Any:
 
 def _check_stops(stops: Any) -> None:
     for name in ("lower", "upper"):
-        stop = coefficient(name, getattr(stops, name), infinite=True)
+        stop = getattr(stops, name)
         if not isinstance(stop, np.ndarray):
             return  # by name, or as the file states: checked when the joints are known
         # A stop that does not exist lies where no depth can be reached, and inf − inf is avoided.

@@ -1,7 +1,4 @@
-"""Plant: rigid bodies and what acts on them, M(q) a + C(q, v) v + N(t, q, v) = Υ, with N = ∂V/∂q − Σ τ_effect.
-
-[Murray, Li, Sastry 1994, eq. 4.24]
-"""
+"""Plant: rigid bodies and what acts on them; its queries check their arguments and results."""
 
 from __future__ import annotations
 
@@ -15,9 +12,9 @@ import numpy as np
 
 from robot_dyn.arithmetic import FLOAT64, Arithmetic, Array
 from robot_dyn.effects.effect import Bound, Effect, Force
+from robot_dyn.effects.equation_of_motion import EquationOfMotion
 from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFriction
 from robot_dyn.errors import EffectError, OverflowedError, shown
-from robot_dyn.foreign import call, users_line
 from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.validate import check_batches, is_moderate, is_state, joint_values, number
 
@@ -55,14 +52,19 @@ class Plant:
         object.__setattr__(self, "effects", tuple(effect.on(dynamics) for effect in effects))
 
     @cached_property
+    def equation_of_motion(self) -> EquationOfMotion:
+        """Its equation of motion, of arguments that are not checked."""
+        return EquationOfMotion(self.dynamics, self.effects)
+
+    @property
     def forces(self) -> tuple[Force, ...]:
         """The effects that are torques."""
-        return tuple(effect for effect in self.effects if isinstance(effect, Force))
+        return self.equation_of_motion.forces
 
     def actuation(self, u: Array) -> Array:
         """What the bounds among the effects leave of the actuation u, (..., n); EffectError if one does not fit."""
         (u,) = (u,) if self._is_plain(u) else self._states(u=u)
-        return bounded(self.effects, u)
+        return self.equation_of_motion.actuation(u)
 
     def M(self, q: Array) -> Array:
         """Mass matrix, (..., n, n)."""
@@ -74,8 +76,7 @@ class Plant:
 
     def N(self, t: float, q: Array, v: Array) -> Array:
         """Every force but actuation, as what must be overcome: N = ∂V/∂q − Σ τ_effect, (..., n)."""
-        torque = self.torque(t, q, v)
-        return self._finite(self.dynamics.N(q) - torque)
+        return self._finite(self.equation_of_motion.N(q, self.torque(t, q, v)))
 
     def torque(self, t: float, q: Array, v: Array) -> Array:
         """Σ τ_effect, the torque of all effects on the joints, (..., n); 0 without effects.
@@ -90,30 +91,22 @@ class Plant:
             EffectError: If an effect does not fit the joints.
         """
         if t.__class__ is float and isfinite(t) and self._is_plain(q) and self._is_plain(v):
-            total = self._sum(t, q, v, np.zeros(self.dynamics.n))
+            total = sum(self.equation_of_motion.torques(t, q, v, v.shape), start=np.zeros(v.shape))
             if is_moderate(total):
                 return total
         t, (q, v) = number("t", t), self._states(q=q, v=v)
         zeros = np.zeros((*check_batches(q=q, v=v), self.dynamics.n))
         with self._arithmetic.scope(), np.errstate(all="ignore"):  # what overflows is told in words
             zeros = zeros if q.dtype != object else self._arithmetic.array(zeros)
-            return self._finite(self._sum(t, q, v, zeros))
-
-    def _sum(self, t: float, q: Array, v: Array, zeros: Array) -> Array:
-        """Σ τ_effect of arguments that were checked."""
-        total = zeros
-        for force in self.forces:
-            total = total + torque_of(force, self.dynamics, t, q, v, zeros.shape)
-        return total
+            return self._finite(sum(self.equation_of_motion.torques(t, q, v, zeros.shape), start=zeros))
 
     def inverse_dynamics(self, t: float, q: Array, v: Array, a: Array) -> Array:
         """Actuation Υ = M a + C v + N that gives the acceleration a, (..., n)."""
-        torque = self.torque(t, q, v)
-        return self._finite(self.dynamics.inverse_dynamics(q, v, a) - torque)
+        return self._finite(self.equation_of_motion.inverse_dynamics(q, v, a, self.torque(t, q, v)))
 
     def forward_dynamics(self, t: float, q: Array, v: Array, u: Array) -> Array:
         """Acceleration under the actuation u, (..., n)."""
-        return self.dynamics.forward_dynamics(q, v, self.actuation(u) + self.torque(t, q, v))
+        return self.equation_of_motion.acceleration(q, v, self.actuation(u) + self.torque(t, q, v))
 
     @cached_property
     def _arithmetic(self) -> Arithmetic:
@@ -135,37 +128,6 @@ class Plant:
         if not self._arithmetic.finite(result).all():
             raise OverflowedError("the arguments are so large that the result overflows")
         return result
-
-
-def bounded(effects: Iterable[Effect], u: Array) -> Array:
-    """What the bounds among effects leave of an actuation, (..., n), that is not checked: floats, balls or symbols.
-
-    Raises:
-        EffectError: If a bound does not fit it.
-    """
-    shape = np.shape(u)
-    for effect in effects:
-        if isinstance(effect, Bound):
-            try:
-                u = call(effect.actuation, u)
-            except (TypeError, ValueError) as error:
-                if users_line(error):
-                    raise
-                raise EffectError(f"{effect.name} does not fit an actuation of shape {shape}: {error}") from None
-    return u
-
-
-def torque_of(
-    force: Force, dynamics: Dynamics, t: float, q: Array, v: Array, shape: tuple[int, ...] | None = None
-) -> Array:
-    """The torque of one effect, of the shape if one is given; EffectError if it does not fit the joints."""
-    try:
-        torque = call(force.torque, dynamics, t, q, v)
-        return torque if shape is None or np.shape(torque) == shape else np.broadcast_to(torque, shape)
-    except (TypeError, ValueError) as error:
-        if users_line(error):
-            raise
-        raise EffectError(f"{force.name} does not fit {dynamics.n} joints and v of shape {v.shape}: {error}") from None
 
 
 def stated_friction(dynamics: Any) -> tuple[Effect, ...]:

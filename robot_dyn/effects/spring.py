@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, final
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.effects.effect import Conservative, coefficient
+from robot_dyn.coefficient import coefficient
+from robot_dyn.effects.effect import Conservative
 from robot_dyn.model.dynamics import Dynamics
 
 
@@ -20,14 +21,10 @@ class Spring(Conservative):
         rest: q₀, a scalar or (n,), in [rad] or [m].
     """
 
-    stiffness: Any
-    rest: Any = 0.0
+    stiffness: Any = field(metadata=coefficient("N m/rad", symbol="k", least=0))
+    rest: Any = field(default=0.0, metadata=coefficient("rad", symbol="q₀"))
 
-    coefficients = "stiffness", "rest"
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "stiffness", coefficient("stiffness", self.stiffness, least=0))
-        object.__setattr__(self, "rest", coefficient("rest", self.rest))
+    term = "−k (q − q₀)"
 
     def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
         return -self.stiffness * (q - self.rest)

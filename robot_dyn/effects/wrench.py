@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import inf
 from typing import Any, final
 
@@ -10,10 +10,13 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array, transpose
 from robot_dyn.arithmetic import apply as times
+from robot_dyn.coefficient import coefficient
 from robot_dyn.effects.effect import Active
 from robot_dyn.errors import EffectError, QueryError
 from robot_dyn.model.dynamics import Axes, Dynamics
-from robot_dyn.validate import instance, number, numbers, rows
+from robot_dyn.validate import instance, rows
+
+_TIME = coefficient("s", shapes=((),), infinite=True, swept=False)
 
 
 @final
@@ -30,19 +33,18 @@ class ExternalWrench(Active):
     """
 
     frame: str
-    wrench: Any
+    wrench: Any = field(metadata=coefficient("N", symbol="F", shapes=((6,),)))
     expressed_in: str = Axes.WORLD_ALIGNED
-    start_s: float = 0.0
-    end_s: float = inf
+    start_s: float = field(default=0.0, metadata=_TIME)
+    end_s: float = field(default=inf, metadata=_TIME)
+
+    term = "Jᵀ F"
 
     def __post_init__(self) -> None:
         instance("frame", self.frame, str, "give the name of a link", error=EffectError)
-        wrench = numbers("wrench, force and torque,", self.wrench, (6,), error=EffectError)
-        for name in ("start_s", "end_s"):
-            object.__setattr__(self, name, number(name, getattr(self, name), error=EffectError, infinite=True))
+        super().__post_init__()
         if not self.start_s < self.end_s:
             raise EffectError(f"end_s must lie after start_s, got {self.start_s} and {self.end_s}")
-        object.__setattr__(self, "wrench", wrench)
         object.__setattr__(self, "expressed_in", Axes.of(self.expressed_in))
 
     def on(self, dynamics: Any) -> ExternalWrench:

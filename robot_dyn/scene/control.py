@@ -7,15 +7,15 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field
 
+from robot_dyn.coefficient import URDF
 from robot_dyn.control.cartesian import CartesianReference, circle, line
 from robot_dyn.control.computed_torque import ComputedTorque, FeedForward, PDGravity
-from robot_dyn.control.controller import Controller, numbers
+from robot_dyn.control.controller import Controller
 from robot_dyn.control.independent_joint import PD, PID, gains_from
 from robot_dyn.control.operational_space import OperationalSpace
-from robot_dyn.control.reference import PiecewisePolynomial, hold, quintic, via_points
+from robot_dyn.control.reference import PiecewisePolynomial, hold, numbers, quintic, via_points
 from robot_dyn.control.samples import Samples
 from robot_dyn.effects.actuator import stated_efforts
-from robot_dyn.effects.effect import URDF
 from robot_dyn.errors import SceneError
 from robot_dyn.model.robot import Robot
 from robot_dyn.scene.effects import Edit

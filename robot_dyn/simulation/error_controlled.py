@@ -25,6 +25,7 @@ from robot_dyn.simulation.time_loop import Functions
 from robot_dyn.simulation.trajectory import Ending, Outcome
 from robot_dyn.simulation.watch import DivergedError, Watch
 
+_NONE = np.zeros(0)
 _RUNAWAY = 1e6  # [rad/s] or [m/s]: such a method would follow an exploding state without end
 _SAMPLES = 1000  # of a run without a record period
 _COMPARED = 1000  # times at which a run is compared with runs of other tolerances
@@ -55,17 +56,20 @@ class ErrorControlled:
         pace: Factor of the tolerances; 1 keeps samples.
         on_progress: Called with the time reached at each step.
         observer: Sees each step.
+        parameters: Of the functions, (P,).
     """
 
     def __init__(
         self, setup: Setup, equation: StateEquation, functions: Functions, pace: Fraction,
         on_progress: Callable[[float], object] | None = None, observer: Observer | None = None,
+        parameters: Array = _NONE,
     ) -> None:  # fmt: skip
         self.setup, self.equation, self.functions, self.pace = setup, equation, functions, pace
         self.on_progress, self.observer = on_progress, observer
         self.watch, self.plan = Watch(setup, equation), plan_of(setup)
         self.t, self.y = 0.0, equation.start(setup.q0, setup.v0)
-        self.own = np.full((equation.plant.dynamics.n if equation.sampled else 0, 1), np.nan)
+        self.held = equation.plant.dynamics.n if equation.sampled else 0
+        self.own = np.concatenate([np.full(self.held, np.nan), parameters])[:, None]
         self.key = self.steps = self.evaluations = 0
         self.due = 0.0  # time of the next sample
         self.samples = _Samples()
@@ -132,7 +136,7 @@ class ErrorControlled:
     def _tick(self, s: int) -> None:
         if self.plan.ticks[s]:
             self.y, held = self.watch.tick(float(self.plan.starts[s]), self.y)
-            self.own[:, 0] = held
+            self.own[: self.held, 0] = held
 
     def _method(self, length: float) -> Adaptive:
         """The method with the tolerances of this run, on a segment."""
@@ -177,7 +181,7 @@ class ErrorControlled:
                 self.observer.seen[len(q) :] = self.equation.command(t, q, v, z)
             except RobotDynError:  # y may be far off where a run fails
                 return
-        self.observer.step(t, y, self.own[:, 0] if self.equation.sampled else None, ticked)
+        self.observer.step(t, y, self.own[: self.held, 0] if self.equation.sampled else None, ticked)
 
     def _record(self, outcome: Outcome) -> Record:
         kept, m = self.samples, self.equation.size

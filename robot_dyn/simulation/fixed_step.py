@@ -14,7 +14,7 @@ from typing import cast, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import FLOAT64
+from robot_dyn.arithmetic import FLOAT64, Array
 from robot_dyn.errors import RobotDynError
 from robot_dyn.foreign import is_mistake
 from robot_dyn.integrate.integrator import Integrator
@@ -33,6 +33,8 @@ _PAUSE_S = 0.1  # between looks at the keyboard
 _FIRST = 1000  # steps before the speed is known
 _DOUBTFUL = 1e6  # of Σ |y| in machine code, which does not see that M becomes singular
 
+_NONE = np.zeros(0)
+
 Advance = Callable[..., int]
 
 
@@ -48,12 +50,13 @@ class FixedStep:
         machine_code: The time loop of the method as machine code; then the functions are, too.
         on_progress: Called with the time reached, at each step or some ten times a second.
         observer: Sees each step.
+        parameters: Of the functions, (P,).
     """
 
     def __init__(
         self, setup: Setup, equation: StateEquation, functions: Functions, pace: Fraction,
         machine_code: Advance | None = None, on_progress: Callable[[float], object] | None = None,
-        observer: Observer | None = None,
+        observer: Observer | None = None, parameters: Array = _NONE,
     ) -> None:  # fmt: skip
         method = cast(Integrator, setup.integrator)
         self.setup, self.equation, self.functions, self.compiled = setup, equation, functions, machine_code is not None
@@ -62,7 +65,8 @@ class FixedStep:
         n, m = equation.plant.dynamics.n, equation.size
         held = n if equation.sampled else 0
         self.start = equation.start(setup.q0, setup.v0)
-        self.runs = runs_of(self.start[:, None], np.full((held, 1), np.nan), n, held, equation.state_size, m + n + 2)
+        own = np.concatenate([np.full(held, np.nan), parameters])[:, None]
+        self.runs = runs_of(self.start[:, None], own, n, held, equation.state_size, m + n + 2)
         self.runs.energy[0], self.runs.scale[0] = self.watch.energy, self.watch.scale
         self.stepper = method.stepper(FLOAT64, m, n, m + n, 1, equation.widths)
         self.advance = machine_code or time_loop(self.stepper.step)
@@ -162,7 +166,7 @@ class FixedStep:
         s, t, y = int(self.now[Now.SEGMENT]), self.time, self.y
         if ended is Ended.TICK:
             y, held = self.watch.tick(t, y)
-            self.runs.y[:, 0], self.runs.own[:, 0] = y, held
+            self.runs.y[:, 0], self.runs.own[: self.rules.held, 0] = y, held
             self.plan.ticks[s] = 0
         elif ended is Ended.DOUBTFUL:
             self._step(s, t, y)
@@ -178,7 +182,7 @@ class FixedStep:
         )
         self.runs.y[:, 0] = y = one_step(method, right_side, t, y, h, self.watch)
         if observer is not None:
-            held = self.runs.own[:, 0] if self.equation.sampled else None
+            held = self.runs.own[: self.rules.held, 0] if self.equation.sampled else None
             observer.step(t + h, y, held, held is None or (self.now[Now.STEP] == 0 and self.segments[s].tick))
         self.now[Now.STEP] += 1
         self.now[Now.STEPS] += 1
@@ -215,7 +219,7 @@ def runs_of(y: np.ndarray, own: np.ndarray, n: int, held: int, states: int, made
     return Runs(
         np.ascontiguousarray(y), np.ascontiguousarray(own), np.empty((m, W)), np.empty((made, W)),
         np.empty((held + states, W)), np.empty((2, W)), np.empty(W), np.zeros(W, np.int64), np.ones(W, np.int64),
-        np.zeros(W, np.int64), np.zeros(W), np.zeros(W, np.int64), np.zeros(W), np.ones(W), np.zeros(W),
+        np.zeros(W, np.int64), np.zeros(W), np.zeros((m, W)), np.zeros(W), np.ones(W), np.zeros(W),
     )  # fmt: skip
 
 

@@ -53,7 +53,7 @@ def levels(plant: Plant, controller: Controller | None) -> tuple[Level, ...]:
 def _bounds(plant: Plant, controller: Controller | None) -> Iterator[tuple[Kind, int, int, np.ndarray, float]]:
     """Kind, 0, 1, 2 for q, v, u, side, bounds (n,), and the part of a bound by which it must be passed."""
     n, robot = plant.dynamics.n, getattr(plant.dynamics, "robot", plant.dynamics)
-    effort: Any = getattr(controller, "effort_limit", np.inf)
+    effort: Any = np.inf if controller is None else controller.saturation
     for limit in (effect.limit for effect in plant.effects if isinstance(effect, EffortLimit)):
         effort = np.minimum(effort, limit)
     yield from ((Kind.EFFORT_REACHED, 2, side, side * effort, -_ROUNDING) for side in (1, -1))

@@ -1,16 +1,16 @@
 """The plan of a run as arrays: its segments, their steps, and what the state equation is given on each.
 
-p = (first and last time of the segment, t₀, c₀, c₁, …)   with the reference q_d(t) = Σⱼ c_j (t − t₀)ʲ on the segment;
-at one time, of a tick or of the end, the first terms of Taylor's series there
+p = (first and last time of the segment, t₀, c₀, c₁, …)   with q_d(t) = Σⱼ c_j (t − t₀)ʲ on the segment, one polynomial
+of the references after the other; at one time, of a tick or of the end, the first terms of Taylor's series there
 """
 
 from __future__ import annotations
 
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 
+from robot_dyn.control.controller import Controller
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.simulation.schedule import paced
 from robot_dyn.simulation.setup import Setup
@@ -26,11 +26,11 @@ def plan_of(setup: Setup, pace: Fraction = Fraction(1)) -> Plan:
     starts, ends = (np.array([getattr(each, name) for each in segments]) for name in ("start", "end"))
     ticks = np.array([each.tick and _sampled(setup) for each in segments])
     bounds = np.column_stack([np.nextafter(starts, np.inf), np.nextafter(ends, -np.inf)])
-    reference: Any = getattr(setup.controller, "reference", None)
-    inside = np.hstack([bounds, pieces(reference, starts, ends)])
+    followed = polynomials(setup.controller)
+    inside = np.hstack([bounds, *(_pieces(each, starts, ends) for each in followed)])
     starts = np.append(starts, setup.duration_s)
     unbounded = np.broadcast_to([-np.inf, np.inf], (len(starts), BOUNDS))
-    at_ticks = np.hstack([unbounded, at_times(reference, starts)])
+    at_ticks = np.ascontiguousarray(np.hstack([unbounded, *(_at_times(each, starts) for each in followed)]))
     return Plan(
         starts,
         np.append((ends - starts[:-1]) / counts, 0.0),
@@ -45,10 +45,19 @@ def _sampled(setup: Setup) -> bool:
     return setup.controller is not None and setup.controller.period_s > 0
 
 
-def at_times(reference: Any, t: np.ndarray) -> np.ndarray:
+def polynomials(controller: Controller | None) -> tuple[PiecewisePolynomial, ...]:
+    """What the references of a controller are made of."""
+    references = () if controller is None else controller.references.values()
+    return tuple(each for reference in references for each in reference.polynomials)
+
+
+def lengths(followed: PiecewisePolynomial) -> int:
+    """Number of the numbers that tell one of its pieces: t₀ and the coefficients."""
+    return 1 + followed.coefficients[0].size
+
+
+def _at_times(reference: PiecewisePolynomial, t: np.ndarray) -> np.ndarray:
     """A reference near each of some times: t₀ = t and the coefficients of its value and derivatives there, (m, P)."""
-    if not isinstance(reference, PiecewisePolynomial):
-        return np.zeros((len(t), 0))
     q, v, a = reference.at(t)
     table = np.zeros((len(t), *reference.coefficients.shape[1:]))
     for j, x in zip(range(len(reference.coefficients[0])), (q, v, a / 2), strict=False):
@@ -56,10 +65,8 @@ def at_times(reference: Any, t: np.ndarray) -> np.ndarray:
     return np.column_stack([t, table.reshape(len(t), -1)])
 
 
-def pieces(reference: Any, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
+def _pieces(reference: PiecewisePolynomial, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
     """The polynomial that a reference is on each segment: t₀ and its coefficients, (S, P)."""
-    if not isinstance(reference, PiecewisePolynomial):
-        return np.zeros((len(starts), 0))
     breaks, middle = reference.breaks, (starts + ends) / 2
     piece = np.searchsorted(breaks[1:-1], middle, side="right")
     table = reference.coefficients[piece].copy()

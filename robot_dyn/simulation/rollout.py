@@ -13,12 +13,12 @@ from typing import Any, cast
 
 import numpy as np
 
+from robot_dyn.compiled.parameters import parameters
 from robot_dyn.compiled.threads import thread_count
 from robot_dyn.errors import QueryError, nearest, shown
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.simulation.machine.batch import LANES, Batch
 from robot_dyn.simulation.machine.making import machine
-from robot_dyn.simulation.machine.payloads import masses
 from robot_dyn.simulation.rollout_result import Rollouts
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import MOST_BYTES
@@ -26,7 +26,6 @@ from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.validate import choice, instance, integer, joint_values, numbers
 
 RECORDS = ("q", "v", "tau", "energy", "work")
-_SIGNED = ("rest", "wrench", "lower", "upper", "posture")  # coefficients that may be negative
 
 
 def rollouts(
@@ -48,8 +47,9 @@ def rollouts(
         q0: Positions at the start, (B, n); those of the setup for all runs unless given.
         v0: Velocities at the start, (B, n) or (n,).
         params: Values that differ from run to run, each (B,) or (B, n): a gain of the controller by its name, as
-            {"kp": …}, a coefficient of an effect, as {"viscous_friction.damping": …}, or the mass in [kg] of the
-            payload that a link of the plant carries, as {"payload_mass:tool0": …}; models of controllers keep theirs.
+            {"kp": …}, a coefficient of an effect, as {"viscous_friction.damping": …}, "gravity", (B, 3), or of a
+            payload that a link carries its mass in [kg], as {"payload_mass:tool0": …}, or its centre of mass,
+            "payload_com:tool0", (B, 3). Models of controllers keep theirs: they are "model.gravity", ….
         record: Which of "q", "v", "tau", "energy", "work" to keep at the samples of the setup.
         threads: Number of threads; None for all processors.
         most_bytes: Refuse to record more than this.
@@ -76,8 +76,8 @@ def rollouts(
     q, v, sweep = _starts(setup, q0, v0, params or {})
     equation = StateEquation(setup.plant, setup.controller, setup.integrator.canonical)
     asked = {"u": "tau" in recorded, "v": equation.canonical and "v" in recorded, "energy": "energy" in recorded}
-    kept, nominal = tuple(name for name, yes in asked.items() if yes), {name: x[0] for name, x in sweep.items()}
-    made = machine(equation, cast(Integrator, setup.integrator), lanes=LANES, sweep=nominal, kept=kept)
+    kept = tuple(name for name, yes in asked.items() if yes)
+    made = machine(equation, cast(Integrator, setup.integrator), lanes=LANES, kept=kept)
     made.check(setup)
     return Batch(setup, made, q, v, sweep, recorded, kept, most_bytes).run(thread_count(threads), on_progress)
 
@@ -100,29 +100,24 @@ def _starts(
 
 
 def _values(setup: Setup, name: str, values: Any) -> np.ndarray:
-    """The values of a parameter, (B, n)."""
-    named = [(f"{effect.name}.{key}", type(effect), x) for effect in setup.plant.effects for key, x in _numbers(effect)]
-    known = {each: x for each, _, x in named}
-    classes = [cls for each, cls, _ in named if each == name]
+    """The values of a parameter, (B, size)."""
+    plant = setup.plant
+    known = parameters(plant.dynamics, plant.effects, setup.controller)
+    swept = [each for each in known if each.declared.swept]
+    mine = [each for each in swept if each.name == name]
+    if not mine:
+        raise QueryError(f"params: no {name!r}; {nearest(name, dict.fromkeys(each.name for each in swept))}")
+    classes = [type(plant.effects[each.part[1]]) if each.part[0] == "effect" else each.part for each in mine]
     if len(classes) > len(set(classes)):
         raise QueryError(f"params: {name} names a coefficient of several effects of the plant; make them one effect")
-    known |= dict(_numbers(setup.controller)) | masses(setup.plant.dynamics)
-    if name not in known:
-        raise QueryError(f"params: no {name!r}; {nearest(name, known)}")
-    n = known[name].size if known[name].ndim else setup.plant.dynamics.n
-    least = None if name.rpartition(".")[2] in _SIGNED else 0
-    array = numbers(f"params: {name}", values, ("B",), ("B", 1), ("B", n), least=least)
+    n, declared = mine[0].size, mine[0].declared
+    array = numbers(
+        f"params: {name}", values, ("B",), ("B", 1), ("B", n),
+        least=declared.least, above=declared.above, infinite=declared.infinite,
+    )  # fmt: skip
     array = array[:, None] if array.ndim == 1 else array
     rows = np.ascontiguousarray(np.broadcast_to(array, (len(array), n)))
-    part, _, key = name.rpartition(".")
-    for effect in (effect for effect in setup.plant.effects if part and effect.name == part and key in vars(effect)):
+    for part in {each.part for each in mine if each.part[0] == "effect"}:
         for row in np.unique(rows, axis=0):
-            replace(effect, **{key: row})  # pyright: ignore[reportArgumentType]  refuses what has no meaning
+            replace(plant.effects[part[1]], **{mine[0].key: row})  # refuses what has no meaning
     return rows
-
-
-def _numbers(part: Any) -> list[tuple[str, np.ndarray]]:
-    """The coefficients of an effect or controller, by name."""
-    if part is None:
-        return []
-    return [(key, x) for key, x in vars(part).items() if isinstance(x, np.ndarray) and x.ndim < 2]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from robot_dyn.compiled.parameters import with_parameters
 from robot_dyn.errors import QueryError
 from robot_dyn.simulation.acting import acting
 from robot_dyn.simulation.ledger import Ledger
@@ -64,12 +65,10 @@ def trajectory(runs: Rollouts, run: int) -> Trajectory:
 def _own(runs: Rollouts, setup: Setup, run: int) -> Setup:
     """The setup of a run, with its own start and parameters."""
     if runs.params:
-        from robot_dyn.simulation.machine.traced import with_values
-
-        equation = with_values(
-            StateEquation(setup.plant, setup.controller), {name: x[run] for name, x in runs.params.items()}
+        plant, controller = with_parameters(
+            setup.plant, setup.controller, {name: x[run] for name, x in runs.params.items()}
         )
-        setup = replace(setup, plant=equation.plant, controller=equation.controller)
+        setup = replace(setup, plant=plant, controller=controller)
     return setup
 
 

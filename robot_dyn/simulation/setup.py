@@ -13,9 +13,9 @@ import numpy as np
 from robot_dyn import former
 from robot_dyn.arithmetic import Array, Ball
 from robot_dyn.control.control_law import ControlLaw
-from robot_dyn.control.controller import ControlError, Controller
-from robot_dyn.effects.plant import Plant, torque_of
-from robot_dyn.errors import EffectError, OverflowedError, QueryError
+from robot_dyn.control.controller import Controller
+from robot_dyn.effects.plant import Plant
+from robot_dyn.errors import ControlError, EffectError, OverflowedError, QueryError
 from robot_dyn.foreign import call
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.integrate.explicit import RK4
@@ -98,8 +98,8 @@ class Setup:
         """That what the controller and each effect return at the start is one number for each joint."""
         dynamics, controller = self.plant.dynamics, self.controller
         with np.errstate(all="ignore"):
-            for force in self.plant.forces:
-                torque = torque_of(force, dynamics, 0.0, self.q0, self.v0)
+            torques = self.plant.equation_of_motion.torques(0.0, self.q0, self.v0)
+            for force, torque in zip(self.plant.forces, torques, strict=True):
                 returned(f"{type(force).__name__}.torque", torque, dynamics.n, error=EffectError)
         if controller is None:
             return
@@ -114,17 +114,21 @@ class Setup:
 
     def _check_model(self) -> None:
         """That the controller means the joints and links of the plant; a file with other names all over may fit too."""
-        plant, model = self.plant.dynamics, getattr(self.controller, "model", None)
-        pairs = tuple(zip(getattr(model, "joint_names", ()), plant.joint_names, strict=False))
-        if any(own in plant.joint_names for own, _ in pairs):
+        plant, controller = self.plant.dynamics, self.controller
+        if controller is None:
+            return
+        for model in controller.models.values():
+            pairs = tuple(zip(model.joint_names, plant.joint_names, strict=False))
+            if not any(own in plant.joint_names for own, _ in pairs):
+                continue
             for own, name in pairs:
                 if own != name:
                     raise QueryError(
                         f"the controller's model has the joint {own!r} where the plant has {name!r}; lock the same"
                         " joints of both"
                     )
-        if isinstance(frame := getattr(self.controller, "frame", None), str):
-            plant.placement(self.q0, frame)  # so that an unknown link is told now
+        if controller.task_frame is not None:
+            plant.placement(self.q0, controller.task_frame)  # so that an unknown link is told now
 
     @cached_property
     def segments(self) -> tuple[Segment, ...]:

@@ -116,10 +116,11 @@ def _run(
         functions = interpreted(equation, Watch(setup, equation))
     else:
         functions = machine.in_python if advance is None else machine.equations.functions
+    parameters = np.zeros(0) if machine is None else machine.parameters
     if setup.integrator.controls_error:
-        run: Any = ErrorControlled(setup, equation, functions, pace, on_progress, observer)
+        run: Any = ErrorControlled(setup, equation, functions, pace, on_progress, observer, parameters)
     else:
-        run = FixedStep(setup, equation, functions, pace, advance, on_progress, observer)
+        run = FixedStep(setup, equation, functions, pace, advance, on_progress, observer, parameters)
     record = run.record()
     if companion and record.outcome.ending is Ending.STOPPED:
         raise KeyboardInterrupt
@@ -142,8 +143,8 @@ def _trajectory(
     power = dict(zip(equation.sources, P.T, strict=True))
     plant = setup.plant
     names, about = plant.dynamics.joint_names, origin(plant.dynamics) | setup.about
-    if isinstance(frame := getattr(setup.controller, "frame", None), str):
-        about = {"frame": link_of(plant.dynamics, frame)} | about
+    if setup.controller is not None and setup.controller.task_frame is not None:
+        about = {"frame": link_of(plant.dynamics, setup.controller.task_frame)} | about
     return Trajectory(
         names, t, q, v, a, tau, power, ledger, desired, deviation, record.outcome, statistics, error, about,
         wrenches(plant, t, q), at_stop(plant, q),
@@ -153,12 +154,14 @@ def _trajectory(
 
 
 def deviation_of(setup: Setup, t: np.ndarray, q: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:
-    """Desired positions, and how far the joints, or the frame, are from the reference."""
-    controller: Any = setup.controller
-    reference = getattr(controller, "reference", None)
+    """Wanted positions, and how far the joints, or the frame, are from what the reference wants."""
+    controller = setup.controller
+    if controller is None:
+        return None, None
+    reference = controller.desired
     if isinstance(reference, PiecewisePolynomial):
-        desired = reference.at(t)[0]
-        return desired, q - desired
-    if isinstance(reference, CartesianReference):
-        return None, setup.plant.dynamics.placement(q, controller.frame)[:, :3, 3] - reference.at(t)[0]
+        wanted = reference.at(t)[0]
+        return wanted, q - wanted
+    if isinstance(reference, CartesianReference) and controller.task_frame is not None:
+        return None, setup.plant.dynamics.placement(q, controller.task_frame)[:, :3, 3] - reference.at(t)[0]
     return None, None

@@ -32,8 +32,8 @@ _LOOKS = 300  # states at which the actuation is computed
 def foreign(setup: Setup) -> tuple[Any, ...]:
     """The parts of a setup that are not of this library's classes."""
     parts = (setup.plant.dynamics, *setup.plant.effects, setup.controller, setup.integrator)
-    model = getattr(setup.controller, "model", None)
-    return tuple(part for part in (*parts, model) if part is not None and _is_foreign(part))
+    models = () if setup.controller is None else setup.controller.models.values()
+    return tuple(part for part in (*parts, *models) if part is not None and _is_foreign(part))
 
 
 def _is_foreign(part: Any) -> bool:
@@ -116,7 +116,8 @@ def extremes(t: np.ndarray, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, n
 def _saturation(setup: Setup, equation: StateEquation, path: Path, q: np.ndarray, v: np.ndarray) -> tuple[float, str]:
     """When a continuous control comes near an effort limit."""
     limits = [np.asarray(x.limit) for x in setup.plant.effects if isinstance(x, EffortLimit)]
-    limits += [np.asarray(x) for x in (getattr(setup.controller, "effort_limit", None),) if x is not None]
+    if setup.controller is not None:
+        limits.append(np.asarray(setup.controller.saturation))
     if equation.sampled or setup.controller is None or not any(np.isfinite(x).any() for x in limits):
         return np.inf, ""
     n, m = equation.plant.dynamics.n, equation.state_size

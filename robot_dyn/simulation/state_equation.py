@@ -16,8 +16,9 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.control.controller import Controller
-from robot_dyn.effects.effect import Conservative, Force
-from robot_dyn.effects.plant import Plant, bounded
+from robot_dyn.effects.effect import Conservative
+from robot_dyn.effects.equation_of_motion import EquationOfMotion
+from robot_dyn.effects.plant import Plant
 from robot_dyn.foreign import call
 from robot_dyn.model.dynamics import acceleration
 
@@ -40,15 +41,15 @@ class StateEquation:
     canonical: bool = False
 
     @cached_property
-    def working(self) -> tuple[Force, ...]:
-        """The effects whose work is integrated: those without a potential."""
-        return tuple(force for force in self.plant.forces if not isinstance(force, Conservative))
+    def equation_of_motion(self) -> EquationOfMotion:
+        """The equation of motion of the plant."""
+        return self.plant.equation_of_motion
 
     @cached_property
     def sources(self) -> tuple[str, ...]:
         """Names of the works in y: control, then effects; a second effect of a name gets a number."""
         names: list[str] = [CONTROL]
-        for force in self.working:
+        for force in (force for force in self.plant.forces if not isinstance(force, Conservative)):
             count = sum(name.split(" ")[0] == force.name for name in names)
             names.append(f"{force.name} {count + 1}" if count else force.name)
         return tuple(names)
@@ -99,7 +100,7 @@ class StateEquation:
         """The actuation that the controller asks for, within the bounds of the plant."""
         if self.controller is None:
             return np.zeros_like(v)
-        return bounded(self.plant.effects, call(self.controller.torque, t, q, v, z))
+        return self.equation_of_motion.actuation(call(self.controller.torque, t, q, v, z))
 
     @property
     def sampled(self) -> bool:
@@ -125,34 +126,25 @@ class StateEquation:
             y: One state.
             held: The actuation in zero-order hold of a sampled controller; None if it acts continuously.
         """
-        dynamics, controller, forces = self.plant.dynamics, self.controller, self.plant.forces
-        n = dynamics.n
+        equation, controller, n = self.equation_of_motion, self.controller, self.plant.dynamics.n
         q, v, z, _ = self.state(y)
         u = self.command(t, q, v, z) if held is None else held
-        torques = [call(force.torque, dynamics, t, q, v) for force in forces]
-        tau = sum(torques, start=u)
+        torques = equation.torques(t, q, v)
+        total = sum(torques, start=u)
         result = np.empty_like(y)
         result[:n] = v
-        if self.canonical:
-            result[n : 2 * n] = tau + dynamics.coriolis_transpose(q, v) - dynamics.N(q)
-        else:
-            result[n : 2 * n] = dynamics.forward_dynamics(q, v, tau)
+        second = equation.momentum_rate if self.canonical else equation.acceleration
+        result[n : 2 * n] = second(q, v, total)
         end = 2 * n + self.state_size
-        advances = held is None and controller is not None and self.state_size > 0
-        result[2 * n : end] = call(controller.state_rate, t, q, v, z) if advances and controller else 0.0
-        working = [x for x, force in zip(torques, forces, strict=True) if not isinstance(force, Conservative)]
-        result[end:] = [x @ v for x in (u, *working)]
+        remembers = held is None and controller is not None and self.state_size > 0
+        result[2 * n : end] = call(controller.state_rate, t, q, v, z) if remembers and controller else 0.0
+        result[end:] = equation.powers(v, u, torques)
         return result, u
 
-    def energy(self, t: Array, q: Array, v: Array) -> tuple[Array, Array]:
+    def energies(self, t: Array, q: Array, v: Array) -> tuple[Array, Array]:
         """Kinetic energy, and the potential of gravity and of all conservative effects, of samples (m, n)."""
-        dynamics = self.plant.dynamics
-        potential = dynamics.potential_energy(q)
-        for force in self.plant.forces:
-            if isinstance(force, Conservative):
-                potential = potential + call(force.potential, dynamics, t, q)
-        return dynamics.kinetic_energy(q, v), potential
+        return self.equation_of_motion.energies(t, q, v)
 
     def powers(self, t: float, q: Array, v: Array, u: Array) -> list[float]:
         """Power of the control and of the effects that work, in the order of `sources`."""
-        return [u @ v, *(call(force.torque, self.plant.dynamics, t, q, v) @ v for force in self.working)]
+        return self.equation_of_motion.powers(v, u, self.equation_of_motion.torques(t, q, v))

@@ -37,7 +37,7 @@ def interpreted(equation: StateEquation, watch: Watch) -> Functions:
     def energy(t: float, y: Array, p: Array, own: Array, out: Array) -> None:
         x = _state(y)
         q, v, _, _ = watch.answer(t, x, lambda: equation.state(x))
-        out[:, 0] = watch.answer(t, x, lambda: equation.energy(t, q, v))
+        out[:, 0] = watch.answer(t, x, lambda: equation.energies(t, q, v))
 
     def sampled(t: float, y: Array, p: Array, own: Array, out: Array) -> None:
         sample(equation, min(max(t, p[0]), p[1]), _state(y), own[:n, 0] if equation.sampled else None, out[:, 0])
@@ -52,7 +52,7 @@ def sample(equation: StateEquation, t: float, y: Array, held: Array | None, out:
     try:
         with np.errstate(all="ignore"):
             q, v, z, _ = equation.state(y)
-            out[:n], out[m + n :] = v, equation.energy(t, q, v)
+            out[:n], out[m + n :] = v, equation.energies(t, q, v)
             out[m : m + n] = u = equation.command(t, q, v, z) if held is None else held
             out[m - len(equation.sources) : m] = equation.powers(t, q, v, u)
             out[:m], _ = equation.rate(t, y, held)

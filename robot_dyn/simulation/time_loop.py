@@ -89,7 +89,8 @@ class Runs(NamedTuple):
     Attributes:
         y, own: State, and numbers of each run: first what a sampled controller holds.
         after, made, command, energies, size, lost: y⁺, a sample, a tick, K and V, Σ |y⁺|, stages not found.
-        alive, why, ended, fastest: 1 while it goes on; then the reason, the time and the fastest joint.
+        alive, why, ended: 1 while it goes on; then the reason and the time.
+        last: Its state where it ended, (m, W).
         energy, scale: E(0), and 1 + |K(0)| + |V(0)|.
         peak: Largest K at the looks at the energy.
     """
@@ -105,7 +106,7 @@ class Runs(NamedTuple):
     alive: Array
     why: Array
     ended: Array
-    fastest: Array
+    last: Array
     energy: Array
     scale: Array
     peak: Array
@@ -256,7 +257,7 @@ def take(runs: Runs, rules: Rules, t: float) -> bool:
     if ill:
         for b in range(len(runs.size)):
             if runs.alive[b] == 1 and (runs.lost[b] != 0 or not runs.size[b] < rules.largest):
-                end(runs, rules, b, t, Why.NOT_FOUND if runs.lost[b] != 0 else Why.OVERFLOWED)
+                end(runs, b, t, Why.NOT_FOUND if runs.lost[b] != 0 else Why.OVERFLOWED)
     copy(runs.y, runs.after)
     if ill:
         erase_ended(runs)
@@ -279,19 +280,17 @@ def conserve(functions: Functions, runs: Runs, rules: Rules, t: float, p: Array)
         if runs.alive[b] == 1 and came > RUNAWAY * moved:
             if rules.alone:
                 return False
-            end(runs, rules, b, t, Why.GAINED)
+            end(runs, b, t, Why.GAINED)
             ended = True
     if ended:
         erase_ended(runs)
     return True
 
 
-def end(runs: Runs, rules: Rules, b: int, t: float, why: int) -> None:
+def end(runs: Runs, b: int, t: float, why: int) -> None:
     """End a run in lock step."""
     runs.alive[b], runs.why[b], runs.ended[b] = 0, why, t
-    for e in range(rules.n):
-        if abs(runs.y[rules.n + e, b]) > abs(runs.y[rules.n + runs.fastest[b], b]):
-            runs.fastest[b] = e
+    copy(runs.last[:, b], runs.y[:, b])
 
 
 def erase_ended(runs: Runs) -> None:

@@ -44,7 +44,7 @@ class Watch:
 
     def __init__(self, setup: Setup, equation: StateEquation) -> None:
         self.setup, self.equation = setup, equation
-        K, V = (float(x[0]) for x in equation.energy(np.zeros(1), setup.q0[None], setup.v0[None]))
+        K, V = (float(x[0]) for x in equation.energies(np.zeros(1), setup.q0[None], setup.v0[None]))
         self.energy, self.scale = K + V, 1.0 + abs(K) + abs(V)
         self.paced = 0.0
 
@@ -99,7 +99,7 @@ class Watch:
     def gains(self, t: float, y: Array) -> bool:
         """Whether the ledger's residual says so."""
         q, v, _, W = self.equation.state(y)
-        K, V = self.equation.energy(np.array([t]), q[None], v[None])
+        K, V = self.equation.energies(np.array([t]), q[None], v[None])
         return bool((K + V)[0] - self.energy - W.sum() > 1e3 * (self.scale + np.abs(W).sum()))
 
     def diverged(self, t: float, y: Array, why: str) -> DivergedError:

@@ -113,7 +113,7 @@ class Odd(Active):
     ids=["None", "index", "branches"],
 )
 def test_an_effect_that_cannot_be_traced_is_named(does) -> None:
-    with pytest.raises(TraceError, match="effect odd cannot be traced"):
+    with pytest.raises(TraceError, match="effect odd cannot be compiled"):
         rd.Compiled(rd.Plant(ARM, [Odd(does)])).torque(0.0, *state(False)[:2])
 
 

@@ -13,6 +13,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.compiled.plant import Compiled, CompiledPlant
 from robot_dyn.compiled.symbolic import TraceError
+from robot_dyn.compiled.trace import Trace
 from robot_dyn.effects.effect import Active
 from tests.compiled.arms import states
 
@@ -67,7 +68,7 @@ def test_what_is_off_costs_no_instruction() -> None:
     for compiled in (bare, full):
         compiled.forward_dynamics(0.0, *np.ones((3, 2)))
     (without,), (with_all,) = (each.instructions["forward_dynamics"].values() for each in (bare, full))
-    assert without == min(bare.trace.quantity("forward_dynamics").counts.values())
+    assert without == min(Trace(bare.dynamics.robot).quantity("forward_dynamics").counts.values())
     assert with_all > without
     assert set(full.instructions_by_effect) == {effect.name for effect in full.plant.forces}
 
@@ -100,7 +101,7 @@ def test_an_effect_with_branches_is_followed_both_ways() -> None:
 
 def test_an_effect_that_cannot_be_traced_is_named() -> None:
     """And the remedy is said."""
-    with pytest.raises(TraceError, match="effect opaque cannot be traced"):
+    with pytest.raises(TraceError, match="effect opaque cannot be compiled"):
         plant([Opaque()]).forward_dynamics(0.0, *np.ones((3, 2)))
 
 

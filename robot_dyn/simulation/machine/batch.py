@@ -15,12 +15,13 @@ from typing import cast, final
 import numpy as np
 
 from robot_dyn.arithmetic import FLOAT64
+from robot_dyn.coefficient import with_values
+from robot_dyn.compiled.parameters import rows
+from robot_dyn.compiled.right_angles import robot_of
 from robot_dyn.effects.plant import Plant
 from robot_dyn.integrate.integrator import PlainMethod
 from robot_dyn.simulation.fixed_step import runs_of, samples_at_most
 from robot_dyn.simulation.machine.machine import Machine
-from robot_dyn.simulation.machine.parts import with_
-from robot_dyn.simulation.machine.traced import robot_of
 from robot_dyn.simulation.origin import origin
 from robot_dyn.simulation.plan import plan_of
 from robot_dyn.simulation.rollout_result import Rollouts
@@ -51,25 +52,25 @@ class Batch:
         equation, n = machine.equation, machine.equation.plant.dynamics.n
         self.setup, self.machine, self.recorded, self.kept, self.values = setup, machine, recorded, kept, sweep
         self.y = _starts(equation, q0, v0)
-        self.sweep = np.column_stack([*sweep.values(), np.zeros((len(q0), 0))])
+        self.rows = {name: rows(machine.known, name) for name in sweep}
         self.columns = [*range(n)] * ("q" in recorded)
         if "v" in recorded and not equation.canonical:
             self.columns += range(n, 2 * n)
         if "work" in recorded:
             self.columns += range(equation.size - len(equation.sources), equation.size)
         tiles = -(-len(self.y) // LANES)
-        width, rows = tiles * LANES, sum({"u": n, "v": n, "energy": 2}[name] for name in kept)
-        size = 8 * samples(setup) * width * (len(self.columns) + rows)
+        width, more = tiles * LANES, sum({"u": n, "v": n, "energy": 2}[name] for name in kept)
+        size = 8 * samples(setup) * width * (len(self.columns) + more)
         if size > most:
             what = f"{samples(setup):.3g} samples of {len(self.y)} runs"
             raise too_large(what, size, most, ", fewer runs, or record less")
         self.plan = plan_of(setup)
         most = samples_at_most(setup, self.plan.counts)
-        self.out_y, self.made = np.empty((most, len(self.columns), width)), np.empty((most, rows, width))
+        self.out_y, self.made = np.empty((most, len(self.columns), width)), np.empty((most, more, width))
         self.place = np.zeros((0, 2), np.int64)  # segment and step of each sample, of the tile that has most
         self.lock = threading.Lock()
         self.unfinished = np.ones(tiles, dtype=bool)
-        self.why, self.fastest = np.zeros(width, np.int64), np.zeros(width, np.int64)
+        self.why, self.last = np.zeros(width, np.int64), np.zeros((equation.size, width))
         self.ended = np.full(width, setup.duration_s)
         self.clocks = np.tile([0.0, setup.record_period_s, 1e-9 * setup.step_s], (tiles, 1))
         self.evaluations, self.stop = np.zeros(tiles, np.int64), np.zeros(1, np.int64)
@@ -116,7 +117,9 @@ class Batch:
         equation, n = self.machine.equation, self.machine.equation.plant.dynamics.n
         index = np.minimum(np.arange(tile * LANES, (tile + 1) * LANES), len(self.y) - 1)
         held = n * equation.sampled
-        own = np.vstack([np.zeros((held, LANES)), self.sweep[index].T])
+        own = np.concatenate([np.zeros(held), self.machine.parameters])[:, None].repeat(LANES, axis=1)
+        for name, values in self.values.items():
+            own[held + self.rows[name]] = values[index].T
         return runs_of(self.y[index].T, own, n, held, equation.state_size, self.made.shape[1])
 
     def _rules(self, base: int) -> Rules:
@@ -146,7 +149,7 @@ class Batch:
         with self.lock:
             if now[Now.ROW] > len(self.place):
                 self.place = records.place[: now[Now.ROW]]
-        self.why[own], self.fastest[own] = runs.why, runs.fastest
+        self.why[own], self.last[:, own] = runs.why, runs.last
         self.ended[own] = np.where(runs.why > 0, runs.ended, self.setup.duration_s)
         if ended != Ended.DONE:
             reached = self.plan.starts[now[Now.SEGMENT]] + now[Now.STEP] * self.plan.lengths[now[Now.SEGMENT]]
@@ -175,7 +178,7 @@ class Batch:
         named = dict(zip(equation.sources, works, strict=True)) if works else None
         return Rollouts(
             equation.plant.dynamics.joint_names, t, q, v if "v" in self.recorded else None, made.get("u"), K, V, named,
-            ended, why > 0, stopped, self._advice(why, self.fastest[:B]), self._steps(ended),
+            ended, why > 0, stopped, self._advice(why), self._steps(ended),
             np.repeat(self.evaluations, LANES)[:B], self._statistics(), tuple(equation.sources),
             origin(self.setup.plant.dynamics) | self.setup.about, dict(self.values), self._compiled(),
         )  # fmt: skip
@@ -183,16 +186,20 @@ class Batch:
     def _compiled(self) -> Setup:
         """The setup whose equations were compiled: right angles of the file written out in full."""
         plant, controller = self.setup.plant, self.setup.controller
-        if (model := robot_of(getattr(controller, "model", None))) is not None:
-            controller = with_(controller, {"model": model})
+        if controller is not None:
+            models = {name: robot_of(each) or each for name, each in controller.models.items()}
+            controller = with_values(controller, models)
         plant = Plant(robot_of(plant.dynamics) or plant.dynamics, plant.effects)
         return replace(self.setup, plant=plant, controller=controller)
 
-    def _advice(self, why: np.ndarray, fastest: np.ndarray) -> tuple[str, ...]:
+    def _advice(self, why: np.ndarray) -> tuple[str, ...]:
         """Why runs diverged and what to do; nothing for the others."""
-        advice, names = [""] * len(why), self.machine.equation.plant.dynamics.joint_names
+        advice, equation = [""] * len(why), self.machine.equation
         for run in np.flatnonzero(why).tolist():
-            advice[run] = diverged_advice(_REASONS[Why(why[run])], names[fastest[run]], self.setup.taken_step_s)
+            with np.errstate(all="ignore"):
+                _, v, _, _ = equation.state(self.last[:, run])
+            name = equation.plant.dynamics.joint_names[int(np.argmax(np.abs(v)))]
+            advice[run] = diverged_advice(_REASONS[Why(why[run])], name, self.setup.taken_step_s)
         return tuple(advice)
 
     def _steps(self, ended: np.ndarray) -> np.ndarray:

@@ -17,6 +17,7 @@ from robot_dyn.compiled.cache import default_store
 from robot_dyn.compiled.identity import digest
 from robot_dyn.compiled.llvm import machine_code
 from robot_dyn.compiled.llvm.lock_step import write_function
+from robot_dyn.compiled.parameters import Parameter, joined
 from robot_dyn.compiled.program import Program
 from robot_dyn.errors import RobotDynError
 from robot_dyn.simulation.plan import plan_of
@@ -82,14 +83,19 @@ class Machine:
     Attributes:
         equation: The interpreted state equation: that of the setup, with right angles written out in full.
         equations: Its machine code.
-        sweep: Values of the sweep parameters, as the setup has them.
+        known: Its parameters, with the values of the setup.
         loop: The time loop as machine code; None if steps are made in Python.
     """
 
     equation: StateEquation
     equations: Equations
-    sweep: np.ndarray
+    known: tuple[Parameter, ...]
     loop: Callable[..., int] | None
+
+    @cached_property
+    def parameters(self) -> np.ndarray:
+        """The values of the parameters, one row after the other."""
+        return joined(self.known)
 
     @cached_property
     def in_python(self) -> Functions:
@@ -117,7 +123,7 @@ class Machine:
         for i in range(_STATES):
             s = int(rng.integers(len(plan.counts) - 1))
             t, y = float(plan.starts[s] + plan.lengths[s]), rng.normal(size=(m, W))
-            own = np.vstack([rng.normal(size=(held, W)), np.repeat(self.sweep[:, None], W, axis=1)])
+            own = np.vstack([rng.normal(size=(held, W)), np.repeat(self.parameters[:, None], W, axis=1)])
             for name, out in made.items():
                 getattr(self.in_python, name)(t, y, plan.parameters[s], own, out)
             for lane in range(min(W, _STATES)):

@@ -1,4 +1,4 @@
-"""The making of machines: state equations traced and compiled, once for all runs of the same parts.
+"""The making of machines: state equations traced and compiled, once for all runs of one structure.
 
 machine(equation, method) → Machine
 """
@@ -7,21 +7,23 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Callable
+from dataclasses import replace
 from threading import RLock
 from typing import Any, final
 
-import numpy as np
-
 from robot_dyn.arithmetic import FLOAT64
-from robot_dyn.compiled.from_casadi import program_of
+from robot_dyn.compiled.cache import default_store
+from robot_dyn.compiled.identity import digest
 from robot_dyn.compiled.interrupts import interrupts_later
+from robot_dyn.compiled.parameters import Parameter, Part, parameters
+from robot_dyn.compiled.program import Program
+from robot_dyn.compiled.right_angles import robot_of
 from robot_dyn.compiled.symbolic import TraceError
 from robot_dyn.effects.plant import Plant
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.machine.machine import Equations, Machine
-from robot_dyn.simulation.machine.payloads import Carrying
-from robot_dyn.simulation.machine.traced import SymbolicDynamics, robot_of, trace, with_values
+from robot_dyn.simulation.machine.structure import structure
 from robot_dyn.simulation.state_equation import StateEquation
 
 _MOST_INSTRUCTIONS = 100_000  # some ten seconds of compiling
@@ -29,8 +31,8 @@ _MOST = 64  # values that are kept
 
 
 @final
-class ByIdentity:
-    """Values kept by the identity of objects, for as long as all of these live; the latest ones."""
+class Kept:
+    """Values by hashable keys and by the identity of objects, for as long as all of these live; the latest ones."""
 
     def __init__(self) -> None:
         self._kept: dict[tuple[Any, ...], tuple[list[weakref.ref[Any]], Any]] = {}
@@ -40,16 +42,16 @@ class ByIdentity:
         """The value of objects and of further, hashable values; it must not hold on to the objects."""
         key = (*map(id, objects), *more)
         with self._lock:
-            references, value = self._kept.pop(key, ([], None))
-            if not references or any(ref() is not each for ref, each in zip(references, objects, strict=True)):
-                references, value = [weakref.ref(each) for each in objects], make()
-            self._kept[key] = references, value
+            found = self._kept.pop(key, None)
+            if found is None or any(ref() is not each for ref, each in zip(found[0], objects, strict=True)):
+                found = [weakref.ref(each) for each in objects], make()
+            self._kept[key] = found
             while len(self._kept) > _MOST or any(ref() is None for ref in next(iter(self._kept.values()))[0]):
                 del self._kept[next(iter(self._kept))]
-            return value
+            return found[1]
 
 
-_robots, _symbols, _equations = ByIdentity(), ByIdentity(), ByIdentity()
+_robots, _symbols, _equations = Kept(), Kept(), Kept()
 
 
 def _robot(dynamics: Any) -> Robot:
@@ -69,20 +71,8 @@ def _robot(dynamics: Any) -> Robot:
     return _robots.get((dynamics,), (), make) or dynamics
 
 
-def _symbolic(dynamics: Any) -> SymbolicDynamics:
-    """Its equations in symbols; of what describes it, so that it is not held on to."""
-    robot = _robot(dynamics)
-    described = Carrying(robot.description, robot.edits, robot.joint_names)
-    return _symbols.get((dynamics,), (), lambda: SymbolicDynamics(described))
-
-
 def machine(
-    equation: StateEquation,
-    method: Integrator | None,
-    *,
-    lanes: int = 1,
-    sweep: dict[str, np.ndarray] | None = None,
-    kept: tuple[str, ...] | None = None,
+    equation: StateEquation, method: Integrator | None, *, lanes: int = 1, kept: tuple[str, ...] | None = None
 ) -> Machine:
     """The machine of a state equation, from the latest ones if it is among them; not compiled yet.
 
@@ -90,37 +80,59 @@ def machine(
         equation: What to compile.
         method: One whose steps are machine code too; None for the state equation alone.
         lanes: Runs in lock step.
-        sweep: The sweep parameters by name, with values to check them at.
         kept: As of `trace`.
 
     Raises:
         TraceError: If a part of the equation cannot be compiled; names it, with the remedy.
     """
-    values, plant, controller = sweep or {}, equation.plant, equation.controller
+    plant, controller = equation.plant, equation.controller
     robot = _robot(plant.dynamics)
-    own = (
-        equation
-        if robot is plant.dynamics
-        else StateEquation(Plant(robot, plant.effects), controller, equation.canonical)
-    )
-    lengths = tuple((name, len(x)) for name, x in values.items())
+    own = equation if robot is plant.dynamics else replace(equation, plant=Plant(robot, plant.effects))
+    known = parameters(robot, plant.effects, controller)
+    described, objects = structure(own)
 
-    @interrupts_later()
     def make() -> Equations:
-        functions = trace(own, _symbolic, dict(lengths), kept)
-        return Equations({name: program_of(each) for name, each in functions.items()}, lanes, robot.name)
+        programs = _programs(own, known, kept, None if objects else described)
+        return Equations(programs, lanes, robot.name)
 
-    parts = (plant.dynamics, *plant.effects, *([] if controller is None else [controller]))
-    equations = _equations.get(parts, (equation.canonical, lanes, lengths, kept), make)
+    equations = _equations.get(objects, (described, lanes, kept), make)
     if equations.instructions > _MOST_INSTRUCTIONS:
         raise TraceError(
             f"the run takes {equations.instructions} instructions, more than the {_MOST_INSTRUCTIONS} worth compiling;"
             " simulate it with engine='interpreted'"
         )
-    numbers = np.concatenate([*values.values(), np.zeros(0)])
-    return Machine(
-        with_values(own, values) if values else own, equations, numbers, None if method is None else _loop(method)
-    )
+    return Machine(own, equations, known, None if method is None else _loop(method))
+
+
+def _programs(
+    equation: StateEquation, known: tuple[Parameter, ...], kept: tuple[str, ...] | None, described: Any
+) -> dict[str, Program]:
+    """The programs of a state equation, from the store if the structure of all its parts is known."""
+    store = None if described is None else default_store()
+    key = digest(["programs", repr(described), repr(kept)])
+    if store is not None and (payload := store.load(key)) is not None:
+        texts = payload.decode().split("\n\n")
+        return {name: Program.read(text) for name, _, text in (each.partition("\n") for each in texts)}
+    programs = _traced(equation, known, kept)
+    if store is not None:
+        text = "\n\n".join(f"{name}\n{program}" for name, program in programs.items())
+        store.save(key, text.encode(), f"the equations of {equation.plant.dynamics.name}")  # pyright: ignore
+    return programs
+
+
+@interrupts_later()
+def _traced(equation: StateEquation, known: tuple[Parameter, ...], kept: tuple[str, ...] | None) -> dict[str, Program]:
+    from robot_dyn.compiled.from_casadi import program_of
+    from robot_dyn.compiled.symbolic_dynamics import SymbolicDynamics
+    from robot_dyn.simulation.machine.traced import trace
+
+    def bodies(dynamics: Any, part: Part) -> SymbolicDynamics:
+        """Its equations in symbols, traced once for a file and its edits."""
+        robot, own = _robot(dynamics), tuple(each for each in known if each.part == part)
+        (described, *_), _ = structure(StateEquation(Plant(robot), None))
+        return _symbols.get((), (described,), lambda: SymbolicDynamics(robot, own))
+
+    return {name: program_of(each) for name, each in trace(equation, bodies, known, kept).items()}
 
 
 def _loop(method: Integrator) -> Callable[..., int]:

@@ -1,0 +1,161 @@
+"""Declared coefficients: the numbers of an effect, a controller or a reference, each with unit, sign and meaning.
+
+    damping: Any = field(metadata=coefficient("N m s/rad", symbol="b", least=0, stated="damping"))
+
+From the declaration follow its checks, values by joint name and "urdf", its key in scenes, its name in sweeps, and
+that machine code takes it as an input.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from copy import copy
+from dataclasses import MISSING, Field, dataclass, fields, is_dataclass
+from functools import cache
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.errors import EffectError, RobotDynError, nearest
+from robot_dyn.validate import numbers
+
+URDF = "urdf"  # in place of a coefficient: what the robot's file states
+_KEY = "robot_dyn.coefficient"
+JOINTS = ((), ("n",))  # one number for all joints, or one for each
+
+
+@final
+@dataclass(frozen=True)
+class Coefficient:
+    """What is declared of a coefficient.
+
+    Attributes:
+        unit: For a revolute joint, such as "N m s/rad"; "" for a number without.
+        symbol: As in the equation, such as "b".
+        shapes: Shapes it may have; a text stands for any length.
+        least, above: What it must not be less than, and must be greater than; None for any.
+        infinite: Whether ±inf is taken.
+        elsewhere: Its value for joints that are not named.
+        stated: The attribute of a `Robot` that "urdf" stands for; "" if files state none.
+        swept: Whether it may differ from run to run in `rollouts`.
+    """
+
+    unit: str = ""
+    symbol: str = ""
+    shapes: tuple[tuple[int | str, ...], ...] = JOINTS
+    least: float | None = None
+    above: float | None = None
+    infinite: bool = False
+    elsewhere: float = 0.0
+    stated: str = ""
+    swept: bool = True
+
+    @property
+    def of_joints(self) -> bool:
+        """Whether it is one number for all joints, or one for each."""
+        return self.shapes == JOINTS
+
+    def checked(self, name: str, values: Any, *, error: type[RobotDynError]) -> Any:
+        """The numbers, copied and frozen, or a float; values by joint name and "urdf" stay until the joints are known.
+
+        Raises:
+            RobotDynError: If they have another shape, a wrong sign, or are not finite; of the class `error`.
+        """
+        if self.of_joints and isinstance(values, Mapping):
+            if not values:
+                raise error(f"{name} names no joint; give values by joint, or one for all")
+            return values
+        if self.stated and isinstance(values, str) and values == URDF:
+            return URDF
+        found = numbers(
+            name, values, *self.shapes, error=error, least=self.least, above=self.above, infinite=self.infinite
+        )
+        return float(found) if self.shapes == ((),) else found
+
+    def on(self, name: str, values: Any, dynamics: Any) -> Any:
+        """The numbers for the joints of an arm: of names and "urdf", an array (n,).
+
+        Raises:
+            EffectError: If a joint is unknown, no file states it, or they are of another number of joints.
+        """
+        names = dynamics.joint_names
+        if isinstance(values, Mapping):
+            for joint in values.keys() - set(names):
+                raise EffectError(f"{name}: no joint {joint!r}; {nearest(str(joint), names)}")
+            return [values.get(joint, self.elsewhere) for joint in names]
+        if values is URDF:
+            return self._stated(name, dynamics)
+        if self.of_joints and np.ndim(values) and np.shape(values) != (len(names),):
+            count = f"{len(values)} joint{'s' if len(values) > 1 else ''}"
+            raise EffectError(
+                f"{name} is of {count}, the arm has {len(names)}; give one number for all, or one for each joint"
+            )
+        return values
+
+    def _stated(self, name: str, dynamics: Any) -> Any:
+        try:
+            stated = getattr(dynamics, self.stated)
+        except AttributeError:
+            raise EffectError(f"{name}='urdf' needs a Robot, got {type(dynamics).__name__}") from None
+        if np.all(stated == self.elsewhere):
+            raise EffectError(
+                f"{name}='urdf' has no effect: the file of {dynamics.name} states none for any joint; give"
+                " numbers, or leave the effect out"
+            )
+        return stated
+
+
+def coefficient(
+    unit: str = "",
+    *,
+    symbol: str = "",
+    shapes: tuple[tuple[int | str, ...], ...] = JOINTS,
+    least: float | None = None,
+    above: float | None = None,
+    infinite: bool = False,
+    elsewhere: float = 0.0,
+    stated: str = "",
+    swept: bool = True,
+) -> Mapping[str, Coefficient]:
+    """The metadata of a dataclass field that is a coefficient; arguments as of `Coefficient`."""
+    return {_KEY: Coefficient(unit, symbol, shapes, least, above, infinite, elsewhere, stated, swept)}
+
+
+@cache
+def declared(kind: type) -> Mapping[str, Coefficient]:
+    """The coefficients that a class declares, by name."""
+    return {each.name: each.metadata[_KEY] for each in _fields(kind) if _KEY in each.metadata}
+
+
+@cache
+def defaults(kind: type) -> Mapping[str, Any]:
+    """The default of each coefficient of a class that has one."""
+    known = declared(kind)
+    return {each.name: each.default for each in _fields(kind) if each.name in known and each.default is not MISSING}
+
+
+def _fields(kind: type) -> tuple[Field[Any], ...]:
+    return fields(kind) if is_dataclass(kind) else ()
+
+
+def check_coefficients(part: Any, error: type[RobotDynError]) -> None:
+    """Check and freeze the coefficients of a part under construction; see `Coefficient.checked`."""
+    for name, each in declared(type(part)).items():
+        if getattr(part, name) is None and defaults(type(part)).get(name, 0) is None:
+            continue  # it may be left out
+        object.__setattr__(part, name, each.checked(name, getattr(part, name), error=error))
+
+
+def values_of(part: Any) -> dict[str, np.ndarray]:
+    """The coefficients of a part by name, as arrays."""
+    return {name: np.asarray(getattr(part, name)) for name in declared(type(part)) if getattr(part, name) is not None}
+
+
+def with_values(part: Any, values: Mapping[str, Any]) -> Any:
+    """A copy of a part with other coefficients, such as symbols, which its own checks would refuse."""
+    if not values:
+        return part
+    made = copy(part)
+    for name, value in values.items():
+        object.__setattr__(made, name, value)
+    return made

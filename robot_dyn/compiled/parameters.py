@@ -1,0 +1,178 @@
+"""The parameters of a plant and its controller: numbers that machine code takes as inputs, p, not as constants.
+
+Coefficients of effects, gains, what references are made of besides polynomials, gravity and payloads: to change one
+compiles nothing, and each may differ from run to run. Link inertias and lengths are constants of the code.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from math import prod
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.coefficient import Coefficient, declared, with_values
+from robot_dyn.control.controller import Controller
+from robot_dyn.effects.effect import Effect
+from robot_dyn.effects.plant import Plant
+from robot_dyn.model.description import Description
+from robot_dyn.model.edits import Edits
+from robot_dyn.model.robot import Robot
+from robot_dyn.model.tree import Described
+
+Part = tuple[Any, ...]  # ("effect", i), ("controller",), ("reference", attribute), ("robot",) or ("model", attribute)
+ROBOT: Part = ("robot",)
+CONTROLLER: Part = ("controller",)
+_GRAVITY = Coefficient("m/s²", shapes=((3,),))
+_PAYLOAD = {
+    "mass": Coefficient("kg", shapes=((),), least=0),
+    "com": Coefficient("m", shapes=((3,),)),
+    "inertia": Coefficient("kg m²", shapes=((3, 3),), swept=False),
+}
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Parameter:
+    """One of the numbers, or one for each joint.
+
+    Attributes:
+        part: What it belongs to.
+        key: Its attribute there.
+        name: As users call it, such as "viscous_friction.damping", "kp" or "payload_mass:tool0".
+        value: As the part has it, one for each joint where it is of joints.
+        declared: Unit, sign and shape.
+    """
+
+    part: Part
+    key: str
+    name: str
+    value: np.ndarray
+    declared: Coefficient
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Of its value."""
+        return self.value.shape
+
+    @property
+    def size(self) -> int:
+        """Number of its entries."""
+        return prod(self.shape)
+
+
+@final
+@dataclass(frozen=True)
+class Numbered:
+    """A robot with other numbers: of any arithmetic.
+
+    Attributes:
+        description: Its file.
+        edits: Its edits, gravity and payloads of these numbers among them.
+        joint_names: In the order of q.
+    """
+
+    description: Description
+    edits: Edits
+    joint_names: tuple[str, ...]
+
+
+def parameters(dynamics: Any, effects: Iterable[Effect], controller: Controller | None) -> tuple[Parameter, ...]:
+    """All parameters of a plant and its controller."""
+    n = dynamics.n
+    made = [*_of_robot(dynamics, ROBOT, "")]
+    for i, effect in enumerate(effects):
+        made += _of_part(effect, ("effect", i), f"{effect.name}.", n)
+    if controller is not None:
+        made += _of_part(controller, CONTROLLER, "", n)
+        for name, reference in controller.references.items():
+            made += _of_part(reference, ("reference", name), f"{name}.", n)
+        for name, model in controller.models.items():
+            made += _of_robot(model, ("model", name), f"{name}.")
+    return tuple(made)
+
+
+def _of_part(part: Any, place: Part, prefix: str, n: int) -> Iterator[Parameter]:
+    for key, each in declared(type(part)).items():
+        value = getattr(part, key)
+        if value is not None:
+            value = np.asarray(value, dtype=float)
+            value = np.broadcast_to(value, (n,)) if each.of_joints else value
+            yield Parameter(place, key, prefix + key, value, each)
+
+
+def _of_robot(dynamics: Any, place: Part, prefix: str) -> Iterator[Parameter]:
+    robot = getattr(dynamics, "robot", dynamics)
+    if not isinstance(robot, Robot):
+        return
+    yield Parameter(place, "gravity", f"{prefix}gravity", np.asarray(robot.edits.gravity), _GRAVITY)
+    for i, payload in enumerate(robot.edits.payloads):
+        for key, each in _PAYLOAD.items():
+            name = f"{prefix}payload_{key}:{payload.frame}"
+            yield Parameter(place, f"{i} {key}", name, np.asarray(getattr(payload, key), dtype=float), each)
+
+
+Values = Mapping[Part, Mapping[str, Any]]
+
+
+def split(known: Iterable[Parameter], values: Any) -> dict[Part, dict[str, Any]]:
+    """The values of parameters, one row after the other, by part and attribute."""
+    made: dict[Part, dict[str, Any]] = {}
+    start = 0
+    for each in known:
+        own = values[start : start + each.size].reshape(each.shape) if each.shape else values[start]
+        made.setdefault(each.part, {})[each.key] = own
+        start += each.size
+    return made
+
+
+def joined(known: Iterable[Parameter]) -> np.ndarray:
+    """The values of all parameters, one row after the other."""
+    return np.concatenate([*(each.value.ravel() for each in known), np.zeros(0)])
+
+
+def described(robot: Described, values: Mapping[str, Any]) -> Numbered:
+    """A robot with other gravity and payloads."""
+    payloads = tuple(
+        with_values(each, {key: _literal(values[f"{i} {key}"]) for key in _PAYLOAD if f"{i} {key}" in values})
+        for i, each in enumerate(robot.edits.payloads)
+    )
+    gravity = _literal(values["gravity"]) if "gravity" in values else robot.edits.gravity
+    return Numbered(robot.description, replace(robot.edits, gravity=gravity, payloads=payloads), robot.joint_names)
+
+
+def _literal(values: Any) -> Any:
+    """A number, or nested tuples of an array."""
+    return tuple(map(_literal, values)) if np.ndim(values) else values
+
+
+def with_numbers(dynamics: Any, values: Mapping[str, Any]) -> Any:
+    """The robot of a dynamics with other gravity and payloads; itself without any."""
+    if not values:
+        return dynamics
+    robot = getattr(dynamics, "robot", dynamics)
+    return Robot(robot.description, described(robot, values).edits)
+
+
+def rows(known: Iterable[Parameter], name: str) -> np.ndarray:
+    """The rows of the parameters of a name, those of one after those of the other, (k, size)."""
+    ends = np.cumsum([0, *(each.size for each in known)])
+    return np.array([np.arange(a, a + each.size) for each, a in zip(known, ends, strict=False) if each.name == name])
+
+
+def with_parameters(plant: Plant, controller: Controller | None, given: Mapping[str, Any]) -> tuple[Plant, Any]:
+    """A plant and its controller with other values of parameters, each (size,) by name; numbers that were checked."""
+    known = parameters(plant.dynamics, plant.effects, controller)
+    values = joined(known)
+    for name, value in given.items():
+        values[rows(known, name)] = value
+    changed = {each.part for each in known if each.name in given}
+    of = {part: each for part, each in split(known, values).items() if part in changed}
+    effects = [with_values(each, of.get(("effect", i), {})) for i, each in enumerate(plant.effects)]
+    if controller is not None:
+        made = dict(of.get(CONTROLLER, {}))
+        made |= {name: with_numbers(each, of.get(("model", name), {})) for name, each in controller.models.items()}
+        controller = with_values(controller, made)
+    return Plant(with_numbers(plant.dynamics, of.get(ROBOT, {})), effects), controller

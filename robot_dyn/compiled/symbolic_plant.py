@@ -1,0 +1,170 @@
+"""A plant and its controller in symbols: effects, bounds and control laws, whichever way they branch.
+
+Each wraps the part it traces, and names it where that cannot be traced. What a controller follows and its models of
+the arm are found by what they are, whatever its attributes are called.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.coefficient import with_values
+from robot_dyn.compiled.parameters import CONTROLLER, Part
+from robot_dyn.compiled.symbolic import Symbols, TraceError, column, every_branch
+from robot_dyn.control.controller import Controller
+from robot_dyn.effects.effect import Active, Bound, Conservative, Effect
+from robot_dyn.effects.plant import Plant
+from robot_dyn.foreign import because
+
+REMEDY = "write it in robot_dyn.arithmetic and NumPy's operators, or take engine='interpreted'"
+
+
+def symbolic_plant(plant: Plant, bodies: Any, values: Mapping[Part, Mapping[str, Array]] | None = None) -> Plant:
+    """The same plant in symbols.
+
+    Args:
+        plant: What to trace.
+        bodies: Its rigid bodies, a `SymbolicDynamics`.
+        values: Symbols for the parameters of its effects; constants otherwise.
+    """
+    values = values or {}
+    return Plant(bodies, [_traced(each, values.get(("effect", i), {})) for i, each in enumerate(plant.effects)])
+
+
+def symbolic_controller(
+    controller: Controller, models: Mapping[str, Any], values: Mapping[Part, Mapping[str, Array]], pieces: Sequence[Any]
+) -> Controller:
+    """The same controller in symbols.
+
+    Args:
+        controller: What to trace.
+        models: Its models of the arm in symbols, by attribute.
+        values: Symbols for its parameters, and those of its references.
+        pieces: The polynomials that its references are made of on a segment.
+    """
+    made: dict[str, Any] = dict(values.get(CONTROLLER, {})) | dict(models)
+    left = list(pieces)
+    for name, reference in controller.references.items():
+        own = [left.pop(0) for _ in reference.polynomials]
+        made[name] = with_values(reference.made_of(own), values.get(("reference", name), {}))
+    return TracedController(with_values(controller, made), controller)
+
+
+def wide(x: Any, n: int) -> np.ndarray:
+    """Symbols (n,) of a number or (n,)."""
+    return np.broadcast_to(np.asarray(x, dtype=object), (n,)).view(Symbols)
+
+
+def _followed(name: str, function: Callable[[], Any]) -> Any:
+    """What a part gives, whichever way its comparisons turn out; TraceError names the part."""
+    try:
+        made = every_branch(function).view(Symbols)
+        column(made)  # of what is not a number it says so
+        return made
+    except Exception as error:  # whatever a user's code raises on symbols
+        raise TraceError(f"{name} cannot be compiled ({because(error)}): {REMEDY}") from error
+
+
+@final
+class Piece:
+    """One polynomial of a reference, of coefficients that are inputs: its first time and c₀, c₁, …, each (n,)."""
+
+    def __init__(self, p: Array, n: int) -> None:
+        self.start, self.coefficients = p[0], p[1:].reshape(-1, n).view(Symbols)
+
+    def at(self, t: Any) -> tuple[Array, Array, Array]:
+        """Position, velocity and acceleration, by the lines of `PiecewisePolynomial.at`."""
+        s, c = t - self.start, self.coefficients
+        q = c[-1] + 0 * s
+        v = a = 0 * q
+        for j in reversed(range(len(c) - 1)):
+            a = a * s + v
+            v = v * s + q
+            q = q * s + c[j]
+        return q, v, 2 * a
+
+
+def _traced(effect: Effect, values: Mapping[str, Array]) -> Effect:
+    own = with_values(effect, values)
+    if isinstance(effect, Bound):
+        return _TracedBound(own)
+    return _TracedConservative(own) if isinstance(effect, Conservative) else _TracedForce(own)
+
+
+class _TracedForce(Active):
+    """A torque, traced whichever way it branches."""
+
+    def __init__(self, force: Any) -> None:
+        self.inner = force
+
+    @property
+    def name(self) -> str:
+        return self.inner.name
+
+    def torque(self, dynamics: Any, t: Any, q: Array, v: Array) -> Array:
+        return _followed(f"effect {self.name}", lambda: wide(self.inner.torque(dynamics, t, q, v), dynamics.n))
+
+
+class _TracedConservative(Conservative):
+    """The same with its potential."""
+
+    def __init__(self, force: Any) -> None:
+        self.inner = force
+
+    @property
+    def name(self) -> str:
+        return self.inner.name
+
+    torque = _TracedForce.torque
+
+    def potential(self, dynamics: Any, t: Any, q: Array) -> Any:
+        return _followed(f"effect {self.name}", lambda: wide(self.inner.potential(dynamics, t, q), 1))[0]
+
+
+class _TracedBound(Bound):
+    """A bound on the actuation, traced likewise."""
+
+    def __init__(self, bound: Any) -> None:
+        self.inner = bound
+
+    @property
+    def name(self) -> str:
+        return self.inner.name
+
+    def actuation(self, u: Array) -> Array:
+        return _followed(f"effect {self.name}", lambda: wide(self.inner.actuation(u), len(u)))
+
+
+@final
+class TracedController(Controller):
+    """A controller, traced likewise."""
+
+    def __init__(self, inner: Any, original: Controller) -> None:
+        self.inner, self.original, self.period_s = inner, original, original.period_s
+
+    @cached_property
+    def n(self) -> int:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Number of joints."""
+        return self.original.n
+
+    @cached_property
+    def state_size(self) -> int:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Number of states of the controller."""
+        return self.original.state_size
+
+    def torque(self, t: Any, q: Array, v: Array, z: Array) -> Array:
+        return self._traced(lambda: self.inner.torque(t, q, v, z), self.n)
+
+    def state_rate(self, t: Any, q: Array, v: Array, z: Array) -> Array:
+        return self._traced(lambda: self.inner.state_rate(t, q, v, z), self.state_size)
+
+    def next_state(self, t: Any, q: Array, v: Array, z: Array) -> Array:
+        return self._traced(lambda: self.inner.next_state(t, q, v, z), self.state_size)
+
+    def _traced(self, function: Callable[[], Any], length: int) -> Array:
+        return _followed(f"controller {self.original.name}", lambda: wide(function(), length))
