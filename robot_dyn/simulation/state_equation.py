@@ -19,6 +19,7 @@ from robot_dyn.control.controller import Controller
 from robot_dyn.effects.effect import Conservative
 from robot_dyn.effects.equation_of_motion import EquationOfMotion
 from robot_dyn.effects.plant import Plant
+from robot_dyn.errors import RobotDynError
 from robot_dyn.foreign import call
 from robot_dyn.model.dynamics import acceleration
 
@@ -95,6 +96,16 @@ class StateEquation:
         """V of states y (k, m), (k, n)."""
         n = self.plant.dynamics.n
         return np.array([self.state(row)[1] for row in y]).reshape(-1, n) if self.canonical else y[:, n : 2 * n]
+
+    def fastest_joint(self, y: Array) -> str:
+        """Name of the joint that moves fastest at a state, which may be far out; by momentum where M is singular."""
+        n = self.plant.dynamics.n
+        with np.errstate(all="ignore"):
+            try:
+                v = self.state(y)[1]
+            except RobotDynError:
+                v = y[n : 2 * n]
+        return self.plant.dynamics.joint_names[int(np.argmax(np.abs(v)))]
 
     def command(self, t: float, q: Array, v: Array, z: Array) -> Array:
         """The actuation that the controller asks for, within the bounds of the plant."""

@@ -104,6 +104,5 @@ class Watch:
 
     def diverged(self, t: float, y: Array, why: str) -> DivergedError:
         """The end of a run at time t and state y, with the fastest joint and the remedy."""
-        names = self.equation.plant.dynamics.joint_names
-        fastest = names[int(np.argmax(np.abs(y[len(names) : 2 * len(names)])))]
+        fastest = self.equation.fastest_joint(y)
         return DivergedError(t, diverged_advice(why, fastest, self.setup.taken_step_s))

@@ -196,10 +196,8 @@ class Batch:
         """Why runs diverged and what to do; nothing for the others."""
         advice, equation = [""] * len(why), self.machine.equation
         for run in np.flatnonzero(why).tolist():
-            with np.errstate(all="ignore"):
-                _, v, _, _ = equation.state(self.last[:, run])
-            name = equation.plant.dynamics.joint_names[int(np.argmax(np.abs(v)))]
-            advice[run] = diverged_advice(_REASONS[Why(why[run])], name, self.setup.taken_step_s)
+            fastest = equation.fastest_joint(self.last[:, run])
+            advice[run] = diverged_advice(_REASONS[Why(why[run])], fastest, self.setup.taken_step_s)
         return tuple(advice)
 
     def _steps(self, ended: np.ndarray) -> np.ndarray:
