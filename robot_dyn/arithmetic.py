@@ -10,6 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from functools import wraps
 from threading import RLock
@@ -206,6 +207,44 @@ def symmetric(A: Array) -> Array:
     return np.where(upper, A, transpose(A))
 
 
+_SWEEPS = 8  # of Jacobi's method: it converges quadratically, six rows in six sweeps
+
+
+def eigh(A: Array) -> tuple[Array, Array]:
+    """Eigenvalues (..., m) and orthonormal eigenvectors (..., m, m) of symmetric A; by LAPACK for float64, ascending.
+
+    For other numbers by Jacobi's cyclic method with a fixed number of sweeps, so that it can be traced; in no order.
+
+    Source: Golub and Van Loan, Matrix Computations, 4th ed., 2013, sec. 8.5.
+    """
+    if A.dtype == np.float64:
+        return np.linalg.eigh(A)
+    m = A.shape[-1]
+    A, U = A.copy(), np.broadcast_to(np.eye(m, dtype=A.dtype), A.shape).copy()
+    for _ in range(_SWEEPS):
+        for p in range(m - 1):
+            for r in range(p + 1, m):
+                c, s = _rotation(A[..., p, p, None], A[..., p, r, None], A[..., r, r, None])
+                for X in (A, U):  # X ← X J, columns p and r
+                    X[..., p], X[..., r] = _turned(X[..., p], X[..., r], c, s)
+                A[..., p, :], A[..., r, :] = _turned(A[..., p, :], A[..., r, :], c, s)
+                A[..., p, r] = A[..., r, p] = 0 * A[..., p, r]
+    return np.diagonal(A, axis1=-2, axis2=-1), U
+
+
+def _rotation(app: Array, apr: Array, arr: Array) -> tuple[Array, Array]:
+    """Cosine and sine of the smaller angle that makes a symmetric 2 × 2 matrix diagonal."""
+    d, b = arr - app, 2 * apr
+    size = np.abs(d) + sqrt(d * d + b * b)
+    t = np.where(d < 0, -1, 1) * b / np.where(size > 0, size, 1)
+    c = 1 / sqrt(1 + t * t)
+    return c, t * c
+
+
+def _turned(x: Array, y: Array, c: Array, s: Array) -> tuple[Array, Array]:
+    return c * x - s * y, s * x + c * y
+
+
 class NotPositiveDefiniteError(Exception):
     """Internal: a pivot of a factorisation is not positive; the caller names the joint of `row`.
 
@@ -238,6 +277,17 @@ def _lapack_solve(M: Array, b: Array) -> Array | None:
     return np.linalg.solve(M, b[..., None])[..., 0]
 
 
+judging_regularity: ContextVar[bool] = ContextVar("judging_regularity", default=False)  # a trace assumes that it is
+
+
+def _is_regular(pivot: Array, least: Array, whole: Array) -> bool:
+    token = judging_regularity.set(True)
+    try:
+        return bool(np.all((pivot > least) & (whole > 0)))
+    finally:
+        judging_regularity.reset(token)
+
+
 def cholesky_solve(M: Array, b: Array) -> Array:
     """Solve M x = b for symmetric positive definite M by its factorisation L D Lᵀ.
 
@@ -263,7 +313,7 @@ def cholesky_solve(M: Array, b: Array) -> Array:
         LD = L[..., j, :j] * np.diagonal(L, axis1=-2, axis2=-1)[..., :j]
         L[..., j, j] = L[..., j, j] - (L[..., j, :j] * LD).sum(axis=-1)
         pivot, whole = L[..., j, j], M[..., j, j]
-        if not np.all((pivot > least * whole) & (whole > 0)):
+        if not _is_regular(pivot, least * whole, whole):
             # of floats the rounding of M itself may turn a pivot's sign; only a diagonal without inertia is certain
             raise NotPositiveDefiniteError(j, decided=bool(np.any(whole <= 0) or (not least and np.any(pivot <= 0))))
         below = L[..., j + 1 :, j] - (L[..., j + 1 :, :j] * LD[..., None, :]).sum(axis=-1)

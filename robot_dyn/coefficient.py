@@ -16,8 +16,8 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.errors import EffectError, RobotDynError, nearest
-from robot_dyn.validate import numbers
+from robot_dyn.errors import EffectError, RobotDynError, nearest, shown
+from robot_dyn.validate import instance, number, numbers, truth
 
 URDF = "urdf"  # in place of a coefficient: what the robot's file states
 _KEY = "robot_dyn.coefficient"
@@ -49,6 +49,19 @@ class Coefficient:
     elsewhere: float = 0.0
     stated: str = ""
     swept: bool = True
+
+    def __post_init__(self) -> None:
+        for name in ("unit", "symbol", "stated"):
+            instance(name, getattr(self, name), str, "give a text, such as 'N m'", error=EffectError)
+        for name in ("infinite", "swept"):
+            truth(name, getattr(self, name), error=EffectError)
+        for name in ("least", "above"):
+            if getattr(self, name) is not None:
+                number(name, getattr(self, name), error=EffectError)
+        number("elsewhere", self.elsewhere, error=EffectError, infinite=True)
+        shapes = self.shapes
+        if not isinstance(shapes, tuple) or not all(isinstance(x, tuple) for x in shapes) or not shapes:
+            raise EffectError(f"shapes must be tuples, such as ((), ('n',)), got {shown(shapes)}")
 
     @property
     def of_joints(self) -> bool:

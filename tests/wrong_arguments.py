@@ -168,6 +168,11 @@ def examples(folder: Path) -> dict[str, Example]:
             {"centre": [0.1, 0.2, 0.3], "radius": 0.1, "normal": [0.0, 0.1, 1.0], "period": 1.0, "turns": 1.0,
              "ramp": 0.1, "toward": [1.0, 0.0, 0.0], "rotation": eye, "start": 0.1},
         ),
+        "coefficient": (
+            rd.coefficient,
+            {"unit": "N m", "symbol": "f", "shapes": ((), ("n",)), "least": 0.5, "above": 0.5, "infinite": False,
+             "elsewhere": 0.5, "stated": "friction", "swept": True},
+        ),
         "compare": (
             rd.compare, {"robot": robot, "samples": 1, "seed": 3, "tolerance": 1e-9, "on_sample": print_nothing},
         ),

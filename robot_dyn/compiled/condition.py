@@ -9,6 +9,8 @@ from typing import Any, final
 
 import casadi as ca
 
+from robot_dyn.arithmetic import judging_regularity
+
 Node = Any  # casadi.SX, 1 × 1
 
 
@@ -39,7 +41,7 @@ class Condition:
         self.node = node
 
     def __bool__(self) -> bool:
-        return _decision.get()(self.node)
+        return judging_regularity.get() or _decision.get()(self.node)
 
     def __and__(self, other: Any) -> Condition:
         return Condition(ca.logic_and(self.node, truth(other)))

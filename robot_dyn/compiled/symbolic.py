@@ -54,16 +54,16 @@ class Symbols(np.ndarray):
         plain = [np.asarray(x) if isinstance(x, Symbols) else x for x in inputs]
         if options.get("out") is not None:
             options["out"] = tuple(np.asarray(x) if isinstance(x, Symbols) else x for x in options["out"])
-        if method == "__call__" and ufunc in _OF_SYMBOLS:
+        if ufunc in _OF_SYMBOLS:
             function, arguments = _OF_SYMBOLS[ufunc]
             with np.errstate(all="ignore"):  # NumPy takes flags of the processor that CasADi leaves for its own
-                return _symbols(np.frompyfunc(function, arguments, 1)(*plain))
+                return _symbols(getattr(np.frompyfunc(function, arguments, 1), method)(*plain, **options))
         return _symbols(getattr(ufunc, method)(*plain, **options))
 
     def __array_function__(self, function: Any, kinds: Any, args: Any, options: Any) -> Any:
         if function is np.where and len(args) == 3:
             return _symbols(np.frompyfunc(select, 3, 1)(*(np.asarray(x) for x in args)))
-        return super().__array_function__(function, kinds, args, options)
+        return _symbols(super().__array_function__(function, kinds, args, options))
 
 
 def _symbols(x: Any) -> Any:
@@ -77,6 +77,7 @@ def _sign(x: Any) -> Symbol:
 _OF_SYMBOLS: dict[Any, tuple[Callable[..., Any], int]] = {
     np.maximum: (lambda x, y: node(ca.fmax(symbol(x).expression, symbol(y).expression)), 2),
     np.minimum: (lambda x, y: node(ca.fmin(symbol(x).expression, symbol(y).expression)), 2),
+    np.arctan2: (lambda y, x: node(ca.atan2(symbol(y).expression, symbol(x).expression)), 2),
     np.sign: (_sign, 1),
     np.less: (lambda x, y: symbol(x) < y, 2),
     np.less_equal: (lambda x, y: symbol(x) <= y, 2),

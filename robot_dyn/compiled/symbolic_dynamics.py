@@ -34,6 +34,16 @@ def _closed_form(name: str) -> Any:
     return property(lambda self: getattr(self._trace.lagrangian, name), doc=getdoc(getattr(Lagrangian, name)))
 
 
+def _kinematic(name: str) -> Any:
+    """A quantity of the closed form that needs no inertia, as a method."""
+
+    def ask(self: SymbolicDynamics, *arguments: Any, **options: Any) -> Any:
+        return getattr(self._trace.lagrangian, name)(*arguments, **options).view(Symbols)
+
+    ask.__doc__ = getattr(Dynamics, name).__doc__
+    return ask
+
+
 @final
 class SymbolicDynamics:
     """A robot in symbols.
@@ -49,7 +59,7 @@ class SymbolicDynamics:
     kinetic_energy, potential_energy = map(_least, ("kinetic_energy", "potential_energy"))
     total_energy = Dynamics.total_energy
     n, joint_names, arithmetic = map(_closed_form, ("n", "joint_names", "arithmetic"))
-    placement, jacobian, jacobian_rate = map(_closed_form, ("placement", "jacobian", "jacobian_rate"))
+    placement, jacobian, jacobian_rate = map(_kinematic, ("placement", "jacobian", "jacobian_rate"))
 
     def __init__(self, robot: Described, known: Sequence[Parameter] = ()) -> None:
         vector, symbols = inputs("numbers", sum(each.size for each in known))

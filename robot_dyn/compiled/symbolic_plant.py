@@ -50,8 +50,8 @@ def symbolic_controller(
     made: dict[str, Any] = dict(values.get(CONTROLLER, {})) | dict(models)
     left = list(pieces)
     for name, reference in controller.references.items():
-        own = [left.pop(0) for _ in reference.polynomials]
-        made[name] = with_values(reference.made_of(own), values.get(("reference", name), {}))
+        own = {attribute: left.pop(0) for attribute in reference.polynomials}
+        made[name] = own.get("") or with_values(reference, own | dict(values.get(("reference", name), {})))
     return TracedController(with_values(controller, made), controller)
 
 

@@ -5,7 +5,6 @@ Position and angle are piecewise polynomials; the twist is (ṗ, φ̇ a), in bas
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import pi
 from typing import Any, final
@@ -13,7 +12,7 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.coefficient import coefficient, with_values
+from robot_dyn.coefficient import coefficient
 from robot_dyn.control.orientation import orientation_error
 from robot_dyn.control.reference import PiecewisePolynomial, Reference, hermite, number, numbers, quintic
 from robot_dyn.errors import ControlError, shown
@@ -56,13 +55,6 @@ class CartesianReference(Reference):
     def knots(self) -> np.ndarray:
         """Times in [s] at which position or angle pass to another polynomial."""
         return self.position.knots if self.angle is None else np.union1d(self.position.knots, self.angle.knots)
-
-    @property
-    def polynomials(self) -> tuple[PiecewisePolynomial, ...]:
-        return (self.position,) if self.angle is None else (self.position, self.angle)
-
-    def made_of(self, polynomials: Sequence[Any]) -> CartesianReference:
-        return with_values(self, dict(zip(("position", "angle"), polynomials, strict=False)))
 
     def at(self, t: Array) -> tuple[Array, Array | None, Array, Array]:
         """Position, orientation, twist and its rate at t.

@@ -12,7 +12,7 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array, apply, transpose
+from robot_dyn.arithmetic import Array, apply, eigh, symmetric, transpose
 from robot_dyn.coefficient import coefficient
 from robot_dyn.control.cartesian import CartesianReference
 from robot_dyn.control.controller import Stateless, check_model
@@ -64,8 +64,7 @@ def task_dynamics(
         s/ε² = s/(s² + λ²),   λ² = ε² − s²,
 
     which keeps Λ below 1/ε and asks for no force at the singularity itself, where none can act. The other directions
-    stay exact. Metres and radians are weighed alike. The eigenvectors come from
-    `numpy.linalg.eigh`, an iteration on values, and so float64 only: a trace must bring its own.
+    stay exact. Metres and radians are weighed alike.
 
     Args:
         dynamics: The arm.
@@ -83,18 +82,24 @@ def task_dynamics(
     Source: Khatib 1987; Chiaverini, Siciliano, Egeland 1994 (damping in the singular directions only).
     """
     check_model(dynamics)
-    rows, epsilon = _rows(rows), number("threshold", threshold, above=0)
+    return _task_dynamics(dynamics, q, v, frame, _rows(rows), number("threshold", threshold, above=0))
+
+
+def _task_dynamics(
+    dynamics: Dynamics, q: Array, v: Array, frame: str, rows: tuple[int, ...], epsilon: float
+) -> TaskDynamics:
+    """The same of arguments that were checked."""
     J = dynamics.jacobian(q, frame)[..., rows, :]
     drift = apply(dynamics.jacobian_rate(q, v, frame)[..., rows, :], np.asarray(v))
     # rows of J M⁻¹, one solve each: M is symmetric
     J_over_M = acceleration(dynamics.M(q)[..., None, :, :], J, dynamics.joint_names)
-    s, U = np.linalg.eigh(J_over_M @ transpose(J))
+    s, U = eigh(symmetric(J_over_M @ transpose(J)))
     with np.errstate(over="ignore", under="ignore"):
         weight = s / np.maximum(s, epsilon) ** 2
     Lambda = (U * weight[..., None, :]) @ transpose(U)
     J_bar = transpose(J_over_M) @ Lambda
     mu = apply(transpose(J_bar), dynamics.coriolis_torque(q, v)) - apply(Lambda, drift)
-    return TaskDynamics(J, Lambda, J_bar, mu, apply(transpose(J_bar), dynamics.N(q)), drift, s[..., 0])
+    return TaskDynamics(J, Lambda, J_bar, mu, apply(transpose(J_bar), dynamics.N(q)), drift, np.minimum.reduce(s, axis=-1))
 
 
 @final
@@ -165,7 +170,7 @@ class OperationalSpace(Stateless):
 
     def torque(self, t: float, q: Array, v: Array, z: Array) -> Array:
         model = self.model
-        task = task_dynamics(model, q, v, self.frame, rows=self.rows, threshold=self.threshold)
+        task = _task_dynamics(model, q, v, self.frame, self.rows, self.threshold)
         F = apply(task.Lambda, self.task_acceleration(t, q, v)) + task.mu + task.p
         free = model.inverse_dynamics(q, v, self.posture_kp * (self.posture - q) - self.posture_kd * v)
         return apply(transpose(task.J), F) + apply(task.projector, free)

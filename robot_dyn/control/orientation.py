@@ -24,12 +24,12 @@ def rotation_vector(R: Array) -> Array:
 
     Source: Shepperd, Quaternion from rotation matrix, 1978.
     """
-    w, x = _quaternion(np.asarray(R))
-    length = sqrt((x * x).sum(axis=-1))
+    w, x = _quaternion(np.asanyarray(R))
+    length = sqrt((x * x).sum(axis=-1, keepdims=True))
     # θ/‖x‖ → 2 where there is no turn; np.where keeps this free of branches
     small = length < 1e-150
     ratio = np.where(small, 2, 2 * np.arctan2(length, np.abs(w)) / np.where(small, 1, length))
-    return (np.where(w < 0, -1, 1) * ratio)[..., None] * x
+    return np.where(w < 0, -1, 1) * ratio * x
 
 
 def orientation_error(R_desired: Array, R: Array) -> Array:
@@ -38,23 +38,21 @@ def orientation_error(R_desired: Array, R: Array) -> Array:
 
 
 def _quaternion(R: Array) -> tuple[Array, Array]:
-    """The unit quaternion (w, x), shapes (...) and (..., 3), of a rotation; its sign is free.
+    """The unit quaternion (w, x), shapes (..., 1) and (..., 3), of a rotation; its sign is free.
 
-    The largest of its four parts is found first, a branch on values: dividing by it is what keeps all digits.
+    It is the row of the largest of its four parts: dividing by that one is what keeps all digits.
     """
-    xx, yy, zz = R[..., 0, 0], R[..., 1, 1], R[..., 2, 2]
-    wx, wy, wz = R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]
-    xy, xz, yz = R[..., 0, 1] + R[..., 1, 0], R[..., 0, 2] + R[..., 2, 0], R[..., 1, 2] + R[..., 2, 1]
-    outer = np.stack(  # 4 (w, x)(w, x)ᵀ, row by row
-        [
-            np.stack([1 + xx + yy + zz, wx, wy, wz], axis=-1),
-            np.stack([wx, 1 + xx - yy - zz, xy, xz], axis=-1),
-            np.stack([wy, xy, 1 - xx + yy - zz, yz], axis=-1),
-            np.stack([wz, xz, yz, 1 - xx - yy + zz], axis=-1),
-        ],
-        axis=-2,
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = ([R[..., i, j : j + 1] for j in range(3)] for i in range(3))
+    rows = (  # of 4 (w, x)(w, x)ᵀ
+        (1 + xx + yy + zz, zy - yz, xz - zx, yx - xy),
+        (zy - yz, 1 + xx - yy - zz, xy + yx, xz + zx),
+        (xz - zx, xy + yx, 1 - xx + yy - zz, yz + zy),
+        (yx - xy, xz + zx, yz + zy, 1 - xx - yy + zz),
     )
-    largest = np.argmax(np.diagonal(outer, axis1=-2, axis2=-1), axis=-1)
-    row = np.take_along_axis(outer, largest[..., None, None], axis=-2)[..., 0, :]
+    outer = np.stack([np.concatenate(each, axis=-1) for each in rows], axis=-2)
+    row, largest = outer[..., 0, :], outer[..., 0, :1]
+    for k in (1, 2, 3):
+        other = outer[..., k, k : k + 1]
+        row, largest = np.where(other > largest, outer[..., k, :], row), np.maximum(other, largest)
     unit = row / sqrt((row * row).sum(axis=-1, keepdims=True))
-    return unit[..., 0], unit[..., 1:]
+    return unit[..., :1], unit[..., 1:]

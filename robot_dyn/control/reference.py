@@ -7,7 +7,6 @@ Each piece is Hermite's polynomial of what is given at its two ends. [Siciliano 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import factorial, isfinite, perm
@@ -43,13 +42,9 @@ class Reference(ABC):
         """Times in [s] at which it passes to another polynomial."""
 
     @property
-    @abstractmethod
-    def polynomials(self) -> tuple[PiecewisePolynomial, ...]:
-        """What it is made of."""
-
-    @abstractmethod
-    def made_of(self, polynomials: Sequence[Any]) -> Any:
-        """The same of other polynomials: of one segment of a run, in symbols, where it is traced."""
+    def polynomials(self) -> dict[str, PiecewisePolynomial]:
+        """What it is made of, by attribute; by "" if it is a polynomial itself."""
+        return {name: value for name, value in vars(self).items() if isinstance(value, PiecewisePolynomial)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,11 +75,8 @@ class PiecewisePolynomial(Reference):
         return self.breaks[:0] if self.coefficients.shape[:2] == (1, 1) else self.breaks
 
     @property
-    def polynomials(self) -> tuple[PiecewisePolynomial, ...]:
-        return (self,)
-
-    def made_of(self, polynomials: Sequence[Any]) -> Any:
-        return polynomials[0]
+    def polynomials(self) -> dict[str, PiecewisePolynomial]:
+        return {"": self}
 
     @property
     def start(self) -> float:

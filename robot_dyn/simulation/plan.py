@@ -48,7 +48,7 @@ def _sampled(setup: Setup) -> bool:
 def polynomials(controller: Controller | None) -> tuple[PiecewisePolynomial, ...]:
     """What the references of a controller are made of."""
     references = () if controller is None else controller.references.values()
-    return tuple(each for reference in references for each in reference.polynomials)
+    return tuple(each for reference in references for each in reference.polynomials.values())
 
 
 def lengths(followed: PiecewisePolynomial) -> int:
