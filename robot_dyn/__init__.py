@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from robot_dyn.arithmetic import Ball as Ball
     from robot_dyn.arithmetic import midpoint as midpoint
     from robot_dyn.arithmetic import radius as radius
-    from robot_dyn.coefficient import coefficient as coefficient
+    from robot_dyn.coefficients import coefficient as coefficient
     from robot_dyn.compiled.plant import Compiled as Compiled
     from robot_dyn.control.cartesian import circle as circle
     from robot_dyn.control.cartesian import line as line
@@ -114,7 +114,7 @@ _HOME = {
     "Trajectory": "simulation.trajectory",
     "ViscousFriction": "effects.friction",
     "circle": "control.cartesian",
-    "coefficient": "coefficient",
+    "coefficient": "coefficients",
     "compare": "accuracy.compare",
     "euler_lagrange": "lagrange.euler_lagrange",
     "gains_from": "control.independent_joint",

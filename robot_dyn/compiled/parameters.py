@@ -13,7 +13,7 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.coefficient import Coefficient, declared, with_values
+from robot_dyn.coefficients import Coefficient, declared, with_values
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.effect import Effect
 from robot_dyn.effects.plant import Plant

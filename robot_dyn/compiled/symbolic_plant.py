@@ -13,7 +13,7 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.coefficient import with_values
+from robot_dyn.coefficients import with_values
 from robot_dyn.compiled.parameters import CONTROLLER, Part
 from robot_dyn.compiled.symbolic import Symbols, TraceError, column, every_branch
 from robot_dyn.control.controller import Controller

@@ -12,7 +12,7 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.coefficient import coefficient
+from robot_dyn.coefficients import coefficient
 from robot_dyn.control.orientation import orientation_error
 from robot_dyn.control.reference import PiecewisePolynomial, Reference, hermite, number, numbers, quintic
 from robot_dyn.errors import ControlError, shown

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any, final
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.coefficient import coefficient
+from robot_dyn.coefficients import coefficient
 from robot_dyn.control.controller import Stateless, check_model
 from robot_dyn.control.independent_joint import DAMPING, STIFFNESS, joint_count
 from robot_dyn.control.reference import PiecewisePolynomial

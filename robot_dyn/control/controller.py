@@ -14,7 +14,7 @@ import numpy as np
 
 from robot_dyn import former
 from robot_dyn.arithmetic import Array
-from robot_dyn.coefficient import JOINTS, check_coefficients, declared
+from robot_dyn.coefficients import JOINTS, check_coefficients, declared
 from robot_dyn.control.reference import Reference
 from robot_dyn.errors import ControlError, shown
 from robot_dyn.model.dynamics import Dynamics
@@ -33,7 +33,7 @@ class Controller(ABC):
 
     and with symbols in place of these numbers where it is compiled: written in `robot_dyn.arithmetic` and NumPy's
     operators it runs in both engines. Its attributes may be references, models of the arm and numbers, whatever they
-    are called; those that are declared (`robot_dyn.coefficient`) are checked when it is made, and may be swept.
+    are called; those that are declared (`robot_dyn.coefficients`) are checked when it is made, and may be swept.
 
     Attributes:
         period_s: Time between samples in [s], with the torque constant between them; 0 for continuous control.

@@ -11,7 +11,7 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.coefficient import coefficient
+from robot_dyn.coefficients import coefficient
 from robot_dyn.control.controller import Controller, Stateless
 from robot_dyn.control.reference import PiecewisePolynomial, numbers
 from robot_dyn.errors import ControlError, shown

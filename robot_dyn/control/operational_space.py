@@ -13,7 +13,7 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.arithmetic import Array, apply, eigh, symmetric, transpose
-from robot_dyn.coefficient import coefficient
+from robot_dyn.coefficients import coefficient
 from robot_dyn.control.cartesian import CartesianReference
 from robot_dyn.control.controller import Stateless, check_model
 from robot_dyn.control.orientation import orientation_error

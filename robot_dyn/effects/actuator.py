@@ -9,7 +9,7 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.coefficient import URDF, coefficient
+from robot_dyn.coefficients import URDF, coefficient
 from robot_dyn.effects.effect import Bound, Effect
 from robot_dyn.errors import EffectError
 

@@ -13,7 +13,7 @@ from math import inf
 from typing import Any, ClassVar
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.coefficient import check_coefficients, declared
+from robot_dyn.coefficients import check_coefficients, declared
 from robot_dyn.errors import EffectError
 from robot_dyn.model.dynamics import Dynamics
 
@@ -31,7 +31,7 @@ class Effect:
     and with symbols in place of these numbers where it is compiled: written in `robot_dyn.arithmetic` and NumPy's
     operators it runs in both engines.
 
-    Those of its numbers that are declared (`robot_dyn.coefficient`) are checked when it is made, may be given by joint
+    Those of its numbers that are declared (`robot_dyn.coefficients`) are checked when it is made, may be given by joint
     name, or as "urdf" where files state them, and may be swept.
 
     Attributes:

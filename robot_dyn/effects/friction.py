@@ -7,7 +7,7 @@ from math import inf
 from typing import Any, final
 
 from robot_dyn.arithmetic import Array, tanh
-from robot_dyn.coefficient import coefficient
+from robot_dyn.coefficients import coefficient
 from robot_dyn.effects.effect import Dissipative
 from robot_dyn.model.dynamics import Dynamics
 

@@ -13,7 +13,7 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.arithmetic import Array, positive_part
-from robot_dyn.coefficient import coefficient
+from robot_dyn.coefficients import coefficient
 from robot_dyn.effects.effect import Conservative, Dissipative
 from robot_dyn.errors import EffectError
 from robot_dyn.model.dynamics import Dynamics

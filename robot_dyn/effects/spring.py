@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any, final
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.coefficient import coefficient
+from robot_dyn.coefficients import coefficient
 from robot_dyn.effects.effect import Conservative
 from robot_dyn.model.dynamics import Dynamics
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array, transpose
 from robot_dyn.arithmetic import apply as times
-from robot_dyn.coefficient import coefficient
+from robot_dyn.coefficients import coefficient
 from robot_dyn.effects.effect import Active
 from robot_dyn.errors import EffectError, QueryError
 from robot_dyn.model.dynamics import Axes, Dynamics

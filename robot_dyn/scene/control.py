@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field
 
-from robot_dyn.coefficient import URDF
+from robot_dyn.coefficients import URDF
 from robot_dyn.control.cartesian import CartesianReference, circle, line
 from robot_dyn.control.computed_torque import ComputedTorque, FeedForward, PDGravity
 from robot_dyn.control.controller import Controller

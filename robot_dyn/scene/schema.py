@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from robot_dyn.coefficient import URDF
+from robot_dyn.coefficients import URDF
 from robot_dyn.errors import RobotDynError
 from robot_dyn.model.edits import by_joint
 from robot_dyn.model.robot import Robot

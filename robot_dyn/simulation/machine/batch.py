@@ -15,7 +15,7 @@ from typing import cast, final
 import numpy as np
 
 from robot_dyn.arithmetic import FLOAT64
-from robot_dyn.coefficient import with_values
+from robot_dyn.coefficients import with_values
 from robot_dyn.compiled.parameters import rows
 from robot_dyn.compiled.right_angles import robot_of
 from robot_dyn.effects.plant import Plant

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.coefficient import declared
+from robot_dyn.coefficients import declared
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.model.edits import Edits
 from robot_dyn.model.robot import Robot

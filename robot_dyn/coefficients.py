@@ -20,7 +20,7 @@ from robot_dyn.errors import EffectError, RobotDynError, nearest, shown
 from robot_dyn.validate import instance, number, numbers, truth
 
 URDF = "urdf"  # in place of a coefficient: what the robot's file states
-_KEY = "robot_dyn.coefficient"
+_KEY = "robot_dyn.coefficients"
 JOINTS = ((), ("n",))  # one number for all joints, or one for each
 
 
