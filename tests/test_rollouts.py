@@ -222,7 +222,10 @@ def test_a_diverged_run_names_its_joint_its_time_and_what_to_do(method: str) -> 
     runs = rd.rollouts(setup, starts(4), v0)
     for i in (1, 3):
         advice, fastest = runs.outcome(i).advice, np.argmax(np.abs(runs[i].v[-1]))
-        assert f"the fastest joint is '{ARM.joint_names[fastest]}'" in advice and "take a smaller step than 0.002 s" in advice
+        assert (
+            f"the fastest joint is '{ARM.joint_names[fastest]}'" in advice
+            and "take a smaller step than 0.002 s" in advice
+        )
         assert runs[i].outcome == runs.outcome(i)
         assert np.isfinite(runs[i].q).all() and runs[i].t[-1] <= runs.ended[i] + 1e-12
     assert not runs.outcome(0).advice and f"run 1 diverged at t = {runs.ended[1]:g} s; " in runs.summary

@@ -99,7 +99,9 @@ def _task_dynamics(
     Lambda = (U * weight[..., None, :]) @ transpose(U)
     J_bar = transpose(J_over_M) @ Lambda
     mu = apply(transpose(J_bar), dynamics.coriolis_torque(q, v)) - apply(Lambda, drift)
-    return TaskDynamics(J, Lambda, J_bar, mu, apply(transpose(J_bar), dynamics.N(q)), drift, np.minimum.reduce(s, axis=-1))
+    return TaskDynamics(
+        J, Lambda, J_bar, mu, apply(transpose(J_bar), dynamics.N(q)), drift, np.minimum.reduce(s, axis=-1)
+    )
 
 
 @final

@@ -17,6 +17,7 @@ from llvmlite import ir
 from robot_dyn.compiled.llvm.python_function import addresses
 from robot_dyn.compiled.store import Store
 
+_LONG = 20_000  # lines: with 31 000, 4 s in place of 12
 _lock = threading.RLock()
 _loaded: dict[str, bytes] = {}  # object files by key
 
@@ -46,7 +47,8 @@ def address(function: str, key: str, write: Callable[[Any, str], None], store: S
 
 def object_file(write: Callable[[Any, str], None], name: str) -> bytes:
     """The object file of a module."""
-    return _machine().emit_object(_optimised(write, name))
+    module = _optimised(write, name)
+    return _machine(_effort(module)).emit_object(module)
 
 
 def assembly(write: Callable[[Any, str], None], name: str) -> str:
@@ -77,7 +79,12 @@ def _opened(payload: bytes | None) -> bytes | None:
     return made if payload == _sealed(made) else None
 
 
-def _machine() -> Any:
+def _effort(module: Any) -> int:
+    """How hard LLVM works on registers: in one long block its time grows faster than the block."""
+    return 1 if str(module).count("\n") > _LONG else 3
+
+
+def _machine(effort: int = 3) -> Any:
     """LLVM's view of this processor."""
     binding.initialize_native_target()
     binding.initialize_native_asmprinter()
@@ -85,7 +92,7 @@ def _machine() -> Any:
     reloc = "static" if target.name.startswith("x86") else "default"
     features = binding.get_host_cpu_features().flatten()
     return target.create_target_machine(
-        cpu=binding.get_host_cpu_name(), features=features, opt=3, reloc=reloc, codemodel="jitdefault", jit=True
+        cpu=binding.get_host_cpu_name(), features=features, opt=effort, reloc=reloc, codemodel="jitdefault", jit=True
     )
 
 
