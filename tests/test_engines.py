@@ -205,9 +205,6 @@ def test_a_reference_that_jumps_between_rests() -> None:
 def test_what_cannot_be_compiled_is_named() -> None:
     with pytest.raises(TraceError, match=r"effect table cannot be compiled .*engine='interpreted'"):
         rd.simulate(rd.Plant(ARM, [Table()]), q0=Q, engine="compiled")
-    own = rd.OperationalSpace(UR5, "tool0", rd.line([0.4, 0.2, 0.3], [0.5, 0.2, 0.3], 1.0), 1.0, 1.0)
-    with pytest.raises(TraceError, match="controller OperationalSpace"):
-        rd.simulate(rd.Plant(UR5), q0=np.full(6, 0.3), controller=own, engine="compiled")
     with pytest.raises(QueryError, match="no engine 'fast'; nearest: auto"):
         rd.Setup(rd.Plant(ARM), Q, engine="fast")
 

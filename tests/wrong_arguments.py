@@ -39,7 +39,7 @@ LAX = {  # arguments that may be infinite or unknown, or of any shape
     "JointStopDamper": {"lower", "upper"}, "JointStopSpring": {"lower", "upper"}, "PID": {"effort_limit"},
     "PiecewisePolynomial.at": {"t"}, "Samples.at": {"t"},
     "Rollouts.outcome": {"run"}, "Robot.with_": {"lock", "armature"},
-    "midpoint": {"x"}, "radius": {"x"},
+    "midpoint": {"x"}, "radius": {"x"}, "coefficient": {"elsewhere"},
     "joint_stops": {"lower", "upper"}, "plot": {"limits"},
 }  # fmt: skip
 SIGNED = {"Adaptive": ("rtol", "atol", "max_step"), "Payload": ("mass",), "Setup": ("duration_s", "step_s")}

@@ -111,8 +111,9 @@ def _values(setup: Setup, name: str, values: Any) -> np.ndarray:
     if len(classes) > len(set(classes)):
         raise QueryError(f"params: {name} names a coefficient of several effects of the plant; make them one effect")
     n, declared = mine[0].size, mine[0].declared
+    shapes = (("B",), ("B", 1), ("B", n)) if declared.of_joints or n == 1 else (("B", n),)
     array = numbers(
-        f"params: {name}", values, ("B",), ("B", 1), ("B", n),
+        f"params: {name}", values, *shapes,
         least=declared.least, above=declared.above, infinite=declared.infinite,
     )  # fmt: skip
     array = array[:, None] if array.ndim == 1 else array
