@@ -28,7 +28,6 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.model.quantity import PLANT
 from robot_dyn.model.robot import Robot
 
-_ARGUMENTS = {quantity.name: quantity.arguments for quantity in PLANT.values()}
 _TIMES = (float, int, np.float64)  # what machine code takes for a time; others are looked at in general
 
 
@@ -58,7 +57,7 @@ class CompiledPlant:
         """The kernels."""
 
         def truth(quantity: str, state: dict[str, np.ndarray]) -> tuple[np.ndarray, Any]:
-            rows = [[state[name][i] for name in _ARGUMENTS[quantity]] for i in range(len(state["t"]))]
+            rows = [[state[name][i] for name in PLANT[quantity].arguments] for i in range(len(state["t"]))]
             times = zip(state["t"], state["q"], state["v"], strict=True)
             effects = np.array(
                 [np.broadcast_to(self.interpreted.torque(*each), state["q"].shape[1:]) for each in times]
@@ -175,7 +174,7 @@ class CompiledPlant:
                 "forward_dynamics": lambda: equation.acceleration(qs, vs, equation.actuation(us) + torque),
             }
             answer = column(made[quantity]())
-        given = [t, q, v, u][: len(_ARGUMENTS[quantity])]
+        given = [t, q, v, u][: len(PLANT[quantity].arguments)]
         function = ca.Function("f", given, [ca.cse(ca.densify(answer))])
         formulation = "effects" if quantity == "torque" else self._bodies.formulation(quantity)
         return Traced(function, formulation, {formulation: instructions(function)})
