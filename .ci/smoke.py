@@ -21,7 +21,7 @@ runs = [rd.simulate(plant, q0=q, duration_s=0.2, controller=controller, engine=e
 np.testing.assert_allclose(runs[0].q, runs[1].q, rtol=0, atol=1e-11)
 many = rd.rollouts(rd.Setup(plant, q, duration_s=0.2, controller=controller), np.tile(q, (3, 1)))
 np.testing.assert_allclose(many.q[2], runs[0].q, rtol=0, atol=1e-11)
-rd.simulate(plant, q0=q, duration_s=0.2, integrator=rd.Adaptive())
+rd.simulate(plant, q0=q, duration_s=0.2)
 
 with tempfile.TemporaryDirectory() as folder:
     path = rd.save_run(runs[1], Path(folder) / "run.npz")

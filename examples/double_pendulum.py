@@ -25,7 +25,7 @@ def fall(q0):
         q0=q0,
         v0=[0.0, 0.0],
         duration_s=10.0,
-        integrator=rd.method("order_8"),
+        integrator="order_8",
         step_s=0.002,
         record_period_s=0.01,
     )

@@ -30,7 +30,7 @@ def move(arm):
         v0=np.zeros(2),
         duration_s=5.0,
         controller=rd.PD(rd.hold(target), kp, kd),
-        integrator=rd.method("order_8"),
+        integrator="order_8",
         step_s=0.002,
         record_period_s=0.01,
     )

@@ -9,6 +9,7 @@ from warnings import warn
 
 _NOWHERE: Any = object()
 Function = TypeVar("Function", bound=Callable[..., Any])
+Made = TypeVar("Made")
 
 
 def tell(former: str, name: str, *, up: int) -> None:
@@ -58,6 +59,20 @@ class Attribute:
             if found is not _NOWHERE and not isinstance(found, _Adopted) and self.name not in vars(instance):
                 return found.__get__(instance, owner) if hasattr(found, "__get__") else found
         return getattr(instance, self.name)
+
+
+def fields(**names: str) -> Callable[[type[Made]], type[Made]]:
+    """A decorator of a dataclass: fields `former=new` are taken and read by their former names as well."""
+
+    def decorate(made: type[Made]) -> type[Made]:
+        made.__init__ = arguments(**names)(made.__init__)
+        for former, name in names.items():
+            attribute = Attribute(name)
+            attribute.__set_name__(made, former)
+            setattr(made, former, attribute)
+        return made
+
+    return decorate
 
 
 @final

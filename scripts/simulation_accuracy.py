@@ -23,7 +23,7 @@ DOUBLE = rd.load("planar_2r")
 
 def free_swing(duration: float) -> rd.Setup:
     """The Panda let go, RK4 at 1 ms."""
-    return rd.Setup(rd.Plant(PANDA), q0=READY, v0=np.zeros(7), duration_s=duration, step_s=1e-3)
+    return rd.Setup(rd.Plant(PANDA), q0=READY, v0=np.zeros(7), duration_s=duration, integrator="rk4", step_s=1e-3)
 
 
 def end(run: rd.Trajectory) -> np.ndarray:
@@ -36,7 +36,7 @@ def references(setup: rd.Setup) -> tuple[np.ndarray, float]:
     quiet = replace(setup, estimate_error=False, record_period_s=setup.duration_s)
     by_tolerance = end(rd.simulate(quiet, integrator=TIGHT))
     own: Any = rd.Lagrangian(PANDA)
-    by_steps = end(rd.simulate(quiet, plant=rd.Plant(own), integrator=rd.method("order_8"), step_s=2e-3))
+    by_steps = end(rd.simulate(replace(quiet, plant=rd.Plant(own)), integrator="order_8", step_s=2e-3))
     return by_tolerance, float(np.abs(by_steps - by_tolerance).max())
 
 
@@ -121,13 +121,15 @@ def scenes() -> dict[str, rd.Setup]:
     friction, spring = rd.ViscousFriction([0.4, 0.2]), rd.Spring([30.0, 0.0], [0.2, 0.0])
     cart_pole = rd.Plant(rd.load("cart_pole"), [spring])
     return {
-        "pendulum": rd.Setup(rd.Plant(rd.load("pendulum")), [2.5], [0.7], 2.0, step_s=4e-3),
-        "planar_2r, friction": rd.Setup(rd.Plant(DOUBLE, [friction]), [0.4, -0.7], [0.3, 0.5], 1.0, step_s=5e-3),
+        "pendulum": rd.Setup(rd.Plant(rd.load("pendulum")), [2.5], [0.7], 2.0, integrator="rk4", step_s=4e-3),
+        "planar_2r, friction": rd.Setup(
+            rd.Plant(DOUBLE, [friction]), [0.4, -0.7], [0.3, 0.5], 1.0, integrator="rk4", step_s=5e-3
+        ),
         "panda, free swing": replace(free_swing(1.0), step_s=2e-3),
         "panda, computed torque": rd.Setup(
-            rd.Plant(PANDA), READY + 0.1, np.full(7, -0.2), 0.5, controller=control, step_s=5e-3
+            rd.Plant(PANDA), READY + 0.1, np.full(7, -0.2), 0.5, controller=control, integrator="rk4", step_s=5e-3
         ),
-        "cart_pole, spring": rd.Setup(cart_pole, [0.1, 0.8], [0.3, -0.5], 1.0, step_s=5e-3),
+        "cart_pole, spring": rd.Setup(cart_pole, [0.1, 0.8], [0.3, -0.5], 1.0, integrator="rk4", step_s=5e-3),
     }
 
 
@@ -140,9 +142,7 @@ def estimates(quick: bool) -> None:
         setup = replace(full, duration_s=0.4) if quick else full
         run = rd.simulate(setup)
         h = setup.step_s
-        exact = rd.simulate(
-            setup, integrator=rd.method("order_8"), step_s=h / 2, record_period_s=h, estimate_error=False
-        )
+        exact = rd.simulate(setup, integrator="order_8", step_s=h / 2, record_period_s=h, estimate_error=False)
         tight = rd.simulate(setup, integrator=TIGHT, estimate_error=False)
         error, doubt = np.abs(run.q - exact.q).max(), np.abs(tight.q[-1] - exact.q[-1]).max()
         ratio = run.error.final / error if run.error else np.nan

@@ -30,7 +30,7 @@ SCENES = {
 
 
 def setup(plant, law, q0, v0, duration, step) -> rd.Setup:
-    return rd.Setup(plant, q0=q0, v0=v0, duration_s=duration, controller=law, step_s=step)
+    return rd.Setup(plant, q0=q0, v0=v0, duration_s=duration, controller=law, integrator="rk4", step_s=step)
 
 
 def true_error(run: rd.Trajectory, reference: rd.Trajectory) -> np.ndarray:

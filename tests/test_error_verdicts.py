@@ -108,7 +108,9 @@ def test_an_impulse_in_a_long_run_is_not_merged_away() -> None:
     start, length = 333.0, 1e-6
     push = rd.ExternalWrench("block", [0, 0, 1 / length, 0, 0, 0], start_s=start, end_s=start + length)
     real = (start + length) - start  # as floats have it
-    run = rd.simulate(rd.Plant(RAIL, [push]), q0=[0.0], duration_s=1000.0, step_s=0.1, record_period_s=1.0)
+    run = rd.simulate(
+        rd.Plant(RAIL, [push]), q0=[0.0], duration_s=1000.0, integrator="rk4", step_s=0.1, record_period_s=1.0
+    )
     v = real / length
     exact = v * (1000.0 - start - length) + v * real / 2
     assert abs(run.q[-1, 0] - exact) < 1e-9
@@ -159,7 +161,9 @@ def test_a_usable_run_with_stiff_friction_is_bounded_not_refused() -> None:
     """RK4 is near its stability limit, so that no order shows; the run is right to 1e-6 all the same."""
     plant = rd.Plant(PANDA, "urdf")
     law = rd.PDGravity(PANDA, rd.quintic(READY, READY + 0.2, 0.2), *rd.gains_from(np.diag(PANDA.M(READY)), 10.0))
-    run = rd.simulate(plant, q0=READY, duration_s=0.2, controller=law, step_s=2.5e-4, record_period_s=1e-3)
+    run = rd.simulate(
+        plant, q0=READY, duration_s=0.2, controller=law, integrator="rk4", step_s=2.5e-4, record_period_s=1e-3
+    )
     tight = rd.simulate(plant, q0=READY, duration_s=0.2, controller=law, integrator=rd.Adaptive(rtol=1e-12, atol=1e-13),
                         record_period_s=1e-3, estimate_error=False)  # fmt: skip
     error = np.abs(run.q - tight.q).max()
@@ -206,7 +210,9 @@ def upright(start: float, times: np.ndarray) -> np.ndarray:
 
 def test_turns_that_no_step_can_see_have_no_estimate() -> None:
     """A whole turn in each step: gravity is sampled at one angle, in all companions alike."""
-    run = rd.simulate(rd.Plant(rd.load("pendulum")), q0=[0.0], v0=[400 * np.pi], duration_s=0.5, step_s=5e-3)
+    run = rd.simulate(
+        rd.Plant(rd.load("pendulum")), q0=[0.0], v0=[400 * np.pi], duration_s=0.5, integrator="rk4", step_s=5e-3
+    )
     assert run.error.verdict is Verdict.NONE
     assert "turns by 6.28 rad in a step" in run.error.note
 
@@ -274,7 +280,7 @@ def test_the_summary_tells_an_estimate_from_a_bound_and_the_time_it_covers() -> 
 def test_a_ledger_that_contradicts_the_estimate_is_told() -> None:
     from dataclasses import replace
 
-    run = rd.simulate(rd.Plant(PANDA), q0=READY, duration_s=0.2, step_s=2e-3)
+    run = rd.simulate(rd.Plant(PANDA), q0=READY, duration_s=0.2, integrator="rk4", step_s=2e-3)
     assert run.leak == ""
     drift = run.ledger.kinetic * (1 + 1e-6 * run.t)
     wrong = replace(run, ledger=replace(run.ledger, kinetic=drift))

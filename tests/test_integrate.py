@@ -12,16 +12,18 @@ import numpy as np
 import pytest
 from flint import arb
 
+import robot_dyn as rd
 from robot_dyn.arithmetic import Ball
 from robot_dyn.errors import QueryError
 from robot_dyn.integrate.explicit import RK4, ExplicitRungeKutta
 from robot_dyn.integrate.gauss import Gauss
 from robot_dyn.integrate.implicit import SinglyDiagonallyImplicit
 from robot_dyn.integrate.integrator import Integrator, System
-from robot_dyn.integrate.methods import METHODS, method
+from robot_dyn.integrate.methods import FIXED_STEP, METHODS, method
 from robot_dyn.integrate.tableau import ButcherTableau, Surd
+from robot_dyn.scene.scene import parse_scene
 
-ALL = [method(name) for name in METHODS]
+ALL = [method(name) for name in FIXED_STEP]
 STIFF = [each for each in ALL if each.stiff]
 ANY_ARITHMETIC = [each for each in ALL if not each.stiff]
 RNG = np.random.default_rng(5)
@@ -98,7 +100,7 @@ def test_an_unknown_method_is_refused_with_the_nearest_names() -> None:
 
 
 def test_names_and_traits_of_the_table() -> None:
-    assert {each.name for each in ALL} == set(METHODS)
+    assert {each.name for each in ALL} == set(FIXED_STEP)
     assert {each.name for each in ALL if each.canonical} == {"gauss_2", "gauss_4", "gauss_6"}
     assert {each.name for each in STIFF} == {"linearly_implicit_euler", "sdirk_3"}
 
@@ -194,3 +196,25 @@ def test_importing_the_package_loads_no_scipy() -> None:
     modules = "explicit, gauss, implicit, adaptive, methods"
     code = f"import sys, robot_dyn.integrate; from robot_dyn.integrate import {modules}; print('scipy' in sys.modules)"
     assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "False"
+
+
+def test_one_list_of_names_serves_all_that_take_a_method() -> None:
+    """Setup, and with it simulate and rollouts, scenes and rd.method."""
+    plant = rd.Plant(rd.load("pendulum"))
+    for name in METHODS:
+        assert method(name).name == name
+        assert rd.Setup(plant, [0.1], integrator=name).integrator.name == name
+        text = f'robot = "pendulum"\nduration_s = 1.0\nmethod = "{name}"\n'
+        assert parse_scene(text, "scene.toml").integrator().name == name
+    with pytest.raises(QueryError, match="no integration method 'rk44'; nearest: rk4"):
+        rd.Setup(plant, [0.1], integrator="rk44")
+    with pytest.raises(QueryError, match=r"integrator: give a name, such as 'rk4' or 'DOP853', .* got 4"):
+        rd.Setup(plant, [0.1], integrator=4)
+
+
+def test_scenes_and_python_have_the_same_defaults() -> None:
+    scene = parse_scene('robot = "pendulum"\nduration_s = 1.0\n', "scene.toml")
+    setup = rd.Setup(rd.Plant(rd.load("pendulum")), [0.1])
+    assert scene.integrator() == setup.integrator == rd.Adaptive()
+    for name in ("step_s", "estimate_error", "engine"):
+        assert getattr(scene, name) == getattr(setup, name), name

@@ -110,7 +110,7 @@ def test_radau_takes_few_steps_on_a_stiff_system_and_dop853_many() -> None:
 def test_longest_step_is_kept_and_inputs_are_left_alone() -> None:
     y0 = START.copy()
     y0.setflags(write=False)
-    solution = Adaptive(rtol=1e-3, max_step=0.1).solve(OSCILLATOR, 0.0, y0, 1.0)
+    solution = Adaptive(rtol=1e-3, max_step_s=0.1).solve(OSCILLATOR, 0.0, y0, 1.0)
     assert np.diff(solution.times).max() <= 0.1 * (1 + 1e-12)
     assert np.array_equal(y0, START)
     with pytest.raises(ValueError, match="read-only"):
@@ -124,7 +124,7 @@ def test_longest_step_is_kept_and_inputs_are_left_alone() -> None:
         ({"rtol": 1e-15}, "rtol must be between 2.2e-14 and 1"),
         ({"rtol": float("nan")}, "rtol must be"),
         ({"atol": -1.0}, "atol must "),
-        ({"max_step": 0.0}, "max_step must be positive"),
+        ({"max_step_s": 0.0}, "max_step_s must be positive"),
     ],
 )
 def test_meaningless_options_are_refused(options: dict[str, Any], message: str) -> None:

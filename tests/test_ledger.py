@@ -66,7 +66,7 @@ def test_energy_and_work_are_those_of_their_definitions(plant, law) -> None:
     np.testing.assert_allclose(ledger.kinetic, (run.v * np.matvec(M, run.v)).sum(axis=1) / 2, rtol=1e-12)
     spring = SPRING.potential(robot, 0.0, run.q) if SPRING in plant.effects else 0.0
     np.testing.assert_allclose(ledger.potential, robot.potential_energy(run.q) + spring, rtol=1e-12)
-    np.testing.assert_allclose(run.power["control"], (run.tau * run.v).sum(axis=1), atol=1e-12)
+    np.testing.assert_allclose(run.power["control"], (run.u * run.v).sum(axis=1), atol=1e-12)
     for effect, power in ((FRICTION, "viscous_friction"), (DRY, "regularised_coulomb_friction")):
         if effect in plant.effects:
             by_hand = (effect.torque(robot, 0.0, run.q, run.v) * run.v).sum(axis=1)

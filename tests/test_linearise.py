@@ -107,7 +107,7 @@ def test_a_small_deviation_moves_as_the_linearisation_says(size: float) -> None:
     A, _ = rd.linearise(plant, q, np.zeros(2), u)
     held = rd.FeedForward(DOUBLE, rd.hold(q), 0.0, 0.0)  # N(q) at the reference: constant
     run = rd.simulate(plant, q0=q + away[:2], v0=away[2:], duration_s=0.3, controller=held, estimate_error=False)
-    np.testing.assert_allclose(run.tau, np.tile(u, (len(run.t), 1)), rtol=1e-12)
+    np.testing.assert_allclose(run.u, np.tile(u, (len(run.t), 1)), rtol=1e-12)
     moved = np.concatenate([run.q[-1] - q, run.v[-1]])
     assert np.abs(moved - expm(0.3 * A) @ away).max() < 100 * size**2
 

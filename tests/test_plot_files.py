@@ -62,7 +62,7 @@ def test_a_diverged_run_shows_how_it_began_and_how_it_ended(cart, tmp_path) -> N
     growth[-3:] = [[np.nan], [np.inf], [np.nan]]
     energy = Ledger(growth[:, 0], growth[:, 1], {"control": growth[:, 0]})
     end = Outcome(Ending.DIVERGED, 5.0, "take a smaller step")
-    fast = {"q": growth, "v": growth, "tau": growth, "ledger": energy, "outcome": end}
+    fast = {"q": growth, "v": growth, "u": growth, "ledger": energy, "outcome": end}
     run = stretched(cart, 200, **fast, deviation=growth, desired=growth)
     save_plot(run, tmp_path / "diverged.png", dpi=40)
     figure = plot(run)
@@ -70,7 +70,7 @@ def test_a_diverged_run_shows_how_it_began_and_how_it_ended(cart, tmp_path) -> N
     assert {axes.get_yscale() for axes in cells(figure, "q")} == {"symlog"}
     assert any("take a smaller step" in text.get_text() for text in figure.texts)
     nothing = np.full((200, 2), np.nan)
-    save_plot(stretched(run, 200, q=nothing, v=nothing, tau=nothing), tmp_path / "nan.png", dpi=40)
+    save_plot(stretched(run, 200, q=nothing, v=nothing, u=nothing), tmp_path / "nan.png", dpi=40)
 
 
 def test_thirty_joints_keep_their_names_and_do_not_overlap(run) -> None:
@@ -88,12 +88,12 @@ def test_thirty_joints_keep_their_names_and_do_not_overlap(run) -> None:
 def test_a_long_run_is_thinned_and_keeps_its_peaks(run) -> None:
     """Of 300 000 samples one is a peak, one a trough; all joints are drawn in seconds."""
     long = stretched(run, 300_000)
-    tau = long.tau.copy()
-    tau[123_457], tau[222_223] = 50.0, -70.0
+    u = long.u.copy()
+    u[123_457], u[222_223] = 50.0, -70.0
     began = perf_counter()
-    figure = plot(replace(long, tau=tau))
+    figure = plot(replace(long, u=u))
     assert perf_counter() - began < 10
-    for axes in cells(figure, "τ"):
+    for axes in cells(figure, "u"):
         drawn = axes.lines[0].get_ydata()
         assert len(drawn) < 5000 and (drawn.min(), drawn.max()) == (-70.0, 50.0)
         assert axes.lines[0].get_xdata()[[0, -1]].tolist() == [0.0, 5.0]

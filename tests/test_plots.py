@@ -45,7 +45,7 @@ def test_units_are_those_of_each_joint(run, cart) -> None:
     """The URDF in the run tells which joint slides; a run without one leaves it open."""
     figure = plot(cart)
     assert [axes.get_ylabel() for axes in cells(figure, "q")] == ["q [m]", "q [rad]"]
-    assert [axes.get_ylabel() for axes in cells(figure, "τ")] == ["τ [N]", "τ [N m]"]
+    assert [axes.get_ylabel() for axes in cells(figure, "u")] == ["u [N]", "u [N m]"]
     assert {axes.get_xlabel() for axes in cells(figure, "v")} >= {"t [s]", "q [m]", "q [rad]"}
     assert "q [rad or m]" in {axes.get_ylabel() for axes in plot(replace(cart, about={})).axes}
 
@@ -59,21 +59,21 @@ def test_every_axis_has_a_unit(run) -> None:
 
 def test_limits_are_drawn_at_plus_and_minus_the_limit(run) -> None:
     limits = np.array([50.0, 60.0, np.inf, 20.0, 0.0, np.nan])  # 0 and nan: none is known
-    for axes, limit in zip(cells(plot(run, "torques", limits=limits), "τ"), limits, strict=True):
+    for axes, limit in zip(cells(plot(run, "torques", limits=limits), "u"), limits, strict=True):
         levels = [line.get_ydata()[0] for line in lines(axes, "_limit")]
         assert levels == ([-limit, limit] if 0 < limit < np.inf else [])
         assert all(line.is_dashed() for line in lines(axes, "_limit"))
 
 
 def test_limits_are_the_urdfs_unless_given(run) -> None:
-    drawn = [lines(axes, "_limit")[1].get_ydata()[0] for axes in cells(plot(run, "torques"), "τ")]
+    drawn = [lines(axes, "_limit")[1].get_ydata()[0] for axes in cells(plot(run, "torques"), "u")]
     np.testing.assert_array_equal(drawn, rd.load("ur5").effort_limit)
 
 
 def test_a_far_limit_does_not_flatten_the_torque(run) -> None:
     """Peak / limit decides: near limits are in sight, of far ones the title tells the part used."""
-    peak = np.abs(run.tau).max(axis=0)
-    near, far = (cells(plot(run, "torques", limits=factor * peak), "τ") for factor in (2.0, 100.0))
+    peak = np.abs(run.u).max(axis=0)
+    near, far = (cells(plot(run, "torques", limits=factor * peak), "u") for factor in (2.0, 100.0))
     for axes, limit in zip(near, 2 * peak, strict=True):
         assert axes.get_ylim()[0] < -limit and limit < axes.get_ylim()[1]
         assert axes.get_title(loc="left").endswith("50% used")

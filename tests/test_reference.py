@@ -19,7 +19,7 @@ POINTS = np.random.default_rng(3).normal(size=(6, 3))
 AXIS = np.array([2.0, -1.0, 2.0]) / 3
 REFERENCES = {
     "hold": hold(Q0),
-    "quintic": quintic(Q0, Q1, 1.7, start=0.4),
+    "quintic": quintic(Q0, Q1, 1.7, start_s=0.4),
     "quintic between motions": quintic(Q0, Q1, 1.7, v0=[0.3, -0.4, 0.5], v1=-0.8, a0=1.3, a1=[0.2, 0.6, -0.9]),
     "cubic spline": via_points(TIMES, POINTS, kind="cubic"),
     "quintic spline": via_points(TIMES, POINTS),
@@ -83,7 +83,7 @@ def test_times_may_carry_axes(reference: PiecewisePolynomial, shape: tuple[int, 
 def test_quintic_is_the_minimum_jerk_motion() -> None:
     """10 s³ − 15 s⁴ + 6 s⁵, of greatest velocity 15/8 halfway; roundings only."""
     s = np.linspace(0, 1, 101)
-    q, v, a = quintic(Q0, Q1, 1.7, start=0.4).at(0.4 + 1.7 * s)
+    q, v, a = quintic(Q0, Q1, 1.7, start_s=0.4).at(0.4 + 1.7 * s)
     expected = Q0 + (Q1 - Q0) * (10 * s**3 - 15 * s**4 + 6 * s**5)[:, None]
     np.testing.assert_allclose(q, expected, atol=1e-14)
     np.testing.assert_allclose(np.abs(v).max(axis=0), 15 / 8 * np.abs(Q1 - Q0) / 1.7, rtol=1e-13)
@@ -117,7 +117,7 @@ def test_spline_passes_its_points_from_rest_to_rest(kind: str) -> None:
     only_two = via_points(TIMES[:2], POINTS[:2])
     np.testing.assert_allclose(
         only_two.coefficients,
-        quintic(*POINTS[:2], duration=TIMES[1] - TIMES[0], start=TIMES[0]).coefficients,
+        quintic(*POINTS[:2], duration_s=TIMES[1] - TIMES[0], start_s=TIMES[0]).coefficients,
         rtol=1e-12,
     )
 
@@ -134,10 +134,10 @@ def test_circle_stays_on_its_circle(ramp: float | None, turns: float) -> None:
     """Within 1e-9 of the radius, as stated, and in its plane to rounding."""
     centre, normal, r, period = np.array([0.4, -0.2, 0.5]), np.array([1.0, -2.0, 0.5]), 0.3, 2.0
     if ramp is not None and ramp > turns * period:
-        with pytest.raises(ControlError, match="ramp must be at most"):
-            circle(centre, r, normal, period, turns=turns, ramp=ramp)
+        with pytest.raises(ControlError, match="ramp_s must be at most"):
+            circle(centre, r, normal, period, turns=turns, ramp_s=ramp)
         return
-    reference = circle(centre, r, normal, period, turns=turns, ramp=ramp, start=0.7)
+    reference = circle(centre, r, normal, period, turns=turns, ramp_s=ramp, start_s=0.7)
     path = reference.position
     p, _, V, _ = reference.at(np.linspace(path.start, path.end, 20001))
     assert np.abs(np.linalg.norm(p - centre, axis=-1) / r - 1).max() < 1e-9
@@ -152,7 +152,7 @@ def test_circle_stays_on_its_circle(ramp: float | None, turns: float) -> None:
 
 def test_circle_turns_by_the_right_hand_from_where_it_is_told() -> None:
     """A quarter turn about z from x ends at y; the angle is exact, so roundings only."""
-    quarter = circle([0.0, 0.0, 1.0], 2.0, [0, 0, 5.0], 4.0, turns=0.25, toward=[3.0, 0.0, 0.7], start=1.0)
+    quarter = circle([0.0, 0.0, 1.0], 2.0, [0, 0, 5.0], 4.0, turns=0.25, toward=[3.0, 0.0, 0.7], start_s=1.0)
     np.testing.assert_allclose(quarter.at(1.0)[0], [2, 0, 1], atol=1e-14)
     np.testing.assert_allclose(quarter.at(9.0)[0], [0, 2, 1], atol=1e-14)
 
@@ -215,10 +215,10 @@ def test_references_are_copied_and_frozen() -> None:
         (lambda: hold([0.1, np.nan]), "q must be finite"),
         (lambda: hold([[1.0], [1.0, 2.0]]), "q must be real numbers"),
         (lambda: quintic(Q0, Q1[:2], 1.0), r"q1 must have shape \(3,\), got \(2,\)"),
-        (lambda: quintic(Q0, Q1, 0.0), "duration must be a positive number of seconds"),
+        (lambda: quintic(Q0, Q1, 0.0), "duration_s must be a positive number of seconds"),
         (lambda: quintic(Q0, Q1, 1.0, v0=[1.0]), r"v0 must be one number or of shape \(3,\)"),
-        (lambda: via_points([0.0, 1.0], POINTS), r"times must have shape \(6,\)"),
-        (lambda: via_points(TIMES[::-1], POINTS), "times must increase"),
+        (lambda: via_points([0.0, 1.0], POINTS), r"times_s must have shape \(6,\)"),
+        (lambda: via_points(TIMES[::-1], POINTS), "times_s must increase"),
         (lambda: via_points(TIMES, POINTS, kind="linear"), "known: cubic, quintic"),
         (lambda: via_points([0.0], POINTS[:1]), "points must be 2 at least"),
         (lambda: PiecewisePolynomial([0.0, 1.0], [1.0]), "coefficients must have shape"),
@@ -310,8 +310,10 @@ def test_the_estimate_along_dense_samples_is_honest(tmp_path) -> None:
     arm, t = rd.load("planar_2r"), np.linspace(0, 0.3, 101)
     reference = Samples(t, *motion(t)[:2])
     controller = rd.ComputedTorque(arm, reference, 100.0, 20.0)
-    setup = rd.Setup(rd.Plant(arm), motion(t)[0][0] + 0.1, duration_s=0.3, controller=controller, step_s=5e-3)
-    run, truth = rd.simulate(setup), rd.simulate(setup, step_s=3e-4, estimate_error=False)
+    setup = rd.Setup(
+        rd.Plant(arm), motion(t)[0][0] + 0.1, duration_s=0.3, controller=controller, integrator="rk4", step_s=5e-3
+    )
+    run, truth = rd.simulate(setup), rd.simulate(setup, integrator="rk4", step_s=3e-4, estimate_error=False)
     error = np.abs(run.q[-1] - truth.q[-1]).max()
     assert run.error is not None and run.error.resolved_until == 0.3
     assert 0 < error < 2 * run.error.final < 1e-4

@@ -31,7 +31,7 @@ def damped(joint, ratio: float, **options) -> rd.Setup:
     control = rd.PD(rd.hold([0.3]), kp=0.05, kd=ratio * INERTIA / PERIOD, period_s=PERIOD)
     given = {"duration_s": 0.5, "record_period_s": 10 * PERIOD, "engine": "interpreted"}
     if not isinstance(options.get("integrator"), rd.Adaptive):
-        given["step_s"] = PERIOD / 4
+        given |= {"integrator": "rk4", "step_s": PERIOD / 4}
     plant = rd.Plant(joint, [rd.EffortLimit(LIMIT)])
     return rd.Setup(plant, [0.2], [0.02], controller=control, estimate_error=False, **given | options)
 
@@ -83,7 +83,9 @@ def test_extremes_are_those_of_all_steps(method: str) -> None:
     """A run that keeps every step shows them: least and largest of q and v over its samples, to the bit."""
     arm = rd.load("ur5")
     q0, v0 = np.array([0.3, -1.1, 0.9, -0.6, 1.2, 0.4]), np.array([0.5, 0.4, -0.3, 0.2, 0.6, -0.5])
-    setup = rd.Setup(rd.Plant(arm, [rd.ViscousFriction(2.0)]), q0, v0, duration_s=0.05, estimate_error=False)
+    setup = rd.Setup(
+        rd.Plant(arm, [rd.ViscousFriction(2.0)]), q0, v0, duration_s=0.05, estimate_error=False, integrator="rk4"
+    )
     setup = replace(setup, integrator=rd.method(method), controller=rd.PD(rd.hold(q0), 50.0, 5.0))
     every, few = rd.simulate(setup), rd.simulate(setup, record_period_s=0.05)
     np.testing.assert_array_equal(every.extremes, few.extremes)
@@ -91,8 +93,8 @@ def test_extremes_are_those_of_all_steps(method: str) -> None:
     slack = 0.02 if method.startswith("gauss") else 0.0
     for seen, sampled in zip(every.extremes[:2], (every.q, every.v), strict=True):
         np.testing.assert_allclose(seen, [sampled.min(axis=0), sampled.max(axis=0)], rtol=0, atol=slack)
-    size = np.abs(every.tau).max()  # u of the last stage of a step, not at its end
-    np.testing.assert_allclose(every.extremes[2], [every.tau.min(axis=0), every.tau.max(axis=0)], atol=0.05 * size)
+    size = np.abs(every.u).max()  # u of the last stage of a step, not at its end
+    np.testing.assert_allclose(every.extremes[2], [every.u.min(axis=0), every.u.max(axis=0)], atol=0.05 * size)
 
 
 def test_machine_code_shows_what_the_interpreted_loop_shows(joint, monkeypatch) -> None:
@@ -117,7 +119,9 @@ def test_time_at_the_effort_limit_is_that_of_the_closed_form(joint) -> None:
     kp, kd, e = 20.0, 10.0, 1.0
     a = LIMIT / INERTIA
     control = rd.PD(rd.hold([e]), kp, kd)
-    setup = rd.Setup(rd.Plant(joint, [rd.EffortLimit(LIMIT)]), [0.0], duration_s=1.0, controller=control)
+    setup = rd.Setup(
+        rd.Plant(joint, [rd.EffortLimit(LIMIT)]), [0.0], duration_s=1.0, controller=control, integrator="rk4"
+    )
     run = rd.simulate(setup, record_period_s=0.5, estimate_error=False)
     root = np.roots([kp * a / 2, kd * a, LIMIT - kp * e]).max()
     (said,) = (remark for remark in run.remarks if remark.kind is Kind.EFFORT_REACHED)
@@ -129,7 +133,13 @@ def test_time_at_the_effort_limit_is_that_of_the_closed_form(joint) -> None:
 def cart():
     """A cart pushed beyond 2 m, 5 m/s and 100 N, the limits of its file, with a sample at both ends only."""
     plan = rd.quintic(np.zeros(2), np.array([2.5, 0.0]), 0.8)
-    setup = rd.Setup(rd.Plant(rd.load("cart_pole")), np.zeros(2), duration_s=1.0, controller=rd.PD(plan, 4e3, 400.0))
+    setup = rd.Setup(
+        rd.Plant(rd.load("cart_pole")),
+        np.zeros(2),
+        duration_s=1.0,
+        controller=rd.PD(plan, 4e3, 400.0),
+        integrator="rk4",
+    )
     return replace(setup, record_period_s=1.0, estimate_error=False)
 
 
@@ -137,12 +147,10 @@ def test_what_passes_the_limits_of_the_file_is_said(cart) -> None:
     """Farthest values, times and durations are those of a run that keeps every step."""
     run, every = rd.simulate(cart), rd.simulate(cart, record_period_s=0.0)
     said = {remark.quantity: remark for remark in run.remarks if remark.kind is Kind.BEYOND}
-    assert set(said) == {"q", "v", "tau"}
-    for (quantity, x), limit in zip(
-        (("q", every.q), ("v", every.v), ("tau", every.tau)), (2.0, 5.0, 100.0), strict=True
-    ):
+    assert set(said) == {"q", "v", "u"}
+    for (quantity, x), limit in zip((("q", every.q), ("v", every.v), ("u", every.u)), (2.0, 5.0, 100.0), strict=True):
         remark, size = said[quantity], np.abs(x[:, 0])
-        slack = 0.01 * size.max() if quantity == "tau" else 0.0  # its value is that of the last stage
+        slack = 0.01 * size.max() if quantity == "u" else 0.0  # its value is that of the last stage
         assert abs(remark.value) == pytest.approx(size.max(), abs=slack)
         assert remark.at == pytest.approx(every.t[size.argmax()], abs=2e-3)
         assert remark.start == pytest.approx(every.t[np.flatnonzero(size > limit)[0]], abs=2e-3)
@@ -155,9 +163,9 @@ def test_a_limit_that_the_plant_enforces_is_reached_not_passed(cart) -> None:
     arm = cart.plant.dynamics
     effects = [*rd.joint_stops(arm.lower, arm.upper, 1e6), rd.EffortLimit("urdf")]
     said = {(remark.kind, remark.quantity) for remark in rd.simulate(cart, plant=rd.Plant(arm, effects)).remarks}
-    assert (Kind.EFFORT_REACHED, "tau") in said
+    assert (Kind.EFFORT_REACHED, "u") in said
     assert (Kind.STOP_REACHED, "q") in said
-    assert not {(Kind.BEYOND, "tau"), (Kind.BEYOND, "q")} & said
+    assert not {(Kind.BEYOND, "u"), (Kind.BEYOND, "q")} & said
 
 
 def test_a_start_beyond_a_limit_is_said(cart) -> None:
@@ -169,7 +177,9 @@ def test_a_start_beyond_a_limit_is_said(cart) -> None:
 
 def test_an_adaptive_run_is_watched_at_its_steps() -> None:
     """A pole falls: q and v against a fixed step of 1 ms; between two of its own steps little is missed."""
-    setup = rd.Setup(rd.Plant(rd.load("cart_pole")), np.array([0.0, 0.4]), duration_s=2.0, estimate_error=False)
+    setup = rd.Setup(
+        rd.Plant(rd.load("cart_pole")), np.array([0.0, 0.4]), duration_s=2.0, estimate_error=False, integrator="rk4"
+    )
     fine = rd.simulate(setup, integrator=rd.method("order_8"), step_s=1e-3)
     run = rd.simulate(setup, integrator=rd.Adaptive(), record_period_s=1.0)
     span = np.ptp(fine.extremes[:2], axis=1)
@@ -183,7 +193,13 @@ def test_a_record_that_hides_an_oscillation_is_said(joint, per_turn: int, said: 
     turn = 2 * np.pi * np.sqrt(INERTIA / stiffness)
     plant = rd.Plant(joint, [rd.Spring(stiffness)])
     run = rd.simulate(
-        plant, q0=[0.4], duration_s=4 * turn, step_s=turn / 200, record_period_s=turn / per_turn, estimate_error=False
+        plant,
+        q0=[0.4],
+        duration_s=4 * turn,
+        integrator="rk4",
+        step_s=turn / 200,
+        record_period_s=turn / per_turn,
+        estimate_error=False,
     )
     assert (kinds(run) == [Kind.COARSE]) == said
     if said:
@@ -245,7 +261,7 @@ def test_remarks_are_said_wherever_a_run_is_shown(joint, tmp_path) -> None:
     assert document((run,), (), None, False)["remarks"] == said
     told = json.loads(json.dumps(report.run(run)))
     assert [each["text"] for each in told["remarks"]] == [remark.text for remark in run.remarks]
-    assert told["extremes"]["tau"] == {"least": [-LIMIT], "largest": [LIMIT]}
+    assert told["extremes"]["u"] == {"least": [-LIMIT], "largest": [LIMIT]}
     back = rd.load_run(rd.save_run(run, tmp_path / "run"))
     assert back.remarks == run.remarks
     np.testing.assert_array_equal(back.extremes, run.extremes)

@@ -221,7 +221,7 @@ def test_ten_seconds_of_ur5_stay_under_fifteen_megabytes(tmp_path) -> None:
     plan = rd.via_points([0, 4, 7, 10], [UR5_Q, UR5_Q + 1, UR5_Q - 0.5, UR5_Q])
     kp, kd = rd.gains_from(1.0, frequency=20.0)
     drive = rd.ComputedTorque(arm, plan, kp, kd)
-    run = rd.simulate(rd.Plant(arm), q0=UR5_Q, duration_s=10.0, controller=drive, estimate_error=False)
+    run = rd.simulate(arm, UR5_Q, duration_s=10.0, controller=drive, integrator="rk4", estimate_error=False)
     assert len(run.t) == 10_001
     assert rd.save_replay(run, tmp_path / "ten.html").stat().st_size < 15e6
 

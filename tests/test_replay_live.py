@@ -137,7 +137,7 @@ def test_bad_input_is_told_in_one_line(swing, tmp_path) -> None:
 def test_runs_that_cannot_be_shown_say_why(swing, tmp_path) -> None:
     from dataclasses import replace
 
-    empty = replace(swing, **{name: getattr(swing, name)[:0] for name in ("t", "q", "v", "a", "tau")})
+    empty = replace(swing, **{name: getattr(swing, name)[:0] for name in ("t", "q", "v", "a", "u")})
     with pytest.raises(rd.RobotDynError, match="no samples"):
         rd.save_replay(empty, tmp_path / "empty.html")
     with pytest.raises(rd.RobotDynError, match="carries no URDF"):
@@ -153,7 +153,7 @@ def test_a_diverged_run_is_shown_as_far_as_it_is_finite(browser, tmp_path) -> No
     """The samples beyond are counted on the page."""
     from dataclasses import replace
 
-    swing = rd.simulate(rd.load("planar_2r"), q0=[0.4, -0.7], duration_s=0.4, estimate_error=False)
+    swing = rd.simulate(rd.load("planar_2r"), q0=[0.4, -0.7], duration_s=0.4, integrator="rk4", estimate_error=False)
     q = swing.q.copy()
     q[300:] = np.nan
     with pytest.warns(rd.ModelWarning, match="the last 101 samples are not shown"):

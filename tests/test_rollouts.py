@@ -16,15 +16,23 @@ from robot_dyn.simulation.machine import batch
 
 ARM = rd.load("planar_2r")
 Q, V = np.array([0.4, -0.7]), np.array([0.3, 0.5])
-REFERENCE = rd.quintic(Q, Q + 0.5, 0.1, start=0.05)
+REFERENCE = rd.quintic(Q, Q + 0.5, 0.1, start_s=0.05)
 PLANT = rd.Plant(ARM, [rd.ViscousFriction([0.3, 0.1]), rd.RegularisedCoulombFriction(0.2, 0.1), rd.EffortLimit(30.0)])
 SETUP = rd.Setup(
-    PLANT, Q, V, 0.2, rd.PD(REFERENCE, 40.0, [4.0, 3.0]), step_s=2e-3, record_period_s=0.01, engine="interpreted"
+    PLANT,
+    Q,
+    V,
+    0.2,
+    rd.PD(REFERENCE, 40.0, [4.0, 3.0]),
+    integrator="rk4",
+    step_s=2e-3,
+    record_period_s=0.01,
+    engine="interpreted",
 )
 PID = replace(SETUP, controller=rd.PID(REFERENCE, 40.0, 30.0, 4.0, effort_limit=3.0, period_s=0.004))
 ARM_TIP, INERTIA = "tip", ((0.01, 0.0, 0.0), (0.0, 0.02, 0.001), (0.0, 0.001, 0.03))
 NOMINAL = ARM.with_(payload=rd.Payload(ARM_TIP, 1.0))
-EVERYTHING = ("q", "v", "tau", "energy", "work")
+EVERYTHING = ("q", "v", "u", "energy", "work")
 
 
 def starts(count: int, spread: float = 0.3) -> np.ndarray:
@@ -33,7 +41,7 @@ def starts(count: int, spread: float = 0.3) -> np.ndarray:
 
 def arrays(runs: rd.Rollouts) -> list[np.ndarray]:
     """All arrays of numbers of a batch, by run."""
-    given = [runs.q, runs.v, runs.tau, runs.kinetic, runs.potential, *(runs.work or {}).values(), runs.ended]
+    given = [runs.q, runs.v, runs.u, runs.kinetic, runs.potential, *(runs.work or {}).values(), runs.ended]
     return [x for x in given if x is not None]
 
 
@@ -47,7 +55,7 @@ def test_each_run_is_that_of_simulate(setup: rd.Setup) -> None:
         for i in {0, count // 2, count - 1}:
             alone = rd.simulate(setup, q0=q0[i], estimate_error=False)
             np.testing.assert_allclose(runs.t, alone.t, rtol=1e-15)
-            pairs = [(runs.q, alone.q), (runs.v, alone.v), (runs.tau, alone.tau)]
+            pairs = [(runs.q, alone.q), (runs.v, alone.v), (runs.u, alone.u)]
             pairs += [(runs.kinetic, alone.ledger.kinetic), (runs.potential, alone.ledger.potential)]
             pairs += [(runs.work[name], work) for name, work in alone.ledger.work.items()]
             for ours, theirs in pairs:
@@ -83,7 +91,7 @@ def test_a_run_that_diverges_leaves_the_others_as_they_are(method: str) -> None:
         assert alone.outcome.ending == runs.outcome(i).ending == "diverged"
         assert runs.ended[i] == pytest.approx(alone.outcome.t, abs=0.01)
         later = runs.t > runs.ended[i] + 1e-9
-        assert later.any() and np.isnan(runs.q[i, later]).all() and np.isnan(runs.tau[i, later]).all()
+        assert later.any() and np.isnan(runs.q[i, later]).all() and np.isnan(runs.u[i, later]).all()
         assert np.isnan(runs.kinetic[i, later]).all() and np.isfinite(runs.q[i, 0]).all()
         assert runs.ended[i] < 0.2 and "smaller step" in runs.outcome(i).advice
     assert "2 diverged" in runs.summary
@@ -112,7 +120,7 @@ def test_values_that_differ_from_run_to_run() -> None:
         setup = replace(SETUP, plant=rd.Plant(ARM, effects), controller=rd.PD(REFERENCE, kp, kd), estimate_error=False)
         alone = rd.simulate(setup)
         np.testing.assert_allclose(runs.q[i], alone.q, rtol=0, atol=1e-12)
-        np.testing.assert_allclose(runs.tau[i], alone.tau, rtol=0, atol=1e-11)
+        np.testing.assert_allclose(runs.u[i], alone.u, rtol=0, atol=1e-11)
         for name, work in alone.ledger.work.items():
             np.testing.assert_allclose(runs.work[name][i], work, rtol=0, atol=1e-11)
 
@@ -134,7 +142,7 @@ def test_masses_of_payloads_that_differ_from_run_to_run(model: bool) -> None:
         alone = setup(mass)
         plant = rd.Plant(alone.plant.dynamics, [rd.ViscousFriction(damping), *PLANT.effects[1:]])
         alone = rd.simulate(replace(alone, plant=plant))
-        for ours, theirs in ((runs.q, alone.q), (runs.tau, alone.tau), (runs.potential, alone.ledger.potential)):
+        for ours, theirs in ((runs.q, alone.q), (runs.u, alone.u), (runs.potential, alone.ledger.potential)):
             np.testing.assert_allclose(ours[i], theirs, rtol=0, atol=1e-11 * (1 + np.abs(theirs).max()))
 
 
@@ -153,7 +161,7 @@ def test_a_mass_beyond_the_range_of_the_tile() -> None:
 
 def test_only_what_is_asked_for_is_recorded() -> None:
     runs = rd.rollouts(SETUP, starts(2), record=["v"])
-    assert runs.q is None and runs.tau is None and runs.kinetic is None and runs.work is None
+    assert runs.q is None and runs.u is None and runs.kinetic is None and runs.work is None
     np.testing.assert_array_equal(runs.v, rd.rollouts(SETUP, starts(2)).v)
 
 
@@ -184,7 +192,7 @@ def test_a_run_of_a_batch_is_the_trajectory_of_simulate(setup: rd.Setup, record:
         assert_alike(getattr(run, name), getattr(alone, name))
     everything, follows = record == EVERYTHING, not setup.controller.state_size
     for ours, theirs, known in (
-        (run.tau, alone.tau, everything or follows),
+        (run.u, alone.u, everything or follows),
         (run.a, alone.a, everything or follows),
         (run.power["control"], alone.power["control"], everything or follows),
         (run.power["viscous_friction"], alone.power["viscous_friction"], True),
@@ -205,7 +213,7 @@ def test_runs_are_numbered_as_lists_are() -> None:
     np.testing.assert_array_equal(runs[-2].q, runs.q[3])
     some = runs[1:4]
     assert len(some) == 3 and some.params["kp"][0, 0] == 1.0 and len(list(runs)) == 5
-    np.testing.assert_array_equal(some[0].tau, runs[1].tau)
+    np.testing.assert_array_equal(some[0].u, runs[1].u)
     with pytest.raises(IndexError):
         runs[5]
     with pytest.raises(QueryError, match="a whole number or a slice"):
@@ -231,7 +239,7 @@ def test_a_diverged_run_names_its_joint_its_time_and_what_to_do(method: str) -> 
     assert not runs.outcome(0).advice and f"run 1 diverged at t = {runs.ended[1]:g} s; " in runs.summary
 
 
-@pytest.mark.parametrize("record", [EVERYTHING, ("q", "v"), ("tau",)])
+@pytest.mark.parametrize("record", [EVERYTHING, ("q", "v"), ("u",)])
 def test_rollouts_are_saved_and_read(record: tuple[str, ...], tmp_path: Path) -> None:
     """Bit for bit, and a file that was cut short, or is of another kind, is refused."""
     v0 = np.tile(V, (4, 1))
@@ -305,7 +313,7 @@ def test_what_has_no_meaning_is_refused() -> None:
     }.items():
         with pytest.raises(QueryError, match=message):
             rd.rollouts(SETUP, **options)
-    with pytest.raises(QueryError, match="rollouts take an explicit or a Gauss method"):
+    with pytest.raises(QueryError, match="rollouts run in lock step by an explicit or a Gauss method, not by DOP853"):
         rd.rollouts(replace(SETUP, integrator=rd.Adaptive(), step_s=1e-3))
     with pytest.raises(TraceError, match="effect table"):
         rd.rollouts(replace(SETUP, plant=rd.Plant(ARM, [Table()])))

@@ -8,7 +8,7 @@ import json
 import os
 import tracemalloc
 import zipfile
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import asdict, fields, is_dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.scene.starters import starter
 from robot_dyn.simulation import archive
+from robot_dyn.simulation.remarks import Kind, Remark
 from robot_dyn.simulation.run_file import RunFileError
 from robot_dyn.simulation.table import export_csv
 from robot_dyn.simulation.trajectory import Ending, Outcome
@@ -54,16 +55,18 @@ def test_a_run_comes_back_as_it_was(run, tmp_path) -> None:
 
 
 def test_a_file_of_the_format_before_is_read(run, tmp_path) -> None:
-    """Format 3 had `desired` under another name."""
-    run = replace(run, desired=run.q + 0.1, deviation=run.q - 0.1)
+    """Format 3 had `desired` and `u` under other names, the latter in remarks as well."""
+    remark = Remark(Kind.CHATTER, "hinge", "u", 0.1, 0.2, 0.1, 3.0, None, "chatters", "take a longer period")
+    run = replace(run, desired=run.q + 0.1, deviation=run.q - 0.1, remarks=(remark,))
 
     def third(text: np.ndarray) -> np.ndarray:
-        return said(text, format=3)
+        return said(text, format=3, remarks=[asdict(replace(remark, quantity="tau"))])
 
-    path = resaved(run, tmp_path / "a.npz", about=third, desired=lambda _: None, wanted=lambda _: run.desired)
+    names = {"desired": lambda _: None, "wanted": lambda _: run.desired, "u": lambda _: None, "tau": lambda _: run.u}
+    path = resaved(run, tmp_path / "a.npz", about=third, **names)
     assert_same(replace(rd.load_run(path), about=run.about), run)
     path = resaved(run, tmp_path / "b.npz", about=third)
-    with pytest.raises(RunFileError, match="'desired' is not known to the format of the file"):
+    with pytest.raises(RunFileError, match=r"'(desired|u)' is not known to the format of the file"):
         rd.load_run(path)
 
 
@@ -204,7 +207,7 @@ def test_members_that_do_not_fit_together_are_refused_by_name(run, tmp_path, nam
     [
         ("q", lambda q: q[:, ::-1].copy()),
         ("t", lambda t: t * 2),
-        ("tau", lambda u: u + 1e-300),
+        ("u", lambda u: u + 1e-300),
         ("about", lambda text: said(text, statistics__steps=7)),
         ("at_stop", lambda _: np.zeros((21, 2), bool)),
     ],

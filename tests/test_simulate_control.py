@@ -51,11 +51,11 @@ def test_torque_of_a_sampled_controller_is_held_between_its_ticks(method) -> Non
     np.testing.assert_allclose(run.t[ticks], period * np.arange(count + 1), atol=1e-14)  # steps end there
     for tick, following in pairwise(ticks):
         assert following - tick >= 6
-        np.testing.assert_array_equal(run.tau[tick:following], np.tile(run.tau[tick], (following - tick, 1)))
+        np.testing.assert_array_equal(run.u[tick:following], np.tile(run.u[tick], (following - tick, 1)))
     for i in ticks:
         expected = law.torque(run.t[i], run.q[i], run.v[i], np.zeros(0))
-        np.testing.assert_allclose(run.tau[i], expected, rtol=1e-12, atol=1e-12)
-    assert (np.abs(np.diff(run.tau[ticks], axis=0)) > 1e-6).all(axis=1).sum() >= count - 1
+        np.testing.assert_allclose(run.u[i], expected, rtol=1e-12, atol=1e-12)
+    assert (np.abs(np.diff(run.u[ticks], axis=0)) > 1e-6).all(axis=1).sum() >= count - 1
 
 
 @pytest.mark.parametrize("method", METHODS, ids=name)
@@ -69,7 +69,7 @@ def test_states_of_a_sampled_pid_advance_once_a_tick(method, step: float) -> Non
     z = np.zeros(2)
     for i in ticks:
         t, q, v = run.t[i], run.q[i], run.v[i]
-        np.testing.assert_allclose(run.tau[i], law.torque(t, q, v, z), rtol=1e-11)
+        np.testing.assert_allclose(run.u[i], law.torque(t, q, v, z), rtol=1e-11)
         z = z + 0.012 * law.state_rate(t, q, v, z)
     assert (np.abs(z) > 1.0).all()  # an integral that matters
 
@@ -80,7 +80,9 @@ def test_continuous_control_is_the_limit_of_a_small_period(kind: int) -> None:
     ends = {}
     for period in (0.0, 1e-3, 2e-3, 4e-3):
         law = controllers(period)[kind]
-        run = rd.simulate(PLANT, **START, duration_s=0.2, controller=law, step_s=1e-3, estimate_error=False)
+        run = rd.simulate(
+            PLANT, **START, duration_s=0.2, controller=law, integrator="rk4", step_s=1e-3, estimate_error=False
+        )
         ends[period] = run.q[-1]
     distance = [np.linalg.norm(ends[period] - ends[0.0]) for period in (1e-3, 2e-3, 4e-3)]
     assert 1e-7 < distance[0] < 1e-2
@@ -91,7 +93,7 @@ def test_exact_computed_torque_makes_each_joint_a_linear_oscillator() -> None:
     """ë + 2 ζ ω ė + ω² e = 0 from e(0), whatever the arm: the closed form within the 1e-10 of its estimate."""
     omega, zeta = 9.0, 0.6
     law = rd.ComputedTorque(DOUBLE, rd.hold([0.9, 0.2]), *rd.gains_from(1.0, omega, zeta))
-    run = rd.simulate(rd.Plant(DOUBLE), **START, duration_s=0.5, controller=law, step_s=5e-4)
+    run = rd.simulate(rd.Plant(DOUBLE), **START, duration_s=0.5, controller=law, integrator="rk4", step_s=5e-4)
     e0, de0, decay = np.array([0.5, 0.9]), -np.array(START["v0"]), zeta * omega
     damped, t = omega * np.sqrt(1 - zeta**2), run.t[:, None]
     wave = e0 * np.cos(damped * t) + (de0 + decay * e0) / damped * np.sin(damped * t)
@@ -109,15 +111,15 @@ def test_recorded_torque_is_within_the_effort_limit(period: float) -> None:
     law = rd.PD(GOAL, [900.0, 300.0], [20.0, 8.0], period_s=period)
     plant = rd.Plant(DOUBLE, [rd.EffortLimit(limit)])
     run = rd.simulate(plant, **START, duration_s=0.3, controller=law, estimate_error=False)
-    assert (np.abs(run.tau) <= limit).all()
-    assert (np.abs(run.tau) == limit).any(axis=0).all()
-    assert (np.abs(run.tau) < limit).any(axis=0).all()
+    assert (np.abs(run.u) <= limit).all()
+    assert (np.abs(run.u) == limit).any(axis=0).all()
+    assert (np.abs(run.u) < limit).any(axis=0).all()
     if period == 0.0:
         asked = [law.torque(*state, np.zeros(0)) for state in zip(run.t, run.q, run.v, strict=True)]
-        np.testing.assert_allclose(run.tau, np.clip(asked, -limit, limit), atol=1e-12)
-    expected = DOUBLE.forward_dynamics(run.q, run.v, run.tau)
+        np.testing.assert_allclose(run.u, np.clip(asked, -limit, limit), atol=1e-12)
+    expected = DOUBLE.forward_dynamics(run.q, run.v, run.u)
     np.testing.assert_allclose(run.a, expected, atol=1e-11 * np.abs(expected).max())
-    np.testing.assert_allclose(run.power["control"], (run.tau * run.v).sum(axis=1), atol=1e-12)
+    np.testing.assert_allclose(run.power["control"], (run.u * run.v).sum(axis=1), atol=1e-12)
 
 
 @pytest.mark.parametrize("edge", [0.3, 0.6, 0.7])
@@ -125,7 +127,7 @@ def test_a_switch_on_a_tick_is_one_cut(edge: float) -> None:
     """3 · 0.1 = 0.30000000000000004 is not 0.3: the two are one end of a step, and companions are not lost to it."""
     push = rd.ExternalWrench("tip", [1.0, 0.0, -2.0, 0.0, -0.5, 0.0], start_s=0.1, end_s=edge)
     law = rd.PD(GOAL, [8.0, 2.0], [1.0, 0.2], period_s=0.1)  # slow enough for 10 Hz
-    run = rd.simulate(rd.Plant(DOUBLE, [push]), **START, duration_s=0.9, controller=law, step_s=5e-3)
+    run = rd.simulate(rd.Plant(DOUBLE, [push]), **START, duration_s=0.9, controller=law, integrator="rk4", step_s=5e-3)
     assert np.diff(run.t).min() > 1e-3
     assert run.error is not None
     assert run.error.final < 1e-6

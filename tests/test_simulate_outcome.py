@@ -62,7 +62,7 @@ def check_kept(run: rd.Trajectory, until: float, early: float = 2e-3) -> None:
     """All samples up to where it ended are there, one a step of 1 ms or less; the last may lack what has no value."""
     assert run.t[-1] == pytest.approx(until, abs=early)
     assert len(run.t) >= round(run.t[-1] / 1e-3)
-    for array in (run.q, run.v, *(x[:-1] for x in (run.a, run.tau, run.ledger.residual, *run.power.values()))):
+    for array in (run.q, run.v, *(x[:-1] for x in (run.a, run.u, run.ledger.residual, *run.power.values()))):
         assert np.isfinite(array).all()
     assert run.summary.startswith(str(run.outcome.ending))
 
@@ -166,7 +166,8 @@ GOOD = {**START, "duration_s": 0.1}
         ({"record_period_s": -0.1}, "record_period_s must"),
         ({"controller": rd.PD(rd.hold([0.0, 0.0, 0.0]), 1.0, 1.0)}, "drives 3 joints, the plant has 2"),
         ({"controller": 3}, "controller"),
-        ({"integrator": "rk4"}, "integrator"),
+        ({"integrator": "rk44"}, "no integration method 'rk44'; nearest: rk4"),
+        ({"integrator": rd.Adaptive}, "integrator: give a name"),
     ],
     ids=str,
 )
@@ -264,7 +265,7 @@ def test_a_companion_whose_energy_overflows_is_no_end_of_the_run() -> None:
     """RK4 is stable at ω h = 2.5; at 4 h a step multiplies q by 400, and in 64 steps ½ k q² overflows, q does not."""
     cart = rd.load("cart_pole").with_(lock={"hinge": 0.3})
     k = float(cart.M([0.0])[0, 0]) * 2.5e3**2
-    run = rd.simulate(rd.Plant(cart, [rd.Spring(k)]), q0=[0.4], duration_s=1.0, engine="interpreted")
+    run = rd.simulate(rd.Plant(cart, [rd.Spring(k)]), q0=[0.4], duration_s=1.0, engine="interpreted", integrator="rk4")
     assert run.outcome.ending == "finished"
     assert run.error is not None and "step" in run.error.note
 
@@ -285,7 +286,7 @@ class WithoutEnergy(Conservative):
 
 @pytest.mark.parametrize("engine", ["interpreted", "auto"])
 def test_a_look_at_the_energy_that_fails_ends_the_run(engine: str) -> None:
-    run = rd.simulate(rd.Plant(DOUBLE, [WithoutEnergy()]), **START, duration_s=0.2, engine=engine)
+    run = rd.simulate(rd.Plant(DOUBLE, [WithoutEnergy()]), **START, duration_s=0.2, engine=engine, integrator="rk4")
     assert run.outcome.ending == "diverged"
     assert 0.05 < run.outcome.t < 0.05 + 64e-3
     assert "the potential has no value" in run.outcome.advice
@@ -320,7 +321,7 @@ def test_an_interrupt_in_a_companion_run_ends_the_estimate_and_keeps_the_run(met
 def test_an_interrupt_before_the_first_step_leaves_the_start(engine: str, period: float, monkeypatch) -> None:
     """One sample, the state at 0 s; what a controller would have held is not known."""
     law = rd.PD(rd.hold([0.1, 0.2]), 3.0, 1.0, period_s=period)
-    setup = rd.Setup(rd.Plant(DOUBLE), **START, duration_s=0.2, controller=law, engine=engine)
+    setup = rd.Setup(rd.Plant(DOUBLE), integrator="rk4", **START, duration_s=0.2, controller=law, engine=engine)
     rd.simulate(setup)  # compiled, and looked at, before
 
     def interrupted(*_, **__):

@@ -193,7 +193,7 @@ class Raises(rd.Stateless):
 )
 def test_what_cannot_be_traced_says_which_line_stopped_it(effects, controller, part, code, why) -> None:
     line = code.co_firstlineno + (1 if code is opaque.__code__ else 2)
-    setup = rd.Setup(rd.Plant(ARM, effects), Q, V, 0.1, controller, engine="compiled")
+    setup = rd.Setup(rd.Plant(ARM, effects), Q, V, 0.1, controller, engine="compiled", integrator="rk4")
     with pytest.raises(
         TraceError, match=rf"{part} cannot be compiled \(line {line} of test_user_code.py: {why}"
     ) as caught:
@@ -208,8 +208,10 @@ def test_a_function_is_the_controller_of_the_same_law() -> None:
     def law(t, q, v):
         return 4.0 * (Q - 0.2 - q) - 1.5 * v
 
-    setup = rd.Setup(rd.Plant(ARM), Q, V, 0.1, rd.PD(rd.hold(Q - 0.2), 4.0, 1.5), engine="interpreted")
-    run = rd.simulate(rd.Plant(ARM), q0=Q, v0=V, duration_s=0.1, controller=law)
+    setup = rd.Setup(
+        rd.Plant(ARM), Q, V, 0.1, rd.PD(rd.hold(Q - 0.2), 4.0, 1.5), engine="interpreted", integrator="rk4"
+    )
+    run = rd.simulate(rd.Plant(ARM), q0=Q, v0=V, duration_s=0.1, controller=law, integrator="rk4")
     assert np.array_equal(run.q, rd.simulate(setup).q)
     assert run.statistics.engine == "interpreted (law is not the library's own)"
     compiled = rd.simulate(setup, controller=law, engine="compiled")
@@ -334,7 +336,9 @@ class Changing(rd.Active):
 def test_machine_code_of_a_part_that_has_changed_since_is_refused() -> None:
     """Constants are in the code: another value is found by the self check of each run of a user's own parts."""
     effect = Changing(3.0)
-    setup = rd.Setup(rd.Plant(ARM, [effect]), [0.3, -0.4], duration_s=0.05, engine="compiled", estimate_error=False)
+    setup = rd.Setup(
+        rd.Plant(ARM, [effect]), [0.3, -0.4], duration_s=0.05, engine="compiled", estimate_error=False, integrator="rk4"
+    )
     rd.simulate(setup)
     effect.stiffness = 5.0
     with pytest.raises(MachineError, match="differs from the interpreted one"):

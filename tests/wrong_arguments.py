@@ -34,7 +34,7 @@ FOR_LOOPS = {name for kind in (Force, Conservative, Bound, Controller, Arithmeti
 FOR_LOOPS |= {"task_acceleration"}
 LAX = {  # arguments that may be infinite or unknown, or of any shape
     "ExternalWrench.acts": {"t"},
-    "Adaptive": {"max_step"}, "Adaptive.with_tolerances": {"longest"},
+    "Adaptive": {"max_step_s"}, "Adaptive.with_tolerances": {"longest_s"},
     "EffortLimit": {"limit"}, "ExternalWrench": {"start_s", "end_s"},
     "JointStopDamper": {"lower", "upper"}, "JointStopSpring": {"lower", "upper"}, "PID": {"effort_limit"},
     "PiecewisePolynomial.at": {"t"}, "Samples.at": {"t"},
@@ -42,7 +42,7 @@ LAX = {  # arguments that may be infinite or unknown, or of any shape
     "midpoint": {"x"}, "radius": {"x"}, "coefficient": {"elsewhere"},
     "joint_stops": {"lower", "upper"}, "plot": {"limits"},
 }  # fmt: skip
-SIGNED = {"Adaptive": ("rtol", "atol", "max_step"), "Payload": ("mass",), "Setup": ("duration_s", "step_s")}
+SIGNED = {"Adaptive": ("rtol", "atol", "max_step_s"), "Payload": ("mass",), "Setup": ("duration_s", "step_s")}
 
 
 def public() -> Iterator[str]:
@@ -71,7 +71,7 @@ def examples(folder: Path) -> dict[str, Example]:
     q, v, u = np.array([0.3, -0.4]), np.array([0.7, 1.1]), np.array([1.3, 0.9])
     friction, hold = rd.ViscousFriction(0.1), rd.hold(q)
     plant, own = rd.Plant(robot, [friction]), rd.Lagrangian(robot)
-    setup = rd.Setup(plant, q, duration_s=0.01)
+    setup = rd.Setup(plant, q, duration_s=0.01, integrator="rk4")
     run, several = rd.simulate(setup), rd.rollouts(setup, np.tile(q, (2, 1)))
     saved, scene, urdf = rd.save_run(run, folder / "run"), folder / "scene.toml", folder / "arm.urdf"
     scene.write_text('robot = "cart_pole"\nduration_s = 0.01\n', encoding="utf-8")
@@ -99,10 +99,10 @@ def examples(folder: Path) -> dict[str, Example]:
     points, eye = [q, u, v], np.eye(3)
     path: Any = rd.line([0.1, 0.2, 0.3], [0.4, 0.2, 0.1], 1.0)
     return made | {
-        "Adaptive": (rd.Adaptive, {"method": "Radau", "rtol": 1e-8, "atol": 1e-9, "max_step": 0.5}),
+        "Adaptive": (rd.Adaptive, {"method": "Radau", "rtol": 1e-8, "atol": 1e-9, "max_step_s": 0.5}),
         "Adaptive.solve": (adaptive.solve, {"system": system, "t0": 0.0, "y0": q, "t1": 1.0, "stop": lambda t, y: 1.0}),
         "Adaptive.steps": (adaptive.steps, {"system": system, "t0": 0.0, "y0": q, "t1": 1.0, "stop": lambda t, y: 1.0}),
-        "Adaptive.with_tolerances": (adaptive.with_tolerances, {"factor": 10.0, "longest": 0.5}),
+        "Adaptive.with_tolerances": (adaptive.with_tolerances, {"factor": 10.0, "longest_s": 0.5}),
         "Ball": (rd.Ball, {"bits": 53}),
         "Compiled": (rd.Compiled, {"robot_or_plant": robot, "dtype": "float64", "threads": 1, "cache": False}),
         "ComputedTorque": (rd.ComputedTorque, pair),
@@ -165,8 +165,8 @@ def examples(folder: Path) -> dict[str, Example]:
         "ViscousFriction": (rd.ViscousFriction, {"damping": [0.1, 0.2]}),
         "circle": (
             rd.circle,
-            {"centre": [0.1, 0.2, 0.3], "radius": 0.1, "normal": [0.0, 0.1, 1.0], "period": 1.0, "turns": 1.0,
-             "ramp": 0.1, "toward": [1.0, 0.0, 0.0], "rotation": eye, "start": 0.1},
+            {"centre": [0.1, 0.2, 0.3], "radius": 0.1, "normal": [0.0, 0.1, 1.0], "period_s": 1.0, "turns": 1.0,
+             "ramp_s": 0.1, "toward": [1.0, 0.0, 0.0], "rotation": eye, "start_s": 0.1},
         ),
         "coefficient": (
             rd.coefficient,
@@ -185,8 +185,8 @@ def examples(folder: Path) -> dict[str, Example]:
         "joint_stops": (rd.joint_stops, stops | {"stiffness": 10.0, "damping": 0.1}),
         "line": (
             rd.line,
-            {"p0": [0.1, 0.2, 0.3], "p1": [0.4, 0.2, 0.1], "duration": 1.0, "rotation": eye, "rotation_end": eye,
-             "start": 0.1},
+            {"p0": [0.1, 0.2, 0.3], "p1": [0.4, 0.2, 0.1], "duration_s": 1.0, "rotation": eye, "rotation_end": eye,
+             "start_s": 0.1},
         ),
         "linearise": (rd.linearise, {"plant": plant, "q": q, "v": v, "u": u, "t": 0.1}),
         "list_robots": (rd.list_robots, {}),
@@ -199,7 +199,7 @@ def examples(folder: Path) -> dict[str, Example]:
         "plot": (rd.plot, {"run": run, "only": ["hinge"], "limits": u, "theme": "dark"}),
         "quintic": (
             rd.quintic,
-            {"q0": q, "q1": v, "duration": 1.0, "start": 0.1, "v0": 0.1, "v1": u, "a0": u, "a1": 0.0},
+            {"q0": q, "q1": v, "duration_s": 1.0, "start_s": 0.1, "v0": 0.1, "v1": u, "a0": u, "a1": 0.0},
         ),
         "read_scene": (rd.read_scene, {"path": scene, "effects": {"own": rd.Spring}}),
         "replay": (
@@ -207,7 +207,7 @@ def examples(folder: Path) -> dict[str, Example]:
         ),
         "rollouts": (
             rd.rollouts,
-            {"setup": setup, "q0": [q, u], "v0": [v, u], "params": {"viscous_friction.damping": [0.1, 0.2]},
+            {"what": setup, "q0": [q, u], "v0": [v, u], "params": {"viscous_friction.damping": [0.1, 0.2]},
              "record": ("q",), "threads": 1, "most_bytes": 10**9},
         ),
         "save_plot": (rd.save_plot, {"run": run, "path": folder / "plot.png", "dpi": 50.0, "only": ["hinge"]}),
@@ -227,7 +227,7 @@ def examples(folder: Path) -> dict[str, Example]:
             rd.task_dynamics,
             {"dynamics": robot, "q": q, "v": v, "frame": "pole", "rows": (0,), "threshold": 0.01},
         ),
-        "via_points": (rd.via_points, {"times": [0.0, 0.5, 1.0], "points": points, "kind": "cubic"}),
+        "via_points": (rd.via_points, {"times_s": [0.0, 0.5, 1.0], "points": points, "kind": "cubic"}),
     }  # fmt: skip
 
 

@@ -149,7 +149,7 @@ def _extremes(trajectory: Trajectory) -> Document | None:
         return None
     return {
         name: {"least": [_finite(x) for x in least], "largest": [_finite(x) for x in largest]}
-        for name, (least, largest) in zip(("q", "v", "tau"), trajectory.extremes, strict=True)
+        for name, (least, largest) in zip(("q", "v", "u"), trajectory.extremes, strict=True)
     }
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any, final
@@ -37,19 +38,19 @@ class CompiledDynamics(Dynamics, Parametrised):
 
     Attributes:
         original: The robot as given.
-        dtype: "float64" or "float32".
+        dtype: np.float64 or np.float32, or its name; kept as the name.
         threads: For batches; None for all processors.
         cache: Whether compiled code is kept on disk.
     """
 
     original: Robot
-    dtype: str = "float64"
+    dtype: Any = "float64"
     threads: int | None = 1
     cache: bool = True
 
     def __post_init__(self) -> None:
         instance("robot", self.original, Robot, "give a Robot, such as rd.load('ur5')")
-        choice("dtype", self.dtype, ("float64", "float32"))
+        object.__setattr__(self, "dtype", _dtype(self.dtype))
         truth("cache", self.cache)
         thread_count(self.threads)
 
@@ -213,3 +214,13 @@ class CompiledDynamics(Dynamics, Parametrised):
         if quantity == _DERIVATIVES:
             return partial(forward_dynamics_derivatives, self.robot)
         return getattr(self.robot, quantity)
+
+
+def _dtype(given: Any) -> str:
+    """The name of a type of NumPy that machine code is made for."""
+    name = given
+    if given is not None and not isinstance(given, str):
+        with suppress(Exception):  # whatever a foreign object makes of it
+            found = np.dtype(given)
+            name = found.name if found.isnative else given
+    return choice("dtype", name, ("float64", "float32"))

@@ -182,20 +182,20 @@ class CompiledPlant:
 
 @overload
 def Compiled(
-    robot_or_plant: Robot, *, dtype: str = ..., threads: int | None = ..., cache: bool = ...
+    robot_or_plant: Robot, *, dtype: Any = ..., threads: int | None = ..., cache: bool = ...
 ) -> CompiledDynamics: ...
 @overload
 def Compiled(
-    robot_or_plant: Plant, *, dtype: str = ..., threads: int | None = ..., cache: bool = ...
+    robot_or_plant: Plant, *, dtype: Any = ..., threads: int | None = ..., cache: bool = ...
 ) -> CompiledPlant: ...
 def Compiled(
-    robot_or_plant: Any, *, dtype: str = "float64", threads: int | None = 1, cache: bool = True
+    robot_or_plant: Any, *, dtype: Any = "float64", threads: int | None = 1, cache: bool = True
 ) -> CompiledDynamics | CompiledPlant:
     """A robot or a plant as machine code, for one state (n,) and batches (..., n).
 
     Args:
         robot_or_plant: A Robot, or a Plant whose dynamics is one (or the Lagrangian of one).
-        dtype: "float64" or "float32".
+        dtype: np.float64 or np.float32, or its name.
         threads: For batches; None for all processors.
         cache: Whether compiled code is kept on disk.
 

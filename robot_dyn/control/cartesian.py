@@ -11,13 +11,14 @@ from typing import Any, final
 
 import numpy as np
 
+from robot_dyn import former
 from robot_dyn.arithmetic import Array
 from robot_dyn.coefficients import coefficient
 from robot_dyn.control.orientation import orientation_error
 from robot_dyn.control.reference import PiecewisePolynomial, Reference, hermite, number, numbers, quintic
 from robot_dyn.errors import ControlError, shown
 from robot_dyn.spatial import rotation as rotation_about
-from robot_dyn.validate import duration as seconds
+from robot_dyn.validate import duration
 
 _MOST_TURNS = 1000
 _TURN_KNOTS, _RAMP_KNOTS = 64, 32  # per turn and per ramp: the accuracy that `circle` states
@@ -75,19 +76,20 @@ class CartesianReference(Reference):
         return p, R, np.concatenate(V, -1), np.concatenate(V_rate, -1)
 
 
+@former.arguments(duration="duration_s", start="start_s")
 @np.errstate(all="ignore")  # what overflows is refused as not finite
 def line(
-    p0: Any, p1: Any, duration: float, *, rotation: Any = None, rotation_end: Any = None, start: float = 0.0
+    p0: Any, p1: Any, duration_s: float, *, rotation: Any = None, rotation_end: Any = None, start_s: float = 0.0
 ) -> CartesianReference:
     """The straight line from p0 to p1 and the shortest turn between two orientations, both of least jerk from rest.
 
     Args:
         p0: Where it starts, shape (3,), in [m].
         p1: Where it ends, shape (3,).
-        duration: In [s], positive.
+        duration_s: In [s], positive.
         rotation: Orientation at the start, (3, 3); None leaves it free.
         rotation_end: Orientation at the end, (3, 3); None keeps that of the start.
-        start: Time at which it starts, in [s].
+        start_s: Time at which it starts, in [s].
 
     Raises:
         ControlError: If a value has the wrong shape or is not a rotation.
@@ -95,7 +97,7 @@ def line(
     Source: Siciliano et al. 2009, secs. 4.3.2 and 4.3.3.
     """
     p0, p1 = numbers("p0", p0, (3,)), numbers("p1", p1, (3,))
-    position = quintic(p0, p1, duration, start=start)
+    position = quintic(p0, p1, duration_s, start_s=start_s)
     if rotation is None or rotation_end is None:
         if rotation_end is not None:
             raise ControlError("rotation_end needs a rotation to start from")
@@ -104,40 +106,41 @@ def line(
     angle = np.linalg.norm(turn)
     if angle == 0:
         return CartesianReference(position, rotation)
-    return CartesianReference(position, rotation, turn, quintic([0.0], [angle], duration, start=start))
+    return CartesianReference(position, rotation, turn, quintic([0.0], [angle], duration_s, start_s=start_s))
 
 
+@former.arguments(period="period_s", ramp="ramp_s", start="start_s")
 @np.errstate(all="ignore")  # what overflows is refused as not finite
 def circle(
     centre: Any,
     radius: float,
     normal: Any,
-    period: float,
+    period_s: float,
     *,
     turns: float = 1.0,
-    ramp: float | None = None,
+    ramp_s: float | None = None,
     toward: Any = None,
     rotation: Any = None,
-    start: float = 0.0,
+    start_s: float = 0.0,
 ) -> CartesianReference:
     """A circle at constant speed, with a smooth start and end: quintic pieces within 1e-9 of the radius.
 
     The pieces match p, ṗ, p̈ at 64 knots a turn or more; between knots the distance from the centre is off by less than
-    1e-9 of the radius. The speed rises as the quintic of least jerk over `ramp`, and falls alike, so that the motion
-    lasts turns · period + ramp.
+    1e-9 of the radius. The speed rises as the quintic of least jerk over `ramp_s`, and falls alike, so that the motion
+    lasts turns · period_s + ramp_s.
 
     Args:
         centre: Shape (3,), in [m].
         radius: In [m], positive.
         normal: Axis about which it turns by the right hand, shape (3,), of any length.
-        period: Time of one turn at full speed, in [s].
-        turns: Number of turns, positive, 1000 at most; ramp may be at most turns · period.
-        ramp: Time to full speed in [s]; 0 starts at full speed, with a jump. Unless given, a quarter of the period, or
-            turns · period if that is less.
+        period_s: Time of one turn at full speed, in [s].
+        turns: Number of turns, positive, 1000 at most; ramp_s may be at most turns · period_s.
+        ramp_s: Time to full speed in [s]; 0 starts at full speed, with a jump. Unless given, a quarter of the period,
+            or turns · period_s if that is less.
         toward: Direction from the centre to the starting point; unless given, that of the base's axis (x, y or z) which
             lies best in the plane, projected onto it.
         rotation: Constant orientation, (3, 3); None leaves it free.
-        start: Time at which it starts, in [s].
+        start_s: Time at which it starts, in [s].
 
     Raises:
         ControlError: If a value is not allowed.
@@ -145,12 +148,12 @@ def circle(
     Source: Siciliano et al. 2009, sec. 4.3.1 (path primitives).
     """
     centre, r, normal = numbers("centre", centre, (3,)), number("radius", radius, above=0), _direction("normal", normal)
-    T, turns = seconds("period", period, error=ControlError), number("turns", turns, above=0)
+    T, turns = duration("period_s", period_s, error=ControlError), number("turns", turns, above=0)
     if turns > _MOST_TURNS:
         raise ControlError(f"turns must be at most {_MOST_TURNS}, got {turns:g}; each takes {_TURN_KNOTS} pieces")
-    rise = number("ramp", min(T / 4, turns * T) if ramp is None else ramp, least=0)
+    rise = number("ramp_s", min(T / 4, turns * T) if ramp_s is None else ramp_s, least=0)
     if rise > turns * T:
-        raise ControlError(f"ramp must be at most turns · period = {turns * T} s, got {rise} s")
+        raise ControlError(f"ramp_s must be at most turns · period_s = {turns * T} s, got {rise} s")
     toward = np.eye(3)[np.argmin(np.abs(normal))] if toward is None else numbers("toward", toward, (3,))
     x = _direction("toward, in the plane of the circle,", toward - (toward @ normal) * normal)
     y = np.cross(normal, x)
@@ -160,7 +163,7 @@ def circle(
     along, across = np.cos(phi) * x + np.sin(phi) * y, np.cos(phi) * y - np.sin(phi) * x
     data = np.stack([centre + r * along, r * rate * across, r * (rate2 * across - rate**2 * along)], axis=1)
     pieces = hermite(np.diff(knots), np.concatenate([data[:-1], data[1:]], axis=1))
-    return CartesianReference(PiecewisePolynomial(number("start", start) + knots, pieces), rotation)
+    return CartesianReference(PiecewisePolynomial(number("start_s", start_s) + knots, pieces), rotation)
 
 
 def _ramped_angle(speed: float, cruise: float, rise: float) -> PiecewisePolynomial:

@@ -19,9 +19,10 @@ from robot_dyn.control.reference import Reference
 from robot_dyn.errors import ControlError, shown
 from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.validate import duration
+from robot_dyn.values import Value
 
 
-class Controller(ABC):
+class Controller(Value, ABC):
     """A control law τ = τ(t, q, v, z) with controller states, ż = rate(t, q, v, z), z(0) = 0.
 
     Subclass `Stateless` if it has no states. Its methods are pure functions, called with

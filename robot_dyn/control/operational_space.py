@@ -20,13 +20,14 @@ from robot_dyn.control.orientation import orientation_error
 from robot_dyn.control.reference import number, numbers
 from robot_dyn.errors import ControlError, shown
 from robot_dyn.model.dynamics import Dynamics, acceleration
+from robot_dyn.values import Value, read_only
 
 POSITION, POSE = (0, 1, 2), (0, 1, 2, 3, 4, 5)  # rows of a twist
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class TaskDynamics:
+class TaskDynamics(Value):
     """The terms of Λ ẍ + μ + p = F at one state, or at several along batch axes.
 
     Attributes:
@@ -46,6 +47,9 @@ class TaskDynamics:
     p: Array
     drift: Array
     smallest: Array
+
+    def __post_init__(self) -> None:
+        read_only(self)
 
     @property
     def projector(self) -> Array:

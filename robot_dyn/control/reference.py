@@ -14,12 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn import validate
+from robot_dyn import former, validate
 from robot_dyn.arithmetic import Array
 from robot_dyn.errors import ControlError, QueryError
-from robot_dyn.validate import choice
-from robot_dyn.validate import duration as seconds
-from robot_dyn.validate import times as real_times
+from robot_dyn.validate import choice, duration, times
+from robot_dyn.values import Value
 
 # values given at each end of a piece, by kind of spline
 _DERIVATIVES = {"cubic": 2, "quintic": 3}
@@ -33,7 +32,7 @@ number = partial(validate.number, error=ControlError)
 numbers = partial(validate.numbers, error=ControlError)
 
 
-class Reference(ABC):
+class Reference(Value, ABC):
     """What a controller follows: a function of time made of piecewise polynomials."""
 
     @property
@@ -101,7 +100,7 @@ class PiecewisePolynomial(Reference):
             (q, v, a), each of shape (n,) or (..., n).
         """
         if not (isinstance(t, float) and isfinite(t)):
-            t = real_times("t", t)
+            t = times("t", t)
             if np.isnan(t).any():
                 raise QueryError("t must be a time in seconds, got nan")
         t, breaks = np.asarray(t), self.breaks
@@ -123,19 +122,28 @@ def hold(q: Any) -> PiecewisePolynomial:
     return PiecewisePolynomial([0.0, 1.0], numbers("q", q, ("n",))[None, None])
 
 
+@former.arguments(duration="duration_s", start="start_s")
 @np.errstate(all="ignore")  # what overflows is refused as not finite
 def quintic(
-    q0: Any, q1: Any, duration: float, *, start: float = 0.0, v0: Any = 0.0, v1: Any = 0.0, a0: Any = 0.0, a1: Any = 0.0
+    q0: Any,
+    q1: Any,
+    duration_s: float,
+    *,
+    start_s: float = 0.0,
+    v0: Any = 0.0,
+    v1: Any = 0.0,
+    a0: Any = 0.0,
+    a1: Any = 0.0,
 ) -> PiecewisePolynomial:
     """The quintic from q0 to q1; between rests the motion of least jerk, q0 + (q1 − q0)(10 s³ − 15 s⁴ + 6 s⁵).
 
-    Between rests its greatest velocity is 15/8 · (q1 − q0)/duration, halfway.
+    Between rests its greatest velocity is 15/8 · (q1 − q0)/duration_s, halfway.
 
     Args:
         q0: Where it starts, shape (n,), in [rad] or [m].
         q1: Where it ends, shape (n,).
-        duration: In [s], positive.
-        start: Time at which it starts, in [s].
+        duration_s: In [s], positive.
+        start_s: Time at which it starts, in [s].
         v0: Velocity at the start, a scalar or (n,), in [rad/s] or [m/s].
         v1: Velocity at the end, likewise.
         a0: Acceleration at the start, a scalar or (n,), in [rad/s²] or [m/s²].
@@ -146,7 +154,7 @@ def quintic(
 
     Source: Siciliano et al. 2009, sec. 4.2.1; Flash and Hogan, The coordination of arm movements, 1985.
     """
-    T, begin = seconds("duration", duration, error=ControlError), number("start", start)
+    T, begin = duration("duration_s", duration_s, error=ControlError), number("start_s", start_s)
     q0 = numbers("q0", q0, ("n",))
     shape = q0.shape
     q1 = numbers("q1", q1, shape)
@@ -156,15 +164,18 @@ def quintic(
     return PiecewisePolynomial([begin, begin + T], hermite(np.array([T]), ends[None]))
 
 
+@former.arguments(times="times_s")
 @np.errstate(all="ignore")  # what overflows is refused as not finite
-def via_points(times: Any, points: Any, *, kind: str = "quintic", v0: Any = 0.0, v1: Any = 0.0) -> PiecewisePolynomial:
+def via_points(
+    times_s: Any, points: Any, *, kind: str = "quintic", v0: Any = 0.0, v1: Any = 0.0
+) -> PiecewisePolynomial:
     """The spline through points at given times, from rest to rest unless velocities at its ends are given.
 
     "quintic" has four continuous derivatives and starts and ends with zero acceleration; "cubic" has two, and its
     acceleration jumps where it starts and ends.
 
     Args:
-        times: Increasing, shape (k + 1,), in [s].
+        times_s: Increasing, shape (k + 1,), in [s].
         points: Shape (k + 1, n), in [rad] or [m].
         kind: "quintic" or "cubic".
         v0: Velocity at the start, a scalar or (n,), in [rad/s] or [m/s].
@@ -179,13 +190,13 @@ def via_points(times: Any, points: Any, *, kind: str = "quintic", v0: Any = 0.0,
     m, points = _DERIVATIVES[kind], numbers("points", points, ("k + 1", "n"))
     if len(points) < 2:
         raise ControlError(f"points must be 2 at least, got {len(points)}; to rest at one, hold(q)")
-    times = increasing("times", times, len(points))
-    unit = (times[-1] - times[0]) / (len(times) - 1)  # of time: derivatives of one size keep the solve well conditioned
+    t = increasing("times_s", times_s, len(points))
+    unit = (t[-1] - t[0]) / (len(t) - 1)  # of time: derivatives of one size keep the solve well conditioned
     shape = points.shape[1:]
     ends = np.stack([np.broadcast_to(numbers(name, v, (), shape), shape) for name, v in (("v0", v0), ("v1", v1))])
-    data = _smooth_derivatives(np.diff(times) / unit, points, m, ends * unit)
-    pieces = hermite(np.diff(times) / unit, np.concatenate([data[:-1], data[1:]], axis=1))
-    return PiecewisePolynomial(times, pieces / unit ** np.arange(2.0 * m)[:, None])
+    data = _smooth_derivatives(np.diff(t) / unit, points, m, ends * unit)
+    pieces = hermite(np.diff(t) / unit, np.concatenate([data[:-1], data[1:]], axis=1))
+    return PiecewisePolynomial(t, pieces / unit ** np.arange(2.0 * m)[:, None])
 
 
 def hermite(h: np.ndarray, ends: np.ndarray) -> np.ndarray:

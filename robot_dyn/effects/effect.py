@@ -16,9 +16,10 @@ from robot_dyn.arithmetic import Array
 from robot_dyn.coefficients import check_coefficients, declared
 from robot_dyn.errors import EffectError
 from robot_dyn.model.dynamics import Dynamics
+from robot_dyn.values import Value
 
 
-class Effect:
+class Effect(Value):
     """Something that acts on the joints: a `Force` or a `Bound`; a plant refuses anything else.
 
     Subclass one of the four kinds below. Its methods are pure functions, called with

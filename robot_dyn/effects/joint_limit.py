@@ -112,7 +112,9 @@ def _check_stops(stops: Any) -> None:
         if not isinstance(stop, np.ndarray):
             return  # by name, or as the file states: checked when the joints are known
         # A stop that does not exist lies where no depth can be reached, and inf − inf is avoided.
-        object.__setattr__(stops, name, np.clip(stop, -1e9, 1e9))
+        stop = np.clip(stop, -1e9, 1e9)
+        stop.setflags(write=False)
+        object.__setattr__(stops, name, stop)
     if np.ndim(stops.lower) == np.ndim(stops.upper) == 1 and len(stops.lower) != len(stops.upper):
         raise EffectError(f"lower and upper stops must be of the same joints, got {stops.lower} and {stops.upper}")
     if not np.all(stops.lower < stops.upper):

@@ -14,6 +14,7 @@ from typing import Any, ClassVar, cast, final
 
 import numpy as np
 
+from robot_dyn import former
 from robot_dyn.arithmetic import Array
 from robot_dyn.errors import OverflowedError, QueryError, RobotDynError
 from robot_dyn.foreign import is_mistake
@@ -21,6 +22,7 @@ from robot_dyn.integrate.implicit import jacobian
 from robot_dyn.integrate.integrator import System
 from robot_dyn.validate import choice, function, instance, number, numbers, rows
 
+ADAPTIVE = ("DOP853", "Radau")
 LEAST_RTOL = 100 * np.finfo(float).eps  # SciPy's bound; below it rounding is taken for local error
 
 
@@ -75,6 +77,7 @@ class Solution:
 
 
 @final
+@former.fields(max_step="max_step_s")
 @dataclass(frozen=True)
 class Adaptive:
     """An integrator with step-size control and dense output, in float64.
@@ -85,7 +88,7 @@ class Adaptive:
         method: DOP853 (explicit, order 8) or Radau (implicit, order 5, L-stable).
         rtol: Relative tolerance, 2.3e-14 at least.
         atol: Absolute tolerance, in the unit of y, not negative.
-        max_step: Longest step, in the unit of t.
+        max_step_s: Longest step, in [s].
 
     Raises:
         QueryError: If an option is not allowed.
@@ -94,7 +97,7 @@ class Adaptive:
     method: str = "DOP853"
     rtol: float = 1e-10
     atol: float = 1e-12
-    max_step: float = inf
+    max_step_s: float = inf
     canonical: ClassVar[bool] = False
     plain: ClassVar[bool] = False
     controls_error: ClassVar[bool] = True
@@ -105,17 +108,17 @@ class Adaptive:
         """As a scene file says it."""
         return self.method
 
-    def with_tolerances(self, factor: float, longest: float) -> Adaptive:
-        """The same with tolerances times a factor, and steps of at most `longest`."""
+    def with_tolerances(self, factor: float, longest_s: float) -> Adaptive:
+        """The same with tolerances times a factor, and steps of at most `longest_s`."""
         factor = number("factor", factor, above=0)
-        return replace(self, rtol=self.rtol * factor, atol=self.atol * factor, max_step=longest)
+        return replace(self, rtol=self.rtol * factor, atol=self.atol * factor, max_step_s=longest_s)
 
     def __post_init__(self) -> None:
-        choice("adaptive method", self.method, ("DOP853", "Radau"))
+        choice("adaptive method", self.method, ADAPTIVE)
         values = {
             "rtol": number("rtol", self.rtol),
             "atol": number("atol", self.atol, least=0),
-            "max_step": number("max_step", self.max_step, above=0, infinite=True),
+            "max_step_s": number("max_step_s", self.max_step_s, above=0, infinite=True),
         }
         if not LEAST_RTOL < values["rtol"] < 1:
             raise QueryError(f"rtol must be between {LEAST_RTOL:.2g} and 1, got {self.rtol!r}")
@@ -237,7 +240,7 @@ class Steps:
         from scipy.integrate import DOP853, Radau
 
         options = self._options
-        settings: dict[str, Any] = {"rtol": options.rtol, "atol": options.atol, "max_step": options.max_step}
+        settings: dict[str, Any] = {"rtol": options.rtol, "atol": options.atol, "max_step": options.max_step_s}
         if options.method == "Radau":
             settings["jac"] = self._jacobian
         make: Any = {"DOP853": DOP853, "Radau": Radau}[options.method]

@@ -1,6 +1,6 @@
-"""The fixed-step methods by the names of a scene file.
+"""The methods of integration by name, the one list of them: scenes and every function that takes a method read it.
 
-    y⁺ = method(name).step(system, t, y, h)
+    y⁺ = method("rk4").step(system, t, y, h)
 
 Each names its source where it is defined: Hairer, Nørsett, Wanner (two volumes), or Hairer, Lubich, Wanner.
 """
@@ -9,8 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
+from typing import Any
 
-from robot_dyn.errors import QueryError
+from robot_dyn.errors import QueryError, shown
+from robot_dyn.integrate.adaptive import ADAPTIVE, Adaptive
 from robot_dyn.integrate.explicit import EXPLICIT_EULER, MIDPOINT, RK4, SemiImplicitEuler, order_8
 from robot_dyn.integrate.gauss import Gauss
 from robot_dyn.integrate.implicit import SDIRK_3, LinearlyImplicitEuler
@@ -30,17 +32,35 @@ _READY = (
 )
 
 # How to get each; order_8 takes its coefficients from SciPy when asked for, so that this module stays light.
-METHODS: Mapping[str, Callable[[], Integrator]] = MappingProxyType(
-    {**{each.name: lambda each=each: each for each in _READY}, "order_8": order_8}
+METHODS: Mapping[str, Callable[[], Integrator | Adaptive]] = MappingProxyType(
+    {
+        **{each.name: lambda each=each: each for each in _READY},
+        "order_8": order_8,
+        **{name: lambda name=name: Adaptive(name) for name in ADAPTIVE},
+    }
 )
+FIXED_STEP = tuple(name for name in METHODS if name not in ADAPTIVE)
 
 
-def method(name: str) -> Integrator:
-    """The fixed-step method of that name.
+def method(name: str) -> Any:
+    """The method of that name: an `Integrator` of fixed step, or an `Adaptive` one with its default tolerances.
 
     Raises:
         QueryError: If the name is unknown; gives the nearest names.
     """
-    if isinstance(name, str) and name in ("DOP853", "Radau"):
-        raise QueryError(f"no integration method {name!r} of fixed step; rd.Adaptive({name!r}) is an adaptive one")
     return METHODS[choice("integration method", name, METHODS)]()
+
+
+def as_method(given: Any) -> Integrator | Adaptive:
+    """The method that is meant: one by its name, or a method as it is.
+
+    Raises:
+        QueryError: If it is not a method.
+    """
+    if isinstance(given, str):
+        return method(given)
+    if not isinstance(given, Integrator | Adaptive):
+        raise QueryError(
+            f"integrator: give a name, such as 'rk4' or 'DOP853', or an rd.Adaptive(…), got {shown(given)}"
+        )
+    return given

@@ -10,6 +10,7 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.arithmetic import Arithmetic, Array
+from robot_dyn.values import Value
 
 
 @final
@@ -35,7 +36,7 @@ def resolve(name: str, mimics: Mapping[str, Mimic], arithmetic: Arithmetic) -> t
 
 @final
 @dataclass(frozen=True, eq=False)
-class Couplings:
+class Couplings(Value):
     """The map q_full = S q + s₀ from n independent coordinates to all N joints that move.
 
     Attributes:

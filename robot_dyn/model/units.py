@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-_UNITS = {"q": ("rad", "m"), "v": ("rad/s", "m/s"), "a": ("rad/s²", "m/s²"), "tau": ("N m", "N")}
+_UNITS = {"q": ("rad", "m"), "v": ("rad/s", "m/s"), "a": ("rad/s²", "m/s²"), "tau": ("N m", "N"), "u": ("N m", "N")}
 
 
 def unit(quantity: str, joint_type: str | None) -> str:
-    """The unit of "q", "v", "a" or "tau" of a joint; both where its type is not known."""
+    """The unit of "q", "v", "a", "tau" or "u" of a joint; both where its type is not known."""
     turns, slides = _UNITS[quantity]
     if joint_type is None:
         return f"{turns} or {slides}"

@@ -57,7 +57,7 @@ class Quintic(Part):
 
     def build(self, robot: Robot, q0: np.ndarray, frame: str | None) -> PiecewisePolynomial:
         """The reference."""
-        return quintic(q0, per_joint("q", self.q, robot), self.duration_s, start=self.start_s)
+        return quintic(q0, per_joint("q", self.q, robot), self.duration_s, start_s=self.start_s)
 
 
 class ViaPoints(Part):
@@ -108,7 +108,7 @@ class Line(Part):
         """The reference."""
         g = robot.placement(q0, _frame(frame))
         R = g[:3, :3] if self.hold_orientation else None
-        return line(g[:3, 3], g[:3, 3] + self.by_m, self.duration_s, rotation=R, start=self.start_s)
+        return line(g[:3, 3], g[:3, 3] + self.by_m, self.duration_s, rotation=R, start_s=self.start_s)
 
 
 class Circle(Part):

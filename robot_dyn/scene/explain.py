@@ -9,8 +9,9 @@ import numpy as np
 
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import RobotDynError
+from robot_dyn.integrate.adaptive import ADAPTIVE
 from robot_dyn.scene.control import LAWS, Control
-from robot_dyn.scene.scene import ADAPTIVE, Scene
+from robot_dyn.scene.scene import Scene
 from robot_dyn.scene.schema import Part
 from robot_dyn.simulation.setup import Setup
 

@@ -8,10 +8,11 @@ from typing import Annotated, Any, Literal, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
-from robot_dyn.integrate.methods import METHODS
+from robot_dyn.integrate.adaptive import ADAPTIVE
+from robot_dyn.integrate.methods import FIXED_STEP
 from robot_dyn.scene.control import LAWS, AnyReference, Control, Model
 from robot_dyn.scene.effects import Acting, Edit
-from robot_dyn.scene.scene import ADAPTIVE, Scene, Start
+from robot_dyn.scene.scene import Scene, Start
 from robot_dyn.scene.schema import Part
 
 _OPENING = """# Scenes
@@ -42,7 +43,7 @@ _FORMS = {float: "number", int: "integer", bool: "true or false", str: "text"}
 
 def manual() -> str:
     """The page, in Markdown."""
-    methods = ", ".join(f"`{name}`" for name in METHODS)
+    methods = ", ".join(f"`{name}`" for name in FIXED_STEP)
     adaptive = ", ".join(f"`{name}`" for name in ADAPTIVE)
     parts = [
         _OPENING,

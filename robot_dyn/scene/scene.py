@@ -14,7 +14,7 @@ from robot_dyn.effects.effect import Effect
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import RobotDynError, SceneError, nearest, shorten
 from robot_dyn.files import Kind
-from robot_dyn.integrate.adaptive import Adaptive
+from robot_dyn.integrate.adaptive import ADAPTIVE, Adaptive
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.integrate.methods import METHODS, method
 from robot_dyn.model.loading import load
@@ -29,7 +29,6 @@ from robot_dyn.simulation.setup import Setup
 
 MAX_BYTES = 2**20
 SCENE = Kind("a scene", ".toml")
-ADAPTIVE = ("DOP853", "Radau")
 
 
 class Start(Part):
@@ -48,17 +47,17 @@ class Scene(Part):
     """Name of a robot of the catalog, or path of a URDF, relative to the folder of the scene."""
     duration_s: Positive
     """Length of the run."""
-    method: str = "DOP853"
+    method: str = Setup.integrator
     """Integrator."""
-    step_s: Positive = 1e-3
+    step_s: Positive = Setup.step_s
     """Step of a method with a fixed step."""
-    rtol: Positive = 1e-10
+    rtol: Positive = Adaptive.rtol
     """Relative tolerance of an adaptive method."""
-    atol: Positive = 1e-12
+    atol: Positive = Adaptive.atol
     """Absolute tolerance of an adaptive method, in rad and rad/s (m and m/s for a prismatic joint)."""
     record_period_s: NotNegative = 0.01
     """Time between samples; 0 for every step."""
-    estimate_error: Truth = True
+    estimate_error: Truth = Setup.estimate_error
     """Whether the run is repeated with longer steps, to estimate its error."""
     engine: Literal["auto", "interpreted", "compiled"] = "auto"
     """Which loop runs; "auto" compiles where that pays."""
@@ -160,8 +159,8 @@ def _parsed(text: str, source: str, effects: Makers | None = None) -> tuple[Scen
     if scene.control is None and "reference" in scene.model_fields_set:
         message = located(text, ["reference"], "reference: nothing follows it; add a [control]")
         raise SceneError(f"{source}: {message}")
-    if scene.method not in (*METHODS, *ADAPTIVE):
-        names = nearest(scene.method, (*METHODS, *ADAPTIVE))
+    if scene.method not in METHODS:
+        names = nearest(scene.method, METHODS)
         message = located(text, ["method"], f"method: no method {shorten(scene.method)!r}; {names}")
         raise SceneError(f"{source}: {message}")
     if why := _without_effect(scene):

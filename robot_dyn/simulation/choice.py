@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from robot_dyn.errors import RobotDynError
 from robot_dyn.simulation.setup import Setup
+from robot_dyn.simulation.size import segments
 from robot_dyn.simulation.smoothness import foreign, named
 from robot_dyn.simulation.state_equation import StateEquation
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 # loop takes 3 s more, once for a version of this library.
 _COMPILED = 20_000
 _GUESSED = 10  # evaluations in a step of an implicit method, beside those of its Jacobian
-_PER_SECOND = 1000  # evaluations of an adaptive method, for each second of the run
+_PER_SECOND, _PER_SEGMENT = 1000, 17  # evaluations of an adaptive method: for each second, at least for each segment
 
 
 def choose(setup: Setup, equation: StateEquation) -> tuple[Machine | None, str]:
@@ -64,7 +65,8 @@ def _evaluations(setup: Setup) -> float:
     """About how many evaluations of the equation of motion a run takes, with its companions."""
     method: Any = setup.integrator
     if method.controls_error:
-        return _PER_SECOND * setup.duration_s * (3 if setup.estimate_error else 1)
+        least = _PER_SEGMENT * segments(setup)
+        return max(_PER_SECOND * setup.duration_s, least) * (3 if setup.estimate_error else 1)
     return (
         setup.steps * (2 if setup.estimate_error else 1) * (method.evaluations_per_step or _GUESSED + 2 * len(setup.q0))
     )

@@ -8,6 +8,8 @@ from typing import final
 
 import numpy as np
 
+from robot_dyn.values import Value, read_only
+
 
 class Verdict(StrEnum):
     """What an estimate rests on."""
@@ -19,7 +21,7 @@ class Verdict(StrEnum):
 
 @final
 @dataclass(frozen=True, eq=False)
-class ErrorEstimate:
+class ErrorEstimate(Value):
     """Estimated error of positions, the largest over the joints, in [rad] or [m].
 
     Attributes:
@@ -37,6 +39,9 @@ class ErrorEstimate:
     note: str = ""
     verdict: Verdict = Verdict.ORDER
     reason: str = ""
+
+    def __post_init__(self) -> None:
+        read_only(self)
 
     def __str__(self) -> str:
         if not self.resolved_until > 0:

@@ -141,7 +141,7 @@ class ErrorControlled:
     def _method(self, length: float) -> Adaptive:
         """The method with the tolerances of this run, on a segment."""
         method, factor = cast(Adaptive, self.setup.integrator), float(self.pace)
-        longest = min(method.max_step, self.setup.longest_step_s)
+        longest = min(method.max_step_s, self.setup.longest_step_s)
         if factor < 1:  # where the ends of segments bound the steps, a tolerance by itself changes nothing
             longest = min(longest, length)
         longest *= factor ** (1 / _LOCAL_ORDER)

@@ -10,10 +10,12 @@ from typing import final
 
 import numpy as np
 
+from robot_dyn.values import Value, read_only
+
 
 @final
 @dataclass(frozen=True, eq=False)
-class Ledger:
+class Ledger(Value):
     """Energy at the samples of a run, in [J]; arrays of shape (m,).
 
     Attributes:
@@ -27,6 +29,9 @@ class Ledger:
     potential: np.ndarray
     work: dict[str, np.ndarray]
     kinetic_peak: float = 0.0
+
+    def __post_init__(self) -> None:
+        read_only(self)
 
     @property
     def energy(self) -> np.ndarray:

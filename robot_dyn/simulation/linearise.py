@@ -20,7 +20,7 @@ _AGREE = 1e-6  # of the largest slope: two steps that differ by more do not show
 
 
 def linearise(
-    plant: Plant | Dynamics, q: Array, v: Array = None, u: Array = None, t: float = 0.0
+    plant: Plant | Dynamics, q: Array, v: Array = None, u: Array = None, *, t: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
     """A and B about one state.
 

@@ -18,7 +18,7 @@ from robot_dyn.simulation.remarks import Kind, Remark
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.state_equation import StateEquation
 
-QUANTITIES = ("q", "v", "tau")
+QUANTITIES = ("q", "v", "u")
 _HIDDEN = 0.1  # of the range of a quantity: what the samples beside a window leave out
 _ROUNDING = 1e-9  # of a quantity: a smaller range is noise
 
@@ -42,7 +42,7 @@ def remarks(
         setup: What ran.
         observer: Closed, at the end of the run.
         t: Times of its samples, (m,), in [s].
-        samples: q, v and tau beside each other, (m, 3n).
+        samples: q, v and u beside each other, (m, 3n).
         power: Of each source, (m,), in [W].
     """
     units = _units(setup)
@@ -68,11 +68,11 @@ def _gaining(setup: Setup, t: np.ndarray, power: dict[str, np.ndarray]) -> Itera
 
 
 def _units(setup: Setup) -> list[tuple[str, str, str]]:
-    """Units of q, v and tau of each joint."""
+    """Units of q, v and u of each joint."""
     dynamics = setup.plant.dynamics
     robot: Any = getattr(dynamics, "robot", dynamics)
     types = robot.joint_types if isinstance(robot, Robot) else (None,) * dynamics.n
-    return [(unit("q", each), unit("v", each), unit("tau", each)) for each in types]
+    return [(unit("q", each), unit("v", each), unit("u", each)) for each in types]
 
 
 def _passed(setup: Setup, visits: dict[Level, Visit], units: list[tuple[str, str, str]]) -> Iterator[Remark]:
@@ -113,7 +113,7 @@ def _chatter(
         unit = f" {units[joint][2]}".rstrip()
         text = f"{names[joint]} ±{episode.amplitude:.3g}{unit} from {episode.start:.4g} s for {episode.duration:.3g} s"
         yield Remark(
-            Kind.CHATTER, names[joint], "tau", episode.start, episode.duration, episode.start, episode.amplitude,
+            Kind.CHATTER, names[joint], "u", episode.start, episode.duration, episode.start, episode.amplitude,
             None, text, remedy,
         )  # fmt: skip
 

@@ -43,7 +43,7 @@ class Remark:
     Attributes:
         kind: What it is about.
         joint: Name of the joint; of the effect, if it is about one.
-        quantity: "q", "v", "tau" or "power", of which value and limit are.
+        quantity: "q", "v", "u" or "power", of which value and limit are.
         start: When it began, in [s].
         duration: How long it lasted in all, in [s].
         at: When the value was reached, in [s].

@@ -9,27 +9,34 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
-from typing import Any, cast
+from typing import Any, Unpack, cast
 
 import numpy as np
 
+from robot_dyn import former
 from robot_dyn.compiled.parameters import parameters
 from robot_dyn.compiled.threads import thread_count
+from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import QueryError, nearest, shown
 from robot_dyn.integrate.integrator import Integrator
+from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.simulation.machine.batch import LANES, Batch
 from robot_dyn.simulation.machine.making import machine
+from robot_dyn.simulation.options import Options, setup_of, takes_options
 from robot_dyn.simulation.rollout_result import Rollouts
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import MOST_BYTES
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.validate import choice, instance, integer, joint_values, numbers
 
-RECORDS = ("q", "v", "tau", "energy", "work")
+RECORDS = ("q", "v", "u", "energy", "work")
+_WITHOUT_EFFECT = {"estimate_error": "simulate one of the runs for that", "engine": "rollouts run in machine code"}
 
 
+@former.arguments(setup="what")
+@takes_options
 def rollouts(
-    setup: Setup,
+    what: Setup | Plant | Dynamics,
     q0: Any = None,
     v0: Any = None,
     *,
@@ -38,23 +45,27 @@ def rollouts(
     threads: int | None = None,
     most_bytes: int = MOST_BYTES,
     on_progress: Callable[[float], object] | None = None,
+    **options: Unpack[Options],
 ) -> Rollouts:
-    """Run a setup many times at once, in machine code.
+    """Run a plant or a robot from many starts, or a setup with the options that are given in place of its own.
+
+    The runs go side by side in machine code, by an explicit or a Gauss method: `integrator="rk4"`, `step_s`.
 
     Args:
-        setup: What to run, by an explicit or a Gauss method; it gives plant, controller, duration, steps and samples.
-            Its engine has no say here, and no errors are estimated: `simulate` one of the runs for that.
-        q0: Positions at the start, (B, n); those of the setup for all runs unless given.
-        v0: Velocities at the start, (B, n) or (n,).
+        what: What to run.
+        q0: Positions at the start, (B, n) or (n,), in [rad] or [m] by joint; required unless `what` is a setup.
+        v0: Velocities at the start, (B, n) or (n,), in [rad/s] or [m/s]; 0, or those of the setup, unless given.
         params: Values that differ from run to run, each (B,) or (B, n): a gain of the controller by its name, as
             {"kp": …}, a coefficient of an effect, as {"viscous_friction.damping": …}, "gravity", (B, 3), or of a
             payload that a link carries its mass in [kg], as {"payload_mass:tool0": …}, or its centre of mass,
             "payload_com:tool0", (B, 3). Models of controllers keep theirs: they are "model.gravity", ….
-        record: Which of "q", "v", "tau", "energy", "work" to keep at the samples of the setup.
+        record: Which of "q", "v", "u", "energy", "work" to keep at the samples.
         threads: Number of threads; None for all processors.
         most_bytes: Refuse to record more than this.
         on_progress: Called with the time that the runs have reached, the mean in [s], some ten times a second; with
             a record period of 0 it grows as tiles of 64 runs end.
+        **options: As of `simulate`; all but `estimate_error` and `engine`, which have no effect here: no error is
+            estimated (`simulate` one of the runs for that), and the engine is machine code.
 
     Runs are not watched at every step, as those of `simulate` are: they carry no remarks.
 
@@ -65,21 +76,41 @@ def rollouts(
         QueryError: If an argument is not allowed or has the wrong shape, or the record would exceed `most_bytes`.
         TraceError: If a part of the setup cannot be compiled; names it.
     """
-    setup = replace(instance("setup", setup, Setup, "give an rd.Setup"), estimate_error=False)
+    setup = replace(_setup(what, q0, options), estimate_error=False)
     most_bytes = integer("most_bytes", most_bytes, most=2**63 - 1)
     if not setup.integrator.plain:
-        raise QueryError("rollouts take an explicit or a Gauss method, such as rd.method('rk4'); simulate takes any")
+        raise QueryError(
+            f"rollouts run in lock step by an explicit or a Gauss method, not by {setup.integrator.name}: give"
+            " integrator='rk4' and its step_s; simulate takes any method"
+        )
     if params is not None and not (isinstance(params, Mapping) and all(isinstance(name, str) for name in params)):
         raise QueryError(f"params must give values by name, such as {{'kp': …}}, got {shown(params)}")
     instance("record", record, Iterable, f"give names of {', '.join(RECORDS)}")
-    recorded = tuple(choice("record", name, RECORDS) for name in record)
+    recorded = tuple(record)
+    if any(isinstance(name, str) and name == "tau" for name in recorded):
+        former.tell("record 'tau' of rollouts", "'u'", up=3)
+        recorded = tuple("u" if isinstance(name, str) and name == "tau" else name for name in recorded)
+    recorded = tuple(choice("record", name, RECORDS) for name in recorded)
     q, v, sweep = _starts(setup, q0, v0, params or {})
     equation = StateEquation(setup.plant, setup.controller, setup.integrator.canonical)
-    asked = {"u": "tau" in recorded, "v": equation.canonical and "v" in recorded, "energy": "energy" in recorded}
+    asked = {"u": "u" in recorded, "v": equation.canonical and "v" in recorded, "energy": "energy" in recorded}
     kept = tuple(name for name, yes in asked.items() if yes)
     made = machine(equation, cast(Integrator, setup.integrator), lanes=LANES, kept=kept)
     made.check(setup)
     return Batch(setup, made, q, v, sweep, recorded, kept, most_bytes).run(thread_count(threads), on_progress)
+
+
+def _setup(what: Setup | Plant | Dynamics, q0: Any, options: Mapping[str, Any]) -> Setup:
+    """The setup of all runs; of a plant or robot, with the first start as its own."""
+    for name in options.keys() & _WITHOUT_EFFECT.keys():
+        raise QueryError(f"rollouts: {name} has no effect, {_WITHOUT_EFFECT[name]}; leave it out")
+    start = {}
+    if not isinstance(what, Setup):
+        what = what if isinstance(what, Plant) else Plant(what)
+        if q0 is not None:
+            q = joint_values("q0", q0, what.dynamics.joint_names)
+            start = {"q0": q.reshape(-1, q.shape[-1])[0] if q.size else np.zeros(q.shape[-1])}
+    return setup_of("rollouts", what, {**start, **options})
 
 
 def _starts(

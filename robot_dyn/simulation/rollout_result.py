@@ -9,17 +9,19 @@ from typing import Any, final, overload
 
 import numpy as np
 
+from robot_dyn import former
 from robot_dyn.errors import QueryError
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.trajectory import Ending, Outcome, Statistics, Trajectory
 from robot_dyn.validate import integer
+from robot_dyn.values import Value, read_only
 
 _SHARED = ("joint_names", "t", "statistics", "sources", "about", "setup")  # by all runs
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class Rollouts:
+class Rollouts(Value):
     """B runs, m samples of each. Samples after a run diverged are nan. What was not recorded is None.
 
     `runs[i]` is the `Trajectory` of a run, `runs[i:j]` some of the runs; both copy no samples.
@@ -28,7 +30,7 @@ class Rollouts:
         joint_names: Of the n joints.
         t: In [s], (m,).
         q, v: In [rad] and [rad/s], or [m] and [m/s], (B, m, n).
-        tau: Actuation within its bounds, (B, m, n), in [N m] or [N].
+        u: Actuation within its bounds, (B, m, n), in [N m] or [N].
         kinetic, potential: Energies, (B, m), in [J].
         work: Done up to each sample by the control and by each other effect, by name, (B, m), in [J].
         ended: When each run ended, (B,), in [s].
@@ -48,7 +50,7 @@ class Rollouts:
     t: np.ndarray
     q: np.ndarray | None
     v: np.ndarray | None
-    tau: np.ndarray | None
+    u: np.ndarray | None
     kinetic: np.ndarray | None
     potential: np.ndarray | None
     work: dict[str, np.ndarray] | None
@@ -63,6 +65,11 @@ class Rollouts:
     about: dict[str, str]
     params: dict[str, np.ndarray]
     setup: Setup | None = None
+
+    def __post_init__(self) -> None:
+        read_only(self)
+
+    tau = former.Attribute("u")
 
     def __len__(self) -> int:
         return len(self.ended)

@@ -36,11 +36,11 @@ def trajectory(runs: Rollouts, run: int) -> Trajectory:
     known = ~np.isnan(runs.q[run]).all(axis=1)  # a run that ended early has nan after its end
     t, q, v = runs.t[known], runs.q[run, known], runs.v[run, known]
     unknown = np.full_like(q, np.nan)
-    tau = unknown if runs.tau is None else runs.tau[run, known]
+    u = unknown if runs.u is None else runs.u[run, known]
     a, power, energy = unknown, np.full((len(t), len(runs.sources)), np.nan), np.full((len(t), 2), np.nan)
     setup = None if runs.setup is None else _own(runs, runs.setup, run)
     if setup is not None:
-        a, tau, power, energy = _follows(setup, t, q, v, None if runs.tau is None else tau)
+        a, u, power, energy = _follows(setup, t, q, v, None if runs.u is None else u)
     if runs.kinetic is not None and runs.potential is not None:
         energy = np.column_stack([runs.kinetic[run, known], runs.potential[run, known]])
     work = {name: np.full(len(t), np.nan) for name in runs.sources}
@@ -55,7 +55,7 @@ def trajectory(runs: Rollouts, run: int) -> Trajectory:
     steps, evaluations = int(runs.steps[run]), int(runs.evaluations[run])
     about = runs.about | {"run": f"{run} of {len(runs)}"}
     return Trajectory(
-        runs.joint_names, t, q, v, a, tau, dict(zip(runs.sources, power.T, strict=True)),
+        runs.joint_names, t, q, v, a, u, dict(zip(runs.sources, power.T, strict=True)),
         Ledger(energy[:, 0], energy[:, 1], work), desired, deviation, runs.outcome(run),
         replace(runs.statistics, steps=steps, evaluations=evaluations), None, about, loads, stops,
         acting=acts,
@@ -73,16 +73,16 @@ def _own(runs: Rollouts, setup: Setup, run: int) -> Setup:
 
 
 def _follows(
-    setup: Setup, t: np.ndarray, q: np.ndarray, v: np.ndarray, tau: np.ndarray | None
+    setup: Setup, t: np.ndarray, q: np.ndarray, v: np.ndarray, u: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Acceleration, torque, powers and energies at the samples."""
     equation = StateEquation(setup.plant, setup.controller)
-    if tau is None and (equation.sampled or equation.state_size):
-        tau = np.full_like(q, np.nan)  # it depends on what was before
+    if u is None and (equation.sampled or equation.state_size):
+        u = np.full_like(q, np.nan)  # it depends on what was before
     made = np.full((len(t), equation.size + q.shape[1] + 2), np.nan)
     rest = np.zeros((len(t), equation.size - 2 * q.shape[1]))
     y = np.hstack([q, v, rest])
     for i in range(len(t)):
-        sample(equation, float(t[i]), y[i], None if tau is None else tau[i], made[i])
+        sample(equation, float(t[i]), y[i], None if u is None else u[i], made[i])
     _, _, a, u, _, power, energy = columns(equation, t, y, made)
     return a, u, power, energy

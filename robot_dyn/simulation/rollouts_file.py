@@ -58,7 +58,7 @@ def _checked(arrays: Arrays, about: dict[str, Any]) -> Rollouts:
     if runs.work is not None and set(runs.work) != set(runs.sources):
         raise ArchiveError("members 'work/…' and 'sources' have different names")
     whole = ~(runs.diverged | runs.stopped)
-    for name in ("q", "v", "tau", "kinetic", "potential"):
+    for name in ("q", "v", "u", "kinetic", "potential"):
         array = getattr(runs, name)
         if array is not None and not np.isfinite(array[whole]).all():
             raise ArchiveError(f"member {name!r} of a run that did not diverge holds nan or inf")

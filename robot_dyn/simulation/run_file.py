@@ -25,9 +25,12 @@ from robot_dyn.simulation.trajectory import Ending, Trajectory
 from robot_dyn.validate import integer
 
 FORMAT = 4
-ROLLOUTS_FORMAT = "rollouts 1"
+ROLLOUTS_FORMAT = "rollouts 2"
 # The formats before, which are read as well, and what some members were called there.
-_BEFORE: Mapping[int | str, Mapping[int | str, Mapping[str, str]]] = {FORMAT: {3: {"wanted": "desired"}}}
+_BEFORE: Mapping[int | str, Mapping[int | str, Mapping[str, str]]] = {
+    FORMAT: {3: {"wanted": "desired", "tau": "u"}},
+    ROLLOUTS_FORMAT: {"rollouts 1": {"tau": "u"}},
+}
 RUN = Kind("a run file", ".npz", b"PK\x03\x04")
 MAX_BYTES = 4 * 2**30  # of the arrays of a run that is read without being asked for more
 _MAX_TEXT = 2**28  # bytes of `about`, 4 a character; the largest URDF that loads has 2^24
@@ -72,7 +75,9 @@ def load_run(path: str | Path, *, max_bytes: int = MAX_BYTES) -> Trajectory:
     Raises:
         RunFileError: If it is missing, damaged, cut short, larger, of another format, or was changed.
     """
-    return read_whole(path, max_bytes, FORMAT, MEMBERS, _checked)
+    run = read_whole(path, max_bytes, FORMAT, MEMBERS, _checked)
+    of_u = [replace(each, quantity="u") if each.quantity == "tau" else each for each in run.remarks]  # its former name
+    return replace(run, remarks=tuple(of_u))
 
 
 def write_whole(run: Run, path: str | Path, form: int | str, checked: Checked[Run]) -> Path:

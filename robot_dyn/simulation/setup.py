@@ -17,13 +17,12 @@ from robot_dyn.control.controller import Controller
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import ControlError, EffectError, OverflowedError, QueryError
 from robot_dyn.foreign import call
-from robot_dyn.integrate.adaptive import Adaptive
-from robot_dyn.integrate.explicit import RK4
-from robot_dyn.integrate.integrator import Integrator
+from robot_dyn.integrate.methods import as_method
 from robot_dyn.simulation.schedule import LEAST_STEPS, Segment, cuts, steps_on
 from robot_dyn.simulation.size import check_segments
 from robot_dyn.simulation.smoothness import may_switch
 from robot_dyn.validate import choice, duration, instance, integer, one_state, returned, truth
+from robot_dyn.values import Value
 
 ENGINES = ("auto", "interpreted", "compiled")
 _LONGEST_STEP_S, _LEAST_STEPS = 0.01, 200  # where something may switch between steps
@@ -31,7 +30,7 @@ _LONGEST_STEP_S, _LEAST_STEPS = 0.01, 200  # where something may switch between 
 
 @final
 @dataclass(frozen=True, eq=False)
-class Setup:
+class Setup(Value):
     """All that a run depends on.
 
     Attributes:
@@ -40,9 +39,10 @@ class Setup:
         v0: Velocity at the start, (n,); 0 if not given.
         duration_s: In [s].
         controller: What drives it: a `Controller`; a function (t, q, v) → torque (n,), which is made one; or None.
-        integrator: A method of fixed step, or an `Adaptive` one.
+        integrator: The method, by its name as in a scene or itself: "DOP853" and "Radau", or an `Adaptive` with other
+            tolerances, choose their steps; "rk4", "order_8", "gauss_4" and others of `rd.method` have a fixed one.
         step_s: Fixed step; made smaller where samples, ticks, switches and the end ask for it. Not to be given
-            for an Adaptive method.
+            for a method that chooses its steps.
         record_period_s: Time between samples; 0 for every step.
         estimate_error: Whether companion runs are made, which cost about as much as the run; five times as much
             where only shorter steps can tell.
@@ -56,7 +56,7 @@ class Setup:
     v0: Array = None
     duration_s: float = 1.0
     controller: Any = None
-    integrator: Integrator | Adaptive = RK4
+    integrator: Any = "DOP853"
     step_s: float = 1e-3
     record_period_s: float = 0.0
     estimate_error: bool = True
@@ -72,7 +72,7 @@ class Setup:
         names = self.plant.dynamics.joint_names
         if self.v0 is None:
             object.__setattr__(self, "v0", np.zeros(len(names)))
-        instance("integrator", self.integrator, Integrator | Adaptive, "give rd.method('rk4') or rd.Adaptive()")
+        object.__setattr__(self, "integrator", as_method(self.integrator))
         for name in ("q0", "v0"):
             object.__setattr__(self, name, one_state(name, getattr(self, name), names))
         for name in ("duration_s", "step_s", "record_period_s"):
@@ -83,8 +83,9 @@ class Setup:
             text for pair in instance("about", self.about, dict, "give texts by name").items() for text in pair
         ):
             instance("about", text, str, "give texts by name")
+        object.__setattr__(self, "about", dict(self.about))
         if self.integrator.controls_error and self.step_s != Setup.step_s:
-            raise QueryError("step_s has no effect on an Adaptive method; leave it out, or give Adaptive(max_step=…)")
+            raise QueryError(no_step(self.integrator.name))
         choice("engine", self.engine, ENGINES)
         object.__setattr__(self, "controller", _controller(self.controller, len(names)))
         self._check_model()
@@ -173,6 +174,14 @@ class Setup:
         error control does not see what no stage meets. A fixed step is the user's.
         """
         return min(_LONGEST_STEP_S, self.duration_s / _LEAST_STEPS) if may_switch(self) else inf
+
+
+def no_step(name: str) -> str:
+    """What is wrong with a step for a method that chooses its own."""
+    return (
+        f"step_s has no effect on {name}, which chooses its steps: leave it out, name a method of fixed step, such as"
+        " integrator='rk4', or give rd.Adaptive(max_step_s=…)"
+    )
 
 
 def _controller(given: Any, n: int) -> Controller | None:

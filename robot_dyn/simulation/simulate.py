@@ -10,14 +10,13 @@ from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
 from robot_dyn.control.cartesian import CartesianReference
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.effects.plant import Plant
-from robot_dyn.errors import QueryError, nearest
 from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.simulation.acting import acting
 from robot_dyn.simulation.choice import choose
@@ -29,6 +28,7 @@ from robot_dyn.simulation.ledger import Ledger
 from robot_dyn.simulation.loads import at_stop, link_of, wrenches
 from robot_dyn.simulation.observed import observer_of, remarks
 from robot_dyn.simulation.observer import Observer
+from robot_dyn.simulation.options import Options, setup_of, starts, takes_options
 from robot_dyn.simulation.origin import origin
 from robot_dyn.simulation.record import Record
 from robot_dyn.simulation.samples import columns
@@ -44,32 +44,31 @@ if TYPE_CHECKING:
     from robot_dyn.simulation.machine.machine import Machine
 
 
+@takes_options
 def simulate(
-    what: Setup | Plant | Dynamics, *, on_progress: Callable[[float], object] | None = None, **options: Any
+    what: Setup | Plant | Dynamics,
+    q0: Any = None,
+    v0: Any = None,
+    *,
+    on_progress: Callable[[float], object] | None = None,
+    **options: Unpack[Options],
 ) -> Trajectory:
-    """Run a setup; or a plant or robot, with the attributes of a `Setup` as options: q0, duration_s, controller, ….
+    """Run a plant or a robot from a start; or a setup, with the options that are given in place of its own.
 
     Args:
         what: What to run.
+        q0: Position at the start, (n,), in [rad] or [m] by joint; required unless `what` is a setup.
+        v0: Velocity at the start, (n,), in [rad/s] or [m/s]; 0, or that of the setup, unless given.
         on_progress: Called with the time reached, in [s], at each step; in machine code some ten times a second.
-        **options: Attributes of the setup, or those to change.
+        **options: The other attributes of a `Setup`, with its defaults: duration_s, controller, integrator, step_s,
+            record_period_s, estimate_error, about and engine.
 
     Raises:
         QueryError: If the setup is not allowed, or its record would not fit into memory. Whatever happens later is
             told by the trajectory's outcome.
     """
     function("on_progress", on_progress, "the time reached")
-    for name in options.keys() - Setup.__dataclass_fields__.keys():
-        raise QueryError(f"simulate: no option {name!r}; {nearest(name, Setup.__dataclass_fields__)}")
-    if getattr(options.get("integrator"), "controls_error", False):
-        options = {"step_s": Setup.step_s} | options  # a step that was given for another method means nothing to it
-    if isinstance(what, Setup):
-        setup = replace(what, **options)
-    else:
-        plant = what if isinstance(what, Plant) else Plant(what)
-        if "q0" not in options:
-            raise QueryError(f"simulate: give q0, the position at the start, ({plant.dynamics.n},)")
-        setup = Setup(plant, **options)
+    setup = setup_of("simulate", what, {**starts(q0, v0), **options})
     equation = StateEquation(setup.plant, setup.controller, setup.integrator.canonical)
     check_record(setup, equation)
     clock = [perf_counter()]
@@ -137,7 +136,7 @@ def _trajectory(
 ) -> Trajectory:
     """The samples with what follows from them."""
     t = record.t
-    q, v, a, tau, W, P, E = columns(equation, t, record.y, record.made)
+    q, v, a, u, W, P, E = columns(equation, t, record.y, record.made)
     desired, deviation = deviation_of(setup, t, q)
     ledger = Ledger(E[:, 0], E[:, 1], dict(zip(equation.sources, W.T, strict=True)), record.kinetic_peak)
     power = dict(zip(equation.sources, P.T, strict=True))
@@ -146,9 +145,9 @@ def _trajectory(
     if setup.controller is not None and setup.controller.task_frame is not None:
         about = {"frame": link_of(plant.dynamics, setup.controller.task_frame)} | about
     return Trajectory(
-        names, t, q, v, a, tau, power, ledger, desired, deviation, record.outcome, statistics, error, about,
+        names, t, q, v, a, u, power, ledger, desired, deviation, record.outcome, statistics, error, about,
         wrenches(plant, t, q), at_stop(plant, q),
-        remarks(setup, observer, t, np.hstack([q, v, tau]), power), observer.extremes, acting(setup),
+        remarks(setup, observer, t, np.hstack([q, v, u]), power), observer.extremes, acting(setup),
         equation.controller_states(record.y),
     )  # fmt: skip
 

@@ -28,12 +28,12 @@ def export_csv(trajectory: Trajectory, path: str | Path) -> Path:
     path = target(path, TABLE, RunFileError)
     types = dict(zip(trajectory.joint_names, joint_types(trajectory), strict=True))
     heading = ["t [s]"]
-    for key in ("q", "v", "a", "tau"):
+    for key in ("q", "v", "a", "u"):
         heading += [f"{key} {name} [{unit(key, kind)}]" for name, kind in types.items()]
     heading += [f"power {name} [W]" for name in trajectory.power] + ["energy [J]", "residual [J]"]
     states = trajectory.controller_states
     heading += [] if states is None else [f"controller state {k + 1}" for k in range(states.shape[1])]
-    columns = [trajectory.t[:, None], trajectory.q, trajectory.v, trajectory.a, trajectory.tau]
+    columns = [trajectory.t[:, None], trajectory.q, trajectory.v, trajectory.a, trajectory.u]
     columns += [power[:, None] for power in trajectory.power.values()]
     columns += [trajectory.ledger.energy[:, None], trajectory.ledger.residual[:, None]]
     columns += [] if states is None else [states]

@@ -14,6 +14,7 @@ from robot_dyn.simulation.error import ErrorEstimate
 from robot_dyn.simulation.ledger import Ledger, largest
 from robot_dyn.simulation.remarks import Remark
 from robot_dyn.simulation.remarks import lines as said
+from robot_dyn.values import Value, read_only
 
 # Residuals, as parts of the energy exchanged. Over 150 random scenes they were at most 10 times the estimated error of
 # q, as a part of the motion; one that is far larger contradicts the estimate.
@@ -75,14 +76,14 @@ class Statistics:
 
 @final
 @dataclass(frozen=True, eq=False)
-class Trajectory:
+class Trajectory(Value):
     """Samples of a run, m of them; arrays are (m,) or (m, n).
 
     Attributes:
         joint_names: Of the n joints.
         t: In [s].
         q, v, a: In [rad], [rad/s], [rad/s²] or [m], [m/s], [m/s²].
-        tau: Actuation within its bounds, in [N m] or [N].
+        u: Actuation within its bounds, in [N m] or [N].
         power: Of the control and of each effect without a potential, by name, in [W].
         ledger: Energy and work.
         desired: Positions of a joint reference, or None.
@@ -96,7 +97,7 @@ class Trajectory:
             at the samples and at both sides of each switch.
         at_stop: Whether each joint is at or beyond a stop, (m, n); None without stops.
         remarks: What was seen at every step that the samples need not show.
-        extremes: The least and the largest of q, v and tau over all steps, (3, 2, n); None if it was not watched.
+        extremes: The least and the largest of q, v and u over all steps, (3, 2, n); None if it was not watched.
         acting: What acted, in words: gravity, payloads, effects, limits, control; None if it is not known.
         controller_states: z of the controller, (m, z), of a sampled one after its tick; None if it has none, or they
             were not recorded.
@@ -107,7 +108,7 @@ class Trajectory:
     q: np.ndarray
     v: np.ndarray
     a: np.ndarray
-    tau: np.ndarray
+    u: np.ndarray
     power: dict[str, np.ndarray]
     ledger: Ledger
     desired: np.ndarray | None
@@ -123,7 +124,10 @@ class Trajectory:
     acting: tuple[str, ...] | None = None
     controller_states: np.ndarray | None = None
 
-    wanted = former.Attribute("desired")
+    def __post_init__(self) -> None:
+        read_only(self)
+
+    wanted, tau = map(former.Attribute, ("desired", "u"))
 
     @property
     def tracking_error(self) -> float | None:

@@ -139,12 +139,12 @@ def _shown(number: int, run: Trajectory, count: int, package_dirs: tuple[Path, .
 
 def _drawable(run: Trajectory) -> Trajectory:
     """The run up to its first sample that cannot be drawn."""
-    tau = np.isfinite(run.tau) | np.isnan(run.tau).all()  # rollouts may not have recorded it
-    good = np.all(np.abs(run.q) < _FAR, axis=1) & np.all(np.isfinite(run.v) & tau, axis=1)
+    u = np.isfinite(run.u) | np.isnan(run.u).all()  # rollouts may not have recorded it
+    good = np.all(np.abs(run.q) < _FAR, axis=1) & np.all(np.isfinite(run.v) & u, axis=1)
     end = len(good) if good.all() else int(good.argmin())
     if not end:
         raise ReplayError("the run has no samples that can be shown; simulate it again, with a smaller step")
-    cut = {name: getattr(run, name)[:end] for name in ("t", "q", "v", "a", "tau")}
+    cut = {name: getattr(run, name)[:end] for name in ("t", "q", "v", "a", "u")}
     wrenches = {link: F[F[:, 0] <= run.t[end - 1]] for link, F in run.wrenches.items()}
     return replace(run, **cut, wrenches=wrenches, at_stop=None if run.at_stop is None else run.at_stop[:end])
 

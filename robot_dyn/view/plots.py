@@ -73,17 +73,17 @@ def torques(view: View) -> Panel:
     Raises:
         PlotError: If it was not recorded.
     """
-    if np.isnan(view.run.tau).all():
-        raise PlotError("the torques of the run were not recorded; add tau to record of rollouts")
+    if np.isnan(view.run.u).all():
+        raise PlotError("the torques of the run were not recorded; add u to record of rollouts")
     cells = []
     for i, name in zip(view.joints, view.names, strict=True):
-        tau, limit = view.run.tau[:, i], float(view.limits[i])
-        every = tau if view.run.extremes is None else np.append(tau, view.run.extremes[2, :, i])
+        u, limit = view.run.u[:, i], float(view.limits[i])
+        every = u if view.run.extremes is None else np.append(u, view.run.extremes[2, :, i])
         peak = float(np.max(np.abs(every), where=np.isfinite(every), initial=0.0))
         used = f"{peak / limit:.0%}" if peak < 10 * limit else "over 1000%"
         note = f", {used} used" if np.isfinite(limit) else ""
-        curves, unit = (Curve("τ", view.run.t, tau),), _FORCE[view.units[i]]
-        cells.append(Cell(name, "t [s]", f"τ [{unit}]", curves, limit=limit, note=note))
+        curves, unit = (Curve("u", view.run.t, u),), _FORCE[view.units[i]]
+        cells.append(Cell(name, "t [s]", f"u [{unit}]", curves, limit=limit, note=note))
     shown = (
         f"; effort limits are dashed where over {NEAR:.0%} are used"
         if np.isfinite(view.limits[list(view.joints)]).any()

@@ -24,7 +24,7 @@ def plots(runs: list[Trajectory], stages: list[Stage]) -> list[dict[str, Any]]:
     titles = (
         ("joint positions q", q),
         ("joint velocities v", " or ".join(f"{part}/s" for part in q.split(" or "))),
-        ("actuation τ", force),
+        ("actuation u", force),
         ("energy ledger", "J"),
     )
     columns = [_columns(run) for run in runs]
@@ -42,7 +42,7 @@ def _columns(run: Trajectory) -> list[dict[str, np.ndarray]]:
         "E − E(0)": ledger.energy - ledger.energy[0],
     }
     energy |= {f"W {name}": work for name, work in ledger.work.items()} | {"residual": ledger.residual}
-    by_joint = [dict(zip(names, each.T, strict=True)) for each in (run.q, run.v, run.tau)]
+    by_joint = [dict(zip(names, each.T, strict=True)) for each in (run.q, run.v, run.u)]
     return [*by_joint, {name: column[:m] for name, column in energy.items()}]
 
 

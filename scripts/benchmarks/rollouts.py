@@ -28,7 +28,13 @@ def one_step(effort: Effort) -> None:
     model: Any = mujoco_model(mujoco, panda, bare=True)
     duration = steps * STEP_S
     setup = rd.Setup(
-        rd.Plant(panda), READY, duration_s=duration, record_period_s=duration, estimate_error=False, engine="compiled"
+        rd.Plant(panda),
+        READY,
+        duration_s=duration,
+        record_period_s=duration,
+        estimate_error=False,
+        engine="compiled",
+        integrator="rk4",
     )
     theirs, ours, apart = [], [], 0.0
     rd.simulate(setup)
@@ -57,7 +63,11 @@ def thousands(effort: Effort) -> None:
     goal, starts = READY + 0.2, READY + 0.1 * np.random.default_rng(0).normal(size=(runs, 7))
     control = rd.PD(rd.hold(goal), *GAINS)
     setup = rd.Setup(
-        rd.Plant(panda, [rd.ViscousFriction(DAMPING)]), READY, duration_s=steps * STEP_S, controller=control
+        rd.Plant(panda, [rd.ViscousFriction(DAMPING)]),
+        READY,
+        duration_s=steps * STEP_S,
+        controller=control,
+        integrator="rk4",
     )
     first = np.zeros((runs, 1 + 14))
     first[:, 1:8] = starts

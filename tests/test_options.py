@@ -1,0 +1,155 @@
+"""Options of a run: simulate and rollouts take the same, show them, and refuse what has no effect."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from inspect import Parameter, signature
+from typing import Any
+
+import numpy as np
+import pytest
+
+import robot_dyn as rd
+from robot_dyn.errors import QueryError
+from robot_dyn.simulation.options import Options
+
+ARM = rd.load("planar_2r")
+PLANT = rd.Plant(ARM, [rd.ViscousFriction(0.3)])
+Q, V = np.array([0.3, -0.4]), np.array([0.2, 0.5])
+OPTIONS: dict[str, Any] = {
+    "duration_s": 0.05, "controller": rd.PD(rd.hold([0.1, 0.2]), [20.0, 9.0], 2.0), "integrator": "rk4",
+    "step_s": 2e-3, "record_period_s": 0.01, "about": {"author": "me"},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("function", [rd.simulate, rd.rollouts])
+def test_the_signature_shows_every_attribute_of_a_setup_with_its_default(function) -> None:
+    shown, stated = signature(function).parameters, signature(rd.Setup).parameters
+    assert Options.__annotations__.keys() == stated.keys() - {"plant", "q0", "v0"}
+    for name in Options.__annotations__:
+        assert shown[name].kind is Parameter.KEYWORD_ONLY
+        assert shown[name].default == stated[name].default, name
+    assert list(shown)[:3] == ["what", "q0", "v0"]
+    assert not any(each.kind is Parameter.VAR_KEYWORD for each in shown.values())
+
+
+def test_a_robot_a_plant_and_a_setup_give_the_same_run() -> None:
+    setup = rd.Setup(PLANT, Q, V, **OPTIONS)
+    runs = [
+        rd.simulate(setup, engine="interpreted"),
+        rd.simulate(PLANT, Q, V, **OPTIONS, engine="interpreted"),
+        rd.simulate(replace(setup, duration_s=9.0, integrator="gauss_2", step_s=0.1), engine="interpreted", **OPTIONS),
+    ]
+    bare = [rd.simulate(each, q0=Q, v0=V, **OPTIONS, engine="interpreted") for each in (ARM, rd.Plant(ARM))]
+    for same in (runs, bare):
+        for run in same[1:]:
+            np.testing.assert_array_equal(run.q, same[0].q)
+            np.testing.assert_array_equal(run.u, same[0].u)
+            assert run.about["author"] == "me"
+
+
+def test_rollouts_take_the_same() -> None:
+    setup, q0 = rd.Setup(PLANT, Q, V, **OPTIONS), Q + 0.1 * np.arange(6.0).reshape(3, 2)
+    expected = rd.rollouts(setup, q0, record=("q", "v", "u"))
+    other = replace(setup, duration_s=9.0, integrator="DOP853", step_s=1e-3)
+    for made in (
+        rd.rollouts(PLANT, q0, V, record=("q", "v", "u"), **OPTIONS),
+        rd.rollouts(other, q0=q0, record=("q", "v", "u"), **OPTIONS),
+    ):
+        np.testing.assert_array_equal(made.q, expected.q)
+        np.testing.assert_array_equal(made.u, expected.u)
+    one = rd.rollouts(ARM, Q, **OPTIONS)
+    assert one.q is not None and one.q.shape == (1, 6, 2)
+    np.testing.assert_array_equal(one.q[0, 0], Q)
+
+
+@pytest.mark.parametrize(
+    ("ask", "message"),
+    [
+        (lambda: rd.simulate(ARM, Q, duration=1.0), r"simulate: no option 'duration'; nearest: duration_s"),
+        (lambda: rd.rollouts(ARM, Q, duration=1.0), r"rollouts: no option 'duration'; nearest: duration_s"),
+        (lambda: rd.simulate(ARM, plant=PLANT, q0=Q), "simulate: no option 'plant'"),
+        (lambda: rd.simulate(ARM, duration_s=1.0), r"simulate: give q0, the position at the start, \(2,\)"),
+        (lambda: rd.rollouts(ARM, integrator="rk4"), r"rollouts: give q0, the position at the start, \(2,\)"),
+        (lambda: rd.rollouts(ARM, np.zeros((0, 2)), integrator="rk4"), "of one number of runs"),
+        (lambda: rd.rollouts(ARM, Q), "not by DOP853: give integrator='rk4' and its step_s"),
+        (lambda: rd.rollouts(ARM, Q, integrator="sdirk_3"), "not by sdirk_3: give integrator='rk4' and its step_s"),
+        (lambda: rd.rollouts(ARM, Q, estimate_error=True), "estimate_error has no effect, simulate one of the runs"),
+        (lambda: rd.rollouts(ARM, Q, engine="compiled"), "engine has no effect, rollouts run in machine code"),
+        (lambda: rd.simulate(ARM, Q, step_s=2e-3), "step_s has no effect on DOP853, .* integrator='rk4'"),
+        (lambda: rd.simulate(ARM, Q, integrator="Radau", step_s=1e-3), "step_s has no effect on Radau"),
+        (lambda: rd.rollouts("ur5", Q), r"dynamics: give a robot, such as rd.load\('ur5'\)"),
+    ],
+)
+def test_what_means_nothing_is_refused(ask, message: str) -> None:
+    with pytest.raises(rd.RobotDynError, match=message):
+        ask()
+
+
+def test_former_names_of_arguments_and_records() -> None:
+    setup = rd.Setup(PLANT, Q, V, **OPTIONS)
+    with pytest.warns(DeprecationWarning, match=r"setup of rollouts is now what") as told:
+        runs = rd.rollouts(setup=setup)
+    assert told[0].filename == __file__
+    np.testing.assert_array_equal(runs.q, rd.rollouts(setup).q)
+    with pytest.warns(DeprecationWarning, match=r"record 'tau' of rollouts is now 'u'") as told:
+        runs = rd.rollouts(setup, record=["tau"])
+    assert told[0].filename == __file__
+    with pytest.warns(DeprecationWarning, match=r"Rollouts.tau is now u"):
+        assert runs.tau is runs.u is not None
+    run = rd.simulate(setup)
+    with pytest.warns(DeprecationWarning, match=r"Trajectory.tau is now u"):
+        assert run.tau is run.u
+
+
+@pytest.mark.parametrize(
+    ("ask", "new", "names"),
+    [
+        (lambda: rd.quintic(Q, V, duration=2.0, start=0.5), rd.quintic(Q, V, 2.0, start_s=0.5), "duration_s start_s"),
+        (lambda: rd.via_points(times=[0, 1], points=[Q, V]), rd.via_points([0, 1], [Q, V]), "times_s"),
+        (
+            lambda: rd.line([0, 0, 0], [1, 0, 0], duration=2.0, start=0.5).position,
+            rd.line([0, 0, 0], [1, 0, 0], 2.0, start_s=0.5).position,
+            "duration_s start_s",
+        ),
+        (
+            lambda: rd.circle([0, 0, 0], 1.0, [0, 0, 1], period=2.0, ramp=0.3, start=0.5).position,
+            rd.circle([0, 0, 0], 1.0, [0, 0, 1], 2.0, ramp_s=0.3, start_s=0.5).position,
+            "period_s ramp_s start_s",
+        ),
+    ],
+)
+def test_former_names_of_times(ask, new, names: str) -> None:
+    with pytest.warns(DeprecationWarning) as told:
+        old = ask()
+    assert {str(each.message).split(" is now ")[1].split(";")[0] for each in told} == set(names.split())
+    assert {each.filename for each in told} == {__file__}
+    np.testing.assert_array_equal(old.breaks, new.breaks)
+    np.testing.assert_array_equal(old.coefficients, new.coefficients)
+
+
+def test_former_name_of_the_longest_step() -> None:
+    with pytest.warns(DeprecationWarning, match=r"max_step of Adaptive is now max_step_s") as told:
+        method = rd.Adaptive(max_step=0.1)  # type: ignore[call-arg]
+    assert told[0].filename == __file__
+    assert method == rd.Adaptive(max_step_s=0.1)
+    with pytest.warns(DeprecationWarning, match=r"Adaptive.max_step is now max_step_s"):
+        assert method.max_step == 0.1  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.dtype(np.float32), np.float64, np.dtype("f8")], ids=str)
+def test_types_of_numpy_are_taken_where_their_names_are(dtype) -> None:
+    name = np.dtype(dtype).name
+    for what in (ARM, PLANT):
+        given, named = (rd.Compiled(what, dtype=each) for each in (dtype, name))
+        assert given == named or what is PLANT
+        x = Q.astype(dtype)
+        answer = given.M(x)
+        assert answer.dtype == np.dtype(dtype)
+        np.testing.assert_array_equal(answer, named.M(x))
+
+
+@pytest.mark.parametrize("dtype", [np.float16, np.int32, np.dtype(">f8"), None, Q, "f4", [("x", "f4")]], ids=str)
+def test_other_types_are_refused(dtype) -> None:
+    with pytest.raises(QueryError, match="no dtype"):
+        rd.Compiled(ARM, dtype=dtype)
