@@ -303,7 +303,7 @@ class Robot(Dynamics, Parametrised):
     def momentum(self, q: Array, v: Array, *, errors: str = "raise") -> ndarray:
         return self._ask("momentum", errors, kernels.momentum, self.couplings.torque, q=q, v=v)
 
-    @cached_property
+    @property
     def body_names(self) -> tuple[str, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
         return ordered(self.joint_names, self.model.names[1:])
 
@@ -313,7 +313,7 @@ class Robot(Dynamics, Parametrised):
         names = list(self.model.names[1:])
         return [names.index(name) for name in self.body_names]
 
-    @cached_property
+    @property
     def inertial_parameters(self) -> ndarray:  # pyright: ignore[reportIncompatibleMethodOverride]
         return frozen(np.concatenate([self.model.inertias[i + 1].toDynamicParameters() for i in self._order]))
 
