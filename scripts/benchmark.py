@@ -28,6 +28,7 @@ def main() -> None:
     print(environment())
     if "queries" in what:
         queries.queries(effort)
+        queries.right_angles(effort)
         queries.startup(effort)
     if "compiled" in what:
         kernels.kernels(effort)

@@ -16,7 +16,7 @@ from robot_dyn.compiled.cache import default_store
 from robot_dyn.compiled.derivatives import forward_dynamics_derivatives
 from robot_dyn.compiled.engine import Engine
 from robot_dyn.compiled.on_first_use import OnFirstUse
-from robot_dyn.compiled.right_angles import completed
+from robot_dyn.compiled.right_angles import RightAngle, completed
 from robot_dyn.compiled.self_check import SelfCheck
 from robot_dyn.compiled.threads import thread_count
 from robot_dyn.compiled.trace import QUANTITIES, Trace
@@ -58,7 +58,7 @@ class CompiledDynamics(Dynamics, Parametrised):
         return CompiledDynamics, (self.original, self.dtype, self.threads, self.cache)
 
     @cached_property
-    def _completed(self) -> tuple[Robot, tuple[str, ...]]:
+    def _completed(self) -> tuple[Robot, tuple[RightAngle, ...]]:
         return completed(self.original)
 
     @property
@@ -69,7 +69,7 @@ class CompiledDynamics(Dynamics, Parametrised):
     @property
     def right_angles(self) -> tuple[str, ...]:
         """Angles that the file states with too few digits and that were taken as right angles, in words."""
-        return self._completed[1]
+        return tuple(map(str, self._completed[1]))
 
     @cached_property
     def engine(self) -> Engine:

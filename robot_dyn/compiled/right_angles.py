@@ -7,8 +7,9 @@ turns a frame by less than 1e-9 rad, and halves the kernel. Masses, inertias and
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any, final
 
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
@@ -19,9 +20,58 @@ _LEAST_DECIMALS = 9  # with fewer, the angle meant is a guess, and the change co
 _FULL = 15  # decimals: nothing to add
 
 
-def completed(robot: Robot) -> tuple[Robot, tuple[str, ...]]:
-    """The robot with right angles written out in full, and what was changed, in words."""
-    root, changes = robot.description.element, []
+@final
+@dataclass(frozen=True)
+class RightAngle:
+    """A joint whose rpy is taken as right angles.
+
+    Attributes:
+        joint: Its name.
+        rpy: As the file states it.
+        change: The largest change of an angle, in [rad].
+    """
+
+    joint: str
+    rpy: str
+    change: float
+
+    def __str__(self) -> str:
+        return f"joint {self.joint!r}: rpy {self.rpy} taken as right angles ({self.change:.0e} rad)"
+
+
+def completed(robot: Robot) -> tuple[Robot, tuple[RightAngle, ...]]:
+    """The robot with right angles written out in full, and what was changed."""
+    description, changes = _written_out(robot.description)
+    return (Robot(description, robot.edits) if changes else robot), changes
+
+
+def robot_of(dynamics: Any) -> Robot | None:
+    """The robot whose equations a dynamics has, its right angles written out in full; None if there is none."""
+    robot = _described(dynamics)
+    return None if robot is None else completed(robot)[0]
+
+
+def written_out(*given: Any) -> str:
+    """The right angles that machine code of these dynamics writes out in full, in one sentence; "" if none."""
+    robots = [robot for each in given if (robot := _described(each)) is not None]
+    changes = tuple(dict.fromkeys(change for robot in robots for change in completed(robot)[1]))
+    return in_words(changes) if changes else ""
+
+
+def _described(dynamics: Any) -> Robot | None:
+    robot = getattr(dynamics, "robot", dynamics)
+    return robot if isinstance(robot, Robot) and isinstance(robot.description, Description) else None
+
+
+def in_words(changes: tuple[RightAngle, ...]) -> str:
+    """Changes, one at least, in one sentence."""
+    names, most = ", ".join(each.joint for each in changes), max(each.change for each in changes)
+    return f"rpy of {names} taken as exact multiples of π/2 (changed by {most:.0e} rad at most)"
+
+
+@lru_cache(maxsize=32)
+def _written_out(description: Description) -> tuple[Description, tuple[RightAngle, ...]]:
+    root, changes = description.element, []
     for joint in root.iterfind("joint"):
         origin = joint.find("origin")
         if origin is None:
@@ -30,21 +80,9 @@ def completed(robot: Robot) -> tuple[Robot, tuple[str, ...]]:
         full = [_completed(word) for word in words]
         if full != words:
             change = max(abs(float(a) - float(b)) for a, b in zip(words, full, strict=True))
-            changes.append(
-                f"joint {joint.get('name')!r}: rpy {' '.join(words)} taken as right angles ({change:.0e} rad)"
-            )
+            changes.append(RightAngle(joint.get("name"), " ".join(words), change))
             origin.set("rpy", " ".join(full))
-    if not changes:
-        return robot, ()
-    return Robot(replace(robot.description, xml=etree.tostring(root)), robot.edits), tuple(changes)
-
-
-def robot_of(dynamics: Any) -> Robot | None:
-    """The robot whose equations a dynamics has, its right angles written out in full; None if there is none."""
-    robot = getattr(dynamics, "robot", dynamics)
-    if not isinstance(getattr(robot, "description", None), Description) or not isinstance(robot, Robot):
-        return None
-    return completed(robot)[0]
+    return (replace(description, xml=etree.tostring(root)) if changes else description), tuple(changes)
 
 
 def _completed(literal: str) -> str:

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import RobotDynError
 from robot_dyn.integrate.adaptive import ADAPTIVE
 from robot_dyn.scene.control import LAWS, Control
 from robot_dyn.scene.scene import Scene
 from robot_dyn.scene.schema import Part
+from robot_dyn.simulation.origin import edits_of_machine_code
 from robot_dyn.simulation.setup import Setup
 
 _TERMS = {
@@ -62,16 +62,16 @@ def explain(scene: Scene, setup: Setup) -> Iterator[str]:
         yield f"  {key} = {getattr(scene, key)}  ({_source(scene, key)})"
     yield "start:"
     yield from _numbers(scene.start, "  ")
-    yield from _machine_code(setup.plant)
+    yield from _machine_code(setup)
     yield f"\nthe file of the robot: {setup.plant.dynamics.description.source}"  # pyright: ignore[reportAttributeAccessIssue]
 
 
-def _machine_code(plant: Plant) -> Iterator[str]:
+def _machine_code(setup: Setup) -> Iterator[str]:
     """What the compiled right-hand side costs, by effect."""
     from robot_dyn.compiled.plant import Compiled
 
     try:
-        compiled: Any = Compiled(plant)
+        compiled: Any = Compiled(setup.plant)
         by_effect, which = compiled.instructions_by_effect, compiled.engine.traces["forward_dynamics"]
     except RobotDynError as error:
         yield f"\nmachine code: none, {error}"
@@ -79,6 +79,8 @@ def _machine_code(plant: Plant) -> Iterator[str]:
     whole = which.counts[which.formulation]
     parts = ", ".join(f"{name} {count}" for name, count in by_effect.items()) or "none"
     yield f"\nmachine code of the acceleration, by the {which.formulation}: {whole} instructions; of effects: {parts}"
+    if edits := edits_of_machine_code(setup):
+        yield f"  edited there: {edits['right_angles']}"
 
 
 def _numbers(part: Part, indent: str) -> Iterator[str]:

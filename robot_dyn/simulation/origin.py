@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robot_dyn.compiled.overload import version_of
+from robot_dyn.compiled.right_angles import written_out
 from robot_dyn.errors import DescriptionError, QueryError
 from robot_dyn.model import catalog
 from robot_dyn.model.description import check
@@ -21,6 +22,7 @@ from robot_dyn.model.edits import Payload
 from robot_dyn.model.robot import Robot
 
 if TYPE_CHECKING:
+    from robot_dyn.simulation.setup import Setup
     from robot_dyn.simulation.trajectory import Trajectory
 
 
@@ -33,6 +35,12 @@ def origin(dynamics: Any) -> dict[str, str]:
         texts |= {"robot": robot.name, "source": robot.description.source}
         texts |= {"urdf": urdf, "edits": robot.edits.as_json()}
     return texts
+
+
+def edits_of_machine_code(setup: Setup) -> dict[str, str]:
+    """What machine code changes of a setup, as texts of a run: right angles of plant and controller's models."""
+    words = written_out(setup.plant.dynamics, *(setup.controller.models.values() if setup.controller else ()))
+    return {"right_angles": words} if words else {}
 
 
 def packed(about: dict[str, str], folder: Path) -> dict[str, str]:

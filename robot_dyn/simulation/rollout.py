@@ -23,6 +23,7 @@ from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.simulation.machine.batch import LANES, Batch
 from robot_dyn.simulation.machine.making import machine
 from robot_dyn.simulation.options import Options, setup_of, takes_options
+from robot_dyn.simulation.origin import edits_of_machine_code
 from robot_dyn.simulation.rollout_result import Rollouts
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import MOST_BYTES
@@ -97,7 +98,8 @@ def rollouts(
     kept = tuple(name for name, yes in asked.items() if yes)
     made = machine(equation, cast(Integrator, setup.integrator), lanes=LANES, kept=kept)
     made.check(setup)
-    return Batch(setup, made, q, v, sweep, recorded, kept, most_bytes).run(thread_count(threads), on_progress)
+    runs = Batch(setup, made, q, v, sweep, recorded, kept, most_bytes).run(thread_count(threads), on_progress)
+    return replace(runs, about=edits_of_machine_code(setup) | runs.about)
 
 
 def _setup(what: Setup | Plant | Dynamics, q0: Any, options: Mapping[str, Any]) -> Setup:

@@ -43,7 +43,7 @@ class Setup(Value):
             tolerances, choose their steps; "rk4", "order_8", "gauss_4" and others of `rd.method` have a fixed one.
         step_s: Fixed step; made smaller where samples, ticks, switches and the end ask for it. Not to be given
             for a method that chooses its steps.
-        record_period_s: Time between samples; 0 for every step.
+        record_period_s: Time between samples; 0 for every step, or 1000 samples where the method chooses its steps.
         estimate_error: Whether companion runs are made, which cost about as much as the run; five times as much
             where only shorter steps can tell.
         about: Texts kept with the run.

@@ -29,7 +29,7 @@ from robot_dyn.simulation.loads import at_stop, link_of, wrenches
 from robot_dyn.simulation.observed import observer_of, remarks
 from robot_dyn.simulation.observer import Observer
 from robot_dyn.simulation.options import Options, setup_of, starts, takes_options
-from robot_dyn.simulation.origin import origin
+from robot_dyn.simulation.origin import edits_of_machine_code, origin
 from robot_dyn.simulation.record import Record
 from robot_dyn.simulation.samples import columns
 from robot_dyn.simulation.setup import Setup
@@ -96,7 +96,8 @@ def simulate(
         setup.integrator.name, step, record.steps, record.evaluations, wall, companions, engine, compiling
     )
     observer.close()
-    made = _trajectory(setup, equation, record, statistics, error, observer)
+    edits = {} if machine is None else edits_of_machine_code(setup)
+    made = _trajectory(setup, equation, record, statistics, error, observer, edits)
     return replace(made, statistics=replace(statistics, samples_s=perf_counter() - clock[-1]))
 
 
@@ -133,6 +134,7 @@ def _trajectory(
     statistics: Statistics,
     error: ErrorEstimate | None,
     observer: Observer,
+    edits: dict[str, str],
 ) -> Trajectory:
     """The samples with what follows from them."""
     t = record.t
@@ -141,7 +143,7 @@ def _trajectory(
     ledger = Ledger(E[:, 0], E[:, 1], dict(zip(equation.sources, W.T, strict=True)), record.kinetic_peak)
     power = dict(zip(equation.sources, P.T, strict=True))
     plant = setup.plant
-    names, about = plant.dynamics.joint_names, origin(plant.dynamics) | setup.about
+    names, about = plant.dynamics.joint_names, origin(plant.dynamics) | edits | setup.about
     if setup.controller is not None and setup.controller.task_frame is not None:
         about = {"frame": link_of(plant.dynamics, setup.controller.task_frame)} | about
     return Trajectory(

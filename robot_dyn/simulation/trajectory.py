@@ -157,6 +157,7 @@ class Trajectory(Value):
         lines = [
             opening + _after(self.outcome.advice),
             *([] if self.acting is None else [f"effects: {', '.join(self.acting) or 'none'}"]),
+            *([f"right angles, in machine code: {self.about['right_angles']}"] if "right_angles" in self.about else []),
             f"energy ledger: {residual}" + _after(self.leak) if ledger.known else "energy ledger: was not recorded",
             f"error of q [{unit}]: {self.error or _NOT_ESTIMATED[self.outcome.ending is Ending.STOPPED]}",
         ]

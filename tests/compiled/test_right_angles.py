@@ -9,6 +9,8 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.compiled.right_angles import completed
+from robot_dyn.scene.explain import explain
+from robot_dyn.scene.scene import parse_scene
 
 ARM = """<robot name="arm"><link name="base"/>
 <link name="tip"><inertial><mass value="1.5"/><origin xyz="0.1 0.2 0.3" rpy="1.57079632679 0 0"/>
@@ -33,7 +35,7 @@ def test_right_angles_of_the_ur5_become_exact() -> None:
     before, after = rpy_of(given), rpy_of(robot)
     changed = [k for k, pair in enumerate(zip(before, after, strict=True)) if pair[0] != pair[1]]
     assert len(changed) == len(changes) == 5
-    assert all("taken as right angles" in text for text in changes)
+    assert all("taken as right angles" in str(change) for change in changes)
     for k in changed:
         for x, y in zip(before[k], after[k], strict=True):
             assert y == round(x / (math.pi / 2)) * (math.pi / 2) if x != y else True
@@ -51,7 +53,7 @@ def test_right_angles_of_the_ur5_become_exact() -> None:
 def test_one_unit_of_the_last_digit_of_a_right_angle_is_it(literal: str, right: int) -> None:
     robot, (change,) = completed(arm(f"0 {literal} 0.3"))
     assert rpy_of(robot) == [[0.0, right * math.pi / 2, 0.3]]
-    assert change.startswith(f"joint 'elbow': rpy 0 {literal} 0.3 taken as right angles")
+    assert str(change).startswith(f"joint 'elbow': rpy 0 {literal} 0.3 taken as right angles")
 
 
 @pytest.mark.parametrize(
@@ -72,3 +74,31 @@ def test_masses_and_translations_are_not_angles() -> None:
     text = robot.description.xml.decode()
     assert text.count('rpy="1.57079632679 0 0"') == 1
     assert 'xyz="1.57079632679 0 0"' in text
+
+
+def test_right_angles_are_named_wherever_machine_code_runs(tmp_path) -> None:
+    """By the summary and the run file of runs in machine code, of the plant or of a model; by no interpreted run."""
+    given, q = arm("0 1.57079632679 0.3"), [0.2]
+    words = "rpy of elbow taken as exact multiples of π/2 (changed by 5e-12 rad at most)"
+    options = {"q0": q, "duration_s": 0.01, "integrator": "rk4", "estimate_error": False}
+    run = rd.simulate(given, **options, engine="compiled")
+    assert f"\nright angles, in machine code: {words}\n" in run.summary
+    assert rd.load_run(rd.save_run(run, tmp_path / "run")).about["right_angles"] == words
+    runs = rd.rollouts(given, q, duration_s=0.01, integrator="rk4")
+    assert runs.about["right_angles"] == words and words in runs[0].summary
+    interpreted = rd.simulate(given, **options, engine="interpreted")
+    exact = rd.simulate(completed(given)[0], **options, engine="compiled")
+    for other in (interpreted, exact):
+        assert "right_angles" not in other.about and "right angles" not in other.summary
+    law = rd.PDGravity(given, rd.hold([0.3]), 5.0, 1.0)
+    run = rd.simulate(completed(given)[0], **options, engine="compiled", controller=law)
+    assert run.about["right_angles"] == words
+
+
+def test_explain_names_right_angles(tmp_path) -> None:
+    path = tmp_path / "scene.toml"
+    (tmp_path / "arm.urdf").write_text(ARM.format(rpy="0 1.57079632679 0.3"))
+    path.write_text('robot = "arm.urdf"\nduration_s = 0.1\n')
+    assert "  edited there: rpy of elbow taken as exact multiples of π/2" in "\n".join(
+        explain(parse_scene(path.read_text(), "scene.toml"), rd.read_scene(path))
+    )
