@@ -51,7 +51,7 @@ def test_states_that_are_not_finite_leave_the_others_their_answers(engine: Any, 
 @every_engine
 @pytest.mark.parametrize("method", ["C", "inverse_dynamics", "kinetic_energy"])
 def test_a_state_that_overflows_is_told_by_its_row(engine: Any, method: str) -> None:
-    """v² = 1e360 is no float64; the row has as many indices as the batch has axes."""
+    """v² = 1e360 does not fit into float64; the row has as many indices as the batch has axes."""
     given = [states(24)[name].reshape(4, 6, 6) for name in ARGUMENTS[method]]
     given[1][2, 3] = 1e180 if method != "C" else 1.5e308
     with pytest.raises(OverflowedError, match=r"so large that the result overflows in row \(2, 3\) of the batch"):

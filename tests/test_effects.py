@@ -54,7 +54,7 @@ def states(count: int = 200) -> np.ndarray:
 
 
 def every_effect(base: type) -> set[type]:
-    """The concrete forces of the library; what stands for one in a trace is none."""
+    """The concrete forces of the library; what stands for one in a trace is not one."""
     below = {each for sub in base.__subclasses__() for each in {sub} | every_effect(sub)}
     return {each for each in below if each.__module__.startswith("robot_dyn.effects.") and not each.__abstractmethods__}
 

@@ -55,7 +55,7 @@ def test_a_run_can_go_back(name: str) -> None:
 
 @pytest.mark.parametrize("name", BOTH)
 def test_a_run_stops_where_it_is_told(name: str) -> None:
-    """Position crosses zero at t = π − atan 2; the solution ends there, and the start on zero is no crossing."""
+    """Position crosses zero at t = π − atan 2; the solution ends there, and the start on zero is not a crossing."""
     options = Adaptive(name, rtol=1e-9, atol=1e-11)
     solution = options.solve(OSCILLATOR, 0.0, START, 10.0, stop=lambda t, y: y[0])
     assert solution.status is Status.STOPPED

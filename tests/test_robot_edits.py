@@ -48,7 +48,7 @@ def test_armature_adds_its_diagonal_to_M_alone(name: str):
 
 
 def test_armature_stores_kinetic_energy():
-    """K = ½ vᵀ M v with the drives in M; pin.computeKineticEnergy leaves them out where an axis is none of x, y, z."""
+    """K = ½ vᵀ M v with the drives in M; pin.computeKineticEnergy leaves them out where an axis is not x, y or z."""
     robot = rd.load("skew_tree")
     q, v, _ = general(robot, 12)
     values = np.linspace(0.1, 0.7, robot.n)

@@ -97,7 +97,7 @@ NOT_NUMBERS = ("abc", None, 1j, object(), True, "0.1", b"0")
 
 
 def wrongs(x: np.ndarray) -> list[Any]:
-    """What is no array of n real numbers."""
+    """What is not an array of n real numbers."""
     entries = [[wrong, *x.tolist()[1:]] for wrong in NOT_NUMBERS[:-3]]
     shapes = [
         0.5,

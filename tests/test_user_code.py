@@ -232,7 +232,7 @@ def test_a_function_that_is_no_controller_is_refused(law, said: str) -> None:
     with pytest.raises(ControlError, match=said):
         rd.Setup(rd.Plant(ARM), Q, controller=law)
     with pytest.raises(QueryError, match="controller"):
-        rd.Setup(rd.Plant(ARM), Q, controller=rd.PD)  # a class is no function of (t, q, v)
+        rd.Setup(rd.Plant(ARM), Q, controller=rd.PD)  # a class is not a function of (t, q, v)
 
 
 @pytest.mark.parametrize("engine", ["interpreted", "compiled"])

@@ -177,7 +177,7 @@ def _objection(folder: Path) -> str:
     except OSError:  # where it cannot be reached, reading and writing fail of themselves
         return ""
     if not S_ISDIR(status.st_mode):
-        return f"is {'a link' if S_ISLNK(status.st_mode) else 'no folder'}; {_OTHER}"
+        return f"is {'a link' if S_ISLNK(status.st_mode) else 'not a folder'}; {_OTHER}"
     if not _is_private(status, 0o077):
         mode = S_IMODE(status.st_mode)
         return f"is not yours alone (owner {status.st_uid}, mode {mode:04o}); chmod 700 it if it is yours, or {_OTHER}"

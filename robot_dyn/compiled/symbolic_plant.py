@@ -64,7 +64,7 @@ def _followed(name: str, function: Callable[[], Any]) -> Any:
     """What a part gives, whichever way its comparisons turn out; TraceError names the part."""
     try:
         made = every_branch(function).view(Symbols)
-        column(made)  # of what is not a number it says so
+        column(made)  # reports what is not a number
         return made
     except Exception as error:  # whatever a user's code raises on symbols
         raise TraceError(f"{name} cannot be compiled ({because(error)}): {REMEDY}") from error

@@ -16,7 +16,7 @@ from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.remarks import Kind
 
 _ROUNDING = 1e-9  # of a limit: nearer to it is at it
-_NONE = 1e9  # stops and limits beyond are none
+_NONE = 1e9  # stops and limits beyond it do not exist
 
 
 @final

@@ -155,7 +155,7 @@ def _trajectory(
 
 
 def deviation_of(setup: Setup, t: np.ndarray, q: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:
-    """Wanted positions, and how far the joints, or the frame, are from what the reference wants."""
+    """Desired positions, and how far the joints, or the frame, are from the reference."""
     controller = setup.controller
     if controller is None:
         return None, None

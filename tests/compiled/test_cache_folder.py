@@ -35,7 +35,7 @@ def spoil(folder: Path, how: str) -> None:
 SPOILT = [
     ("link", "is a link"),
     ("dangling", "is a link"),
-    ("file", "is no folder"),
+    ("file", "is not a folder"),
     ("0755", "mode 0755"),
     ("0770", "mode 0770"),
     ("0701", "mode 0701"),

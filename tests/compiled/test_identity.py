@@ -19,7 +19,7 @@ from tests.compiled.test_kernel import Memory
 
 
 def test_an_edited_module_is_another_key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Any file of the package, however deep; another name of a file; and nothing that is no Python."""
+    """Any file of the package, however deep; another name of a file; and nothing that is not Python."""
     below = tmp_path / "compiled" / "llvm"
     below.mkdir(parents=True)
     (below / "tanh.py").write_text("x = 1")

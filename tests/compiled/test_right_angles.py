@@ -29,7 +29,7 @@ def rpy_of(robot: rd.Robot) -> list[list[float]]:
 
 
 def test_right_angles_of_the_ur5_become_exact() -> None:
-    """All five, each listed by its joint; others, and all that is no angle, stay as they are."""
+    """All five, each listed by its joint; others, and all that is not an angle, stay as they are."""
     given = rd.load("ur5")
     robot, changes = completed(given)
     before, after = rpy_of(given), rpy_of(robot)

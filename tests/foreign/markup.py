@@ -31,7 +31,7 @@ FILES = [
         LATE,
     ),
     Foreign("two declarations", V1 + V1 + ARM, refused=(*NOT_XML, "declaration")),
-    Foreign("a version that is no number", f'<?xml version="one"?>{ARM}', refused=NOT_XML),
+    Foreign("a version that is not a number", f'<?xml version="one"?>{ARM}', refused=NOT_XML),
     Foreign("an element of a prefix not declared", inside(SENSOR), ((*PREFIXES, "sensor", "line 28"),)),
     Foreign(
         "an attribute of a prefix not declared",

@@ -71,7 +71,7 @@ FILES = [
         (("velocity limit -0.5 is negative",), ("lower limit 2 is above its upper 1",)),
         sound=arm((LIMIT, '<limit effort="9"/>')),
     ),
-    Foreign("a limit that is no number", arm((LIMIT, taken("effort", 'effort="nan"'))), refused=("effort", "'nan'")),
+    Foreign("a limit that is not a number", arm((LIMIT, taken("effort", 'effort="nan"'))), refused=("effort", "'nan'")),
     Foreign("elements of other programs", inside(ONE_BODY)),
     Foreign("a version of the format", ARM.replace("<robot ", '<robot version="1.0" ')),
     Foreign(

@@ -75,7 +75,7 @@ def mutate(rng: np.random.Generator, seed: list[str]) -> list[str]:
                 del words[i : i + 1]
             case _:
                 words[i : i + 1] = words[i : i + 1] * 2
-    # A live server and a run of hours are no hang.
+    # A live server and a run of hours do not hang.
     return words if "replay" not in words or "--html" in words else ["--help"]
 
 

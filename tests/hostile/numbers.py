@@ -1,4 +1,4 @@
-"""Numbers that are none, do not fit, are too many or too large."""
+"""Numbers that are not numbers, do not fit, are too many or too large."""
 
 from __future__ import annotations
 

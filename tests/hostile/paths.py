@@ -71,5 +71,5 @@ KINDS = [
     Kind("a path in the home of nobody", at("~no_such_user/robot.urdf"), ("no file", "home", "give the path")),
     Kind("a path through a file", lambda path: text(ARM)(path) / "robot.urdf", NO_FILE),
     Kind("a file of 64 GiB of zeros", sparse, ("is larger than 16 MiB", "keep meshes")),
-    Kind("a file whose name is no text", lambda path: text(ARM)(path.with_name("arm-\udcff.urdf")), upper=(1, 2)),
+    Kind("a file whose name is not text", lambda path: text(ARM)(path.with_name("arm-\udcff.urdf")), upper=(1, 2)),
 ]

@@ -1,4 +1,4 @@
-"""Files that are no XML, or the XML of something else."""
+"""Files that are not XML, or the XML of something else."""
 
 from __future__ import annotations
 
