@@ -19,8 +19,8 @@ from robot_dyn.errors import EffectError
 from robot_dyn.model.dynamics import Dynamics
 
 _NAME = "joint_stops"  # of both parts, as of the function that makes them
-_LOWER = coefficient("rad", symbol="lower stop", infinite=True, elsewhere=-inf, stated="lower")
-_UPPER = coefficient("rad", symbol="upper stop", infinite=True, elsewhere=inf, stated="upper")
+_LOWER = coefficient("rad", symbol="Lower stop", infinite=True, elsewhere=-inf, stated="lower")
+_UPPER = coefficient("rad", symbol="Upper stop", infinite=True, elsewhere=inf, stated="upper")
 
 
 @final

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from math import inf
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Literal, Union, get_args
 
 from pydantic import Field
 
 from robot_dyn.effects.actuator import EffortLimit
 from robot_dyn.effects.effect import Effect
 from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFriction
-from robot_dyn.effects.joint_limit import joint_stops
+from robot_dyn.effects.joint_limit import JointStopDamper, JointStopSpring, joint_stops
 from robot_dyn.effects.spring import Spring
 from robot_dyn.effects.wrench import ExternalWrench
 from robot_dyn.errors import SceneError
 from robot_dyn.model.edits import STANDARD_GRAVITY, Payload
 from robot_dyn.model.robot import Robot
-from robot_dyn.scene.schema import NotNegative, Number, Part, PerJoint, Positive, Stated, Vector3, per_joint
+from robot_dyn.scene.declared import Acting, declared_part
+from robot_dyn.scene.schema import NotNegative, Number, Part, PerJoint, Positive, Vector3
 
 
 class Gravity(Part):
@@ -73,73 +74,10 @@ class Armature(Part):
         return robot.with_(armature=self.inertia_kg_m2)
 
 
-class Viscous(Part):
-    """Viscous friction τ = −b v."""
-
-    kind: Literal["viscous_friction"]
-    damping_N_m_s_per_rad: Stated = "urdf"
-    """b."""
-
-    def build(self, robot: Robot) -> tuple[Effect, ...]:
-        """The effect."""
-        return (ViscousFriction(per_joint("damping", self.damping_N_m_s_per_rad, robot)),)
-
-
-class RegularisedCoulomb(Part):
-    """Dry friction, regularised: τ = −f tanh(v / v_s). Inside |v| < v_s it creeps and does not stick."""
-
-    kind: Literal["regularised_coulomb_friction"]
-    friction_N_m: Stated = "urdf"
-    """f."""
-    velocity_scale_rad_per_s: Positive = 0.01
-    """v_s."""
-
-    def build(self, robot: Robot) -> tuple[Effect, ...]:
-        """The effect."""
-        friction = per_joint("friction", self.friction_N_m, robot)
-        return (RegularisedCoulombFriction(friction, self.velocity_scale_rad_per_s),)
-
-
-class JointSpring(Part):
-    """Springs in the joints: τ = −k (q − q₀)."""
-
-    kind: Literal["spring"]
-    stiffness_N_m_per_rad: PerJoint
-    """k."""
-    rest_rad: PerJoint = 0.0
-    """Rest position q₀."""
-
-    def build(self, robot: Robot) -> tuple[Effect, ...]:
-        """The effect."""
-        stiffness = per_joint("stiffness", self.stiffness_N_m_per_rad, robot)
-        return (Spring(stiffness, per_joint("rest", self.rest_rad, robot)),)
-
-
-class JointStops(Part):
-    """Soft joint stops: τ = k (δ₋ − δ₊) − c (δ₋ + δ₊) v, with δ the depth beyond a stop."""
-
-    kind: Literal["joint_stops"]
-    lower_rad: Stated = "urdf"
-    """Lower stops; joints left out have none."""
-    upper_rad: Stated = "urdf"
-    """Upper stops; joints left out have none."""
-    stiffness_N_m_per_rad: PerJoint = 1e4
-    """k."""
-    damping_N_m_s_per_rad2: PerJoint = 1e3
-    """c, damping for each unit of depth."""
-
-    def build(self, robot: Robot) -> tuple[Effect, ...]:
-        """The elastic and the dissipative part."""
-        return joint_stops(
-            per_joint("lower", self.lower_rad, robot, elsewhere=-1e9),
-            per_joint("upper", self.upper_rad, robot, elsewhere=1e9),
-            per_joint("stiffness", self.stiffness_N_m_per_rad, robot),
-            per_joint("damping", self.damping_N_m_s_per_rad2, robot),
-        )
-
-
-class Wrench(Part):
+class Wrench(Acting):
     """A force and a torque on a link, for start_s ≤ t < end_s: τ = Jᵀ F."""
+
+    term = ExternalWrench.term
 
     kind: Literal["external_wrench"]
     frame: str
@@ -156,32 +94,33 @@ class Wrench(Part):
     """When it ends."""
 
     def build(self, robot: Robot) -> tuple[Effect, ...]:
-        """The effect."""
         if not any((*self.force_N, *self.torque_N_m)):
             raise SceneError(f"external_wrench on {self.frame!r}: has no effect; give force_N or torque_N_m")
         end = inf if self.end_s is None else self.end_s
         return (ExternalWrench(self.frame, [*self.force_N, *self.torque_N_m], self.expressed_in, self.start_s, end),)
 
 
-class Effort(Part):
-    """Limits of the actuation: −u_max ≤ u ≤ u_max."""
-
-    kind: Literal["effort_limit"]
-    limit_N_m: Stated = "urdf"
-    """u_max; joints left out have none."""
-
-    def build(self, robot: Robot) -> tuple[Effect, ...]:
-        """The bound."""
-        return (EffortLimit(per_joint("limit", self.limit_N_m, robot, elsewhere=inf)),)
-
-
+EDITS = Gravity, Lock, Load, Armature
+ACTING = (
+    declared_part("viscous_friction", ViscousFriction),
+    declared_part("regularised_coulomb_friction", RegularisedCoulombFriction),
+    declared_part("spring", Spring),
+    declared_part(
+        "joint_stops", JointStopSpring, JointStopDamper, make=joint_stops,
+        text="Soft joint stops: τ = k (δ₋ − δ₊) − c (δ₋ + δ₊) v, with δ the depth beyond a stop.",
+    ),
+    Wrench,
+    declared_part("effort_limit", EffortLimit),
+)  # fmt: skip
 Edit = Gravity | Lock | Load | Armature
-Acting = Viscous | RegularisedCoulomb | JointSpring | JointStops | Wrench | Effort
-AnyEffect = Annotated[Edit | Acting, Field(discriminator="kind")]
+AnyEffect = Annotated[Union[EDITS + ACTING], Field(discriminator="kind")]  # pyright: ignore  # noqa: UP007
+
+
+def kind_of(part: type[Part]) -> str:
+    """The kind that names a part."""
+    return str(get_args(part.model_fields["kind"].annotation)[0])
 
 
 def kinds() -> tuple[str, ...]:
     """All kinds of effects that a scene can name."""
-    return tuple(
-        str(get_args(part.model_fields["kind"].annotation)[0]) for part in (*get_args(Edit), *get_args(Acting))
-    )
+    return tuple(map(kind_of, (*EDITS, *ACTING)))

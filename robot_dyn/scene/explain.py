@@ -10,19 +10,13 @@ import numpy as np
 from robot_dyn.errors import RobotDynError
 from robot_dyn.integrate.adaptive import ADAPTIVE
 from robot_dyn.scene.control import LAWS, Control
+from robot_dyn.scene.effects import ACTING, kind_of
 from robot_dyn.scene.scene import Scene
 from robot_dyn.scene.schema import Part
 from robot_dyn.simulation.origin import edits_of_machine_code
 from robot_dyn.simulation.setup import Setup
 
-_TERMS = {
-    "viscous_friction": "−b v",
-    "regularised_coulomb_friction": "−f tanh(v / v_s)",
-    "spring": "−k (q − q₀)",
-    "joint_stops": "k (δ₋ − δ₊) − c (δ₋ + δ₊) v",
-    "external_wrench": "Jᵀ F",
-    "effort_limit": "|u| ≤ u_max",
-}
+_TERMS = {kind_of(part): part.term for part in ACTING}
 _EDITS = {
     "gravity": "∂V/∂q in N, with V = −Σ m gᵀ p",
     "lock": "a joint held at a value, its link part of the link before",

@@ -11,7 +11,7 @@ from pydantic.fields import FieldInfo
 from robot_dyn.integrate.adaptive import ADAPTIVE
 from robot_dyn.integrate.methods import FIXED_STEP
 from robot_dyn.scene.control import LAWS, AnyReference, Control, Model
-from robot_dyn.scene.effects import Acting, Edit
+from robot_dyn.scene.effects import ACTING, EDITS, kind_of
 from robot_dyn.scene.scene import Scene, Start
 from robot_dyn.scene.schema import Part
 
@@ -52,14 +52,14 @@ def manual() -> str:
         *_section("`[start]`", "The state at the start.", Start),
         "## `[[effect]]`\n\nWhat acts; one table for each, with its `kind`.\n",
     ]
-    for part in (*get_args(Edit), *get_args(Acting)):
-        parts += _section(f'`kind = "{_kind(part)}"`', _text(part), part, level=3)
+    for part in (*EDITS, *ACTING):
+        parts += _section(f'`kind = "{kind_of(part)}"`', _text(part), part, level=3)
     parts += _section("`[control]`", _text(Control), Control)
     parts += ["| kind | law |\n|---|---|", *(f"| `{kind}` | {_cell(law)} |" for kind, law in LAWS.items()), ""]
     parts += _section("`[control.model]`", _text(Model), Model)
     parts += ["## `[reference]`\n\nWhat the controller follows; one table, with its `kind`.\n"]
     for part in get_args(get_args(AnyReference)[0]):
-        parts += _section(f'`kind = "{_kind(part)}"`', _text(part), part, level=3)
+        parts += _section(f'`kind = "{kind_of(part)}"`', _text(part), part, level=3)
     return "\n".join(parts).rstrip() + "\n"
 
 
@@ -131,10 +131,6 @@ def _toml(value: Any) -> str:
 def _text(part: type[Part]) -> str:
     """The docstring of a part."""
     return "\n".join(line.strip() for line in (part.__doc__ or "").strip().splitlines())
-
-
-def _kind(part: type[Part]) -> str:
-    return str(get_args(part.model_fields["kind"].annotation)[0])
 
 
 def _cell(text: str) -> str:

@@ -8,9 +8,11 @@ from typing import Any
 
 from pydantic import ValidationInfo, ValidatorFunctionWrapHandler
 
+from robot_dyn.coefficients import Coefficient
 from robot_dyn.effects.effect import Effect
 from robot_dyn.errors import SceneError, shown
 from robot_dyn.model.robot import Robot
+from robot_dyn.scene.declared import keys_of
 from robot_dyn.scene.schema import Part, per_joint
 from robot_dyn.validate import number, numbers
 
@@ -28,12 +30,16 @@ class OwnEffect(Part):
 
     def build(self, robot: Robot) -> tuple[Effect, ...]:
         """The effect; SceneError if its keys are others than the arguments."""
-        arguments = {key: _argument(key, value, robot) for key, value in self.values.items()}
         known = signature(self.make)
+        of = keys_of(self.make, self.make) if isinstance(self.make, type) else {}
+        given = {of[key][0] if key in of else key: (key, value) for key, value in self.values.items()}
+        arguments = {name: _argument(key, value, robot, of.get(key)) for name, (key, value) in given.items()}
         try:
             known.bind(**arguments)
         except TypeError as error:
-            raise SceneError(f"{self.kind}: {error}; keys: {', '.join(known.parameters)}") from None
+            spelled = {name: key for key, (name, _) in of.items()}
+            keys = ", ".join(spelled.get(name, name) for name in known.parameters)
+            raise SceneError(f"{self.kind}: {error}; keys: {keys}") from None
         return (self.make(**arguments),)
 
 
@@ -58,8 +64,10 @@ def check_makers(effects: Any, taken: set[str]) -> Makers:
     return effects
 
 
-def _argument(key: str, value: Any, robot: Robot) -> Any:
+def _argument(key: str, value: Any, robot: Robot, known: tuple[str, Coefficient] | None) -> Any:
     """A number, an array of a list, an array (n,) of a table by joint; a text or truth value as it is."""
+    if known is not None and known[1].of_joints:
+        return per_joint(key, value, robot, elsewhere=known[1].elsewhere)
     if isinstance(value, dict):
         return per_joint(key, value, robot)
     if isinstance(value, list):

@@ -22,7 +22,8 @@ from robot_dyn.model.robot import Robot
 from robot_dyn.reading import read
 from robot_dyn.scene.complaint import complaint, located, where
 from robot_dyn.scene.control import AnyReference, Control, Hold, Sampled
-from robot_dyn.scene.effects import Acting, AnyEffect, Edit, kinds
+from robot_dyn.scene.declared import Acting
+from robot_dyn.scene.effects import AnyEffect, Edit, kinds
 from robot_dyn.scene.own_effects import Makers, OwnEffect, check_makers, own_or
 from robot_dyn.scene.schema import NotNegative, Part, PerJoint, PlacedError, Positive, Truth, per_joint, placed
 from robot_dyn.simulation.setup import Setup
@@ -63,7 +64,7 @@ class Scene(Part):
     """Which loop runs; "auto" compiles where that pays."""
     start: Start = Start()
     """The state at the start."""
-    effect: tuple[Annotated[AnyEffect, WrapValidator(own_or)], ...] = ()
+    effect: tuple[Annotated[AnyEffect, WrapValidator(own_or)], ...] = ()  # pyright: ignore[reportInvalidTypeForm]
     """What acts, gravity included; nothing by default."""
     control: Control | None = None
     """What drives the joints; nothing by default."""
@@ -113,7 +114,8 @@ def read_scene(path: str | Path, *, effects: Makers | None = None) -> Setup:
     Args:
         path: Of the file.
         effects: Effects of your own that it may name: a class, or a function that returns an effect, by its kind. The
-            keys of such a table are its arguments: numbers, arrays from lists, arrays (n,) from tables by joint.
+            keys of such a table are its arguments, those of declared coefficients with their unit, as
+            "damping_N_m_s_per_rad": numbers, arrays from lists, arrays (n,) from tables by joint.
 
     Raises:
         SceneError: If the file cannot be read, or a key or value of it is not allowed.
