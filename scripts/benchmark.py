@@ -1,7 +1,7 @@
 """Benchmarks, both sides in one run: medians over repeats that take turns. Only ratios of one run count.
 
-Subjects: queries (Robot over bare Pinocchio), compiled (against Pinocchio's C++), rollouts (against MuJoCo), growth
-(cost against the number of joints).
+Subjects: queries (Robot over bare Pinocchio), compiled (against Pinocchio's C++), rollouts (against MuJoCo),
+parameters (numbers as inputs of machine code over constants), growth (cost against the number of joints).
 """
 
 from __future__ import annotations
@@ -9,11 +9,11 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from benchmarks import growth, kernels, queries, rollouts
+from benchmarks import growth, kernels, parameters, queries, rollouts
 from benchmarks.measure import Effort, environment
 
 PICTURE = Path(__file__).parents[1] / "docs" / "pictures" / "growth.png"
-SUBJECTS = ("queries", "compiled", "rollouts", "growth")
+SUBJECTS = ("queries", "compiled", "rollouts", "parameters", "growth")
 
 
 def main() -> None:
@@ -38,6 +38,8 @@ def main() -> None:
     if "rollouts" in what:
         rollouts.one_step(effort)
         rollouts.thousands(effort)
+    if "parameters" in what:
+        parameters.parameters(effort)
     if "growth" in what:
         growth.growth(effort, None if options.quick else PICTURE)
         growth.memory(effort)

@@ -9,10 +9,14 @@ v, and with no masses left on bodies that turn their code is a fifth to two thir
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from robot_dyn.arithmetic import Array, sqrt, symmetric
 from robot_dyn.compiled.origins import of_bodies
+from robot_dyn.compiled.symbol import Symbol
+from robot_dyn.compiled.symbolic import Symbols
 from robot_dyn.model.linkage import BASE, Body, Linkage
 from robot_dyn.spatial import adjoint_inverse, first_moment, hat
 
@@ -37,8 +41,14 @@ def _unchanged(body: Body, inertia: Array) -> Array:
     a = body.axis
     # The lesser of two moments: what is left is not negative, so that sums over bodies do not cancel. The greater one
     # costs Kinova's M a factor of ten in accuracy.
-    J = min(across @ moments @ across for across in _across(a))
+    J = _least(*(across @ moments @ across for across in _across(a)))
     return _parts(inertia[0, 0], a * (a @ first_moment(inertia)), J * (np.eye(3, dtype=a.dtype) - np.outer(a, a)))
+
+
+def _least(x: Any, y: Any) -> Any:
+    """The lesser of two numbers; of symbols, such as of a payload whose mass is an input, whichever it will be."""
+    pair = np.array([x, y]).view(Symbols) if isinstance(x, Symbol) else np.array([x, y])
+    return np.minimum(pair[:1], pair[1:])[0]
 
 
 def _parts(mass: Array, moment: Array, rotational: Array) -> Array:

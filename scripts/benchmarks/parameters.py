@@ -1,0 +1,121 @@
+"""What it costs that numbers are inputs of machine code, not constants: instructions, and time of an RK4 step.
+
+ratio = with inputs / with constants: of the instructions of y', of one run, and of 64 runs in lock step
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+import robot_dyn as rd
+from benchmarks.measure import Effort, arms, row, table
+from robot_dyn.compiled.from_casadi import program_of
+from robot_dyn.compiled.right_angles import completed
+from robot_dyn.compiled.symbolic_dynamics import SymbolicDynamics
+from robot_dyn.integrate.methods import method
+from robot_dyn.simulation.fixed_step import FixedStep
+from robot_dyn.simulation.machine.batch import LANES, Batch
+from robot_dyn.simulation.machine.machine import Equations, Machine
+from robot_dyn.simulation.machine.making import machine
+from robot_dyn.simulation.machine.traced import trace
+from robot_dyn.simulation.size import MOST_BYTES
+from robot_dyn.simulation.state_equation import StateEquation
+
+READY = np.array([0.3, 0.6, -0.4, -1.2, 0.5, 1.1, 0.2])
+
+
+def parameters(effort: Effort) -> None:
+    """Scenes of Panda-7 whose numbers are gravity, a payload, gains and coefficients; and what another value costs."""
+    arm = completed(arms()["Panda-7"])[0]
+    held = arm.with_(payload=rd.Payload("panda_link8", 1.5, (0.01, 0.02, 0.1)))
+    friction, goal = [rd.ViscousFriction(0.5)], rd.quintic(READY, READY + 0.2, 1.0)
+    scenes = {
+        "free swing": (rd.Plant(arm), None),
+        "free swing, payload": (rd.Plant(held), None),
+        "PD, friction": (rd.Plant(arm, friction), rd.PD(goal, 100.0, 10.0)),
+        "computed torque, friction": (rd.Plant(arm, friction), rd.ComputedTorque(arm, goal, 100.0, 20.0)),
+    }
+    table("what", "constants", "inputs", "ratio", "one run", "64 runs", "first run, s", "other values, ms")
+    for name, (plant, controller) in scenes.items():
+        setup = rd.Setup(
+            plant, READY, duration_s=0.02 if effort.quick else 1.0, controller=controller, integrator=method("rk4"),
+            record_period_s=0.02, estimate_error=False, engine="compiled",
+        )  # fmt: skip
+        began = perf_counter()
+        rd.simulate(setup)
+        first = perf_counter() - began
+        other = rd.Setup(
+            rd.Plant(plant.dynamics.with_(gravity=(0.0, 0.1, -9.7)), plant.effects), READY, duration_s=0.02,  # pyright: ignore
+            controller=controller and replace(controller, kp=90.0), estimate_error=False, engine="compiled",
+        )  # fmt: skip
+        began = perf_counter()
+        rd.simulate(other)
+        again = perf_counter() - began
+        made = {"constants": _constant(setup, 1), "inputs": machine(_equation(setup), _rk4(setup))}
+        lanes = {
+            "constants": _constant(setup, LANES),
+            "inputs": machine(_equation(setup), _rk4(setup), lanes=LANES, kept=()),
+        }
+        counts = {kind: len(each.equations.programs["rate"]) for kind, each in made.items()}
+        alone = _ratio({kind: _one(setup, each) for kind, each in made.items()}, effort)
+        many = _ratio({kind: _many(setup, each) for kind, each in lanes.items()}, effort)
+        ratio = counts["inputs"] / counts["constants"]
+        row(
+            name, counts["constants"], counts["inputs"], f"{ratio:.3f}", f"{alone:.2f}", f"{many:.2f}",
+            f"{first:.2f}", f"{1e3 * again:.0f}",
+        )  # fmt: skip
+
+
+def _equation(setup: rd.Setup) -> StateEquation:
+    return StateEquation(setup.plant, setup.controller)
+
+
+def _rk4(setup: rd.Setup) -> Any:
+    return setup.integrator
+
+
+def _constant(setup: rd.Setup, lanes: int) -> Machine:
+    """The machine code with all numbers as constants."""
+    equation = _equation(setup)
+    functions = trace(equation, lambda dynamics, part: SymbolicDynamics(dynamics), (), None if lanes == 1 else ())
+    programs = {name: program_of(each) for name, each in functions.items()}
+    like = machine(equation, _rk4(setup))
+    return Machine(equation, Equations(programs, lanes, "constants"), (), like.loop)
+
+
+def _one(setup: rd.Setup, made: Machine) -> Any:
+    def run() -> float:
+        advance = FixedStep(
+            setup, made.equation, made.equations.functions, Fraction(1), made.loop, parameters=made.parameters
+        )
+        began = perf_counter()
+        advance.record()
+        return perf_counter() - began
+
+    return run
+
+
+def _many(setup: rd.Setup, made: Machine) -> Any:
+    starts = np.tile(READY, (8 * LANES, 1))
+
+    def run() -> float:
+        batch = Batch(setup, made, starts, 0 * starts, {}, ("q",), (), MOST_BYTES)
+        began = perf_counter()
+        batch.run(1)
+        return perf_counter() - began
+
+    return run
+
+
+def _ratio(runs: dict[str, Any], effort: Effort) -> float:
+    """Median of inputs over constants; they take turns."""
+    times: dict[str, list[float]] = {kind: [] for kind in runs}
+    for _ in range(effort.repeats + 1):
+        for kind, run in runs.items():
+            times[kind].append(run())
+    return float(np.median(times["inputs"][1:]) / np.median(times["constants"][1:]))
