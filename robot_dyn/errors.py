@@ -41,6 +41,10 @@ class EditError(RobotDynError):
     """An edit of a robot (lock, payload, armature, gravity) that cannot be made."""
 
 
+class TraceError(RobotDynError):
+    """A function that cannot be traced: it does what symbols cannot."""
+
+
 class ControlError(RobotDynError):
     """A controller or reference with values that are not allowed, or of the wrong shape."""
 

@@ -17,13 +17,9 @@ import numpy as np
 from robot_dyn.arithmetic import Arithmetic, Array
 from robot_dyn.compiled.condition import Condition, Node, deciding, truth
 from robot_dyn.compiled.symbol import Symbol, node, select, symbol
-from robot_dyn.errors import RobotDynError
+from robot_dyn.errors import TraceError
 
 _MOST_BRANCHES = 64  # each is a copy of the function in the kernel
-
-
-class TraceError(RobotDynError):
-    """A function that cannot be traced: it does what symbols cannot."""
 
 
 @final

@@ -69,7 +69,12 @@ class Controller(Value, ABC):
     @property
     def models(self) -> dict[str, Dynamics]:
         """Its own models of the arm, by attribute."""
-        return {name: value for name, value in vars(self).items() if isinstance(value, Dynamics)}
+        others = np.ndarray, float, int, str, Reference, type(None)  # a protocol takes longer to ask for
+        return {
+            name: value
+            for name, value in vars(self).items()
+            if not isinstance(value, others) and isinstance(value, Dynamics)
+        }
 
     @property
     def desired(self) -> Reference | None:

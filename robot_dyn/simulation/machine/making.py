@@ -18,8 +18,8 @@ from robot_dyn.compiled.interrupts import interrupts_later
 from robot_dyn.compiled.parameters import Parameter, Part, parameters
 from robot_dyn.compiled.program import Program
 from robot_dyn.compiled.right_angles import robot_of
-from robot_dyn.compiled.symbolic import TraceError
 from robot_dyn.effects.plant import Plant
+from robot_dyn.errors import TraceError
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.machine.machine import Equations, Machine
