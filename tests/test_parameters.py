@@ -26,17 +26,17 @@ def loaded(mass: float, com: tuple[float, ...], inertia=INERTIA, gravity=(0.3, 0
 
 def setup(x: float, kind: str = "computed torque") -> rd.Setup:
     """A setup whose numbers all depend on x, and whose structure does not."""
-    arm = loaded(1.0 + x, (0.05 + x / 10, 0.02, 0.03 * x), gravity=(0.3 + x, 0.2, -9.7))
+    arm = loaded(1.0 + x, (0.05 + x / 10, 0.02, 0.03 + x), gravity=(0.3 + x, 0.2, -9.7))
     effects = [
         rd.ViscousFriction(0.3 + x),
         rd.RegularisedCoulombFriction([0.2, 0.1 + x], 0.05 + x),
         rd.Spring(1.0 + x, 0.2 - x),
         *rd.joint_stops([-1.0, -0.75 + x / 10], [1.2, 1.0 + x], 300.0 + x, 20.0 + x),
-        rd.ExternalWrench(TIP, [1.0, 0.2 * x, 0.7, 0.1, 0.4 + x, 0.2], start_s=0.05 + x / 100, end_s=0.15),
+        rd.ExternalWrench(TIP, [1.0, 0.2 + x, 0.7, 0.1, 0.4 + x, 0.2], start_s=0.05 + x / 100, end_s=0.15),
         rd.EffortLimit(30.0 + x),
     ]
     reference = rd.quintic(Q + x / 10, Q + 0.3, 0.2)
-    model = loaded(0.8 + x, (0.0, 0.02, x))
+    model = loaded(0.8 + x, (0.01, 0.02, 0.01 + x))
     controllers = {
         "computed torque": rd.ComputedTorque(model, reference, 60.0 + x, [9.0, 8.0 + x]),
         "PID": rd.PID(reference, 60.0 + x, 20.0 + x, 9.0, effort_limit=25.0 + x, period_s=0.01),
@@ -102,9 +102,9 @@ def ARM_plant(effect: rd.Active) -> rd.Plant:
     ],
 )
 def test_every_number_is_a_sweep_parameter(name: str, values: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each run is that of the setup with this value; what is swept compiles nothing."""
+    """Each run is that of the setup with this value; other values of what is swept compile nothing."""
     base = replace(setup(0.0), record_period_s=0.02)
-    rd.rollouts(base, params={"kd": [9.0, 8.0]})
+    rd.rollouts(base, params={name: values[::-1] + 0.01})
     compiles_nothing(monkeypatch)
     runs = rd.rollouts(base, params={name: values})
     monkeypatch.undo()

@@ -6,9 +6,8 @@ compiles nothing, and each may differ from run to run. Link inertias and lengths
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from math import prod
 from typing import Any, final
 
 import numpy as np
@@ -44,6 +43,7 @@ class Parameter:
         name: As users call it, such as "viscous_friction.damping", "kp" or "payload_mass:tool0".
         value: As the part has it, one for each joint where it is of joints.
         declared: Unit, sign and shape.
+        entries: Which of its entries, row by row, are inputs; the others are 0.
     """
 
     part: Part
@@ -51,16 +51,12 @@ class Parameter:
     name: str
     value: np.ndarray
     declared: Coefficient
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Of its value."""
-        return self.value.shape
+    entries: tuple[int, ...]
 
     @property
     def size(self) -> int:
-        """Number of its entries."""
-        return prod(self.shape)
+        """Number of its entries that are inputs."""
+        return len(self.entries)
 
 
 @final
@@ -79,10 +75,16 @@ class Numbered:
     joint_names: tuple[str, ...]
 
 
-def parameters(dynamics: Any, effects: Iterable[Effect], controller: Controller | None) -> tuple[Parameter, ...]:
-    """All parameters of a plant and its controller."""
+def parameters(
+    dynamics: Any, effects: Iterable[Effect], controller: Controller | None, swept: Collection[str] = ()
+) -> tuple[Parameter, ...]:
+    """All parameters of a plant and its controller; of those that are swept, all entries are inputs.
+
+    Zeros of gravity and of payloads are constants otherwise: with gravity along z, the angle of a vertical first joint
+    does not matter, and its sine is not computed.
+    """
     n = dynamics.n
-    made = [*_of_robot(dynamics, ROBOT, "")]
+    made = [*_of_robot(dynamics, ROBOT, "", swept)]
     for i, effect in enumerate(effects):
         made += _of_part(effect, ("effect", i), f"{effect.name}.", n)
     if controller is not None:
@@ -90,7 +92,7 @@ def parameters(dynamics: Any, effects: Iterable[Effect], controller: Controller 
         for name, reference in controller.references.items():
             made += _of_part(reference, ("reference", name), f"{name}.", n)
         for name, model in controller.models.items():
-            made += _of_robot(model, ("model", name), f"{name}.")
+            made += _of_robot(model, ("model", name), f"{name}.", swept)
     return tuple(made)
 
 
@@ -100,18 +102,24 @@ def _of_part(part: Any, place: Part, prefix: str, n: int) -> Iterator[Parameter]
         if value is not None:
             value = np.asarray(value, dtype=float)
             value = np.broadcast_to(value, (n,)) if each.of_joints else value
-            yield Parameter(place, key, prefix + key, value, each)
+            yield Parameter(place, key, prefix + key, value, each, tuple(range(value.size)))
 
 
-def _of_robot(dynamics: Any, place: Part, prefix: str) -> Iterator[Parameter]:
+def _of_robot(dynamics: Any, place: Part, prefix: str, swept: Collection[str]) -> Iterator[Parameter]:
     robot = getattr(dynamics, "robot", dynamics)
     if not isinstance(robot, Robot):
         return
-    yield Parameter(place, "gravity", f"{prefix}gravity", np.asarray(robot.edits.gravity), _GRAVITY)
+
+    def parameter(key: str, name: str, value: Any, each: Coefficient) -> Parameter:
+        value = np.asarray(value, dtype=float)
+        varies = name in swept or not value.ndim
+        return Parameter(place, key, name, value, each, tuple(i for i, x in enumerate(value.flat) if varies or x != 0))
+
+    yield parameter("gravity", f"{prefix}gravity", robot.edits.gravity, _GRAVITY)
     for i, payload in enumerate(robot.edits.payloads):
         for key, each in _PAYLOAD.items():
             name = f"{prefix}payload_{key}:{payload.frame}"
-            yield Parameter(place, f"{i} {key}", name, np.asarray(getattr(payload, key), dtype=float), each)
+            yield parameter(f"{i} {key}", name, getattr(payload, key), each)
 
 
 Values = Mapping[Part, Mapping[str, Any]]
@@ -122,15 +130,17 @@ def split(known: Iterable[Parameter], values: Any) -> dict[Part, dict[str, Any]]
     made: dict[Part, dict[str, Any]] = {}
     start = 0
     for each in known:
-        own = values[start : start + each.size].reshape(each.shape) if each.shape else values[start]
-        made.setdefault(each.part, {})[each.key] = own
+        inputs = values[start : start + each.size]
+        own = np.zeros(each.value.size, dtype=inputs.dtype).view(type(inputs))
+        own[list(each.entries)] = inputs
+        made.setdefault(each.part, {})[each.key] = own.reshape(each.value.shape) if each.value.ndim else own[0]
         start += each.size
     return made
 
 
 def joined(known: Iterable[Parameter]) -> np.ndarray:
     """The values of all parameters, one row after the other."""
-    return np.concatenate([*(each.value.ravel() for each in known), np.zeros(0)])
+    return np.concatenate([*(each.value.ravel()[list(each.entries)] for each in known), np.zeros(0)])
 
 
 def described(robot: Described, values: Mapping[str, Any]) -> Numbered:
@@ -164,7 +174,7 @@ def rows(known: Iterable[Parameter], name: str) -> np.ndarray:
 
 def with_parameters(plant: Plant, controller: Controller | None, given: Mapping[str, Any]) -> tuple[Plant, Any]:
     """A plant and its controller with other values of parameters, each (size,) by name; numbers that were checked."""
-    known = parameters(plant.dynamics, plant.effects, controller)
+    known = parameters(plant.dynamics, plant.effects, controller, given)
     values = joined(known)
     for name, value in given.items():
         values[rows(known, name)] = value

@@ -67,13 +67,15 @@ class SymbolicDynamics:
         self._trace = Trace(described(robot, values) if known else robot, (vector,) if known else ())
         self._traced: dict[str, Traced] = {}
         self._given: tuple[Any, ...] = self._trace.given
+        self._known = known
 
     def of(self, values: Mapping[str, Any]) -> SymbolicDynamics:
         """The same with its inputs of these values, in the order of `known`."""
         if not values:
             return self
         made = copy(self)
-        made._given = (ca.vertcat(*(column(np.asarray(x, dtype=object)) for x in values.values())),)
+        inputs = (np.ravel(values[each.key])[list(each.entries)] for each in self._known)
+        made._given = (ca.vertcat(*map(column, inputs)),)
         return made
 
     def formulation(self, quantity: str) -> str:

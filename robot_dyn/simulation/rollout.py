@@ -96,7 +96,13 @@ def rollouts(
     equation = StateEquation(setup.plant, setup.controller, setup.integrator.canonical)
     asked = {"u": "u" in recorded, "v": equation.canonical and "v" in recorded, "energy": "energy" in recorded}
     kept = tuple(name for name, yes in asked.items() if yes)
-    made = machine(equation, cast(Integrator, setup.integrator), lanes=LANES, kept=kept)
+    made = machine(
+        equation,
+        cast(Integrator, setup.integrator),
+        lanes=LANES,
+        kept=kept,
+        swept=tuple(sweep),
+    )
     made.check(setup)
     runs = Batch(setup, made, q, v, sweep, recorded, kept, most_bytes).run(thread_count(threads), on_progress)
     return replace(runs, about=edits_of_machine_code(setup) | runs.about)
@@ -135,7 +141,7 @@ def _starts(
 def _values(setup: Setup, name: str, values: Any) -> np.ndarray:
     """The values of a parameter, (B, size)."""
     plant = setup.plant
-    known = parameters(plant.dynamics, plant.effects, setup.controller)
+    known = parameters(plant.dynamics, plant.effects, setup.controller, (name,))
     swept = [each for each in known if each.declared.swept]
     mine = [each for each in swept if each.name == name]
     if not mine:

@@ -1,11 +1,14 @@
 """Functions (t, y, p, own, out) of a state equation as machine code, of one run or of W in lock step.
 
-Number k of run b is y[k W + b]; t and p are shared. A run with an angle beyond the range of the vectors' sine and
-cosine is computed once more with the C library's, so that no run depends on the others.
+Number k of run b is y[k W + b]; t and p are shared, and so are those of `own` that are one number for all runs. A run
+with an angle beyond the range of the vectors' sine and cosine is computed once more with the C library's, so that no
+run depends on the others.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 from llvmlite import ir
@@ -16,12 +19,25 @@ from robot_dyn.compiled.llvm.writer import Writer
 from robot_dyn.compiled.program import Program
 
 SIDE = 8  # runs in a vector: a 512-bit register, or two or four smaller ones
+Own = Mapping[int, tuple[int, bool]]  # of each number of `own`: its row, or where it stands once
+_NOTHING: Mapping[int, int] = MappingProxyType({})
 _ARGUMENTS = [F64, *[F64.as_pointer()] * 4]
 
 
-def write_function(module: Any, name: str, program: Program, runs: int) -> None:
-    """A function of a program with the inputs t (1,), y, p and own; `runs` is 1 or a multiple of SIDE."""
-    any_angle = _any_angle(module, f"{name}_any_angle", program, runs)
+def write_function(module: Any, name: str, program: Program, runs: int, shared: Mapping[int, int] = _NOTHING) -> None:
+    """A function of a program with the inputs t (1,), y, p and own.
+
+    Args:
+        module: LLVM's.
+        name: Of the function.
+        program: What it computes.
+        runs: 1 or a multiple of SIDE.
+        shared: Of those numbers of `own` that are the same for all runs, where in it each stands once; the others come
+            row by row in their order.
+    """
+    rows = [k for k in range(program.inputs[-1]) if k not in shared]
+    own = {k: (row, False) for row, k in enumerate(rows)} | {k: (at, True) for k, at in shared.items()}
+    any_angle = _any_angle(module, f"{name}_any_angle", program, runs, own)
     function = ir.Function(module, ir.FunctionType(ir.VoidType(), _ARGUMENTS), name)
     builder = ir.IRBuilder(function.append_basic_block())
     before, body, end = builder.block, function.append_basic_block(), function.append_basic_block()
@@ -30,7 +46,7 @@ def write_function(module: Any, name: str, program: Program, runs: int) -> None:
     at = builder.phi(I64)
     at.add_incoming(ir.Constant(I64, 0), before)
     writer = Writer(builder, F64, min(SIDE, runs))
-    written = writer.write(program, _inputs(writer.vectors, function.args, program, runs, at))
+    written = writer.write(program, _inputs(writer.vectors, function.args, program, runs, at, own))
     for k, value in enumerate(written.results):
         builder.store(value, _place(writer.vectors, function.args[-1], k, runs, at), align=8)
     with builder.if_then(writer.vectors.any(written.beyond), likely=False):
@@ -42,7 +58,7 @@ def write_function(module: Any, name: str, program: Program, runs: int) -> None:
     builder.ret_void()
 
 
-def _any_angle(module: Any, name: str, program: Program, runs: int) -> Any:
+def _any_angle(module: Any, name: str, program: Program, runs: int, own: Own) -> Any:
     """The same for the runs from a number on that share a vector, and stored of those alone whose bit is set."""
     side = min(SIDE, runs)
     shape = ir.FunctionType(ir.VoidType(), [*_ARGUMENTS, I64, ir.IntType(side)])
@@ -54,23 +70,32 @@ def _any_angle(module: Any, name: str, program: Program, runs: int) -> Any:
     *arguments, at, bits = function.args
     writer = Writer(builder, F64, side, any_angle=True)
     mask = builder.bitcast(bits, wide(I1, side))
-    for k, value in enumerate(writer.write(program, _inputs(writer.vectors, arguments, program, runs, at)).results):
+    given = _inputs(writer.vectors, arguments, program, runs, at, own)
+    for k, value in enumerate(writer.write(program, given).results):
         place = _place(writer.vectors, arguments[-1], k, runs, at)
         builder.store(builder.select(mask, value, builder.load(place, align=8)), place, align=8)
     builder.ret_void()
     return function
 
 
-def _inputs(vectors: Vectors, arguments: Any, program: Program, runs: int, at: Any) -> list[list[Any]]:
+def _inputs(vectors: Vectors, arguments: Any, program: Program, runs: int, at: Any, own: Own) -> list[list[Any]]:
     """The vectors of t, y, p and own, of the runs from `at` on."""
-    t, y, p, own, _ = arguments
+    t, y, p, numbers, _ = arguments
     _, m, shared, each = program.inputs
     builder = vectors.builder
+
+    def one(array: Any, k: int) -> Any:
+        """A number that all runs share."""
+        return _spread(vectors, builder.load(builder.gep(array, [ir.Constant(I64, k)])))
+
+    def of_each(array: Any, k: int) -> Any:
+        return builder.load(_place(vectors, array, k, runs, at), align=8)
+
     return [
         [_spread(vectors, t)],
-        [builder.load(_place(vectors, y, k, runs, at), align=8) for k in range(m)],
-        [_spread(vectors, builder.load(builder.gep(p, [ir.Constant(I64, k)]))) for k in range(shared)],
-        [builder.load(_place(vectors, own, k, runs, at), align=8) for k in range(each)],
+        [of_each(y, k) for k in range(m)],
+        [one(p, k) for k in range(shared)],
+        [(one if own[k][1] else of_each)(numbers, own[k][0]) for k in range(each)],
     ]
 
 

@@ -16,7 +16,6 @@ import numpy as np
 
 from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.coefficients import with_values
-from robot_dyn.compiled.parameters import rows
 from robot_dyn.compiled.right_angles import robot_of
 from robot_dyn.effects.plant import Plant
 from robot_dyn.integrate.integrator import PlainMethod
@@ -52,7 +51,6 @@ class Batch:
         equation, n = machine.equation, machine.equation.plant.dynamics.n
         self.setup, self.machine, self.recorded, self.kept, self.values = setup, machine, recorded, kept, sweep
         self.y = _starts(equation, q0, v0)
-        self.rows = {name: rows(machine.known, name) for name in sweep}
         self.columns = [*range(n)] * ("q" in recorded)
         if "v" in recorded and not equation.canonical:
             self.columns += range(n, 2 * n)
@@ -117,9 +115,7 @@ class Batch:
         equation, n = self.machine.equation, self.machine.equation.plant.dynamics.n
         index = np.minimum(np.arange(tile * LANES, (tile + 1) * LANES), len(self.y) - 1)
         held = n * equation.sampled
-        own = np.concatenate([np.zeros(held), self.machine.parameters])[:, None].repeat(LANES, axis=1)
-        for name, values in self.values.items():
-            own[held + self.rows[name]] = values[index].T
+        own = self.machine.own({name: values[index] for name, values in self.values.items()})
         return runs_of(self.y[index].T, own, n, held, equation.state_size, self.made.shape[1])
 
     def _rules(self, base: int) -> Rules:

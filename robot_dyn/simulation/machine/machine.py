@@ -45,11 +45,13 @@ class Equations:
         programs: rate, energy and sample, and tick where there is one.
         runs: W.
         name: What moves, for people.
+        shared: As of `write_function`.
     """
 
     programs: Mapping[str, Program]
     runs: int
     name: str
+    shared: Mapping[int, int] = field(default_factory=dict)
     checked: set[bool] = field(default_factory=set, repr=False)
 
     @property
@@ -59,7 +61,13 @@ class Equations:
 
     @cached_property
     def _key(self) -> str:
-        return digest([str(self.runs), *(f"{name} {program}" for name, program in self.programs.items())])
+        return digest(
+            [
+                str(self.runs),
+                str(sorted(self.shared.items())),
+                *(f"{name} {program}" for name, program in self.programs.items()),
+            ]
+        )
 
     @cached_property
     def functions(self) -> Functions:
@@ -67,7 +75,7 @@ class Equations:
 
         def write(module: Any, prefix: str) -> None:
             for name, program in self.programs.items():
-                write_function(module, f"{prefix}{name}", program, self.runs)
+                write_function(module, f"{prefix}{name}", program, self.runs, self.shared)
 
         def address(name: str) -> int:
             return machine_code.address(name, self._key, write, default_store(), f"the state equation of {self.name}")
@@ -85,6 +93,7 @@ class Machine:
         equations: Its machine code.
         known: Its parameters, with the values of the setup.
         loop: The time loop as machine code; None if steps are made in Python.
+        swept: Names of the parameters that differ from run to run.
     """
 
     equation: StateEquation
@@ -92,10 +101,27 @@ class Machine:
     known: tuple[Parameter, ...]
     loop: Callable[..., int] | None
 
+    swept: tuple[str, ...] = ()
+
     @cached_property
     def parameters(self) -> np.ndarray:
         """The values of the parameters, one row after the other."""
         return joined(self.known)
+
+    def own(self, swept: Mapping[str, np.ndarray]) -> np.ndarray:
+        """The numbers of W runs, (O, W): what is held, then row by row what is swept, (W, size) each, then the others.
+
+        A single run has all of them row by row.
+        """
+        held, W = self.equation.plant.dynamics.n * self.equation.sampled, self.equations.runs
+        if W == 1:
+            return np.concatenate([np.zeros(held), self.parameters])[:, None]
+        shared = [each for each in self.known if each.name not in swept]
+        names = [each.name for each in self.known if each.name in swept]
+        rows = np.vstack([np.zeros((held, W)), *(swept[name].T for name in names)])
+        block = np.zeros((-(-sum(each.size for each in shared) // W), W))
+        block.ravel()[: sum(each.size for each in shared)] = joined(shared)
+        return np.vstack([rows, block])
 
     @cached_property
     def in_python(self) -> Functions:
@@ -123,7 +149,9 @@ class Machine:
         for i in range(_STATES):
             s = int(rng.integers(len(plan.counts) - 1))
             t, y = float(plan.starts[s] + plan.lengths[s]), rng.normal(size=(m, W))
-            own = np.vstack([rng.normal(size=(held, W)), np.repeat(self.parameters[:, None], W, axis=1)])
+            swept = {each.name: np.tile(each.value.ravel(), (W, 1)) for each in self.known if each.name in self.swept}
+            own = self.own(swept)
+            own[:held] = rng.normal(size=(held, W))
             for name, out in made.items():
                 getattr(self.in_python, name)(t, y, plan.parameters[s], own, out)
             for lane in range(min(W, _STATES)):

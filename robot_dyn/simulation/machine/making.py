@@ -72,7 +72,12 @@ def _robot(dynamics: Any) -> Robot:
 
 
 def machine(
-    equation: StateEquation, method: Integrator | None, *, lanes: int = 1, kept: tuple[str, ...] | None = None
+    equation: StateEquation,
+    method: Integrator | None,
+    *,
+    lanes: int = 1,
+    kept: tuple[str, ...] | None = None,
+    swept: tuple[str, ...] = (),
 ) -> Machine:
     """The machine of a state equation, from the latest ones if it is among them; not compiled yet.
 
@@ -81,6 +86,7 @@ def machine(
         method: One whose steps are machine code too; None for the state equation alone.
         lanes: Runs in lock step.
         kept: As of `trace`.
+        swept: Names of the parameters that differ from run to run.
 
     Raises:
         TraceError: If a part of the equation cannot be compiled; names it, with the remedy.
@@ -88,20 +94,35 @@ def machine(
     plant, controller = equation.plant, equation.controller
     robot = _robot(plant.dynamics)
     own = equation if robot is plant.dynamics else replace(equation, plant=Plant(robot, plant.effects))
-    known = parameters(robot, plant.effects, controller)
+    known = parameters(robot, plant.effects, controller, swept)
     described, objects = structure(own)
+    described = described, tuple(each.entries for each in known)
 
     def make() -> Equations:
         programs = _programs(own, known, kept, None if objects else described)
-        return Equations(programs, lanes, robot.name)
+        return Equations(programs, lanes, robot.name, _shared(own, known, lanes, swept))
 
-    equations = _equations.get(objects, (described, lanes, kept), make)
+    names = tuple(name for name in dict.fromkeys(each.name for each in known) if name in swept)
+    equations = _equations.get(objects, (described, lanes, kept, names), make)
     if equations.instructions > _MOST_INSTRUCTIONS:
         raise TraceError(
             f"the run takes {equations.instructions} instructions, more than the {_MOST_INSTRUCTIONS} worth compiling;"
             " simulate it with engine='interpreted'"
         )
-    return Machine(own, equations, known, None if method is None else _loop(method))
+    return Machine(own, equations, known, None if method is None else _loop(method), swept)
+
+
+def _shared(
+    equation: StateEquation, known: tuple[Parameter, ...], lanes: int, swept: tuple[str, ...]
+) -> dict[int, int]:
+    """Where the numbers stand that all runs in lock step share: behind those of each run, as `Machine.own` has them."""
+    if lanes == 1:
+        return {}
+    held = equation.plant.dynamics.n * equation.sampled
+    once = [each.name not in swept for each in known for _ in range(each.size)]
+    first = (held + len(once) - sum(once)) * lanes
+    numbers = (held + k for k, shared in enumerate(once) if shared)
+    return {k: first + i for i, k in enumerate(numbers)}
 
 
 def _programs(
@@ -130,7 +151,8 @@ def _traced(equation: StateEquation, known: tuple[Parameter, ...], kept: tuple[s
         """Its equations in symbols, traced once for a file and its edits."""
         robot, own = _robot(dynamics), tuple(each for each in known if each.part == part)
         (described, *_), _ = structure(StateEquation(Plant(robot), None))
-        return _symbols.get((), (described,), lambda: SymbolicDynamics(robot, own))
+        inputs = tuple(each.entries for each in own)
+        return _symbols.get((), (described, inputs), lambda: SymbolicDynamics(robot, own))
 
     return {name: program_of(each) for name, each in trace(equation, bodies, known, kept).items()}
 
