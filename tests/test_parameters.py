@@ -95,6 +95,8 @@ def ARM_plant(effect: rd.Active) -> rd.Plant:
         ("model.gravity", np.array([[0.0, 0.0, -9.0], [0.4, 0.1, -3.0]])),
         (f"payload_com:{TIP}", np.array([[0.1, 0.0, 0.05], [-0.05, 0.02, 0.1]])),
         (f"model.payload_mass:{TIP}", np.array([0.1, 2.5])),
+        ("armature", np.array([[0.1, 0.02], [0.3, 0.15]])),
+        ("model.mass_scale", np.array([0.7, 1.3])),
         ("joint_stops.upper", np.array([[0.45, 0.2], [0.5, 1.0]])),
         ("external_wrench.wrench", np.array([[1.0, 2, 3, 0.4, 0.5, 0.6], [3.0, 1, -2, 0.1, 0.2, 0.9]])),
         ("effort_limit.limit", np.array([2.0, 11.0])),
@@ -118,6 +120,10 @@ def with_value(base: rd.Setup, name: str, value: np.ndarray) -> rd.Setup:
     """The setup with one value changed, by its constructors."""
     plant, controller = base.plant, base.controller
     part, _, key = name.rpartition(".")
+    if key in ("armature", "mass_scale"):
+        if part:
+            return replace(base, controller=replace(controller, model=controller.model.with_(**{key: value})))
+        return replace(base, plant=rd.Plant(plant.dynamics.with_(**{key: value}), plant.effects))
     if key.startswith(("gravity", "payload")):
         robot = controller.model if part else plant.dynamics
         payload = robot.edits.payloads[0]

@@ -1,7 +1,8 @@
 """The parameters of a plant and its controller: numbers that machine code takes as inputs, p, not as constants.
 
 Coefficients of effects, gains, what references are made of besides polynomials, gravity and payloads: to change one
-compiles nothing, and each may differ from run to run. Link inertias and lengths are constants of the code.
+compiles nothing, and each may differ from run to run. Armature and the factor on all masses are inputs where they are
+swept; link inertias and lengths are constants of the code.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ Part = tuple[Any, ...]  # ("effect", i), ("controller",), ("reference", attribut
 ROBOT: Part = ("robot",)
 CONTROLLER: Part = ("controller",)
 _GRAVITY = Coefficient("m/s²", shapes=((3,),))
+_WHEN_SWEPT = {"armature": Coefficient("kg m²", least=0), "mass_scale": Coefficient(shapes=((),), above=0)}
 _PAYLOAD = {
     "mass": Coefficient("kg", shapes=((),), least=0),
     "com": Coefficient("m", shapes=((3,),)),
@@ -120,6 +122,11 @@ def _of_robot(dynamics: Any, place: Part, prefix: str, swept: Collection[str]) -
         for key, each in _PAYLOAD.items():
             name = f"{prefix}payload_{key}:{payload.frame}"
             yield parameter(f"{i} {key}", name, getattr(payload, key), each)
+    drives = dict(robot.edits.armature)
+    given = {"armature": [drives.get(joint, 0.0) for joint in robot.joint_names], "mass_scale": robot.edits.mass_scale}
+    for key, each in _WHEN_SWEPT.items():
+        if f"{prefix}{key}" in swept:
+            yield parameter(key, f"{prefix}{key}", given[key], each)
 
 
 Values = Mapping[Part, Mapping[str, Any]]
@@ -144,13 +151,16 @@ def joined(known: Iterable[Parameter]) -> np.ndarray:
 
 
 def described(robot: Described, values: Mapping[str, Any]) -> Numbered:
-    """A robot with other gravity and payloads."""
+    """A robot with other gravity, payloads, armature and factor on its masses."""
     payloads = tuple(
         with_values(each, {key: _literal(values[f"{i} {key}"]) for key in _PAYLOAD if f"{i} {key}" in values})
         for i, each in enumerate(robot.edits.payloads)
     )
-    gravity = _literal(values["gravity"]) if "gravity" in values else robot.edits.gravity
-    return Numbered(robot.description, replace(robot.edits, gravity=gravity, payloads=payloads), robot.joint_names)
+    edits = {"payloads": payloads} | {key: _literal(values[key]) for key in ("gravity", "mass_scale") if key in values}
+    if "armature" in values:
+        drives = zip(robot.joint_names, _literal(values["armature"]), strict=True)
+        edits["armature"] = tuple((dict(robot.edits.armature) | dict(drives)).items())
+    return Numbered(robot.description, replace(robot.edits, **edits), robot.joint_names)
 
 
 def _literal(values: Any) -> Any:

@@ -59,7 +59,8 @@ def rollouts(
         params: Values that differ from run to run, each (B,) or (B, n): a gain of the controller by its name, as
             {"kp": …}, a coefficient of an effect, as {"viscous_friction.damping": …}, "gravity", (B, 3), or of a
             payload that a link carries its mass in [kg], as {"payload_mass:tool0": …}, or its centre of mass,
-            "payload_com:tool0", (B, 3). Models of controllers keep theirs: they are "model.gravity", ….
+            "payload_com:tool0", (B, 3); "armature", (B, n); "mass_scale", (B,). Models of controllers keep theirs:
+            they are "model.gravity", ….
         record: Which of "q", "v", "u", "energy", "work" to keep at the samples.
         threads: Number of threads; None for all processors.
         most_bytes: Refuse to record more than this.
@@ -141,7 +142,7 @@ def _starts(
 def _values(setup: Setup, name: str, values: Any) -> np.ndarray:
     """The values of a parameter, (B, size)."""
     plant = setup.plant
-    known = parameters(plant.dynamics, plant.effects, setup.controller, (name,))
+    known = parameters(plant.dynamics, plant.effects, setup.controller, (name, "armature", "mass_scale"))
     swept = [each for each in known if each.declared.swept]
     mine = [each for each in swept if each.name == name]
     if not mine:
