@@ -13,6 +13,7 @@ from robot_dyn.compiled.llvm import machine_code
 from robot_dyn.compiled.right_angles import completed
 from robot_dyn.errors import EffectError, QueryError
 from robot_dyn.simulation.machine import making
+from robot_dyn.simulation.machine.machine import MachineError
 
 ARM = rd.load("planar_2r")
 TIP = ARM.frame_names[-1]
@@ -191,6 +192,26 @@ def test_parts_of_a_users_own_have_all_of_it() -> None:
     assert theirs.desired is not None and np.abs(theirs.desired - path.at(theirs.t)[0]).max() == 0
     runs = rd.rollouts(base, params={"gain": [50.0, 20.0], "drag.strength": [[0.0, 0.5], [0.3, 0.1]]})
     assert np.abs(runs.q[0] - theirs.q).max() < 1e-12 < np.abs(runs.q[1] - theirs.q).max()
+
+
+class Shaken(rd.PiecewisePolynomial):
+    """A reference of a user's own that is not the polynomial that it is made of."""
+
+    def at(self, t):
+        q, v, a = super().at(t)
+        return q + 0.1 * np.sin(t)[..., None], v, a
+
+
+def test_a_reference_of_a_users_own_is_not_taken_for_its_polynomial() -> None:
+    """A structure that is compiled already is held to it again; "auto" runs it interpreted."""
+    path = rd.quintic(Q, Q + 0.2, 0.1)
+    shaken = Shaken(path.breaks, path.coefficients)
+    base = rd.Setup(rd.Plant(ARM), Q, V, 0.2, rd.PD(path, 40.0, 4.0), "rk4", estimate_error=False)
+    rd.simulate(base, engine="compiled")
+    own = replace(base, controller=rd.PD(shaken, 40.0, 4.0))
+    assert rd.simulate(own).statistics.engine == "interpreted (Shaken is not the library's own)"
+    with pytest.raises(MachineError, match="differs from the interpreted one"):
+        rd.simulate(own, engine="compiled")
 
 
 UR5 = completed(rd.load("ur5"))[0]

@@ -32,8 +32,9 @@ _LOOKS = 300  # states at which the actuation is computed
 def foreign(setup: Setup) -> tuple[Any, ...]:
     """The parts of a setup that are not of this library's classes."""
     parts = (setup.plant.dynamics, *setup.plant.effects, setup.controller, setup.integrator)
-    models = () if setup.controller is None else setup.controller.models.values()
-    return tuple(part for part in (*parts, *models) if part is not None and _is_foreign(part))
+    if setup.controller is not None:
+        parts += (*setup.controller.models.values(), *setup.controller.references.values())
+    return tuple(part for part in parts if part is not None and _is_foreign(part))
 
 
 def _is_foreign(part: Any) -> bool:

@@ -15,6 +15,7 @@ import numpy as np
 
 from robot_dyn.coefficients import declared
 from robot_dyn.control.reference import PiecewisePolynomial
+from robot_dyn.control.samples import Samples
 from robot_dyn.model.edits import Edits
 from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.state_equation import StateEquation
@@ -46,7 +47,7 @@ def _of(value: Any, objects: list[Any]) -> Any:
     robot = getattr(value, "robot", value)
     if isinstance(robot, Robot):
         return "robot", sha256(robot.description.xml).digest(), robot.joint_names, _of_edits(robot.edits)
-    if isinstance(value, PiecewisePolynomial):
+    if type(value) in (PiecewisePolynomial, Samples):  # one of a user's own may be another function of time
         return "polynomial", value.coefficients.shape[1:]
     if is_dataclass(value) and type(value).__module__.startswith("robot_dyn.") and not _holds_function(value):
         return type(value).__qualname__, *(_of_field(value, each.name, objects) for each in fields(value))
