@@ -17,9 +17,10 @@ for dynamics in (rd.Lagrangian(arm), rd.Compiled(arm)):
 assert rd.compare(rd.load("panda")).ok
 
 plant, controller = rd.Plant(arm, [rd.ViscousFriction(0.1)]), rd.PD(rd.quintic(q, q + 0.5, 0.1), 40.0, 4.0)
-runs = [rd.simulate(plant, q0=q, duration_s=0.2, controller=controller, engine=e) for e in ("interpreted", "compiled")]
+setup = rd.Setup(plant, q, duration_s=0.2, controller=controller, integrator="rk4")
+runs = [rd.simulate(setup, engine=each) for each in ("interpreted", "compiled")]
 np.testing.assert_allclose(runs[0].q, runs[1].q, rtol=0, atol=1e-11)
-many = rd.rollouts(rd.Setup(plant, q, duration_s=0.2, controller=controller), np.tile(q, (3, 1)))
+many = rd.rollouts(setup, np.tile(q, (3, 1)))
 np.testing.assert_allclose(many.q[2], runs[0].q, rtol=0, atol=1e-11)
 rd.simulate(plant, q0=q, duration_s=0.2)
 
