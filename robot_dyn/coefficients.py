@@ -68,17 +68,19 @@ class Coefficient:
         """Whether it is one number for all joints, or one for each."""
         return self.shapes == JOINTS
 
-    def checked(self, name: str, values: Any, *, error: type[RobotDynError]) -> Any:
-        """The numbers, copied and frozen, or a float; values by joint name and "urdf" stay until the joints are known.
+    def checked(self, name: str, values: Any, *, error: type[RobotDynError], resolved: bool) -> Any:
+        """The numbers, copied and frozen, or a float.
+
+        Values by joint name and "urdf" stay until the joints are known, where they are `resolved` later, by `on`.
 
         Raises:
             RobotDynError: If they have another shape, a wrong sign, or are not finite; of the class `error`.
         """
-        if self.of_joints and isinstance(values, Mapping):
+        if resolved and self.of_joints and isinstance(values, Mapping):
             if not values:
                 raise error(f"{name} names no joint; give values by joint, or one for all")
             return values
-        if self.stated and isinstance(values, str) and values == URDF:
+        if resolved and self.stated and isinstance(values, str) and values == URDF:
             return URDF
         found = numbers(
             name, values, *self.shapes, error=error, least=self.least, above=self.above, infinite=self.infinite
@@ -151,17 +153,12 @@ def _fields(kind: type) -> tuple[Field[Any], ...]:
     return fields(kind) if is_dataclass(kind) else ()
 
 
-def check_coefficients(part: Any, error: type[RobotDynError]) -> None:
+def check_coefficients(part: Any, error: type[RobotDynError], *, resolved: bool = False) -> None:
     """Check and freeze the coefficients of a part under construction; see `Coefficient.checked`."""
     for name, each in declared(type(part)).items():
         if getattr(part, name) is None and defaults(type(part)).get(name, 0) is None:
             continue  # it may be left out
-        object.__setattr__(part, name, each.checked(name, getattr(part, name), error=error))
-
-
-def values_of(part: Any) -> dict[str, np.ndarray]:
-    """The coefficients of a part by name, as arrays."""
-    return {name: np.asarray(getattr(part, name)) for name in declared(type(part)) if getattr(part, name) is not None}
+        object.__setattr__(part, name, each.checked(name, getattr(part, name), error=error, resolved=resolved))
 
 
 def with_values(part: Any, values: Mapping[str, Any]) -> Any:

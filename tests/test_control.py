@@ -185,3 +185,10 @@ def test_control_never_sees_the_plant() -> None:
     )
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert out.stdout.strip() == ""
+
+
+@pytest.mark.parametrize("gain", [{"joint_1": 5.0}, "urdf", None])
+def test_gains_by_joint_name_are_refused(gain) -> None:
+    """A controller such as PD knows no names of joints, so that nothing could resolve them later."""
+    with pytest.raises(ControlError, match="kp must be real numbers, one or of shape"):
+        PD(MOTION, gain, KD)

@@ -42,7 +42,7 @@ class Effect(Value):
     term: ClassVar[str] = ""
 
     def __post_init__(self) -> None:
-        check_coefficients(self, EffectError)
+        check_coefficients(self, EffectError, resolved=True)
 
     @property
     def name(self) -> str:
