@@ -73,11 +73,11 @@ def test_another_structure_is_compiled() -> None:
     """What is not a number, such as a locked joint or the link that a wrench acts on, is not taken for one."""
     at = {name: rd.ExternalWrench(name, [1.0, 0.2, 0.7, 0.1, 0.4, 0.2]) for name in ARM.frame_names[1:3]}
     ends = {
-        name: rd.simulate(ARM_plant(each), q0=Q, duration_s=0.1, engine="compiled", integrator="rk4").q[-1]
+        name: rd.simulate(plant_with(each), q0=Q, duration_s=0.1, engine="compiled", integrator="rk4").q[-1]
         for name, each in at.items()
     }
     theirs = {
-        name: rd.simulate(ARM_plant(each), q0=Q, duration_s=0.1, engine="interpreted", integrator="rk4")
+        name: rd.simulate(plant_with(each), q0=Q, duration_s=0.1, engine="interpreted", integrator="rk4")
         for name, each in at.items()
     }
     for name, q in ends.items():
@@ -85,7 +85,7 @@ def test_another_structure_is_compiled() -> None:
     assert np.abs(np.subtract(*ends.values())).max() > 1e-3
 
 
-def ARM_plant(effect: rd.Active) -> rd.Plant:
+def plant_with(effect: rd.Active) -> rd.Plant:
     return rd.Plant(ARM, [effect])
 
 

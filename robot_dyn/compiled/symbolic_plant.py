@@ -17,6 +17,7 @@ from robot_dyn.coefficients import with_values
 from robot_dyn.compiled.parameters import CONTROLLER, Part
 from robot_dyn.compiled.symbolic import Symbols, TraceError, column, every_branch
 from robot_dyn.control.controller import Controller
+from robot_dyn.control.reference import polynomial
 from robot_dyn.effects.effect import Active, Bound, Conservative, Effect
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foreign import because
@@ -78,15 +79,8 @@ class Piece:
         self.start, self.coefficients = p[0], p[1:].reshape(-1, n).view(Symbols)
 
     def at(self, t: Any) -> tuple[Array, Array, Array]:
-        """Position, velocity and acceleration, by the lines of `PiecewisePolynomial.at`."""
-        s, c = t - self.start, self.coefficients
-        q = c[-1] + 0 * s
-        v = a = 0 * q
-        for j in reversed(range(len(c) - 1)):
-            a = a * s + v
-            v = v * s + q
-            q = q * s + c[j]
-        return q, v, 2 * a
+        """Position, velocity and acceleration."""
+        return polynomial(self.coefficients, t - self.start)
 
 
 def _traced(effect: Effect, values: Mapping[str, Array]) -> Effect:
@@ -96,48 +90,44 @@ def _traced(effect: Effect, values: Mapping[str, Array]) -> Effect:
     return _TracedConservative(own) if isinstance(effect, Conservative) else _TracedForce(own)
 
 
-class _TracedForce(Active):
-    """A torque, traced whichever way it branches."""
+class _Part:
+    """An effect that is traced whichever way it branches."""
 
-    def __init__(self, force: Any) -> None:
-        self.inner = force
+    def __init__(self, inner: Any) -> None:
+        self.inner = inner
 
     @property
     def name(self) -> str:
         return self.inner.name
+
+    def traced(self, function: Callable[[], Any], length: int) -> Array:
+        """Symbols (length,) of what it gives."""
+        return _followed(f"effect {self.name}", lambda: wide(function(), length))
+
+
+class _Torque(_Part):
+    """The torque of a force."""
 
     def torque(self, dynamics: Any, t: Any, q: Array, v: Array) -> Array:
-        return _followed(f"effect {self.name}", lambda: wide(self.inner.torque(dynamics, t, q, v), dynamics.n))
+        return self.traced(lambda: self.inner.torque(dynamics, t, q, v), dynamics.n)
 
 
-class _TracedConservative(Conservative):
-    """The same with its potential."""
+class _TracedForce(_Torque, Active):
+    """A torque."""
 
-    def __init__(self, force: Any) -> None:
-        self.inner = force
 
-    @property
-    def name(self) -> str:
-        return self.inner.name
-
-    torque = _TracedForce.torque
+class _TracedConservative(_Torque, Conservative):
+    """A torque with a potential."""
 
     def potential(self, dynamics: Any, t: Any, q: Array) -> Any:
-        return _followed(f"effect {self.name}", lambda: wide(self.inner.potential(dynamics, t, q), 1))[0]
+        return self.traced(lambda: self.inner.potential(dynamics, t, q), 1)[0]
 
 
-class _TracedBound(Bound):
-    """A bound on the actuation, traced likewise."""
-
-    def __init__(self, bound: Any) -> None:
-        self.inner = bound
-
-    @property
-    def name(self) -> str:
-        return self.inner.name
+class _TracedBound(_Part, Bound):
+    """A bound on the actuation."""
 
     def actuation(self, u: Array) -> Array:
-        return _followed(f"effect {self.name}", lambda: wide(self.inner.actuation(u), len(u)))
+        return self.traced(lambda: self.inner.actuation(u), len(u))
 
 
 @final

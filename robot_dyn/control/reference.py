@@ -107,14 +107,20 @@ class PiecewisePolynomial(Reference):
         inside = np.clip(t, breaks[0], breaks[-1])
         piece = np.searchsorted(breaks[1:-1], inside, side="right")
         s, c = (inside - breaks[piece])[..., None], self.coefficients[piece]
-        q = c[..., -1, :] + 0 * s  # a fresh array, also where the degree is 0
-        v = a = np.zeros_like(q)
-        for j in reversed(range(c.shape[-2] - 1)):
-            a = a * s + v
-            v = v * s + q
-            q = q * s + c[..., j, :]
+        q, v, a = polynomial(c, s)
         moves = ((breaks[0] <= t) & (t <= breaks[-1]))[..., None]
-        return q, np.where(moves, v, 0), np.where(moves, 2 * a, 0)
+        return q, np.where(moves, v, 0), np.where(moves, a, 0)
+
+
+def polynomial(c: Array, s: Array) -> tuple[Array, Array, Array]:
+    """Value and derivatives of Σⱼ cⱼ sʲ by Horner's rule, of c (..., d + 1, n) and s (..., 1), each (..., n)."""
+    q = c[..., -1, :] + 0 * s  # a fresh array, also where the degree is 0
+    v = a = 0 * q
+    for j in reversed(range(c.shape[-2] - 1)):
+        a = a * s + v
+        v = v * s + q
+        q = q * s + c[..., j, :]
+    return q, v, 2 * a
 
 
 def hold(q: Any) -> PiecewisePolynomial:

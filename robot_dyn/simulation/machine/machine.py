@@ -61,13 +61,8 @@ class Equations:
 
     @cached_property
     def _key(self) -> str:
-        return digest(
-            [
-                str(self.runs),
-                str(sorted(self.shared.items())),
-                *(f"{name} {program}" for name, program in self.programs.items()),
-            ]
-        )
+        texts = (f"{name} {program}" for name, program in self.programs.items())
+        return digest([str(self.runs), str(sorted(self.shared.items())), *texts])
 
     @cached_property
     def functions(self) -> Functions:
@@ -138,12 +133,8 @@ class Machine:
         """
         if self.equations.checked and not foreign(setup):
             return
-        rng, n, m, W = (
-            np.random.default_rng(20),
-            self.equation.plant.dynamics.n,
-            self.equation.size,
-            self.equations.runs,
-        )
+        rng, n, m = np.random.default_rng(20), self.equation.plant.dynamics.n, self.equation.size
+        W = self.equations.runs
         plan, held = plan_of(setup), n * self.equation.sampled
         made = {name: np.empty((len(program.outputs), W)) for name, program in self.equations.programs.items()}
         for i in range(_STATES):

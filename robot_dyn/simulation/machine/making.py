@@ -31,7 +31,7 @@ _MOST = 64  # values that are kept
 
 
 @final
-class Kept:
+class Recent:
     """Values by hashable keys and by the identity of objects, for as long as all of these live; the latest ones."""
 
     def __init__(self) -> None:
@@ -51,7 +51,7 @@ class Kept:
             return found[1]
 
 
-_robots, _symbols, _equations = Kept(), Kept(), Kept()
+_robots, _symbols, _equations = Recent(), Recent(), Recent()
 
 
 def _robot(dynamics: Any) -> Robot:
