@@ -17,7 +17,7 @@ import numpy as np
 from robot_dyn.arithmetic import Arithmetic, Array
 from robot_dyn.errors import OverflowedError, QueryError
 from robot_dyn.integrate.fixed_point import enclose_fixed_point, unit_roundoff
-from robot_dyn.integrate.integrator import IntegrationError, PlainMethod, Stepper, System
+from robot_dyn.integrate.integrator import IntegrationError, PlainMethod, RightSide, Stepper, System
 from robot_dyn.integrate.primitives import GOING, MOST_ITERATIONS, SETTLED, combination, evaluate, settle
 from robot_dyn.integrate.tableau import ButcherTableau, Coefficients, Surd, combine
 from robot_dyn.validate import integer
@@ -67,7 +67,7 @@ class Increments(NamedTuple):
 
 
 def gauss_step(
-    rate: Any, tableau: Coefficients, t: Any, h: Any, y: Array, p: Array, own: Array, after: Array, work: Increments,
+    f: RightSide, tableau: Coefficients, t: Any, h: Any, y: Array, p: Array, own: Array, after: Array, work: Increments,
     lost: Array,
 ) -> int:  # fmt: skip
     """A step of a Gauss method; arguments as of `Stepper`."""
@@ -78,7 +78,7 @@ def gauss_step(
     while going > 0 and rounds < MOST_ITERATIONS:
         for i in range(s):
             combination(after, y, tableau.one, tableau.a[i], Z, s)
-            evaluate(rate, t + tableau.c[i] * h, after, p, own, work.K[0])
+            evaluate(f.rate, t + tableau.c[i] * h, after, p, own, work.K[0])
             np.multiply(work.K[0, :m], h, work.new[i])
         going = settle(Z, work.new, y, work.least, work.stale, work.state, work.epsilon)
         rounds += 1

@@ -55,12 +55,25 @@ class System:
     widths: Array | None = None
 
 
+class RightSide(NamedTuple):
+    """f of y' = f(t, y) as a step calls it: functions of (t, y, p, own, out), as of `evaluate`.
+
+    Attributes:
+        rate: y', (r, W).
+        jacobian: ∂f/∂y_j in out[j] and ∂f/∂t in out[m], (m + 1, m, W); 0 unless the method needs it.
+    """
+
+    rate: Any
+    jacobian: Any = 0
+
+
 class Stepper(NamedTuple):
     """A method made ready for a time loop, for states (m, W).
 
     Attributes:
-        step: The plain function (rate, coefficients, t, h, y, p, own, after, work, lost) → evaluations. It writes
-            y(t + h) into `after`, and 1 into `lost` (W,) where stages are not found; rate, p, own as of `evaluate`.
+        step: The plain function (f, coefficients, t, h, y, p, own, after, work, lost) → evaluations. It writes
+            y(t + h) into `after`, and 1 into `lost` (W,) where stages are not found; f has the functions of a
+            `RightSide`, p and own are as of `evaluate`.
         coefficients: Its numbers.
         work: Its arrays; work.K[-1], (r, W), is the latest rate.
     """
@@ -131,22 +144,23 @@ class Integrator(ABC):
         K = np.empty((1, rows, 1), kind.dtype)
 
         def step(
-            rate: Any, _: Any, t: Any, h: Any, y: Array, p: Array, own: Array, after: Array, work: Latest, lost: Array
-        ) -> int:
+            f: RightSide, _: Any, t: Any, h: Any, y: Array, p: Array, own: Array, after: Array, work: Latest,
+            lost: Array,
+        ) -> int:  # fmt: skip
             evaluations = 0
 
             def one(t: Any, x: Array) -> Array:
                 nonlocal evaluations
                 evaluations += 1
-                evaluate(rate, t, x[:, None], p, own, K[0])
+                evaluate(f.rate, t, x[:, None], p, own, K[0])
                 return K[0, :m, 0].copy()
 
-            def f(t: Any, x: Array) -> Array:
+            def rate(t: Any, x: Array) -> Array:
                 return (
                     one(t, x) if x.ndim == 1 else np.array([one(t, each) for each in x.reshape(-1, m)]).reshape(x.shape)
                 )
 
-            after[:, 0] = self.step(System(f, n, widths), t, y[:, 0].copy(), h)
+            after[:, 0] = self.step(System(rate, n, widths), t, y[:, 0].copy(), h)
             return evaluations
 
         return Stepper(step, None, Latest(K))
@@ -178,7 +192,7 @@ class PlainMethod(Integrator):
         def rate(t: Any, x: Array, p: Any, own: Any, out: Array) -> None:
             out[...] = system.rate(t, x.T.reshape(y.shape)).reshape(-1, m).T
 
-        step(rate, coefficients, t, h, x, None, None, after, work, lost)
+        step(RightSide(rate), coefficients, t, h, x, None, None, after, work, lost)
         return after.T.reshape(y.shape), lost, work
 
     def not_found(self, t: Any, h: Any) -> IntegrationError:

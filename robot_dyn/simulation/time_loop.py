@@ -57,12 +57,21 @@ Now = _Entries()  # no enumeration: Numba before 0.62 takes none as an index
 
 
 class Functions(NamedTuple):
-    """The state equation, each as of `evaluate`: y' and u; the next own numbers; K and V; what a sample holds."""
+    """The state equation, each as of `evaluate`, as a step and the time loop call it.
+
+    Attributes:
+        rate: y' and u.
+        tick: The next own numbers.
+        energy: K and V.
+        sample: What a sample holds.
+        jacobian: As of `RightSide`.
+    """
 
     rate: Any
     tick: Any
     energy: Any
     sample: Any
+    jacobian: Any = 0
 
 
 class Plan(NamedTuple):
@@ -183,8 +192,8 @@ def time_loop(step: Callable[..., int]) -> Callable[..., int]:
                 if s == last:
                     now[Now.STEP] += 1
                     continue
-                rate, own = functions.rate, runs.own
-                now[Now.EVALUATIONS] += step(rate, coefficients, t, h, runs.y, p, own, runs.after, work, runs.lost)
+                y, own, after, lost = runs.y, runs.own, runs.after, runs.lost
+                now[Now.EVALUATIONS] += step(functions, coefficients, t, h, y, p, own, after, work, lost)
                 if not take(runs, rules, t):
                     return Ended.DOUBTFUL
                 now[Now.STEP] += 1
