@@ -42,6 +42,9 @@ if TYPE_CHECKING:
     from robot_dyn.effects.joint_limit import JointStopDamper as JointStopDamper
     from robot_dyn.effects.joint_limit import JointStopSpring as JointStopSpring
     from robot_dyn.effects.joint_limit import joint_stops as joint_stops
+    from robot_dyn.effects.line_spring_damper import LineDamper as LineDamper
+    from robot_dyn.effects.line_spring_damper import LineSpring as LineSpring
+    from robot_dyn.effects.line_spring_damper import LineSpringDamper as LineSpringDamper
     from robot_dyn.effects.plant import Plant as Plant
     from robot_dyn.effects.spring import Spring as Spring
     from robot_dyn.effects.wrench import ExternalWrench as ExternalWrench
@@ -94,6 +97,9 @@ _HOME = {
     "JointStopDamper": "effects.joint_limit",
     "JointStopSpring": "effects.joint_limit",
     "Lagrangian": "lagrange.manipulator",
+    "LineDamper": "effects.line_spring_damper",
+    "LineSpring": "effects.line_spring_damper",
+    "LineSpringDamper": "effects.line_spring_damper",
     "ModelWarning": "errors",
     "OperationalSpace": "control.operational_space",
     "PD": "control.independent_joint",

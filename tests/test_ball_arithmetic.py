@@ -34,6 +34,16 @@ def distance(values: np.ndarray, balls: np.ndarray, bits: int = 200) -> np.ndarr
         return np.vectorize(lambda x, ball: float(abs(arb(float(x)) - ball).upper()), otypes=[float])(values, balls)
 
 
+def test_placement_and_jacobian_are_balls_throughout() -> None:
+    """Those entries too that are 0 or 1 at any state; they hold the float64 values to their rounding."""
+    robot, ball = arm("ur5"), Ball(100)
+    own, (q, v, _) = rd.Lagrangian(robot, ball), general_state(robot)
+    for name, arguments in (("placement", (q,)), ("jacobian", (q,)), ("jacobian_rate", (q, v))):
+        balls = getattr(own, name)(*arguments, "wrist_3_link")
+        assert {type(x) for x in balls.flat} == {arb}
+        np.testing.assert_allclose(rd.midpoint(balls), getattr(robot, name)(*arguments, "wrist_3_link"), atol=1e-14)
+
+
 @pytest.mark.parametrize("name", ARMS)
 def test_balls_of_more_bits_lie_inside_balls_of_fewer(name: str) -> None:
     """Both enclose the exact value, so they meet; 147 bits more shrink the radius by 2⁻¹⁴⁷ = 6e-45, to rounding."""

@@ -80,6 +80,10 @@ EFFECTS = {
     "regularised_coulomb_friction": "friction_N_m = {joint_1 = 0.2}",
     "spring": "stiffness_N_m_per_rad = 2.0\nrest_rad = [0.1, 0.2]",
     "joint_stops": "lower_rad = -1.0\nupper_rad = {joint_1 = 1.0}",
+    "line_spring_damper": (
+        'frame = "tip"\npoint_m = [0.1, 0.0, 0.2]\nother_point_m = [0.5, 0.0, 0.4]\n'
+        "stiffness_N_per_m = 30.0\ndamping_N_s_per_m = 2.0\nlength_m = 0.7"
+    ),
     "external_wrench": 'frame = "tip"\nforce_N = [1.0, 0.0, 0.0]',
     "effort_limit": "limit_N_m = 3.0",
     "payload": 'frame = "tip"\nmass_kg = 0.5',
@@ -103,6 +107,10 @@ def test_effect_of_a_scene_is_that_of_python(write, kind: str) -> None:
         "regularised_coulomb_friction": lambda: rd.Plant(robot, [rd.RegularisedCoulombFriction([0.2, 0.0])]),
         "spring": lambda: rd.Plant(robot, [rd.Spring(2.0, [0.1, 0.2])]),
         "joint_stops": lambda: rd.Plant(robot, rd.joint_stops([-1.0, -1.0], [1.0, 1e9])),
+        "line_spring_damper": lambda: rd.Plant(
+            robot,
+            [rd.LineSpringDamper("tip", None, [0.1, 0, 0.2], [0.5, 0, 0.4], stiffness=30.0, damping=2.0, length=0.7)],
+        ),
         "external_wrench": lambda: rd.Plant(robot, [rd.ExternalWrench("tip", [1, 0, 0, 0, 0, 0])]),
         "effort_limit": lambda: rd.Plant(robot, [rd.EffortLimit(3.0)]),
         "payload": lambda: rd.Plant(robot.with_(payload=rd.Payload("tip", 0.5))),

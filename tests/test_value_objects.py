@@ -26,14 +26,15 @@ def values() -> dict[str, Any]:
     setup = rd.Setup(plant, Q, **options)
     run, runs = rd.simulate(setup), rd.rollouts(setup, q0=[Q, Q + 0.1], params={"kp": [1.0, 2.0]})
     spring, damper = rd.joint_stops([-1.0, -1.0], [1.0, 1.0])
+    strut = rd.LineSpringDamper("tip", None, stiffness=9.0, damping=1.0, length=0.3)
     made = [
         rd.Adaptive(), rd.Ball(100), rd.compare(ARM, samples=2), rd.Payload("tip", 1.0), ARM, rd.Lagrangian(ARM), plant,
         rd.PD(PLAN, [1.0, 2.0], 1.0), rd.PID(PLAN, 1.0, 1.0, 1.0), rd.PDGravity(ARM, PLAN, 1.0, 1.0),
         rd.FeedForward(ARM, PLAN, 1.0, 1.0), rd.ComputedTorque(ARM, PLAN, 1.0, 1.0),
         rd.OperationalSpace(ARM, "tip", LINE, 1.0, 1.0, posture=Q, rows=(0, 2)), rd.EffortLimit([1.0, 2.0]),
-        rd.ExternalWrench("tip", np.ones(6)), spring, damper, rd.RegularisedCoulombFriction([0.1, 0.2]),
-        rd.Spring([1.0, 2.0]), rd.ViscousFriction([1.0, 2.0]), PLAN, rd.Samples([0.0, 1.0, 2.0], np.ones((3, 2))), LINE,
-        setup, run, runs, run.ledger, run.error, run.statistics, run.outcome, ARM.couplings, ARM.edits,
+        rd.ExternalWrench("tip", np.ones(6)), spring, damper, rd.RegularisedCoulombFriction([0.1, 0.2]), strut,
+        *strut.parts, rd.Spring([1.0, 2.0]), rd.ViscousFriction([1.0, 2.0]), PLAN, rd.Samples([0.0, 1.0, 2.0], np.ones((3, 2))),
+        LINE, setup, run, runs, run.ledger, run.error, run.statistics, run.outcome, ARM.couplings, ARM.edits,
         rd.task_dynamics(ARM, Q, Q, "tip", rows=(0, 2)), rd.method("rk4"), rd.method("gauss_4"), rd.method("sdirk_3"),
     ]  # fmt: skip
     named: dict[str, Any] = {type(each).__name__: each for each in made}
@@ -88,7 +89,7 @@ def test_values_cannot_be_changed(name: str) -> None:
 
 def test_values_keep_copies_of_what_they_are_given() -> None:
     """What the caller does to an array afterwards changes nothing, and the array of the caller stays writeable."""
-    x, six, points = np.array([0.3, 0.4]), np.ones(6), np.ones((3, 2))
+    x, six, points, three = np.array([0.3, 0.4]), np.ones(6), np.ones((3, 2)), np.ones(3)
     times, about = np.array([0.0, 1.0, 2.0]), {"author": "me"}
     made: list[tuple[Any, tuple[str, ...]]] = [
         (rd.PD(PLAN, x, x), ("kp", "kd")),
@@ -100,11 +101,15 @@ def test_values_keep_copies_of_what_they_are_given() -> None:
         (rd.joint_stops(-x, x, x)[0], ("upper", "stiffness")),
         (rd.EffortLimit(x), ("limit",)),
         (rd.ExternalWrench("tip", six), ("wrench",)),
+        (
+            rd.LineSpringDamper("tip", None, three, three, stiffness=1.0, damping=1.0, length=1.0),
+            ("point", "other_point"),
+        ),
         (rd.Samples(times, points), ("breaks", "coefficients")),
         (rd.Setup(rd.Plant(ARM), x, x, about=about), ("q0", "v0", "about")),
     ]
     before = [[deepcopy(getattr(value, name)) for name in names] for value, names in made]
-    for array in (x, six, points, times):
+    for array in (x, six, points, three, times):
         array += 7.0
     about["author"] = "you"
     for (value, names), kept in zip(made, before, strict=True):

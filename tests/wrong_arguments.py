@@ -95,6 +95,7 @@ def examples(folder: Path) -> dict[str, Example]:
             made[f"{kind}.{method}"][1]["expressed_in"] = "body"
         made[f"{kind}.total_energy"] = getattr(dynamics, "total_energy", None), {"q": q, "v": v}
     stops = {"lower": [-1.0, -2.0], "upper": 1.0}
+    strut = {"frame": "pole", "other_frame": "cart", "point": [0.1, 0.2, 0.3], "other_point": [0.4, 0.2, 0.1]}
     pair = {"model": robot, "reference": hold, "kp": 9.0, "kd": [6.0, 2.0], "period_s": 0.01}
     points, eye = [q, u, v], np.eye(3)
     path: Any = rd.line([0.1, 0.2, 0.3], [0.4, 0.2, 0.1], 1.0)
@@ -182,6 +183,9 @@ def examples(folder: Path) -> dict[str, Example]:
         ),
         "gains_from": (rd.gains_from, {"inertia_diagonal": [1.0, 2.0], "frequency": 3.0, "damping_ratio": 0.9}),
         "hold": (rd.hold, {"q": q}),
+        "LineDamper": (rd.LineDamper, strut | {"damping": 0.1}),
+        "LineSpring": (rd.LineSpring, strut | {"stiffness": 10.0, "length": 0.2}),
+        "LineSpringDamper": (rd.LineSpringDamper, strut | {"stiffness": 10.0, "damping": 0.1, "length": 0.2}),
         "joint_stops": (rd.joint_stops, stops | {"stiffness": 10.0, "damping": 0.1}),
         "line": (
             rd.line,

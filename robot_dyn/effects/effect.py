@@ -20,7 +20,7 @@ from robot_dyn.values import Value
 
 
 class Effect(Value):
-    """Something that acts on the joints: a `Force` or a `Bound`; a plant refuses anything else.
+    """Something that acts on the joints: a `Force`, a `Bound`, or several of them as its `parts`.
 
     Subclass one of the four kinds below. Its methods are pure functions, called with
 
@@ -61,6 +61,11 @@ class Effect(Value):
         }
         made: Any = {key: value for key, value in known.items() if value is not getattr(self, key)}
         return replace(self, **made) if made else self  # pyright: ignore[reportArgumentType]  a dataclass
+
+    @property
+    def parts(self) -> tuple[Effect, ...]:
+        """The forces and bounds that a plant takes it as; itself unless it consists of several."""
+        return (self,)
 
     @property
     def switches(self) -> tuple[float, ...]:

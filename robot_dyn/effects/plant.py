@@ -42,14 +42,14 @@ class Plant:
             effects = stated_friction(dynamics)
         if not isinstance(effects, Iterable):
             raise EffectError(f"effects must be several, such as [rd.ViscousFriction(0.1)], got {shown(effects)}")
-        effects = tuple(effects)
-        for effect in effects:
-            if not isinstance(effect, Force | Bound):
+        parts = [part for effect in effects for part in (effect.parts if isinstance(effect, Effect) else (effect,))]
+        for part in parts:
+            if not isinstance(part, Force | Bound):
                 raise EffectError(
-                    f"{shown(effect)} is neither a Force nor a Bound, so nothing would evaluate it; subclass"
+                    f"{shown(part)} is neither a Force nor a Bound, so nothing would evaluate it; subclass"
                     " Conservative, Dissipative, Active or Bound"
                 )
-        object.__setattr__(self, "effects", tuple(effect.on(dynamics) for effect in effects))
+        object.__setattr__(self, "effects", tuple(part.on(dynamics) for part in parts))
 
     @cached_property
     def equation_of_motion(self) -> EquationOfMotion:

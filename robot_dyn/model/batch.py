@@ -51,6 +51,10 @@ def answered(
         for name, x in zip(arrays, given, strict=True):
             check_finite(name, x, joint_names, arithmetic)
         answer = equation(*given)
+        if (
+            isinstance(answer, np.ndarray) and answer.dtype == object
+        ):  # entries that are 0 or 1 whatever the state are integers still
+            answer = arithmetic.array(answer)
         if not arithmetic.finite(answer).all():
             raise OverflowedError(f"{', '.join(arrays)} are so large that the result overflows")
         return answer

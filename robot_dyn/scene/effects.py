@@ -11,6 +11,7 @@ from robot_dyn.effects.actuator import EffortLimit
 from robot_dyn.effects.effect import Effect
 from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFriction
 from robot_dyn.effects.joint_limit import JointStopDamper, JointStopSpring, joint_stops
+from robot_dyn.effects.line_spring_damper import LineSpringDamper
 from robot_dyn.effects.spring import Spring
 from robot_dyn.effects.wrench import ExternalWrench
 from robot_dyn.errors import SceneError
@@ -100,6 +101,35 @@ class Wrench(Acting):
         return (ExternalWrench(self.frame, [*self.force_N, *self.torque_N_m], self.expressed_in, self.start_s, end),)
 
 
+class Line(Acting):
+    """A spring and a damper along the line between two points: τ = −(∂ℓ/∂q)ᵀ (k (ℓ − ℓ₀) + c ℓ'), ℓ their distance."""
+
+    term = LineSpringDamper.term
+
+    kind: Literal["line_spring_damper"]
+    frame: str
+    """A link."""
+    other_frame: str | None = None
+    """Another one; the world unless given."""
+    point_m: Vector3 = (0.0, 0.0, 0.0)
+    """A point of the link, in its axes."""
+    other_point_m: Vector3 = (0.0, 0.0, 0.0)
+    """A point of the other link, in its axes, or of the world, in those of the base."""
+    stiffness_N_per_m: NotNegative
+    """k."""
+    damping_N_s_per_m: NotNegative
+    """c."""
+    length_m: NotNegative
+    """ℓ₀, the length without force."""
+
+    def build(self, robot: Robot) -> tuple[Effect, ...]:
+        made = LineSpringDamper(
+            self.frame, self.other_frame, self.point_m, self.other_point_m,
+            stiffness=self.stiffness_N_per_m, damping=self.damping_N_s_per_m, length=self.length_m,
+        )  # fmt: skip
+        return made.parts
+
+
 EDITS = Gravity, Lock, Load, Armature
 ACTING = (
     declared_part("viscous_friction", ViscousFriction),
@@ -109,6 +139,7 @@ ACTING = (
         "joint_stops", JointStopSpring, JointStopDamper, make=joint_stops,
         text="Soft joint stops: τ = k (δ₋ − δ₊) − c (δ₋ + δ₊) v, with δ the depth beyond a stop.",
     ),
+    Line,
     Wrench,
     declared_part("effort_limit", EffortLimit),
 )  # fmt: skip

@@ -32,7 +32,7 @@ integrates, and where each number comes from. This page is written from the sche
 _UNITS = {
     "_N_m_s_per_rad2": "N m s/rad²", "_N_m_s_per_rad": "N m s/rad", "_N_m_per_rad": "N m/rad", "_rad_per_s": "rad/s",
     "_kg_m2": "kg m²", "_m_s2": "m/s²", "_per_s": "1/s", "_N_m": "N m", "_rad": "rad", "_kg": "kg", "_N": "N",
-    "_m": "m", "_s": "s",
+    "_N_s_per_m": "N s/m", "_N_per_m": "N/m", "_m": "m", "_s": "s",
 }  # fmt: skip
 _UNITS_OF_KEYS = {
     "q": "rad", "v": "rad/s", "joints": "rad", "points": "rad", "kp": "N m/rad", "kd": "N m s/rad",

@@ -160,5 +160,6 @@ def _values(setup: Setup, name: str, values: Any) -> np.ndarray:
     rows = np.ascontiguousarray(np.broadcast_to(array, (len(array), n)))
     for part in {each.part for each in mine if each.part[0] == "effect"}:
         for row in np.unique(rows, axis=0):
-            replace(plant.effects[part[1]], **{mine[0].key: row})  # refuses what has no meaning
+            value = row.reshape(mine[0].value.shape)
+            replace(plant.effects[part[1]], **{mine[0].key: value})  # refuses what has no meaning
     return rows

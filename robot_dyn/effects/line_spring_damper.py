@@ -1,0 +1,168 @@
+"""Spring and damper along the line between two points: τ = −(∂ℓ/∂q)ᵀ (k (ℓ − ℓ₀) + c ℓ'), with ℓ their distance.
+
+Each point is fixed to a frame of the arm, or to the world. With e = (p − p') / ℓ, the direction of the line, and the
+Jacobians of the points, ∂ℓ/∂q = eᵀ (J − J') and ℓ' = ∂ℓ/∂q v. Where the points meet, ℓ = 0, the line has no direction.
+[Shabana, Computational Dynamics, 3rd ed., 2010, sec. 3.3]
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array, apply, sqrt, transpose
+from robot_dyn.coefficients import coefficient
+from robot_dyn.effects.effect import Conservative, Dissipative, Effect
+from robot_dyn.errors import EffectError, QueryError
+from robot_dyn.model.dynamics import Dynamics
+from robot_dyn.spatial import hat
+from robot_dyn.validate import instance
+
+_POINT = coefficient("m", symbol="p, in the axes of the frame", shapes=((3,),))
+_OTHER = coefficient("m", symbol="p', in the axes of the other frame, or of the base", shapes=((3,),))
+_STIFFNESS = coefficient("N/m", symbol="k", shapes=((),), least=0)
+_DAMPING = coefficient("N s/m", symbol="c", shapes=((),), least=0)
+_LENGTH = coefficient("m", symbol="ℓ₀, the length without force", shapes=((),), least=0)
+
+
+@dataclass(frozen=True, eq=False)
+class _Line(Effect):
+    """The line between a point of a frame and a point of another, or of the world."""
+
+    frame: str
+    other_frame: str | None
+    point: Any = field(default=(0.0, 0.0, 0.0), metadata=_POINT)
+    other_point: Any = field(default=(0.0, 0.0, 0.0), metadata=_OTHER)
+
+    def __post_init__(self) -> None:
+        for name, frame in zip(("frame", "other_frame"), self._frames, strict=False):
+            instance(name, frame, str, "give the name of a frame", error=EffectError)
+        if self.frame == self.other_frame:
+            raise EffectError(f"both points are fixed to {self.frame!r}, so their distance is constant: name another")
+        super().__post_init__()
+
+    @property
+    def name(self) -> str:
+        return "line_spring_damper"
+
+    @property
+    def _frames(self) -> tuple[str, ...]:
+        return (self.frame,) if self.other_frame is None else (self.frame, self.other_frame)
+
+    def on(self, dynamics: Any) -> Effect:
+        for frame in self._frames:
+            try:
+                dynamics.placement(np.zeros(dynamics.n), frame)
+            except QueryError as error:
+                raise EffectError(f"{self.name}: {error}") from None
+        return self
+
+    def _line(self, dynamics: Dynamics, q: Array) -> tuple[Array, Array]:
+        """The vector p − p' in base axes, and ℓ, (..., 3) and (..., 1); EffectError where ℓ is 0."""
+        other = _position(dynamics, q, self.other_frame, self.other_point)
+        line = _position(dynamics, q, self.frame, self.point) - other
+        square = (line**2).sum(axis=-1, keepdims=True)
+        if square.dtype != object and not square.all():
+            other = "the world" if self.other_frame is None else repr(self.other_frame)
+            raise EffectError(
+                f"{self.name}: its points of {self.frame!r} and {other} meet, where the line between them has no direction"
+            )
+        return line, sqrt(square)
+
+    def _along(self, dynamics: Dynamics, q: Array) -> tuple[Array, Array]:
+        """ℓ, (..., 1), and ∂ℓ/∂q, (..., n)."""
+        line, length = self._line(dynamics, q)
+        direction = line / length
+        slope = _slope(dynamics, q, self.frame, self.point, direction)
+        if self.other_frame is not None:
+            slope = slope - _slope(dynamics, q, self.other_frame, self.other_point, direction)
+        return length, slope
+
+
+def _position(dynamics: Dynamics, q: Array, frame: str | None, point: Array) -> Array:
+    """A point in base axes, (..., 3)."""
+    if frame is None:
+        return point
+    placement = dynamics.placement(q, frame)
+    return apply(placement[..., :3, :3], point) + placement[..., :3, 3]
+
+
+def _slope(dynamics: Dynamics, q: Array, frame: str, point: Array, direction: Array) -> Array:
+    """∂(eᵀ p)/∂q of a point of a frame along a direction e: Jᵀ (e, r × e), with r from the frame to the point."""
+    r = apply(dynamics.placement(q, frame)[..., :3, :3], point)
+    force = np.concatenate([direction, apply(hat(r), direction)], axis=-1)
+    return apply(transpose(dynamics.jacobian(q, frame)), force)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class LineSpring(_Line, Conservative):
+    """The elastic part of a line spring-damper: τ = −(∂ℓ/∂q)ᵀ k (ℓ − ℓ₀), of energy ½ k (ℓ − ℓ₀)².
+
+    Attributes:
+        frame, other_frame, point, other_point, stiffness, length: As of `LineSpringDamper`.
+    """
+
+    stiffness: Any = field(kw_only=True, metadata=_STIFFNESS)
+    length: Any = field(kw_only=True, metadata=_LENGTH)
+
+    term = "−(∂ℓ/∂q)ᵀ k (ℓ − ℓ₀)"
+
+    def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
+        length, slope = self._along(dynamics, q)
+        return -self.stiffness * (length - self.length) * slope
+
+    def potential(self, dynamics: Dynamics, t: float, q: Array) -> Array:
+        _, length = self._line(dynamics, q)
+        return self.stiffness * ((length - self.length) ** 2).sum(axis=-1) / 2
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class LineDamper(_Line, Dissipative):
+    """The dissipative part of a line spring-damper: τ = −(∂ℓ/∂q)ᵀ c ℓ'.
+
+    Attributes:
+        frame, other_frame, point, other_point, damping: As of `LineSpringDamper`.
+    """
+
+    damping: Any = field(kw_only=True, metadata=_DAMPING)
+
+    term = "−(∂ℓ/∂q)ᵀ c ℓ'"
+
+    def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
+        _, slope = self._along(dynamics, q)
+        return -self.damping * (slope * v).sum(axis=-1, keepdims=True) * slope
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class LineSpringDamper(_Line):
+    """A spring and a damper along the line between two points: τ = −(∂ℓ/∂q)ᵀ (k (ℓ − ℓ₀) + c ℓ').
+
+    A plant takes it as its two parts, a `LineSpring` and a `LineDamper`. Where the points meet, the line has no
+    direction: the torque raises an EffectError there, and a run ends.
+
+    Attributes:
+        frame: A frame of the arm.
+        other_frame: Another one; None for the world.
+        point: A point of the frame, in its axes, (3,), in [m]; its origin unless given.
+        other_point: A point of the other frame, in its axes, or of the world, in those of the base.
+        stiffness: k, in [N/m], not negative.
+        damping: c, in [N s/m], not negative.
+        length: ℓ₀, without force, in [m], not negative.
+    """
+
+    stiffness: Any = field(kw_only=True, metadata=_STIFFNESS)
+    damping: Any = field(kw_only=True, metadata=_DAMPING)
+    length: Any = field(kw_only=True, metadata=_LENGTH)
+
+    term = f"{LineSpring.term} {LineDamper.term}".replace(" −", " − ")
+
+    @property
+    def parts(self) -> tuple[Effect, ...]:
+        ends = self.frame, self.other_frame, self.point, self.other_point
+        spring = LineSpring(*ends, stiffness=self.stiffness, length=self.length)
+        return spring, LineDamper(*ends, damping=self.damping)
