@@ -13,7 +13,7 @@ from robot_dyn.errors import OverflowedError, RobotDynError
 from robot_dyn.integrate.explicit import EXPLICIT_EULER
 from robot_dyn.integrate.fixed_point import MOST_ITERATIONS
 from robot_dyn.integrate.gauss import Gauss
-from robot_dyn.integrate.implicit import SDIRK_3, jacobian
+from robot_dyn.integrate.implicit import SDIRK_3
 from robot_dyn.integrate.integrator import IntegrationError, Integrator, System
 from robot_dyn.integrate.methods import method
 from tests.test_integrate import ALL, OSCILLATOR, PENDULUM, RNG, STIFF, name_of, oscillator, pendulum
@@ -99,7 +99,7 @@ def test_a_system_at_rest_stays_there(integrator: Integrator) -> None:
 def test_jacobian_of_a_batch() -> None:
     """Central differences: truncation and rounding of u^(2/3) = 4e-11, some ten times that allowed."""
     y = RNG.normal(size=(4, 2, 3))
-    J = jacobian(PENDULUM, 0.8, y)
+    J = PENDULUM.jacobian(0.8, y)
     assert J.shape == (4, 2, 3, 3)
     expected = np.zeros_like(J)
     expected[..., 0, 1], expected[..., 1, 0], expected[..., 1, 1], expected[..., 2, 1] = (

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.integrate.implicit import jacobian
 from robot_dyn.integrate.integrator import System
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.state_functions import interpreted, system
@@ -27,7 +26,7 @@ def test_a_jacobian_is_taken_inside_the_width_of_the_rate(width: float) -> None:
         lambda t, y: np.stack([np.tanh(y[..., 0] / width), y[..., 1] ** 2], -1), 0, np.array([width, np.inf])
     )
     expected = np.diag([(1 - np.tanh(0.3) ** 2) / width, 2.0])
-    np.testing.assert_allclose(jacobian(system, 0.0, y), expected, rtol=1e-4)
+    np.testing.assert_allclose(system.jacobian(0.0, y), expected, rtol=1e-4)
 
 
 @pytest.mark.parametrize("width", [1e-5, 1e-7, 1e-9])
@@ -37,7 +36,7 @@ def test_the_jacobian_of_a_motion_knows_its_friction(width: float) -> None:
     q = np.array([0.4, -0.7])
     setup = rd.Setup(equation.plant, q)
     functions, bounds = interpreted(equation, Watch(setup, equation)), np.array([0.0, 1.0])
-    J = jacobian(system(functions, equation, bounds, np.zeros((0, 1))), 0.5, equation.start(q, np.zeros(2)))
+    J = system(functions, equation, bounds, np.zeros((0, 1))).jacobian(0.5, equation.start(q, np.zeros(2)))
     expected = -np.linalg.inv(ARM.M(q)) * [3.0, 2.0] / width
     np.testing.assert_allclose(J[2:4, 2:4], expected, rtol=1e-4)
 

@@ -18,7 +18,6 @@ from robot_dyn import former
 from robot_dyn.arithmetic import Array
 from robot_dyn.errors import OverflowedError, QueryError, RobotDynError
 from robot_dyn.foreign import is_mistake
-from robot_dyn.integrate.implicit import jacobian
 from robot_dyn.integrate.integrator import System
 from robot_dyn.validate import choice, function, instance, number, numbers, rows
 
@@ -101,6 +100,7 @@ class Adaptive:
     canonical: ClassVar[bool] = False
     plain: ClassVar[bool] = False
     controls_error: ClassVar[bool] = True
+    needs_jacobian: ClassVar[bool] = False
     evaluations_per_step: ClassVar[int | None] = None
 
     @property
@@ -205,7 +205,7 @@ class Steps:
             return np.full_like(y, np.nan)
 
     def _jacobian(self, t: Any, y: Array) -> Array:
-        J = jacobian(self._system, t, y)
+        J = self._system.jacobian(t, y)
         if not np.isfinite(J).all():
             raise _NotFiniteError
         return J

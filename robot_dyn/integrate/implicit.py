@@ -2,7 +2,7 @@
 
     (1 − h γ J) Δ = residual of a stage
 
-The Jacobian comes from central differences and the linear systems go to LAPACK, so these are for float32 and float64.
+The Jacobian is that of the system, or by differences, and the linear systems go to LAPACK: for float32 and float64.
 [Hairer, Wanner, Solving Ordinary Differential Equations II, 2nd ed., 1996, IV.6 and IV.7]
 """
 
@@ -18,36 +18,6 @@ from robot_dyn.errors import QueryError
 from robot_dyn.integrate.fixed_point import MOST_ITERATIONS, fixed_point
 from robot_dyn.integrate.integrator import IntegrationError, Integrator, System, arithmetic_like
 from robot_dyn.integrate.tableau import ButcherTableau, Row, combine
-
-_INSIDE = 0.01  # of a width: a central difference of tanh is then off by 3e-5, which Newton's iteration corrects
-_LEAST = 64  # units in the last place of an entry that a difference spans at least
-
-
-def jacobian(system: System, t: Any, y: Array) -> Array:
-    """J = ∂f/∂y by central differences, from 2 m evaluations in one batch; quadratures are entries like the others.
-
-    Args:
-        system: The equation y' = f(t, y).
-        t: Time.
-        y: State, shape (..., m), float32 or float64. Entries are taken to vary on a scale of max(1, |y|), or on that
-            of `system.widths` where it is narrower.
-
-    Returns:
-        Shape (..., m, m), in error by some u^(2/3), of both truncation and rounding.
-
-    Source: Dennis and Schnabel, Numerical Methods for Unconstrained Optimization, 1983, 5.4.
-    """
-    m = y.shape[-1]
-    unit = np.eye(m, dtype=y.dtype).reshape(m, *(1,) * (y.ndim - 1), m)  # axis 0: the entry that is moved
-    u, size = np.finfo(y.dtype).eps, np.maximum(1, np.abs(y))
-    span = np.cbrt(u) * size
-    if system.widths is not None:
-        span = np.maximum(np.minimum(span, _INSIDE * system.widths), _LEAST * u * np.abs(y)).astype(y.dtype)
-    shift = unit * span
-    both = np.stack([y + shift, y - shift])
-    width = (both[0] - both[1]).sum(axis=-1, keepdims=True)  # as rounded, not 2 × shift; all other entries are 0
-    up, down = system.rate(t, both)
-    return np.moveaxis((up - down) / width, 0, -1)
 
 
 @final
@@ -65,10 +35,11 @@ class LinearlyImplicitEuler(Integrator):
     order: int = field(default=1, init=False)
     evaluations_per_step: int | None = field(default=None, init=False)  # 1 + 2 m
     stiff: ClassVar[bool] = True
+    needs_jacobian: ClassVar[bool] = True
 
     def step(self, system: System, t: Any, y: Array, h: Any) -> Array:
         h = _step_of(self, y, h)
-        W = np.eye(y.shape[-1], dtype=y.dtype) - h * jacobian(system, t + h, y)
+        W = np.eye(y.shape[-1], dtype=y.dtype) - h * system.jacobian(t + h, y)
         try:
             k = np.linalg.solve(W, system.rate(t + h, y)[..., None])[..., 0]
         except np.linalg.LinAlgError:
@@ -93,6 +64,7 @@ class SinglyDiagonallyImplicit(Integrator):
     order: int = field(init=False)
     evaluations_per_step: int | None = field(default=None, init=False)  # 2 m, and one a round
     stiff: ClassVar[bool] = True
+    needs_jacobian: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         rows = self.tableau.a
@@ -105,7 +77,7 @@ class SinglyDiagonallyImplicit(Integrator):
         _, a, b, c = self.tableau.numbers(y)
         h_gamma = h * a[0][0][1]
         try:  # the inverse, for it serves many rounds, and Newton's iteration corrects its rounding
-            inverse = np.linalg.inv(np.eye(y.shape[-1], dtype=y.dtype) - h_gamma * jacobian(system, t, y))
+            inverse = np.linalg.inv(np.eye(y.shape[-1], dtype=y.dtype) - h_gamma * system.jacobian(t, y))
         except np.linalg.LinAlgError:
             raise _singular(self, t, h) from None
         k: list[Array] = []

@@ -17,6 +17,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import Arithmetic, Array, Ball, Float
 from robot_dyn.errors import QueryError, RobotDynError
+from robot_dyn.integrate.differences import by_state, by_time
 from robot_dyn.integrate.primitives import evaluate
 
 _FLOATS = {np.dtype(kind): Float(np.dtype(kind)) for kind in (np.float32, np.float64, np.longdouble)}
@@ -48,11 +49,25 @@ class System:
         n: Number of positions, 0 if y has no such parts.
         widths: Change of each entry of y over which the rate bends, (m,), positive, inf where it does not; None if
             nothing is known. A difference quotient across more than that is not a derivative.
+        exact: ∂f/∂y_j for each j and then ∂f/∂t, a fresh array (m + 1, ..., m) of t and y (..., m); None if they are
+            to be found by differences.
     """
 
     rate: Callable[[Any, Array], Array]
     n: int
     widths: Array | None = None
+    exact: Callable[[Any, Array], Array] | None = None
+
+    def derivatives(self, t: Any, y: Array, end: Any) -> Array:
+        """∂f/∂y_j for each j, then ∂f/∂t, (m + 1, ..., m); the latter, by differences, from times between t and end."""
+        if self.exact is not None:
+            return self.exact(t, y)
+        return np.concatenate([by_state(self.rate, t, y, self.widths), by_time(self.rate, t, y, end)[None]])
+
+    def jacobian(self, t: Any, y: Array) -> Array:
+        """∂f/∂y, (..., m, m); quadratures are entries like the others."""
+        columns = by_state(self.rate, t, y, self.widths) if self.exact is None else self.exact(t, y)[:-1]
+        return np.moveaxis(columns, 0, -1)
 
 
 class RightSide(NamedTuple):
@@ -100,6 +115,7 @@ class Integrator(ABC):
         stiff: Whether its step is not bounded by the fastest decay of the system.
         plain: Whether its step is a plain function, which machine code and runs in lock step take.
         controls_error: Whether it chooses its steps, as `Adaptive` does.
+        needs_jacobian: Whether its step asks for ∂f/∂y.
     """
 
     name: str
@@ -109,6 +125,7 @@ class Integrator(ABC):
     stiff: ClassVar[bool] = False
     plain: ClassVar[bool] = False
     controls_error: ClassVar[bool] = False
+    needs_jacobian: ClassVar[bool] = False
 
     @abstractmethod
     def step(self, system: System, t: Any, y: Array, h: Any) -> Array:
@@ -141,7 +158,7 @@ class Integrator(ABC):
             runs: W; 1 unless the method is `plain`.
             widths: As of `System`.
         """
-        K = np.empty((1, rows, 1), kind.dtype)
+        K, J = np.empty((1, rows, 1), kind.dtype), np.empty((m + 1, m, 1), kind.dtype)
 
         def step(
             f: RightSide, _: Any, t: Any, h: Any, y: Array, p: Array, own: Array, after: Array, work: Latest,
@@ -160,7 +177,12 @@ class Integrator(ABC):
                     one(t, x) if x.ndim == 1 else np.array([one(t, each) for each in x.reshape(-1, m)]).reshape(x.shape)
                 )
 
-            after[:, 0] = self.step(System(rate, n, widths), t, y[:, 0].copy(), h)
+            def derivatives(t: Any, x: Array) -> Array:
+                evaluate(f.jacobian, t, x[:, None], p, own, J)
+                return J[:, :, 0].copy()
+
+            exact = derivatives if self.needs_jacobian else None
+            after[:, 0] = self.step(System(rate, n, widths, exact), t, y[:, 0].copy(), h)
             return evaluations
 
         return Stepper(step, None, Latest(K))
@@ -192,7 +214,11 @@ class PlainMethod(Integrator):
         def rate(t: Any, x: Array, p: Any, own: Any, out: Array) -> None:
             out[...] = system.rate(t, x.T.reshape(y.shape)).reshape(-1, m).T
 
-        step(RightSide(rate), coefficients, t, h, x, None, None, after, work, lost)
+        def jacobian(t: Any, x: Array, p: Any, own: Any, out: Array) -> None:
+            made = system.derivatives(t, x.T.reshape(y.shape), t + h)
+            out[...] = np.moveaxis(made.reshape(m + 1, -1, m), 1, 2)
+
+        step(RightSide(rate, jacobian), coefficients, t, h, x, None, None, after, work, lost)
         return after.T.reshape(y.shape), lost, work
 
     def not_found(self, t: Any, h: Any) -> IntegrationError:

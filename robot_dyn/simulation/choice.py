@@ -31,17 +31,17 @@ def choose(setup: Setup, equation: StateEquation) -> tuple[Machine | None, str]:
         MachineError: If the machine code does not agree with the interpreted engine.
     """
     if setup.engine == "interpreted":
-        return None, "interpreted"
+        return None, _interpreted(setup)
     if setup.engine == "compiled":
         return _machine(setup, equation), _label(setup)
     if parts := foreign(setup):  # they may have effects of their own, which a trace would lose
-        return None, f"interpreted ({named(parts[0])} is not the library's own)"
-    if _evaluations(setup) < _COMPILED:
-        return None, "interpreted (short: compiling does not pay)"
+        return None, _interpreted(setup, f"{named(parts[0])} is not the library's own")
+    if _evaluations(setup, equation.size) < _COMPILED:
+        return None, _interpreted(setup, "short: compiling does not pay")
     try:
         return _machine(setup, equation), _label(setup)
     except (ImportError, RobotDynError) as error:
-        return None, f"interpreted ({error})"
+        return None, _interpreted(setup, str(error))
 
 
 def _machine(setup: Setup, equation: StateEquation) -> Machine:
@@ -54,19 +54,24 @@ def _made(setup: Setup, equation: StateEquation) -> Machine:
     from robot_dyn.simulation.machine.making import machine
 
     method: Any = setup.integrator
-    return machine(equation, method if method.plain else None)
+    return machine(equation, method if method.plain else None, jacobian=method.needs_jacobian)
+
+
+def _interpreted(setup: Setup, why: str = "") -> str:
+    words = [why] * bool(why) + ["Jacobian by differences"] * setup.integrator.needs_jacobian
+    return f"interpreted ({'; '.join(words)})" if words else "interpreted"
 
 
 def _label(setup: Setup) -> str:
     return "compiled" if setup.integrator.plain else "compiled (the equation of motion; steps in Python)"
 
 
-def _evaluations(setup: Setup) -> float:
-    """About how many evaluations of the equation of motion a run takes, with its companions."""
+def _evaluations(setup: Setup, size: int) -> float:
+    """About how many evaluations of an equation of motion of that size a run takes, with its companions."""
     method: Any = setup.integrator
     if method.controls_error:
         least = _PER_SEGMENT * segments(setup)
         return max(_PER_SECOND * setup.duration_s, least) * (3 if setup.estimate_error else 1)
-    return (
-        setup.steps * (2 if setup.estimate_error else 1) * (method.evaluations_per_step or _GUESSED + 2 * len(setup.q0))
-    )
+    for_jacobian = 2 * size if method.needs_jacobian else 0  # by differences
+    each = (method.evaluations_per_step or _GUESSED) + for_jacobian
+    return setup.steps * (2 if setup.estimate_error else 1) * each

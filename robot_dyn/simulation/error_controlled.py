@@ -93,7 +93,10 @@ class ErrorControlled:
     def _segment(self, s: int) -> None:
         start, end, p = float(self.plan.starts[s]), float(self.plan.starts[s + 1]), self.plan.parameters[s]
         self._tick(s)
-        right_side = system(self.functions, self.equation, p, self.own, self.observer and self.observer.seen)
+        right_side = system(
+            self.functions, self.equation, p, self.own, self.observer and self.observer.seen,
+            exact=self.setup.integrator.needs_jacobian,
+        )  # fmt: skip
         steps = self._method(end - start).steps(self._counted(right_side), start, self.y, end, stop=self._sane)
         self._keep(start, self.y, p)
         self._share(start, self.y)

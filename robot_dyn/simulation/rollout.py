@@ -103,6 +103,7 @@ def rollouts(
         lanes=LANES,
         kept=kept,
         swept=tuple(sweep),
+        jacobian=setup.integrator.needs_jacobian,
     )
     made.check(setup)
     runs = Batch(setup, made, q, v, sweep, recorded, kept, most_bytes).run(thread_count(threads), on_progress)

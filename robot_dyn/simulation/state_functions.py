@@ -1,7 +1,7 @@
 """The state equation as functions for a time loop, (t, y, p, own, out), of one interpreted run.
 
 rate: y' and u    tick: u, in zero-order hold from then on, and the next states of the controller    energy: K and V
-sample: y', u, K and V
+sample: y', u, K and V    jacobian: as of `RightSide`, by differences
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ from robot_dyn.simulation.watch import Watch
 def interpreted(equation: StateEquation, watch: Watch) -> Functions:
     """The functions of a state equation, in Python.
 
-    `rate` raises what the equation raises, `tick` and `energy` the DivergedError of the watch; `sample` gives nan.
+    `rate` and `jacobian` raise what the equation raises, `tick` and `energy` the DivergedError of the watch; `sample`
+    gives nan.
     """
     n, m = equation.plant.dynamics.n, equation.size
 
@@ -42,7 +43,12 @@ def interpreted(equation: StateEquation, watch: Watch) -> Functions:
     def sampled(t: float, y: Array, p: Array, own: Array, out: Array) -> None:
         sample(equation, min(max(t, p[0]), p[1]), _state(y), own[:n, 0] if equation.sampled else None, out[:, 0])
 
-    return Functions(rate, tick, energy, sampled)
+    def jacobian(t: float, y: Array, p: Array, own: Array, out: Array) -> None:
+        end = p[1] if t - p[0] < p[1] - t else p[0]
+        out[:, :, 0] = system(functions, equation, p, own, exact=False).derivatives(t, y[:, 0], end)
+
+    functions = Functions(rate, tick, energy, sampled, jacobian)
+    return functions
 
 
 def sample(equation: StateEquation, t: float, y: Array, held: Array | None, out: Array) -> None:
@@ -67,7 +73,14 @@ def _state(y: Array) -> Array:
     return x
 
 
-def system(functions: Functions, equation: StateEquation, p: Array, own: Array, seen: Array | None = None) -> System:
+def system(
+    functions: Functions,
+    equation: StateEquation,
+    p: Array,
+    own: Array,
+    seen: Array | None = None,
+    exact: bool = True,
+) -> System:
     """The equation y' = f(t, y) on one segment.
 
     Args:
@@ -76,9 +89,10 @@ def system(functions: Functions, equation: StateEquation, p: Array, own: Array, 
         p: Of the segment.
         own: u of a sampled controller, in zero-order hold, (n, 1), or nothing, (0, 1).
         seen: Where the velocity and the actuation of each evaluation are written, (2n,).
+        exact: Whether derivatives are those of the functions, if they have them.
     """
     n, m = equation.plant.dynamics.n, equation.size
-    out = np.empty((m + n, 1))
+    out, J = np.empty((m + n, 1)), np.empty((m + 1, m, 1))
 
     def rate(t: Any, y: Array) -> Array:
         if y.ndim > 1:  # an implicit method asks for its Jacobian
@@ -88,4 +102,8 @@ def system(functions: Functions, equation: StateEquation, p: Array, own: Array, 
             seen[:n], seen[n:] = out[:n, 0], out[m:, 0]
         return out[:m, 0].copy()
 
-    return System(rate, n, equation.widths)
+    def derivatives(t: Any, y: Array) -> Array:
+        evaluate(functions.jacobian, float(t), np.ascontiguousarray(y)[:, None], p, own, J)
+        return J[:, :, 0].copy()
+
+    return System(rate, n, equation.widths, derivatives if exact and functions.jacobian else None)

@@ -55,7 +55,7 @@ class Statistics:
         method: Name of the integrator.
         step_s: Its step, or 0 if it chose its own.
         steps: Number of steps.
-        evaluations: Evaluations of the equation of motion.
+        evaluations: Evaluations of the equation of motion, those of its Jacobian apart.
         wall_s: Time of the run itself, in [s].
         companions_s: Time of the error estimate.
         engine: Which loop ran, and why if another was possible.

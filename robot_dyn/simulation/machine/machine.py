@@ -20,6 +20,7 @@ from robot_dyn.compiled.llvm.lock_step import write_function
 from robot_dyn.compiled.parameters import Parameter, joined
 from robot_dyn.compiled.program import Program
 from robot_dyn.errors import RobotDynError
+from robot_dyn.simulation.machine.jacobian_check import DIFFERENCES, by_differences
 from robot_dyn.simulation.plan import plan_of
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.smoothness import foreign
@@ -42,7 +43,7 @@ class Equations:
     """The functions of a state equation, as programs and machine code.
 
     Attributes:
-        programs: rate, energy and sample, and tick where there is one.
+        programs: rate, energy and sample, tick where there is one, and jacobian where a method needs it.
         runs: W.
         name: What moves, for people.
         shared: As of `write_function`.
@@ -121,7 +122,7 @@ class Machine:
     @cached_property
     def in_python(self) -> Functions:
         """The functions as Python calls them."""
-        return Functions(*(_callable(address) for address in self.equations.functions))
+        return Functions(*(_callable(address) if address else 0 for address in self.equations.functions))
 
     def check(self, setup: Setup) -> None:
         """Hold the functions to the interpreted equations at random states.
@@ -151,12 +152,21 @@ class Machine:
                 allowed = _AGREES * max(1.0, float(np.linalg.cond(self.equation.plant.M(y[:n, lane]))))
                 worst = max(_difference(mine, theirs, y[:, lane]) for mine, theirs in pairs)
                 if not worst <= allowed:
-                    raise MachineError(
-                        f"the compiled state equation of {self.equations.name} differs from the interpreted one by"
-                        f" {worst:.1e} of its size, {allowed:.1e} allowed: take engine='interpreted', or make"
-                        f" a part anew that was changed after a run; if none was, report it (random state {i})"
-                    )
+                    raise self._differs("state equation", worst, allowed, i)
+            if "jacobian" in made:
+                J = made["jacobian"][:, 0].reshape(m + 1, m)
+                held_here = own[:n, 0] if held else None
+                worst = by_differences(self.equation, t, y[:, 0], held_here, plan.parameters[s], J)
+                if not worst <= 1:
+                    raise self._differs("Jacobian", worst * DIFFERENCES, DIFFERENCES, i)
         self.equations.checked.add(True)
+
+    def _differs(self, what: str, worst: float, allowed: float, state: int) -> MachineError:
+        return MachineError(
+            f"the compiled {what} of {self.equations.name} differs from the interpreted one by {worst:.1e} of its size,"
+            f" {allowed:.1e} allowed: take engine='interpreted', or make a part anew that was changed after a run; if"
+            f" none was, report it (random state {state})"
+        )
 
     def _pairs(
         self, t: float, y: np.ndarray, held: np.ndarray | None, ours: dict[str, np.ndarray]

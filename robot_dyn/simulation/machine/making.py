@@ -78,6 +78,7 @@ def machine(
     lanes: int = 1,
     kept: tuple[str, ...] | None = None,
     swept: tuple[str, ...] = (),
+    jacobian: bool = False,
 ) -> Machine:
     """The machine of a state equation, from the latest ones if it is among them; not compiled yet.
 
@@ -87,6 +88,7 @@ def machine(
         lanes: Runs in lock step.
         kept: As of `trace`.
         swept: Names of the parameters that differ from run to run.
+        jacobian: Whether the method needs that of the rate.
 
     Raises:
         TraceError: If a part of the equation cannot be compiled; names it, with the remedy.
@@ -99,11 +101,11 @@ def machine(
     described = described, tuple(each.entries for each in known)
 
     def make() -> Equations:
-        programs = _programs(own, known, kept, None if objects else described)
+        programs = _programs(own, known, kept, jacobian, None if objects else described)
         return Equations(programs, lanes, robot.name, _shared(own, known, lanes, swept))
 
     names = tuple(name for name in dict.fromkeys(each.name for each in known) if name in swept)
-    equations = _equations.get(objects, (described, lanes, kept, names), make)
+    equations = _equations.get(objects, (described, lanes, kept, names, jacobian), make)
     if equations.instructions > _MOST_INSTRUCTIONS:
         raise TraceError(
             f"the run takes {equations.instructions} instructions, more than the {_MOST_INSTRUCTIONS} worth compiling;"
@@ -126,15 +128,15 @@ def _shared(
 
 
 def _programs(
-    equation: StateEquation, known: tuple[Parameter, ...], kept: tuple[str, ...] | None, described: Any
+    equation: StateEquation, known: tuple[Parameter, ...], kept: tuple[str, ...] | None, jacobian: bool, described: Any
 ) -> dict[str, Program]:
     """The programs of a state equation, from the store if the structure of all its parts is known."""
     store = None if described is None else default_store()
-    key = digest(["programs", repr(described), repr(kept)])
+    key = digest(["programs", repr(described), repr(kept), repr(jacobian)])
     if store is not None and (payload := store.load(key)) is not None:
         texts = payload.decode().split("\n\n")
         return {name: Program.read(text) for name, _, text in (each.partition("\n") for each in texts)}
-    programs = _traced(equation, known, kept)
+    programs = _traced(equation, known, kept, jacobian)
     if store is not None:
         text = "\n\n".join(f"{name}\n{program}" for name, program in programs.items())
         store.save(key, text.encode(), f"the equations of {equation.plant.dynamics.name}")  # pyright: ignore
@@ -142,7 +144,9 @@ def _programs(
 
 
 @interrupts_later()
-def _traced(equation: StateEquation, known: tuple[Parameter, ...], kept: tuple[str, ...] | None) -> dict[str, Program]:
+def _traced(
+    equation: StateEquation, known: tuple[Parameter, ...], kept: tuple[str, ...] | None, jacobian: bool
+) -> dict[str, Program]:
     from robot_dyn.compiled.from_casadi import program_of
     from robot_dyn.compiled.symbolic_dynamics import SymbolicDynamics
     from robot_dyn.simulation.machine.traced import trace
@@ -154,7 +158,7 @@ def _traced(equation: StateEquation, known: tuple[Parameter, ...], kept: tuple[s
         inputs = tuple(each.entries for each in own)
         return _symbols.get((), (described, inputs), lambda: SymbolicDynamics(robot, own))
 
-    return {name: program_of(each) for name, each in trace(equation, bodies, known, kept).items()}
+    return {name: program_of(each) for name, each in trace(equation, bodies, known, kept, jacobian).items()}
 
 
 def _loop(method: Integrator) -> Callable[..., int]:

@@ -1,6 +1,7 @@
 """The state equation in symbols: the lines of `StateEquation` traced to functions of (t, y, p, own).
 
     rate = (y', u),   tick = (u, z⁺),   energy = (K, V),   sample = what is kept beside the state
+    jacobian = (∂y'/∂y₁, …, ∂y'/∂y_m, ∂y'/∂t)
 
 p holds what all runs share on a segment: its ends, and the polynomials of the references; `own` what is each run's own:
 what a sampled controller holds, and the parameters.
@@ -27,9 +28,13 @@ Bodies = Callable[[Any, Part], SymbolicDynamics]
 
 
 def trace(
-    equation: StateEquation, bodies: Bodies, known: Sequence[Parameter], kept: tuple[str, ...] | None
+    equation: StateEquation,
+    bodies: Bodies,
+    known: Sequence[Parameter],
+    kept: tuple[str, ...] | None,
+    jacobian: bool = False,
 ) -> dict[str, ca.Function]:
-    """The state equation as CasADi Functions: rate, energy, tick if it is sampled, and sample.
+    """The state equation as CasADi Functions: rate, energy, tick if it is sampled, sample, and jacobian if asked for.
 
     Args:
         equation: What to trace.
@@ -37,6 +42,7 @@ def trace(
         known: The parameters.
         kept: Which of "u", "v" and "energy" a sample of runs in lock step holds; None for a single run, whose rate
             gives u as well and whose samples hold y', u, K and V.
+        jacobian: Whether a method needs it.
 
     Raises:
         TraceError: If a part cannot be traced; names it.
@@ -61,7 +67,14 @@ def trace(
         if equation.sampled and symbolic.controller is not None:
             after = symbolic.controller.next_state(time, q, v, z) if equation.state_size else z
             made["tick"] = np.concatenate([wide(symbolic.command(time, q, v, z), n), after])
-    return {name: ca.Function("f", [t, y, p, own], [ca.cse(ca.densify(column(x)))]) for name, x in made.items()}
+        columns = {name: column(x) for name, x in made.items()}
+        if jacobian:
+            # of the time before it is bounded: a segment goes on, for its derivatives
+            unbounded, [free] = inputs("time", 1)
+            changing, _ = symbolic.rate(free, state, owns[:held].view(Symbols) if equation.sampled else None)
+            J = ca.jacobian(column(changing), ca.vertcat(y, unbounded))
+            columns["jacobian"] = ca.vec(ca.substitute(J, unbounded, column(time)))
+    return {name: ca.Function("f", [t, y, p, own], [ca.cse(ca.densify(x))]) for name, x in columns.items()}
 
 
 def _pieces(followed: Sequence[PiecewisePolynomial], p: Array) -> list[Piece]:
