@@ -1,7 +1,8 @@
 """Benchmarks, both sides in one run: medians over repeats that take turns. Only ratios of one run count.
 
 Subjects: queries (Robot over bare Pinocchio), compiled (against Pinocchio's C++), rollouts (against MuJoCo),
-parameters (numbers as inputs of machine code over constants), growth (cost against the number of joints).
+parameters (numbers as inputs of machine code over constants), growth (cost against the number of joints), iftomm
+(problems A01 and A05 of the IFToMM library of multibody benchmarks).
 """
 
 from __future__ import annotations
@@ -9,11 +10,11 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from benchmarks import growth, kernels, parameters, queries, rollouts
+from benchmarks import growth, iftomm, kernels, parameters, queries, rollouts
 from benchmarks.measure import Effort, environment
 
 PICTURE = Path(__file__).parents[1] / "docs" / "pictures" / "growth.png"
-SUBJECTS = ("queries", "compiled", "rollouts", "parameters", "growth")
+SUBJECTS = ("queries", "compiled", "rollouts", "parameters", "growth", "iftomm")
 
 
 def main() -> None:
@@ -43,6 +44,8 @@ def main() -> None:
     if "growth" in what:
         growth.growth(effort, None if options.quick else PICTURE)
         growth.memory(effort)
+    if "iftomm" in what:
+        iftomm.iftomm(effort)
 
 
 if __name__ == "__main__":

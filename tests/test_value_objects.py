@@ -33,8 +33,9 @@ def values() -> dict[str, Any]:
         rd.FeedForward(ARM, PLAN, 1.0, 1.0), rd.ComputedTorque(ARM, PLAN, 1.0, 1.0),
         rd.OperationalSpace(ARM, "tip", LINE, 1.0, 1.0, posture=Q, rows=(0, 2)), rd.EffortLimit([1.0, 2.0]),
         rd.ExternalWrench("tip", np.ones(6)), spring, damper, rd.RegularisedCoulombFriction([0.1, 0.2]), strut,
-        *strut.parts, rd.Spring([1.0, 2.0]), rd.ViscousFriction([1.0, 2.0]), PLAN, rd.Samples([0.0, 1.0, 2.0], np.ones((3, 2))),
-        LINE, setup, run, runs, run.ledger, run.error, run.statistics, run.outcome, ARM.couplings, ARM.edits,
+        *strut.parts, rd.Spring([1.0, 2.0]), rd.ViscousFriction([1.0, 2.0]), PLAN,
+        rd.Samples([0.0, 1.0, 2.0], np.ones((3, 2))), LINE,
+        setup, run, runs, run.ledger, run.error, run.statistics, run.outcome, ARM.couplings, ARM.edits,
         rd.task_dynamics(ARM, Q, Q, "tip", rows=(0, 2)), rd.method("rk4"), rd.method("gauss_4"), rd.method("sdirk_3"),
     ]  # fmt: skip
     named: dict[str, Any] = {type(each).__name__: each for each in made}

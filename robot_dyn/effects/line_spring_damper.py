@@ -67,7 +67,7 @@ class _Line(Effect):
         if square.dtype != object and not square.all():
             other = "the world" if self.other_frame is None else repr(self.other_frame)
             raise EffectError(
-                f"{self.name}: its points of {self.frame!r} and {other} meet, where the line between them has no direction"
+                f"{self.name}: its points of {self.frame!r} and {other} meet, where their line has no direction"
             )
         return line, sqrt(square)
 
