@@ -87,7 +87,7 @@ def test_each_method_makes_the_interpreted_step(name: str) -> None:
     ours, theirs = both(integrator=rd.method(name), duration_s=0.06, controller=CONTROLLERS["PD"])
     check_equal(ours, theirs, 1e-12)  # 60 steps of rounding, amplified by the gains
     assert ours.statistics.engine == "compiled" and ", compiled\n" in ours.summary
-    assert theirs.statistics.engine == "interpreted"
+    assert theirs.statistics.engine.startswith("interpreted")
     np.testing.assert_allclose(ours.q[1], theirs.q[1], rtol=1e-13)
 
 

@@ -26,11 +26,11 @@ def stiff_rate(t: Any, y: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("integrator", STIFF, ids=name_of)
 def test_l_stable_methods_follow_the_slow_motion(integrator: Integrator) -> None:
-    """At h |λ| = 1e5, from a start far off, the fast part is damped by 1/(h |λ|) a step, so 1e-5 is left of it."""
+    """At h |λ| = 1e5, from a start far off, the fast part, 2, is damped by |R| = 13/(h |λ|) or less."""
     y, h = np.array([3.0]), 0.1
     for i in range(20):
         y = integrator.step(System(stiff_rate, 0), i * h, y, h)
-        assert abs(y[0] - np.cos((i + 1) * h)) < (1e-4 if i == 0 else 2e-6)
+        assert abs(y[0] - np.cos((i + 1) * h)) < (3e-4 if i == 0 else 2e-6)
 
 
 @pytest.mark.parametrize("name", ["explicit_euler", "semi_implicit_euler", "midpoint", "rk4", "order_8"])

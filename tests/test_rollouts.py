@@ -313,7 +313,9 @@ def test_what_has_no_meaning_is_refused() -> None:
     }.items():
         with pytest.raises(QueryError, match=message):
             rd.rollouts(SETUP, **options)
-    with pytest.raises(QueryError, match="rollouts run in lock step by an explicit or a Gauss method, not by DOP853"):
+    with pytest.raises(
+        QueryError, match="rollouts run in lock step by an explicit, Gauss or Rosenbrock method, not by DOP853"
+    ):
         rd.rollouts(replace(SETUP, integrator=rd.Adaptive(), step_s=1e-3))
     with pytest.raises(TraceError, match="effect table"):
         rd.rollouts(replace(SETUP, plant=rd.Plant(ARM, [Table()])))

@@ -17,6 +17,7 @@ from robot_dyn.integrate.explicit import EXPLICIT_EULER, MIDPOINT, RK4, SemiImpl
 from robot_dyn.integrate.gauss import Gauss
 from robot_dyn.integrate.implicit import SDIRK_3, LinearlyImplicitEuler
 from robot_dyn.integrate.integrator import Integrator
+from robot_dyn.integrate.rosenbrock import ROSENBROCK_5
 from robot_dyn.validate import choice
 
 _READY = (
@@ -29,6 +30,7 @@ _READY = (
     Gauss(6),
     LinearlyImplicitEuler(),
     SDIRK_3,
+    ROSENBROCK_5,
 )
 
 # How to get each; order_8 takes its coefficients from SciPy when asked for, so that this module stays light.

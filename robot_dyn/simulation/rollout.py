@@ -50,7 +50,7 @@ def rollouts(
 ) -> Rollouts:
     """Run a plant or a robot from many starts, or a setup with the options that are given in place of its own.
 
-    The runs go side by side in machine code, by an explicit or a Gauss method: `integrator="rk4"`, `step_s`.
+    The runs go side by side in machine code, by an explicit, Gauss or Rosenbrock method: `integrator="rk4"`, `step_s`.
 
     Args:
         what: What to run.
@@ -82,8 +82,8 @@ def rollouts(
     most_bytes = integer("most_bytes", most_bytes, most=2**63 - 1)
     if not setup.integrator.plain:
         raise QueryError(
-            f"rollouts run in lock step by an explicit or a Gauss method, not by {setup.integrator.name}: give"
-            " integrator='rk4' and its step_s; simulate takes any method"
+            f"rollouts run in lock step by an explicit, Gauss or Rosenbrock method, not by {setup.integrator.name}:"
+            " give integrator='rk4' and its step_s; simulate takes any method"
         )
     if params is not None and not (isinstance(params, Mapping) and all(isinstance(name, str) for name in params)):
         raise QueryError(f"params must give values by name, such as {{'kp': …}}, got {shown(params)}")

@@ -14,6 +14,7 @@ from typing import Any
 from robot_dyn.compiled.cache import default_store
 from robot_dyn.compiled.overload import compiled
 from robot_dyn.compiled.primitives import machine_code, plain
+from robot_dyn.integrate import rosenbrock
 from robot_dyn.simulation import time_loop
 
 plain(
@@ -22,6 +23,9 @@ plain(
         for name in ("act", "share", "sample", "take", "conserve", "end", "erase_ended", "erase", "show")
     )
 )
+
+
+plain(rosenbrock.start, rosenbrock.stages)
 
 
 @cache
