@@ -177,6 +177,7 @@ def test_elimination_solves_each_system() -> None:
 
 @pytest.mark.parametrize("runs", [1, 3, 64])
 def test_elimination_in_machine_code_gives_equal_bits(runs: int) -> None:
+    import robot_dyn.compiled.elimination  # noqa: F401
     from robot_dyn.compiled.primitives import machine_code
 
     def both(A: Any, J: Any, scale: Any, rows: Any, lost: Any, x: Any) -> int:

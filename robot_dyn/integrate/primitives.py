@@ -54,47 +54,6 @@ def sizes(x: Array, out: Array) -> None:
     out[...] = np.abs(x).sum(axis=0)
 
 
-def factor(A: Array, J: Array, scale: Any, rows: Array, lost: Array) -> None:
-    """L U = P (1 − scale J) for W matrices, by elimination with the largest entry of each column as pivot.
-
-    [Golub and Van Loan, Matrix Computations, 4th ed., 2013, alg. 3.4.1]
-
-    Args:
-        A: Where the factors go, by column: A[j, i] is row i of column j, (m, m, W).
-        J: Matrices by column, and what may follow them, (m, m, W) or more.
-        scale: Number.
-        rows: Where the row goes that each one is exchanged with, (m, W).
-        lost: 1 where a pivot is 0, (W,); else 0.
-    """
-    m, runs = len(A), np.arange(A.shape[2])
-    np.multiply(J[:m], -scale, A)
-    A[np.arange(m), np.arange(m)] += 1
-    lost[...] = 0
-    for k in range(m):
-        rows[k] = k + np.abs(A[k, k:]).argmax(axis=0)
-        top = A[:, k].copy()
-        A[:, k] = A[:, rows[k], runs]
-        A[:, rows[k], runs] = top
-        none = A[k, k] == 0
-        lost[none], A[k, k, none] = 1, 1
-        A[k, k + 1 :] /= A[k, k]
-        A[k + 1 :, k + 1 :] -= A[k, k + 1 :] * A[k + 1 :, k, None]
-
-
-def solve(A: Array, rows: Array, x: Array) -> None:
-    """A⁻¹ x in place of x, (m, W), by the factors of `factor`."""
-    m, runs = len(A), np.arange(A.shape[2])
-    for k in range(m):
-        top = x[k].copy()
-        x[k] = x[rows[k], runs]
-        x[rows[k], runs] = top
-    for k in range(m):
-        x[k + 1 :] -= A[k, k + 1 :] * x[k]
-    for k in range(m - 1, -1, -1):
-        x[k] /= A[k, k]
-        x[:k] -= A[k, :k] * x[k]
-
-
 def settle(Z: Array, new: Array, y: Array, least: Array, stale: Array, state: Array, epsilon: Any) -> int:
     """Take the next iterate of a fixed-point iteration for the runs that are going; how many go on.
 
@@ -135,3 +94,44 @@ def _exact(x: Array) -> Array:
 
 def _middle(x: Array) -> Array:
     return x if x.dtype != object else midpoint(x)
+
+
+def factor(A: Array, J: Array, scale: Any, rows: Array, lost: Array) -> None:
+    """L U = P (1 − scale J) for W matrices, by elimination with the largest entry of each column as pivot.
+
+    [Golub and Van Loan, Matrix Computations, 4th ed., 2013, alg. 3.4.1]
+
+    Args:
+        A: Where the factors go, by column: A[j, i] is row i of column j, (m, m, W).
+        J: Matrices by column, and what may follow them, (m, m, W) or more.
+        scale: Number.
+        rows: Where the row goes that each one is exchanged with, (m, W).
+        lost: 1 where a pivot is 0, (W,); else 0.
+    """
+    m, runs = len(A), np.arange(A.shape[2])
+    np.multiply(J[:m], -scale, A)
+    A[np.arange(m), np.arange(m)] += 1
+    lost[...] = 0
+    for k in range(m):
+        rows[k] = k + np.abs(A[k, k:]).argmax(axis=0)
+        top = A[:, k].copy()
+        A[:, k] = A[:, rows[k], runs]
+        A[:, rows[k], runs] = top
+        none = A[k, k] == 0
+        lost[none], A[k, k, none] = 1, 1
+        A[k, k + 1 :] /= A[k, k]
+        A[k + 1 :, k + 1 :] -= A[k, k + 1 :] * A[k + 1 :, k, None]
+
+
+def solve(A: Array, rows: Array, x: Array) -> None:
+    """A⁻¹ x in place of x, (m, W), by the factors of `factor`."""
+    m, runs = len(A), np.arange(A.shape[2])
+    for k in range(m):
+        top = x[k].copy()
+        x[k] = x[rows[k], runs]
+        x[rows[k], runs] = top
+    for k in range(m):
+        x[k + 1 :] -= A[k, k + 1 :] * x[k]
+    for k in range(m - 1, -1, -1):
+        x[k] /= A[k, k]
+        x[:k] -= A[k, :k] * x[k]

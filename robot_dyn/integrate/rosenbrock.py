@@ -115,7 +115,7 @@ def stages(
         if i > 0:
             combination(after, y, table.one, table.a[i], U, i)
             evaluate(f.rate, t + table.alpha[i] * h, after, p, own, K[2])
-        combination(work.known, work.zero, h_gamma, table.f[i], K, 3)
+        combination(work.known, work.zero, h_gamma, table.f[i], K, 3 if i > 0 else 2)
         combination(U[i], work.known, table.gamma, table.c[i], U, i)
         solve(work.A, work.rows, U[i])
     combination(after, y, table.one, table.m, U, len(table.m))

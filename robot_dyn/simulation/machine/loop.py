@@ -11,6 +11,7 @@ from functools import cache
 from inspect import getsource
 from typing import Any
 
+from robot_dyn.compiled import elimination as elimination  # a step of a stiff method calls it
 from robot_dyn.compiled.cache import default_store
 from robot_dyn.compiled.overload import compiled
 from robot_dyn.compiled.primitives import machine_code, plain
