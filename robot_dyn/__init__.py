@@ -61,6 +61,7 @@ if TYPE_CHECKING:
     from robot_dyn.model.loading import load as load
     from robot_dyn.model.robot import Robot as Robot
     from robot_dyn.scene.scene import read_scene as read_scene
+    from robot_dyn.simulation.event import Event as Event
     from robot_dyn.simulation.linearise import linearise as linearise
     from robot_dyn.simulation.rollout import rollouts as rollouts
     from robot_dyn.simulation.rollout_result import Rollouts as Rollouts
@@ -92,6 +93,7 @@ _HOME = {
     "Dissipative": "effects.effect",
     "Dynamics": "model.dynamics",
     "EffortLimit": "effects.actuator",
+    "Event": "simulation.event",
     "ExternalWrench": "effects.wrench",
     "FeedForward": "control.computed_torque",
     "JointStopDamper": "effects.joint_limit",

@@ -307,7 +307,7 @@ def test_an_interrupt_in_a_companion_run_ends_the_estimate_and_keeps_the_run(met
         return interrupted
 
     monkeypatch.setattr(FixedStep, "_loop", on_second(FixedStep._loop))
-    monkeypatch.setattr(ErrorControlled, "_segment", on_second(ErrorControlled._segment))
+    monkeypatch.setattr(ErrorControlled, "_loop", on_second(ErrorControlled._loop))
     run = rd.simulate(rd.Plant(DOUBLE), **START, duration_s=0.2, integrator=method, engine="interpreted")
     assert len(ran) == 2
     assert (run.outcome.ending, run.outcome.t) == ("stopped", 0.2)

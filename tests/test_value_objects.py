@@ -19,6 +19,10 @@ PLAN = rd.quintic(Q, Q + 1, 1.0)
 LINE = rd.line([0.1, 0.2, 0.3], [0.4, 0.2, 0.1], 1.0, rotation=np.eye(3))
 
 
+def height(t: float, q: np.ndarray, v: np.ndarray) -> float:
+    return q[0]
+
+
 def values() -> dict[str, Any]:
     """One of each public class, by its name, and of the values that they hold."""
     plant = rd.Plant(ARM, [rd.ViscousFriction([0.1, 0.2])])
@@ -28,6 +32,7 @@ def values() -> dict[str, Any]:
     spring, damper = rd.joint_stops([-1.0, -1.0], [1.0, 1.0])
     strut = rd.LineSpringDamper("tip", None, stiffness=9.0, damping=1.0, length=0.3)
     made = [
+        rd.Event(height),
         rd.Adaptive(), rd.Ball(100), rd.compare(ARM, samples=2), rd.Payload("tip", 1.0), ARM, rd.Lagrangian(ARM), plant,
         rd.PD(PLAN, [1.0, 2.0], 1.0), rd.PID(PLAN, 1.0, 1.0, 1.0), rd.PDGravity(ARM, PLAN, 1.0, 1.0),
         rd.FeedForward(ARM, PLAN, 1.0, 1.0), rd.ComputedTorque(ARM, PLAN, 1.0, 1.0),

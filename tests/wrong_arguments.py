@@ -35,7 +35,7 @@ FOR_LOOPS |= {"task_acceleration"}
 LAX = {  # arguments that may be infinite or unknown, or of any shape
     "ExternalWrench.acts": {"t"},
     "Adaptive": {"max_step_s"}, "Adaptive.with_tolerances": {"longest_s"},
-    "EffortLimit": {"limit"}, "ExternalWrench": {"start_s", "end_s"},
+    "EffortLimit": {"limit"}, "Event": {"direction"}, "ExternalWrench": {"start_s", "end_s"},
     "JointStopDamper": {"lower", "upper"}, "JointStopSpring": {"lower", "upper"}, "PID": {"effort_limit"},
     "PiecewisePolynomial.at": {"t"}, "Samples.at": {"t"},
     "Rollouts.outcome": {"run"}, "Robot.with_": {"lock", "armature"},
@@ -108,6 +108,7 @@ def examples(folder: Path) -> dict[str, Example]:
         "Compiled": (rd.Compiled, {"robot_or_plant": robot, "dtype": "float64", "threads": 1, "cache": False}),
         "ComputedTorque": (rd.ComputedTorque, pair),
         "EffortLimit": (rd.EffortLimit, {"limit": [1.0, 2.0]}),
+        "Event": (rd.Event, {"function": lambda t, q, v: 1.0, "direction": 1, "terminal": True, "name": "high"}),
         "ExternalWrench": (
             rd.ExternalWrench,
             linked | {"wrench": [1.0, 2.0, 3.0, 0.1, 0.2, 0.3], "start_s": 0.1, "end_s": 0.2},

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import re
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import replace
 from math import inf
 from typing import Any, ClassVar
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.coefficients import check_coefficients, declared
+from robot_dyn.effects.threshold import Threshold
 from robot_dyn.errors import EffectError
 from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.values import Value
@@ -71,6 +73,17 @@ class Effect(Value):
     def switches(self) -> tuple[float, ...]:
         """Times in [s] at which it starts or stops: a step of integration ends there."""
         return ()
+
+    def thresholds(self, n: int) -> tuple[Threshold, ...]:
+        """Where it switches from one smooth formula to another, on an arm of n joints.
+
+        A step of integration ends where one is passed; `beyond` says what the effect is on either side.
+        """
+        return ()
+
+    def beyond(self, n: int, sides: Mapping[Threshold, int]) -> Effect:
+        """The effect as it is with each threshold passed (1) or not (−1), a smooth function wherever q and v are."""
+        return self
 
     @property
     def widths(self) -> tuple[Any, Any]:

@@ -6,6 +6,7 @@ overrun by about v √(M/k); rigid ones are set-valued and no part of these.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import inf
 from typing import Any, final
@@ -13,11 +14,13 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.arithmetic import Array, positive_part
-from robot_dyn.coefficients import coefficient
+from robot_dyn.coefficients import coefficient, with_values
 from robot_dyn.effects.effect import Conservative, Dissipative
+from robot_dyn.effects.threshold import Threshold
 from robot_dyn.errors import EffectError
 from robot_dyn.model.dynamics import Dynamics
 
+_NOWHERE = 1e9  # a stop that does not exist: no depth can be reached there
 _NAME = "joint_stops"  # of both parts, as of the function that makes them
 _LOWER = coefficient("rad", symbol="Lower stop", infinite=True, elsewhere=-inf, stated="lower")
 _UPPER = coefficient("rad", symbol="Upper stop", infinite=True, elsewhere=inf, stated="upper")
@@ -51,6 +54,12 @@ class JointStopSpring(Conservative):
     @property
     def widths(self) -> tuple[Any, Any]:
         return _depth(self.stiffness), inf
+
+    def thresholds(self, n: int) -> tuple[Threshold, ...]:
+        return _thresholds(self, self.stiffness, n)
+
+    def beyond(self, n: int, sides: Mapping[Threshold, int]) -> JointStopSpring:
+        return with_values(self, _levels(self, n, sides))
 
     def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
         return self.stiffness * (positive_part(self.lower - q) - positive_part(q - self.upper))
@@ -89,6 +98,12 @@ class JointStopDamper(Dissipative):
     def widths(self) -> tuple[Any, Any]:
         return _depth(self.damping), inf
 
+    def thresholds(self, n: int) -> tuple[Threshold, ...]:
+        return _thresholds(self, self.damping, n)
+
+    def beyond(self, n: int, sides: Mapping[Threshold, int]) -> JointStopDamper:
+        return with_values(self, _levels(self, n, sides))
+
     def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
         return -self.damping * (positive_part(self.lower - q) + positive_part(q - self.upper)) * v
 
@@ -106,13 +121,34 @@ def _depth(coefficient: Any) -> Any:
         return np.divide(1.0, coefficient)
 
 
+def _thresholds(stops: Any, coefficient: Any, n: int) -> tuple[Threshold, ...]:
+    acts = np.broadcast_to(coefficient, n) > 0
+    return tuple(
+        Threshold(i, float(level), name)
+        for name, levels in (("lower stop", stops.lower), ("upper stop", stops.upper))
+        for i, level in enumerate(np.broadcast_to(levels, n))
+        if abs(level) < _NOWHERE and acts[i]
+    )
+
+
+def _levels(stops: Any, n: int, sides: Mapping[Threshold, int]) -> dict[str, np.ndarray]:
+    """A stop that is not touched lies nowhere; of one that is, the depth goes on to both sides, as of a spring."""
+    lower, upper = np.broadcast_to(stops.lower, n).copy(), np.broadcast_to(stops.upper, n).copy()
+    for joint in {each.joint for each in sides}:
+        lower[joint], upper[joint] = -_NOWHERE, _NOWHERE
+    for each, side in sides.items():
+        if side == (1 if each.name == "upper stop" else -1):
+            lower[each.joint] = upper[each.joint] = each.level
+    return {"lower": lower, "upper": upper}
+
+
 def _check_stops(stops: Any) -> None:
     for name in ("lower", "upper"):
         stop = getattr(stops, name)
         if not isinstance(stop, np.ndarray):
             return  # by name, or as the file states: checked when the joints are known
         # A stop that does not exist lies where no depth can be reached, and inf − inf is avoided.
-        stop = np.clip(stop, -1e9, 1e9)
+        stop = np.clip(stop, -_NOWHERE, _NOWHERE)
         stop.setflags(write=False)
         object.__setattr__(stops, name, stop)
     if np.ndim(stops.lower) == np.ndim(stops.upper) == 1 and len(stops.lower) != len(stops.upper):

@@ -6,10 +6,11 @@ II, 2nd ed., 1996, IV.8]
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from math import inf
+from types import MappingProxyType
 from typing import Any, ClassVar, cast, final
 
 import numpy as np
@@ -18,7 +19,9 @@ from robot_dyn import former
 from robot_dyn.arithmetic import Array
 from robot_dyn.errors import OverflowedError, QueryError, RobotDynError
 from robot_dyn.foreign import is_mistake
+from robot_dyn.integrate import dop853
 from robot_dyn.integrate.integrator import System
+from robot_dyn.integrate.step_control import ControlledStepper
 from robot_dyn.validate import choice, function, instance, number, numbers, rows
 
 ADAPTIVE = ("DOP853", "Radau")
@@ -98,10 +101,14 @@ class Adaptive:
     atol: float = 1e-12
     max_step_s: float = inf
     canonical: ClassVar[bool] = False
-    plain: ClassVar[bool] = False
     controls_error: ClassVar[bool] = True
     needs_jacobian: ClassVar[bool] = False
     evaluations_per_step: ClassVar[int | None] = None
+
+    @property
+    def plain(self) -> bool:
+        """Whether its steps are plain functions."""
+        return self.method in STEPPERS
 
     @property
     def name(self) -> str:
@@ -271,6 +278,10 @@ class Steps:
         ends = {t0: stop(t0, self.y), t1: -stop(t0, self.y)}
         t = float(root(lambda t: ends.get(t) or stop(t, piece(t)), t0, t1, xtol=4e-16 * max(1, abs(t1))))
         return t if t != t0 else float(np.nextafter(t0, t1))  # times ascend
+
+
+# The methods of our own, ready for a loop: (entries of the state, rows of the rate, entries whose error counts).
+STEPPERS: Mapping[str, Callable[[int, int, int], ControlledStepper]] = MappingProxyType({"DOP853": dop853.stepper})
 
 
 def _initial_state(y0: Array) -> np.ndarray:

@@ -54,6 +54,26 @@ def sizes(x: Array, out: Array) -> None:
     out[...] = np.abs(x).sum(axis=0)
 
 
+def subtract(x: Array, y: Array) -> None:
+    """X − y in place of x, of one shape."""
+    x[...] = x - y
+
+
+def norm(x: Array, y: Array, after: Array, rtol: float, atol: float) -> float:
+    """√ of the mean of (x / (atol + rtol max(|y|, |y⁺|)))², of arrays (m, 1); inf if x is not finite."""
+    ratio = x / (atol + rtol * np.maximum(np.abs(y), np.abs(after)))
+    total = float(np.add.accumulate(ratio.ravel() ** 2)[-1]) / ratio.size  # in the order of machine code
+    return float(np.sqrt(total)) if total < np.inf else np.inf
+
+
+def between(y: Array, F: Array, theta: float, out: Array) -> None:
+    """Y(t + θ h) = y + θ (F₀ + (1 − θ) (F₁ + θ (F₂ + …))), of the polynomial F (d, m, W) of a step."""
+    x = np.zeros_like(y)
+    for i in range(len(F) - 1, -1, -1):
+        x = (x + F[i]) * (theta if i % 2 == 0 else 1 - theta)
+    out[...] = y + x
+
+
 def settle(Z: Array, new: Array, y: Array, least: Array, stale: Array, state: Array, epsilon: Any) -> int:
     """Take the next iterate of a fixed-point iteration for the runs that are going; how many go on.
 

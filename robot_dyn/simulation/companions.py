@@ -83,6 +83,19 @@ class Estimated:
         seen = ((ratio > 2) & (ratio < 100) | (bound <= self.floor)) & (tight is not None)
         return self._judged(np.where(self._smooth(seen), near, bound), bound, seen)
 
+    def from_refinement(self, finer: Path, loose: Path | None) -> ErrorEstimate:
+        """The estimate of a method that chooses its steps.
+
+        Args:
+            finer: The companion of a tenth of the tolerance, which errs some eight times less, or of halved steps.
+            loose: That of ten times the tolerance where something may switch unseen: a quarter of its difference bounds
+                the error with that of the finer one.
+        """
+        near = differences(self.path, finer, self.n)
+        bound = near if loose is None else np.fmax(near, differences(self.path, loose, self.n) / 4)
+        seen = np.ones(len(near), bool)
+        return self._judged(np.where(self._smooth(seen), near, bound), bound, seen)
+
     def lost_at(self, companion: Path) -> float:
         """Time in [s] at which a companion differs from the run as much as the motion itself; inf if it does not."""
         gap = differences(self.path, companion, self.n)

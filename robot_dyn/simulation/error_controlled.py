@@ -1,48 +1,52 @@
-"""A run by a method that chooses its steps: the samples lie between their ends, by the method's own interpolation."""
+"""A run by a method that chooses its steps, followed by Python: the loop comes back for progress, Ctrl-C and events.
+
+At an event the effects change their mode: what they are on the other side of a switch stands in their coefficients, so
+that within a step the right-hand side is smooth.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from fractions import Fraction
-from math import ceil
-from typing import cast, final
+from math import inf
+from time import perf_counter
+from typing import Any, cast, final
 
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.errors import RobotDynError
-from robot_dyn.integrate.adaptive import Adaptive, Status
-from robot_dyn.integrate.integrator import System
-from robot_dyn.integrate.primitives import evaluate
+from robot_dyn.errors import OverflowedError, RobotDynError
+from robot_dyn.foreign import is_mistake
+from robot_dyn.integrate.adaptive import STEPPERS, Adaptive
+from robot_dyn.integrate.step_control import control_of
+from robot_dyn.simulation.controlled_loop import Kept, Times, controlled_loop
+from robot_dyn.simulation.event import Occurrence
+from robot_dyn.simulation.fixed_step import runs_of
 from robot_dyn.simulation.observer import Observer
 from robot_dyn.simulation.plan import plan_of
 from robot_dyn.simulation.record import MOST_SHARED, Path, Record
 from robot_dyn.simulation.setup import Setup
+from robot_dyn.simulation.size import samples as most_samples
 from robot_dyn.simulation.state_equation import StateEquation
-from robot_dyn.simulation.state_functions import system
-from robot_dyn.simulation.time_loop import Functions
+from robot_dyn.simulation.switching import Switching
+from robot_dyn.simulation.time_loop import Ended, Functions, Now, Rules
 from robot_dyn.simulation.trajectory import Ending, Outcome
 from robot_dyn.simulation.watch import DivergedError, Watch
 
-_NONE = np.zeros(0)
-_RUNAWAY = 1e6  # [rad/s] or [m/s]: such a method would follow an exploding state without end
 _SAMPLES = 1000  # of a run without a record period
 _COMPARED = 1000  # times at which a run is compared with runs of other tolerances
-_PEAKS = 200  # states at which the kinetic energy of a run is looked at
-_LOCAL_ORDER = 8  # of DOP853: its steps grow as this root of the tolerance
+_PAUSE_S, _FIRST = 0.1, 200  # between looks at the keyboard; steps before the speed is known
+_CHUNK = 1024  # ends of steps for which there is room at first
+
+Advance = Callable[..., int]
+Made = Callable[[StateEquation], tuple[Functions, np.ndarray]]
 
 
-@final
-@dataclass
-class _Samples:
-    """What a run leaves behind, sample by sample."""
+class TerminalEvent(Exception):  # noqa: N818
+    """Internal: an event that ends the run, at `t`."""
 
-    place: list[float] = field(default_factory=list)
-    y: list[Array] = field(default_factory=list)
-    made: list[Array] = field(default_factory=list)
-    shared: list[tuple[int, float, Array]] = field(default_factory=list)
-    walked: list[tuple[int, float, Array]] = field(default_factory=list)
+    def __init__(self, t: float, name: str) -> None:
+        super().__init__(name)
+        self.t = t
 
 
 @final
@@ -52,161 +56,219 @@ class ErrorControlled:
     Args:
         setup: What to run.
         equation: Its state equation.
-        functions: The same, in Python.
-        pace: Factor of the tolerances; 1 keeps samples.
-        on_progress: Called with the time reached at each step.
+        made: Gives the functions of a state equation, for the loop, and their parameters (P,).
+        mesh: Where steps end, (k,); None for error control.
+        samples: Whether samples are kept.
+        machine_code: The loop of the method as machine code; then the functions are, too.
+        on_progress: Called with the time reached, at each step or some ten times a second.
         observer: Sees each step.
-        parameters: Of the functions, (P,).
+        in_python: The functions as Python calls them, where they are machine code.
     """
 
     def __init__(
-        self, setup: Setup, equation: StateEquation, functions: Functions, pace: Fraction,
+        self, setup: Setup, equation: StateEquation, made: Made, mesh: np.ndarray | None,
+        machine_code: Advance | None = None,
         on_progress: Callable[[float], object] | None = None, observer: Observer | None = None,
-        parameters: Array = _NONE,
+        in_python: Functions | None = None, samples: bool = True,
     ) -> None:  # fmt: skip
-        self.setup, self.equation, self.functions, self.pace = setup, equation, functions, pace
-        self.on_progress, self.observer = on_progress, observer
+        self.in_python = in_python
+        self.setup, self.equation, self.made, self.samples = setup, equation, made, samples
+        self.on_progress, self.observer, self.compiled = on_progress, observer, machine_code is not None
         self.watch, self.plan = Watch(setup, equation), plan_of(setup)
-        self.t, self.y = 0.0, equation.start(setup.q0, setup.v0)
-        self.held = equation.plant.dynamics.n if equation.sampled else 0
-        self.own = np.concatenate([np.full(self.held, np.nan), parameters])[:, None]
-        self.key = self.steps = self.evaluations = 0
-        self.due = 0.0  # time of the next sample
-        self.samples = _Samples()
+        method, n, m = cast(Adaptive, setup.integrator), equation.plant.dynamics.n, equation.size
+        held = n if equation.sampled else 0
+        self.start = equation.start(setup.q0, setup.v0)
+        self.stepper, self.switching = STEPPERS[method.method](m, m + n, m - len(equation.sources)), Switching(equation)
+        self.functions, parameters = made(equation)
+        own = np.concatenate([np.full(held, np.nan), parameters])[:, None]
+        self.runs = runs_of(self.start[:, None], own, n, held, equation.state_size, m + n + 2)
+        self.runs.energy[0], self.runs.scale[0] = self.watch.energy, self.watch.scale
+        of = self.stepper
+        self.advance = machine_code or controlled_loop(of.begin, of.step, of.error, of.accept, of.dense)
+        self.rules = Rules(n, len(equation.sources), equation.state_size, held, False, True, inf, 0, 1, 0)
+        self.control = self._control(method)
+        record = setup.record_period_s or setup.duration_s / _SAMPLES
+        compared = setup.duration_s / _COMPARED if setup.estimate_error else inf
+        self.times = Times(
+            np.zeros(1),
+            record if samples else inf,
+            compared,
+            not setup.record_period_s,
+            setup.duration_s,
+            np.zeros(0) if mesh is None else mesh,
+        )
+        S, rows = len(self.plan.counts), int(most_samples(setup)) + 2 if samples else 0
+        states = 0 if compared == inf else _COMPARED + S + 2
+        columns = np.empty((2 + 3 * n, 0)) if observer is None else observer.columns
+        self.kept = Kept(
+            np.empty(rows), np.empty((rows, m, 1)), np.empty((rows, m + n + 2, 1)), np.empty(states),
+            np.empty((states, m)), np.empty(_CHUNK), np.empty((_CHUNK, m)), columns,
+        )  # fmt: skip
+        events = self.functions.events if self.compiled else self.switching.function
+        self.switches = self.switching.at(self.start, len(of.work.F), events)
+        self.events: list[Occurrence] = []
+        self._change_mode()
+        self.now, self.stop = np.zeros(len(Now), np.int64), np.zeros(1, np.int64)
+
+    def _control(self, method: Adaptive) -> np.ndarray:
+        """The choice of steps before the first, with the tolerances of this run."""
+        longest = min(method.max_step_s, self.setup.longest_step_s)
+        return control_of(self.stepper, method.rtol, method.atol, longest)
+
+    @property
+    def time(self) -> float:
+        """The time reached, in [s]."""
+        return float(self.times.reached[0])
+
+    @property
+    def y(self) -> np.ndarray:
+        """The state reached."""
+        return self.runs.y[:, 0].copy()
 
     def record(self) -> Record:
         """Run to the end, however the run ends."""
         try:
             with np.errstate(all="ignore"):  # what overflows ends the run
-                for s in range(len(self.plan.counts) - 1):
-                    self._segment(s)
-                self._end()
-            outcome = Outcome(Ending.FINISHED, self.t)
+                self._loop()
+            outcome = Outcome(Ending.FINISHED, self.setup.duration_s)
+        except TerminalEvent as end:
+            outcome = Outcome(Ending.FINISHED, end.t, f"ended by the event {str(end)!r}")
+            self._keep_end(end.t)
         except DivergedError as end:
             outcome = Outcome(Ending.DIVERGED, end.t, str(end))
         except KeyboardInterrupt:
-            outcome = Outcome(Ending.STOPPED, self.t, "interrupted; all samples up to here are kept")
-        if self.pace == 1 and not self.samples.place:  # interrupted, or without a tick, at once
-            self._keep(0.0, self.y, self.plan.parameters[0])
+            outcome = Outcome(Ending.STOPPED, self.time, "interrupted; all samples up to here are kept")
         return self._record(outcome)
 
-    def _segment(self, s: int) -> None:
-        start, end, p = float(self.plan.starts[s]), float(self.plan.starts[s + 1]), self.plan.parameters[s]
-        self._tick(s)
-        right_side = system(
-            self.functions, self.equation, p, self.own, self.observer and self.observer.seen,
-            exact=self.setup.integrator.needs_jacobian,
-        )  # fmt: skip
-        steps = self._method(end - start).steps(self._counted(right_side), start, self.y, end, stop=self._sane)
-        self._keep(start, self.y, p)
-        self._share(start, self.y)
-        period, compared = (
-            self.setup.record_period_s or self.setup.duration_s / _SAMPLES,
-            self.setup.duration_s / _COMPARED,
-        )
-        due, last = ceil(start / period + 1e-9), ceil(end / period - 1e-9)  # multiples of the period inside
-        met = ceil(start / compared + 1e-9)
-        ticked = bool(self.plan.ticks[s])
-        for t, y, piece in steps:
-            self.steps += 1
-            self._observe(t, y, ticked)
-            ticked = False
-            while due < last and due * period <= t:
-                self._keep(due * period, piece(due * period), p)
-                due += 1
-            while met * compared < min(t, end):
-                self._share(met * compared, piece(met * compared))
-                met += 1
-            if len(self.samples.walked) < MOST_SHARED:
-                self.samples.walked.append((-1, t, y))
-            self.t, self.y = t, y
-            if self.on_progress is not None:
-                self.on_progress(t)
-            self.watch.pace(t, self.steps)
-        if steps.status is Status.FAILED:
-            raise DivergedError(steps.t, steps.message)
-        if steps.status is Status.STOPPED:
-            raise DivergedError(steps.t, f"a joint moves faster than {_RUNAWAY:g} rad/s: the control is unstable")
+    def _loop(self) -> None:
+        budget, told = _FIRST if self.compiled else 1, -1.0
+        while True:
+            if self.on_progress is not None and self.time > told:
+                told = self.time
+                self.on_progress(told)
+            began = perf_counter()
+            ended = self._go(budget)
+            if ended is Ended.DONE:
+                break
+            self._judge(ended)
+            if ended is Ended.PAUSED and self.compiled:
+                spent = perf_counter() - began
+                budget = int(np.clip(budget * _PAUSE_S / max(spent, 1e-9), _FIRST // 10, 100 * budget))
+        if self.on_progress is not None and self.time > told:
+            self.on_progress(self.time)
 
-    def _end(self) -> None:
-        self._tick(len(self.plan.counts) - 1)
-        self.t = self.setup.duration_s
-        self._keep(self.t, self.y, self.plan.parameters[-1])
-        self._share(self.t, self.y)
-        if self.on_progress is not None:
-            self.on_progress(self.t)
+    def _go(self, budget: int) -> Ended:
+        """So many steps, or fewer, with a rest whenever there is no room for what is shown and kept."""
+        observer = self.observer
+        while True:
+            self._widen()
+            rest = len(self.kept.walked_t) - int(self.now[Now.WALKED]) or budget
+            self.now[Now.BUDGET] = steps = min(budget, rest, budget if observer is None else observer.room)
+            if observer is not None:
+                self.now[Now.COLUMN] = observer.filled
+            ended = self._advance()
+            if observer is not None:
+                observer.filled = int(self.now[Now.COLUMN])
+                observer.look()
+            budget -= steps
+            if ended is not Ended.PAUSED or budget <= 0:
+                return ended
 
-    def _tick(self, s: int) -> None:
-        if self.plan.ticks[s]:
-            self.y, held = self.watch.tick(float(self.plan.starts[s]), self.y)
-            self.own[: self.held, 0] = held
+    def _widen(self) -> None:
+        """Room for as many more ends of steps, where it is used up."""
+        kept, rows = self.kept, len(self.kept.walked_t)
+        if self.now[Now.WALKED] == rows:
+            states = max(len(kept.walked), min(2 * rows, MOST_SHARED))
+            wider = np.empty(2 * rows), np.empty((states, self.equation.size))
+            wider[0][:rows], wider[1][: len(kept.walked)] = kept.walked_t, kept.walked
+            self.kept = kept._replace(walked_t=wider[0], walked=wider[1])
 
-    def _method(self, length: float) -> Adaptive:
-        """The method with the tolerances of this run, on a segment."""
-        method, factor = cast(Adaptive, self.setup.integrator), float(self.pace)
-        longest = min(method.max_step_s, self.setup.longest_step_s)
-        if factor < 1:  # where the ends of segments bound the steps, a tolerance by itself changes nothing
-            longest = min(longest, length)
-        longest *= factor ** (1 / _LOCAL_ORDER)
-        return method.with_tolerances(factor, longest)
+    def _advance(self) -> Ended:
+        arguments = self.functions, self.plan, self.runs, self.kept, self.times, self.rules
+        made = self.stepper.coefficients, self.stepper.work, self.switches
+        try:
+            return Ended(self.advance(*arguments, *made, self.now, self.control, self.stop))
+        except RobotDynError as error:
+            if is_mistake(error):
+                raise
+            raise DivergedError(self.time, f"{error}, at t = {self.time}") from None
 
-    def _counted(self, right_side: System) -> System:
-        def rate(t: float, y: Array) -> Array:
-            self.evaluations += 1
-            return right_side.rate(t, y)
+    def _judge(self, ended: Ended) -> None:
+        """What the loop came back for; DivergedError ends the run."""
+        t, y = self.time, self.y
+        self.watch.pace(t, int(self.now[Now.STEPS]))
+        where = f"at t = {t}, max |y| = {np.abs(y).max():.3g}: y grows without bound, or tolerances are too tight"
+        if ended is Ended.EVENT:
+            self._event(t, y)
+        elif ended is Ended.TICK:
+            s = int(self.now[Now.SEGMENT])
+            y, held = self.watch.tick(float(self.plan.starts[s]), y)
+            self.runs.y[:, 0], self.runs.own[: self.rules.held, 0] = y, held
+            self.plan.ticks[s] = 0
+        elif ended is Ended.GAINS:
+            self.watch.look(t, y)
+        elif ended is Ended.TOO_SMALL:
+            raise DivergedError(t, f"the step became smaller than the spacing of floats {where}")
+        elif ended is Ended.NOT_FINITE:
+            raise DivergedError(t, f"the rate is not finite {where}")
+        elif ended is Ended.FAST:
+            raise DivergedError(t, "a joint moves faster than 1e+06 rad/s: the control is unstable")
 
-        return replace(right_side, rate=rate)
+    def _keep_end(self, t: float) -> None:
+        """A sample where an event ends the run."""
+        row, s = int(self.now[Now.ROW]), int(self.now[Now.SEGMENT])
+        if self.samples and not (row and self.kept.t[row - 1] == t):
+            functions = self.in_python or self.functions
+            self.kept.t[row], self.kept.y[row] = t, self.runs.y
+            functions.sample(t, self.runs.y, self.plan.parameters[s], self.runs.own, self.kept.made[row])
+            self.now[Now.ROW] += 1
 
-    def _sane(self, _: float, y: Array) -> float:
-        n = self.equation.plant.dynamics.n
-        return 1.0 if np.abs(y[n : 2 * n]).max() < _RUNAWAY else -1.0
+    def _change_mode(self) -> None:
+        """Let the functions be those of the sides that the switching functions are on."""
+        if self.switching.thresholds:
+            self.functions, parameters = self.made(self.switching.on(self.switches.sides))
+            self.runs.own[self.rules.held :, 0] = parameters
+        if not self.compiled:
+            self.functions = _ready(self.functions)
 
-    def _keep(self, t: float, y: Array, p: Array) -> None:
-        if self.pace == 1 and (t >= self.due - 1e-9 * self.setup.step_s or t == self.setup.duration_s):
-            self.due += self.setup.record_period_s
-            made = np.empty((self.equation.size + self.equation.plant.dynamics.n + 2, 1))
-            evaluate(self.functions.sample, t, np.ascontiguousarray(y)[:, None], p, self.own, made)
-            self.samples.place.append(t)
-            self.samples.y.append(y)
-            self.samples.made.append(made[:, 0])
-
-    def _share(self, t: float, y: Array) -> None:
-        self.samples.shared.append((self.key, t, y))
-        self.key += 1
-
-    def _observe(self, t: float, y: Array, ticked: bool) -> None:
-        """Show a step; the actuation of continuous control is that at its end."""
-        if self.observer is None:
+    def _event(self, t: float, y: np.ndarray) -> None:
+        """Keep an event, and go on behind it; TerminalEvent ends the run."""
+        index, E = int(self.now[Now.EVENT]), len(self.switching.thresholds)
+        side = float(self.switches.sides[index])
+        if index < E:
+            self.events.append(self.switching.occurrence(index, t, y, side))
+            self._change_mode()
             return
-        if not self.equation.sampled:
-            try:
-                q, v, z, _ = self.equation.state(y)
-                self.observer.seen[len(q) :] = self.equation.command(t, q, v, z)
-            except RobotDynError:  # y may be far off where a run fails
-                return
-        self.observer.step(t, y, self.own[: self.held, 0] if self.equation.sampled else None, ticked)
+        event = self.setup.events[index - E]
+        if event.direction in (0, int(side)):
+            self.events.append(self.switching.occurrence(index, t, y, side))
+            if event.terminal:
+                raise TerminalEvent(t, event.name)
 
     def _record(self, outcome: Outcome) -> Record:
-        kept, m = self.samples, self.equation.size
-        walked = sorted([*kept.walked, *kept.shared], key=lambda each: each[1])
-        made = np.array(kept.made).reshape(len(kept.made), m + self.equation.plant.dynamics.n + 2)
+        kept = self.kept
+        rows, shared, walked = (int(self.now[i]) for i in (Now.ROW, Now.SHARED, Now.WALKED))
+        if self.samples and not rows:  # interrupted, or without a tick, at once
+            kept.t[0], kept.y[0, :, 0], kept.made[0], rows = 0.0, self.start, np.nan, 1
+        common = Path(np.arange(shared), kept.shared_t[:shared], kept.shared[:shared])
+        ends = kept.walked_t[:walked]
+        states = np.vstack([self.start, kept.walked[: min(walked, len(kept.walked))]])
+        path = Path(np.full(len(states), -1), np.append(0.0, ends)[: len(states)], states)
         return Record(
-            outcome, np.array(kept.place), np.array(kept.y).reshape(-1, m), made, _path(kept.shared, m),
-            _path(walked, m), self.steps, self.evaluations, self._kinetic_peak(walked),
+            outcome, kept.t[:rows], kept.y[:rows, :, 0], kept.made[:rows, :, 0], common, path,
+            int(self.now[Now.STEPS]), int(self.now[Now.EVALUATIONS]), float(self.runs.peak[0]), tuple(self.events),
+            ends,
         )  # fmt: skip
 
-    def _kinetic_peak(self, walked: list[tuple[int, float, Array]]) -> float:
-        """Largest kinetic energy at some states of the run, which its samples may all miss; 0 if it is not known."""
-        some = walked[:: max(1, len(walked) // _PEAKS)]
-        y = np.array([each[2] for each in some]).reshape(-1, self.equation.size)
+
+def _ready(functions: Functions) -> Functions:
+    """The functions in Python, with a rate that is nan where a trial step goes too far: a shorter one is tried."""
+
+    def rate(t: float, y: Array, p: Array, own: Array, out: Array) -> None:
         try:
-            q = y[:, : self.equation.plant.dynamics.n]
-            energies = self.equation.plant.dynamics.kinetic_energy(q, self.equation.velocities(y))
-            return float(np.max(energies, initial=0.0))
-        except RobotDynError:  # a run that diverges may overflow
-            return 0.0
+            functions.rate(t, y, p, own, out)
+        except OverflowedError:
+            out[...] = np.nan
 
-
-def _path(states: list[tuple[int, float, Array]], m: int) -> Path:
-    key, t, y = zip(*states, strict=True) if states else ((), (), ())
-    return Path(np.array(key, np.int64), np.array(t, float), np.array(y, float).reshape(-1, m))
+    made: Any = functions._replace(rate=rate)
+    return made

@@ -25,12 +25,13 @@ from robot_dyn.simulation.smoothness import first_kink
 from robot_dyn.simulation.state_equation import StateEquation
 
 _GAIN = 1.3  # in the time resolved, that a shorter step must bring
+_MORE_STEPS = 1.05  # of a companion with tighter tolerances, so that it tells something
 _TENTH, _TENFOLD = Fraction(1, 10), Fraction(10)
 _FAR_TURN = 1.0  # [rad] in a step: beyond, longer steps may meet the same angles
 _BLIND_TURN = np.pi  # [rad] in a step: beyond, shorter ones may, too
 _PUSH = 4.0  # units of rounding by which a start is moved, to see what the motion makes of rounding
 
-Companion = Callable[[Fraction, Setup], Record]
+Companion = Callable[[Any, Setup], Record]  # of a factor of the steps, or of a mesh
 
 
 def estimate(setup: Setup, equation: StateEquation, run: Record, companion: Companion) -> ErrorEstimate:
@@ -48,7 +49,9 @@ def estimate(setup: Setup, equation: StateEquation, run: Record, companion: Comp
     kink, why = first_kink(setup, equation, run.walked)
     estimated = Estimated(run.shared, n, kink, rounding(run.shared, n), meaningless(run.walked, n))
     method: Any = setup.integrator
-    if method.controls_error:
+    if run.ends is not None:
+        made = _by_refinement(setup, method, run, estimated, companion)
+    elif method.controls_error:
         made = _by_tolerances(setup, method, estimated, companion)
     else:
         made = _by_steps(setup, method, estimated, companion, _turn(equation, run.walked))
@@ -78,6 +81,30 @@ def _by_steps(
     pushed = differences(estimated.path, companion(Fraction(1), _pushed(setup)).shared, estimated.n)
     estimated = replace(estimated, floor=np.fmax(estimated.floor, pushed))
     return estimated.from_shorter_steps({FINE[0]: half, FINE[1]: companion(FINE[1], setup).shared})
+
+
+def _by_refinement(
+    setup: Setup, method: Adaptive, run: Record, estimated: Estimated, companion: Companion
+) -> ErrorEstimate:
+    """From a tenth of the tolerance; from half as long steps where that changes none of them, as between ticks.
+
+    Where something may switch unseen, from ten times the tolerance as well.
+    """
+    assert run.ends is not None
+    tight = None
+    if method.rtol / 10 > LEAST_RTOL:
+        made = companion(Fraction(1), _tolerant(setup, method, 0.1))
+        tight = made.shared if made.steps > _MORE_STEPS * run.steps else None
+    if tight is None:
+        ends = np.append(0.0, run.ends)
+        halves = np.setdiff1d(np.concatenate([ends[1:], (ends[1:] + ends[:-1]) / 2]), [each.t for each in run.events])
+        tight = companion(halves, setup).shared
+    loose = companion(Fraction(1), _tolerant(setup, method, 10)).shared if estimated.kink < np.inf else None
+    return estimated.from_refinement(tight, loose)
+
+
+def _tolerant(setup: Setup, method: Adaptive, factor: float) -> Setup:
+    return replace(setup, integrator=replace(method, rtol=method.rtol * factor, atol=method.atol * factor))
 
 
 def _by_tolerances(setup: Setup, method: Adaptive, estimated: Estimated, companion: Companion) -> ErrorEstimate:

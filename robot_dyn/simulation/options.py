@@ -30,6 +30,7 @@ class Options(TypedDict, total=False):
     estimate_error: bool
     about: dict[str, str]
     engine: str
+    events: Any
 
 
 def takes_options(function: Function) -> Function:

@@ -7,6 +7,7 @@ from typing import final
 
 import numpy as np
 
+from robot_dyn.simulation.event import Occurrence
 from robot_dyn.simulation.trajectory import Outcome
 
 MOST_SHARED = 200_000  # states of a run that are compared with those of its companions
@@ -43,6 +44,8 @@ class Record:
         steps: Number of steps.
         evaluations: Of the equation of motion.
         kinetic_peak: Largest kinetic energy that is known, beside that of the samples, in [J].
+        events: That occurred.
+        ends: Of the steps, in [s], where the method chooses them; None for any other.
     """
 
     outcome: Outcome
@@ -54,3 +57,5 @@ class Record:
     steps: int
     evaluations: int
     kinetic_peak: float
+    events: tuple[Occurrence, ...] = ()
+    ends: np.ndarray | None = None

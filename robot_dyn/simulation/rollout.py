@@ -80,7 +80,7 @@ def rollouts(
     """
     setup = replace(_setup(what, q0, options), estimate_error=False)
     most_bytes = integer("most_bytes", most_bytes, most=2**63 - 1)
-    if not setup.integrator.plain:
+    if not setup.integrator.plain or setup.integrator.controls_error:
         raise QueryError(
             f"rollouts run in lock step by an explicit, Gauss or Rosenbrock method, not by {setup.integrator.name}:"
             " give integrator='rk4' and its step_s; simulate takes any method"

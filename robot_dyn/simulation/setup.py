@@ -15,12 +15,13 @@ from robot_dyn.arithmetic import Array, Ball
 from robot_dyn.control.control_law import ControlLaw
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.plant import Plant
-from robot_dyn.errors import ControlError, EffectError, OverflowedError, QueryError
+from robot_dyn.errors import ControlError, EffectError, OverflowedError, QueryError, shown
 from robot_dyn.foreign import call
 from robot_dyn.integrate.methods import as_method
+from robot_dyn.simulation.event import Event
 from robot_dyn.simulation.schedule import LEAST_STEPS, Segment, cuts, steps_on
 from robot_dyn.simulation.size import check_segments
-from robot_dyn.simulation.smoothness import may_switch
+from robot_dyn.simulation.smoothness import finds_events, may_switch
 from robot_dyn.validate import choice, duration, instance, integer, one_state, returned, truth
 from robot_dyn.values import Value
 
@@ -49,6 +50,7 @@ class Setup(Value):
         about: Texts kept with the run.
         engine: "interpreted"; "compiled", the run in machine code, right angles of the file written out in
             full; or "auto", which compiles where that pays.
+        events: What to look out for: steps end there, and the run does if one is terminal.
     """
 
     plant: Plant
@@ -62,6 +64,7 @@ class Setup(Value):
     estimate_error: bool = True
     about: dict[str, str] = field(default_factory=dict, repr=False)
     engine: str = "auto"
+    events: tuple[Event, ...] = ()
 
     def __post_init__(self) -> None:
         instance("plant", self.plant, Plant, "give one, as rd.Plant(robot)")
@@ -87,6 +90,9 @@ class Setup(Value):
         if self.integrator.controls_error and self.step_s != Setup.step_s:
             raise QueryError(no_step(self.integrator.name))
         choice("engine", self.engine, ENGINES)
+        object.__setattr__(self, "events", _events(self.events))
+        if self.events and not finds_events(self):
+            raise QueryError(f"events: {self.integrator.name} does not look for them; take integrator='DOP853'")
         object.__setattr__(self, "controller", _controller(self.controller, len(names)))
         self._check_model()
         check_segments(self)
@@ -182,6 +188,14 @@ def no_step(name: str) -> str:
         f"step_s has no effect on {name}, which chooses its steps: leave it out, name a method of fixed step, such as"
         " integrator='rk4', or give rd.Adaptive(max_step_s=…)"
     )
+
+
+def _events(given: Any) -> tuple[Event, ...]:
+    """The events that are meant: several, or one."""
+    given = (given,) if isinstance(given, Event) else given
+    if not isinstance(given, tuple | list):
+        raise QueryError(f"events: give a list of rd.Event, got {shown(given)}")
+    return tuple(instance("events", each, Event, "give a list of rd.Event") for each in given)
 
 
 def _controller(given: Any, n: int) -> Controller | None:

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Any, Unpack, cast
 
 import numpy as np
 
@@ -32,10 +32,12 @@ from robot_dyn.simulation.options import Options, setup_of, starts, takes_option
 from robot_dyn.simulation.origin import edits_of_machine_code, origin
 from robot_dyn.simulation.record import Record
 from robot_dyn.simulation.samples import columns
+from robot_dyn.simulation.scipy_steps import ScipySteps
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import check_record
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.state_functions import interpreted
+from robot_dyn.simulation.time_loop import Functions
 from robot_dyn.simulation.trajectory import Ending, Outcome, Statistics, Trajectory
 from robot_dyn.simulation.watch import Watch
 from robot_dyn.validate import function
@@ -69,7 +71,7 @@ def simulate(
     """
     function("on_progress", on_progress, "the time reached")
     setup = setup_of("simulate", what, {**starts(q0, v0), **options})
-    equation = StateEquation(setup.plant, setup.controller, setup.integrator.canonical)
+    equation = StateEquation(setup.plant, setup.controller, setup.integrator.canonical, setup.events)
     check_record(setup, equation)
     clock = [perf_counter()]
     machine, engine = choose(setup, equation)
@@ -105,22 +107,30 @@ def _run(
     setup: Setup,
     equation: StateEquation,
     machine: Machine | None,
-    pace: Fraction = Fraction(1),
+    pace: Fraction | np.ndarray = Fraction(1),
     on_progress: Callable[[float], object] | None = None,
     observer: Observer | None = None,
     companion: bool = False,
 ) -> Record:
-    """The run of a setup, or of a companion with another pace."""
-    advance = None if machine is None else machine.loop
-    if machine is None:
-        functions = interpreted(equation, Watch(setup, equation))
+    """The run of a setup, or of a companion: with another pace of its steps, or on a mesh."""
+    watch = Watch(setup, equation)
+
+    def made(of: StateEquation) -> tuple[Functions, np.ndarray]:
+        if machine is None:
+            return interpreted(of, watch), np.zeros(0)
+        functions = machine.in_python if machine.loop is None else machine.equations.functions
+        return functions, machine.parameters if of is equation else machine.with_effects(of.plant.effects)
+
+    loop, in_python = (None, None) if machine is None else (machine.loop, machine.in_python)
+    if setup.integrator.controls_error and setup.integrator.plain:
+        mesh = pace if isinstance(pace, np.ndarray) else None
+        run: Any = ErrorControlled(setup, equation, made, mesh, loop, on_progress, observer, in_python, not companion)
+    elif setup.integrator.controls_error:
+        functions, parameters = made(equation)
+        run = ScipySteps(setup, equation, functions, cast(Fraction, pace), on_progress, observer, parameters)
     else:
-        functions = machine.in_python if advance is None else machine.equations.functions
-    parameters = np.zeros(0) if machine is None else machine.parameters
-    if setup.integrator.controls_error:
-        run: Any = ErrorControlled(setup, equation, functions, pace, on_progress, observer, parameters)
-    else:
-        run = FixedStep(setup, equation, functions, pace, advance, on_progress, observer, parameters)
+        functions, parameters = made(equation)
+        run = FixedStep(setup, equation, functions, cast(Fraction, pace), loop, on_progress, observer, parameters)
     record = run.record()
     if companion and record.outcome.ending is Ending.STOPPED:
         raise KeyboardInterrupt
@@ -150,7 +160,7 @@ def _trajectory(
         names, t, q, v, a, u, power, ledger, desired, deviation, record.outcome, statistics, error, about,
         wrenches(plant, t, q), at_stop(plant, q),
         remarks(setup, observer, t, np.hstack([q, v, u]), power), observer.extremes, acting(setup),
-        equation.controller_states(record.y),
+        equation.controller_states(record.y), record.events,
     )  # fmt: skip
 
 

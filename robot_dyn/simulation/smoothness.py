@@ -51,8 +51,15 @@ def looked_s(setup: Setup) -> float:
     return setup.duration_s / LOOKS
 
 
+def finds_events(setup: Setup) -> bool:
+    """Whether steps end where effects of this library switch."""
+    return setup.integrator.controls_error and setup.integrator.plain
+
+
 def may_switch(setup: Setup) -> bool:
     """Whether something may act between two steps without acting at either."""
+    if finds_events(setup):  # and windows are ends of segments
+        return bool(foreign(setup))
     effects = setup.plant.effects
     windows = any(0.0 < t < setup.duration_s for effect in effects for t in effect.switches)
     return windows or any(isinstance(effect, STOPS) for effect in effects) or bool(foreign(setup))
@@ -76,7 +83,7 @@ def first_kink(setup: Setup, equation: StateEquation, path: Path) -> tuple[float
     n = equation.plant.dynamics.n
     q, v = path.y[:, :n], equation.velocities(path.y)
     found = [(np.inf, "")]
-    for effect in setup.plant.effects:
+    for effect in () if finds_events(setup) else setup.plant.effects:  # or cuts and resolves them
         if isinstance(effect, STOPS):
             low, high = extremes(path.t, q, v)
             found.append(_first(path.t, (low < effect.lower) | (high > effect.upper), "a joint touches its stop"))

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import final
+from typing import Any, final
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import RobotDynError
 from robot_dyn.foreign import call
 from robot_dyn.model.dynamics import acceleration
+from robot_dyn.simulation.event import Event
 
 CONTROL = "control"
 
@@ -35,11 +36,13 @@ class StateEquation:
         plant: What moves.
         controller: What drives it, or None.
         canonical: Whether the second part of y is the momentum p instead of v.
+        events: Functions of the state that a run looks out for.
     """
 
     plant: Plant
     controller: Controller | None
     canonical: bool = False
+    events: tuple[Event, ...] = ()
 
     @cached_property
     def equation_of_motion(self) -> EquationOfMotion:
@@ -151,6 +154,10 @@ class StateEquation:
         result[2 * n : end] = call(controller.state_rate, t, q, v, z) if remembers and controller else 0.0
         result[end:] = equation.powers(v, u, torques)
         return result, u
+
+    def switching(self, t: float, q: Array, v: Array) -> list[Any]:
+        """The values of the events, in floats or symbols."""
+        return [call(each.function, t, q, v) for each in self.events]
 
     def energies(self, t: Array, q: Array, v: Array) -> tuple[Array, Array]:
         """Kinetic energy, and the potential of gravity and of all conservative effects, of samples (m, n)."""

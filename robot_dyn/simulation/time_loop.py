@@ -28,6 +28,10 @@ class Ended(IntEnum):
     DOUBTFUL = 2  # the next step is to be looked at; y is the state before it
     TICK = 3  # the controller asks for no finite torque
     GAINS = 4  # energy may grow without a source; y is the state after the step
+    TOO_SMALL = 5  # no step that floats can tell from none is within the tolerance
+    NOT_FINITE = 6  # the rate at y
+    FAST = 7  # a joint moves without bound; y is the state after the step
+    EVENT = 8  # y is the state at it
 
 
 class Why(IntEnum):
@@ -51,6 +55,10 @@ class _Entries(NamedTuple):
     BUDGET: int = 6  # steps to do before it comes back
     EVALUATIONS: int = 7  # of the rate, in all
     COLUMN: int = 8  # of what an observer sees, next
+    DUE: int = 9  # period of the next sample, where steps do not end at samples
+    MET: int = 10  # the same of the next shared state
+    WALKED: int = 11  # row of the ends of steps, next
+    EVENT: int = 12  # the switching function that has changed sign
 
 
 Now = _Entries()  # no enumeration: Numba before 0.62 takes none as an index
@@ -65,6 +73,7 @@ class Functions(NamedTuple):
         energy: K and V.
         sample: What a sample holds.
         jacobian: As of `RightSide`.
+        events: Values of the events.
     """
 
     rate: Any
@@ -72,6 +81,7 @@ class Functions(NamedTuple):
     energy: Any
     sample: Any
     jacobian: Any = 0
+    events: Any = 0
 
 
 class Plan(NamedTuple):

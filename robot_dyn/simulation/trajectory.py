@@ -11,6 +11,7 @@ import numpy as np
 from robot_dyn import former
 from robot_dyn.model.units import units
 from robot_dyn.simulation.error import ErrorEstimate
+from robot_dyn.simulation.event import Occurrence
 from robot_dyn.simulation.ledger import Ledger, largest
 from robot_dyn.simulation.remarks import Remark
 from robot_dyn.simulation.remarks import lines as said
@@ -101,6 +102,7 @@ class Trajectory(Value):
         acting: What acted, in words: gravity, payloads, effects, limits, control; None if it is not known.
         controller_states: z of the controller, (m, z), of a sampled one after its tick; None if it has none, or they
             were not recorded.
+        events: Where effects switched, and those asked for, in the order of time.
     """
 
     joint_names: tuple[str, ...]
@@ -123,6 +125,7 @@ class Trajectory(Value):
     extremes: np.ndarray | None = None
     acting: tuple[str, ...] | None = None
     controller_states: np.ndarray | None = None
+    events: tuple[Occurrence, ...] = ()
 
     def __post_init__(self) -> None:
         read_only(self)

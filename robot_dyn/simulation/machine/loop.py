@@ -1,4 +1,4 @@
-"""The time loop as machine code: one for each step function, whatever it is that moves.
+"""The time loop as machine code: one for each method, whatever it is that moves.
 
 The functions of the state equation are addresses; so a loop is compiled once for a version of this library.
 """
@@ -14,43 +14,32 @@ from typing import Any
 from robot_dyn.compiled import elimination as elimination  # a step of a stiff method calls it
 from robot_dyn.compiled.cache import default_store
 from robot_dyn.compiled.overload import compiled
-from robot_dyn.compiled.primitives import machine_code, plain
-from robot_dyn.integrate import rosenbrock
-from robot_dyn.simulation import time_loop
+from robot_dyn.compiled.primitives import machine_code, reached
 
-plain(
-    *(
-        getattr(time_loop, name)
-        for name in ("act", "share", "sample", "take", "conserve", "end", "erase_ended", "erase", "show")
-    )
-)
-
-
-plain(rosenbrock.start, rosenbrock.stages)
+Loop = Callable[..., int]
 
 
 @cache
-def loop(step: Callable[..., int]) -> Callable[..., int]:
-    """The loop of a step function, compiled for the arguments of its first call."""
+def loop(make: Callable[..., Loop], *functions: Callable[..., Any]) -> Loop:
+    """The loop that `make` gives of the plain functions of a method, compiled for the arguments of its first call."""
     made: list[Any] = []
     lock = threading.Lock()
 
     def advance(*arguments: Any) -> int:
         if not made:
             with lock:
-                made[:] = made or [_compiled(step, arguments)]
+                made[:] = made or [_compiled(make(*functions), arguments, functions[0])]
         return made[0](*arguments)
 
     return advance
 
 
-def _compiled(step: Callable[..., int], arguments: tuple[Any, ...]) -> Any:
+def _compiled(advance: Loop, arguments: tuple[Any, ...], of: Callable[..., Any]) -> Any:
     import numba as nb
 
-    def make() -> Any:
-        plain(step)
-        return machine_code(time_loop.time_loop(step))
-
     types = [nb.typeof(each) for each in arguments]
-    identity = [f"{step.__module__}.{step.__qualname__}", getsource(step)]  # it may be of a user's own
-    return compiled(make, types, default_store(), identity, f"the time loop of {step.__name__}")
+    identity = [f"{each.__module__}.{each.__qualname__} {getsource(each)}" for each in reached(advance)]
+    about = f"the time loop of {of.__module__}.{of.__name__}"
+    return compiled(
+        lambda: machine_code(advance), types, default_store(), identity, about
+    )  # a step may be a user's own

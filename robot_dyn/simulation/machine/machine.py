@@ -6,8 +6,8 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, final
 
@@ -19,6 +19,7 @@ from robot_dyn.compiled.llvm import machine_code
 from robot_dyn.compiled.llvm.lock_step import write_function
 from robot_dyn.compiled.parameters import Parameter, joined
 from robot_dyn.compiled.program import Program
+from robot_dyn.effects.effect import Effect
 from robot_dyn.errors import RobotDynError
 from robot_dyn.simulation.machine.jacobian_check import DIFFERENCES, by_differences
 from robot_dyn.simulation.plan import plan_of
@@ -104,6 +105,17 @@ class Machine:
         """The values of the parameters, one row after the other."""
         return joined(self.known)
 
+    def with_effects(self, effects: Sequence[Effect]) -> np.ndarray:
+        """The values of the parameters where the effects have other coefficients."""
+        of = {("effect", i): effect for i, effect in enumerate(effects)}
+        known = [
+            replace(each, value=np.broadcast_to(getattr(of[each.part], each.key), each.value.shape))
+            if each.part in of
+            else each
+            for each in self.known
+        ]
+        return joined(known)
+
     def own(self, swept: Mapping[str, np.ndarray]) -> np.ndarray:
         """The numbers of W runs, (O, W): what is held, then row by row what is swept, (W, size) each, then the others.
 
@@ -181,6 +193,8 @@ class Machine:
         if self.equations.runs == 1:
             yield ours["rate"][m:], u
             yield from zip(np.split(ours["sample"], [m, m + n]), (rate, u, energy), strict=True)
+        if "events" in ours:
+            yield ours["events"], np.array(self.equation.switching(t, *self.equation.state(y)[:2]), dtype=float)
         if "tick" in ours:
             after, command = self.equation.tick(t, y)
             yield ours["tick"][:n], np.asarray(command)

@@ -20,11 +20,14 @@ from robot_dyn.compiled.program import Program
 from robot_dyn.compiled.right_angles import robot_of
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import TraceError
+from robot_dyn.integrate.adaptive import STEPPERS
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.model.robot import Robot
+from robot_dyn.simulation.controlled_loop import controlled_loop
 from robot_dyn.simulation.machine.machine import Equations, Machine
 from robot_dyn.simulation.machine.structure import structure
 from robot_dyn.simulation.state_equation import StateEquation
+from robot_dyn.simulation.time_loop import time_loop
 
 _MOST_INSTRUCTIONS = 100_000  # some ten seconds of compiling
 _MOST = 64  # values that are kept
@@ -161,7 +164,10 @@ def _traced(
     return {name: program_of(each) for name, each in trace(equation, bodies, known, kept, jacobian).items()}
 
 
-def _loop(method: Integrator) -> Callable[..., int]:
+def _loop(method: Any) -> Callable[..., int]:
     from robot_dyn.simulation.machine.loop import loop
 
-    return loop(method.stepper(FLOAT64, 1, 0, 1).step)
+    if method.controls_error:
+        made = STEPPERS[method.method](1, 1, 1)
+        return loop(controlled_loop, made.begin, made.step, made.error, made.accept, made.dense)
+    return loop(time_loop, method.stepper(FLOAT64, 1, 0, 1).step)

@@ -26,7 +26,7 @@ _PLAIN = bool, int, float, str, bytes, type(None)
 def structure(equation: StateEquation) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
     """The structure of a state equation in hashable values, and the objects that stand in it by identity."""
     objects: list[Any] = []
-    parts = equation.plant.dynamics, *equation.plant.effects, equation.controller
+    parts = equation.plant.dynamics, *equation.plant.effects, equation.controller, *equation.events
     described = tuple(_of(each, objects) for each in parts)
     controller = equation.controller
     period = None

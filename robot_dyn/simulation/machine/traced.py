@@ -64,6 +64,8 @@ def trace(
         made["sample"] = np.concatenate(
             [rate, parts["u"], parts["energy"]] if single else [parts[x] for x in kept] or [[]]
         )
+        if equation.events:
+            made["events"] = np.concatenate([np.asarray(x).reshape(1) for x in symbolic.switching(time, q, v)])
         if equation.sampled and symbolic.controller is not None:
             after = symbolic.controller.next_state(time, q, v, z) if equation.state_size else z
             made["tick"] = np.concatenate([wide(symbolic.command(time, q, v, z), n), after])
@@ -95,4 +97,4 @@ def _symbolic(
             part = ("model", name)
             models[name] = bodies(model, part).of(values.get(part, {}))
         controller = symbolic_controller(controller, models, values, pieces)
-    return StateEquation(plant, controller, equation.canonical)
+    return StateEquation(plant, controller, equation.canonical, equation.events)

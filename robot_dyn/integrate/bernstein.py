@@ -1,0 +1,75 @@
+"""Polynomials on a step in Bernstein's form, whose coefficients enclose them: a sign that all share proves no root.
+
+    p(θ) = Σ_j b_j C(d, j) θʲ (1 − θ)^(d−j),   min b ≤ p(θ) ≤ max b   for 0 ≤ θ ≤ 1
+
+[Farouki, The Bernstein polynomial basis: a centennial retrospective, Computer Aided Geometric Design, 2012]
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+
+NONE = 2.0  # in place of a root
+_NARROW = 1e-13  # of a step
+_DEEP = 64  # more halvings than floats between 0 and 1 allow to be of use
+
+
+def room(degree: int) -> np.ndarray:
+    """Room for `first_below`."""
+    return np.zeros((_DEEP, degree + 3))
+
+
+def coefficients(start: float, F: Array, e: int, b: Array) -> None:
+    """Coefficients b (d + 1,) of entry e of `primitives.between`: start + θ (F₀ + (1 − θ) (F₁ + θ (F₂ + …)))."""
+    d = len(F)
+    b[0] = 0.0
+    for i in range(d - 1, -1, -1):
+        k = d - 1 - i  # degree before the product
+        for j in range(k + 1):
+            b[j] += F[i, e, 0]
+        if i % 2 == 0:  # times θ
+            for j in range(k + 1, 0, -1):
+                b[j] = b[j - 1] * j / (k + 1)
+            b[0] = 0.0
+        else:
+            b[k + 1] = 0.0
+            for j in range(k + 1):
+                b[j] *= (k + 1 - j) / (k + 1)
+    for j in range(d + 1):
+        b[j] += start
+
+
+def first_below(b: Array, slack: float, stack: Array) -> float:
+    """The first θ from which a polynomial is below −slack, up to the halving of floats; NONE if it never is.
+
+    Args:
+        b: Its coefficients, (d + 1,).
+        slack: Rounding of the coefficients: none above −slack counts as below.
+        stack: As of `room`.
+    """
+    d, depth = len(b) - 1, 1
+    stack[0, 0], stack[0, 1] = 0.0, 1.0
+    for j in range(d + 1):
+        stack[0, 2 + j] = b[j]
+    while depth > 0:
+        piece = stack[depth - 1]
+        low, high, least = piece[0], piece[1], np.inf
+        for j in range(d + 1):
+            least = min(least, piece[2 + j])
+        if least >= -slack:
+            depth -= 1
+            continue
+        if piece[2] < -slack or high - low <= _NARROW or depth == _DEEP:
+            return low
+        middle, left = (low + high) / 2, stack[depth]  # the right half stays below, the left one comes first
+        left[0], left[1] = low, middle
+        for k in range(d + 1):  # de Casteljau: the first coefficients of all levels are the left half
+            left[2 + k] = piece[2]
+            for j in range(d - k):
+                piece[2 + j] = (piece[2 + j] + piece[3 + j]) / 2
+        # what is left in place are the last coefficients of all levels, which are the right half
+        piece[0] = middle
+        depth += 1
+    return NONE

@@ -1,0 +1,140 @@
+"""DOP853: the explicit method of order 8 of Dormand and Prince with error estimates of orders 5 and 3.
+
+    y⁺ = y + h (k₁ + Σ b_j (k_j − k₁)),   ‖e‖ = |h| ‖e₅‖² / √(‖e₅‖² + 0.01 ‖e₃‖²),   dense output of order 7
+
+Its stages stand as differences from the first: Σ |b_j| is 13, and Σ b_j, as rounded, is not 1. Three further stages
+make the dense output, where it is asked for. The coefficients are SciPy's.
+
+[Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed., 1993, II.5, II.6 and II.10]
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.integrate.primitives import combination, copy, evaluate, norm, subtract
+from robot_dyn.integrate.step_control import ControlledStepper
+
+_STAGES, _EXTENDED, _DEGREE, _ERROR_ORDER = 12, 16, 7, 8
+
+
+class Coefficients(NamedTuple):
+    """A, b, c of all 16 stages, the weights of errors, of dense output and of the rate at the end, of differences."""
+
+    a: Array
+    b: Array
+    c: Array
+    e3: Array
+    e5: Array
+    d: Array
+    end: Array
+
+
+class Work(NamedTuple):
+    """The arrays of a step.
+
+    Attributes:
+        K: k₁, and k_j − k₁ of the others, (16, r, 1).
+        last: The rate at its end, (r, 1).
+        F: Dense output, (7, m, 1), as of `between`.
+        error: (2, k, 1), of the first entries of y, whose error is bounded.
+        zero: (m, 1).
+    """
+
+    K: Array
+    last: Array
+    F: Array
+    error: Array
+    zero: Array
+
+
+@cache
+def coefficients() -> Coefficients:
+    """SciPy's coefficients, for differences of the stages."""
+    from scipy.integrate import DOP853
+
+    a = np.zeros((_EXTENDED, _EXTENDED))
+    a[:_STAGES, :_STAGES], a[_STAGES + 1 :] = DOP853.A, DOP853.A_EXTRA
+    a[_STAGES, :_STAGES] = DOP853.B
+    c = np.concatenate([DOP853.C, [1.0], DOP853.C_EXTRA])
+    a[:, 0] = c  # Σ_j a_ij = c_i, so this is the weight of k₁
+    b, d, e3, e5 = (np.array(x) for x in (DOP853.B, DOP853.D, DOP853.E3[:_STAGES], DOP853.E5[:_STAGES]))
+    b[0], d[:, 0], e3[0], e5[0] = 1.0, 0.0, 0.0, 0.0
+    end = np.zeros(_STAGES + 1)
+    end[[0, _STAGES]] = 1.0
+    return Coefficients(a, b, c, e3, e5, d, end)
+
+
+def stepper(m: int, rows: int, bounded: int) -> ControlledStepper:
+    """The method for one state of m entries, rates of so many rows, and so many entries whose error is bounded."""
+    work = Work(
+        np.zeros((_EXTENDED, rows, 1)), np.zeros((rows, 1)), np.zeros((_DEGREE, m, 1)),
+        np.zeros((2, bounded, 1)), np.zeros((m, 1)),
+    )  # fmt: skip
+    return ControlledStepper(begin, step, error, accept, dense, coefficients(), work, _ERROR_ORDER)
+
+
+def begin(f: Any, c: Coefficients, t: Any, y: Array, p: Array, own: Array, work: Work) -> int:
+    """The first stage."""
+    evaluate(f.rate, t, y, p, own, work.K[0])
+    return 1
+
+
+def stage(
+    f: Any, c: Coefficients, i: int, t: Any, h: Any, y: Array, p: Array, own: Array, x: Array, work: Work
+) -> None:
+    """Stage i, its state in x."""
+    combination(x, y, h, c.a[i], work.K, i)
+    evaluate(f.rate, t + c.c[i] * h, x, p, own, work.K[i])
+    subtract(work.K[i], work.K[0])
+
+
+def step(
+    f: Any, c: Coefficients, t: Any, h: Any, y: Array, p: Array, own: Array, after: Array, work: Work, lost: Array
+) -> int:
+    """A trial; see `ControlledStepper`."""
+    lost[0] = 0
+    for i in range(1, _STAGES):
+        stage(f, c, i, t, h, y, p, own, after, work)
+    combination(after, y, h, c.b, work.K, _STAGES)
+    return _STAGES - 1
+
+
+def error(c: Coefficients, h: Any, y: Array, after: Array, work: Work, rtol: float, atol: float) -> float:
+    """The norm of its error; see `ControlledStepper`."""
+    fifth, third = work.error[0], work.error[1]
+    k = len(fifth)
+    combination(fifth, work.zero[:k], 1.0, c.e5, work.K, _STAGES)
+    combination(third, work.zero[:k], 1.0, c.e3, work.K, _STAGES)
+    large, small = norm(fifth, y[:k], after[:k], rtol, atol), norm(third, y[:k], after[:k], rtol, atol)
+    if large == 0.0:
+        return 0.0
+    return abs(h) * large * large / np.sqrt(large * large + 0.01 * small * small)
+
+
+def accept(f: Any, c: Coefficients, t: Any, h: Any, y: Array, p: Array, own: Array, after: Array, work: Work) -> int:
+    """The rate at the end; see `ControlledStepper`."""
+    evaluate(f.rate, t + h, after, p, own, work.last)
+    return 1
+
+
+def dense(f: Any, c: Coefficients, t: Any, h: Any, y: Array, p: Array, own: Array, after: Array, work: Work) -> int:
+    """The dense output, from three further stages; see `ControlledStepper`."""
+    F = work.F
+    copy(work.K[_STAGES], work.last)
+    subtract(work.K[_STAGES], work.K[0])
+    for i in range(_STAGES + 1, _EXTENDED):
+        stage(f, c, i, t, h, y, p, own, F[0], work)
+    copy(F[0], after)
+    subtract(F[0], y)
+    combination(F[1], work.zero, h, c.b, work.K, 1)
+    subtract(F[1], F[0])
+    combination(F[2], F[0], -h, c.end, work.K, _STAGES + 1)
+    subtract(F[2], F[1])
+    for i in range(4):
+        combination(F[3 + i], work.zero, h, c.d[i], work.K, _EXTENDED)
+    return _EXTENDED - _STAGES - 1

@@ -1,0 +1,172 @@
+"""Control of the step: the longest one whose local error is within the tolerance, by a PI controller.
+
+    ‖e‖ ≤ 1,   h⁺ = h · 0.9 ‖e‖^(−α) ‖e₋‖^β,   e the local error over atol + rtol |y|, e₋ that of the step before
+
+[Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed., 1993, II.4; Hairer, Wanner, II, 2nd ed.,
+1996, IV.2; Gustafsson 1991]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import IntEnum
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.integrate.primitives import combination, evaluate, norm, subtract
+
+_BETA_ORDER = 0.2  # β times the order of the error: the part that the error before has in the next step
+_SAFETY, _LEAST, _MOST = 0.9, 0.2, 10.0  # of a new step
+_CUT = 0.1  # of a step whose error is no number
+_STRETCH = 1.01  # rather than to leave a sliver of a step before the end
+_SPACINGS = 4  # of floats at t: the least step
+_ONE = np.ones(1)
+
+
+class Choice(IntEnum):
+    """What came of the choice of a step."""
+
+    TAKEN = 0
+    TOO_SMALL = 1  # no step whose end floats can tell from t has an error within the tolerance
+
+
+class _Entries(NamedTuple):
+    """Entries of `control`, where the choice of steps is."""
+
+    NEXT: int = 0  # length of the next step, not negative; 0 before the first
+    TAKEN: int = 1  # the step that was taken, with its sign
+    END: int = 2  # the time where it ends
+    ERROR: int = 3  # ‖e₋‖
+    RTOL: int = 4
+    ATOL: int = 5
+    LONGEST: int = 6
+    EXPONENT: int = 7  # 1 over the order of ‖e‖ in h
+    REJECTED: int = 8  # steps, in all
+    MESH: int = 9  # the next time of a mesh
+
+
+At = _Entries()  # no enumeration: Numba before 0.62 takes none as an index
+
+
+class ControlledStepper(NamedTuple):
+    """A method made ready for steps of controlled error, of one state (m, 1).
+
+    Its functions are plain; f is the state equation (f.rate, f.jacobian), p and own are as of `evaluate`.
+
+    Attributes:
+        begin: (f, c, t, y, p, own, work) → evaluations. What depends on (t, y) alone: work.K[0], (r, 1), is the rate.
+        step: (f, c, t, h, y, p, own, after, work, lost) → evaluations. A trial: writes y(t + h) into `after`.
+        error: (c, h, y, after, work, rtol, atol) → ‖e‖.
+        accept: (f, c, t, h, y, p, own, after, work) → evaluations. work.last, (r, 1), is the rate at its end.
+        dense: (f, c, t, h, y, p, own, after, work) → evaluations. work.F, (d, m, 1), as of `between`.
+        coefficients: Its numbers, c.
+        work: Its arrays; work.error, (…, k, 1), of the first entries of y, whose error is bounded.
+        error_order: Order of ‖e‖ in h.
+    """
+
+    begin: Callable[..., int]
+    step: Callable[..., int]
+    error: Callable[..., float]
+    accept: Callable[..., int]
+    dense: Callable[..., int]
+    coefficients: Any
+    work: Any
+    error_order: int
+
+
+def control_of(stepper: ControlledStepper, rtol: float, atol: float, longest: float) -> np.ndarray:
+    """The choice of steps before the first."""
+    control = np.zeros(len(At))
+    control[At.ERROR], control[At.RTOL], control[At.ATOL] = 1e-4, rtol, atol
+    control[At.LONGEST], control[At.EXPONENT] = longest, 1 / stepper.error_order
+    return control
+
+
+def first_step(
+    f: Any, t: float, end: float, y: Array, p: Array, own: Array, after: Array, work: Any, control: Array
+) -> int:
+    """The length of the first step, from the rate at its start and after a short step of Euler's; 1 evaluation.
+
+    [Hairer, Nørsett, Wanner 1993, II.4]
+    """
+    k, rtol, atol = work.error.shape[1], control[At.RTOL], control[At.ATOL]
+    x, rate = y[:k], work.K[0][:k]
+    size, slope = norm(x, x, x, rtol, atol), norm(rate, x, x, rtol, atol)
+    h = 1e-6 if size < 1e-5 or slope < 1e-5 else 0.01 * size / slope
+    h = min(h, abs(end - t), control[At.LONGEST])
+    signed = h if end >= t else -h
+    combination(after, y, signed, _ONE, work.K, 1)
+    evaluate(f.rate, t + signed, after, p, own, work.last)
+    subtract(work.last, work.K[0])
+    steepest = max(slope, norm(work.last[:k], x, x, rtol, atol) / h)
+    other = (0.01 / steepest) ** control[At.EXPONENT] if steepest > 1e-15 else max(1e-6, 1e-3 * h)
+    control[At.NEXT] = min(100 * h, other)
+    return 1
+
+
+def following(mesh: Array, control: Array, t: float, end: float) -> float:
+    """The first time of a mesh behind t, or the end."""
+    k = int(control[At.MESH])
+    while k < len(mesh) and mesh[k] <= t:
+        k += 1
+    control[At.MESH] = k
+    return min(mesh[k], end) if k < len(mesh) else end
+
+
+def finite(x: Array) -> bool:
+    """Whether all numbers of (m, 1) are finite."""
+    total = 0.0
+    for e in range(len(x)):
+        total += abs(x[e, 0])
+    return total < np.inf
+
+
+def chosen_step(step: Callable[..., int], error: Callable[..., float]) -> Callable[..., tuple[int, int]]:
+    """The choice of a step, for a method's `step` and `error`.
+
+    choose(f, c, t, end, y, p, own, after, work, lost, control, mesh) → evaluations, Choice. Steps end at the times of
+    the mesh (k,), whatever their error, if there are any.
+    """
+
+    def choose(
+        f: Any, c: Any, t: float, end: float, y: Array, p: Array, own: Array, after: Array, work: Any, lost: Array,
+        control: Array, mesh: Array,
+    ) -> tuple[int, int]:  # fmt: skip
+        if len(mesh) > 0:
+            control[At.END] = target = following(mesh, control, t, end)
+            control[At.TAKEN] = h = target - t
+            made = step(f, c, t, h, y, p, own, after, work, lost)
+            return made, Choice.TAKEN if lost[0] == 0 and finite(after) else Choice.TOO_SMALL
+        left, evaluations, rejected = abs(end - t), 0, False
+        wanted = min(control[At.NEXT], control[At.LONGEST])
+        least = _SPACINGS * (np.nextafter(abs(t), np.inf) - abs(t))
+        while True:
+            reaches = wanted * _STRETCH >= left
+            h = left if reaches else wanted
+            if h < least and not reaches:
+                return evaluations, Choice.TOO_SMALL
+            signed = h if end >= t else -h
+            evaluations += step(f, c, t, signed, y, p, own, after, work, lost)
+            e = error(c, signed, y, after, work, control[At.RTOL], control[At.ATOL]) if lost[0] == 0 else np.inf
+            if e <= 1.0:
+                break
+            rejected = True
+            control[At.REJECTED] += 1
+            wanted = h * (max(_LEAST, _SAFETY * e ** -control[At.EXPONENT]) if e < np.inf else _CUT)
+            if wanted < least:
+                return evaluations, Choice.TOO_SMALL
+        alpha = control[At.EXPONENT]
+        beta = _BETA_ORDER * alpha
+        factor = _MOST
+        if e > 0.0:
+            factor = min(_MOST, max(_LEAST, _SAFETY * e ** (0.75 * beta - alpha) * control[At.ERROR] ** beta))
+        next_h = h * (min(1.0, factor) if rejected else factor)
+        # the end of a segment says nothing about the error
+        control[At.NEXT] = max(next_h, wanted) if reaches and not rejected else next_h
+        control[At.ERROR] = max(e, 1e-4)
+        control[At.TAKEN], control[At.END] = signed, end if reaches else t + signed
+        return evaluations, Choice.TAKEN
+
+    return choose

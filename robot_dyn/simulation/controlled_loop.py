@@ -1,0 +1,372 @@
+"""The time loop of methods that choose their steps: samples lie between, and steps end where a switching function does.
+
+Plain functions of arrays, for one run, as of `time_loop`. The dense output of a step brackets a root of a switching
+function g; the step is then made anew, up to where g vanishes after it, which keeps the order of the method:
+
+    g(step(t, y, θ h)) = 0
+
+[Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed., 1993, II.6; Shampine, Thompson 2000]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.integrate.bernstein import NONE, coefficients, first_below
+from robot_dyn.integrate.primitives import between, copy, evaluate
+from robot_dyn.integrate.step_control import At, chosen_step, finite, first_step
+from robot_dyn.simulation.time_loop import Ended, Functions, Now, Plan, Rules, Runs, act, conserve
+
+FASTEST = 1e6  # [rad/s] or [m/s]: such a method would follow an exploding state without end
+_EARLY = 1e-9  # of a period: a sample at the end of a segment belongs to the next one
+_ROUNDING = 64 * np.finfo(float).eps  # of the coefficients of a polynomial
+_ROOTS = 6  # steps made anew for an event, at most
+_LOOKS = 8  # at a switching function that is no coordinate, in each step
+_HALVINGS = 50
+_WATCHED = 8  # steps between looks at the energy
+_NEAR = 1e-4  # of a step: for the slope of a switching function that is no coordinate
+
+
+class Kept(NamedTuple):
+    """What is kept.
+
+    Attributes:
+        t, y, made: Times of samples (R,), the states (R, m, 1), and what else a sample holds (R, d, 1).
+        shared_t, shared: States that companion runs share, (S,) and (S, m).
+        walked_t, walked: The ends of steps, (K,), and the states at the first of them, (k, m).
+        columns: As of `Observer.columns`; without any, no step is shown.
+    """
+
+    t: Array
+    y: Array
+    made: Array
+    shared_t: Array
+    shared: Array
+    walked_t: Array
+    walked: Array
+    columns: Array
+
+
+class Times(NamedTuple):
+    """Times as numbers.
+
+    Attributes:
+        reached: The time reached, (1,), in [s].
+        period, compared: Periods of samples and of shared states, in [s]; inf for none.
+        nodes: Whether there is a sample at the start of every segment, too.
+        end: Of the run.
+        mesh: Where steps end, (k,), in place of error control; none for that.
+    """
+
+    reached: Array
+    period: float
+    compared: float
+    nodes: bool
+    end: float
+    mesh: Array
+
+
+class Switches(NamedTuple):
+    """Switching functions: E coordinates of y that pass a level, and G functions of (t, y, p, own).
+
+    Attributes:
+        rows, levels: Entry of y, and its level, (E,).
+        sides: 1 where the function is not negative, −1 where it is not positive, (E + G,).
+        functions: Gives the G values, as of `evaluate`.
+        now, then: They, at the start of a step and within it, (G, 1).
+        size: Unit of rounding of each coordinate's level, (E,).
+        b, stack: Room for `bernstein`.
+    """
+
+    rows: Array
+    levels: Array
+    sides: Array
+    functions: Any
+    now: Array
+    then: Array
+    size: Array
+    b: Array
+    stack: Array
+
+
+def controlled_loop(
+    begin: Callable[..., int], step: Callable[..., int], error: Callable[..., float], accept: Callable[..., int],
+    dense: Callable[..., int],
+) -> Callable[..., int]:  # fmt: skip
+    """The time loop of the functions of a method; see `ControlledStepper`.
+
+    advance(functions, plan, runs, kept, times, rules, coefficients, work, switches, now, control, stop) → Ended, with
+    `control` as of `control_of`; `stop[0]` other than 0 ends it.
+    """
+    choose = chosen_step(step, error)
+
+    def advance(
+        f: Functions, plan: Plan, runs: Runs, kept: Kept, times: Times, rules: Rules, c: Any, work: Any,
+        switches: Switches, now: Array, control: Array, stop: Array,
+    ) -> int:  # fmt: skip
+        last = len(plan.counts) - 1
+        own, y, after = runs.own, runs.y, runs.after
+        while now[Now.SEGMENT] <= last:
+            s = now[Now.SEGMENT]
+            start, p = plan.starts[s], plan.parameters[s]
+            if now[Now.STEP] == 0:
+                if plan.ticks[s] == 1 and not act(f, runs, rules, start, plan.at_ticks[s]):
+                    return Ended.TICK
+                node(f, runs, kept, times, now, start, p)
+                times.reached[0] = start
+                now[Now.STEP] = 1
+            if s == last:
+                now[Now.SEGMENT] += 1
+                continue
+            end = plan.starts[s + 1]
+            if now[Now.STEP] == 1:  # at the start of a segment, and behind an event
+                now[Now.EVALUATIONS] += begin(f, c, times.reached[0], y, p, own, work)
+                if not finite(work.K[0]):
+                    return Ended.NOT_FINITE
+                if control[At.NEXT] == 0.0 and len(times.mesh) == 0:
+                    now[Now.EVALUATIONS] += first_step(f, start, end, y, p, own, after, work, control)
+                if len(switches.now) > 0:
+                    evaluate(switches.functions, times.reached[0], y, p, own, switches.now)
+                now[Now.STEP] = 2
+            while times.reached[0] < end:
+                t = times.reached[0]
+                made, found = choose(f, c, t, end, y, p, own, after, work, runs.lost, control, times.mesh)
+                now[Now.EVALUATIONS] += made
+                if found != 0:
+                    return Ended.TOO_SMALL
+                h, t1 = control[At.TAKEN], control[At.END]
+                now[Now.EVALUATIONS] += accept(f, c, t, h, y, p, own, after, work)
+                has_dense, event, theta = False, -1, NONE
+                if len(switches.sides) > 0:
+                    near = len(switches.now) > 0 or approaches(y, after, h, work.K[0], work.last, rules.n, switches)
+                    if near:
+                        now[Now.EVALUATIONS] += dense(f, c, t, h, y, p, own, after, work)
+                        event, theta = first_event(f, t, h, y, p, runs, work.F, switches)
+                        has_dense = event < 0
+                    if event >= 0 and theta * abs(h) <= np.spacing(abs(t)):  # at once, as right behind another one
+                        h, t1 = 0.0, t
+                        copy(after, y)
+                        copy(work.last, work.K[0])
+                    elif event >= 0:
+                        h = theta * h
+                        for k in range(_ROOTS):
+                            now[Now.EVALUATIONS] += step(f, c, t, h, y, p, own, after, work, runs.lost)
+                            now[Now.EVALUATIONS] += accept(f, c, t, h, y, p, own, after, work)
+                            shift = correction(f, t, h, control[At.TAKEN], y, p, runs, work, switches, event)
+                            if k == _ROOTS - 1 or not abs(shift) > np.spacing(abs(t + h)) or abs(shift) > abs(h):
+                                break
+                            h += shift
+                        t1 = t + h
+                        if event < len(switches.rows):
+                            after[switches.rows[event], 0] = switches.levels[event]
+                    if event >= 0:
+                        control[At.NEXT] = max(control[At.NEXT], abs(control[At.TAKEN]))
+                        switches.sides[event] = -switches.sides[event]
+                if h > 0.0 and asked(times, now, t1, end):
+                    if not has_dense:
+                        now[Now.EVALUATIONS] += dense(f, c, t, h, y, p, own, after, work)
+                    inside(f, runs, kept, times, now, t, h, t1, end, p, work.F)
+                copy(y, after)
+                times.reached[0] = t1
+                copy(work.K[0], work.last)
+                now[Now.STEPS] += 1
+                now[Now.BUDGET] -= 1
+                walk(runs, kept, rules, now, t1, work.last, plan.ticks[s] == 1 and t == start)
+                if event >= 0:
+                    now[Now.EVENT] = event
+                    now[Now.STEP] = 1
+                    return Ended.EVENT
+                if len(switches.now) > 0:
+                    copy(switches.now, switches.then)
+                if fast(y, rules.n):
+                    return Ended.FAST
+                if now[Now.STEPS] % _WATCHED == 0 and not conserve(f, runs, rules, t1, p):
+                    return Ended.GAINS
+                if now[Now.BUDGET] <= 0 or stop[0] != 0:
+                    return Ended.PAUSED
+            now[Now.SEGMENT] += 1
+            now[Now.STEP] = 0
+        return Ended.DONE
+
+    return advance
+
+
+def node(f: Functions, runs: Runs, kept: Kept, times: Times, now: Array, t: float, p: Array) -> None:
+    """A sample, if there is to be one, and a shared state, at the start of a segment or at the end of the run."""
+    due = now[Now.DUE] * times.period <= t + _EARLY * times.period
+    if due or (times.nodes and times.period < np.inf) or (t == times.end and times.period < np.inf):
+        keep(f, runs, kept, now, t, runs.y, p)
+    while now[Now.DUE] * times.period <= t + _EARLY * times.period:
+        now[Now.DUE] += 1
+    if times.compared < np.inf:
+        share(kept, now, t, runs.y)
+        while now[Now.MET] * times.compared <= t + _EARLY * times.compared:
+            now[Now.MET] += 1
+
+
+def asked(times: Times, now: Array, t: float, end: float) -> bool:
+    """Whether a sample or a shared state is due before t."""
+    return due(now[Now.DUE], times.period, t, end) or due(now[Now.MET], times.compared, t, end)
+
+
+def due(k: int, period: float, t: float, end: float) -> bool:
+    """Whether the k-th period ends at t at the latest, and before the end of the segment."""
+    return k * period <= t and k * period < end - _EARLY * period
+
+
+def inside(
+    f: Functions, runs: Runs, kept: Kept, times: Times, now: Array, t: float, h: float, t1: float, end: float,
+    p: Array, F: Array,
+) -> None:  # fmt: skip
+    """The samples and shared states within a step."""
+    x = runs.last
+    while due(now[Now.DUE], times.period, t1, end):
+        at = now[Now.DUE] * times.period
+        between(runs.y, F, (at - t) / h, x)
+        keep(f, runs, kept, now, at, x, p)
+        now[Now.DUE] += 1
+    while due(now[Now.MET], times.compared, t1, end):
+        at = now[Now.MET] * times.compared
+        between(runs.y, F, (at - t) / h, x)
+        share(kept, now, at, x)
+        now[Now.MET] += 1
+
+
+def keep(f: Functions, runs: Runs, kept: Kept, now: Array, t: float, y: Array, p: Array) -> None:
+    """Keep a sample."""
+    row = now[Now.ROW]
+    kept.t[row] = t
+    copy(kept.y[row], y)
+    evaluate(f.sample, t, y, p, runs.own, kept.made[row])
+    now[Now.ROW] += 1
+
+
+def share(kept: Kept, now: Array, t: float, y: Array) -> None:
+    """Keep a state for companion runs."""
+    row = now[Now.SHARED]
+    kept.shared_t[row] = t
+    copy(kept.shared[row], y[:, 0])
+    now[Now.SHARED] += 1
+
+
+def walk(runs: Runs, kept: Kept, rules: Rules, now: Array, t: float, latest: Array, acted: bool) -> None:
+    """Keep the end of a step, and show it to the observer, as of `Observer.step`, while there is room."""
+    row, n, m = now[Now.WALKED], rules.n, len(runs.y)
+    if row < len(kept.walked_t):
+        kept.walked_t[row] = t
+        if row < len(kept.walked):
+            copy(kept.walked[row], runs.y[:, 0])
+        now[Now.WALKED] += 1
+    if kept.columns.shape[1] == 0:
+        return
+    column = now[Now.COLUMN]
+    kept.columns[0, column], kept.columns[1, column] = t, acted or rules.held == 0
+    copy(kept.columns[2 : 2 + n, column], runs.y[:n, 0])
+    copy(kept.columns[2 + n : 2 + 2 * n, column], runs.y[n : 2 * n, 0])
+    copy(kept.columns[2 + 2 * n :, column], runs.own[:n, 0] if rules.held > 0 else latest[m : m + n, 0])
+    now[Now.COLUMN] += 1
+
+
+def fast(y: Array, n: int) -> bool:
+    """Whether a joint moves without bound."""
+    most = 0.0
+    for e in range(n, 2 * n):
+        most = max(most, abs(y[e, 0]))
+    return not most < FASTEST
+
+
+def approaches(y: Array, after: Array, h: float, before: Array, last: Array, n: int, switches: Switches) -> bool:
+    """Whether a coordinate may pass its level in a step, by Hermite's polynomial through rates at both ends.
+
+    Its coefficients in Bernstein's form, from values and two derivatives of a position and one of a velocity, enclose
+    it; as much room again is left on both sides.
+    """
+    for e in range(len(switches.rows)):
+        row = switches.rows[e]
+        x0, x1, d0, d1 = y[row, 0], after[row, 0], before[row, 0], last[row, 0]
+        low, high = min(x0, x1), max(x0, x1)
+        if row < n:
+            a, b = x0 + h * d0 / 5, x1 - h * d1 / 5
+            c = x0 + 2 * h * d0 / 5 + h * h * before[n + row, 0] / 20
+            d = x1 - 2 * h * d1 / 5 + h * h * last[n + row, 0] / 20
+            low, high = min(low, a, b, c, d), max(high, a, b, c, d)
+        else:
+            a, b = x0 + h * d0 / 3, x1 - h * d1 / 3
+            low, high = min(low, a, b), max(high, a, b)
+        room = high - low
+        if switches.sides[e] > 0 and not low - room > switches.levels[e]:
+            return True
+        if switches.sides[e] < 0 and not high + room < switches.levels[e]:
+            return True
+    return False
+
+
+def first_event(
+    f: Functions, t: float, h: float, y: Array, p: Array, runs: Runs, F: Array, switches: Switches
+) -> tuple[int, float]:
+    """The switching function that changes sign first within a step, and θ; −1 without any."""
+    event, first, b, own = -1, NONE, switches.b, runs.own
+    for e in range(len(switches.rows)):
+        row, side = switches.rows[e], switches.sides[e]
+        coefficients(y[row, 0] - switches.levels[e], F, row, b)
+        if y[row, 0] == switches.levels[e]:
+            b[0] = 0.0
+        for j in range(len(b)):
+            b[j] *= side
+        theta = first_below(b, _ROUNDING * switches.size[e], switches.stack)
+        if theta < first:
+            event, first = e, theta
+    E, before, x = len(switches.rows), 0.0, runs.last
+    for i in range(1, _LOOKS + 1 if len(switches.now) > 0 else 0):
+        theta = i / _LOOKS
+        values(f, t, h, theta, y, p, own, F, x, switches)
+        for g in range(len(switches.now)):
+            if switches.sides[E + g] * switches.then[g, 0] < 0.0 and before < first:
+                low, high = before, theta
+                for _ in range(_HALVINGS):
+                    middle = (low + high) / 2
+                    values(f, t, h, middle, y, p, own, F, x, switches)
+                    if switches.sides[E + g] * switches.then[g, 0] < 0.0:
+                        high = middle
+                    else:
+                        low = middle
+                if high < first:
+                    event, first = E + g, high
+                values(f, t, h, theta, y, p, own, F, x, switches)
+        if event >= 0 and first <= theta:
+            break
+        before = theta
+    return event, first
+
+
+def values(
+    f: Functions, t: float, h: float, theta: float, y: Array, p: Array, own: Array, F: Array, x: Array,
+    switches: Switches,
+) -> None:  # fmt: skip
+    """The switching functions that are no coordinates, within a step."""
+    between(y, F, theta, x)
+    evaluate(switches.functions, t + theta * h, x, p, own, switches.then)
+
+
+def correction(
+    f: Functions, t: float, h: float, whole: float, y: Array, p: Array, runs: Runs, work: Any, switches: Switches,
+    event: int,
+) -> float:  # fmt: skip
+    """Newton's correction of the step h whose end is to be a root of a switching function."""
+    E = len(switches.rows)
+    if event < E:
+        row = switches.rows[event]
+        gap, slope = runs.after[row, 0] - switches.levels[event], work.last[row, 0]
+    else:  # its slope from the dense output of the whole step
+        theta = h / whole
+        values(f, t, whole, theta + _NEAR, y, p, runs.own, work.F, runs.last, switches)
+        slope = switches.then[event - E, 0]
+        values(f, t, whole, theta - _NEAR, y, p, runs.own, work.F, runs.last, switches)
+        slope = (slope - switches.then[event - E, 0]) / (2 * _NEAR * whole)
+        evaluate(switches.functions, t + h, runs.after, p, runs.own, switches.then)
+        gap = switches.then[event - E, 0]
+    return -gap / slope if slope != 0.0 else 0.0
