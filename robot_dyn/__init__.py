@@ -32,11 +32,13 @@ if TYPE_CHECKING:
     from robot_dyn.control.reference import quintic as quintic
     from robot_dyn.control.reference import via_points as via_points
     from robot_dyn.control.samples import Samples as Samples
+    from robot_dyn.effects.actuator import ActuatorLag as ActuatorLag
     from robot_dyn.effects.actuator import EffortLimit as EffortLimit
     from robot_dyn.effects.effect import Active as Active
     from robot_dyn.effects.effect import Bound as Bound
     from robot_dyn.effects.effect import Conservative as Conservative
     from robot_dyn.effects.effect import Dissipative as Dissipative
+    from robot_dyn.effects.effect import Stateful as Stateful
     from robot_dyn.effects.friction import RegularisedCoulombFriction as RegularisedCoulombFriction
     from robot_dyn.effects.friction import ViscousFriction as ViscousFriction
     from robot_dyn.effects.joint_limit import JointStopDamper as JointStopDamper
@@ -45,6 +47,7 @@ if TYPE_CHECKING:
     from robot_dyn.effects.line_spring_damper import LineDamper as LineDamper
     from robot_dyn.effects.line_spring_damper import LineSpring as LineSpring
     from robot_dyn.effects.line_spring_damper import LineSpringDamper as LineSpringDamper
+    from robot_dyn.effects.lugre import LuGreFriction as LuGreFriction
     from robot_dyn.effects.plant import Plant as Plant
     from robot_dyn.effects.spring import Spring as Spring
     from robot_dyn.effects.wrench import ExternalWrench as ExternalWrench
@@ -82,6 +85,7 @@ if TYPE_CHECKING:
 # Public names and where they live; imported when first used, so that `import robot_dyn` stays light (PEP 562).
 _HOME = {
     "Active": "effects.effect",
+    "ActuatorLag": "effects.actuator",
     "Adaptive": "integrate.adaptive",
     "Ball": "arithmetic",
     "Bound": "effects.effect",
@@ -102,6 +106,7 @@ _HOME = {
     "LineDamper": "effects.line_spring_damper",
     "LineSpring": "effects.line_spring_damper",
     "LineSpringDamper": "effects.line_spring_damper",
+    "LuGreFriction": "effects.lugre",
     "ModelWarning": "errors",
     "OperationalSpace": "control.operational_space",
     "PD": "control.independent_joint",
@@ -118,6 +123,7 @@ _HOME = {
     "Samples": "control.samples",
     "Setup": "simulation.setup",
     "Spring": "effects.spring",
+    "Stateful": "effects.effect",
     "Stateless": "control.controller",
     "Trajectory": "simulation.trajectory",
     "ViscousFriction": "effects.friction",

@@ -63,11 +63,13 @@ def test_an_effect_has_one_name_in_python_scene_ledger_and_rollouts() -> None:
     built = {
         "viscous_friction": [rd.ViscousFriction(0.3)],
         "regularised_coulomb_friction": [rd.RegularisedCoulombFriction(0.2)],
+        "lugre_friction": [rd.LuGreFriction(100.0, 0.1, 0.2, 1.0, 1.2, 0.1)],
         "spring": [rd.Spring(2.0)],
         "joint_stops": rd.joint_stops(-1.0, 1.0),
         "line_spring_damper": rd.LineSpringDamper("tip", None, stiffness=1.0, damping=0.3, length=0.2).parts,
         "external_wrench": [rd.ExternalWrench("tip", [1.0, 0, 0, 0, 0, 0])],
         "effort_limit": [rd.EffortLimit(5.0)],
+        "actuator_lag": [rd.ActuatorLag(0.05)],
     }
     assert [kind for kind in kinds() if kind in built] == list(built)
     assert set(kinds()) - set(built) == {"gravity", "lock", "payload", "armature"}
@@ -76,7 +78,7 @@ def test_an_effect_has_one_name_in_python_scene_ledger_and_rollouts() -> None:
     plant = rd.Plant(robot, [effect for effects in built.values() for effect in effects])
     run = rd.simulate(plant, q0=[0.3, 0.4], duration_s=0.01, estimate_error=False)
     assert list(run.power) == [
-        "control", "viscous_friction", "regularised_coulomb_friction", "joint_stops",
+        "control", "viscous_friction", "regularised_coulomb_friction", "lugre_friction", "joint_stops",
         "line_spring_damper", "external_wrench",
     ]  # fmt: skip
 

@@ -86,6 +86,11 @@ EFFECTS = {
     ),
     "external_wrench": 'frame = "tip"\nforce_N = [1.0, 0.0, 0.0]',
     "effort_limit": "limit_N_m = 3.0",
+    "actuator_lag": "time_constant_s = {joint_1 = 0.02, joint_2 = 0.05}",
+    "lugre_friction": (
+        "bristle_stiffness_N_m_per_rad = 300.0\nbristle_damping_N_m_s_per_rad = 1.0\nviscous_N_m_s_per_rad = 0.4\n"
+        "coulomb_N_m = {joint_1 = 0.7}\nbreakaway_N_m = [1.1, 1.2]\nstribeck_velocity_rad_per_s = 0.1"
+    ),
     "payload": 'frame = "tip"\nmass_kg = 0.5',
     "armature": "inertia_kg_m2 = 0.1",
     "lock": "joints = {joint_1 = 0.2}",
@@ -113,11 +118,14 @@ def test_effect_of_a_scene_is_that_of_python(write, kind: str) -> None:
         ),
         "external_wrench": lambda: rd.Plant(robot, [rd.ExternalWrench("tip", [1, 0, 0, 0, 0, 0])]),
         "effort_limit": lambda: rd.Plant(robot, [rd.EffortLimit(3.0)]),
+        "actuator_lag": lambda: rd.Plant(robot, [rd.ActuatorLag([0.02, 0.05])]),
+        "lugre_friction": lambda: rd.Plant(robot, [rd.LuGreFriction(300.0, 1.0, 0.4, [0.7, 1.0], [1.1, 1.2], 0.1)]),
         "payload": lambda: rd.Plant(robot.with_(payload=rd.Payload("tip", 0.5))),
         "armature": lambda: rd.Plant(robot.with_(armature=0.1)),
         "lock": lambda: rd.Plant(robot.with_(lock={"joint_1": 0.2})),
     }[kind]()
     plant = rd.read_scene(write(text)).plant
+    assert [type(each) for each in plant.effects] == [type(each) for each in by_hand.effects]
     q, v, u = np.random.default_rng(3).uniform(1.0, 4.0, (3, plant.dynamics.n))
     expected = by_hand.forward_dynamics(0.05, q, v, u)
     np.testing.assert_array_equal(plant.forward_dynamics(0.05, q, v, u), expected)

@@ -39,6 +39,7 @@ def values() -> dict[str, Any]:
         rd.OperationalSpace(ARM, "tip", LINE, 1.0, 1.0, posture=Q, rows=(0, 2)), rd.EffortLimit([1.0, 2.0]),
         rd.ExternalWrench("tip", np.ones(6)), spring, damper, rd.RegularisedCoulombFriction([0.1, 0.2]), strut,
         *strut.parts, rd.Spring([1.0, 2.0]), rd.ViscousFriction([1.0, 2.0]), PLAN,
+        rd.ActuatorLag([0.1, 0.2]), rd.LuGreFriction(9.0, 1.0, 1.0, [1.0, 2.0], 2.0, 0.1),
         rd.Samples([0.0, 1.0, 2.0], np.ones((3, 2))), LINE,
         setup, run, runs, run.ledger, run.error, run.statistics, run.outcome, ARM.couplings, ARM.edits,
         rd.task_dynamics(ARM, Q, Q, "tip", rows=(0, 2)), rd.method("rk4"), rd.method("gauss_4"), rd.method("sdirk_3"),
@@ -52,7 +53,16 @@ VALUES = values()
 
 def test_every_public_class_is_looked_at() -> None:
     classes = {name for name in rd.__all__ if isclass(thing := getattr(rd, name)) and not isabstract(thing)}
-    own = {"Active", "Bound", "Conservative", "Controller", "Dissipative", "Dynamics", "ModelWarning", "RobotDynError"}
+    own = {
+        "Active",
+        "Bound",
+        "Conservative",
+        "Controller",
+        "Dissipative",
+        "Dynamics",
+        "ModelWarning",
+        "RobotDynError",
+    } | {"Stateful"}
     assert classes - own - {"Stateless"} <= VALUES.keys()  # the others are subclassed, or raised
 
 

@@ -14,7 +14,7 @@ import numpy as np
 import robot_dyn as rd
 from robot_dyn.arithmetic import Arithmetic
 from robot_dyn.control.controller import Controller
-from robot_dyn.effects.effect import Bound, Conservative, Effect, Force
+from robot_dyn.effects.effect import Bound, Conservative, Effect, Force, Stateful
 from robot_dyn.integrate.integrator import System
 from tests.queries import ARGUMENTS, FRAMED
 
@@ -30,7 +30,7 @@ NOT_OBJECTS = (None, 3, NAN, True, "no such", object(), np.ones(2), MASKED, {"a"
 RESULTS = {"Comparison", "Rollouts", "Trajectory"}  # made by the library: their constructors take what it computed
 # What time loops and traces call, with numbers that were checked before, or symbols.
 INTERFACES = (Effect, Controller, Arithmetic)
-FOR_LOOPS = {name for kind in (Force, Conservative, Bound, Controller, Arithmetic) for name in dir(kind)}
+FOR_LOOPS = {name for kind in (Force, Conservative, Bound, Stateful, Controller, Arithmetic) for name in dir(kind)}
 FOR_LOOPS |= {"task_acceleration"}
 LAX = {  # arguments that may be infinite or unknown, or of any shape
     "ExternalWrench.acts": {"t"},
@@ -107,6 +107,7 @@ def examples(folder: Path) -> dict[str, Example]:
         "Ball": (rd.Ball, {"bits": 53}),
         "Compiled": (rd.Compiled, {"robot_or_plant": robot, "dtype": "float64", "threads": 1, "cache": False}),
         "ComputedTorque": (rd.ComputedTorque, pair),
+        "ActuatorLag": (rd.ActuatorLag, {"time_constant": [0.1, 0.2]}),
         "EffortLimit": (rd.EffortLimit, {"limit": [1.0, 2.0]}),
         "Event": (rd.Event, {"function": lambda t, q, v: 1.0, "direction": 1, "terminal": True, "name": "high"}),
         "ExternalWrench": (
@@ -184,6 +185,13 @@ def examples(folder: Path) -> dict[str, Example]:
         ),
         "gains_from": (rd.gains_from, {"inertia_diagonal": [1.0, 2.0], "frequency": 3.0, "damping_ratio": 0.9}),
         "hold": (rd.hold, {"q": q}),
+        "LuGreFriction": (
+            rd.LuGreFriction,
+            {
+                "bristle_stiffness": 90.0, "bristle_damping": 0.3, "viscous": 0.1, "coulomb": 1.0,
+                "breakaway": [1.5, 1.2], "stribeck_velocity": 0.1,
+            },
+        ),
         "LineDamper": (rd.LineDamper, strut | {"damping": 0.1}),
         "LineSpring": (rd.LineSpring, strut | {"stiffness": 10.0, "length": 0.2}),
         "LineSpringDamper": (rd.LineSpringDamper, strut | {"stiffness": 10.0, "damping": 0.1, "length": 0.2}),

@@ -18,7 +18,7 @@ from robot_dyn.compiled.parameters import CONTROLLER, Part
 from robot_dyn.compiled.symbolic import Symbols, TraceError, column, every_branch
 from robot_dyn.control.controller import Controller
 from robot_dyn.control.reference import polynomial
-from robot_dyn.effects.effect import Active, Bound, Conservative, Effect
+from robot_dyn.effects.effect import Active, Bound, Conservative, Effect, Stateful
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foreign import because
 
@@ -85,6 +85,8 @@ class Piece:
 
 def _traced(effect: Effect, values: Mapping[str, Array]) -> Effect:
     own = with_values(effect, values)
+    if isinstance(effect, Stateful):
+        return _StatefulBound(own) if isinstance(effect, Bound) else _StatefulForce(own)
     if isinstance(effect, Bound):
         return _TracedBound(own)
     return _TracedConservative(own) if isinstance(effect, Conservative) else _TracedForce(own)
@@ -108,8 +110,8 @@ class _Part:
 class _Torque(_Part):
     """The torque of a force."""
 
-    def torque(self, dynamics: Any, t: Any, q: Array, v: Array) -> Array:
-        return self.traced(lambda: self.inner.torque(dynamics, t, q, v), dynamics.n)
+    def torque(self, dynamics: Any, t: Any, q: Array, v: Array, *z: Array) -> Array:
+        return self.traced(lambda: self.inner.torque(dynamics, t, q, v, *z), dynamics.n)
 
 
 class _TracedForce(_Torque, Active):
@@ -126,8 +128,26 @@ class _TracedConservative(_Torque, Conservative):
 class _TracedBound(_Part, Bound):
     """A bound on the actuation."""
 
-    def actuation(self, u: Array) -> Array:
-        return self.traced(lambda: self.inner.actuation(u), len(u))
+    def actuation(self, u: Array, *z: Array) -> Array:
+        return self.traced(lambda: self.inner.actuation(u, *z), len(u))
+
+
+class _States(_Part, Stateful):
+    """The states of an effect."""
+
+    def state_size(self, n: int) -> int:
+        return self.inner.state_size(n)
+
+    def state_rate(self, dynamics: Any, t: Any, q: Array, v: Array, u: Array, z: Array) -> Array:
+        return self.traced(lambda: self.inner.state_rate(dynamics, t, q, v, u, z), len(z))
+
+
+class _StatefulForce(_States, _TracedForce):
+    """A torque with states."""
+
+
+class _StatefulBound(_States, _TracedBound):
+    """A bound with states."""
 
 
 @final

@@ -1,4 +1,4 @@
-"""What drives can do: |u| ≤ u_max."""
+"""What drives can do: |u| ≤ u_max, and u' = (u_command − u) / T."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.coefficients import URDF, coefficient
-from robot_dyn.effects.effect import Bound, Effect
+from robot_dyn.effects.effect import Bound, Effect, Stateful
 from robot_dyn.errors import EffectError
+from robot_dyn.model.dynamics import Dynamics
 
 
 @final
@@ -38,6 +39,33 @@ class EffortLimit(Bound):
 
     def actuation(self, u: Array) -> Array:
         return np.minimum(np.maximum(u, -self.limit), self.limit)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class ActuatorLag(Stateful, Bound):
+    """The actuation follows its command with a lag of first order: u' = (u_command − u) / T, from u = 0.
+
+    Of the bounds of a plant, those before it act on the command, and those after it on u.
+
+    Attributes:
+        time_constant: T, a scalar or (n,), in [s], positive.
+    """
+
+    time_constant: Any = field(metadata=coefficient("s", symbol="T", above=0))
+
+    term = "u' = (u_command − u) / T"
+
+    def state_size(self, n: int) -> int:
+        return n
+
+    def state_rate(self, dynamics: Dynamics, t: float, q: Array, v: Array, u: Array, z: Array) -> Array:
+        return (u - z) / self.time_constant
+
+    def actuation(  # pyright: ignore[reportIncompatibleMethodOverride]  with its states
+        self, u: Array, z: Array
+    ) -> Array:
+        return z
 
 
 def stated_efforts(robot: Any) -> np.ndarray:

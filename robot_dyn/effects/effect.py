@@ -118,6 +118,36 @@ class Active(Force):
     """An effect whose power torqueᵀ v may have either sign. Contract as of `Effect`."""
 
 
+class Stateful(Effect, ABC):
+    """An effect with states z of its own, ż = rate(t, q, v, u, z), z(0) = 0, which are integrated with the plant.
+
+    It is of another kind besides. The torque of such a force is torque(dynamics, t, q, v, z), and what such a bound
+    leaves is actuation(u, z). A dissipative one obeys torqueᵀ v + dE/dt ≤ 0, with E the energy that its states store.
+    A plant that is asked for one state takes z = 0, and its actuation as it is.
+    """
+
+    @abstractmethod
+    def state_size(self, n: int) -> int:
+        """Number of its states on an arm of n joints."""
+
+    @abstractmethod
+    def state_rate(self, dynamics: Dynamics, t: float, q: Array, v: Array, u: Array, z: Array) -> Array:
+        """ż, (state_size,), in the unit of z per s.
+
+        Args:
+            dynamics: As of `Effect`, as are t, q and v, of one state.
+            t: Time.
+            q: Position.
+            v: Velocity.
+            u: The actuation, (n,), in [N m] or [N]; for a bound what the bounds before it leave.
+            z: Its states, (state_size,).
+        """
+
+    def stored_energy(self, dynamics: Dynamics, t: float, q: Array, z: Array) -> Array:
+        """Energy E that its states hold, in [J], for the ledger; 0 unless it says otherwise."""
+        return 0 * q[..., 0]
+
+
 class Bound(Effect, ABC):
     """An effect that bounds the actuation, by the order of a plant's effects. Contract as of `Effect`."""
 

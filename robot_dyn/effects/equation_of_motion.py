@@ -7,17 +7,19 @@ Its arguments are not checked: floats, balls or symbols. [Murray, Li, Sastry 199
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import final
+from typing import Any, final
 
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.effects.effect import Bound, Conservative, Effect, Force
+from robot_dyn.effects.effect import Bound, Conservative, Effect, Force, Stateful
 from robot_dyn.errors import EffectError
 from robot_dyn.foreign import call, users_line
 from robot_dyn.model.dynamics import Dynamics
+from robot_dyn.validate import integer
 
 
 @final
@@ -38,13 +40,48 @@ class EquationOfMotion:
         """The effects that are torques."""
         return tuple(effect for effect in self.effects if isinstance(effect, Force))
 
-    def torques(self, t: float, q: Array, v: Array, shape: tuple[int, ...] | None = None) -> list[Array]:
-        """The torque of each force, of the shape if one is given; EffectError if one does not fit the joints."""
-        return [self._torque_of(force, t, q, v, shape) for force in self.forces]
+    @cached_property
+    def states(self) -> Mapping[int, slice]:
+        """Where the states of effects stand among those of all, by the number of the effect."""
+        places, end = {}, 0
+        for k, effect in enumerate(self.effects):
+            if isinstance(effect, Stateful):
+                size = integer(f"state_size of {effect.name}", effect.state_size(self.dynamics.n), error=EffectError)
+                places[k], end = slice(end, end + size), end + size
+        return places
 
-    def _torque_of(self, force: Force, t: float, q: Array, v: Array, shape: tuple[int, ...] | None) -> Array:
+    @cached_property
+    def state_size(self) -> int:
+        """Number of states of all effects."""
+        return max((place.stop for place in self.states.values()), default=0)
+
+    def torques(
+        self, t: float, q: Array, v: Array, shape: tuple[int, ...] | None = None, z: Array | None = None
+    ) -> list[Array]:
+        """The torque of each force, of the shape if one is given, at states z of the effects, 0 unless given.
+
+        Raises:
+            EffectError: If one does not fit the joints.
+        """
+        return [
+            self._torque_of(force, (t, q, v, *self._own(k, v, z)), shape)
+            for k, force in enumerate(self.effects)
+            if isinstance(force, Force)
+        ]
+
+    def _own(self, k: int, v: Array, z: Array | None) -> tuple[Array, ...]:
+        """The states of an effect, as its last argument; nothing if it has none."""
+        if k not in self.states:
+            return ()
+        place = self.states[k]
+        if z is None:
+            return (np.zeros((*v.shape[:-1], place.stop - place.start), dtype=v.dtype).view(type(v)),)
+        return (z[place],)
+
+    def _torque_of(self, force: Force, state: tuple[Any, ...], shape: tuple[int, ...] | None) -> Array:
+        v = state[2]
         try:
-            torque = call(force.torque, self.dynamics, t, q, v)
+            torque = call(force.torque, self.dynamics, *state)
             return torque if shape is None or np.shape(torque) == shape else np.broadcast_to(torque, shape)
         except (TypeError, ValueError) as error:
             if users_line(error):
@@ -54,17 +91,55 @@ class EquationOfMotion:
             ) from None
 
     def actuation(self, u: Array) -> Array:
-        """What the bounds leave of the actuation u, in the order of the effects; EffectError if one does not fit."""
-        shape = np.shape(u)
-        for effect in self.effects:
-            if isinstance(effect, Bound):
-                try:
-                    u = call(effect.actuation, u)
-                except (TypeError, ValueError) as error:
-                    if users_line(error):
-                        raise
-                    raise EffectError(f"{effect.name} does not fit an actuation of shape {shape}: {error}") from None
+        """What the bounds leave of the actuation u, in the order of the effects; one with states leaves it as it is.
+
+        Raises:
+            EffectError: If one does not fit.
+        """
+        for k, effect in enumerate(self.effects):
+            if isinstance(effect, Bound) and k not in self.states:
+                u = self._bounded(effect, u)
         return u
+
+    @cached_property
+    def _lags(self) -> int:
+        """Number of the first bound with states: what is held between ticks is what the bounds before it leave."""
+        return next((k for k in self.states if isinstance(self.effects[k], Bound)), len(self.effects))
+
+    def commanded(self, u: Array) -> Array:
+        """What the bounds before the first one with states leave of the actuation u."""
+        for effect in self.effects[: self._lags]:
+            if isinstance(effect, Bound):
+                u = self._bounded(effect, u)
+        return u
+
+    def applied(self, u: Array, z: Array) -> tuple[Array, Mapping[int, Array]]:
+        """What the other bounds leave of it, at states z of the effects; and what reaches each that has states."""
+        reached = {}
+        for k in range(self._lags, len(self.effects)):
+            effect = self.effects[k]
+            if isinstance(effect, Bound):
+                reached[k] = u
+                u = self._bounded(effect, u, *self._own(k, u, z))
+        return u, reached
+
+    def _bounded(self, bound: Bound, u: Array, *own: Array) -> Array:
+        try:
+            return call(bound.actuation, u, *own)
+        except (TypeError, ValueError) as error:
+            if users_line(error):
+                raise
+            raise EffectError(f"{bound.name} does not fit an actuation of shape {np.shape(u)}: {error}") from None
+
+    def state_rates(
+        self, t: float, q: Array, v: Array, u: Array, reached: Mapping[int, Array], z: Array
+    ) -> list[tuple[slice, Array]]:
+        """ż of each effect with states, with its place, at the actuation u and what reaches each bound of it."""
+        return [
+            (place, call(effect.state_rate, self.dynamics, t, q, v, reached.get(k, u), z[place]))
+            for k, place in self.states.items()
+            if isinstance(effect := self.effects[k], Stateful)
+        ]
 
     def N(self, q: Array, torque: Array) -> Array:
         """Every force but actuation, with the torque Σ τ_effect."""

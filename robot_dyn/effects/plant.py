@@ -11,7 +11,7 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.arithmetic import FLOAT64, Arithmetic, Array
-from robot_dyn.effects.effect import Bound, Effect, Force
+from robot_dyn.effects.effect import Bound, Conservative, Effect, Force, Stateful
 from robot_dyn.effects.equation_of_motion import EquationOfMotion
 from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFriction
 from robot_dyn.errors import EffectError, OverflowedError, shown
@@ -49,6 +49,8 @@ class Plant:
                     f"{shown(part)} is neither a Force nor a Bound, so nothing would evaluate it; subclass"
                     " Conservative, Dissipative, Active or Bound"
                 )
+            if isinstance(part, Conservative) and isinstance(part, Stateful):
+                raise EffectError(f"{part.name} is Conservative and has states; its energy is their stored_energy")
         object.__setattr__(self, "effects", tuple(part.on(dynamics) for part in parts))
 
     @cached_property

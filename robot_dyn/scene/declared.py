@@ -61,7 +61,8 @@ def declared_part(
     for key, (name, each) in keys.items():
         default = defaults[name].default
         default = (URDF if each.stated else ...) if default is Parameter.empty else default
-        none = "; joints left out have none" if isinf(each.elsewhere) else ""
+        none = f"; joints left out have {'none' if isinf(each.elsewhere) else f'{each.elsewhere:g}'}"
+        none = none if each.elsewhere else ""
         fields[key] = (Stated if each.stated else PerJoint, Field(default, description=f"{each.symbol}{none}."))
     text = text or (getdoc(classes[0]) or "").partition("\n\nAttributes:")[0]
     part = create_model(kind, __base__=Declared, __doc__=text, **fields)

@@ -7,11 +7,12 @@ from typing import Annotated, Literal, Union, get_args
 
 from pydantic import Field
 
-from robot_dyn.effects.actuator import EffortLimit
+from robot_dyn.effects.actuator import ActuatorLag, EffortLimit
 from robot_dyn.effects.effect import Effect
 from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFriction
 from robot_dyn.effects.joint_limit import JointStopDamper, JointStopSpring, joint_stops
 from robot_dyn.effects.line_spring_damper import LineSpringDamper
+from robot_dyn.effects.lugre import LuGreFriction
 from robot_dyn.effects.spring import Spring
 from robot_dyn.effects.wrench import ExternalWrench
 from robot_dyn.errors import SceneError
@@ -134,6 +135,7 @@ EDITS = Gravity, Lock, Load, Armature
 ACTING = (
     declared_part("viscous_friction", ViscousFriction),
     declared_part("regularised_coulomb_friction", RegularisedCoulombFriction),
+    declared_part("lugre_friction", LuGreFriction),
     declared_part("spring", Spring),
     declared_part(
         "joint_stops", JointStopSpring, JointStopDamper, make=joint_stops,
@@ -142,6 +144,7 @@ ACTING = (
     Line,
     Wrench,
     declared_part("effort_limit", EffortLimit),
+    declared_part("actuator_lag", ActuatorLag),
 )  # fmt: skip
 Edit = Gravity | Lock | Load | Armature
 AnyEffect = Annotated[Union[EDITS + ACTING], Field(discriminator="kind")]  # pyright: ignore  # noqa: UP007

@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from robot_dyn.effects.actuator import ActuatorLag, EffortLimit
 from robot_dyn.errors import RobotDynError
 from robot_dyn.integrate.adaptive import ADAPTIVE
 from robot_dyn.scene.control import LAWS, Control
+from robot_dyn.scene.declared import Declared
 from robot_dyn.scene.effects import ACTING, kind_of
 from robot_dyn.scene.scene import Scene
 from robot_dyn.scene.schema import Part
@@ -17,6 +19,7 @@ from robot_dyn.simulation.origin import edits_of_machine_code
 from robot_dyn.simulation.setup import Setup
 
 _TERMS = {kind_of(part): part.term for part in ACTING}
+_BOUNDS = [kind_of(part) for part in ACTING if issubclass(part, Declared) and part.make in (EffortLimit, ActuatorLag)]
 _EDITS = {
     "gravity": "∂V/∂q in N, with V = −Σ m gᵀ p",
     "lock": "a joint held at a value, its link part of the link before",
@@ -28,7 +31,7 @@ _EDITS = {
 def explain(scene: Scene, setup: Setup) -> Iterator[str]:
     """The explanation, line by line."""
     named = {effect.kind for effect in scene.effect}
-    forces = [kind for kind in _TERMS if kind in named and kind != "effort_limit"]
+    forces = [kind for kind in _TERMS if kind in named and kind not in _BOUNDS]
     gravity = ["∂V/∂q"] if "gravity" in named else []
     N = " ".join([*gravity, *(f"− τ_{kind}" for kind in forces)]).removeprefix("− ") or "0"
     N = f"−{N}" if not gravity and forces else N

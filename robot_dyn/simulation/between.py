@@ -73,14 +73,16 @@ def _stop(
 
 def _code(equation: StateEquation, part: Any, path: Path, q: np.ndarray, v: np.ndarray, error: float) -> Missed | None:
     """A torque that stands out between two steps from what it is at their ends."""
-    n, m, dynamics = equation.plant.dynamics.n, equation.state_size, equation.plant.dynamics
+    n, m, dynamics = equation.plant.dynamics.n, equation.states, equation.plant.dynamics
+    own = slice(0, equation.state_size) if isinstance(part, Controller) else _states_of(equation, part)
     if not isinstance(part, Force | Controller) or (isinstance(part, Controller) and equation.sampled):
         return None
 
     def torque(t: float, q: np.ndarray, v: np.ndarray, z: np.ndarray) -> np.ndarray:
         if isinstance(part, Controller):
-            return np.asarray(call(part.torque, t, q, v, z), dtype=float)
-        return np.broadcast_to(np.asarray(call(part.torque, dynamics, t, q, v), dtype=float), (n,))
+            return np.asarray(call(part.torque, t, q, v, z[own]), dtype=float)
+        state = (t, q, v) if own is None else (t, q, v, z[own])
+        return np.broadcast_to(np.asarray(call(part.torque, dynamics, *state), dtype=float), (n,))
 
     every = max(1, len(path.t) // LOOKS)
     t, q, v, z = path.t[::every], q[::every], v[::every], path.y[::every, 2 * n : 2 * n + m]
@@ -100,6 +102,14 @@ def _code(equation: StateEquation, part: Any, path: Path, q: np.ndarray, v: np.n
         if _displacement(equation, path, path.y[:, :n], k * every, jump[k]) > error:
             why = f"{named(part)} acts between steps after t = {t[k]:g} s and not at their ends"
             return Missed(float(t[k]), f"{why}; declare its times as `switches`")
+    return None
+
+
+def _states_of(equation: StateEquation, part: Any) -> slice | None:
+    """Where the states of an effect stand behind q and v; None if it has none."""
+    for k, place in equation.equation_of_motion.states.items():
+        if equation.plant.effects[k] is part:
+            return slice(equation.state_size + place.start, equation.state_size + place.stop)
     return None
 
 

@@ -267,7 +267,7 @@ def walk(runs: Runs, kept: Kept, rules: Rules, now: Array, t: float, latest: Arr
     kept.columns[0, column], kept.columns[1, column] = t, acted or rules.held == 0
     copy(kept.columns[2 : 2 + n, column], runs.y[:n, 0])
     copy(kept.columns[2 + n : 2 + 2 * n, column], runs.y[n : 2 * n, 0])
-    copy(kept.columns[2 + 2 * n :, column], runs.own[:n, 0] if rules.held > 0 else latest[m : m + n, 0])
+    copy(kept.columns[2 + 2 * n :, column], latest[m : m + n, 0])
     now[Now.COLUMN] += 1
 
 

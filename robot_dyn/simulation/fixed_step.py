@@ -182,8 +182,8 @@ class FixedStep:
         )
         self.runs.y[:, 0] = y = one_step(method, right_side, t, y, h, self.watch)
         if observer is not None:
-            held = self.runs.own[: self.rules.held, 0] if self.equation.sampled else None
-            observer.step(t + h, y, held, held is None or (self.now[Now.STEP] == 0 and self.segments[s].tick))
+            ticked = self.now[Now.STEP] == 0 and self.segments[s].tick
+            observer.step(t + h, y, ticked or not self.equation.sampled)
         self.now[Now.STEP] += 1
         self.now[Now.STEPS] += 1
         if self.now[Now.STEPS] % WATCHED == 0:

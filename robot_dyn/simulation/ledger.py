@@ -5,7 +5,7 @@ A residual near zero is necessary for a run to be right, not sufficient: the err
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import final
 
 import numpy as np
@@ -23,12 +23,14 @@ class Ledger(Value):
         potential: Of gravity and of the conservative effects.
         work: Done up to each sample by the control and by each other effect, by name.
         kinetic_peak: Largest K between the samples that is known.
+        stored: Of effects with states, by name: what these hold of the energy that their work took.
     """
 
     kinetic: np.ndarray
     potential: np.ndarray
     work: dict[str, np.ndarray]
     kinetic_peak: float = 0.0
+    stored: dict[str, np.ndarray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         read_only(self)

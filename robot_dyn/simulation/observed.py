@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.effects.effect import Dissipative
+from robot_dyn.effects.effect import Dissipative, Stateful
 from robot_dyn.errors import RobotDynError
 from robot_dyn.model.robot import Robot
 from robot_dyn.model.units import unit
@@ -28,7 +28,7 @@ def observer_of(setup: Setup, equation: StateEquation) -> Observer:
     u = np.full(len(setup.q0), np.nan)
     if not equation.sampled:
         with suppress(RobotDynError):  # the run will tell
-            u = equation.command(0.0, setup.q0, setup.v0, np.zeros(equation.state_size))
+            u = equation.actuation(0.0, setup.q0, setup.v0, np.zeros(equation.states), None)
     start = np.concatenate([setup.q0, setup.v0, u])
     return Observer(start, levels(setup.plant, setup.controller), equation.canonical)
 
@@ -55,7 +55,11 @@ def remarks(
 
 def _gaining(setup: Setup, t: np.ndarray, power: dict[str, np.ndarray]) -> Iterator[Remark]:
     """Effects declared dissipative with τᵀv > 0 at a sample, by more than rounding."""
-    declared = {effect.name for effect in setup.plant.effects if isinstance(effect, Dissipative)}
+    declared = {
+        effect.name
+        for effect in setup.plant.effects
+        if isinstance(effect, Dissipative) and not isinstance(effect, Stateful)  # which may give back what they store
+    }
     for name, P in power.items():
         if name.partition(" ")[0] not in declared or not (np.nan_to_num(P) > _ROUNDING * np.nanmax(np.abs(P))).any():
             continue

@@ -44,8 +44,7 @@ class Observer:
         columns: (2 + 3n, CHUNK and some): end of the step in [s]; 1 where the controller acted at its start, else 0;
             q and v at its end; the actuation u during it.
         filled: Number of columns written.
-        seen: v and u of the latest evaluation of the equation of motion, (2n,): of steps in (q, p), and of continuous
-            control, where the state has them not.
+        seen: v and u of the latest evaluation of the equation of motion, (2n,).
         canonical: Whether steps are in (q, p).
         visits: By level.
         chatter: Of the actuation.
@@ -70,11 +69,11 @@ class Observer:
         """Columns that can still be written."""
         return self._chunk - self.filled
 
-    def step(self, t: float, y: Array, held: Array | None, acted: bool) -> None:
-        """One step to the state y at t; the controller `acted` at its start, and holds `held` if it is sampled."""
+    def step(self, t: float, y: Array, acted: bool) -> None:
+        """One step to the state y at t; whether the controller `acted` at its start. Its actuation is `seen`."""
         n, column = self.n, self.columns[:, self.filled]
         column[0], column[1], column[2 : 2 + 2 * n] = t, acted, y[: 2 * n]
-        column[2 + 2 * n :] = self.seen[n:] if held is None else held
+        column[2 + 2 * n :] = self.seen[n:]
         if self.canonical:
             column[2 + n : 2 + 2 * n] = self.seen[:n]
         self.filled += 1

@@ -77,7 +77,10 @@ def _follows(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Acceleration, torque, powers and energies at the samples."""
     equation = StateEquation(setup.plant, setup.controller)
-    if u is None and (equation.sampled or equation.state_size):
+    if equation.equation_of_motion.state_size:  # torques depend on states that are not recorded
+        nothing, energies = np.full_like(q, np.nan), np.column_stack(equation.energies(0.0, q, v))
+        return nothing, nothing if u is None else u, np.full((len(t), len(equation.sources)), np.nan), energies
+    if u is None and (equation.sampled or equation.states):
         u = np.full_like(q, np.nan)  # it depends on what was before
     made = np.full((len(t), equation.size + q.shape[1] + 2), np.nan)
     rest = np.zeros((len(t), equation.size - 2 * q.shape[1]))

@@ -24,12 +24,15 @@ def columns(equation: StateEquation, t: np.ndarray, y: np.ndarray, made: np.ndar
     q, v, a, u = y[:, :n], y[:, n : 2 * n], made[:, n : 2 * n], made[:, m : m + n]
     if equation.canonical:  # y holds the momentum, and y' its rate
         v = made[:, :n]
-        a = np.array([_acceleration(equation, *each) for each in zip(t, q, v, u, strict=True)]).reshape(q.shape)
+        z = y[:, 2 * n : works]
+        a = np.array([_acceleration(equation, *each) for each in zip(t, q, v, z, u, strict=True)]).reshape(q.shape)
     return q, v, a, u, y[:, works:], made[:, works:m], made[:, m + n :]
 
 
-def _acceleration(equation: StateEquation, t: float, q: np.ndarray, v: np.ndarray, u: np.ndarray) -> np.ndarray:
+def _acceleration(
+    equation: StateEquation, t: float, q: np.ndarray, v: np.ndarray, z: np.ndarray, u: np.ndarray
+) -> np.ndarray:
     try:
-        return equation.plant.forward_dynamics(float(t), q, v, u)
+        return equation.acceleration(float(t), q, v, z, u)
     except RobotDynError:
         return np.full_like(q, np.nan)

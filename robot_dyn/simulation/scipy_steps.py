@@ -174,16 +174,16 @@ class ScipySteps:
         self.key += 1
 
     def _observe(self, t: float, y: Array, ticked: bool) -> None:
-        """Show a step; the actuation of continuous control is that at its end."""
+        """Show a step, and the actuation at its end."""
         if self.observer is None:
             return
-        if not self.equation.sampled:
-            try:
-                q, v, z, _ = self.equation.state(y)
-                self.observer.seen[len(q) :] = self.equation.command(t, q, v, z)
-            except RobotDynError:  # y may be far off where a run fails
-                return
-        self.observer.step(t, y, self.own[: self.held, 0] if self.equation.sampled else None, ticked)
+        held = self.own[: self.held, 0] if self.equation.sampled else None
+        try:
+            q, v, z, _ = self.equation.state(y)
+            self.observer.seen[len(q) :] = self.equation.actuation(t, q, v, z, held)
+        except RobotDynError:  # y may be far off where a run fails
+            return
+        self.observer.step(t, y, ticked)
 
     def _record(self, outcome: Outcome) -> Record:
         kept, m = self.samples, self.equation.size

@@ -108,6 +108,13 @@ class Setup(Value):
             torques = self.plant.equation_of_motion.torques(0.0, self.q0, self.v0)
             for force, torque in zip(self.plant.forces, torques, strict=True):
                 returned(f"{type(force).__name__}.torque", torque, dynamics.n, error=EffectError)
+            equation = self.plant.equation_of_motion
+            u, z = np.zeros(dynamics.n), np.zeros(equation.state_size)
+            u, reached = equation.applied(u, z)
+            names = (type(self.plant.effects[k]).__name__ for k in equation.states)
+            rates = equation.state_rates(0.0, self.q0, self.v0, u, reached, z)
+            for name, (place, rate) in zip(names, rates, strict=True):
+                returned(f"{name}.state_rate", rate, place.stop - place.start, "state", error=EffectError)
         if controller is None:
             return
         with np.errstate(all="ignore"), suppress(OverflowedError):  # of its model: the outcome of a run

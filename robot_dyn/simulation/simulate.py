@@ -150,7 +150,13 @@ def _trajectory(
     t = record.t
     q, v, a, u, W, P, E = columns(equation, t, record.y, record.made)
     desired, deviation = deviation_of(setup, t, q)
-    ledger = Ledger(E[:, 0], E[:, 1], dict(zip(equation.sources, W.T, strict=True)), record.kinetic_peak)
+    ledger = Ledger(
+        E[:, 0],
+        E[:, 1],
+        dict(zip(equation.sources, W.T, strict=True)),
+        record.kinetic_peak,
+        equation.stored(t, record.y),
+    )
     power = dict(zip(equation.sources, P.T, strict=True))
     plant = setup.plant
     names, about = plant.dynamics.joint_names, origin(plant.dynamics) | edits | setup.about
@@ -160,7 +166,7 @@ def _trajectory(
         names, t, q, v, a, u, power, ledger, desired, deviation, record.outcome, statistics, error, about,
         wrenches(plant, t, q), at_stop(plant, q),
         remarks(setup, observer, t, np.hstack([q, v, u]), power), observer.extremes, acting(setup),
-        equation.controller_states(record.y), record.events,
+        equation.controller_states(record.y), record.events, equation.effect_states(record.y),
     )  # fmt: skip
 
 

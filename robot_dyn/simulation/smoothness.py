@@ -16,6 +16,7 @@ from robot_dyn.control.controller import Controller
 from robot_dyn.effects.actuator import EffortLimit
 from robot_dyn.effects.friction import RegularisedCoulombFriction
 from robot_dyn.effects.joint_limit import JointStopDamper, JointStopSpring
+from robot_dyn.effects.lugre import LuGreFriction
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.record import Path
@@ -92,6 +93,8 @@ def first_kink(setup: Setup, equation: StateEquation, path: Path) -> tuple[float
             crosses = (v[:-1] * v[1:] <= 0) & (np.abs(np.diff(v, axis=0)) * _IN_LAYER > effect.velocity_scale * steps)
             crosses &= np.broadcast_to(np.asarray(effect.friction) > 0, crosses.shape)
             found.append(_first(path.t, crosses, "dry friction reverses within a few steps"))
+        elif isinstance(effect, LuGreFriction):
+            found.append(_first(path.t, v[:-1] * v[1:] <= 0, "a joint with bristles stands or reverses"))
     found.append(_saturation(setup, equation, path, q, v))
     return min(found)
 

@@ -1,7 +1,8 @@
 """The state equation: the motion of a plant as a first-order system y' = f(t, y), with y = (q, v or p, z, W).
 
     q' = v,   v' = M⁻¹ (u + Σ τ − C v − N)   or   p' = u + Σ τ + Cᵀ v − N with p = M v,
-    z' = rate of the controller states,   W_k' = τ_kᵀ v: the work of the control and of each effect without a potential
+    z' = rate of the states of the controller, then of the effects,
+    W_k' = τ_kᵀ v: the work of the control and of each effect without a potential
 
 [Murray, Li, Sastry 1994, ch. 4; Hairer, Lubich, Wanner 2006, §VI.1 for canonical coordinates]
 """
@@ -16,7 +17,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.control.controller import Controller
-from robot_dyn.effects.effect import Conservative
+from robot_dyn.effects.effect import Conservative, Stateful
 from robot_dyn.effects.equation_of_motion import EquationOfMotion
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import RobotDynError
@@ -52,21 +53,22 @@ class StateEquation:
     @cached_property
     def sources(self) -> tuple[str, ...]:
         """Names of the works in y: control, then effects; a second effect of a name gets a number."""
-        names: list[str] = [CONTROL]
-        for force in (force for force in self.plant.forces if not isinstance(force, Conservative)):
-            count = sum(name.split(" ")[0] == force.name for name in names)
-            names.append(f"{force.name} {count + 1}" if count else force.name)
-        return tuple(names)
+        return _numbered(CONTROL, *(x.name for x in self.plant.forces if not isinstance(x, Conservative)))
 
     @cached_property
     def state_size(self) -> int:
         """Number of states of the controller."""
         return self.controller.state_size if self.controller else 0
 
+    @cached_property
+    def states(self) -> int:
+        """Number of states of the controller and of the effects."""
+        return self.state_size + self.equation_of_motion.state_size
+
     @property
     def size(self) -> int:
         """Number m of entries of y."""
-        return 2 * self.plant.dynamics.n + self.state_size + len(self.sources)
+        return 2 * self.plant.dynamics.n + self.states + len(self.sources)
 
     @cached_property
     def widths(self) -> np.ndarray:
@@ -79,13 +81,13 @@ class StateEquation:
         return widths
 
     def start(self, q: Array, v: Array) -> Array:
-        """Y at the start: controller states and works are zero."""
+        """Y at the start: states of controller and effects, and works, are zero."""
         second = self.plant.dynamics.momentum(q, v) if self.canonical else v
-        return np.concatenate([q, second, np.zeros(self.state_size + len(self.sources))])
+        return np.concatenate([q, second, np.zeros(self.states + len(self.sources))])
 
     def state(self, y: Array) -> tuple[Array, Array, Array, Array]:
-        """q, v, z, W of y."""
-        n, m = self.plant.dynamics.n, self.state_size
+        """q, v, z, W of y, with z the states of the controller, then of the effects."""
+        n, m = self.plant.dynamics.n, self.states
         q, second = y[:n], y[n : 2 * n]
         v = acceleration(self.plant.M(q), second, self.plant.dynamics.joint_names) if self.canonical else second
         return q, v, y[2 * n : 2 * n + m], y[2 * n + m :]
@@ -94,6 +96,27 @@ class StateEquation:
         """Controller states in states y (k, m), (k, state_size); None without any."""
         n, m = self.plant.dynamics.n, self.state_size
         return y[:, 2 * n : 2 * n + m].copy() if m else None
+
+    def effect_states(self, y: Array) -> dict[str, Array]:
+        """States of each effect that has some in states y (k, m), (k, size) by name."""
+        first, equation = 2 * self.plant.dynamics.n + self.state_size, self.equation_of_motion
+        names = _numbered(*(self.plant.effects[k].name for k in equation.states))
+        places = zip(names, equation.states.values(), strict=True)
+        return {name: y[:, first + place.start : first + place.stop].copy() for name, place in places}
+
+    def stored(self, t: Array, y: Array) -> dict[str, Array]:
+        """Energy that the states of effects hold at times t (k,) and states y (k, m), (k,) by name."""
+        held = self.effect_states(y)
+        effects = [x for x in self.plant.effects if isinstance(x, Stateful)]
+        return {
+            name: np.array(
+                [
+                    call(effect.stored_energy, self.plant.dynamics, *state)
+                    for state in zip(t, y[:, : self.plant.dynamics.n], z, strict=True)
+                ]
+            ).reshape(len(t))
+            for effect, (name, z) in zip(effects, held.items(), strict=True)
+        }
 
     def velocities(self, y: Array) -> Array:
         """V of states y (k, m), (k, n)."""
@@ -111,10 +134,20 @@ class StateEquation:
         return self.plant.dynamics.joint_names[int(np.argmax(np.abs(v)))]
 
     def command(self, t: float, q: Array, v: Array, z: Array) -> Array:
-        """The actuation that the controller asks for, within the bounds of the plant."""
+        """The actuation that the controller asks for, within the bounds of the plant before one with states."""
         if self.controller is None:
             return np.zeros_like(v)
-        return self.equation_of_motion.actuation(call(self.controller.torque, t, q, v, z))
+        return self.equation_of_motion.commanded(call(self.controller.torque, t, q, v, z[: self.state_size]))
+
+    def actuation(self, t: float, q: Array, v: Array, z: Array, held: Array | None) -> Array:
+        """The actuation within all bounds of the plant; of `held` in zero-order hold, if it is not None."""
+        u = self.command(t, q, v, z) if held is None else held
+        return self.equation_of_motion.applied(u, z[self.state_size :])[0]
+
+    def acceleration(self, t: float, q: Array, v: Array, z: Array, u: Array) -> Array:
+        """The acceleration under the actuation u within all bounds."""
+        equation = self.equation_of_motion
+        return equation.acceleration(q, v, sum(equation.torques(t, q, v, z=z[self.state_size :]), start=u))
 
     @property
     def sampled(self) -> bool:
@@ -129,7 +162,7 @@ class StateEquation:
         held, n = self.command(t, q, v, z), self.plant.dynamics.n
         if self.state_size:
             y = y.copy()
-            y[2 * n : 2 * n + self.state_size] = call(self.controller.next_state, t, q, v, z)
+            y[2 * n : 2 * n + self.state_size] = call(self.controller.next_state, t, q, v, z[: self.state_size])
         return y, held
 
     def rate(self, t: float, y: Array, held: Array | None) -> tuple[Array, Array]:
@@ -142,8 +175,9 @@ class StateEquation:
         """
         equation, controller, n = self.equation_of_motion, self.controller, self.plant.dynamics.n
         q, v, z, _ = self.state(y)
-        u = self.command(t, q, v, z) if held is None else held
-        torques = equation.torques(t, q, v)
+        of_controller, of_effects = z[: self.state_size], z[self.state_size :]
+        u, reached = equation.applied(self.command(t, q, v, z) if held is None else held, of_effects)
+        torques = equation.torques(t, q, v, z=of_effects)
         total = sum(torques, start=u)
         result = np.empty_like(y)
         result[:n] = v
@@ -151,8 +185,11 @@ class StateEquation:
         result[n : 2 * n] = second(q, v, total)
         end = 2 * n + self.state_size
         remembers = held is None and controller is not None and self.state_size > 0
-        result[2 * n : end] = call(controller.state_rate, t, q, v, z) if remembers and controller else 0.0
-        result[end:] = equation.powers(v, u, torques)
+        result[2 * n : end] = call(controller.state_rate, t, q, v, of_controller) if remembers and controller else 0.0
+        rates = result[end : end + equation.state_size]
+        for place, rate in equation.state_rates(t, q, v, u, reached, of_effects):
+            rates[place] = rate
+        result[2 * n + self.states :] = equation.powers(v, u, torques)
         return result, u
 
     def switching(self, t: float, q: Array, v: Array) -> list[Any]:
@@ -163,6 +200,16 @@ class StateEquation:
         """Kinetic energy, and the potential of gravity and of all conservative effects, of samples (m, n)."""
         return self.equation_of_motion.energies(t, q, v)
 
-    def powers(self, t: float, q: Array, v: Array, u: Array) -> list[float]:
+    def powers(self, t: float, q: Array, v: Array, z: Array, u: Array) -> list[float]:
         """Power of the control and of the effects that work, in the order of `sources`."""
-        return self.equation_of_motion.powers(v, u, self.equation_of_motion.torques(t, q, v))
+        equation = self.equation_of_motion
+        return equation.powers(v, u, equation.torques(t, q, v, z=z[self.state_size :]))
+
+
+def _numbered(*names: str) -> tuple[str, ...]:
+    """Names, of which a second one of an effect gets a number."""
+    made: list[str] = []
+    for name in names:
+        count = sum(each.split(" ")[0] == name for each in made)
+        made.append(f"{name} {count + 1}" if count else name)
+    return tuple(made)

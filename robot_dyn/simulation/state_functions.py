@@ -59,8 +59,8 @@ def sample(equation: StateEquation, t: float, y: Array, held: Array | None, out:
         with np.errstate(all="ignore"):
             q, v, z, _ = equation.state(y)
             out[:n], out[m + n :] = v, equation.energies(t, q, v)
-            out[m : m + n] = u = equation.command(t, q, v, z) if held is None else held
-            out[m - len(equation.sources) : m] = equation.powers(t, q, v, u)
+            out[m : m + n] = u = equation.actuation(t, q, v, z, held)
+            out[m - len(equation.sources) : m] = equation.powers(t, q, v, z, u)
             out[:m], _ = equation.rate(t, y, held)
     except RobotDynError:
         pass

@@ -33,10 +33,12 @@ def export_csv(trajectory: Trajectory, path: str | Path) -> Path:
     heading += [f"power {name} [W]" for name in trajectory.power] + ["energy [J]", "residual [J]"]
     states = trajectory.controller_states
     heading += [] if states is None else [f"controller state {k + 1}" for k in range(states.shape[1])]
+    heading += [f"{name} state {k + 1}" for name, z in trajectory.effect_states.items() for k in range(z.shape[1])]
     columns = [trajectory.t[:, None], trajectory.q, trajectory.v, trajectory.a, trajectory.u]
     columns += [power[:, None] for power in trajectory.power.values()]
     columns += [trajectory.ledger.energy[:, None], trajectory.ledger.residual[:, None]]
     columns += [] if states is None else [states]
+    columns += trajectory.effect_states.values()
 
     table = io.StringIO()
     csv.writer(table).writerows([heading, *np.hstack(columns).tolist()])

@@ -334,5 +334,5 @@ def show(runs: Runs, records: Records, rules: Rules, K: Array, now: Array, t: fl
     latest = K[len(K) - 1]
     copy(records.columns[2 : 2 + n, c], runs.y[:n, 0])
     copy(records.columns[2 + n : 2 + 2 * n, c], latest[:n, 0] if rules.canonical else runs.y[n : 2 * n, 0])
-    copy(records.columns[2 + 2 * n :, c], runs.own[:n, 0] if rules.held > 0 else latest[m : m + n, 0])
+    copy(records.columns[2 + 2 * n :, c], latest[m : m + n, 0])
     now[Now.COLUMN] += 1

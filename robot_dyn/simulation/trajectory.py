@@ -103,6 +103,7 @@ class Trajectory(Value):
         controller_states: z of the controller, (m, z), of a sampled one after its tick; None if it has none, or they
             were not recorded.
         events: Where effects switched, and those asked for, in the order of time.
+        effect_states: z of each effect with states, by name, (m, z); empty if they were not recorded.
     """
 
     joint_names: tuple[str, ...]
@@ -126,6 +127,7 @@ class Trajectory(Value):
     acting: tuple[str, ...] | None = None
     controller_states: np.ndarray | None = None
     events: tuple[Occurrence, ...] = ()
+    effect_states: dict[str, np.ndarray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         read_only(self)

@@ -67,7 +67,9 @@ def trace(
         if equation.events:
             made["events"] = np.concatenate([np.asarray(x).reshape(1) for x in symbolic.switching(time, q, v)])
         if equation.sampled and symbolic.controller is not None:
-            after = symbolic.controller.next_state(time, q, v, z) if equation.state_size else z
+            after = z[: equation.state_size]
+            if equation.state_size:
+                after = symbolic.controller.next_state(time, q, v, after)
             made["tick"] = np.concatenate([wide(symbolic.command(time, q, v, z), n), after])
         columns = {name: column(x) for name, x in made.items()}
         if jacobian:

@@ -1,0 +1,84 @@
+"""LuGre friction: bristles of deflection z between the surfaces, z' = v − σ₀ |v| z / g(v), τ = −(σ₀ z + σ₁ z' + σ₂ v).
+
+    g(v) = f_c + (f_s − f_c) exp(−(v/v_s)²)
+
+At rest it is a spring of stiffness σ₀ that holds up to f_s; sliding steadily it is g(v) sign(v) + σ₂ v.
+[Canudas de Wit, Olsson, Åström, Lischinsky 1995]
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import inf
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.coefficients import coefficient
+from robot_dyn.effects.effect import Active, Stateful
+from robot_dyn.errors import EffectError
+from robot_dyn.model.dynamics import Dynamics
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class LuGreFriction(Stateful, Active):
+    """Dry friction with a state for each joint, the deflection z of bristles: τ = −(σ₀ z + σ₁ z' + σ₂ v).
+
+    z' = v − σ₀ |v| z / g(v) and g(v) = f_c + (f_s − f_c) exp(−(v/v_s)²). The bristles store ½ σ₀ z² and give it back,
+    so that its power may be positive; it is passive where σ₂ ≥ σ₁ (f_s / f_c − 1) [Barahanov, Ortega 2000]. Its rate
+    bends where v = 0, and is stiff: bristles settle within g / (σ₀ |v|) seconds.
+
+    Attributes:
+        bristle_stiffness: σ₀, a scalar or (n,), in [N m/rad] or [N/m], not negative.
+        bristle_damping: σ₁, in [N m s/rad] or [N s/m], not negative.
+        viscous: σ₂, in [N m s/rad] or [N s/m], not negative.
+        coulomb: f_c, of sliding, in [N m] or [N], positive.
+        breakaway: f_s, of rest, in [N m] or [N], not less than f_c.
+        stribeck_velocity: v_s, in [rad/s] or [m/s], positive.
+    """
+
+    bristle_stiffness: Any = field(metadata=coefficient("N m/rad", symbol="σ₀", least=0))
+    bristle_damping: Any = field(metadata=coefficient("N m s/rad", symbol="σ₁", least=0))
+    viscous: Any = field(metadata=coefficient("N m s/rad", symbol="σ₂", least=0))
+    coulomb: Any = field(metadata=coefficient("N m", symbol="f_c", above=0, elsewhere=1.0))
+    breakaway: Any = field(metadata=coefficient("N m", symbol="f_s", above=0, elsewhere=1.0))
+    stribeck_velocity: Any = field(metadata=coefficient("rad/s", symbol="v_s", above=0, elsewhere=1.0))
+
+    term = "−(σ₀ z + σ₁ z' + σ₂ v), z' = v − σ₀ |v| z / g(v)"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        try:
+            less = np.any(np.less(self.breakaway, self.coulomb))
+        except (TypeError, ValueError):  # by name, or of other numbers of joints: checked when the joints are known
+            return
+        if less:
+            raise EffectError(f"breakaway must not be less than coulomb, got {self.breakaway} and {self.coulomb}")
+
+    @property
+    def name(self) -> str:
+        return "lugre_friction"
+
+    @property
+    def widths(self) -> tuple[Any, Any]:
+        return inf, self.stribeck_velocity
+
+    def state_size(self, n: int) -> int:
+        return n
+
+    def state_rate(self, dynamics: Dynamics, t: float, q: Array, v: Array, u: Array, z: Array) -> Array:
+        return self._rate(v, z)
+
+    def _rate(self, v: Array, z: Array) -> Array:
+        level = self.coulomb + (self.breakaway - self.coulomb) * np.exp(-((v / self.stribeck_velocity) ** 2))
+        return v - self.bristle_stiffness * np.abs(v) * z / level
+
+    def torque(  # pyright: ignore[reportIncompatibleMethodOverride]  with its states
+        self, dynamics: Dynamics, t: float, q: Array, v: Array, z: Array
+    ) -> Array:
+        return -(self.bristle_stiffness * z + self.bristle_damping * self._rate(v, z) + self.viscous * v)
+
+    def stored_energy(self, dynamics: Dynamics, t: float, q: Array, z: Array) -> Array:
+        return (self.bristle_stiffness * z**2 / 2).sum(axis=-1)

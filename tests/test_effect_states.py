@@ -1,0 +1,234 @@
+"""Effects with states, ż = rate(t, q, v, u, z): actuator lag and LuGre friction against closed forms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+
+import robot_dyn as rd
+from robot_dyn.errors import EffectError
+
+MASS = 0.7
+SLIDER = rd.Robot.from_text(
+    f"""<robot name="slider"><link name="base"/>
+<joint name="slide" type="prismatic"><parent link="base"/><child link="cart"/><axis xyz="1 0 0"/>
+<limit lower="-99" upper="99" effort="99" velocity="99"/></joint>
+<link name="cart"><inertial><mass value="{MASS}"/>
+<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link></robot>"""
+)
+ARM = rd.load("planar_2r")
+Q = np.array([0.1, 0.2])
+FRICTION = rd.LuGreFriction(120.0, [1.0, 0.8], 0.8, [1.0, 0.5], 1.5, 0.1)
+BOTH = pytest.mark.parametrize("engine", ["interpreted", "compiled"])
+
+
+@dataclass(frozen=True, eq=False)
+class Ramp(rd.Stateless):
+    """u = c + d t."""
+
+    constant: float
+    slope: float = 0.0
+    period_s: float = 0.0
+    n: int = 1
+
+    def torque(self, t, q, v, z):
+        return np.stack([self.constant + self.slope * t])
+
+
+def slide(effects, control, engine: str, **options) -> rd.Trajectory:
+    options = {"integrator": "order_8", "step_s": 1e-3, "record_period_s": 0.01, "estimate_error": False} | options
+    return rd.simulate(rd.Plant(SLIDER, effects), q0=[0.0], controller=control, engine=engine, **options)
+
+
+@BOTH
+def test_a_lag_of_first_order_follows_a_constant_command(engine: str) -> None:
+    """The torque is u₀ (1 − exp(−t/T)), v = u₀/m (t − u T/u₀), and the work of the control is the kinetic energy."""
+    u0, T = 3.0, 0.08
+    run = slide([rd.ActuatorLag(T)], Ramp(u0), engine, duration_s=0.4)
+    u = u0 * (1 - np.exp(-run.t / T))
+    np.testing.assert_allclose(run.u[:, 0], u, atol=1e-12)
+    np.testing.assert_allclose(run.v[:, 0], (u0 * run.t - u * T) / MASS, atol=1e-12)
+    np.testing.assert_allclose(run.effect_states["actuator_lag"][:, 0], u, atol=1e-12)
+    np.testing.assert_allclose(run.ledger.work["control"], MASS * run.v[:, 0] ** 2 / 2, atol=1e-12)
+    np.testing.assert_allclose(run.power["control"], u * run.v[:, 0], atol=1e-12)
+
+
+@BOTH
+def test_a_lag_follows_what_a_sampled_controller_holds(engine: str) -> None:
+    """Between ticks c is constant: u(t + Δ) = c + (u(t) − c) exp(−Δ/T), while c changes from tick to tick."""
+    T, period = 0.08, 0.05
+    run = slide([rd.ActuatorLag(T)], Ramp(1.0, 4.0, period), engine, duration_s=0.4)
+    u, expected = 0.0, []
+    for tick in np.arange(0, 0.4 - 1e-9, period):
+        c = 1.0 + 4.0 * tick
+        expected += [c + (u - c) * np.exp(-0.01 * k / T) for k in range(5)]
+        u = c + (u - c) * np.exp(-period / T)
+    np.testing.assert_allclose(run.u[:-1, 0], expected, atol=1e-12)
+    assert run.extremes is not None
+    assert run.extremes[2, 1, 0] == pytest.approx(u, abs=1e-9)  # the observer sees what is applied, not the command
+
+
+@pytest.mark.parametrize(
+    ("effects", "peak"),
+    [
+        ([rd.EffortLimit(1.0), rd.ActuatorLag(0.05)], 1.0 - np.exp(-6.0)),
+        ([rd.ActuatorLag(0.05), rd.EffortLimit(1.0)], 1.0),
+    ],
+)
+@BOTH
+def test_a_limit_before_a_lag_cuts_the_command_and_one_after_it_the_torque(effects, peak: float, engine: str) -> None:
+    """Command 3: cut to 1 and followed for six time constants; or followed, and cut after 0.4 of one."""
+    for period in (0.0, 0.3):
+        run = slide(effects, Ramp(3.0, 0.0, period), engine, duration_s=0.3)
+        assert run.u.max() == pytest.approx(peak, abs=1e-9)
+
+
+@BOTH
+def test_lugre_friction_slides_steadily_at_its_level(engine: str) -> None:
+    """Pushed by F beyond breakaway the speed goes to the root of F = g(v) + σ₂ v, and z to g / σ₀."""
+    s0, s1, s2, fc, fs, vs, F = 400.0, 3.0, 2.0, 1.0, 1.4, 0.2, 2.5
+    friction = rd.LuGreFriction(s0, s1, s2, fc, fs, vs)
+    run = slide([friction], Ramp(F), engine, duration_s=12.0, step_s=2e-3, record_period_s=0.1)
+    v = run.v[-1, 0]
+    level = fc + (fs - fc) * np.exp(-((v / vs) ** 2))
+    assert v == pytest.approx((F - level) / s2, abs=1e-9)
+    assert run.effect_states["lugre_friction"][-1, 0] == pytest.approx(level / s0, rel=1e-9)
+    assert run.power["lugre_friction"][-1] == pytest.approx(-F * v, rel=1e-8)
+    assert run.ledger.stored["lugre_friction"][-1] == pytest.approx(level**2 / (2 * s0), rel=1e-9)
+
+
+@BOTH
+def test_lugre_friction_at_rest_is_a_spring(engine: str) -> None:
+    """Pushed slowly by F < f, with g = f: dz/dx = 1 − σ₀ z / f, so it rests at x = −(f/σ₀) ln(1 − F/f), σ₀ z = F."""
+    s0, f, F = 50.0, 1.2, 0.7
+    friction = rd.LuGreFriction(s0, 0.0, 40.0, f, f, 0.1)  # heavily damped: it does not overshoot
+    run = slide([friction], Ramp(F), engine, duration_s=50.0, step_s=0.01, record_period_s=0.5)
+    assert run.q[-1, 0] == pytest.approx(-f / s0 * np.log(1 - F / f), rel=1e-9)
+    assert s0 * run.effect_states["lugre_friction"][-1, 0] == pytest.approx(F, rel=1e-9)
+    small = slide([friction], Ramp(1e-4 * f), engine, duration_s=50.0, step_s=0.01, record_period_s=0.5)
+    assert 1e-4 * f / small.q[-1, 0] == pytest.approx(s0, rel=1e-4)  # presliding stiffness
+
+
+def setup(engine: str, period: float = 0.0, **options) -> rd.Setup:
+    effects = [rd.ActuatorLag([0.05, 0.02]), FRICTION, rd.EffortLimit(15.0)]
+    control = rd.PID(rd.quintic(Q, [0.6, -0.3], 0.3), 90.0, 60.0, 20.0, period_s=period)
+    return rd.Setup(
+        rd.Plant(ARM, effects), Q, duration_s=0.3, controller=control, record_period_s=0.01, estimate_error=False,
+        engine=engine, **({"integrator": "rk4", "step_s": 1e-3} | options),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("method", ["rk4", "gauss_4", "semi_implicit_euler", "rosenbrock_5"])
+@pytest.mark.parametrize("period", [0.0, 0.005])
+def test_both_engines_make_the_same_run_of_effects_with_states(method: str, period: float) -> None:
+    """Beside controller states, in (q, v) and in (q, p); 300 steps leave some 1e-10 of rounding in stiff ones."""
+    ours, theirs = (rd.simulate(setup(engine, period, integrator=method)) for engine in ("compiled", "interpreted"))
+    assert ours.outcome.ending == "finished"
+    np.testing.assert_allclose(ours.q, theirs.q, atol=1e-11)
+    np.testing.assert_allclose(ours.u, theirs.u, atol=1e-8)
+    np.testing.assert_allclose(ours.a, theirs.a, atol=1e-7)
+    assert ours.controller_states is not None and ours.controller_states.shape == (31, 2)
+    for name, z in theirs.effect_states.items():
+        assert z.shape == (31, 2) and np.abs(z[-1]).min() > 0
+        np.testing.assert_allclose(ours.effect_states[name], z, atol=1e-9)
+    error = {"rk4": 1e-6, "gauss_4": 1e-9, "rosenbrock_5": 1e-6}.get(method, 0.1)
+    assert ours.ledger.closure < error
+    equation_of_motion = ARM.inverse_dynamics(ours.q, ours.v, ours.a)
+    v, z = ours.v, ours.effect_states["lugre_friction"]
+    level = FRICTION.coulomb + (1.5 - FRICTION.coulomb) * np.exp(-((v / 0.1) ** 2))
+    bristles = v - 120.0 * np.abs(v) * z / level
+    torque = 120.0 * z + FRICTION.bristle_damping * bristles + 0.8 * v
+    np.testing.assert_allclose(equation_of_motion, ours.u - torque, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("actuator_lag.time_constant", np.array([[0.05, 0.02], [0.01, 0.08]])),
+        ("lugre_friction.coulomb", np.array([[1.0, 0.5], [0.3, 1.2]])),
+        ("lugre_friction.bristle_stiffness", np.array([120.0, 60.0])),
+    ],
+)
+def test_effects_with_states_run_in_rollouts(name: str, values: np.ndarray) -> None:
+    """Each run is that of the setup with its value, 1e-12."""
+    base = setup("auto")
+    runs = rd.rollouts(base, params={name: values}, record=("q", "v", "u", "work"))
+    part, _, key = name.partition(".")
+    for k, value in enumerate(values):
+        effects = [replace(x, **{key: value}) if x.name == part else x for x in base.plant.effects]  # pyright: ignore
+        alone = rd.simulate(replace(base, plant=rd.Plant(ARM, effects)), engine="interpreted")
+        np.testing.assert_allclose(runs.q[k], alone.q, atol=1e-12)
+        np.testing.assert_allclose(runs.u[k], alone.u, atol=1e-10)
+        one = runs[k]
+        np.testing.assert_array_equal(one.u, runs.u[k])
+        np.testing.assert_allclose(one.ledger.work["lugre_friction"], alone.ledger.work["lugre_friction"], atol=1e-10)
+        assert np.isnan(one.a).all()  # it depends on states that rollouts do not record
+    assert np.abs(runs.q[1] - runs.q[0]).max() > 1e-5
+
+
+def test_passive_bristles_only_take_energy() -> None:
+    """With σ₂ ≥ σ₁ (f_s/f_c − 1), work done on it minus what it stores never falls; without storage it would."""
+    friction = rd.LuGreFriction(200.0, 0.5, 0.4, 1.0, 1.6, 0.1)
+    swing = rd.simulate(
+        rd.Plant(rd.load("pendulum"), [friction]), q0=[0.9], duration_s=3.0, integrator="rk4", step_s=5e-4,
+        record_period_s=0.01, estimate_error=False,
+    )  # fmt: skip
+    work, stored = swing.ledger.work["lugre_friction"], swing.ledger.stored["lugre_friction"]
+    assert np.diff(work + stored).max() < 1e-9
+    assert np.diff(work).max() > 1e-6
+    assert swing.ledger.closure < 1e-7
+
+
+def test_effect_states_are_kept_in_run_files_and_tables(tmp_path) -> None:
+    run = rd.simulate(setup("compiled"))
+    again = rd.load_run(rd.save_run(run, tmp_path / "run"))
+    for name in ("actuator_lag", "lugre_friction"):
+        np.testing.assert_array_equal(again.effect_states[name], run.effect_states[name])
+    np.testing.assert_array_equal(again.ledger.stored["lugre_friction"], run.ledger.stored["lugre_friction"])
+    from robot_dyn.simulation.table import export_csv
+
+    heading = export_csv(run, tmp_path / "run.csv").read_text(encoding="utf-8").splitlines()[0]
+    assert heading.endswith("actuator_lag state 1,actuator_lag state 2,lugre_friction state 1,lugre_friction state 2")
+
+
+def test_a_plant_that_is_asked_takes_relaxed_states() -> None:
+    """At z = 0 LuGre friction is −(σ₁ + σ₂) v, one state or a batch; a lag passes the actuation; also compiled."""
+    plant, v = rd.Plant(ARM, [rd.ActuatorLag(0.1), FRICTION]), np.array([[0.3, -0.7], [1.0, 2.0]])
+    expected = -(np.array([1.0, 0.8]) + 0.8) * v
+    np.testing.assert_allclose(plant.torque(0.0, v, v), expected, rtol=1e-14)
+    np.testing.assert_array_equal(plant.actuation(v), v)
+    np.testing.assert_allclose(rd.Compiled(plant).torque(0.0, v, v), expected, rtol=1e-14)
+    still = rd.linearise(plant, Q, v=[0.4, 0.3])
+    assert np.isfinite(still[0]).all()
+
+
+@dataclass(frozen=True, eq=False)
+class Wrong(rd.Stateful, rd.Active):
+    """An effect whose rate has another number of entries than it has states."""
+
+    stiffness: float = field(default=1.0, metadata=rd.coefficient("N m/rad", shapes=((),)))
+
+    def state_size(self, n):
+        return 3
+
+    def state_rate(self, dynamics, t, q, v, u, z):
+        return v
+
+    def torque(self, dynamics, t, q, v, z):
+        return -self.stiffness * z[:2]
+
+
+def test_states_that_do_not_fit_are_refused() -> None:
+    with pytest.raises(EffectError, match=r"Wrong.state_rate returned shape \(2,\) for 3 states"):
+        rd.Setup(rd.Plant(ARM, [Wrong()]), Q, duration_s=0.1)
+
+    class Both(Wrong, rd.Conservative):
+        def potential(self, dynamics, t, q):
+            return q[..., 0]
+
+    with pytest.raises(EffectError, match="both is Conservative and has states"):
+        rd.Plant(ARM, [Both()])
+    with pytest.raises(EffectError, match="breakaway must not be less than coulomb"):
+        rd.LuGreFriction(1.0, 1.0, 1.0, 2.0, 1.5, 0.1)
