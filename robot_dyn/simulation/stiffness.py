@@ -1,0 +1,107 @@
+"""What makes a system stiff: the fastest eigenvalue of its Jacobian, the joint that takes part most, and the effect.
+
+    J x = λ x,   wᴴ J = λ wᴴ,   λ = Σ_k λ_k with λ_k = wᴴ (∂f_k/∂y) x / wᴴ x
+
+f_k is what a force or the control adds to the state equation; the rest is that of the rigid bodies. |w_i x_i| / |wᴴ x|
+is the participation of entry i. [Hairer, Wanner 1996, IV.1; Pérez-Arriaga, Verghese, Schweppe 1982]
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.integrate.differences import by_state
+from robot_dyn.simulation.state_equation import CONTROL, StateEquation
+
+BODIES = "the motion of the bodies"
+
+
+@final
+@dataclass(frozen=True)
+class Fastest:
+    """The fastest motion near a state.
+
+    Attributes:
+        eigenvalue: λ, in [1/s].
+        joint: Name of the joint that takes part most.
+        source: Name of the effect or of the control whose λ_k is the largest; BODIES if none is.
+    """
+
+    eigenvalue: complex
+    joint: str
+    source: str
+
+    def __str__(self) -> str:
+        how = "decays" if -self.eigenvalue.real > abs(self.eigenvalue.imag) else "changes"
+        by = self.source if self.source == BODIES else repr(self.source)
+        return f"the fastest motion {how} with {abs(self.eigenvalue):.1e} per second, of joint {self.joint!r}, by {by}"
+
+
+def fastest(equation: StateEquation, t: float, y: Array, held: Array | None) -> Fastest:
+    """The fastest motion near a state, by differences of the interpreted equation.
+
+    Args:
+        equation: The state equation, in (q, v).
+        t: Time, in [s].
+        y: State, (m,).
+        held: The actuation in zero-order hold, or None.
+
+    Raises:
+        RobotDynError: If the equation has no answer near the state.
+        numpy.linalg.LinAlgError: If its eigenvalues are not found.
+    """
+    n, size = equation.plant.dynamics.n, 2 * equation.plant.dynamics.n + equation.state_size
+
+    def f(at: Any, states: Array) -> Array:
+        rows = [equation.rate(t, row, held)[0] for row in states.reshape(-1, len(y))]
+        return np.array(rows).reshape(states.shape)
+
+    J = np.moveaxis(by_state(f, t, y, equation.widths), 0, -1)[:size, :size]  # works do not act back
+    values, right = np.linalg.eig(J)
+    k = int(np.argmax(np.abs(values)))
+    x = right[:, k]
+    others, left = np.linalg.eig(J.T)
+    w = left[:, np.argmin(np.abs(others - values[k]))]
+    part = np.abs(w * x)
+    joint = int(np.argmax(part[:n] + part[n : 2 * n]))
+    parts = {name: w[n : 2 * n] @ (A @ x) / (w @ x) for name, A in _accelerations(equation, t, y, held).items()}
+    parts[BODIES] = values[k] - sum(parts.values())
+    source = max(parts, key=lambda name: abs(parts[name]))
+    return Fastest(complex(values[k]), equation.plant.dynamics.joint_names[joint], source)
+
+
+def _accelerations(equation: StateEquation, t: float, y: Array, held: Array | None) -> dict[str, Array]:
+    """M⁻¹ ∂τ_k/∂(q, v, z) of the control and of each force, (n, 2 n + z), by name."""
+    n, z = equation.plant.dynamics.n, equation.state_size
+    size, M = 2 * n + z, equation.plant.M(y[:n])
+    made = {}
+    for k, name in enumerate(_names(equation)):
+
+        def torque(at: Any, states: Array, k: int = k) -> Array:
+            rows = states.reshape(-1, size)
+            return np.array([_torque(equation, k, t, row, held) for row in rows]).reshape(*states.shape[:-1], n)
+
+        made[name] = np.linalg.solve(M, by_state(torque, t, y[:size], equation.widths[:size]).T)
+    return made
+
+
+def _names(equation: StateEquation) -> list[str]:
+    """The control and the forces; a second force of a name gets a number, as in `sources`."""
+    names, count = [CONTROL], Counter[str]()
+    for force in equation.plant.forces:
+        count[force.name] += 1
+        names.append(f"{force.name} {count[force.name]}" if count[force.name] > 1 else force.name)
+    return names
+
+
+def _torque(equation: StateEquation, k: int, t: float, x: Array, held: Array | None) -> Array:
+    n = equation.plant.dynamics.n
+    if k == 0:
+        return np.asarray(equation.command(t, x[:n], x[n : 2 * n], x[2 * n :]) if held is None else held)
+    force = equation.plant.forces[k - 1]
+    return np.broadcast_to(force.torque(equation.plant.dynamics, t, x[:n], x[n : 2 * n]), (n,))
