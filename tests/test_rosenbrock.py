@@ -91,6 +91,24 @@ def test_the_conditions_of_order_5_hold() -> None:
     np.testing.assert_allclose(GAMMA.sum(axis=1), NUMBERS.f[:, 1], atol=1e-13)
 
 
+def test_without_its_last_stage_it_is_of_order_4() -> None:
+    """And no more, so that the difference tells the error."""
+    less = (NUMBERS.m - np.eye(STAGES)[-1]) @ GAMMA
+    for tree in (tree for n in range(1, 5) for tree in trees(n)):
+        assert less @ weights(tree) == pytest.approx(1 / density(tree), abs=1e-13), tree
+    assert max(abs(less @ weights(tree) - 1 / density(tree)) for tree in trees(5)) > 1e-3
+
+
+@pytest.mark.parametrize("theta", [0.0, 0.17, 0.5, 0.83, 1.0])
+def test_the_polynomial_between_is_of_order_4(theta: float) -> None:
+    """Σ b_i(θ) Φ_i = θᵖ/γ for all trees of p ≤ 4 vertices; and it is y⁺ at θ = 1."""
+    h0, h1, h2 = np.array(ROSENBROCK_5.table.dense)
+    at = (theta * NUMBERS.m + theta * (1 - theta) * (h0 + theta * (h1 + theta * h2))) @ GAMMA
+    for n in range(1, 5):
+        for tree in trees(n):
+            assert at @ weights(tree) == pytest.approx(theta**n / density(tree), abs=1e-13), tree
+
+
 def test_the_method_is_l_stable() -> None:
     """|R(iy)| ≤ 1 with poles in the right half plane alone, where 1 = γ z, and R(∞) = 1 − bᵀ B⁻¹ 1 = 0."""
     np.testing.assert_allclose(np.diag(BETA), NUMBERS.gamma)  # B is triangular, so these are its eigenvalues
@@ -239,6 +257,50 @@ def test_both_engines_make_the_same_steps() -> None:
         kappa = np.linalg.cond(np.eye(m) - h * ROSENBROCK_5.table.gamma * exact(0.0, y)[:m].T)
         difference = np.abs(np.concatenate([run.q[-1], run.v[-1]]) - after).max()
         assert difference <= 4 * kappa * np.finfo(float).eps * np.abs(after).max()
+
+
+def test_the_error_follows_the_tolerance() -> None:
+    """Samples between the ends of steps included; a hundredth of the tolerance takes 100^(1/5) = 2.5 times as many."""
+    plant = rd.Plant(ARM, [rd.RegularisedCoulombFriction([1.0, 0.6], 0.3), rd.Spring([40.0, 20.0])])
+    options = OPTIONS | {"duration_s": 2.0, "record_period_s": 0.003, "engine": "compiled"}
+    exact = rd.simulate(plant, **options | {"integrator": rd.Adaptive(rtol=1e-13, atol=1e-13)})
+    steps = []
+    for tolerance in (1e-5, 1e-7, 1e-9):
+        run = rd.simulate(plant, **options | {"integrator": rd.Adaptive("Rosenbrock", tolerance, tolerance)})
+        assert np.abs(run.q - exact.q).max() < 30 * tolerance
+        steps.append(run.statistics.steps)
+    np.testing.assert_allclose(np.divide(steps[1:], steps[:-1]), 2.5, rtol=0.2)
+
+
+@pytest.mark.parametrize("segments", [{}, {"controller": rd.PD(rd.hold([0.2, 0.1]), [40.0, 20.0], 3.0, period_s=0.01)}])
+def test_both_engines_choose_the_same_steps(segments: dict[str, Any]) -> None:
+    """Though one has differences for its Jacobian: right to 1e-10, which the error of a step does not see."""
+    plant = rd.Plant(ARM, [rd.ViscousFriction([100.0, 300.0])])
+    options = OPTIONS | segments | {"duration_s": 0.1, "record_period_s": 0.003}
+    method = {"integrator": rd.Adaptive("Rosenbrock", 1e-7, 1e-9)}
+    ours, theirs = (rd.simulate(plant, **options | method, engine=engine) for engine in ("compiled", "interpreted"))
+    assert ours.statistics.steps == theirs.statistics.steps
+    assert ours.statistics.evaluations == theirs.statistics.evaluations
+    assert theirs.statistics.engine == "interpreted (Jacobian by differences)"
+    np.testing.assert_allclose(ours.q, theirs.q, rtol=0, atol=1e-9)
+
+
+def test_stiffness_does_not_bound_its_steps() -> None:
+    """Dampers of 1e5 and springs of 1e8 together, 0.1 rad off the rest: a thousandth of an explicit method's steps.
+
+    Within the first 10 ms against the explicit method, whose steps stability bounds, so that 1 s takes 100 times as
+    many; then at rest, but for what gravity bends, 1e-7 rad.
+    """
+    rest = np.array([0.4, -0.7])
+    plant = rd.Plant(ARM, [rd.ViscousFriction(1e5), rd.Spring(1e8, rest)])
+    options: dict[str, Any] = {"record_period_s": 1e-4, "estimate_error": False, "engine": "compiled"}
+    run = rd.simulate(plant, rest + 0.1, **options, duration_s=1.0, integrator=rd.Adaptive("Rosenbrock", 1e-6, 1e-6))
+    explicit = rd.simulate(
+        plant, rest + 0.1, **options, duration_s=0.01, integrator=rd.Adaptive("DOP853", 1e-12, 1e-12)
+    )
+    np.testing.assert_allclose(run.q[:101], explicit.q, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(run.q[-1], rest, rtol=0, atol=1e-6)
+    assert 100 * explicit.statistics.steps > 1000 * run.statistics.steps
 
 
 def test_runs_in_lock_step_are_those_of_simulate() -> None:

@@ -283,7 +283,7 @@ def reached(function: Callable[..., Any]) -> list[Callable[..., Any]]:
         if each in found or each.__module__ == primitives.__name__:
             return
         found[each] = None
-        scope = each.__globals__ | getclosurevars(each).nonlocals
+        scope = {**each.__globals__, **getclosurevars(each).nonlocals}
         for name in each.__code__.co_names + each.__code__.co_freevars:
             if isfunction(scope.get(name)):
                 look(scope[name])

@@ -1,4 +1,4 @@
-"""Methods that choose their steps: ‖local error / (atol + rtol |y|)‖ ≤ 1, by SciPy's DOP853 and Radau IIA of order 5.
+"""Methods that choose their steps, ‖local error / (atol + rtol |y|)‖ ≤ 1: DOP853, Rosenbrock, and SciPy's Radau IIA.
 
 [Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed., 1993, II.4–II.6 and II.10; Hairer, Wanner,
 II, 2nd ed., 1996, IV.8]
@@ -20,11 +20,13 @@ from robot_dyn.arithmetic import Array
 from robot_dyn.errors import OverflowedError, QueryError, RobotDynError
 from robot_dyn.foreign import is_mistake
 from robot_dyn.integrate import dop853
+from robot_dyn.integrate.controlled_steps import ControlledSteps
 from robot_dyn.integrate.integrator import System
-from robot_dyn.integrate.step_control import ControlledStepper
+from robot_dyn.integrate.rosenbrock import ROSENBROCK_5
+from robot_dyn.integrate.step_control import ControlledStepper, control_of
 from robot_dyn.validate import choice, function, instance, number, numbers, rows
 
-ADAPTIVE = ("DOP853", "Radau")
+ADAPTIVE = ("DOP853", "Rosenbrock", "Radau")
 LEAST_RTOL = 100 * np.finfo(float).eps  # SciPy's bound; below it rounding is taken for local error
 
 
@@ -87,7 +89,8 @@ class Adaptive:
     Tolerances bound the error of a step; that of the run is larger by what the system magnifies.
 
     Attributes:
-        method: DOP853 (explicit, order 8) or Radau (implicit, order 5, L-stable).
+        method: DOP853 (explicit, order 8), Rosenbrock (linearly implicit, order 5, L-stable) or Radau (implicit,
+            order 5, L-stable).
         rtol: Relative tolerance, 2.3e-14 at least.
         atol: Absolute tolerance, in the unit of y, not negative.
         max_step_s: Longest step, in [s].
@@ -102,8 +105,12 @@ class Adaptive:
     max_step_s: float = inf
     canonical: ClassVar[bool] = False
     controls_error: ClassVar[bool] = True
-    needs_jacobian: ClassVar[bool] = False
     evaluations_per_step: ClassVar[int | None] = None
+
+    @property
+    def needs_jacobian(self) -> bool:
+        """Whether its steps ask for ∂f/∂y."""
+        return self.method == "Rosenbrock"
 
     @property
     def plain(self) -> bool:
@@ -244,14 +251,15 @@ class Steps:
             self.message = f"finished at t = {self.t}"
 
     def _solver(self) -> Any:
-        from scipy.integrate import DOP853, Radau
+        options, m = self._options, len(self.y)
+        if options.method in STEPPERS:
+            stepper = STEPPERS[options.method](m, m, m)
+            control = control_of(stepper, options.rtol, options.atol, options.max_step_s)
+            return ControlledSteps(stepper, control, self._system, self.t, self.y, self._end)
+        from scipy.integrate import Radau
 
-        options = self._options
-        settings: dict[str, Any] = {"rtol": options.rtol, "atol": options.atol, "max_step": options.max_step_s}
-        if options.method == "Radau":
-            settings["jac"] = self._jacobian
-        make: Any = {"DOP853": DOP853, "Radau": Radau}[options.method]
-        return make(self._rate, self.t, self.y, self._end, **settings)
+        settings: Any = {"rtol": options.rtol, "atol": options.atol, "max_step": options.max_step_s}
+        return Radau(self._rate, self.t, self.y, self._end, jac=self._jacobian, **settings)
 
     def _failed(self, what: str) -> None:
         where = f"{what} at t = {self.t}, max |y| = {np.abs(self.y).max():.3g}"
@@ -281,7 +289,9 @@ class Steps:
 
 
 # The methods of our own, ready for a loop: (entries of the state, rows of the rate, entries whose error counts).
-STEPPERS: Mapping[str, Callable[[int, int, int], ControlledStepper]] = MappingProxyType({"DOP853": dop853.stepper})
+STEPPERS: Mapping[str, Callable[[int, int, int], ControlledStepper]] = MappingProxyType(
+    {"DOP853": dop853.stepper, "Rosenbrock": ROSENBROCK_5.controlled}
+)
 
 
 def _initial_state(y0: Array) -> np.ndarray:

@@ -88,7 +88,7 @@ class SinglyDiagonallyImplicit(Integrator):
                 if z is None:
                     raise IntegrationError(
                         f"{self.name}: Newton's iteration for the step {float(h)} at t = {float(t)} does not converge "
-                        f"in {MOST_ITERATIONS} rounds: take a smaller step, or Radau",
+                        f"in {MOST_ITERATIONS} rounds: take a smaller step, or Rosenbrock",
                         t,
                     )
                 k.append((z - known) / h_gamma)  # not f(y + z): a stiff f would magnify the rounding of z

@@ -5,6 +5,7 @@ The functions of the state equation are addresses; so a loop is compiled once fo
 
 from __future__ import annotations
 
+import sys
 import threading
 from collections.abc import Callable
 from functools import cache
@@ -37,9 +38,16 @@ def loop(make: Callable[..., Loop], *functions: Callable[..., Any]) -> Loop:
 def _compiled(advance: Loop, arguments: tuple[Any, ...], of: Callable[..., Any]) -> Any:
     import numba as nb
 
-    types = [nb.typeof(each) for each in arguments]
-    identity = [f"{each.__module__}.{each.__qualname__} {getsource(each)}" for each in reached(advance)]
+    types, functions = [nb.typeof(each) for each in arguments], reached(advance)
     about = f"the time loop of {of.__module__}.{of.__name__}"
-    return compiled(
-        lambda: machine_code(advance), types, default_store(), identity, about
-    )  # a step may be a user's own
+    if not all(map(_imported, functions[1:])):  # a step of a user's own, of types that no other process has
+        return compiled(lambda: machine_code(advance), types, None, [], about)
+    identity = [f"{each.__module__}.{each.__qualname__} {getsource(each)}" for each in functions]
+    return compiled(lambda: machine_code(advance), types, default_store(), identity, about)
+
+
+def _imported(function: Callable[..., Any]) -> bool:
+    """Whether another process finds a function by its name, as not one of a script or of an interactive session."""
+    module = function.__module__
+    found = getattr(sys.modules.get(module), function.__qualname__, None)
+    return module.startswith("robot_dyn.") or (module != "__main__" and found is function)
