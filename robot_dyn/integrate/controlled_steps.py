@@ -27,7 +27,7 @@ class ControlledSteps:
         end: Where it ends.
 
     Attributes:
-        t, y, f: Where it is, with the rate there.
+        t: Time reached.
         status: "running", "finished" or "failed".
     """
 
@@ -51,10 +51,12 @@ class ControlledSteps:
 
     @property
     def y(self) -> Array:
+        """State reached, (m,)."""
         return self._now[:, 0].copy()
 
     @property
     def f(self) -> Array:
+        """Its rate, (m,)."""
         return self._stepper.work.K[0][:, 0].copy()
 
     def step(self) -> None:

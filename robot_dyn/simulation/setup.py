@@ -40,8 +40,9 @@ class Setup(Value):
         v0: Velocity at the start, (n,); 0 if not given.
         duration_s: In [s].
         controller: What drives it: a `Controller`; a function (t, q, v) → torque (n,), which is made one; or None.
-        integrator: The method, by its name as in a scene or itself: "DOP853" and "Radau", or an `Adaptive` with other
-            tolerances, choose their steps; "rk4", "order_8", "gauss_4" and others of `rd.method` have a fixed one.
+        integrator: The method, by its name as in a scene or itself: "DOP853" and "Rosenbrock", or an `Adaptive`
+            with other tolerances, choose their steps; "rk4", "order_8", "gauss_4" and others of `rd.method` have a
+            fixed one.
         step_s: Fixed step; made smaller where samples, ticks, switches and the end ask for it. Not to be given
             for a method that chooses its steps.
         record_period_s: Time between samples; 0 for every step, or 1000 samples where the method chooses its steps.

@@ -48,6 +48,6 @@ def _compiled(advance: Loop, arguments: tuple[Any, ...], of: Callable[..., Any])
 
 def _imported(function: Callable[..., Any]) -> bool:
     """Whether another process finds a function by its name, as not one of a script or of an interactive session."""
-    module = function.__module__
+    module = function.__module__ or "__main__"
     found = getattr(sys.modules.get(module), function.__qualname__, None)
     return module.startswith("robot_dyn.") or (module != "__main__" and found is function)
