@@ -2,7 +2,7 @@
 
 Coefficients of effects, gains, what references are made of besides polynomials, gravity and payloads: to change one
 compiles nothing, and each may differ from run to run. Armature and the factor on all masses are inputs where they are
-swept; link inertias and lengths are constants of the code.
+swept, and so are mass and inertia of a single link; lengths are constants of the code.
 """
 
 from __future__ import annotations
@@ -20,13 +20,14 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.model.description import Description
 from robot_dyn.model.edits import Edits
 from robot_dyn.model.robot import Robot
-from robot_dyn.model.tree import Described
+from robot_dyn.model.tree import Described, tree
 
 Part = tuple[Any, ...]  # ("effect", i), ("controller",), ("reference", attribute), ("robot",) or ("model", attribute)
 ROBOT: Part = ("robot",)
 CONTROLLER: Part = ("controller",)
 _GRAVITY = Coefficient("m/s²", shapes=((3,),))
 _WHEN_SWEPT = {"armature": Coefficient("kg m²", least=0), "mass_scale": Coefficient(shapes=((),), above=0)}
+_OF_LINK = {"mass": Coefficient("kg", shapes=((),), above=0), "inertia": Coefficient("kg m²", shapes=((3, 3),))}
 _PAYLOAD = {
     "mass": Coefficient("kg", shapes=((),), least=0),
     "com": Coefficient("m", shapes=((3,),)),
@@ -54,6 +55,11 @@ class Parameter:
     value: np.ndarray
     declared: Coefficient
     entries: tuple[int, ...]
+
+    @property
+    def place(self) -> tuple[Any, ...]:
+        """Where machine code has it: two with the same one are the same input."""
+        return self.part, self.key, self.entries
 
     @property
     def size(self) -> int:
@@ -127,6 +133,30 @@ def _of_robot(dynamics: Any, place: Part, prefix: str, swept: Collection[str]) -
     for key, each in _WHEN_SWEPT.items():
         if f"{prefix}{key}" in swept:
             yield parameter(key, f"{prefix}{key}", given[key], each)
+    named = {name for name in swept if name.startswith(prefix) and name.rpartition(".")[2] in _OF_LINK}
+    links = _of_links(robot) if named else {}
+    for name in sorted(named):
+        link, _, key = name.removeprefix(prefix).rpartition(".")
+        if link in links:
+            yield parameter(f"{key} {link}", name, links[link][key], _OF_LINK[key])
+
+
+def link_parameters(dynamics: Any) -> tuple[str, ...]:
+    """Names of the masses and inertias of its links, as "panda_link3.mass"; they are parameters where swept."""
+    robot = getattr(dynamics, "robot", dynamics)
+    if not isinstance(robot, Robot):
+        return ()
+    return tuple(f"{link}.{key}" for link in _of_links(robot) for key in _OF_LINK)
+
+
+def _of_links(robot: Robot) -> dict[str, dict[str, Any]]:
+    """Mass and inertia of each link that states some, by link, edited."""
+    made = {}
+    for link in tree(robot.description, replace(robot.edits, payloads=(), mass_scale="1")).links:
+        for body in link.inertials:
+            xx, xy, xz, yy, yz, zz = map(float, body.moments)
+            made[link.name] = {"mass": float(body.mass), "inertia": [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]}
+    return made
 
 
 Values = Mapping[Part, Mapping[str, Any]]
@@ -151,7 +181,7 @@ def joined(known: Iterable[Parameter]) -> np.ndarray:
 
 
 def described(robot: Described, values: Mapping[str, Any]) -> Numbered:
-    """A robot with other gravity, payloads, armature and factor on its masses."""
+    """A robot with other gravity, payloads, armature, factor on its masses, and masses and inertias of links."""
     payloads = tuple(
         with_values(each, {key: _literal(values[f"{i} {key}"]) for key in _PAYLOAD if f"{i} {key}" in values})
         for i, each in enumerate(robot.edits.payloads)
@@ -160,6 +190,9 @@ def described(robot: Described, values: Mapping[str, Any]) -> Numbered:
     if "armature" in values:
         drives = zip(robot.joint_names, _literal(values["armature"]), strict=True)
         edits["armature"] = tuple((dict(robot.edits.armature) | dict(drives)).items())
+    for key, kept in (("mass", robot.edits.masses), ("inertia", robot.edits.inertias)):
+        own = {name.partition(" ")[2]: _literal(x) for name, x in values.items() if name.startswith(f"{key} ")}
+        edits[{"mass": "masses", "inertia": "inertias"}[key]] = tuple((dict(kept) | own).items())
     return Numbered(robot.description, replace(robot.edits, **edits), robot.joint_names)
 
 

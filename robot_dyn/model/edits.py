@@ -10,6 +10,7 @@ from typing import Any, TypedDict, Unpack, final
 import numpy as np
 
 from robot_dyn.errors import EditError, nearest, shown
+from robot_dyn.model.inertia import implausibility
 from robot_dyn.model.urdf import LARGEST
 from robot_dyn.validate import instance, numbers
 
@@ -54,6 +55,8 @@ class Changes(TypedDict, total=False):
     payload: Payload | Iterable[Payload]
     armature: Any
     mass_scale: float
+    masses: Mapping[str, float]
+    inertias: Mapping[str, Any]
 
 
 @final
@@ -67,6 +70,9 @@ class Edits:
         payloads: Bodies fastened to links.
         armature: Inertia of the drives felt at the joints: (name, value in [kg m²] or [kg]) each.
         mass_scale: Factor on the mass and inertia of all links, payloads excepted: for models that are wrong.
+        masses: In place of those that the file states: (link, value in [kg]) each.
+        inertias: Likewise, about the centre of mass in the axes of the link's inertial frame: (link, (3, 3) in
+            [kg m²]) each.
     """
 
     gravity: tuple[float, float, float] = STANDARD_GRAVITY
@@ -74,6 +80,8 @@ class Edits:
     payloads: tuple[Payload, ...] = ()
     armature: tuple[tuple[str, float], ...] = ()
     mass_scale: float = 1.0
+    masses: tuple[tuple[str, float], ...] = ()
+    inertias: tuple[tuple[str, Matrix3], ...] = ()
 
     def with_(self, joint_names: tuple[str, ...], **changes: Unpack[Changes]) -> Edits:
         """These edits and more, as `Robot.with_`; `joint_names` are the joints that can be named."""
@@ -103,6 +111,15 @@ class Edits:
             mass_scale = changes["mass_scale"]
             factor = float(_numbers("mass_scale", mass_scale, (), above=0))
             new = replace(new, mass_scale=factor)
+        if "masses" in changes:
+            masses = {
+                link: float(_numbers(f"mass of {link!r}", x, (), above=0))
+                for link, x in _by_link("masses", changes["masses"])
+            }
+            new = replace(new, masses=tuple((dict(new.masses) | masses).items()))
+        if "inertias" in changes:
+            inertias = {link: _inertia(link, x) for link, x in _by_link("inertias", changes["inertias"])}
+            new = replace(new, inertias=tuple((dict(new.inertias) | inertias).items()))
         return new
 
     def as_json(self) -> str:
@@ -126,6 +143,21 @@ def by_joint(what: str, values: Any, joint_names: tuple[str, ...]) -> dict[str, 
             raise EditError(f"{what}: no joint {name!r} that moves freely; {nearest(str(name), joint_names)}")
         checked[name] = float(_numbers(f"{what} of {name!r}", value, (), least=least))
     return checked
+
+
+def _by_link(what: str, values: Any) -> Iterable[tuple[str, Any]]:
+    if not isinstance(values, Mapping) or not all(isinstance(link, str) for link in values):
+        raise EditError(f"{what} must give values by link name, such as {{'panda_link3': …}}, got {shown(values)}")
+    return values.items()
+
+
+def _inertia(link: str, values: Any) -> Matrix3:
+    inertia = _numbers(f"inertia of {link!r}", values, (3, 3))
+    if not np.array_equal(inertia, inertia.T):
+        raise EditError(f"inertia of {link!r} must be symmetric, got {inertia.tolist()}")
+    if why := implausibility(0.0, np.zeros(3), inertia):
+        raise EditError(f"inertia of {link!r}: no body has it, {why}")
+    return tuple(map(tuple, inertia.tolist()))
 
 
 def _numbers(

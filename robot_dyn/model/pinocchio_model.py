@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import combinations_with_replacement
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,7 @@ def build(description: Description, edits: Edits) -> tuple[Any, Couplings, tuple
         EditError: If a payload's frame is unknown, or no joint is left to move.
     """
     robot = description.element
+    _state(robot, edits)
     mimics = stated_mimics(robot)
     for joint in robot.iterfind("joint"):
         joint.set("name", _MARK + joint.get("name"))
@@ -51,6 +53,20 @@ def build(description: Description, edits: Edits) -> tuple[Any, Couplings, tuple
     model = _locked(model, edits, mimics)
     _unmark(model)
     return model, *_couplings(tuple(model.names[1:]), mimics)
+
+
+def _state(robot: Any, edits: Edits) -> None:
+    """Write the masses and inertias of links in place of those of the file."""
+    links = {link.get("name"): link.find("inertial") for link in robot.iterfind("link")}
+    known = [name for name, inertial in links.items() if inertial is not None]
+    for what, names in (("masses", dict(edits.masses)), ("inertias", dict(edits.inertias))):
+        for name in names.keys() - set(known):
+            raise EditError(f"{what}: no link {name!r} of which the file states a mass; {nearest(name, known)}")
+    for name, mass in edits.masses:
+        links[name].find("mass").set("value", repr(float(mass)))
+    for name, inertia in edits.inertias:
+        for i, j in combinations_with_replacement(range(3), 2):
+            links[name].find("inertia").set(f"i{'xyz'[i]}{'xyz'[j]}", repr(float(inertia[i][j])))
 
 
 def _unmark(model: Any) -> None:

@@ -104,7 +104,8 @@ class Robot(Dynamics, Parametrised):
 
         Args:
             **changes: gravity (3,) in base axes, in [m/s²]; lock: values by joint, in [rad] or [m]; payload: one or
-                several; armature: inertia of the drives, a scalar, (n,) or by joint, in [kg m²] or [kg]; mass_scale.
+                several; armature: inertia of the drives, a scalar, (n,) or by joint, in [kg m²] or [kg]; mass_scale;
+                masses and inertias: values by link in place of the file's, in [kg], and (3, 3) in [kg m²].
 
         Raises:
             EditError: If a name is unknown or a value is not allowed.

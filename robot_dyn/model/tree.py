@@ -171,12 +171,21 @@ def _from_the_root(joint_of_child: dict[str, Joint]) -> tuple[str, list[Joint]]:
 
 def _loaded(link: Link, edits: Edits) -> Link:
     """The link with its masses scaled and the payloads it carries."""
+    mass, inertia = dict(edits.masses).get(link.name), dict(edits.inertias).get(link.name)
     more = [replace(part, scale=edits.mass_scale) for part in link.inertials]
+    if mass is not None:
+        more = [replace(part, mass=mass) for part in more]
+    if inertia is not None:
+        more = [replace(part, moments=_moments(inertia)) for part in more]
     for payload in edits.payloads:
         if payload.frame == link.name:
-            (Ixx, Ixy, Ixz), (_, Iyy, Iyz), (_, _, Izz) = payload.inertia
-            more.append(Inertial(payload.mass, (Ixx, Ixy, Ixz, Iyy, Iyz, Izz), payload.com))
+            more.append(Inertial(payload.mass, _moments(payload.inertia), payload.com))
     return replace(link, inertials=tuple(more))
+
+
+def _moments(inertia: Any) -> tuple[Literal, ...]:
+    (Ixx, Ixy, Ixz), (_, Iyy, Iyz), (_, _, Izz) = inertia
+    return Ixx, Ixy, Ixz, Iyy, Iyz, Izz
 
 
 def _edited(joint: Joint, edits: Edits) -> Joint:

@@ -26,6 +26,8 @@ def _edits(robot: Robot) -> Iterator[str]:
     yield from (f"payload {each.mass:g} kg on {each.frame}" for each in edits.payloads)
     if edits.mass_scale != 1:
         yield f"mass_scale {edits.mass_scale:g}"
+    yield from (f"mass {mass:g} kg of {link}" for link, mass in edits.masses)
+    yield from (f"inertia of {link}" for link, _ in edits.inertias)
     if any(value for _, value in edits.armature):
         yield "armature"
     yield from (f"lock {joint}" for joint, _ in edits.lock)

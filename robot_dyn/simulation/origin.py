@@ -116,5 +116,8 @@ def _edited(robot: Robot, edits: Any) -> Robot:
     """The robot with the edits of `Edits.as_json`, checked as a user's are; locks come last, they take joints away."""
     payloads = [Payload(**each) for each in edits["payloads"]]
     armature, lock = dict(edits["armature"]), dict(edits["lock"])
-    free = robot.with_(gravity=edits["gravity"], armature=armature, payload=payloads, mass_scale=edits["mass_scale"])
+    links = {key: dict(edits[key]) for key in ("masses", "inertias") if edits.get(key)}
+    free = robot.with_(
+        gravity=edits["gravity"], armature=armature, payload=payloads, mass_scale=edits["mass_scale"], **links
+    )
     return free.with_(lock=lock) if lock else free

@@ -14,12 +14,13 @@ from typing import Any, Unpack, cast
 import numpy as np
 
 from robot_dyn import former
-from robot_dyn.compiled.parameters import parameters
+from robot_dyn.compiled.parameters import link_parameters, parameters
 from robot_dyn.compiled.threads import thread_count
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import QueryError, nearest, shown
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.model.dynamics import Dynamics
+from robot_dyn.model.edits import Edits
 from robot_dyn.simulation.machine.batch import LANES, Batch
 from robot_dyn.simulation.machine.making import machine
 from robot_dyn.simulation.options import Options, setup_of, takes_options
@@ -59,8 +60,9 @@ def rollouts(
         params: Values that differ from run to run, each (B,) or (B, n): a gain of the controller by its name, as
             {"kp": …}, a coefficient of an effect, as {"viscous_friction.damping": …}, "gravity", (B, 3), or of a
             payload that a link carries its mass in [kg], as {"payload_mass:tool0": …}, or its centre of mass,
-            "payload_com:tool0", (B, 3); "armature", (B, n); "mass_scale", (B,). Models of controllers keep theirs:
-            they are "model.gravity", ….
+            "payload_com:tool0", (B, 3); "armature", (B, n); "mass_scale", (B,); mass and inertia of a link as of
+            `Robot.with_`, as {"link3.mass": …, "link3.inertia": …}, (B,) and (B, 3, 3). Models of controllers keep
+            theirs: they are "model.gravity", ….
         record: Which of "q", "v", "u", "energy", "work" to keep at the samples.
         threads: Number of threads; None for all processors.
         most_bytes: Refuse to record more than this.
@@ -147,18 +149,21 @@ def _values(setup: Setup, name: str, values: Any) -> np.ndarray:
     swept = [each for each in known if each.declared.swept]
     mine = [each for each in swept if each.name == name]
     if not mine:
-        raise QueryError(f"params: no {name!r}; {nearest(name, dict.fromkeys(each.name for each in swept))}")
+        names = dict.fromkeys((*(each.name for each in swept), *link_parameters(plant.dynamics)))
+        raise QueryError(f"params: no {name!r}; {nearest(name, names)}")
     classes = [type(plant.effects[each.part[1]]) if each.part[0] == "effect" else each.part for each in mine]
     if len(classes) > len(set(classes)):
         raise QueryError(f"params: {name} names a coefficient of several effects of the plant; make them one effect")
     n, declared = mine[0].size, mine[0].declared
-    shapes = (("B",), ("B", 1), ("B", n)) if declared.of_joints or n == 1 else (("B", n),)
+    shapes = (("B",), ("B", 1), ("B", n)) if declared.of_joints or n == 1 else (("B", *mine[0].value.shape),)
     array = numbers(
         f"params: {name}", values, *shapes,
         least=declared.least, above=declared.above, infinite=declared.infinite,
     )  # fmt: skip
-    array = array[:, None] if array.ndim == 1 else array
-    rows = np.ascontiguousarray(np.broadcast_to(array, (len(array), n)))
+    rows = np.ascontiguousarray(np.broadcast_to(array.reshape(len(array), -1), (len(array), n)))
+    for part in (each for each in mine if each.key.startswith("inertia ")):
+        for inertia in rows.reshape(-1, 3, 3):
+            Edits().with_((), inertias={part.key.partition(" ")[2]: inertia})  # refuses what no body has
     for part in {each.part for each in mine if each.part[0] == "effect"}:
         for row in np.unique(rows, axis=0):
             value = row.reshape(mine[0].value.shape)

@@ -101,7 +101,7 @@ def machine(
     own = equation if robot is plant.dynamics else replace(equation, plant=Plant(robot, plant.effects))
     known = parameters(robot, plant.effects, controller, swept)
     described, objects = structure(own)
-    described = described, tuple(each.entries for each in known)
+    described = described, tuple(each.place for each in known)
 
     def make() -> Equations:
         programs = _programs(own, known, kept, jacobian, None if objects else described)
@@ -158,7 +158,7 @@ def _traced(
         """Its equations in symbols, traced once for a file and its edits."""
         robot, own = _robot(dynamics), tuple(each for each in known if each.part == part)
         (described, *_), _ = structure(StateEquation(Plant(robot), None))
-        inputs = tuple(each.entries for each in own)
+        inputs = tuple(each.place for each in own)
         return _symbols.get((), (described, inputs), lambda: SymbolicDynamics(robot, own))
 
     return {name: program_of(each) for name, each in trace(equation, bodies, known, kept, jacobian).items()}

@@ -72,4 +72,5 @@ def _holds_function(part: Any) -> bool:
 
 
 def _of_edits(edits: Edits) -> tuple[Any, ...]:
-    return edits.lock, tuple(each.frame for each in edits.payloads), edits.armature, edits.mass_scale
+    frames = tuple(each.frame for each in edits.payloads)
+    return edits.lock, frames, edits.armature, edits.mass_scale, edits.masses, edits.inertias
