@@ -58,7 +58,8 @@ def test_an_event_lies_on_its_level_to_the_last_digits(engine: str) -> None:
     run, _ = tossed(0.5, 1e-3, 1e6, 0.3, engine=engine)
     stop = (G * 0.5) ** 2 / (2 * G) - 1e-3
     touched, left = run.events
-    assert touched.name == left.name == "upper stop of lift"
+    assert (touched.name, left.name) == ("upper stop of lift touched", "upper stop of lift left")
+    assert "events: upper stop of lift touched at 0.4857 s" in run.summary
     assert touched.q == left.q == (stop,)
     assert touched.t == pytest.approx(0.5 - np.sqrt(2e-3 / G), abs=4 * np.spacing(0.5) + 1e-13)
     assert left.v[0] == pytest.approx(-touched.v[0], rel=1e-9)
@@ -129,13 +130,13 @@ def test_two_joints_that_meet_their_stops_at_once() -> None:
 
 
 def test_machine_code_paused_at_every_third_step_gives_the_same_bits(monkeypatch) -> None:
-    from robot_dyn.simulation.error_controlled import ErrorControlled
+    from robot_dyn.simulation.event_run import EventRun
 
     options = {"q0": [0.3, 0.4], "v0": [0.2, 0.1], "duration_s": 2.0, "engine": "compiled", "estimate_error": False}
     plant = rd.Plant(ARM, rd.joint_stops([-1.0, -1.0], [1.0, 1.0], 1e5))
     whole = rd.simulate(plant, **options)
-    go = ErrorControlled._go
-    monkeypatch.setattr(ErrorControlled, "_go", lambda self, budget: go(self, 3))
+    go = EventRun._go
+    monkeypatch.setattr(EventRun, "_go", lambda self, budget: go(self, 3))
     paused = rd.simulate(plant, **options)
     assert whole.events == paused.events != ()
     for name in ("t", "q", "v", "a", "u"):

@@ -13,7 +13,7 @@ import robot_dyn as rd
 from robot_dyn.control.controller import ControlError, Stateless
 from robot_dyn.effects.effect import Active, Conservative
 from robot_dyn.errors import EffectError, QueryError
-from robot_dyn.simulation.error_controlled import ErrorControlled
+from robot_dyn.simulation.event_run import EventRun
 from robot_dyn.simulation.fixed_step import FixedStep
 
 DOUBLE = rd.load("planar_2r")
@@ -307,7 +307,7 @@ def test_an_interrupt_in_a_companion_run_ends_the_estimate_and_keeps_the_run(met
         return interrupted
 
     monkeypatch.setattr(FixedStep, "_loop", on_second(FixedStep._loop))
-    monkeypatch.setattr(ErrorControlled, "_loop", on_second(ErrorControlled._loop))
+    monkeypatch.setattr(EventRun, "_loop", on_second(EventRun._loop))
     run = rd.simulate(rd.Plant(DOUBLE), **START, duration_s=0.2, integrator=method, engine="interpreted")
     assert len(ran) == 2
     assert (run.outcome.ending, run.outcome.t) == ("stopped", 0.2)

@@ -22,6 +22,7 @@ from robot_dyn.model.dynamics import Dynamics
 
 _NOWHERE = 1e9  # a stop that does not exist: no depth can be reached there
 _NAME = "joint_stops"  # of both parts, as of the function that makes them
+_LOWER_STOP, _UPPER_STOP = ("lower stop", "left", "touched"), ("upper stop", "touched", "left")
 _LOWER = coefficient("rad", symbol="Lower stop", infinite=True, elsewhere=-inf, stated="lower")
 _UPPER = coefficient("rad", symbol="Upper stop", infinite=True, elsewhere=inf, stated="upper")
 
@@ -124,8 +125,8 @@ def _depth(coefficient: Any) -> Any:
 def _thresholds(stops: Any, coefficient: Any, n: int) -> tuple[Threshold, ...]:
     acts = np.broadcast_to(coefficient, n) > 0
     return tuple(
-        Threshold(i, float(level), name)
-        for name, levels in (("lower stop", stops.lower), ("upper stop", stops.upper))
+        Threshold(i, float(level), *words)
+        for words, levels in ((_LOWER_STOP, stops.lower), (_UPPER_STOP, stops.upper))
         for i, level in enumerate(np.broadcast_to(levels, n))
         if abs(level) < _NOWHERE and acts[i]
     )
@@ -137,7 +138,7 @@ def _levels(stops: Any, n: int, sides: Mapping[Threshold, int]) -> dict[str, np.
     for joint in {each.joint for each in sides}:
         lower[joint], upper[joint] = -_NOWHERE, _NOWHERE
     for each, side in sides.items():
-        if side == (1 if each.name == "upper stop" else -1):
+        if side == (1 if each.name == _UPPER_STOP[0] else -1):
             lower[each.joint] = upper[each.joint] = each.level
     return {"lower": lower, "upper": upper}
 

@@ -15,10 +15,13 @@ class Threshold:
         joint: Its index.
         level: In [rad] or [m], or [rad/s] or [m/s].
         name: What it is, as "upper stop".
+        rising, falling: What happens where the coordinate grows through it, or falls, as "touched" and "left".
         of_velocity: Whether the velocity passes it.
     """
 
     joint: int
     level: float
     name: str
+    rising: str
+    falling: str
     of_velocity: bool = False

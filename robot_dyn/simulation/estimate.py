@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from robot_dyn.coefficients import with_values
 from robot_dyn.integrate.adaptive import LEAST_RTOL, Adaptive
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.simulation.between import stepped_over
@@ -49,12 +50,13 @@ def estimate(setup: Setup, equation: StateEquation, run: Record, companion: Comp
     kink, why = first_kink(setup, equation, run.walked)
     estimated = Estimated(run.shared, n, kink, rounding(run.shared, n), meaningless(run.walked, n))
     method: Any = setup.integrator
-    if run.ends is not None:
+    if method.controls_error and method.plain:
         made = _by_refinement(setup, method, run, estimated, companion)
     elif method.controls_error:
         made = _by_tolerances(setup, method, estimated, companion)
     else:
         made = _by_steps(setup, method, estimated, companion, _turn(equation, run.walked))
+        made = _until_brief(setup, run, made)
     return _advised(setup, _looked_between(setup, equation, run, made), why)
 
 
@@ -83,6 +85,21 @@ def _by_steps(
     return estimated.from_shorter_steps({FINE[0]: half, FINE[1]: companion(FINE[1], setup).shared})
 
 
+def _until_brief(setup: Setup, run: Record, made: ErrorEstimate) -> ErrorEstimate:
+    """The estimate up to where a joint switches and switches back within a few steps.
+
+    Each companion cuts its steps there as well, so that all of them make the same one or two.
+    """
+    h, before = setup.taken_step_s, {}
+    for each in run.events:
+        t = before.get(each.joint, -np.inf) if each.joint else -np.inf
+        if each.t - t < LEAST_STEPS * h and t < made.resolved_until:
+            why = f"joint {each.joint!r} switches and switches back within {LEAST_STEPS} steps"
+            return replace(made, resolved_until=t, note=why)
+        before[each.joint] = each.t
+    return made
+
+
 def _by_refinement(
     setup: Setup, method: Adaptive, run: Record, estimated: Estimated, companion: Companion
 ) -> ErrorEstimate:
@@ -104,7 +121,8 @@ def _by_refinement(
 
 
 def _tolerant(setup: Setup, method: Adaptive, factor: float) -> Setup:
-    return replace(setup, integrator=replace(method, rtol=method.rtol * factor, atol=method.atol * factor))
+    method = replace(method, rtol=method.rtol * factor, atol=method.atol * factor)
+    return with_values(setup, {"integrator": method})  # all else was checked
 
 
 def _by_tolerances(setup: Setup, method: Adaptive, estimated: Estimated, companion: Companion) -> ErrorEstimate:

@@ -63,6 +63,7 @@ class Occurrence:
         direction: 1 where the switching function grows, −1 where it falls.
         q: Position then, n numbers, in [rad] or [m].
         v: Velocity then, in [rad/s] or [m/s].
+        joint: The joint that it is of; empty for the user's own.
     """
 
     t: float
@@ -70,3 +71,4 @@ class Occurrence:
     direction: int
     q: tuple[float, ...]
     v: tuple[float, ...]
+    joint: str = ""

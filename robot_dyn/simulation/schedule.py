@@ -87,6 +87,24 @@ def steps_on(length: float, step_s: float, record_period_s: float) -> int:
     return max(1, ceil(length / step_s - _ROUNDED))
 
 
+def nodes(segments: tuple[Segment, ...]) -> np.ndarray:
+    """Ends of all steps, the start among them, in [s]."""
+    parts = [each.start + np.arange(each.steps) * ((each.end - each.start) / each.steps) for each in segments]
+    return np.concatenate([*parts, [segments[-1].end]])
+
+
+def mesh(segments: tuple[Segment, ...], pace: Fraction) -> np.ndarray:
+    """Ends of steps `pace` times as long, a whole number or one over it; of the former each is one of `nodes`."""
+    times = nodes(segments)
+    if pace >= 1:
+        firsts = np.array([each.first for each in segments])
+        place = np.arange(len(times)) - firsts[np.searchsorted(firsts, np.arange(len(times)), side="right") - 1]
+        return times[place % int(pace) == 0]
+    parts = int(1 / pace)
+    inside = times[:-1, None] + np.diff(times)[:, None] * (np.arange(parts) / parts)
+    return np.append(inside.ravel(), times[-1])
+
+
 def paced(segments: tuple[Segment, ...], pace: Fraction) -> tuple[Segment, ...]:
     """The schedule of a companion run, whose steps are `pace` times as long.
 

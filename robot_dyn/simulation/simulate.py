@@ -21,8 +21,8 @@ from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.simulation.acting import acting
 from robot_dyn.simulation.choice import choose
 from robot_dyn.simulation.error import ErrorEstimate, no_estimate
-from robot_dyn.simulation.error_controlled import ErrorControlled
 from robot_dyn.simulation.estimate import estimate
+from robot_dyn.simulation.event_run import EventRun
 from robot_dyn.simulation.fixed_step import FixedStep
 from robot_dyn.simulation.ledger import Ledger
 from robot_dyn.simulation.loads import at_stop, link_of, wrenches
@@ -32,9 +32,11 @@ from robot_dyn.simulation.options import Options, setup_of, starts, takes_option
 from robot_dyn.simulation.origin import edits_of_machine_code, origin
 from robot_dyn.simulation.record import Record
 from robot_dyn.simulation.samples import columns
+from robot_dyn.simulation.schedule import mesh
 from robot_dyn.simulation.scipy_steps import ScipySteps
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import check_record
+from robot_dyn.simulation.smoothness import finds_events
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.state_functions import interpreted
 from robot_dyn.simulation.time_loop import Functions
@@ -122,9 +124,11 @@ def _run(
         return functions, machine.parameters if of is equation else machine.with_effects(of.plant.effects)
 
     loop, in_python = (None, None) if machine is None else (machine.loop, machine.in_python)
-    if setup.integrator.controls_error and setup.integrator.plain:
-        mesh = pace if isinstance(pace, np.ndarray) else None
-        run: Any = ErrorControlled(setup, equation, made, mesh, loop, on_progress, observer, in_python, not companion)
+    if finds_events(setup):
+        ends = pace if isinstance(pace, np.ndarray) else None
+        if not setup.integrator.controls_error:
+            ends = mesh(setup.segments, cast(Fraction, pace))
+        run: Any = EventRun(watch, made, ends, loop, on_progress, observer, in_python, not companion)
     elif setup.integrator.controls_error:
         functions, parameters = made(equation)
         run = ScipySteps(setup, equation, functions, cast(Fraction, pace), on_progress, observer, parameters)

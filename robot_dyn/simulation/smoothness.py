@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 STOPS = (JointStopSpring, JointStopDamper)
 _IN_LAYER = 4  # steps within |v| < v_s that show a method's order
 _NEAR_LIMIT = 0.95  # of the effort limit
+MOST_CUT = 200_000  # steps of a run of fixed step that is cut at events
 LOOKS = 4000  # at foreign code, between steps
 _LOOKS = 300  # states at which the actuation is computed
 
@@ -54,7 +55,11 @@ def looked_s(setup: Setup) -> float:
 
 def finds_events(setup: Setup) -> bool:
     """Whether steps end where effects of this library switch."""
-    return setup.integrator.controls_error and setup.integrator.plain
+    if setup.integrator.controls_error:
+        return setup.integrator.plain
+    n = setup.plant.dynamics.n
+    switches = bool(setup.events) or any(effect.thresholds(n) for effect in setup.plant.effects)
+    return switches and setup.steps <= MOST_CUT
 
 
 def may_switch(setup: Setup) -> bool:
@@ -84,8 +89,9 @@ def first_kink(setup: Setup, equation: StateEquation, path: Path) -> tuple[float
     n = equation.plant.dynamics.n
     q, v = path.y[:, :n], equation.velocities(path.y)
     found = [(np.inf, "")]
-    for effect in () if finds_events(setup) else setup.plant.effects:  # or cuts and resolves them
-        if isinstance(effect, STOPS):
+    found_by_events = finds_events(setup)
+    for effect in () if setup.integrator.plain and setup.integrator.controls_error else setup.plant.effects:
+        if isinstance(effect, STOPS) and not found_by_events:
             low, high = extremes(path.t, q, v)
             found.append(_first(path.t, (low < effect.lower) | (high > effect.upper), "a joint touches its stop"))
         elif isinstance(effect, RegularisedCoulombFriction):

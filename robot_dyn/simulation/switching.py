@@ -11,8 +11,8 @@ from robot_dyn.arithmetic import Array
 from robot_dyn.effects.plant import Plant
 from robot_dyn.effects.threshold import Threshold
 from robot_dyn.integrate.bernstein import room
-from robot_dyn.simulation.controlled_loop import Switches
 from robot_dyn.simulation.event import Occurrence
+from robot_dyn.simulation.event_loop import Switches
 from robot_dyn.simulation.state_equation import StateEquation
 
 
@@ -22,15 +22,24 @@ class Switching:
 
     Args:
         equation: The state equation, of effects that switch by themselves, and with events asked for.
+        dropped: Thresholds that are not looked for: there the effects switch by themselves.
 
     Attributes:
         thresholds: Of the effects, each once, E of them; the switching function is the coordinate less the level.
     """
 
-    def __init__(self, equation: StateEquation) -> None:
-        self.equation, self.events = equation, equation.events
+    def __init__(self, equation: StateEquation, dropped: frozenset[Threshold] = frozenset()) -> None:
+        self.equation, self.events, self.dropped = equation, equation.events, dropped
         n = equation.plant.dynamics.n
-        self._of = [effect.thresholds(n) for effect in equation.plant.effects]
+        joints = {each.joint for each in dropped}  # the formulas of a joint hang together
+        self._of = [
+            tuple(
+                each
+                for each in effect.thresholds(n)
+                if each.joint not in joints and not (each.of_velocity and equation.canonical)
+            )
+            for effect in equation.plant.effects
+        ]
         self.thresholds: tuple[Threshold, ...] = tuple(dict.fromkeys(each for of in self._of for each in of))
         self._known: dict[bytes, StateEquation] = {}
 
@@ -42,13 +51,13 @@ class Switching:
         gaps = y[rows] - levels
         moving = y[np.where(rows < n, rows + n, rows)]  # on the level itself, where it is going
         sides = np.where(gaps + (gaps == 0) * moving > 0, 1.0, -1.0)
-        if (at_rest := (gaps == 0) & (moving == 0)).any():  # a stop is touched, and not passed
-            sides[at_rest] = np.where([each.name.startswith("lower") for each in self.thresholds], 1.0, -1.0)[at_rest]
+        for i in np.flatnonzero((gaps == 0) & (moving == 0)):  # a stop is touched, and not passed
+            sides[i] = 1.0 if self.thresholds[i].falling == "touched" else -1.0
         values = self.values(0.0, y)
-        sides = np.append(sides, np.where(values > 0, 1.0, -1.0))
+        sides = np.append(sides, np.sign(values))  # 0 where the start is a root: the first step tells
         size = np.maximum(1.0, np.abs(levels))
         return Switches(
-            rows, levels, sides, functions, values[:, None].copy(), np.zeros((G, 1)), size, np.zeros(degree + 1),
+            rows, levels, sides, functions, np.zeros((G, 1)), size, np.zeros(degree + 1),
             room(degree),
         )  # fmt: skip
 
@@ -78,11 +87,11 @@ class Switching:
 
     def occurrence(self, index: int, t: float, y: np.ndarray, side: float) -> Occurrence:
         """The event of a switching function whose sign is now `side`."""
-        q, v, _, _ = self.equation.state(y)
+        q, v, joint = *self.equation.state(y)[:2], ""
         if index < len(self.thresholds):
             each = self.thresholds[index]
             joint = self.equation.plant.dynamics.joint_names[each.joint]
-            name = f"{each.name} of {joint}"
+            name = f"{each.name} of {joint} {each.rising if side > 0 else each.falling}"
         else:
             name = self.events[index - len(self.thresholds)].name
-        return Occurrence(t, name, int(side), tuple(q.tolist()), tuple(v.tolist()))
+        return Occurrence(t, name, int(side), tuple(q.tolist()), tuple(v.tolist()), joint)

@@ -21,6 +21,7 @@ from robot_dyn.values import Value, read_only
 # q, as a part of the motion; one that is far larger contradicts the estimate.
 _OPEN, _CONTRADICTS, _ROUNDING = 1e-3, 100.0, 1e-12
 _NOT_ESTIMATED = ("not estimated (estimate_error is False)", "not estimated (the run was stopped)")
+_TOLD = 3  # events in a summary
 _NOTICED = 0.01  # [s]: shorter times are not worth a word
 
 
@@ -167,6 +168,7 @@ class Trajectory(Value):
             f"error of q [{unit}]: {self.error or _NOT_ESTIMATED[self.outcome.ending is Ending.STOPPED]}",
         ]
         lines += ["between samples: not watched"] if self.extremes is None else []
+        lines += [f"events: {_told(self.events)}"] if self.events else []
         lines += said(self.remarks)
         if self.tracking_error is not None:
             what = "the frame [m]" if self.desired is None else f"q [{unit}]"
@@ -183,6 +185,12 @@ class Trajectory(Value):
             "time: " + ", ".join(f"{name} {spent:.2g} s" for name, spent in parts if spent >= _NOTICED or name == "run")
         )
         return "\n".join(lines)
+
+
+def _told(events: tuple[Occurrence, ...]) -> str:
+    """The first events in words."""
+    words = [f"{each.name} at {each.t:.4g} s" for each in events[:_TOLD]]
+    return ", ".join(words) + (f", and {len(events) - _TOLD} more" if len(events) > _TOLD else "")
 
 
 def _after(text: str) -> str:

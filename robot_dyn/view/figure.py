@@ -22,6 +22,7 @@ _WILD = 1e3  # times its usual size: what grew beyond it while a run diverged ne
 _LINE, _WIDE = 0.15, 160  # height of a line of text in [inch], its letters
 _ACROSS = 6  # entries of a legend beside each other
 NEAR = 0.2  # of its effort limit: a torque that stays below is drawn without it
+_MOST_MARKS = 200  # in a cell
 _PIXELS = 1000  # across a cell; of the samples that fall on one, the least and the largest are drawn
 THEMES: dict[str, dict[str, Any]] = {  # colours of Okabe and Ito, told apart by the colour-blind, by contrast
     "light": {"paper": "#ffffff", "ink": "#1a1a1a", "grid": "#dddddd", "veil": "#eeeeee"}
@@ -47,7 +48,10 @@ class Curve:
 @final
 @dataclass(frozen=True)
 class Cell:
-    """One pair of axes; `limit` is drawn at ±limit, what lies after `until` is veiled; no `x`: as below."""
+    """One pair of axes; `limit` is drawn at ±limit, `marks` as dotted lines, what lies after `until` is veiled.
+
+    Without `x` it is that of the row below.
+    """
 
     title: str
     x: str
@@ -57,6 +61,7 @@ class Cell:
     limit: float = np.inf
     until: float = np.inf
     note: str = ""
+    marks: tuple[float, ...] = ()
 
 
 @final
@@ -154,6 +159,10 @@ def _fill(axes: Any, cell: Cell, theme: Mapping[str, Any], diverged: bool) -> No
     for level in (-cell.limit, cell.limit) if np.isfinite(cell.limit) else ():
         dashed = {"color": colours[_LIMIT[0]], "linestyle": _DASHES[_LIMIT[1]], "linewidth": 1}
         axes.axhline(level, label="_limit", **dashed)
+    axes.vlines(
+        cell.marks[:_MOST_MARKS], 0, 1, transform=axes.get_xaxis_transform(), color=theme["ink"], linewidth=0.6,
+        linestyle=":", label="_events",
+    )  # fmt: skip
     if np.isfinite(cell.until):
         axes.axvspan(cell.until, cell.curves[0].x[-1], color=theme["veil"], zorder=0.5, label="_not resolved")
     _scale(axes, "y", np.concatenate([curve.y for curve in cell.curves]), cell.limit, diverged, log)

@@ -61,10 +61,13 @@ def joints(view: View) -> Panel:
         q = [Curve("actual", run.t, run.q[:, i])]
         if run.desired is not None:
             q.append(Curve("desired", run.t, run.desired[:, i], DESIRED))
-        cells.append(Cell(name, "", f"q [{view.units[i]}]", tuple(q)))
-        cells.append(Cell("", "t [s]", f"v [{_rate(view.units[i])}]", (Curve("actual", run.t, run.v[:, i]),)))
+        marks = tuple(each.t for each in run.events if each.joint in ("", name))
+        cells.append(Cell(name, "", f"q [{view.units[i]}]", tuple(q), marks=marks))
+        v = (Curve("actual", run.t, run.v[:, i]),)
+        cells.append(Cell("", "t [s]", f"v [{_rate(view.units[i])}]", v, marks=marks))
     pairs = zip(_grid(cells[::2]), _grid(cells[1::2]), strict=True)
-    return Panel("Joint positions and velocities", tuple(row for pair in pairs for row in pair))
+    marked = "; events are dotted" if run.events else ""
+    return Panel(f"Joint positions and velocities{marked}", tuple(row for pair in pairs for row in pair))
 
 
 def torques(view: View) -> Panel:

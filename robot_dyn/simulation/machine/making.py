@@ -20,10 +20,11 @@ from robot_dyn.compiled.program import Program
 from robot_dyn.compiled.right_angles import robot_of
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import TraceError
+from robot_dyn.integrate import hermite
 from robot_dyn.integrate.adaptive import STEPPERS
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.model.robot import Robot
-from robot_dyn.simulation.controlled_loop import controlled_loop
+from robot_dyn.simulation.event_loop import event_loop
 from robot_dyn.simulation.machine.machine import Equations, Machine
 from robot_dyn.simulation.machine.structure import structure
 from robot_dyn.simulation.state_equation import StateEquation
@@ -82,6 +83,7 @@ def machine(
     kept: tuple[str, ...] | None = None,
     swept: tuple[str, ...] = (),
     jacobian: bool = False,
+    cuts: bool = False,
 ) -> Machine:
     """The machine of a state equation, from the latest ones if it is among them; not compiled yet.
 
@@ -92,6 +94,7 @@ def machine(
         kept: As of `trace`.
         swept: Names of the parameters that differ from run to run.
         jacobian: Whether the method needs that of the rate.
+        cuts: Whether steps are chosen, or cut at events.
 
     Raises:
         TraceError: If a part of the equation cannot be compiled; names it, with the remedy.
@@ -114,7 +117,7 @@ def machine(
             f"the run takes {equations.instructions} instructions, more than the {_MOST_INSTRUCTIONS} worth compiling;"
             " simulate it with engine='interpreted'"
         )
-    return Machine(own, equations, known, None if method is None else _loop(method), swept)
+    return Machine(own, equations, known, None if method is None else _loop(method, cuts), swept)
 
 
 def _shared(
@@ -164,10 +167,10 @@ def _traced(
     return {name: program_of(each) for name, each in trace(equation, bodies, known, kept, jacobian).items()}
 
 
-def _loop(method: Any) -> Callable[..., int]:
+def _loop(method: Any, cuts: bool) -> Callable[..., int]:
     from robot_dyn.simulation.machine.loop import loop
 
-    if method.controls_error:
-        made = STEPPERS[method.method](1, 1, 1)
-        return loop(controlled_loop, made.begin, made.step, made.error, made.accept, made.dense)
-    return loop(time_loop, method.stepper(FLOAT64, 1, 0, 1).step)
+    if not cuts:
+        return loop(time_loop, method.stepper(FLOAT64, 1, 0, 1).step)
+    made = STEPPERS[method.method](1, 1, 1) if method.controls_error else hermite.stepper(method, 1, 0, 1, None)
+    return loop(event_loop, made.begin, made.step, made.error, made.accept, made.dense)

@@ -1,4 +1,4 @@
-"""A run by a method that chooses its steps, followed by Python: the loop comes back for progress, Ctrl-C and events.
+"""A run whose steps are chosen or cut, followed by Python: the loop comes back for progress, Ctrl-C and events.
 
 At an event the effects change their mode: what they are on the other side of a switch stands in their coefficients, so
 that within a step the right-hand side is smooth.
@@ -7,38 +7,51 @@ that within a step the right-hand side is smooth.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from math import inf
 from time import perf_counter
-from typing import Any, cast, final
+from typing import Any, final
 
 import numpy as np
 
 from robot_dyn.arithmetic import Array
+from robot_dyn.effects.threshold import Threshold
 from robot_dyn.errors import OverflowedError, RobotDynError
 from robot_dyn.foreign import is_mistake
-from robot_dyn.integrate.adaptive import STEPPERS, Adaptive
-from robot_dyn.integrate.step_control import control_of
-from robot_dyn.simulation.controlled_loop import Kept, Times, controlled_loop
+from robot_dyn.integrate import hermite
+from robot_dyn.integrate.adaptive import STEPPERS
+from robot_dyn.integrate.step_control import At, ControlledStepper, control_of
 from robot_dyn.simulation.event import Occurrence
+from robot_dyn.simulation.event_loop import Kept, Times, event_loop
 from robot_dyn.simulation.fixed_step import runs_of
 from robot_dyn.simulation.observer import Observer
 from robot_dyn.simulation.plan import plan_of
 from robot_dyn.simulation.record import MOST_SHARED, Path, Record
+from robot_dyn.simulation.schedule import nodes
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import samples as most_samples
 from robot_dyn.simulation.state_equation import StateEquation
+from robot_dyn.simulation.state_functions import interpreted, system
 from robot_dyn.simulation.switching import Switching
 from robot_dyn.simulation.time_loop import Ended, Functions, Now, Rules
 from robot_dyn.simulation.trajectory import Ending, Outcome
-from robot_dyn.simulation.watch import DivergedError, Watch
+from robot_dyn.simulation.watch import DivergedError, Watch, one_step
 
 _SAMPLES = 1000  # of a run without a record period
 _COMPARED = 1000  # times at which a run is compared with runs of other tolerances
 _PAUSE_S, _FIRST = 0.1, 200  # between looks at the keyboard; steps before the speed is known
+_CHATTER, _BRIEF = 20, 1e-9  # events of one threshold, in that part of the run
 _CHUNK = 1024  # ends of steps for which there is room at first
 
 Advance = Callable[..., int]
 Made = Callable[[StateEquation], tuple[Functions, np.ndarray]]
+
+
+def _on(times: np.ndarray, path: Path) -> Path:
+    """The states of a path that lie on nodes; their keys are the steps before these."""
+    key = np.minimum(np.searchsorted(times, path.t), len(times) - 1)
+    met = np.flatnonzero((times[key] == path.t) & np.append(np.diff(path.t) > 0, True))
+    return Path(key[met], path.t[met], path.y[met])
 
 
 class TerminalEvent(Exception):  # noqa: N818
@@ -50,12 +63,11 @@ class TerminalEvent(Exception):  # noqa: N818
 
 
 @final
-class ErrorControlled:
+class EventRun:
     """A run on its way.
 
     Args:
-        setup: What to run.
-        equation: Its state equation.
+        watch: Of the setup, and its state equation.
         made: Gives the functions of a state equation, for the loop, and their parameters (P,).
         mesh: Where steps end, (k,); None for error control.
         samples: Whether samples are kept.
@@ -66,37 +78,29 @@ class ErrorControlled:
     """
 
     def __init__(
-        self, setup: Setup, equation: StateEquation, made: Made, mesh: np.ndarray | None,
+        self, watch: Watch, made: Made, mesh: np.ndarray | None,
         machine_code: Advance | None = None,
         on_progress: Callable[[float], object] | None = None, observer: Observer | None = None,
         in_python: Functions | None = None, samples: bool = True,
     ) -> None:  # fmt: skip
-        self.in_python = in_python
+        setup, equation = watch.setup, watch.equation
+        self.watch, self.plan, self.in_python = watch, plan_of(setup), in_python
         self.setup, self.equation, self.made, self.samples = setup, equation, made, samples
         self.on_progress, self.observer, self.compiled = on_progress, observer, machine_code is not None
-        self.watch, self.plan = Watch(setup, equation), plan_of(setup)
-        method, n, m = cast(Adaptive, setup.integrator), equation.plant.dynamics.n, equation.size
+        n, m = equation.plant.dynamics.n, equation.size
         held = n if equation.sampled else 0
         self.start = equation.start(setup.q0, setup.v0)
-        self.stepper, self.switching = STEPPERS[method.method](m, m + n, m - len(equation.sources)), Switching(equation)
+        self.stepper, self.control = _method(setup, equation)
+        self.switching = Switching(equation)
         self.functions, parameters = made(equation)
         own = np.concatenate([np.full(held, np.nan), parameters])[:, None]
         self.runs = runs_of(self.start[:, None], own, n, held, equation.state_size, m + n + 2)
         self.runs.energy[0], self.runs.scale[0] = self.watch.energy, self.watch.scale
         of = self.stepper
-        self.advance = machine_code or controlled_loop(of.begin, of.step, of.error, of.accept, of.dense)
-        self.rules = Rules(n, len(equation.sources), equation.state_size, held, False, True, inf, 0, 1, 0)
-        self.control = self._control(method)
-        record = setup.record_period_s or setup.duration_s / _SAMPLES
-        compared = setup.duration_s / _COMPARED if setup.estimate_error else inf
-        self.times = Times(
-            np.zeros(1),
-            record if samples else inf,
-            compared,
-            not setup.record_period_s,
-            setup.duration_s,
-            np.zeros(0) if mesh is None else mesh,
-        )
+        self.advance = machine_code or event_loop(of.begin, of.step, of.error, of.accept, of.dense)
+        self.rules = Rules(n, len(equation.sources), equation.state_size, held, equation.canonical, True, inf, 0, 1, 0)
+        self.times = _times(setup, mesh, samples)
+        compared = self.times.compared
         S, rows = len(self.plan.counts), int(most_samples(setup)) + 2 if samples else 0
         states = 0 if compared == inf else _COMPARED + S + 2
         columns = np.empty((2 + 3 * n, 0)) if observer is None else observer.columns
@@ -109,11 +113,6 @@ class ErrorControlled:
         self.events: list[Occurrence] = []
         self._change_mode()
         self.now, self.stop = np.zeros(len(Now), np.int64), np.zeros(1, np.int64)
-
-    def _control(self, method: Adaptive) -> np.ndarray:
-        """The choice of steps before the first, with the tolerances of this run."""
-        longest = min(method.max_step_s, self.setup.longest_step_s)
-        return control_of(self.stepper, method.rtol, method.atol, longest)
 
     @property
     def time(self) -> float:
@@ -191,7 +190,19 @@ class ErrorControlled:
         except RobotDynError as error:
             if is_mistake(error):
                 raise
+            if not self.setup.integrator.controls_error:
+                self._step_in_words()
             raise DivergedError(self.time, f"{error}, at t = {self.time}") from None
+
+    def _step_in_words(self) -> None:
+        """A step of a method of fixed step that was not found: DivergedError with the words for it."""
+        s, t, y = int(self.now[Now.SEGMENT]), self.time, self.y
+        equation = self.switching.on(self.switches.sides)
+        p, functions = self.plan.parameters[s], interpreted(equation, self.watch)
+        right_side = system(functions, equation, p, self.runs.own[: self.rules.held])
+        h = float(self.control[At.TAKEN])
+        one_step(self.setup.integrator, right_side, t, y, h, self.watch)
+        raise self.watch.diverged(t, y, "a number overflowed")
 
     def _judge(self, ended: Ended) -> None:
         """What the loop came back for; DivergedError ends the run."""
@@ -207,6 +218,8 @@ class ErrorControlled:
             self.plan.ticks[s] = 0
         elif ended is Ended.GAINS:
             self.watch.look(t, y)
+        elif ended is Ended.TOO_SMALL and not self.setup.integrator.controls_error:
+            self._step_in_words()
         elif ended is Ended.TOO_SMALL:
             raise DivergedError(t, f"the step became smaller than the spacing of floats {where}")
         elif ended is Ended.NOT_FINITE:
@@ -225,11 +238,24 @@ class ErrorControlled:
 
     def _change_mode(self) -> None:
         """Let the functions be those of the sides that the switching functions are on."""
-        if self.switching.thresholds:
+        if self.switching.thresholds or self.switching.dropped:
             self.functions, parameters = self.made(self.switching.on(self.switches.sides))
             self.runs.own[self.rules.held :, 0] = parameters
         if not self.compiled:
             self.functions = _ready(self.functions)
+
+    def _chatters(self) -> bool:
+        """Whether the latest events were all of one threshold, in next to no time."""
+        latest = self.events[-_CHATTER:]
+        brief = latest[-1].t - latest[0].t <= _BRIEF * self.setup.duration_s
+        return len(latest) == _CHATTER and brief and len({each.joint for each in latest} - {""}) == 1
+
+    def _drop(self, threshold: Threshold) -> None:
+        """Look for a threshold no longer, where steps would never get on."""
+        last = self.events[-1]
+        self.events.append(replace(last, name=f"{last.name} chatters, and is no longer looked for"))
+        self.switching = Switching(self.equation, self.switching.dropped | {threshold})
+        self.switches = self.switching.at(self.y, len(self.switches.b) - 1, self.switches.functions)
 
     def _event(self, t: float, y: np.ndarray) -> None:
         """Keep an event, and go on behind it; TerminalEvent ends the run."""
@@ -237,6 +263,8 @@ class ErrorControlled:
         side = float(self.switches.sides[index])
         if index < E:
             self.events.append(self.switching.occurrence(index, t, y, side))
+            if self._chatters():
+                self._drop(self.switching.thresholds[index])
             self._change_mode()
             return
         event = self.setup.events[index - E]
@@ -250,15 +278,40 @@ class ErrorControlled:
         rows, shared, walked = (int(self.now[i]) for i in (Now.ROW, Now.SHARED, Now.WALKED))
         if self.samples and not rows:  # interrupted, or without a tick, at once
             kept.t[0], kept.y[0, :, 0], kept.made[0], rows = 0.0, self.start, np.nan, 1
-        common = Path(np.arange(shared), kept.shared_t[:shared], kept.shared[:shared])
         ends = kept.walked_t[:walked]
         states = np.vstack([self.start, kept.walked[: min(walked, len(kept.walked))]])
         path = Path(np.full(len(states), -1), np.append(0.0, ends)[: len(states)], states)
+        if self.setup.integrator.controls_error:
+            common = Path(np.arange(shared), kept.shared_t[:shared], kept.shared[:shared])
+        else:
+            common = _on(nodes(self.setup.segments), path)
         return Record(
             outcome, kept.t[:rows], kept.y[:rows, :, 0], kept.made[:rows, :, 0], common, path,
             int(self.now[Now.STEPS]), int(self.now[Now.EVALUATIONS]), float(self.runs.peak[0]), tuple(self.events),
             ends,
         )  # fmt: skip
+
+
+def _method(setup: Setup, equation: StateEquation) -> tuple[ControlledStepper, np.ndarray]:
+    """The method made ready, and the choice of its steps before the first."""
+    method: Any = setup.integrator
+    n, m = equation.plant.dynamics.n, equation.size
+    if not method.controls_error:
+        stepper = hermite.stepper(method, m, n, m + n, equation.widths)
+        return stepper, control_of(stepper, 0.0, 0.0, inf)
+    stepper = STEPPERS[method.method](m, m + n, m - len(equation.sources))
+    return stepper, control_of(stepper, method.rtol, method.atol, min(method.max_step_s, setup.longest_step_s))
+
+
+def _times(setup: Setup, mesh: np.ndarray | None, samples: bool) -> Times:
+    """The times of a run: those of a method of fixed step all lie on its mesh."""
+    chosen, every = setup.integrator.controls_error, not setup.record_period_s
+    period = setup.record_period_s or (setup.duration_s / _SAMPLES if chosen else inf)
+    compared = setup.duration_s / _COMPARED if chosen and setup.estimate_error else inf
+    return Times(
+        np.zeros(1), period if samples else inf, compared, samples and every, samples and every and not chosen,
+        setup.duration_s, np.zeros(0) if mesh is None else mesh,
+    )  # fmt: skip
 
 
 def _ready(functions: Functions) -> Functions:

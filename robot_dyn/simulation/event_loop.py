@@ -1,4 +1,4 @@
-"""The time loop of methods that choose their steps: samples lie between, and steps end where a switching function does.
+"""The time loop of a run whose steps are chosen, or cut at events: samples lie between the ends of steps.
 
 Plain functions of arrays, for one run, as of `time_loop`. The dense output of a step brackets a root of a switching
 function g; the step is then made anew, up to where g vanishes after it, which keeps the order of the method:
@@ -57,7 +57,7 @@ class Times(NamedTuple):
     Attributes:
         reached: The time reached, (1,), in [s].
         period, compared: Periods of samples and of shared states, in [s]; inf for none.
-        nodes: Whether there is a sample at the start of every segment, too.
+        nodes, every: Whether there is a sample at the start of every segment, and at the end of every step, too.
         end: Of the run.
         mesh: Where steps end, (k,), in place of error control; none for that.
     """
@@ -66,6 +66,7 @@ class Times(NamedTuple):
     period: float
     compared: float
     nodes: bool
+    every: bool
     end: float
     mesh: Array
 
@@ -77,7 +78,7 @@ class Switches(NamedTuple):
         rows, levels: Entry of y, and its level, (E,).
         sides: 1 where the function is not negative, −1 where it is not positive, (E + G,).
         functions: Gives the G values, as of `evaluate`.
-        now, then: They, at the start of a step and within it, (G, 1).
+        then: Room for them, (G, 1).
         size: Unit of rounding of each coordinate's level, (E,).
         b, stack: Room for `bernstein`.
     """
@@ -86,14 +87,13 @@ class Switches(NamedTuple):
     levels: Array
     sides: Array
     functions: Any
-    now: Array
     then: Array
     size: Array
     b: Array
     stack: Array
 
 
-def controlled_loop(
+def event_loop(
     begin: Callable[..., int], step: Callable[..., int], error: Callable[..., float], accept: Callable[..., int],
     dense: Callable[..., int],
 ) -> Callable[..., int]:  # fmt: skip
@@ -129,8 +129,6 @@ def controlled_loop(
                     return Ended.NOT_FINITE
                 if control[At.NEXT] == 0.0 and len(times.mesh) == 0:
                     now[Now.EVALUATIONS] += first_step(f, start, end, y, p, own, after, work, control)
-                if len(switches.now) > 0:
-                    evaluate(switches.functions, times.reached[0], y, p, own, switches.now)
                 now[Now.STEP] = 2
             while times.reached[0] < end:
                 t = times.reached[0]
@@ -142,7 +140,7 @@ def controlled_loop(
                 now[Now.EVALUATIONS] += accept(f, c, t, h, y, p, own, after, work)
                 has_dense, event, theta = False, -1, NONE
                 if len(switches.sides) > 0:
-                    near = len(switches.now) > 0 or approaches(y, after, h, work.K[0], work.last, rules.n, switches)
+                    near = len(switches.then) > 0 or approaches(y, after, h, work.K[0], work.last, rules, switches)
                     if near:
                         now[Now.EVALUATIONS] += dense(f, c, t, h, y, p, own, after, work)
                         event, theta = first_event(f, t, h, y, p, runs, work.F, switches)
@@ -173,6 +171,8 @@ def controlled_loop(
                 copy(y, after)
                 times.reached[0] = t1
                 copy(work.K[0], work.last)
+                if times.every and event < 0 and t1 < end:
+                    keep(f, runs, kept, now, t1, y, p)
                 now[Now.STEPS] += 1
                 now[Now.BUDGET] -= 1
                 walk(runs, kept, rules, now, t1, work.last, plan.ticks[s] == 1 and t == start)
@@ -180,8 +180,7 @@ def controlled_loop(
                     now[Now.EVENT] = event
                     now[Now.STEP] = 1
                     return Ended.EVENT
-                if len(switches.now) > 0:
-                    copy(switches.now, switches.then)
+                settle_sides(switches)
                 if fast(y, rules.n):
                     return Ended.FAST
                 if now[Now.STEPS] % _WATCHED == 0 and not conserve(f, runs, rules, t1, p):
@@ -198,9 +197,9 @@ def controlled_loop(
 def node(f: Functions, runs: Runs, kept: Kept, times: Times, now: Array, t: float, p: Array) -> None:
     """A sample, if there is to be one, and a shared state, at the start of a segment or at the end of the run."""
     due = now[Now.DUE] * times.period <= t + _EARLY * times.period
-    if due or (times.nodes and times.period < np.inf) or (t == times.end and times.period < np.inf):
+    if due or times.nodes or (t == times.end and times.period < np.inf):
         keep(f, runs, kept, now, t, runs.y, p)
-    while now[Now.DUE] * times.period <= t + _EARLY * times.period:
+    while now[Now.DUE] * times.period <= t + _EARLY * times.period and times.period < np.inf:
         now[Now.DUE] += 1
     if times.compared < np.inf:
         share(kept, now, t, runs.y)
@@ -266,7 +265,7 @@ def walk(runs: Runs, kept: Kept, rules: Rules, now: Array, t: float, latest: Arr
     column = now[Now.COLUMN]
     kept.columns[0, column], kept.columns[1, column] = t, acted or rules.held == 0
     copy(kept.columns[2 : 2 + n, column], runs.y[:n, 0])
-    copy(kept.columns[2 + n : 2 + 2 * n, column], runs.y[n : 2 * n, 0])
+    copy(kept.columns[2 + n : 2 + 2 * n, column], latest[:n, 0] if rules.canonical else runs.y[n : 2 * n, 0])
     copy(kept.columns[2 + 2 * n :, column], latest[m : m + n, 0])
     now[Now.COLUMN] += 1
 
@@ -279,12 +278,13 @@ def fast(y: Array, n: int) -> bool:
     return not most < FASTEST
 
 
-def approaches(y: Array, after: Array, h: float, before: Array, last: Array, n: int, switches: Switches) -> bool:
+def approaches(y: Array, after: Array, h: float, before: Array, last: Array, rules: Rules, switches: Switches) -> bool:
     """Whether a coordinate may pass its level in a step, by Hermite's polynomial through rates at both ends.
 
     Its coefficients in Bernstein's form, from values and two derivatives of a position and one of a velocity, enclose
     it; as much room again is left on both sides.
     """
+    n = 0 if rules.canonical else rules.n  # p' is no acceleration
     for e in range(len(switches.rows)):
         row = switches.rows[e]
         x0, x1, d0, d1 = y[row, 0], after[row, 0], before[row, 0], last[row, 0]
@@ -321,10 +321,10 @@ def first_event(
         if theta < first:
             event, first = e, theta
     E, before, x = len(switches.rows), 0.0, runs.last
-    for i in range(1, _LOOKS + 1 if len(switches.now) > 0 else 0):
+    for i in range(1, _LOOKS + 1 if len(switches.then) > 0 else 0):
         theta = i / _LOOKS
         values(f, t, h, theta, y, p, own, F, x, switches)
-        for g in range(len(switches.now)):
+        for g in range(len(switches.then)):
             if switches.sides[E + g] * switches.then[g, 0] < 0.0 and before < first:
                 low, high = before, theta
                 for _ in range(_HALVINGS):
@@ -350,6 +350,14 @@ def values(
     """The switching functions that are no coordinates, within a step."""
     between(y, F, theta, x)
     evaluate(switches.functions, t + theta * h, x, p, own, switches.then)
+
+
+def settle_sides(switches: Switches) -> None:
+    """The side of functions that vanished at the start of the run."""
+    E = len(switches.rows)
+    for g in range(len(switches.then)):
+        if switches.sides[E + g] == 0.0:
+            switches.sides[E + g] = np.sign(switches.then[g, 0])
 
 
 def correction(

@@ -1,0 +1,102 @@
+"""Methods of fixed step made ready for a loop that cuts steps at events: with dense output by Hermite's cubic.
+
+    y(t + θ h) ≈ y + θ (Δ + (1 − θ) (h f − Δ + θ (2 Δ − h (f + f⁺)))),   Δ = y⁺ − y
+
+It only brackets an event; the step that ends there is the method's own. [Hairer, Nørsett, Wanner, Solving Ordinary
+Differential Equations I, 2nd ed., 1993, II.6, (6.7)]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from robot_dyn.arithmetic import FLOAT64, Array
+from robot_dyn.integrate.integrator import Integrator
+from robot_dyn.integrate.primitives import combination, copy, evaluate, subtract
+from robot_dyn.integrate.step_control import ControlledStepper
+
+
+class Numbers(NamedTuple):
+    """The coefficients of the method, and the weights that choose the rate at the start, or at the end."""
+
+    method: Any
+    one: Array
+    end: Array
+
+
+class Work(NamedTuple):
+    """The arrays of a step.
+
+    Attributes:
+        method: Those of the method.
+        K: The rate at the start, and room for that at the end, (2, r, 1).
+        last: The rate at the end, (r, 1).
+        F: Dense output, (3, m, 1), as of `between`.
+        error: Of no step, (0, m, 1).
+        zero: (m, 1).
+    """
+
+    method: Any
+    K: Array
+    last: Array
+    F: Array
+    error: Array
+    zero: Array
+
+
+def stepper(method: Integrator, m: int, n: int, rows: int, widths: Array | None) -> ControlledStepper:
+    """A method of fixed step for one state of m entries, n of them positions, and rates of so many rows."""
+    inner = method.stepper(FLOAT64, m, n, rows, 1, widths)
+    K, last, F = np.zeros((2, rows, 1)), np.zeros((rows, 1)), np.zeros((3, m, 1))
+    work = Work(inner.work, K, last, F, np.zeros((0, m, 1)), np.zeros((m, 1)))
+    step = (_known_step if method.plain else step_of)(inner.step)
+    return ControlledStepper(begin, step, error, accept, dense, Numbers(inner.coefficients, *np.eye(2)), work, 1)
+
+
+def step_of(inner: Callable[..., int]) -> Callable[..., int]:
+    """The step of a method, of its coefficients and arrays among these."""
+
+    def step(
+        f: Any, c: Numbers, t: Any, h: Any, y: Array, p: Array, own: Array, after: Array, work: Work, lost: Array
+    ) -> int:
+        lost[0] = 0
+        return inner(f, c.method, t, h, y, p, own, after, work.method, lost)
+
+    return step
+
+
+_known_step = cache(step_of)  # machine code is made once for a function
+
+
+def begin(f: Any, c: Numbers, t: Any, y: Array, p: Array, own: Array, work: Work) -> int:
+    """The rate at the start."""
+    evaluate(f.rate, t, y, p, own, work.K[0])
+    return 1
+
+
+def error(c: Numbers, h: Any, y: Array, after: Array, work: Work, rtol: float, atol: float) -> float:
+    """None is known."""
+    return 0.0
+
+
+def accept(f: Any, c: Numbers, t: Any, h: Any, y: Array, p: Array, own: Array, after: Array, work: Work) -> int:
+    """The rate at the end."""
+    evaluate(f.rate, t + h, after, p, own, work.last)
+    return 1
+
+
+def dense(f: Any, c: Numbers, t: Any, h: Any, y: Array, p: Array, own: Array, after: Array, work: Work) -> int:
+    """The cubic."""
+    F = work.F
+    copy(work.K[1], work.last)
+    copy(F[0], after)
+    subtract(F[0], y)
+    combination(F[1], work.zero, h, c.one, work.K, 1)
+    subtract(F[1], F[0])
+    combination(F[2], F[0], -h, c.end, work.K, 2)
+    subtract(F[2], F[1])
+    return 0
