@@ -128,6 +128,11 @@ def test_why_adds_up(given: str):
         assert sum(shares) + sum(why["effects"].values()) == pytest.approx(why["tau"], rel=0, abs=1e-9)
         assert why["tau"] == answer["tau"][answer["joints"].index(joint)]
         assert {share["source"] for share in why["shares"]} == {"cart", "pole"}
+        b, f = {"slide": ("0.8 N s/m", "1.5 N"), "hinge": ("0.02 N m s/rad", "0.01 N m")}[joint]
+        v_s = {"slide": "0.01 m/s", "hinge": "0.01 rad/s"}[joint]
+        assert why["coefficients"] == {
+            "viscous_friction": [f"b = {b}"], "regularised_coulomb_friction": [f"f = {f}", f"v_s = {v_s}"]
+        }  # fmt: skip
 
 
 def test_query_and_why_as_text():

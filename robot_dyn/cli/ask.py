@@ -75,7 +75,7 @@ def query(
     given = None if tau is None else arguments.vector("--tau", tau, loaded.joint_names)
     answer = report.query(loaded, effects or "", **state, a=arguments.vector("--a", a, loaded.joint_names), tau=given)
     if why is not None:
-        answer |= report.why(loaded, answer, why)
+        answer |= report.why(loaded, effects or "", answer, why)
     say_json(answer) if as_json else say(*report.query_tables(answer))
 
 

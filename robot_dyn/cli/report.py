@@ -11,6 +11,8 @@ import numpy as np
 from rich.table import Table
 
 from robot_dyn.accuracy.compare import Comparison, compare
+from robot_dyn.coefficients import declared, with_values
+from robot_dyn.effects.effect import Force
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import QueryError, nearest
 from robot_dyn.lagrange.breakdown import breakdown
@@ -18,7 +20,7 @@ from robot_dyn.lagrange.manipulator import Lagrangian
 from robot_dyn.model.gravity import gravity_acts, no_torque
 from robot_dyn.model.quantity import PLANT, C, M
 from robot_dyn.model.robot import Robot
-from robot_dyn.model.units import unit, units
+from robot_dyn.model.units import in_words, unit, units
 from robot_dyn.simulation.ledger import largest
 from robot_dyn.simulation.trajectory import Trajectory
 from robot_dyn.validate import joint_values
@@ -72,7 +74,7 @@ def query(robot: Robot, effects: str, q: np.ndarray, v: np.ndarray, a: np.ndarra
     }
 
 
-def why(robot: Robot, answer: Document, joint: str) -> Document:
+def why(robot: Robot, effects: str, answer: Document, joint: str) -> Document:
     """One joint's torque in an answer of `query`, split by link and cause.
 
     Raises:
@@ -87,9 +89,17 @@ def why(robot: Robot, answer: Document, joint: str) -> Document:
         {"source": part.source, "inertia": part.M[i] @ a, "coriolis": part.C[i] @ v, "gravity": float(part.N[i])}
         for part in breakdown(Lagrangian(robot), q, v)
     ]
-    effects = {name: -torque[i] for name, torque in answer["effects"].items()}
+    torques = {name: -torque[i] for name, torque in answer["effects"].items()}
+    forces = Plant(robot, effects or ()).forces
+    numbers = {force.name: list(in_words(_at(force, i), answer["types"][i : i + 1]).values()) for force in forces}
     share = {"joint": joint, "tau": answer["tau"][i], "unit": unit("tau", answer["types"][i])}
-    return {"why": share | {"shares": shares, "effects": effects}}
+    return {"why": share | {"shares": shares, "effects": torques, "coefficients": numbers}}
+
+
+def _at(force: Force, i: int) -> Force:
+    """A force as it is at one joint."""
+    numbers = {name: getattr(force, name) for name, each in declared(type(force)).items() if each.of_joints}
+    return with_values(force, {name: x[i] if np.ndim(x) else x for name, x in numbers.items()})
 
 
 def comparison(results: Sequence[tuple[str, Comparison]], refused: dict[str, str]) -> Document:
@@ -200,7 +210,8 @@ def _why_tables(why: Document) -> Iterator[Any]:
     yield f"\nwhy {why['joint']} needs {why['tau']:.6g} {why['unit']}:"
     table = _table("from", "inertia", "Coriolis", "gravity", "effect", "sum")
     rows = [(s["source"], s["inertia"], s["coriolis"], s["gravity"], 0.0) for s in why["shares"]]
-    rows += [(effect, 0.0, 0.0, 0.0, torque) for effect, torque in why["effects"].items()]
+    named = {effect: ", ".join((effect, *numbers)) for effect, numbers in why["coefficients"].items()}
+    rows += [(named[effect], 0.0, 0.0, 0.0, torque) for effect, torque in why["effects"].items()]
     inertia, coriolis, gravity, effect = (sum(column) for column in list(zip(*rows, strict=True))[1:])
     rows.append(("sum", inertia, coriolis, gravity, effect))
     for source, *terms in rows:

@@ -159,7 +159,7 @@ class LineSpringDamper(_Line):
     damping: Any = field(kw_only=True, metadata=_DAMPING)
     length: Any = field(kw_only=True, metadata=_LENGTH)
 
-    term = f"{LineSpring.term} {LineDamper.term}".replace(" −", " − ")
+    term = f"{LineSpring.term} {LineDamper.term}".replace(" −(", " − (")
 
     @property
     def parts(self) -> tuple[Effect, ...]:

@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from typing import Any
 
+import numpy as np
+
+from robot_dyn.coefficients import Coefficient, declared
+
+_NONE = 1e9  # stops beyond it do not exist
 _UNITS = {"q": ("rad", "m"), "v": ("rad/s", "m/s"), "a": ("rad/s²", "m/s²"), "tau": ("N m", "N"), "u": ("N m", "N")}
 
 
@@ -15,8 +21,37 @@ def unit(quantity: str, joint_type: str | None) -> str:
     return slides if joint_type == "prismatic" else turns
 
 
+def of_joint(stated: str, joint_type: str | None) -> str:
+    """A unit that is stated of a revolute joint, such as "N m s/rad", for a joint of a type: "N s/m" if it slides."""
+    if joint_type != "prismatic":
+        return stated
+    return stated.replace("N m", "N").replace("kg m²", "kg").replace("rad", "m")
+
+
 def units(quantity: str, joint_types: Iterable[str | None]) -> str:
     """The units of a vector over joints, such as "rad or m": each once."""
     of_joints = dict.fromkeys(unit(quantity, each) for each in joint_types)
     both = unit(quantity, None)
     return both if both in of_joints else " or ".join(of_joints)
+
+
+def in_words(part: Any, joint_types: Sequence[str | None]) -> dict[str, str]:
+    """The coefficients of a part on joints of some types, by name: symbol, value and unit, as "b = 0.5 N m s/rad"."""
+    made = {}
+    for name, each in declared(type(part)).items():
+        values, symbol = getattr(part, name), each.symbol.partition(",")[0] or name
+        if values is None:
+            continue
+        if each.of_joints:
+            values = np.broadcast_to(values, len(joint_types))
+            stated = [_one(x, each, kind) for x, kind in zip(values, joint_types, strict=True)]
+            made[name] = f"{symbol} = {', '.join(stated if len(set(stated)) > 1 else stated[:1])}"
+        else:
+            shown = f"{values:g}" if np.ndim(values) == 0 else np.array2string(np.asarray(values), precision=6)
+            made[name] = f"{symbol} = {shown} {each.unit}".rstrip()
+    return made
+
+
+def _one(x: float, known: Coefficient, kind: str | None) -> str:
+    """A number and its unit; a limit that does not exist is beyond any."""
+    return "none" if known.infinite and abs(x) >= _NONE else f"{x:g} {of_joint(known.unit, kind)}".rstrip()

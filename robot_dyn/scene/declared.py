@@ -67,7 +67,7 @@ def declared_part(
     text = text or (getdoc(classes[0]) or "").partition("\n\nAttributes:")[0]
     part = create_model(kind, __base__=Declared, __doc__=text, **fields)
     part.make, part.keys = staticmethod(make), keys
-    part.term = " ".join(each.term for each in classes).replace(" −", " − ")
+    part.term = " ".join(each.term for each in classes).replace(" −", " − ").replace("−  ", "− ")
     return part
 
 

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from itertools import islice
 from typing import Any
 
 import numpy as np
 
 from robot_dyn.effects.actuator import ActuatorLag, EffortLimit
+from robot_dyn.effects.effect import Effect
 from robot_dyn.errors import RobotDynError
 from robot_dyn.integrate.adaptive import ADAPTIVE
+from robot_dyn.model.units import in_words
 from robot_dyn.scene.control import LAWS, Control
-from robot_dyn.scene.declared import Declared
+from robot_dyn.scene.declared import Acting, Declared
 from robot_dyn.scene.effects import ACTING, kind_of
 from robot_dyn.scene.scene import Scene
 from robot_dyn.scene.schema import Part
@@ -41,9 +44,12 @@ def explain(scene: Scene, setup: Setup) -> Iterator[str]:
     yield f"    N = {N}"
     yield f"    u = {'0' if scene.control is None else LAWS[scene.control.kind].removeprefix('u = ')}"
     yield "\neffects:" if scene.effect else "\neffects: none"
+    made = iter(setup.plant.effects)
     for effect in scene.effect:
         yield f"  {effect.kind}: {(_TERMS | _EDITS)[effect.kind]}"
         yield from _numbers(effect, "    ")
+        if isinstance(effect, Acting):
+            yield from _in_words(islice(made, len(effect.build(setup.plant.dynamics))), setup)  # pyright: ignore
     yield "\nnot simulated, since the scene does not name it:"
     missing = [kind for kind in (*_EDITS, *_TERMS) if kind not in named]
     yield f"  {', '.join(missing)}"
@@ -78,6 +84,14 @@ def _machine_code(setup: Setup) -> Iterator[str]:
     yield f"\nmachine code of the acceleration, by the {which.formulation}: {whole} instructions; of effects: {parts}"
     if edits := edits_of_machine_code(setup):
         yield f"  edited there: {edits['right_angles']}"
+
+
+def _in_words(effects: Iterable[Effect], setup: Setup) -> Iterator[str]:
+    """Coefficients of the parts of an effect as they act, with units."""
+    dynamics: Any = setup.plant.dynamics
+    words = {name: text for effect in effects for name, text in in_words(effect, dynamics.joint_types).items()}
+    if words:
+        yield f"    as it acts: {'; '.join(words.values())}"
 
 
 def _numbers(part: Part, indent: str) -> Iterator[str]:
