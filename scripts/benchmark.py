@@ -2,7 +2,7 @@
 
 Subjects: queries (Robot over bare Pinocchio), compiled (against Pinocchio's C++), rollouts (against MuJoCo),
 parameters (numbers as inputs of machine code over constants), growth (cost against the number of joints), iftomm
-(problems A01 and A05 of the IFToMM library of multibody benchmarks).
+(problems A01 and A05 of the IFToMM library of multibody benchmarks), stiff (joints with stiff dampers and springs).
 """
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from benchmarks import growth, iftomm, kernels, parameters, queries, rollouts
+from benchmarks import growth, iftomm, kernels, parameters, queries, rollouts, stiff
 from benchmarks.measure import Effort, environment
 
 PICTURE = Path(__file__).parents[1] / "docs" / "pictures" / "growth.png"
-SUBJECTS = ("queries", "compiled", "rollouts", "parameters", "growth", "iftomm")
+SUBJECTS = ("queries", "compiled", "rollouts", "parameters", "growth", "iftomm", "stiff")
 
 
 def main() -> None:
@@ -46,6 +46,8 @@ def main() -> None:
         growth.memory(effort)
     if "iftomm" in what:
         iftomm.iftomm(effort)
+    if "stiff" in what:
+        stiff.stiff(effort)
 
 
 if __name__ == "__main__":

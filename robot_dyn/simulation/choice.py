@@ -69,9 +69,10 @@ def _label(setup: Setup) -> str:
 def _evaluations(setup: Setup, size: int) -> float:
     """About how many evaluations of an equation of motion of that size a run takes, with its companions."""
     method: Any = setup.integrator
+    for_jacobian = 2 * size if method.needs_jacobian else 0  # by differences, in each step
     if method.controls_error:
         least = _PER_SEGMENT * segments(setup)
-        return max(_PER_SECOND * setup.duration_s, least) * (3 if setup.estimate_error else 1)
-    for_jacobian = 2 * size if method.needs_jacobian else 0  # by differences
+        each = 1 + for_jacobian / _GUESSED
+        return max(_PER_SECOND * setup.duration_s, least) * (3 if setup.estimate_error else 1) * each
     each = (method.evaluations_per_step or _GUESSED) + for_jacobian
     return setup.steps * (2 if setup.estimate_error else 1) * each

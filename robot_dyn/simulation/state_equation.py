@@ -53,7 +53,7 @@ class StateEquation:
     @cached_property
     def sources(self) -> tuple[str, ...]:
         """Names of the works in y: control, then effects; a second effect of a name gets a number."""
-        return _numbered(CONTROL, *(x.name for x in self.plant.forces if not isinstance(x, Conservative)))
+        return numbered(CONTROL, *(x.name for x in self.plant.forces if not isinstance(x, Conservative)))
 
     @cached_property
     def state_size(self) -> int:
@@ -100,7 +100,7 @@ class StateEquation:
     def effect_states(self, y: Array) -> dict[str, Array]:
         """States of each effect that has some in states y (k, m), (k, size) by name."""
         first, equation = 2 * self.plant.dynamics.n + self.state_size, self.equation_of_motion
-        names = _numbered(*(self.plant.effects[k].name for k in equation.states))
+        names = numbered(*(self.plant.effects[k].name for k in equation.states))
         places = zip(names, equation.states.values(), strict=True)
         return {name: y[:, first + place.start : first + place.stop].copy() for name, place in places}
 
@@ -206,7 +206,7 @@ class StateEquation:
         return equation.powers(v, u, equation.torques(t, q, v, z=z[self.state_size :]))
 
 
-def _numbered(*names: str) -> tuple[str, ...]:
+def numbered(*names: str) -> tuple[str, ...]:
     """Names, of which a second one of an effect gets a number."""
     made: list[str] = []
     for name in names:

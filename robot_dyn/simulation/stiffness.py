@@ -8,7 +8,6 @@ is the participation of entry i. [Hairer, Wanner 1996, IV.1; Pérez-Arriaga, Ver
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass
 from typing import Any, final
 
@@ -16,7 +15,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.integrate.differences import by_state
-from robot_dyn.simulation.state_equation import CONTROL, StateEquation
+from robot_dyn.simulation.state_equation import CONTROL, StateEquation, numbered
 
 BODIES = "the motion of the bodies"
 
@@ -55,7 +54,7 @@ def fastest(equation: StateEquation, t: float, y: Array, held: Array | None) -> 
         RobotDynError: If the equation has no answer near the state.
         numpy.linalg.LinAlgError: If its eigenvalues are not found.
     """
-    n, size = equation.plant.dynamics.n, 2 * equation.plant.dynamics.n + equation.state_size
+    n, size = equation.plant.dynamics.n, 2 * equation.plant.dynamics.n + equation.states
 
     def f(at: Any, states: Array) -> Array:
         rows = [equation.rate(t, row, held)[0] for row in states.reshape(-1, len(y))]
@@ -77,10 +76,10 @@ def fastest(equation: StateEquation, t: float, y: Array, held: Array | None) -> 
 
 def _accelerations(equation: StateEquation, t: float, y: Array, held: Array | None) -> dict[str, Array]:
     """M⁻¹ ∂τ_k/∂(q, v, z) of the control and of each force, (n, 2 n + z), by name."""
-    n, z = equation.plant.dynamics.n, equation.state_size
-    size, M = 2 * n + z, equation.plant.M(y[:n])
+    n, M = equation.plant.dynamics.n, equation.plant.M(y[: equation.plant.dynamics.n])
+    size = 2 * n + equation.states
     made = {}
-    for k, name in enumerate(_names(equation)):
+    for k, name in enumerate(numbered(CONTROL, *(force.name for force in equation.plant.forces))):
 
         def torque(at: Any, states: Array, k: int = k) -> Array:
             rows = states.reshape(-1, size)
@@ -90,18 +89,9 @@ def _accelerations(equation: StateEquation, t: float, y: Array, held: Array | No
     return made
 
 
-def _names(equation: StateEquation) -> list[str]:
-    """The control and the forces; a second force of a name gets a number, as in `sources`."""
-    names, count = [CONTROL], Counter[str]()
-    for force in equation.plant.forces:
-        count[force.name] += 1
-        names.append(f"{force.name} {count[force.name]}" if count[force.name] > 1 else force.name)
-    return names
-
-
 def _torque(equation: StateEquation, k: int, t: float, x: Array, held: Array | None) -> Array:
     n = equation.plant.dynamics.n
+    q, v, z = x[:n], x[n : 2 * n], x[2 * n :]
     if k == 0:
-        return np.asarray(equation.command(t, x[:n], x[n : 2 * n], x[2 * n :]) if held is None else held)
-    force = equation.plant.forces[k - 1]
-    return np.broadcast_to(force.torque(equation.plant.dynamics, t, x[:n], x[n : 2 * n]), (n,))
+        return equation.actuation(t, q, v, z, held)
+    return equation.equation_of_motion.torques(t, q, v, (n,), z[equation.state_size :])[k - 1]

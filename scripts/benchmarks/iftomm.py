@@ -34,7 +34,8 @@ LADDERS: dict[str, tuple[float, ...]] = {
     "gauss_6": (0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3),
     "sdirk_3": (0.01, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4),
     "DOP853": (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9),
-    "Radau": (1e-4, 1e-5, 1e-6, 1e-7, 1e-8),
+    "rosenbrock_5": (0.01, 5e-3, 2e-3, 1e-3),
+    "Rosenbrock": (1e-4, 1e-5, 1e-6, 1e-7, 1e-8),
 }  # steps in [s], or tolerances
 
 
@@ -112,7 +113,10 @@ PROBLEMS = {
         ("rk4", "order_8", "gauss_6", "DOP853"),
     ),
     "A05, stiff flyball governor": Problem(
-        "flyball_governor", lambda q: 0.5 + q[:, 3:], governor, ("order_8", "sdirk_3", "Radau")
+        "flyball_governor",
+        lambda q: 0.5 + q[:, 3:],
+        governor,
+        ("order_8", "DOP853", "sdirk_3", "rosenbrock_5", "Rosenbrock"),
     ),
 }
 
@@ -141,7 +145,7 @@ def iftomm(effort: Effort) -> None:
 
 def _options(method: str, number: float) -> dict[str, Any]:
     if method in ADAPTIVE:
-        return {"integrator": rd.Adaptive(method, number, number), "step_s": rd.Setup.step_s}
+        return {"integrator": rd.Adaptive(method, number, number), "step_s": rd.Setup.step_s, "engine": "compiled"}
     return {"integrator": rd.method(method), "step_s": number, "engine": "compiled"}
 
 
