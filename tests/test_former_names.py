@@ -128,3 +128,9 @@ def test_former_arguments() -> None:
     assert wait(1, length_s=2.0) == (1, 2.0)
     with pytest.raises(TypeError, match="length_s twice: length is its former name"):
         wait(1, length=1.0, length_s=2.0)
+
+
+def test_the_method_that_was_scipys_is_rosenbrock_now() -> None:
+    with pytest.warns(DeprecationWarning, match="the method Radau is now Rosenbrock") as told:
+        assert rd.Adaptive("Radau", rtol=1e-6) == rd.Adaptive("Rosenbrock", rtol=1e-6)
+    assert told[0].filename == __file__

@@ -11,7 +11,7 @@ from robot_dyn.errors import OverflowedError, QueryError
 from robot_dyn.integrate.adaptive import Adaptive, Status
 from robot_dyn.integrate.integrator import System
 
-ALL = ["DOP853", "Rosenbrock", "Radau"]
+ALL = ["DOP853", "Rosenbrock"]
 OSCILLATOR = System(lambda t, y: np.stack([y[..., 1], -y[..., 0]], axis=-1), 1)
 START = np.array([1.0, 0.5])
 
@@ -99,7 +99,7 @@ def test_a_rate_that_ends_to_be_finite_is_reported(name: str) -> None:
     assert solution.times[-1] == pytest.approx(1, abs=ahead)
 
 
-@pytest.mark.parametrize("name", ["Rosenbrock", "Radau"])
+@pytest.mark.parametrize("name", ["Rosenbrock"])
 def test_implicit_methods_take_few_steps_on_a_stiff_system_and_dop853_many(name: str) -> None:
     """For y' = −1e6 (y − cos t) an explicit method needs some 1e5 steps a second, so only 1e-3 s of it are run."""
     stiff = System(lambda t, y: -1e6 * (y - np.cos(t)), 0)
@@ -122,7 +122,7 @@ def test_longest_step_is_kept_and_inputs_are_left_alone() -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"method": "LSODA"}, "known: DOP853, Rosenbrock, Radau"),
+        ({"method": "LSODA"}, "known: DOP853, Rosenbrock"),
         ({"rtol": 1e-15}, "rtol must be between 2.2e-14 and 1"),
         ({"rtol": float("nan")}, "rtol must be"),
         ({"atol": -1.0}, "atol must "),

@@ -100,7 +100,7 @@ def examples(folder: Path) -> dict[str, Example]:
     points, eye = [q, u, v], np.eye(3)
     path: Any = rd.line([0.1, 0.2, 0.3], [0.4, 0.2, 0.1], 1.0)
     return made | {
-        "Adaptive": (rd.Adaptive, {"method": "Radau", "rtol": 1e-8, "atol": 1e-9, "max_step_s": 0.5}),
+        "Adaptive": (rd.Adaptive, {"method": "Rosenbrock", "rtol": 1e-8, "atol": 1e-9, "max_step_s": 0.5}),
         "Adaptive.solve": (adaptive.solve, {"system": system, "t0": 0.0, "y0": q, "t1": 1.0, "stop": lambda t, y: 1.0}),
         "Adaptive.steps": (adaptive.steps, {"system": system, "t0": 0.0, "y0": q, "t1": 1.0, "stop": lambda t, y: 1.0}),
         "Adaptive.with_tolerances": (adaptive.with_tolerances, {"factor": 10.0, "longest_s": 0.5}),

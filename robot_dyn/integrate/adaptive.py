@@ -1,4 +1,4 @@
-"""Methods that choose their steps, ‖local error / (atol + rtol |y|)‖ ≤ 1: DOP853, Rosenbrock, and SciPy's Radau IIA.
+"""Methods that choose their steps, ‖local error / (atol + rtol |y|)‖ ≤ 1: DOP853 and Rosenbrock.
 
 [Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed., 1993, II.4–II.6 and II.10; Hairer, Wanner,
 II, 2nd ed., 1996, IV.8]
@@ -26,7 +26,8 @@ from robot_dyn.integrate.rosenbrock import ROSENBROCK_5
 from robot_dyn.integrate.step_control import ControlledStepper, control_of
 from robot_dyn.validate import choice, function, instance, number, numbers, rows
 
-ADAPTIVE = ("DOP853", "Rosenbrock", "Radau")
+ADAPTIVE = ("DOP853", "Rosenbrock")
+FORMER = MappingProxyType({"Radau": "Rosenbrock"})  # methods that were SciPy's
 LEAST_RTOL = 100 * np.finfo(float).eps  # SciPy's bound; below it rounding is taken for local error
 
 
@@ -89,8 +90,7 @@ class Adaptive:
     Tolerances bound the error of a step; that of the run is larger by what the system magnifies.
 
     Attributes:
-        method: DOP853 (explicit, order 8), Rosenbrock (linearly implicit, order 5, L-stable) or Radau (implicit,
-            order 5, L-stable).
+        method: DOP853 (explicit, order 8) or Rosenbrock (linearly implicit, order 5, L-stable).
         rtol: Relative tolerance, 2.3e-14 at least.
         atol: Absolute tolerance, in the unit of y, not negative.
         max_step_s: Longest step, in [s].
@@ -105,17 +105,13 @@ class Adaptive:
     max_step_s: float = inf
     canonical: ClassVar[bool] = False
     controls_error: ClassVar[bool] = True
+    plain: ClassVar[bool] = True
     evaluations_per_step: ClassVar[int | None] = None
 
     @property
     def needs_jacobian(self) -> bool:
         """Whether its steps ask for ∂f/∂y."""
         return self.method == "Rosenbrock"
-
-    @property
-    def plain(self) -> bool:
-        """Whether its steps are plain functions."""
-        return self.method in STEPPERS
 
     @property
     def name(self) -> str:
@@ -128,6 +124,9 @@ class Adaptive:
         return replace(self, rtol=self.rtol * factor, atol=self.atol * factor, max_step_s=longest_s)
 
     def __post_init__(self) -> None:
+        if self.method in FORMER:
+            former.tell(f"the method {self.method}", FORMER[self.method], up=4)
+            object.__setattr__(self, "method", FORMER[self.method])
         choice("adaptive method", self.method, ADAPTIVE)
         values = {
             "rtol": number("rtol", self.rtol),
@@ -218,12 +217,6 @@ class Steps:
         except OverflowedError:  # a trial step went too far; the solver tries a shorter one
             return np.full_like(y, np.nan)
 
-    def _jacobian(self, t: Any, y: Array) -> Array:
-        J = self._system.jacobian(t, y)
-        if not np.isfinite(J).all():
-            raise _NotFiniteError
-        return J
-
     def __iter__(self) -> Iterator[tuple[float, Array, Any]]:
         solver = None
         try:
@@ -250,16 +243,11 @@ class Steps:
         else:
             self.message = f"finished at t = {self.t}"
 
-    def _solver(self) -> Any:
+    def _solver(self) -> ControlledSteps:
         options, m = self._options, len(self.y)
-        if options.method in STEPPERS:
-            stepper = STEPPERS[options.method](m, m, m)
-            control = control_of(stepper, options.rtol, options.atol, options.max_step_s)
-            return ControlledSteps(stepper, control, self._system, self.t, self.y, self._end)
-        from scipy.integrate import Radau
-
-        settings: Any = {"rtol": options.rtol, "atol": options.atol, "max_step": options.max_step_s}
-        return Radau(self._rate, self.t, self.y, self._end, jac=self._jacobian, **settings)
+        stepper = STEPPERS[options.method](m, m, m)
+        control = control_of(stepper, options.rtol, options.atol, options.max_step_s)
+        return ControlledSteps(stepper, control, self._system, self.t, self.y, self._end)
 
     def _failed(self, what: str) -> None:
         where = f"{what} at t = {self.t}, max |y| = {np.abs(self.y).max():.3g}"

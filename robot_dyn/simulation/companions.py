@@ -69,20 +69,6 @@ class Estimated:
         error = np.maximum(np.maximum(*gaps), between)
         return self._judged(error, error, (between < error / 2) | (error <= self.floor))
 
-    def from_tolerances(self, tight: Path | None, loose: Path) -> ErrorEstimate:
-        """The estimate of a method that chooses its steps.
-
-        Args:
-            tight: The companion of a tenth of the tolerance; None where that is beyond floats.
-            loose: That of ten times the tolerance.
-        """
-        far = differences(self.path, loose, self.n)
-        near = far if tight is None else differences(self.path, tight, self.n)
-        bound = far if tight is None else np.fmax(near, far / 4)
-        ratio = np.maximum(far, self.floor) / np.maximum(near, self.floor)
-        seen = ((ratio > 2) & (ratio < 100) | (bound <= self.floor)) & (tight is not None)
-        return self._judged(np.where(self._smooth(seen), near, bound), bound, seen)
-
     def from_refinement(self, finer: Path, loose: Path | None) -> ErrorEstimate:
         """The estimate of a method that chooses its steps.
 

@@ -27,7 +27,6 @@ from robot_dyn.simulation.state_equation import StateEquation
 
 _GAIN = 1.3  # in the time resolved, that a shorter step must bring
 _MORE_STEPS = 1.05  # of a companion with tighter tolerances, so that it tells something
-_TENTH, _TENFOLD = Fraction(1, 10), Fraction(10)
 _FAR_TURN = 1.0  # [rad] in a step: beyond, longer steps may meet the same angles
 _BLIND_TURN = np.pi  # [rad] in a step: beyond, shorter ones may, too
 _PUSH = 4.0  # units of rounding by which a start is moved, to see what the motion makes of rounding
@@ -50,10 +49,8 @@ def estimate(setup: Setup, equation: StateEquation, run: Record, companion: Comp
     kink, why = first_kink(setup, equation, run.walked)
     estimated = Estimated(run.shared, n, kink, rounding(run.shared, n), meaningless(run.walked, n))
     method: Any = setup.integrator
-    if method.controls_error and method.plain:
+    if method.controls_error:
         made = _by_refinement(setup, method, run, estimated, companion)
-    elif method.controls_error:
-        made = _by_tolerances(setup, method, estimated, companion)
     else:
         made = _by_steps(setup, method, estimated, companion, _turn(equation, run.walked))
         made = _until_brief(setup, run, made)
@@ -123,12 +120,6 @@ def _by_refinement(
 def _tolerant(setup: Setup, method: Adaptive, factor: float) -> Setup:
     method = replace(method, rtol=method.rtol * factor, atol=method.atol * factor)
     return with_values(setup, {"integrator": method})  # all else was checked
-
-
-def _by_tolerances(setup: Setup, method: Adaptive, estimated: Estimated, companion: Companion) -> ErrorEstimate:
-    """From a tenth of the tolerance, where floats have it, and from ten times."""
-    tight = companion(_TENTH, setup).shared if method.rtol / 10 > LEAST_RTOL else None
-    return estimated.from_tolerances(tight, companion(_TENFOLD, setup).shared)
 
 
 def _pushed(setup: Setup) -> Setup:

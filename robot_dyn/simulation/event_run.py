@@ -263,6 +263,8 @@ class EventRun:
         side = float(self.switches.sides[index])
         if index < E:
             self.events.append(self.switching.occurrence(index, t, y, side))
+            if self.setup.integrator.needs_jacobian:
+                self.control[At.NEXT] = 0.0  # an L-stable step damps what is fast: to start with, it must be resolved
             if self._chatters():
                 self._drop(self.switching.thresholds[index])
             self._change_mode()

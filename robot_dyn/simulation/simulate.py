@@ -33,7 +33,6 @@ from robot_dyn.simulation.origin import edits_of_machine_code, origin
 from robot_dyn.simulation.record import Record
 from robot_dyn.simulation.samples import columns
 from robot_dyn.simulation.schedule import mesh
-from robot_dyn.simulation.scipy_steps import ScipySteps
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import check_record
 from robot_dyn.simulation.smoothness import finds_events
@@ -129,9 +128,6 @@ def _run(
         if not setup.integrator.controls_error:
             ends = mesh(setup.segments, cast(Fraction, pace))
         run: Any = EventRun(watch, made, ends, loop, on_progress, observer, in_python, not companion)
-    elif setup.integrator.controls_error:
-        functions, parameters = made(equation)
-        run = ScipySteps(setup, equation, functions, cast(Fraction, pace), on_progress, observer, parameters)
     else:
         functions, parameters = made(equation)
         run = FixedStep(setup, equation, functions, cast(Fraction, pace), loop, on_progress, observer, parameters)

@@ -56,7 +56,7 @@ def looked_s(setup: Setup) -> float:
 def finds_events(setup: Setup) -> bool:
     """Whether steps end where effects of this library switch."""
     if setup.integrator.controls_error:
-        return setup.integrator.plain
+        return True
     n = setup.plant.dynamics.n
     switches = bool(setup.events) or any(effect.thresholds(n) for effect in setup.plant.effects)
     return switches and setup.steps <= MOST_CUT
@@ -90,7 +90,7 @@ def first_kink(setup: Setup, equation: StateEquation, path: Path) -> tuple[float
     q, v = path.y[:, :n], equation.velocities(path.y)
     found = [(np.inf, "")]
     found_by_events = finds_events(setup)
-    for effect in () if setup.integrator.plain and setup.integrator.controls_error else setup.plant.effects:
+    for effect in () if setup.integrator.controls_error else setup.plant.effects:
         if isinstance(effect, STOPS) and not found_by_events:
             low, high = extremes(path.t, q, v)
             found.append(_first(path.t, (low < effect.lower) | (high > effect.upper), "a joint touches its stop"))

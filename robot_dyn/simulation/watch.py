@@ -17,7 +17,6 @@ from robot_dyn.simulation.trajectory import diverged_advice
 
 _PACED = 2000  # steps between looks at the pace of an adaptive method
 _MOST_AHEAD = 1e7  # steps that such a run may have before it at the pace it has: about an hour
-_IMPLICIT = ("Rosenbrock", "Radau")
 _STEEP = 1e-3  # of q or v: an effect that bends within less makes a system stiff
 
 T = TypeVar("T")
@@ -79,7 +78,7 @@ class Watch:
         made, self.paced = t - self.paced, t
         ahead = (self.setup.duration_s - t) / max(made, 1e-300) * _PACED
         if ahead > _MOST_AHEAD:
-            implicit = "" if getattr(self.setup.integrator, "method", "") in _IMPLICIT else "Rosenbrock, "
+            implicit = "" if self.setup.integrator.name == "Rosenbrock" else "Rosenbrock, "
             raise DivergedError(
                 t, f"the last {_PACED} steps led {made:.1e} s on, at which pace {ahead:.0e} more are left: the system "
                 f"is stiff; take {implicit}softer effects or a larger tolerance{self._steepest()}"
