@@ -25,6 +25,24 @@ inertia_kg_m2 = 0.1
 kind = "joint_stops"
 lower_rad = -1.0
 upper_rad = 1.0
+[[effect]]
+kind = "lugre_friction"
+bristle_stiffness_N_m_per_rad = 100.0
+bristle_damping_N_m_s_per_rad = {hinge = 0.1}
+viscous_N_m_s_per_rad = 0.2
+coulomb_N_m = 0.5
+breakaway_N_m = 0.7
+stribeck_velocity_rad_per_s = 0.1
+[[effect]]
+kind = "line_spring_damper"
+frame = "pole"
+other_point_m = [0.3, 0.2, 0.9]
+stiffness_N_per_m = 30.0
+damping_N_s_per_m = 2.0
+length_m = 0.7
+[[effect]]
+kind = "actuator_lag"
+time_constant_s = 0.05
 [control]
 kind = "pid"
 frequency_rad_per_s = 10.0
