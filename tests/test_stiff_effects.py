@@ -73,7 +73,10 @@ def test_rosenbrock_bounces_off_a_stop_whatever_its_stiffness(stiffness: float) 
 @pytest.mark.parametrize(
     ("method", "verdict"),
     [
-        (rd.Adaptive(), "is stiff; take Rosenbrock, softer effects"),
+        (
+            rd.Adaptive(),
+            "is stiff; take Rosenbrock, softer effects",
+        ),
         (rd.method("sdirk_3"), "does not converge.*take a smaller step, or Rosenbrock"),
     ],
     ids=["DOP853", "sdirk_3"],

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import re
+from typing import Any
+
 import numpy as np
 import pytest
 
 import robot_dyn as rd
+from robot_dyn.simulation.remarks import Kind
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.stiffness import BODIES, fastest
 
@@ -48,3 +52,26 @@ def test_springs_control_and_narrow_friction_are_told_apart() -> None:
 
 def test_without_effects_it_is_the_bodies() -> None:
     assert found([]).source == BODIES
+
+
+def test_a_run_says_that_stability_bounds_its_steps() -> None:
+    """With the joint and the effect, where a damper is stiff and motion has decayed; not where the tolerance does."""
+    options: dict[str, Any] = {"q0": STATE[:2], "duration_s": 0.1, "engine": "compiled", "estimate_error": False}
+    stiff = rd.simulate(rd.Plant(ARM, [rd.ViscousFriction([1.0, 1e4])]), **options)
+    (remark,) = (each for each in stiff.remarks if each.kind is Kind.STIFF)
+    assert stiff.statistics.steps > 1000
+    assert remark.joint == "joint_2"
+    assert "steps bounded by stability: the fastest motion decays with" in stiff.summary
+    assert "by 'viscous_friction'; take integrator='Rosenbrock'" in stiff.summary
+    short = rd.simulate(ARM, **options | {"duration_s": 20.0, "integrator": rd.Adaptive(rtol=1e-13, atol=1e-13)})
+    assert short.statistics.steps > 1000
+    assert not [each for each in short.remarks if each.kind is Kind.STIFF]
+
+
+@pytest.mark.parametrize("engine", ["compiled", "interpreted"])
+def test_a_run_that_stability_would_keep_for_hours_ends_with_the_reason(engine: str) -> None:
+    plant = rd.Plant(ARM, [rd.ViscousFriction([1.0, 1e6])])
+    run = rd.simulate(plant, STATE[:2], duration_s=100.0, engine=engine, estimate_error=False)
+    assert run.outcome.ending == "diverged"
+    assert run.outcome.t < 1.0
+    assert re.search("of joint 'joint_2', by 'viscous_friction': take Rosenbrock, softer", run.outcome.advice)

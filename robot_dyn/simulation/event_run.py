@@ -207,7 +207,7 @@ class EventRun:
     def _judge(self, ended: Ended) -> None:
         """What the loop came back for; DivergedError ends the run."""
         t, y = self.time, self.y
-        self.watch.pace(t, int(self.now[Now.STEPS]))
+        self.watch.pace(t, y, int(self.now[Now.STEPS]))
         where = f"at t = {t}, max |y| = {np.abs(y).max():.3g}: y grows without bound, or tolerances are too tight"
         if ended is Ended.EVENT:
             self._event(t, y)

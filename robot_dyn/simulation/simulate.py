@@ -38,6 +38,7 @@ from robot_dyn.simulation.size import check_record
 from robot_dyn.simulation.smoothness import finds_events
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.state_functions import interpreted
+from robot_dyn.simulation.stiffness import bounded_by_stability
 from robot_dyn.simulation.time_loop import Functions
 from robot_dyn.simulation.trajectory import Ending, Outcome, Statistics, Trajectory
 from robot_dyn.simulation.watch import Watch
@@ -165,7 +166,8 @@ def _trajectory(
     return Trajectory(
         names, t, q, v, a, u, power, ledger, desired, deviation, record.outcome, statistics, error, about,
         wrenches(plant, t, q), at_stop(plant, q),
-        remarks(setup, observer, t, np.hstack([q, v, u]), power), observer.extremes, acting(setup),
+        (*remarks(setup, observer, t, np.hstack([q, v, u]), power), *bounded_by_stability(setup, equation, record)),
+        observer.extremes, acting(setup),
         equation.controller_states(record.y), record.events, equation.effect_states(record.y),
     )  # fmt: skip
 

@@ -14,10 +14,17 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.arithmetic import Array
+from robot_dyn.errors import RobotDynError
 from robot_dyn.integrate.differences import by_state
+from robot_dyn.simulation.record import Record
+from robot_dyn.simulation.remarks import Kind, Remark
+from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.state_equation import CONTROL, StateEquation, numbered
 
 BODIES = "the motion of the bodies"
+_LEAST_STEPS = 1000  # of a run that is looked at
+_LOOKS = 9  # at steps of it
+_BOUND = (4.0, 9.0)  # h |λ| of explicit steps that stability bounds: by 6.1 for DOP853, about which they go up and down
 
 
 @final
@@ -35,10 +42,45 @@ class Fastest:
     joint: str
     source: str
 
+    @property
+    def decays(self) -> bool:
+        """Whether it decays more than it oscillates."""
+        return -self.eigenvalue.real > abs(self.eigenvalue.imag)
+
     def __str__(self) -> str:
-        how = "decays" if -self.eigenvalue.real > abs(self.eigenvalue.imag) else "changes"
+        how = "decays" if self.decays else "changes"
         by = self.source if self.source == BODIES else repr(self.source)
         return f"the fastest motion {how} with {abs(self.eigenvalue):.1e} per second, of joint {self.joint!r}, by {by}"
+
+
+def bounded_by_stability(setup: Setup, equation: StateEquation, record: Record) -> tuple[Remark, ...]:
+    """A remark if stability, and not the tolerance, bounds the steps of an explicit method that chooses them.
+
+    That is where h |λ| is about the end of the stability domain in most of some steps, λ the fastest decay.
+    [Hairer, Wanner 1996, IV.2, p. 21]
+    """
+    method, t, y = setup.integrator, record.walked.t, record.walked.y
+    explicit = method.controls_error and method.plain and not method.needs_jacobian
+    if not explicit or record.steps < _LEAST_STEPS or len(t) < _LEAST_STEPS:
+        return ()
+    held, found = np.zeros(equation.plant.dynamics.n) if equation.sampled else None, []
+    for k in np.linspace(1, len(t) - 2, _LOOKS).astype(int):
+        try:
+            motion = fastest(equation, float(t[k]), y[k], held)
+        except (RobotDynError, np.linalg.LinAlgError):
+            continue
+        size = abs(motion.eigenvalue)
+        if motion.decays and _BOUND[0] < size * (t[k + 1] - t[k]) < _BOUND[1]:
+            found.append((size, k, motion))
+    if len(found) <= _LOOKS // 2:
+        return ()
+    size, k, motion = max(found, key=lambda each: each[0])
+    at, end = float(t[k]), float(t[-1])
+    return (
+        Remark(
+            Kind.STIFF, motion.joint, "v", 0.0, end, at, size, None, str(motion), "take integrator='Rosenbrock'"
+        ),
+    )  # fmt: skip
 
 
 def fastest(equation: StateEquation, t: float, y: Array, held: Array | None) -> Fastest:

@@ -13,6 +13,7 @@ from robot_dyn.foreign import is_mistake
 from robot_dyn.integrate.integrator import IntegrationError, Integrator, System
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.state_equation import StateEquation
+from robot_dyn.simulation.stiffness import fastest
 from robot_dyn.simulation.trajectory import diverged_advice
 
 _PACED = 2000  # steps between looks at the pace of an adaptive method
@@ -46,7 +47,7 @@ class Watch:
         self.setup, self.equation = setup, equation
         K, V = (float(x[0]) for x in equation.energies(np.zeros(1), setup.q0[None], setup.v0[None]))
         self.energy, self.scale = K + V, 1.0 + abs(K) + abs(V)
-        self.paced = 0.0
+        self.paced, self.looked = 0.0, 0  # time and steps at the last look at the pace
 
     def tick(self, t: float, y: Array) -> tuple[Array, Array | None]:
         """A tick of the controller; DivergedError if it fails, or asks for no finite torque."""
@@ -71,18 +72,29 @@ class Watch:
                 raise
             raise self.diverged(t, y, str(error)) from None
 
-    def pace(self, t: float, steps: int) -> None:
+    def pace(self, t: float, y: Array, steps: int) -> None:
         """DivergedError if the steps of an adaptive method have become so short that the run would not end."""
-        if steps % _PACED:
+        since = steps - self.looked
+        if since < _PACED:
             return
-        made, self.paced = t - self.paced, t
-        ahead = (self.setup.duration_s - t) / max(made, 1e-300) * _PACED
+        made, self.paced, self.looked = t - self.paced, t, steps
+        ahead = (self.setup.duration_s - t) / max(made, 1e-300) * since
         if ahead > _MOST_AHEAD:
+            why = self._fastest(t, y, made / since)
             implicit = "" if self.setup.integrator.name == "Rosenbrock" else "Rosenbrock, "
             raise DivergedError(
-                t, f"the last {_PACED} steps led {made:.1e} s on, at which pace {ahead:.0e} more are left: the system "
-                f"is stiff; take {implicit}softer effects or a larger tolerance{self._steepest()}"
+                t, f"the last {since} steps led {made:.1e} s on, at which pace {ahead:.0e} more are left: the system "
+                f"is stiff; {why}take {implicit}softer effects or a larger tolerance{self._steepest()}"
             )  # fmt: skip
+
+    def _fastest(self, t: float, y: Array, h: float) -> str:
+        """Words for the fastest motion, if it is found at this state and such that steps h are those of stability."""
+        held = np.zeros(self.equation.plant.dynamics.n) if self.equation.sampled else None
+        try:
+            motion = fastest(self.equation, t, y, held)
+        except (RobotDynError, np.linalg.LinAlgError):
+            return ""
+        return f"{motion}: " if abs(motion.eigenvalue) * h > 1 else ""
 
     def _steepest(self) -> str:
         """Words for the effect that bends within the least change of q or v, if that is small."""
