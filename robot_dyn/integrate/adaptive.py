@@ -124,7 +124,7 @@ class Adaptive:
         return replace(self, rtol=self.rtol * factor, atol=self.atol * factor, max_step_s=longest_s)
 
     def __post_init__(self) -> None:
-        if self.method in FORMER:
+        if isinstance(self.method, str) and self.method in FORMER:
             former.tell(f"the method {self.method}", FORMER[self.method], up=4)
             object.__setattr__(self, "method", FORMER[self.method])
         choice("adaptive method", self.method, ADAPTIVE)

@@ -50,7 +50,7 @@ def method(name: str) -> Any:
     Raises:
         QueryError: If the name is unknown; gives the nearest names.
     """
-    if name in FORMER:
+    if isinstance(name, str) and name in FORMER:
         return Adaptive(name)
     return METHODS[choice("integration method", name, METHODS)]()
 
