@@ -43,8 +43,8 @@ def test_a_refused_robot_says_why(name: str) -> None:
 
 
 def test_a_robot_of_69_files_is_each_in_the_catalog() -> None:
-    """example-robot-data 6.0.0 has 69 URDFs, urdf/ seven; no two share a name."""
-    assert len(rd.list_robots()) == 69 + 7
+    """example-robot-data 6.0.0 has 69 URDFs, urdf/ nine; no two share a name."""
+    assert len(rd.list_robots()) == 69 + 9
 
 
 @pytest.mark.parametrize("name", ["ur5", "skew_tree", "mimic_chain"])
