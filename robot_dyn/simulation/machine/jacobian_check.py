@@ -15,7 +15,7 @@ from robot_dyn.simulation.state_equation import StateEquation
 
 DIFFERENCES = 1e-6  # of a column: differences are right to some 1e-10 of f, over columns of other units
 _NARROWER = 4.0
-_DOUBT, _ROUNDINGS = 10.0, 100.0  # of f, where forces cancel
+_DOUBT, _ROUNDINGS = 30.0, 300.0  # of f, where forces cancel
 
 
 def by_differences(equation: StateEquation, t: float, y: Array, held: Array | None, p: Array, J: Array) -> float:
