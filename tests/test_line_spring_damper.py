@@ -117,6 +117,19 @@ def test_it_compiles_in_runs_and_rollouts_with_every_number_an_input(effect: rd.
         assert np.abs(runs.q[1] - runs.q[0]).max() > 1e-6
 
 
+def test_of_two_the_numbers_differ_from_run_to_run_under_their_numbers() -> None:
+    """Each run is that of the plant whose second one has the value, in both of its parts."""
+    q, v = state()
+    options = {"q0": q, "v0": v, "duration_s": 0.05, "integrator": "rk4"}
+    points = np.array([[0.8, 0.2, 0.3], [0.6, 0.1, 1.0]])
+    params = {"line_spring_damper 2.other_point": points, "line_spring_damper 1.stiffness": [50.0, 90.0]}
+    runs = rd.rollouts(rd.Plant(TREE, [BETWEEN, TO_WORLD]), params=params, **options)
+    for k, k1 in enumerate((50.0, 90.0)):
+        both = [replace(BETWEEN, stiffness=k1), replace(TO_WORLD, other_point=points[k])]
+        alone = rd.simulate(rd.Plant(TREE, both), engine="interpreted", estimate_error=False, **options)
+        np.testing.assert_allclose(runs.q[k][-1], alone.q[-1], atol=1e-12)
+
+
 def test_it_runs_in_balls_that_hold_the_float_value() -> None:
     own, (q, v) = rd.Lagrangian(TREE, rd.Ball(200)), state()
     torque = rd.Plant(own, [BETWEEN]).torque(0.0, q, v)

@@ -345,7 +345,7 @@ def test_params_are_held_to_what_their_effect_takes() -> None:
     with pytest.raises(rd.RobotDynError, match="velocity_scale"):
         rd.rollouts(SETUP, starts(2), params={"regularised_coulomb_friction.velocity_scale": np.zeros(2)})
     two = replace(SETUP, plant=rd.Plant(ARM, [rd.ViscousFriction(0.3), rd.ViscousFriction(0.1)]))
-    with pytest.raises(QueryError, match="several effects"):
+    with pytest.raises(QueryError, match=r"several effects of the plant; give 'viscous_friction 1\.damping' and 'visc"):
         rd.rollouts(two, starts(2), params={"viscous_friction.damping": np.ones(2)})
     for params in ([1], {3: np.ones(2)}):
         with pytest.raises(QueryError, match="params must give values by name"):

@@ -7,7 +7,7 @@ swept, and so are mass and inertia of a single link; lengths are constants of th
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, final
 
@@ -93,8 +93,9 @@ def parameters(
     """
     n = dynamics.n
     made = [*_of_robot(dynamics, ROBOT, "", swept)]
-    for i, effect in enumerate(effects):
-        made += _of_part(effect, ("effect", i), f"{effect.name}.", n)
+    effects = tuple(effects)
+    for i, name in enumerate(names_of(effects)):
+        made += _of_part(effects[i], ("effect", i), f"{name}.", n)
     if controller is not None:
         made += _of_part(controller, CONTROLLER, "", n)
         for name, reference in controller.references.items():
@@ -139,6 +140,15 @@ def _of_robot(dynamics: Any, place: Part, prefix: str, swept: Collection[str]) -
         link, _, key = name.removeprefix(prefix).rpartition(".")
         if link in links:
             yield parameter(f"{key} {link}", name, links[link][key], _OF_LINK[key])
+
+
+def names_of(effects: Sequence[Effect]) -> list[str]:
+    """Their names, those of a kind numbered: "spring 1" and "spring 2"; both parts of an effect share one."""
+    kinds = [(type(each), each.name) for each in effects]
+    return [
+        f"{each.name} {kinds[: i + 1].count(kind)}" if kinds.count(kind) > 1 else each.name
+        for i, (each, kind) in enumerate(zip(effects, kinds, strict=True))
+    ]
 
 
 def link_parameters(dynamics: Any) -> tuple[str, ...]:

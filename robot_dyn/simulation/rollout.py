@@ -7,6 +7,7 @@ Each run is a lane of a tile, and no lane depends on another: one that diverges 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Any, Unpack, cast
@@ -14,7 +15,7 @@ from typing import Any, Unpack, cast
 import numpy as np
 
 from robot_dyn import former
-from robot_dyn.compiled.parameters import link_parameters, parameters
+from robot_dyn.compiled.parameters import link_parameters, names_of, parameters
 from robot_dyn.compiled.threads import thread_count
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import QueryError, nearest, shown
@@ -58,7 +59,8 @@ def rollouts(
         q0: Positions at the start, (B, n) or (n,), in [rad] or [m] by joint; required unless `what` is a setup.
         v0: Velocities at the start, (B, n) or (n,), in [rad/s] or [m/s]; 0, or those of the setup, unless given.
         params: Values that differ from run to run, each (B,) or (B, n): a gain of the controller by its name, as
-            {"kp": …}, a coefficient of an effect, as {"viscous_friction.damping": …}, "gravity", (B, 3), or of a
+            {"kp": …}, a coefficient of an effect, as {"viscous_friction.damping": …} (of several of a kind
+            {"external_wrench 2.wrench": …}), "gravity", (B, 3), or of a
             payload that a link carries its mass in [kg], as {"payload_mass:tool0": …}, or its centre of mass,
             "payload_com:tool0", (B, 3); "armature", (B, n); "mass_scale", (B,); mass and inertia of a link as of
             `Robot.with_`, as {"link3.mass": …, "link3.inertia": …}, (B,) and (B, 3, 3). Models of controllers keep
@@ -149,11 +151,13 @@ def _values(setup: Setup, name: str, values: Any) -> np.ndarray:
     swept = [each for each in known if each.declared.swept]
     mine = [each for each in swept if each.name == name]
     if not mine:
+        part, _, key = name.rpartition(".")
+        several = [each for each in names_of(plant.effects) if re.fullmatch(rf"{re.escape(part)} \d+", each)]
+        if several:
+            both = " and ".join(repr(f"{each}.{key}") for each in dict.fromkeys(several))
+            raise QueryError(f"params: {name} names a coefficient of several effects of the plant; give {both}")
         names = dict.fromkeys((*(each.name for each in swept), *link_parameters(plant.dynamics)))
         raise QueryError(f"params: no {name!r}; {nearest(name, names)}")
-    classes = [type(plant.effects[each.part[1]]) if each.part[0] == "effect" else each.part for each in mine]
-    if len(classes) > len(set(classes)):
-        raise QueryError(f"params: {name} names a coefficient of several effects of the plant; make them one effect")
     n, declared = mine[0].size, mine[0].declared
     shapes = (("B",), ("B", 1), ("B", n)) if declared.of_joints or n == 1 else (("B", *mine[0].value.shape),)
     array = numbers(
