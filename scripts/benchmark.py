@@ -2,7 +2,8 @@
 
 Subjects: queries (Robot over bare Pinocchio), compiled (against Pinocchio's C++), rollouts (against MuJoCo),
 parameters (numbers as inputs of machine code over constants), growth (cost against the number of joints), iftomm
-(problems A01 and A05 of the IFToMM library of multibody benchmarks), stiff (joints with stiff dampers and springs).
+(problems A01 and A05 of the IFToMM library of multibody benchmarks), stiff (joints with stiff dampers and springs),
+precision (time against error, all methods beside SciPy, MuJoCo and heyoka).
 """
 
 from __future__ import annotations
@@ -10,11 +11,11 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from benchmarks import growth, iftomm, kernels, parameters, queries, rollouts, stiff
+from benchmarks import growth, iftomm, kernels, parameters, precision, queries, rollouts, stiff
 from benchmarks.measure import Effort, environment
 
-PICTURE = Path(__file__).parents[1] / "docs" / "pictures" / "growth.png"
-SUBJECTS = ("queries", "compiled", "rollouts", "parameters", "growth", "iftomm", "stiff")
+PICTURES = Path(__file__).parents[1] / "docs" / "pictures"
+SUBJECTS = ("queries", "compiled", "rollouts", "parameters", "growth", "iftomm", "stiff", "precision")
 
 
 def main() -> None:
@@ -42,12 +43,14 @@ def main() -> None:
     if "parameters" in what:
         parameters.parameters(effort)
     if "growth" in what:
-        growth.growth(effort, None if options.quick else PICTURE)
+        growth.growth(effort, None if options.quick else PICTURES / "growth.png")
         growth.memory(effort)
     if "iftomm" in what:
         iftomm.iftomm(effort)
     if "stiff" in what:
         stiff.stiff(effort)
+    if "precision" in what:
+        precision.precision(effort, None if options.quick else PICTURES / "precision.png")
 
 
 if __name__ == "__main__":
