@@ -72,7 +72,10 @@ def test_rollouts_take_the_same() -> None:
         (lambda: rd.simulate(ARM, duration_s=1.0), r"simulate: give q0, the position at the start, \(2,\)"),
         (lambda: rd.rollouts(ARM, integrator="rk4"), r"rollouts: give q0, the position at the start, \(2,\)"),
         (lambda: rd.rollouts(ARM, np.zeros((0, 2)), integrator="rk4"), "of one number of runs"),
-        (lambda: rd.rollouts(ARM, Q), "not by DOP853: give integrator='rk4' and its step_s"),
+        (
+            lambda: rd.rollouts(ARM, Q, events=[rd.Event(lambda t, q, v: v[0])]),
+            "rollouts: events has no effect, since runs in lock step are not cut",
+        ),
         (lambda: rd.rollouts(ARM, Q, integrator="sdirk_3"), "not by sdirk_3: give integrator='rk4' and its step_s"),
         (lambda: rd.rollouts(ARM, Q, estimate_error=True), "estimate_error has no effect, simulate one of the runs"),
         (lambda: rd.rollouts(ARM, Q, engine="compiled"), "engine has no effect, rollouts run in machine code"),

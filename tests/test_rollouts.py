@@ -313,12 +313,31 @@ def test_what_has_no_meaning_is_refused() -> None:
     }.items():
         with pytest.raises(QueryError, match=message):
             rd.rollouts(SETUP, **options)
-    with pytest.raises(
-        QueryError, match="rollouts run in lock step by an explicit, Gauss or Rosenbrock method, not by DOP853"
-    ):
-        rd.rollouts(replace(SETUP, integrator=rd.Adaptive(), step_s=1e-3))
     with pytest.raises(TraceError, match="effect table"):
         rd.rollouts(replace(SETUP, plant=rd.Plant(ARM, [Table()])))
+
+
+def test_runs_of_chosen_steps_are_those_of_simulate() -> None:
+    """One after the other on each thread: gains and stops that differ, events included, to rounding of two engines."""
+    stops = rd.joint_stops([-1.0, -1.0], [0.4, 1.0], 1e4)
+    setup = replace(
+        SETUP, plant=rd.Plant(ARM, [rd.ViscousFriction(0.5), *stops]), integrator=rd.Adaptive(), step_s=1e-3,
+        record_period_s=0.05,
+    )  # fmt: skip
+    upper, kp, q0 = np.array([[0.4, 1.0], [0.3, 0.8], [0.35, 0.9]]), np.array([20.0, 30.0, 40.0]), starts(3)
+    params = {"joint_stops.upper": upper, "kp": kp}
+    runs = rd.rollouts(setup, q0, params=params, record=("q", "v", "u", "energy", "work"), threads=2)
+    for i in range(3):
+        stops = rd.joint_stops([-1.0, -1.0], upper[i], 1e4)
+        plant, law = rd.Plant(ARM, [rd.ViscousFriction(0.5), *stops]), replace(setup.controller, kp=kp[i])
+        own = replace(setup, plant=plant, controller=law, q0=q0[i], estimate_error=False, engine="interpreted")
+        theirs = rd.simulate(own)
+        np.testing.assert_array_equal(runs.t, theirs.t)
+        np.testing.assert_allclose(runs.q[i], theirs.q, atol=1e-9)  # steps differ where errors are near the tolerance
+        np.testing.assert_allclose(runs.u[i], theirs.u, atol=1e-6)
+        np.testing.assert_allclose(runs.kinetic[i], theirs.ledger.kinetic, atol=1e-7)
+        assert runs.work["joint_stops"][i] == pytest.approx(theirs.ledger.work["joint_stops"], abs=1e-7)
+    assert not runs.diverged.any() and "one after the other" in runs.statistics.engine
 
 
 def test_an_interrupt_ends_the_batch_and_keeps_what_there_is(monkeypatch) -> None:

@@ -24,6 +24,7 @@ from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.model.edits import Edits
 from robot_dyn.simulation.machine.batch import LANES, Batch
 from robot_dyn.simulation.machine.making import machine
+from robot_dyn.simulation.machine.one_by_one import OneByOne
 from robot_dyn.simulation.options import Options, setup_of, takes_options
 from robot_dyn.simulation.origin import edits_of_machine_code
 from robot_dyn.simulation.rollout_result import Rollouts
@@ -52,7 +53,9 @@ def rollouts(
 ) -> Rollouts:
     """Run a plant or a robot from many starts, or a setup with the options that are given in place of its own.
 
-    The runs go side by side in machine code, by an explicit, Gauss or Rosenbrock method: `integrator="rk4"`, `step_s`.
+    By an explicit, Gauss or Rosenbrock method of fixed step, such as `integrator="rk4"`, the runs go side by side in
+    machine code, and are not cut where a stop is touched. By a method that chooses its steps, such as the default, they
+    go one after the other on each thread, each as `simulate` makes it.
 
     Args:
         what: What to run.
@@ -84,11 +87,13 @@ def rollouts(
     """
     setup = replace(_setup(what, q0, options), estimate_error=False)
     most_bytes = integer("most_bytes", most_bytes, most=2**63 - 1)
-    if not setup.integrator.plain or setup.integrator.controls_error:
+    if not setup.integrator.plain:
         raise QueryError(
-            f"rollouts run in lock step by an explicit, Gauss or Rosenbrock method, not by {setup.integrator.name}:"
-            " give integrator='rk4' and its step_s; simulate takes any method"
+            f"rollouts run by an explicit, Gauss or Rosenbrock method, or by one that chooses its steps, not by"
+            f" {setup.integrator.name}: give integrator='rk4' and its step_s; simulate takes any method"
         )
+    if setup.events:
+        raise QueryError("rollouts: events has no effect, since runs in lock step are not cut; simulate takes them")
     if params is not None and not (isinstance(params, Mapping) and all(isinstance(name, str) for name in params)):
         raise QueryError(f"params must give values by name, such as {{'kp': …}}, got {shown(params)}")
     instance("record", record, Iterable, f"give names of {', '.join(RECORDS)}")
@@ -98,6 +103,10 @@ def rollouts(
         recorded = tuple("u" if isinstance(name, str) and name == "tau" else name for name in recorded)
     recorded = tuple(choice("record", name, RECORDS) for name in recorded)
     q, v, sweep = _starts(setup, q0, v0, params or {})
+    if setup.integrator.controls_error:
+        singles = OneByOne(setup, q, v, sweep, recorded, most_bytes)
+        runs = singles.run(thread_count(threads), on_progress)
+        return replace(runs, about=edits_of_machine_code(setup) | runs.about)
     equation = StateEquation(setup.plant, setup.controller, setup.integrator.canonical)
     asked = {"u": "u" in recorded, "v": equation.canonical and "v" in recorded, "energy": "energy" in recorded}
     kept = tuple(name for name, yes in asked.items() if yes)
