@@ -131,6 +131,7 @@ class OneByOne:
             self.setup.plant.dynamics.joint_names, t, kept[_Q] if asked["q"] else None,
             kept[_V] if asked["v"] else None, kept[_U] if asked["u"] else None,
             K, V, work if asked["work"] else None, np.array([each.t for each in outcomes]), ending == Ending.DIVERGED,
-            ending == Ending.STOPPED, advice, steps, evaluations, statistics, tuple(equation.sources), origin(self.setup.plant.dynamics) | self.setup.about,
+            ending == Ending.STOPPED, advice, steps, evaluations, statistics, tuple(equation.sources),
+            origin(self.setup.plant.dynamics) | self.setup.about,
             dict(self.sweep), self.setup,
         )  # fmt: skip
