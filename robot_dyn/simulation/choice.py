@@ -5,6 +5,7 @@ It is made by a count, about how often the equation of motion is evaluated: the 
 
 from __future__ import annotations
 
+from math import inf
 from typing import TYPE_CHECKING, Any
 
 from robot_dyn.errors import RobotDynError
@@ -23,8 +24,13 @@ _GUESSED = 10  # evaluations in a step of an implicit method, beside those of it
 _PER_SECOND, _PER_SEGMENT = 1000, 17  # evaluations of an adaptive method: for each second, at least for each segment
 
 
-def choose(setup: Setup, equation: StateEquation) -> tuple[Machine | None, str]:
+def choose(setup: Setup, equation: StateEquation, seen: float = 0) -> tuple[Machine | None, str]:
     """The machine that runs a setup, or None for the interpreted engine; and words for the summary.
+
+    Args:
+        setup: What to run.
+        equation: Its state equation.
+        seen: Evaluations that it is known to take at least.
 
     Raises:
         TraceError: If engine is "compiled" and a part cannot be; names it.
@@ -36,12 +42,18 @@ def choose(setup: Setup, equation: StateEquation) -> tuple[Machine | None, str]:
         return _machine(setup, equation), _label(setup)
     if parts := foreign(setup):  # they may have effects of their own, which a trace would lose
         return None, _interpreted(setup, f"{named(parts[0])} is not the library's own")
-    if _evaluations(setup, equation.size) < _COMPILED:
+    if max(seen, _evaluations(setup, equation.size)) < _COMPILED:
         return None, _interpreted(setup, "short: compiling does not pay")
     try:
         return _machine(setup, equation), _label(setup)
     except (ImportError, RobotDynError) as error:
         return None, _interpreted(setup, str(error))
+
+
+def most_interpreted(setup: Setup, machine: Machine | None) -> float:
+    """Evaluations after which a run is begun again in machine code: a count that was guessed too low."""
+    guessed = setup.engine == "auto" and machine is None and setup.integrator.controls_error and not foreign(setup)
+    return _COMPILED if guessed else inf
 
 
 def _machine(setup: Setup, equation: StateEquation) -> Machine:

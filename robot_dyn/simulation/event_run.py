@@ -54,6 +54,14 @@ def _on(times: np.ndarray, path: Path) -> Path:
     return Path(key[met], path.t[met], path.y[met])
 
 
+class TooLongError(Exception):
+    """Internal: a run that takes more evaluations than were allowed."""
+
+    def __init__(self, evaluations: int) -> None:
+        super().__init__()
+        self.evaluations = evaluations
+
+
 class TerminalEvent(Exception):  # noqa: N818
     """Internal: an event that ends the run, at `t`."""
 
@@ -75,15 +83,16 @@ class EventRun:
         on_progress: Called with the time reached, at each step or some ten times a second.
         observer: Sees each step.
         in_python: The functions as Python calls them, where they are machine code.
+        most: Evaluations after which it gives up with a TooLongError.
     """
 
     def __init__(
         self, watch: Watch, made: Made, mesh: np.ndarray | None,
         machine_code: Advance | None = None,
         on_progress: Callable[[float], object] | None = None, observer: Observer | None = None,
-        in_python: Functions | None = None, samples: bool = True,
+        in_python: Functions | None = None, samples: bool = True, most: float = inf,
     ) -> None:  # fmt: skip
-        setup, equation = watch.setup, watch.equation
+        setup, equation, self.most = watch.setup, watch.equation, most
         self.watch, self.plan, self.in_python = watch, plan_of(setup), in_python
         self.setup, self.equation, self.made, self.samples = setup, equation, made, samples
         self.on_progress, self.observer, self.compiled = on_progress, observer, machine_code is not None
@@ -150,6 +159,8 @@ class EventRun:
             if ended is Ended.DONE:
                 break
             self._judge(ended)
+            if self.now[Now.EVALUATIONS] > self.most:
+                raise TooLongError(int(self.now[Now.EVALUATIONS]))
             if ended is Ended.PAUSED and self.compiled:
                 spent = perf_counter() - began
                 budget = int(np.clip(budget * _PAUSE_S / max(spent, 1e-9), _FIRST // 10, 100 * budget))

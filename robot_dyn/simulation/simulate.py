@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
+from math import inf
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Unpack, cast
 
@@ -19,10 +20,10 @@ from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.effects.plant import Plant
 from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.simulation.acting import acting
-from robot_dyn.simulation.choice import choose
+from robot_dyn.simulation.choice import choose, most_interpreted
 from robot_dyn.simulation.error import ErrorEstimate, no_estimate
 from robot_dyn.simulation.estimate import estimate
-from robot_dyn.simulation.event_run import EventRun
+from robot_dyn.simulation.event_run import EventRun, TooLongError
 from robot_dyn.simulation.fixed_step import FixedStep
 from robot_dyn.simulation.ledger import Ledger
 from robot_dyn.simulation.loads import at_stop, link_of, wrenches
@@ -77,9 +78,16 @@ def simulate(
     check_record(setup, equation)
     clock = [perf_counter()]
     machine, engine = choose(setup, equation)
-    clock.append(perf_counter())
-    observer = observer_of(setup, equation)
-    record = _run(setup, equation, machine, on_progress=on_progress, observer=observer)
+    try:
+        clock.append(perf_counter())
+        observer = observer_of(setup, equation)
+        most = most_interpreted(setup, machine)
+        record = _run(setup, equation, machine, on_progress=on_progress, observer=observer, most=most)
+    except TooLongError as run:
+        machine, engine = choose(setup, equation, run.evaluations)
+        clock[1] = perf_counter()
+        observer = observer_of(setup, equation)
+        record = _run(setup, equation, machine, on_progress=on_progress, observer=observer)
     clock.append(perf_counter())
     error = None
     if setup.estimate_error and record.outcome.ending is not Ending.STOPPED:
@@ -113,6 +121,7 @@ def _run(
     on_progress: Callable[[float], object] | None = None,
     observer: Observer | None = None,
     companion: bool = False,
+    most: float = inf,
 ) -> Record:
     """The run of a setup, or of a companion: with another pace of its steps, or on a mesh."""
     watch = Watch(setup, equation)
@@ -128,7 +137,7 @@ def _run(
         ends = pace if isinstance(pace, np.ndarray) else None
         if not setup.integrator.controls_error:
             ends = mesh(setup.segments, cast(Fraction, pace))
-        run: Any = EventRun(watch, made, ends, loop, on_progress, observer, in_python, not companion)
+        run: Any = EventRun(watch, made, ends, loop, on_progress, observer, in_python, not companion, most)
     else:
         functions, parameters = made(equation)
         run = FixedStep(setup, equation, functions, cast(Fraction, pace), loop, on_progress, observer, parameters)
