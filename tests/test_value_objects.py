@@ -32,7 +32,7 @@ def values() -> dict[str, Any]:
     spring, damper = rd.joint_stops([-1.0, -1.0], [1.0, 1.0])
     strut = rd.LineSpringDamper("tip", None, stiffness=9.0, damping=1.0, length=0.3)
     made = [
-        rd.Event(height),
+        rd.Event(height), rd.Threshold(0, 0.5, "upper stop", "touched", "left"),
         rd.Adaptive(), rd.Ball(100), rd.compare(ARM, samples=2), rd.Payload("tip", 1.0), ARM, rd.Lagrangian(ARM), plant,
         rd.PD(PLAN, [1.0, 2.0], 1.0), rd.PID(PLAN, 1.0, 1.0, 1.0), rd.PDGravity(ARM, PLAN, 1.0, 1.0),
         rd.FeedForward(ARM, PLAN, 1.0, 1.0), rd.ComputedTorque(ARM, PLAN, 1.0, 1.0),

@@ -165,6 +165,10 @@ def examples(folder: Path) -> dict[str, Example]:
              "about": {"note": "text"}, "engine": "interpreted"},
         ),
         "Spring": (rd.Spring, {"stiffness": 2.0, "rest": [0.1, -0.2]}),
+        "Threshold": (
+            rd.Threshold,
+            {"joint": 1, "level": 0.5, "name": "stop", "rising": "touched", "falling": "left", "of_velocity": True},
+        ),
         "ViscousFriction": (rd.ViscousFriction, {"damping": [0.1, 0.2]}),
         "circle": (
             rd.circle,

@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import final
 
+from robot_dyn.errors import EffectError
+from robot_dyn.validate import instance, integer, number, truth
+
 
 @final
 @dataclass(frozen=True)
@@ -17,6 +20,9 @@ class Threshold:
         name: What it is, as "upper stop".
         rising, falling: What happens where the coordinate grows through it, or falls, as "touched" and "left".
         of_velocity: Whether the velocity passes it.
+
+    Raises:
+        EffectError: If an attribute is of another type, or the level is not finite.
     """
 
     joint: int
@@ -25,3 +31,10 @@ class Threshold:
     rising: str
     falling: str
     of_velocity: bool = False
+
+    def __post_init__(self) -> None:
+        integer("joint", self.joint, error=EffectError)
+        object.__setattr__(self, "level", number("level", self.level, error=EffectError))
+        for name in ("name", "rising", "falling"):
+            instance(name, getattr(self, name), str, "give a text", error=EffectError)
+        truth("of_velocity", self.of_velocity, error=EffectError)
