@@ -26,7 +26,7 @@ PD = '[control]\nkind = "pd"\nfrequency_rad_per_s = 3\n'
 
 MISTAKES = {
     GRAVITY + '\n[[effect]]\nkind = "sprng"\n': r"line 6: effect 2 \(sprng\): kind: no kind 'sprng'; nearest: spring",
-    '[[effect]]\nkin = "gravity"\n': "line 3: effect 1: has no kind; give one of gravity, lock, .*effort_limit",
+    '[[effect]]\nkin = "gravity"\n': "line 3: effect 1: has no kind; give one of gravity, lock, .*actuator_lag",
     GRAVITY + '[[effect]]\nkind = "spring"\nstiffness_N_m_per_rad = 1.0\nrest = 1\n': (
         r"line 8: 'rest' is not a key of effect 2 \(spring\); nearest: rest_rad; keys: kind, .*, rest_rad"
     ),

@@ -8,6 +8,8 @@ from typing import final
 from robot_dyn.errors import EffectError
 from robot_dyn.validate import instance, integer, number, truth
 
+_MOST = 10**6  # joints
+
 
 @final
 @dataclass(frozen=True)
@@ -33,7 +35,7 @@ class Threshold:
     of_velocity: bool = False
 
     def __post_init__(self) -> None:
-        integer("joint", self.joint, error=EffectError)
+        integer("joint", self.joint, most=_MOST, error=EffectError)
         object.__setattr__(self, "level", number("level", self.level, error=EffectError))
         for name in ("name", "rising", "falling"):
             instance(name, getattr(self, name), str, "give a text", error=EffectError)
