@@ -104,6 +104,27 @@ def event_loop(
     """
     choose = chosen_step(step, error)
 
+    def cut(
+        f: Functions, c: Any, t: float, whole: float, theta: float, p: Array, runs: Runs, work: Any,
+        switches: Switches, event: int,
+    ) -> tuple[int, float]:  # fmt: skip
+        """The step made anew, up to where a switching function vanishes after it: its evaluations and its length."""
+        h, evaluations, y, after = theta * whole, 0, runs.y, runs.after
+        if abs(h) <= np.spacing(abs(t)):  # at once, as right behind another event
+            copy(after, y)
+            copy(work.last, work.K[0])
+            return 0, 0.0
+        for k in range(_ROOTS):
+            evaluations += step(f, c, t, h, y, p, runs.own, after, work, runs.lost)
+            evaluations += accept(f, c, t, h, y, p, runs.own, after, work)
+            shift = correction(f, t, h, whole, y, p, runs, work, switches, event)
+            if k == _ROOTS - 1 or not abs(shift) > np.spacing(abs(t + h)) or abs(shift) > abs(h):
+                break
+            h += shift
+        if event < len(switches.rows):
+            after[switches.rows[event], 0] = switches.levels[event]
+        return evaluations, h
+
     def advance(
         f: Functions, plan: Plan, runs: Runs, kept: Kept, times: Times, rules: Rules, c: Any, work: Any,
         switches: Switches, now: Array, control: Array, stop: Array,
@@ -128,7 +149,7 @@ def event_loop(
                 if not finite(work.K[0]):
                     return Ended.NOT_FINITE
                 if control[At.NEXT] == 0.0 and len(times.mesh) == 0:
-                    now[Now.EVALUATIONS] += first_step(f, start, end, y, p, own, after, work, control)
+                    now[Now.EVALUATIONS] += first_step(f, times.reached[0], end, y, p, own, after, work, control)
                 now[Now.STEP] = 2
             while times.reached[0] < end:
                 t = times.reached[0]
@@ -145,24 +166,11 @@ def event_loop(
                         now[Now.EVALUATIONS] += dense(f, c, t, h, y, p, own, after, work)
                         event, theta = first_event(f, t, h, y, p, runs, work.F, switches)
                         has_dense = event < 0
-                    if event >= 0 and theta * abs(h) <= np.spacing(abs(t)):  # at once, as right behind another one
-                        h, t1 = 0.0, t
-                        copy(after, y)
-                        copy(work.last, work.K[0])
-                    elif event >= 0:
-                        h = theta * h
-                        for k in range(_ROOTS):
-                            now[Now.EVALUATIONS] += step(f, c, t, h, y, p, own, after, work, runs.lost)
-                            now[Now.EVALUATIONS] += accept(f, c, t, h, y, p, own, after, work)
-                            shift = correction(f, t, h, control[At.TAKEN], y, p, runs, work, switches, event)
-                            if k == _ROOTS - 1 or not abs(shift) > np.spacing(abs(t + h)) or abs(shift) > abs(h):
-                                break
-                            h += shift
-                        t1 = t + h
-                        if event < len(switches.rows):
-                            after[switches.rows[event], 0] = switches.levels[event]
                     if event >= 0:
-                        control[At.NEXT] = max(control[At.NEXT], abs(control[At.TAKEN]))
+                        made, h = cut(f, c, t, h, theta, p, runs, work, switches, event)
+                        now[Now.EVALUATIONS] += made
+                        t1 = t + h
+                        control[At.NEXT] = max(control[At.NEXT], abs(control[At.TAKEN]))  # the cut is no error
                         switches.sides[event] = -switches.sides[event]
                 if h > 0.0 and asked(times, now, t1, end):
                     if not has_dense:
