@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from math import inf
-from time import perf_counter
 from typing import Any, final
 
 import numpy as np
@@ -24,6 +23,7 @@ from robot_dyn.integrate.step_control import At, ControlledStepper, control_of
 from robot_dyn.simulation.event import Occurrence
 from robot_dyn.simulation.event_loop import Kept, Times, event_loop
 from robot_dyn.simulation.fixed_step import runs_of
+from robot_dyn.simulation.followed import Followed
 from robot_dyn.simulation.observer import Observer
 from robot_dyn.simulation.plan import plan_of
 from robot_dyn.simulation.record import MOST_SHARED, Path, Record
@@ -39,7 +39,6 @@ from robot_dyn.simulation.watch import DivergedError, Watch, one_step
 
 _SAMPLES = 1000  # of a run without a record period
 _COMPARED = 1000  # times at which a run is compared with runs of other tolerances
-_PAUSE_S, _FIRST = 0.1, 200  # between looks at the keyboard; steps before the speed is known
 _CHATTER, _BRIEF = 20, 1e-9  # events of one threshold, in that part of the run
 _CHUNK = 1024  # ends of steps for which there is room at first
 
@@ -71,7 +70,7 @@ class TerminalEvent(Exception):  # noqa: N818
 
 
 @final
-class EventRun:
+class EventRun(Followed):
     """A run on its way.
 
     Args:
@@ -85,6 +84,8 @@ class EventRun:
         in_python: The functions as Python calls them, where they are machine code.
         most: Evaluations after which it gives up with a TooLongError.
     """
+
+    first = 200
 
     def __init__(
         self, watch: Watch, made: Made, mesh: np.ndarray | None,
@@ -148,41 +149,10 @@ class EventRun:
             outcome = Outcome(Ending.STOPPED, self.time, "interrupted; all samples up to here are kept")
         return self._record(outcome)
 
-    def _loop(self) -> None:
-        budget, told = _FIRST if self.compiled else 1, -1.0
-        while True:
-            if self.on_progress is not None and self.time > told:
-                told = self.time
-                self.on_progress(told)
-            began = perf_counter()
-            ended = self._go(budget)
-            if ended is Ended.DONE:
-                break
-            self._judge(ended)
-            if self.now[Now.EVALUATIONS] > self.most:
-                raise TooLongError(int(self.now[Now.EVALUATIONS]))
-            if ended is Ended.PAUSED and self.compiled:
-                spent = perf_counter() - began
-                budget = int(np.clip(budget * _PAUSE_S / max(spent, 1e-9), _FIRST // 10, 100 * budget))
-        if self.on_progress is not None and self.time > told:
-            self.on_progress(self.time)
-
-    def _go(self, budget: int) -> Ended:
-        """So many steps, or fewer, with a rest whenever there is no room for what is shown and kept."""
-        observer = self.observer
-        while True:
-            self._widen()
-            rest = len(self.kept.walked_t) - int(self.now[Now.WALKED]) or budget
-            self.now[Now.BUDGET] = steps = min(budget, rest, budget if observer is None else observer.room)
-            if observer is not None:
-                self.now[Now.COLUMN] = observer.filled
-            ended = self._advance()
-            if observer is not None:
-                observer.filled = int(self.now[Now.COLUMN])
-                observer.look()
-            budget -= steps
-            if ended is not Ended.PAUSED or budget <= 0:
-                return ended
+    def _room(self, budget: int) -> int:
+        self._widen()
+        rest = len(self.kept.walked_t) - int(self.now[Now.WALKED]) or budget
+        return min(rest, super()._room(budget))
 
     def _widen(self) -> None:
         """Room for as many more ends of steps, where it is used up."""
@@ -216,7 +186,9 @@ class EventRun:
         raise self.watch.diverged(t, y, "a number overflowed")
 
     def _judge(self, ended: Ended) -> None:
-        """What the loop came back for; DivergedError ends the run."""
+        """What the loop came back for; DivergedError ends the run, TooLongError gives it up."""
+        if self.now[Now.EVALUATIONS] > self.most:
+            raise TooLongError(int(self.now[Now.EVALUATIONS]))
         t, y = self.time, self.y
         self.watch.pace(t, y, int(self.now[Now.STEPS]))
         where = f"at t = {t}, max |y| = {np.abs(y).max():.3g}: y grows without bound, or tolerances are too tight"

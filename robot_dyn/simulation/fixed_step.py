@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from fractions import Fraction
 from math import ceil, inf
-from time import perf_counter
 from typing import cast, final
 
 import numpy as np
@@ -18,6 +17,7 @@ from robot_dyn.arithmetic import FLOAT64, Array
 from robot_dyn.errors import RobotDynError
 from robot_dyn.foreign import is_mistake
 from robot_dyn.integrate.integrator import Integrator
+from robot_dyn.simulation.followed import Followed
 from robot_dyn.simulation.observer import Observer
 from robot_dyn.simulation.plan import plan_of
 from robot_dyn.simulation.record import MOST_SHARED, Path, Record
@@ -29,8 +29,6 @@ from robot_dyn.simulation.time_loop import WATCHED, Ended, Functions, Now, Recor
 from robot_dyn.simulation.trajectory import Ending, Outcome
 from robot_dyn.simulation.watch import DivergedError, Watch, one_step
 
-_PAUSE_S = 0.1  # between looks at the keyboard
-_FIRST = 1000  # steps before the speed is known
 _DOUBTFUL = 1e6  # of Σ |y| in machine code, which does not see that M becomes singular
 
 _NONE = np.zeros(0)
@@ -39,7 +37,7 @@ Advance = Callable[..., int]
 
 
 @final
-class FixedStep:
+class FixedStep(Followed):
     """A run on its way.
 
     Args:
@@ -52,6 +50,8 @@ class FixedStep:
         observer: Sees each step.
         parameters: Of the functions, (P,).
     """
+
+    first = 1000
 
     def __init__(
         self, setup: Setup, equation: StateEquation, functions: Functions, pace: Fraction,
@@ -118,39 +118,6 @@ class FixedStep:
             outcome = Outcome(Ending.STOPPED, self.time, "interrupted; all samples up to here are kept")
         return self._record(outcome)
 
-    def _loop(self) -> None:
-        budget, told = _FIRST if self.compiled else 1, -1.0
-        while True:
-            if self.on_progress is not None and self.time > told:
-                told = self.time
-                self.on_progress(told)
-            began = perf_counter()
-            ended = self._go(budget)
-            if ended is Ended.DONE:
-                break
-            if ended is not Ended.PAUSED:
-                self._judge(ended)
-            elif self.compiled:
-                spent = perf_counter() - began
-                budget = int(np.clip(budget * _PAUSE_S / max(spent, 1e-9), _FIRST // 10, 100 * budget))
-        if self.on_progress is not None and self.time > told:
-            self.on_progress(self.time)
-
-    def _go(self, budget: int) -> Ended:
-        """So many steps, or fewer, with a rest whenever the observer has all columns to look at."""
-        observer = self.observer
-        while True:
-            self.now[Now.BUDGET] = steps = budget if observer is None else min(budget, observer.room)
-            if observer is not None:
-                self.now[Now.COLUMN] = observer.filled
-            ended = self._advance()
-            if observer is not None:
-                observer.filled = int(self.now[Now.COLUMN])
-                observer.look()
-            budget -= steps
-            if ended is not Ended.PAUSED or budget <= 0:
-                return ended
-
     def _advance(self) -> Ended:
         _, coefficients, work = self.stepper
         arguments = self.functions, self.plan, self.runs, self.records, self.rules, coefficients, work
@@ -162,7 +129,9 @@ class FixedStep:
             return Ended.DOUBTFUL
 
     def _judge(self, ended: Ended) -> None:
-        """Do a doubtful step, tick or look at the energy by the interpreted equation; DivergedError ends the run."""
+        """Do a doubtful step, tick or look at the energy by the interpreted equation."""
+        if ended is Ended.PAUSED:
+            return
         s, t, y = int(self.now[Now.SEGMENT]), self.time, self.y
         if ended is Ended.TICK:
             y, held = self.watch.tick(t, y)

@@ -172,9 +172,10 @@ def test_a_call_is_restored_from_a_store(double: Kernel, monkeypatch: pytest.Mon
 
 
 def test_what_is_loaded_is_kept_once(double: Kernel) -> None:
-    """Numba never frees machine code: 200 kernels that are alike share it, and what is new to a store still gets there.
+    """Numba never frees machine code: 600 kernels that are alike share it, and what is new to a store still gets there.
 
-    No module of LLVM and no function is left over; 3 MB allow for what the count itself allocates (8 MB were lost).
+    No module of LLVM and no function is left over; 10 MB allow for what the count itself allocates, 4 MB late in the
+    suite (24 MB were lost).
     """
 
     def load(count: int) -> tuple[int, int]:
@@ -189,8 +190,8 @@ def test_what_is_loaded_is_kept_once(double: Kernel) -> None:
     memory = Memory()
     first = load(20)
     before = resident()
-    assert load(200) == first == (first[0], 1)
-    assert resident() - before < 3_000_000
+    assert load(600) == first == (first[0], 1)
+    assert resident() - before < 10_000_000
 
 
 def resident() -> int:
