@@ -24,7 +24,8 @@ def call(method: Callable[..., Any], *arguments: Any) -> Any:
         raise
     except Exception as error:
         part: Any = getattr(method, "__self__", None)
-        error.add_note(f"in {getattr(method, '__name__', 'a method')} of {getattr(part, 'name', type(part).__name__)}")
+        of = "" if part is None else f" of {getattr(part, 'name', type(part).__name__)}"  # None: a plain function
+        error.add_note(f"in {getattr(method, '__name__', 'a method')}{of}")
         raise
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.errors import QueryError
+from robot_dyn.errors import QueryError, TraceError
 from tests.estimates.scenes import arms
 
 G = 9.80665
@@ -143,6 +145,15 @@ def test_machine_code_paused_at_every_third_step_gives_the_same_bits(monkeypatch
         assert np.array_equal(getattr(whole, name), getattr(paused, name))
 
 
+def test_an_event_that_cannot_be_compiled_is_named_and_runs_interpreted() -> None:
+    """`math.sin` takes no symbol: engine="compiled" says so, with the line; "auto" runs in Python."""
+    options = {"q0": [0.3, 0.4], "duration_s": 0.3, "estimate_error": False}
+    events = [rd.Event(lambda t, q, v: math.sin(q[0]), name="level")]
+    with pytest.raises(TraceError, match=r"event level cannot be compiled .*line .* of test_events\.py"):
+        rd.simulate(ARM, engine="compiled", events=events, **options)
+    assert [each.name for each in rd.simulate(ARM, events=events, **options).events] == ["level"]
+
+
 @pytest.mark.parametrize(
     ("make", "message"),
     [
@@ -150,6 +161,9 @@ def test_machine_code_paused_at_every_third_step_gives_the_same_bits(monkeypatch
         (lambda: rd.Event(lambda t: t), "give a function of"),
         (lambda: rd.Event(lambda t, q, v: t, direction=2), "direction must be"),
         (lambda: rd.simulate(ARM, [0.0, 0.0], events=3), "give a list of rd.Event"),
+        (lambda: rd.simulate(ARM, [0.0, 0.0], events=[rd.Event(lambda t, q, v: q)]), "must return a finite number"),
+        (lambda: rd.simulate(ARM, [0.0, 0.0], events=[rd.Event(lambda t, q, v: "a")]), "must return a finite number"),
+        (lambda: rd.simulate(ARM, [0.0, 0.0], events=[rd.Event(lambda t, q, v: np.nan)]), "must return a finite"),
     ],
 )
 def test_meaningless_events_are_refused(make, message: str) -> None:

@@ -61,7 +61,7 @@ def wide(x: Any, n: int) -> np.ndarray:
     return np.broadcast_to(np.asarray(x, dtype=object), (n,)).view(Symbols)
 
 
-def _followed(name: str, function: Callable[[], Any]) -> Any:
+def whichever_way(name: str, function: Callable[[], Any]) -> Any:
     """What a part gives, whichever way its comparisons turn out; TraceError names the part."""
     try:
         made = every_branch(function).view(Symbols)
@@ -104,7 +104,7 @@ class _Part:
 
     def traced(self, function: Callable[[], Any], length: int) -> Array:
         """Symbols (length,) of what it gives."""
-        return _followed(f"effect {self.name}", lambda: wide(function(), length))
+        return whichever_way(f"effect {self.name}", lambda: wide(function(), length))
 
 
 class _Torque(_Part):
@@ -177,4 +177,4 @@ class TracedController(Controller):
         return self._traced(lambda: self.inner.next_state(t, q, v, z), self.state_size)
 
     def _traced(self, function: Callable[[], Any], length: int) -> Array:
-        return _followed(f"controller {self.original.name}", lambda: wide(function(), length))
+        return whichever_way(f"controller {self.original.name}", lambda: wide(function(), length))

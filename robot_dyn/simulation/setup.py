@@ -98,6 +98,7 @@ class Setup(Value):
         self._check_model()
         check_segments(self)
         self._check_torques()
+        self._check_events()
         self.plant.actuation(np.zeros(len(names)))
         with suppress(OverflowedError):  # a start so far out is the outcome of a run
             self.plant.forward_dynamics(0.0, self.q0, self.v0, np.zeros(len(names)))  # a singular M is told at once
@@ -126,6 +127,13 @@ class Setup(Value):
                 after = controller.next_state if controller.period_s else controller.state_rate
                 made = f"{controller.name}.{after.__name__}"
                 returned(made, call(after, *start), controller.state_size, "state", error=ControlError)
+
+    def _check_events(self) -> None:
+        """That what each event returns at the start is a number."""
+        for event in self.events:
+            value = call(event.function, 0.0, self.q0, self.v0)
+            if np.ndim(value) or not isinstance(value, int | float | np.number) or not np.isfinite(value):
+                raise QueryError(f"event {event.name!r}: its function must return a finite number, got {shown(value)}")
 
     def _check_model(self) -> None:
         """That the controller means the joints and links of the plant; a file with other names all over may fit too."""

@@ -19,8 +19,10 @@ from robot_dyn.arithmetic import Array
 from robot_dyn.compiled.parameters import ROBOT, Parameter, Part, split
 from robot_dyn.compiled.symbolic import Symbolic, Symbols, column, inputs
 from robot_dyn.compiled.symbolic_dynamics import SymbolicDynamics
-from robot_dyn.compiled.symbolic_plant import Piece, symbolic_controller, symbolic_plant, wide
+from robot_dyn.compiled.symbolic_plant import Piece, symbolic_controller, symbolic_plant, whichever_way, wide
 from robot_dyn.control.reference import PiecewisePolynomial
+from robot_dyn.foreign import call
+from robot_dyn.simulation.event import Event
 from robot_dyn.simulation.plan import BOUNDS, lengths, polynomials
 from robot_dyn.simulation.state_equation import StateEquation
 
@@ -65,7 +67,7 @@ def trace(
             [rate, parts["u"], parts["energy"]] if single else [parts[x] for x in kept] or [[]]
         )
         if equation.events:
-            made["events"] = np.concatenate([np.asarray(x).reshape(1) for x in symbolic.switching(time, q, v)])
+            made["events"] = np.concatenate([_value(event, time, q, v) for event in equation.events])
         if equation.sampled and symbolic.controller is not None:
             after = z[: equation.state_size]
             if equation.state_size:
@@ -79,6 +81,11 @@ def trace(
             J = ca.jacobian(column(changing), ca.vertcat(y, unbounded))
             columns["jacobian"] = ca.vec(ca.substitute(J, unbounded, column(time)))
     return {name: ca.Function("f", [t, y, p, own], [ca.cse(ca.densify(x))]) for name, x in columns.items()}
+
+
+def _value(event: Event, t: Any, q: Array, v: Array) -> Array:
+    """The switching function of an event, (1,)."""
+    return whichever_way(f"event {event.name}", lambda: wide(call(event.function, t, q, v), 1))
 
 
 def _pieces(followed: Sequence[PiecewisePolynomial], p: Array) -> list[Piece]:
