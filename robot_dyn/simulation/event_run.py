@@ -119,7 +119,7 @@ class EventRun(Followed):
             np.empty((states, m)), np.empty(_CHUNK), np.empty((_CHUNK, m)), columns,
         )  # fmt: skip
         events = self.functions.events if self.compiled else self.switching.function
-        self.switches = self.switching.at(self.start, len(of.work.F), events)
+        self.switches = self.switching.at(0.0, self.start, len(of.work.F), events)
         self.events: list[Occurrence] = []
         self._change_mode()
         self.now, self.stop = np.zeros(len(Now), np.int64), np.zeros(1, np.int64)
@@ -238,7 +238,7 @@ class EventRun(Followed):
         last = self.events[-1]
         self.events.append(replace(last, name=f"{last.name} chatters, and is no longer looked for"))
         self.switching = Switching(self.equation, self.switching.dropped | {threshold})
-        self.switches = self.switching.at(self.y, len(self.switches.b) - 1, self.switches.functions)
+        self.switches = self.switching.at(last.t, self.y, len(self.switches.b) - 1, self.switches.functions)
 
     def _event(self, t: float, y: np.ndarray) -> None:
         """Keep an event, and go on behind it; TerminalEvent ends the run."""

@@ -11,8 +11,8 @@ from robot_dyn.arithmetic import Array
 from robot_dyn.effects.plant import Plant
 from robot_dyn.effects.threshold import Threshold
 from robot_dyn.integrate.bernstein import room
+from robot_dyn.simulation.crossings import Switches
 from robot_dyn.simulation.event import Occurrence
-from robot_dyn.simulation.event_loop import Switches
 from robot_dyn.simulation.state_equation import StateEquation
 
 
@@ -43,8 +43,8 @@ class Switching:
         self.thresholds: tuple[Threshold, ...] = tuple(dict.fromkeys(each for of in self._of for each in of))
         self._known: dict[bytes, StateEquation] = {}
 
-    def at(self, y: np.ndarray, degree: int, functions: object) -> Switches:
-        """The switching functions at the start y of a run, for dense output of a degree."""
+    def at(self, t: float, y: np.ndarray, degree: int, functions: object) -> Switches:
+        """The switching functions, their sides those of a state y at t, for dense output of a degree."""
         n, G = self.equation.plant.dynamics.n, len(self.events)
         rows = np.array([each.joint + n * each.of_velocity for each in self.thresholds], np.int64)
         levels = np.array([each.level for each in self.thresholds])
@@ -53,8 +53,8 @@ class Switching:
         sides = np.where(gaps + (gaps == 0) * moving > 0, 1.0, -1.0)
         for i in np.flatnonzero((gaps == 0) & (moving == 0)):  # a stop is touched, and not passed
             sides[i] = 1.0 if self.thresholds[i].falling == "touched" else -1.0
-        values = self.values(0.0, y)
-        sides = np.append(sides, np.sign(values))  # 0 where the start is a root: the first step tells
+        values = self.values(t, y)
+        sides = np.append(sides, np.sign(values))  # 0 where y is a root: the next step tells
         size = np.maximum(1.0, np.abs(levels))
         return Switches(
             rows, levels, sides, functions, np.zeros((G, 1)), size, np.zeros(degree + 1),

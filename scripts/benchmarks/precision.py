@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from fractions import Fraction
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -82,7 +83,7 @@ def ours(setup: rd.Setup, method: Any, step: float | None = None) -> Timed:
             prepared: Any = EventRun(Watch(setup, equation), lambda _: made, None, machine.loop)
         else:
             functions, loop = machine.equations.functions, machine.loop
-            prepared = FixedStep(setup, equation, functions, 1, loop, parameters=machine.parameters)  # type: ignore[arg-type]
+            prepared = FixedStep(setup, equation, functions, Fraction(1), loop, parameters=machine.parameters)
         began = perf_counter()
         record = prepared.record()
         return perf_counter() - began, record.y[-1, :7]
