@@ -10,6 +10,9 @@ if TYPE_CHECKING:
 
     from robot_dyn.accuracy.compare import Comparison as Comparison
     from robot_dyn.accuracy.compare import compare as compare
+    from robot_dyn.accuracy.diagram import save_work_precision as save_work_precision
+    from robot_dyn.accuracy.work_precision import WorkPrecision as WorkPrecision
+    from robot_dyn.accuracy.work_precision import work_precision as work_precision
     from robot_dyn.arithmetic import Ball as Ball
     from robot_dyn.arithmetic import midpoint as midpoint
     from robot_dyn.arithmetic import radius as radius
@@ -129,6 +132,7 @@ _HOME = {
     "Threshold": "effects.threshold",
     "Trajectory": "simulation.trajectory",
     "ViscousFriction": "effects.friction",
+    "WorkPrecision": "accuracy.work_precision",
     "circle": "control.cartesian",
     "coefficient": "coefficients",
     "compare": "accuracy.compare",
@@ -155,10 +159,12 @@ _HOME = {
     "save_rollouts": "simulation.rollouts_file",
     "save_run": "simulation.run_file",
     "save_show": "view.replay",
+    "save_work_precision": "accuracy.diagram",
     "show": "view.replay",
     "simulate": "simulation.simulate",
     "task_dynamics": "control.operational_space",
     "via_points": "control.reference",
+    "work_precision": "accuracy.work_precision",
 }
 
 _FORMER = {"Memoryless": "Stateless"}

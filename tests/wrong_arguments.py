@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from inspect import isabstract, isclass, signature
 from pathlib import Path
 from socket import socket
@@ -27,7 +28,12 @@ NOT_WHOLE = (*NOT_NUMBERS, -1, 0.5, [1])
 NOT_TEXT = (None, 3, NAN, True, b"arm", object(), ["arm"], {}, np.ones(2), 10**5000)
 NOT_OBJECTS = (None, 3, NAN, True, "no such", object(), np.ones(2), MASKED, {"a": 1}, rd.Robot, 10**5000)
 
-RESULTS = {"Comparison", "Rollouts", "Trajectory"}  # made by the library: their constructors take what it computed
+RESULTS = {
+    "Comparison",
+    "Rollouts",
+    "Trajectory",
+    "WorkPrecision",
+}  # made by the library: their constructors take what it computed
 # What time loops and traces call, with numbers that were checked before, or symbols.
 INTERFACES = (Effect, Controller, Arithmetic)
 FOR_LOOPS = {name for kind in (Force, Conservative, Bound, Stateful, Controller, Arithmetic) for name in dir(kind)}
@@ -73,6 +79,7 @@ def examples(folder: Path) -> dict[str, Example]:
     plant, own = rd.Plant(robot, [friction]), rd.Lagrangian(robot)
     setup = rd.Setup(plant, q, duration_s=0.01, integrator="rk4")
     run, several = rd.simulate(setup), rd.rollouts(setup, np.tile(q, (2, 1)))
+    measured = rd.work_precision(replace(setup, engine="interpreted"), methods=["rk4"], budget_s=0.5, repeats=1)
     saved, scene, urdf = rd.save_run(run, folder / "run"), folder / "scene.toml", folder / "arm.urdf"
     scene.write_text('robot = "cart_pole"\nduration_s = 0.01\n', encoding="utf-8")
     urdf.write_bytes(robot.description.xml)
@@ -239,10 +246,20 @@ def examples(folder: Path) -> dict[str, Example]:
             {"robot": robot, "path": folder / "still", "q": q, "package_dirs": [folder], "inertia": False},
         ),
         "show": (rd.show, {"robot": robot, "q": q, "package_dirs": [folder], "inertia": False, "port": free_port()}),
+        "save_work_precision": (
+            rd.save_work_precision, {"result": measured, "path": folder / "diagram.csv", "theme": "dark"},
+        ),
         "simulate": (rd.simulate, {"what": plant, "on_progress": lambda t: None, "q0": q, "duration_s": 0.01}),
         "task_dynamics": (
             rd.task_dynamics,
             {"dynamics": robot, "q": q, "v": v, "frame": "pole", "rows": (0,), "threshold": 0.01},
+        ),
+        "WorkPrecision.digits": (measured.digits, {"error": 1e-6}),
+        "WorkPrecision.sentence": (measured.sentence, {"digits": 6}),
+        "work_precision": (
+            rd.work_precision,
+            {"what": setup, "q0": q, "v0": v, "duration_s": 0.01, "methods": ["rk4"], "peers": False, "budget_s": 0.5,
+             "repeats": 1, "on_progress": print_nothing},
         ),
         "via_points": (rd.via_points, {"times_s": [0.0, 0.5, 1.0], "points": points, "kind": "cubic"}),
     }  # fmt: skip

@@ -88,3 +88,14 @@ def bar(duration_s: float) -> Iterator[Callable[[float], object]]:
     with Progress(console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty()) as progress:
         task = progress.add_task("simulating", total=duration_s)
         yield lambda t: progress.update(task, completed=t)
+
+
+@contextmanager
+def spending(budget_s: float) -> Iterator[Callable[[float, str], object]]:
+    """The same for a budget of time; what it gives is called with the time spent, and with what is being done."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    with Progress(console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty()) as progress:
+        task = progress.add_task("starting", total=budget_s)
+        yield lambda spent, what: progress.update(task, completed=spent, description=what)

@@ -83,6 +83,7 @@ class EventRun(Followed):
         observer: Sees each step.
         in_python: The functions as Python calls them, where they are machine code.
         most: Evaluations after which it gives up with a TooLongError.
+        thresholds: Whether those of the effects are looked for; if not, the effects switch by themselves within steps.
     """
 
     first = 200
@@ -92,6 +93,7 @@ class EventRun(Followed):
         machine_code: Advance | None = None,
         on_progress: Callable[[float], object] | None = None, observer: Observer | None = None,
         in_python: Functions | None = None, samples: bool = True, most: float = inf,
+        thresholds: bool = True,
     ) -> None:  # fmt: skip
         setup, equation, self.most = watch.setup, watch.equation, most
         self.watch, self.plan, self.in_python = watch, plan_of(setup), in_python
@@ -102,6 +104,8 @@ class EventRun(Followed):
         self.start = equation.start(setup.q0, setup.v0)
         self.stepper, self.control = _method(setup, equation)
         self.switching = Switching(equation)
+        if not thresholds:
+            self.switching = Switching(equation, frozenset(self.switching.thresholds))
         self.functions, parameters = made(equation)
         own = np.concatenate([np.full(held, np.nan), parameters])[:, None]
         self.runs = runs_of(self.start[:, None], own, n, held, equation.state_size, m + n + 2)

@@ -11,7 +11,7 @@ from dataclasses import replace
 from fractions import Fraction
 from math import inf
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, Unpack, cast
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
@@ -23,26 +23,21 @@ from robot_dyn.simulation.acting import acting
 from robot_dyn.simulation.choice import choose, most_interpreted
 from robot_dyn.simulation.error import ErrorEstimate, no_estimate
 from robot_dyn.simulation.estimate import estimate
-from robot_dyn.simulation.event_run import EventRun, TooLongError
-from robot_dyn.simulation.fixed_step import FixedStep
+from robot_dyn.simulation.event_run import TooLongError
 from robot_dyn.simulation.ledger import Ledger
 from robot_dyn.simulation.loads import at_stop, link_of, wrenches
 from robot_dyn.simulation.observed import observer_of, remarks
 from robot_dyn.simulation.observer import Observer
 from robot_dyn.simulation.options import Options, setup_of, starts, takes_options
 from robot_dyn.simulation.origin import edits_of_machine_code, origin
+from robot_dyn.simulation.prepared import prepared
 from robot_dyn.simulation.record import Record
 from robot_dyn.simulation.samples import columns
-from robot_dyn.simulation.schedule import mesh
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import check_record
-from robot_dyn.simulation.smoothness import finds_events
 from robot_dyn.simulation.state_equation import StateEquation
-from robot_dyn.simulation.state_functions import interpreted
 from robot_dyn.simulation.stiffness import bounded_by_stability
-from robot_dyn.simulation.time_loop import Functions
 from robot_dyn.simulation.trajectory import Ending, Outcome, Statistics, Trajectory
-from robot_dyn.simulation.watch import Watch
 from robot_dyn.validate import function
 
 if TYPE_CHECKING:
@@ -124,23 +119,7 @@ def _run(
     most: float = inf,
 ) -> Record:
     """The run of a setup, or of a companion: with another pace of its steps, or on a mesh."""
-    watch = Watch(setup, equation)
-
-    def made(of: StateEquation) -> tuple[Functions, np.ndarray]:
-        if machine is None:
-            return interpreted(of, watch), np.zeros(0)
-        functions = machine.in_python if machine.loop is None else machine.equations.functions
-        return functions, machine.parameters if of is equation else machine.with_effects(of.plant.effects)
-
-    loop, in_python = (None, None) if machine is None else (machine.loop, machine.in_python)
-    if finds_events(setup):
-        ends = pace if isinstance(pace, np.ndarray) else None
-        if not setup.integrator.controls_error:
-            ends = mesh(setup.segments, cast(Fraction, pace))
-        run: Any = EventRun(watch, made, ends, loop, on_progress, observer, in_python, not companion, most)
-    else:
-        functions, parameters = made(equation)
-        run = FixedStep(setup, equation, functions, cast(Fraction, pace), loop, on_progress, observer, parameters)
+    run = prepared(setup, equation, machine, pace, on_progress, observer, not companion, most)
     record = run.record()
     if companion and record.outcome.ending is Ending.STOPPED:
         raise KeyboardInterrupt

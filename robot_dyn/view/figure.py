@@ -94,18 +94,18 @@ def draw(panels: list[Panel], run: Trajectory, theme: Mapping[str, Any]) -> Figu
     y = tall - 0.15 - _LINE * len(opening)
     for k, (line, colour) in enumerate(opening, start=1):
         at = 0.15 / width, (tall - 0.15 - _LINE * k) / tall
-        figure.text(*at, _drawable(_short(line, _WIDE)), fontsize=9, **ink | {"color": colour})
+        figure.text(*at, drawable(_short(line, _WIDE)), fontsize=9, **ink | {"color": colour})
     for panel in panels:
         y -= head
         top = y / tall + 0.15 / tall
-        figure.text(0.15 / width, top, _drawable(panel.heading), fontsize=11, weight="bold", **ink)
+        figure.text(0.15 / width, top, drawable(panel.heading), fontsize=11, weight="bold", **ink)
         for cells in panel.rows:
             wide = width / len(panel.rows[0])
             y -= _above(cells) + panel.height
             for k, cell in enumerate(cells):
                 box = (wide * k + left) / width, y / tall, (wide - left - right) / width, panel.height / tall
                 axes = figure.add_axes(box, facecolor=theme["paper"])
-                title = _drawable(_short(cell.title, int(wide / 0.08) - len(cell.note)) + cell.note)
+                title = drawable(_short(cell.title, int(wide / 0.08) - len(cell.note)) + cell.note)
                 axes.set_title(title, loc="left", x=-0.75 / (wide - left - right), fontsize=8, **ink)
                 _fill(axes, cell, theme, run.outcome.ending is Ending.DIVERGED)
                 axes.yaxis.set_label_coords(-0.6 / (wide - left - right), 0.5)  # one line, however long the numbers
@@ -155,7 +155,7 @@ def _fill(axes: Any, cell: Cell, theme: Mapping[str, Any], diverged: bool) -> No
         at, (hue, dash) = _thinned(x, y), curve.style
         shape = {"marker": "o", "markersize": 4} if len(x) == 1 else {"linestyle": _DASHES[dash % len(_DASHES)]}
         style = {"color": colours[hue % len(colours)], "linewidth": 1.3, "rasterized": len(at) > 20_000} | shape
-        axes.plot(x[at], y[at], label=_drawable(_short(curve.label, 30)), **style)
+        axes.plot(x[at], y[at], label=drawable(_short(curve.label, 30)), **style)
     for level in (-cell.limit, cell.limit) if np.isfinite(cell.limit) else ():
         dashed = {"color": colours[_LIMIT[0]], "linestyle": _DASHES[_LIMIT[1]], "linewidth": 1}
         axes.axhline(level, label="_limit", **dashed)
@@ -241,7 +241,7 @@ def _short(name: str, most: int) -> str:
     return name if len(name) <= most else f"{name[: most // 2]}…{name[len(name) - (most - 1) // 2 :]}"
 
 
-def _drawable(name: str) -> str:
+def drawable(name: str) -> str:
     """The text with what the font lacks spelled by its code point.
 
     Otherwise all of it would be the same empty box.

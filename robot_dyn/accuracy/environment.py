@@ -1,0 +1,23 @@
+"""Versions and processor, without which a time says nothing."""
+
+from __future__ import annotations
+
+import platform
+import re
+from collections.abc import Iterable
+from contextlib import suppress
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+_PACKAGES = ("robot-dyn", "pin", "numpy", "scipy", "numba", "casadi", "mujoco", "drake", "heyoka")
+
+
+def environment(packages: Iterable[str] = _PACKAGES) -> dict[str, str]:
+    """Processor and versions by name, of the packages that are installed."""
+    info = Path("/proc/cpuinfo")  # Linux; elsewhere the name of the architecture must do
+    found = re.findall(r"model name\s*: (.*)", info.read_text() if info.exists() else "")
+    made = {"processor": (found or [platform.processor()])[0], "python": platform.python_version()}
+    for name in packages:
+        with suppress(PackageNotFoundError):
+            made[name] = version(name)
+    return made

@@ -1,0 +1,90 @@
+"""Commands that say what digits cost: accuracy."""
+
+from __future__ import annotations
+
+import os
+from math import isfinite
+from typing import Annotated, Any
+
+import typer
+
+import robot_dyn as rd
+from robot_dyn.cli import arguments, completion
+from robot_dyn.cli.app import Force, Json, Lock, PackageDir, app, spending
+from robot_dyn.cli.terminal import say, say_json, tell
+from robot_dyn.errors import QueryError
+
+_DURATION_S = 1.0
+
+
+@app.command()
+def accuracy(
+    what: Annotated[
+        str,
+        typer.Argument(
+            metavar="SCENE.toml|ROBOT",
+            help="A scene file; or a robot, which then swings freely.",
+            autocompletion=completion.robots,
+        ),
+    ],
+    output: Annotated[
+        str | None, typer.Option("-o", "--output", metavar="PLOT.png", help="Draw it, as a .png, .svg or .pdf.")
+    ] = None,
+    csv: Annotated[str | None, typer.Option(metavar="TABLE.csv", help="Write all runs as a table.")] = None,
+    budget: Annotated[float, typer.Option(metavar="SECONDS", help="Time to spend, compiling not counted.")] = 30.0,
+    method: Annotated[
+        list[str] | None, typer.Option(metavar="METHOD", help="Only this method; may be repeated; all by default.")
+    ] = None,
+    peers: Annotated[bool, typer.Option(help="Run other programs that are installed beside, where they can.")] = True,
+    q: Annotated[str | None, typer.Option(help="Start of a robot: as of query; random by default.")] = None,
+    v: Annotated[str | None, typer.Option(help="Its velocities; 0 by default.")] = None,
+    duration: Annotated[float | None, typer.Option(metavar="SECONDS", help="Of its motion; 1 by default.")] = None,
+    dark: Annotated[bool, typer.Option("--dark", help="Draw for dark screens.")] = False,
+    force: Force = False,
+    lock: Lock = None,
+    package_dir: PackageDir = None,
+    as_json: Json = False,
+) -> None:
+    """Show what each digit of a motion costs in time, by method and program. Ctrl-C ends it and keeps its runs."""
+    from robot_dyn.accuracy.diagram import TABLE, DiagramError
+    from robot_dyn.cli import prices
+    from robot_dyn.view.plots import PICTURES
+
+    inputs = [what] if os.path.isfile(what) else []
+    drawn = output and arguments.output(output, PICTURES, DiagramError, inputs, force)
+    table = csv and arguments.output(csv, TABLE, DiagramError, [*inputs, *([drawn] if drawn else [])], force)
+    setup = _setup(what, q, v, duration, lock, package_dir)
+    with spending(budget) as spent:
+        result = rd.work_precision(setup, methods=method, peers=peers, budget_s=budget, on_progress=spent)
+    theme = "dark" if dark else "light"
+    try:  # the files first: a terminal or pipe may be gone
+        written = [rd.save_work_precision(result, path, theme=theme) for path in (drawn, table) if path]
+    finally:
+        say_json(prices.work_precision(result)) if as_json else say(*prices.work_precision_tables(result))
+    for path in written:
+        tell(f"written: {path}")
+    if result.interrupted:
+        raise typer.Exit(130)
+
+
+def _setup(
+    what: str, q: str | None, v: str | None, duration: float | None, lock: list[str] | None,
+    package_dir: list[str] | None,
+) -> rd.Setup:  # fmt: skip
+    """The setup of a scene file, or of the free swing of a robot."""
+    if what.lower().endswith(".toml"):
+        given = {"--q": q, "--v": v, "--duration": duration, "--lock": lock, "--package-dir": package_dir}
+        if of_robots := [name for name, value in given.items() if value]:
+            raise QueryError(f"{of_robots[0]}: is of a robot; a scene states its own, so leave it out")
+        return rd.read_scene(what)
+    import numpy as np
+
+    robot = arguments.load(what, lock, package_dir)
+    names = robot.joint_names
+    start: Any = (
+        robot.random_configuration(np.random.default_rng(0)) if q is None else arguments.vector("--q", q, names)
+    )
+    seconds = _DURATION_S if duration is None else duration
+    if not (isfinite(seconds) and seconds > 0):
+        raise QueryError(f"--duration must be positive, got {seconds:g}")
+    return rd.Setup(rd.Plant(robot), start, arguments.vector("--v", v, names), seconds)

@@ -1,0 +1,92 @@
+"""What the commands on prices say: plain documents for --json (docs/json.md), and the same as tables for a person."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict
+from math import isfinite
+from typing import Any
+
+from rich.table import Table
+
+from robot_dyn.accuracy.work_precision import WorkPrecision, in_words
+
+Document = dict[str, Any]
+_DIGITS = (3, 6, 9)
+
+
+def work_precision(result: WorkPrecision) -> Document:
+    """All runs, the front, the reference, and what was left out."""
+    of, front = result.reference, {id(point) for _, point in result.front}
+    return {
+        "robot": result.name,
+        "acting": list(result.acting),
+        "unit": result.unit,
+        "duration_s": result.duration_s,
+        "horizon_s": of.horizon_s,
+        "reference": {
+            "methods": list(of.methods), "error": of.error, "records": len(of.t) - 1, "parted_s": of.parted_s,
+            "lost_s": of.lost_s,
+        },
+        "sentence": result.sentence(),
+        "ladders": [
+            {
+                "name": each.name, "method": each.method, "engine": each.engine, "events": each.events, "by": each.by,
+                "order": each.order, "measured_order": each.measured_order, "ended": each.ended,
+                "points": [
+                    {key: _finite(value) for key, value in asdict(point).items()} | {"on_front": id(point) in front}
+                    for point in each.points
+                ],
+            }
+            for each in result.ladders
+        ],
+        "left_out": list(result.left_out),
+        "environment": result.environment,
+        "budget_s": result.budget_s,
+        "spent_s": result.spent_s,
+        "interrupted": result.interrupted,
+    }  # fmt: skip
+
+
+def work_precision_tables(result: WorkPrecision) -> Iterator[Any]:
+    """The sentence, what it rests on, and a line for each method."""
+    of = result.reference
+    yield result.sentence()
+    yield f"\n{result.name}: {', '.join(result.acting) or 'no effects'}"
+    yield (
+        f"error: largest |q − q_ref| over joints and {len(of.t) - 1} records in {of.horizon_s:g} s, in {result.unit};"
+        f" reference: {of.methods[0]}, {of.error:.1e} from {of.methods[1]}: no error below that is believed"
+    )
+    if of.parted_s is not None:
+        lost = "" if of.lost_s is None else f", and by a tenth at {of.lost_s:.3g} s"
+        yield (
+            f"horizon: {of.horizon_s:g} s of {result.duration_s:g} s: two methods at tight tolerances differ by 1e-9"
+            f" from there on{lost}"
+        )
+    columns = [digits for digits in _DIGITS if 10.0**-digits >= of.error]
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for heading in ("method", "order", "measured", *(f"{digits} digits" for digits in columns), "least error", "in"):
+        table.add_column(heading, no_wrap=True, justify="left" if heading == "method" else "right")
+    best = {digits: min((p.value for _, p in result.digits(10.0**-digits)), default=0.0) for digits in columns}
+    for each in result.ladders:
+        prices = [(each.price(10.0**-digits), digits) for digits in columns]
+        cells = ["—" if p is None else _price(p.value, p.extrapolated, p.value == best[d]) for p, d in prices]
+        finest = min(each.points, key=lambda point: point.error)
+        error = f"{finest.error:.1e}" if finest.error > of.error else f"< {of.error:.0e}"
+        order = "—" if each.order is None else str(each.order)
+        seen = "—" if each.measured_order is None else f"{each.measured_order:.1f}"
+        table.add_row(each.name, order, seen, *cells, error if isfinite(finest.error) else "—", in_words(finest.time_s))
+    yield table
+    yield "times of the loop alone, medians of runs that take turns; * the least; ( ) extrapolated by the order"
+    yield from (f"left out: {each}" for each in result.left_out)
+    yield f"{', '.join(f'{name} {value}' for name, value in result.environment.items())}"
+
+
+def _price(seconds: float, extrapolated: bool, least: bool) -> str:
+    words = f"({in_words(seconds)})" if extrapolated else in_words(seconds)
+    return f"{words}{' *' if least else ''}"
+
+
+def _finite(x: Any) -> Any:
+    """JSON has no infinity: the error of a run that diverged is null."""
+    return None if isinstance(x, float) and not isfinite(x) else x

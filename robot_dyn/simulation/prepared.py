@@ -1,0 +1,69 @@
+"""A run made ready: its equations as functions, interpreted or machine code, in one of the two time loops.
+
+run = prepared(setup, equation, machine);   record = run.record()
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+from math import inf
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+
+from robot_dyn.simulation.event_run import EventRun
+from robot_dyn.simulation.fixed_step import FixedStep
+from robot_dyn.simulation.observer import Observer
+from robot_dyn.simulation.schedule import mesh
+from robot_dyn.simulation.setup import Setup
+from robot_dyn.simulation.smoothness import finds_events
+from robot_dyn.simulation.state_equation import StateEquation
+from robot_dyn.simulation.state_functions import interpreted
+from robot_dyn.simulation.time_loop import Functions
+from robot_dyn.simulation.watch import Watch
+
+if TYPE_CHECKING:
+    from robot_dyn.simulation.machine.machine import Machine
+
+
+def prepared(
+    setup: Setup,
+    equation: StateEquation,
+    machine: Machine | None,
+    pace: Fraction | np.ndarray = Fraction(1),
+    on_progress: Callable[[float], object] | None = None,
+    observer: Observer | None = None,
+    samples: bool = True,
+    most: float = inf,
+    thresholds: bool = True,
+) -> EventRun | FixedStep:
+    """The run of a setup, or of a companion.
+
+    Args:
+        setup: What to run.
+        equation: Its state equation.
+        machine: That equation as machine code; None for the interpreted engine.
+        pace: Length of steps, in steps of the setup; or the ends of all steps, in [s].
+        on_progress: Called with the time reached.
+        observer: Sees each step.
+        samples: Whether samples are kept.
+        most: Evaluations after which it gives up with a TooLongError.
+        thresholds: Whether steps end at the thresholds of the effects.
+    """
+    watch = Watch(setup, equation)
+
+    def made(of: StateEquation) -> tuple[Functions, np.ndarray]:
+        if machine is None:
+            return interpreted(of, watch), np.zeros(0)
+        functions = machine.in_python if machine.loop is None else machine.equations.functions
+        return functions, machine.parameters if of is equation else machine.with_effects(of.plant.effects)
+
+    loop, in_python = (None, None) if machine is None else (machine.loop, machine.in_python)
+    if finds_events(setup):
+        ends = pace if isinstance(pace, np.ndarray) else None
+        if not setup.integrator.controls_error:
+            ends = mesh(setup.segments, cast(Fraction, pace))
+        return EventRun(watch, made, ends, loop, on_progress, observer, in_python, samples, most, thresholds)
+    functions, parameters = made(equation)
+    return FixedStep(setup, equation, functions, cast(Fraction, pace), loop, on_progress, observer, parameters)
