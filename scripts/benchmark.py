@@ -3,7 +3,8 @@
 Subjects: queries (Robot over bare Pinocchio), compiled (against Pinocchio's C++), rollouts (against MuJoCo),
 parameters (numbers as inputs of machine code over constants), growth (cost against the number of joints), iftomm
 (problems A01 and A05 of the IFToMM library of multibody benchmarks), stiff (joints with stiff dampers and springs),
-precision (time against error, all methods beside SciPy, MuJoCo and heyoka).
+precision (time against error, all methods beside SciPy, MuJoCo, Drake and heyoka), energy (of a long run), estimates
+(of errors, beside true ones). What accuracy costs in other scenes: work_precision.py.
 """
 
 from __future__ import annotations
@@ -11,11 +12,15 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from benchmarks import growth, iftomm, kernels, parameters, precision, queries, rollouts, stiff
-from benchmarks.measure import Effort, environment
+from benchmarks import energy, estimates, growth, iftomm, kernels, parameters, precision, queries, rollouts, stiff
+from benchmarks.measure import Effort
+
+from robot_dyn.accuracy.environment import environment
 
 PICTURES = Path(__file__).parents[1] / "docs" / "pictures"
-SUBJECTS = ("queries", "compiled", "rollouts", "parameters", "growth", "iftomm", "stiff", "precision")
+SUBJECTS = (
+    "queries", "compiled", "rollouts", "parameters", "growth", "iftomm", "stiff", "precision", "energy", "estimates",
+)  # fmt: skip
 
 
 def main() -> None:
@@ -27,7 +32,7 @@ def main() -> None:
         parser.error(f"no subject {', '.join(sorted(unknown))}; there are {', '.join(SUBJECTS)}")
     effort = Effort(2, 0.002) if options.quick else Effort()
     what = options.what or SUBJECTS
-    print(environment())
+    print(", ".join(f"{name} {value}" for name, value in environment().items()))
     if "queries" in what:
         queries.queries(effort)
         queries.right_angles(effort)
@@ -51,6 +56,10 @@ def main() -> None:
         stiff.stiff(effort)
     if "precision" in what:
         precision.precision(effort, None if options.quick else PICTURES / "precision.png")
+    if "energy" in what:
+        energy.energy(effort)
+    if "estimates" in what:
+        estimates.estimates(effort)
 
 
 if __name__ == "__main__":

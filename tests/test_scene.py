@@ -51,7 +51,7 @@ def test_payload_starter_keeps_its_sampled_damping_below_one_reversal(write) -> 
 
 @pytest.mark.parametrize("name", starters())
 def test_starter_runs_and_closes_its_ledger(write, name: str) -> None:
-    """At its own settings, cut to half a second: residual ≤ 1e-9 of the energy exchanged; no remark but stops reached."""
+    """At its own settings, cut to half a second: residual ≤ 1e-9 of the energy exchanged; no remark but of stops."""
     setup = rd.read_scene(write(starter(name)))
     run = rd.simulate(setup, duration_s=min(setup.duration_s, 0.5), estimate_error=False)
     assert run.outcome.ending == "finished"

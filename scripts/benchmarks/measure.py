@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import platform
-import re
 import timeit
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from importlib.metadata import version
-from pathlib import Path
 from statistics import median
 from typing import final
 
@@ -66,11 +62,3 @@ def table(*headings: str) -> None:
 def row(*cells: object) -> None:
     """A row of a table."""
     print("| " + " | ".join(map(str, cells)) + " |", flush=True)
-
-
-def environment(packages: Iterable[str] = ("pin", "numpy", "numba", "casadi", "mujoco")) -> str:
-    """Versions and processor, without which a time says nothing."""
-    names = ", ".join(f"{name} {version(name)}" for name in packages)
-    info = Path("/proc/cpuinfo")  # Linux; elsewhere the name of the architecture must do
-    found = re.findall(r"model name\s*: (.*)", info.read_text() if info.exists() else "")
-    return f"Python {platform.python_version()}, {names}, {(found or [platform.processor()])[0]}"
