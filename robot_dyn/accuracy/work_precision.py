@@ -19,6 +19,7 @@ from robot_dyn.accuracy.peers import found
 from robot_dyn.accuracy.reference_run import Reference, reference
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import RobotDynError
+from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, STIFF
 from robot_dyn.integrate.methods import METHODS, as_method
 from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.model.units import units
@@ -171,6 +172,8 @@ def work_precision(
     given = {"duration_s": duration_s, "controller": controller}
     setup = setup_of("work_precision", what, starts(q0, v0) | {k: x for k, x in given.items() if x is not None})
     made = [as_method(each) for each in (_ordered(METHODS) if methods is None else _several(methods))]
+    if any(each.name == AUTO for each in made):
+        raise QueryError(f"methods: {AUTO!r} is one of {EXPLICIT!r} and {STIFF!r}; name these")
     truth("peers", peers)
     integer("repeats", repeats, least=1, most=_MOST_REPEATS)
     budget = Budget(number("budget_s", budget_s, above=0), function("on_progress", on_progress, "(spent, what)"))
@@ -218,5 +221,5 @@ def _several(methods: Any) -> tuple[Any, ...]:
 
 
 def _ordered(names: Iterable[str]) -> tuple[str, ...]:
-    names = tuple(names)
+    names = tuple(name for name in names if name != AUTO)
     return (*(name for name in _FIRST if name in names), *(name for name in names if name not in _FIRST))

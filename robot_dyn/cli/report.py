@@ -147,6 +147,7 @@ def run(trajectory: Trajectory) -> Document:
         "error_verdict": None if error is None else str(error.verdict),
         "error_note": None if error is None else error.note or error.reason,
         "tracking_error": trajectory.tracking_error,
+        "accuracy": None if trajectory.accuracy is None else asdict(trajectory.accuracy),
         "remarks": [asdict(remark) for remark in trajectory.remarks],
         "extremes": _extremes(trajectory),
         "statistics": asdict(trajectory.statistics),

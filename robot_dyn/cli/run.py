@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated
 
 import typer
@@ -19,6 +20,10 @@ def simulate(
         str | None, typer.Option("-o", "--output", metavar="RUN.npz", help="Write the run to a file.")
     ] = None,
     csv: Annotated[str | None, typer.Option(metavar="TABLE.csv", help="Write the samples as a table.")] = None,
+    accuracy: Annotated[
+        float | None,
+        typer.Option(metavar="ERROR", help="Largest error of q to have, in rad and m; pilot runs choose the method."),
+    ] = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -28,6 +33,8 @@ def simulate(
     from robot_dyn.simulation.table import TABLE, export_csv
 
     setup = rd.read_scene(scene)
+    if accuracy is not None:
+        setup = replace(setup, accuracy=accuracy)
     inputs = [scene, setup.plant.dynamics.description.source]  # pyright: ignore[reportAttributeAccessIssue]
     kept = output and arguments.output(output, RUN, RunFileError, inputs, force)
     table = csv and arguments.output(csv, TABLE, RunFileError, [*inputs, *([kept] if kept else [])], force)

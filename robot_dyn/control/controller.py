@@ -8,6 +8,7 @@ plant, a sampled one takes z⁺ = z + period · rate at its ticks and keeps its 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -66,7 +67,7 @@ class Controller(Value, ABC):
         """What it follows, by attribute."""
         return {name: value for name, value in vars(self).items() if isinstance(value, Reference)}
 
-    @property
+    @cached_property
     def models(self) -> dict[str, Dynamics]:
         """Its own models of the arm, by attribute."""
         others = np.ndarray, float, int, str, Reference, type(None)  # a protocol takes longer to ask for

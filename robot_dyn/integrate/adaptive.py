@@ -26,7 +26,8 @@ from robot_dyn.integrate.rosenbrock import ROSENBROCK_5
 from robot_dyn.integrate.step_control import ControlledStepper, control_of
 from robot_dyn.validate import choice, function, instance, number, numbers, rows
 
-ADAPTIVE = ("DOP853", "Rosenbrock")
+EXPLICIT, STIFF, AUTO = "DOP853", "Rosenbrock", "auto"
+ADAPTIVE = (EXPLICIT, STIFF, AUTO)
 FORMER = MappingProxyType({"Radau": "Rosenbrock"})  # methods that were SciPy's
 LEAST_RTOL = 100 * np.finfo(float).eps  # SciPy's bound; below it rounding is taken for local error
 
@@ -90,7 +91,8 @@ class Adaptive:
     Tolerances bound the error of a step; that of the run is larger by what the system magnifies.
 
     Attributes:
-        method: DOP853 (explicit, order 8) or Rosenbrock (linearly implicit, order 5, L-stable).
+        method: DOP853 (explicit, order 8), Rosenbrock (linearly implicit, order 5, L-stable), or auto: a simulation by
+            DOP853 that is made by Rosenbrock if stability bounds its steps.
         rtol: Relative tolerance, 2.3e-14 at least.
         atol: Absolute tolerance, in the unit of y, not negative.
         max_step_s: Longest step, in [s].
@@ -111,7 +113,7 @@ class Adaptive:
     @property
     def needs_jacobian(self) -> bool:
         """Whether its steps ask for ∂f/∂y."""
-        return self.method == "Rosenbrock"
+        return self.method == STIFF
 
     @property
     def name(self) -> str:
@@ -159,7 +161,7 @@ class Adaptive:
             The solution up to where the run ended; a run that fails says so in its status and keeps what it has.
 
         Raises:
-            QueryError: If y0, t0 or t1 is unfit.
+            QueryError: If y0, t0 or t1 is unfit, or the method is to be chosen.
         """
         steps = self.steps(system, t0, y0, t1, stop)
         times, states, pieces = [steps.t], [steps.y], []
@@ -179,6 +181,8 @@ class Adaptive:
     ) -> Steps:
         """The steps from t0 to t1, one at a time; arguments and errors as of `solve`."""
         instance("system", system, System, "give a System(rate, n)")
+        if self.method == AUTO:
+            raise QueryError(f"method: simulations choose one for {AUTO!r}; name {EXPLICIT!r} or {STIFF!r} here")
         t0, t1, y0 = number("t0", t0), number("t1", t1), _initial_state(y0)
         if t0 == t1:
             raise QueryError(f"t0 and t1 must differ, got {t0} twice")
@@ -278,7 +282,7 @@ class Steps:
 
 # The methods of our own, ready for a loop: (entries of the state, rows of the rate, entries whose error counts).
 STEPPERS: Mapping[str, Callable[[int, int, int], ControlledStepper]] = MappingProxyType(
-    {"DOP853": dop853.stepper, "Rosenbrock": ROSENBROCK_5.controlled}
+    {EXPLICIT: dop853.stepper, STIFF: ROSENBROCK_5.controlled, AUTO: dop853.stepper}
 )
 
 

@@ -59,8 +59,12 @@ def explain(scene: Scene, setup: Setup) -> Iterator[str]:
         yield from _numbers(scene.control, "  ")
         yield f"reference: {scene.reference.kind}"
         yield from _numbers(scene.reference, "  ")
-    yield f"\nmethod: {scene.method}, {scene.duration_s:g} s"
-    used = ("rtol", "atol") if scene.method in ADAPTIVE else ("step_s",)
+    if scene.accuracy is not None:
+        yield f"\nmethod: chosen for an error of q of at most {scene.accuracy:g}, {scene.duration_s:g} s"
+        used = ("accuracy",)
+    else:
+        yield f"\nmethod: {scene.method}, {scene.duration_s:g} s"
+        used = ("rtol", "atol") if scene.method in ADAPTIVE else ("step_s",)
     for key in (*used, "record_period_s", "estimate_error", "engine"):
         yield f"  {key} = {getattr(scene, key)}  ({_source(scene, key)})"
     yield "start:"

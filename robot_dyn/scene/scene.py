@@ -56,6 +56,8 @@ class Scene(Part):
     """Relative tolerance of an adaptive method."""
     atol: Positive = Adaptive.atol
     """Absolute tolerance of an adaptive method, in rad and rad/s (m and m/s for a prismatic joint)."""
+    accuracy: Positive | None = None
+    """Largest error of q to have, in rad and m, for which pilot runs choose method and tolerance."""
     record_period_s: NotNegative = 0.01
     """Time between samples; 0 for every step."""
     estimate_error: Truth = Setup.estimate_error
@@ -99,6 +101,7 @@ class Scene(Part):
         return Setup(
             Plant(robot, acting), q0, v0, self.duration_s, controller, self.integrator(),
             self.step_s, self.record_period_s, self.estimate_error, about, self.engine,
+            accuracy=self.accuracy,
         )  # fmt: skip
 
     def integrator(self) -> Integrator | Adaptive:
@@ -172,6 +175,9 @@ def _parsed(text: str, source: str, effects: Makers | None = None) -> tuple[Scen
 
 def _without_effect(scene: Scene) -> str:
     """What a scene states that has no effect on its run; empty if nothing."""
+    chosen = [key for key in ("method", "step_s", "rtol", "atol") if key in scene.model_fields_set]
+    if scene.accuracy is not None and chosen:
+        return f"{chosen[0]}: has no effect, since accuracy chooses method and tolerance; remove one of the two"
     own = ("step_s",) if scene.method in ADAPTIVE else ("rtol", "atol")
     if unused := [key for key in own if key in scene.model_fields_set]:
         kind = "chooses its own step" if scene.method in ADAPTIVE else "has a fixed step"

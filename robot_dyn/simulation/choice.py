@@ -42,7 +42,7 @@ def choose(setup: Setup, equation: StateEquation, seen: float = 0) -> tuple[Mach
         return _machine(setup, equation), _label(setup)
     if parts := foreign(setup):  # they may have effects of their own, which a trace would lose
         return None, _interpreted(setup, f"{named(parts[0])} is not the library's own")
-    if max(seen, _evaluations(setup, equation.size)) < _COMPILED:
+    if max(seen * _with_jacobians(setup, equation.size), _evaluations(setup, equation.size)) < _COMPILED:
         return None, _interpreted(setup, "short: compiling does not pay")
     try:
         return _machine(setup, equation), _label(setup)
@@ -50,10 +50,10 @@ def choose(setup: Setup, equation: StateEquation, seen: float = 0) -> tuple[Mach
         return None, _interpreted(setup, str(error))
 
 
-def most_interpreted(setup: Setup, machine: Machine | None) -> float:
+def most_interpreted(setup: Setup, equation: StateEquation, machine: Machine | None) -> float:
     """Evaluations after which a run is begun again in machine code: a count that was guessed too low."""
     guessed = setup.engine == "auto" and machine is None and setup.integrator.controls_error and not foreign(setup)
-    return _COMPILED if guessed else inf
+    return _COMPILED / _with_jacobians(setup, equation.size) if guessed else inf
 
 
 def _machine(setup: Setup, equation: StateEquation) -> Machine:
@@ -81,10 +81,14 @@ def _label(setup: Setup) -> str:
 def _evaluations(setup: Setup, size: int) -> float:
     """About how many evaluations of an equation of motion of that size a run takes, with its companions."""
     method: Any = setup.integrator
-    for_jacobian = 2 * size if method.needs_jacobian else 0  # by differences, in each step
+    each = _with_jacobians(setup, size)
     if method.controls_error:
         least = _PER_SEGMENT * segments(setup)
-        each = 1 + for_jacobian / _GUESSED
         return max(_PER_SECOND * setup.duration_s, least) * (3 if setup.estimate_error else 1) * each
-    each = (method.evaluations_per_step or _GUESSED) + for_jacobian
-    return setup.steps * (2 if setup.estimate_error else 1) * each
+    return setup.steps * (2 if setup.estimate_error else 1) * (method.evaluations_per_step or _GUESSED) * each
+
+
+def _with_jacobians(setup: Setup, size: int) -> float:
+    """Evaluations for each one of a step, those for a Jacobian by differences in each step included."""
+    method: Any = setup.integrator
+    return 1 + 2 * size / (method.evaluations_per_step or _GUESSED) if method.needs_jacobian else 1

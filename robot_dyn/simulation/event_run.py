@@ -32,6 +32,7 @@ from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import samples as most_samples
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.state_functions import interpreted, system
+from robot_dyn.simulation.stiffness import FIRST_LOOK, changes_over
 from robot_dyn.simulation.switching import Switching
 from robot_dyn.simulation.time_loop import Ended, Functions, Now, Rules
 from robot_dyn.simulation.trajectory import Ending, Outcome
@@ -84,6 +85,7 @@ class EventRun(Followed):
         in_python: The functions as Python calls them, where they are machine code.
         most: Evaluations after which it gives up with a TooLongError.
         thresholds: Whether those of the effects are looked for; if not, the effects switch by themselves within steps.
+        chooses: Whether it gives up with a StiffError where another method is to make the run.
     """
 
     first = 200
@@ -93,9 +95,9 @@ class EventRun(Followed):
         machine_code: Advance | None = None,
         on_progress: Callable[[float], object] | None = None, observer: Observer | None = None,
         in_python: Functions | None = None, samples: bool = True, most: float = inf,
-        thresholds: bool = True,
+        thresholds: bool = True, chooses: bool = False,
     ) -> None:  # fmt: skip
-        setup, equation, self.most = watch.setup, watch.equation, most
+        setup, equation, self.most, self._look = watch.setup, watch.equation, most, FIRST_LOOK if chooses else 0
         self.watch, self.plan, self.in_python = watch, plan_of(setup), in_python
         self.setup, self.equation, self.made, self.samples = setup, equation, made, samples
         self.on_progress, self.observer, self.compiled = on_progress, observer, machine_code is not None
@@ -156,7 +158,19 @@ class EventRun(Followed):
     def _room(self, budget: int) -> int:
         self._widen()
         rest = len(self.kept.walked_t) - int(self.now[Now.WALKED]) or budget
+        if self._look:
+            rest = min(rest, self._until_look())
         return min(rest, super()._room(budget))
+
+    def _until_look(self) -> int:
+        """Steps until it is looked whether another method is to make the run; StiffError if one is."""
+        steps = int(self.now[Now.STEPS])
+        if steps >= self._look:
+            self._look *= 2
+            held = self.runs.own[: self.rules.held, 0] if self.rules.held else None
+            ends = self.kept.walked_t[: int(self.now[Now.WALKED])]
+            changes_over(self.setup, self.switching.on(self.switches.sides), ends, self.y, held)
+        return self._look - steps
 
     def _widen(self) -> None:
         """Room for as many more ends of steps, where it is used up."""

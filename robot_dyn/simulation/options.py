@@ -31,6 +31,7 @@ class Options(TypedDict, total=False):
     about: dict[str, str]
     engine: str
     events: Any
+    accuracy: Any
 
 
 def takes_options(function: Function) -> Function:

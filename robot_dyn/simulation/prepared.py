@@ -37,6 +37,7 @@ def prepared(
     samples: bool = True,
     most: float = inf,
     thresholds: bool = True,
+    chooses: bool = False,
 ) -> EventRun | FixedStep:
     """The run of a setup, or of a companion.
 
@@ -50,6 +51,7 @@ def prepared(
         samples: Whether samples are kept.
         most: Evaluations after which it gives up with a TooLongError.
         thresholds: Whether steps end at the thresholds of the effects.
+        chooses: Whether it gives up with a StiffError where another method is to make the run.
     """
     watch = Watch(setup, equation)
 
@@ -64,6 +66,8 @@ def prepared(
         ends = pace if isinstance(pace, np.ndarray) else None
         if not setup.integrator.controls_error:
             ends = mesh(setup.segments, cast(Fraction, pace))
-        return EventRun(watch, made, ends, loop, on_progress, observer, in_python, samples, most, thresholds)
+        return EventRun(
+            watch, made, ends, loop, on_progress, observer, in_python, samples, most, thresholds, chooses
+        )  # fmt: skip
     functions, parameters = made(equation)
     return FixedStep(setup, equation, functions, cast(Fraction, pace), loop, on_progress, observer, parameters)

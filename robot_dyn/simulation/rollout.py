@@ -19,6 +19,7 @@ from robot_dyn.compiled.parameters import link_parameters, names_of, parameters
 from robot_dyn.compiled.threads import thread_count
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import QueryError, nearest, shown
+from robot_dyn.integrate.adaptive import AUTO, EXPLICIT
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.model.edits import Edits
@@ -34,7 +35,11 @@ from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.validate import choice, instance, integer, joint_values, numbers
 
 RECORDS = ("q", "v", "u", "energy", "work")
-_WITHOUT_EFFECT = {"estimate_error": "simulate one of the runs for that", "engine": "rollouts run in machine code"}
+_WITHOUT_EFFECT = {
+    "estimate_error": "simulate one of the runs for that",
+    "accuracy": "simulate one of the runs for that",
+    "engine": "rollouts run in machine code",
+}
 
 
 @former.arguments(setup="what")
@@ -73,8 +78,9 @@ def rollouts(
         most_bytes: Refuse to record more than this.
         on_progress: Called with the time that the runs have reached, the mean in [s], some ten times a second; with
             a record period of 0 it grows as tiles of 64 runs end.
-        **options: As of `simulate`; all but `estimate_error` and `engine`, which have no effect here: no error is
-            estimated (`simulate` one of the runs for that), and the engine is machine code.
+        **options: As of `simulate`; all but `estimate_error`, `accuracy` and `engine`, which have no effect here: no
+            error is estimated (`simulate` one of the runs for that), and the engine is machine code. The method "auto"
+            is DOP853 here.
 
     Runs are not watched at every step, as those of `simulate` are: they carry no remarks.
 
@@ -86,6 +92,8 @@ def rollouts(
         TraceError: If a part of the setup cannot be compiled; names it.
     """
     setup = replace(_setup(what, q0, options), estimate_error=False)
+    if setup.integrator.name == AUTO:
+        setup = replace(setup, integrator=replace(setup.integrator, method=EXPLICIT))
     most_bytes = integer("most_bytes", most_bytes, most=2**63 - 1)
     if not setup.integrator.plain:
         raise QueryError(

@@ -17,7 +17,9 @@ from robot_dyn.control.controller import Controller
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import ControlError, EffectError, OverflowedError, QueryError, shown
 from robot_dyn.foreign import call
+from robot_dyn.integrate.adaptive import AUTO, Adaptive
 from robot_dyn.integrate.methods import as_method
+from robot_dyn.simulation.asked import asked
 from robot_dyn.simulation.event import Event
 from robot_dyn.simulation.schedule import LEAST_STEPS, Segment, cuts, steps_on
 from robot_dyn.simulation.size import check_segments
@@ -40,7 +42,7 @@ class Setup(Value):
         v0: Velocity at the start, (n,); 0 if not given.
         duration_s: In [s].
         controller: What drives it: a `Controller`; a function (t, q, v) → torque (n,), which is made one; or None.
-        integrator: The method, by its name as in a scene or itself: "DOP853" and "Rosenbrock", or an `Adaptive`
+        integrator: The method, by its name as in a scene or itself: "auto", "DOP853" and "Rosenbrock", or an `Adaptive`
             with other tolerances, choose their steps; "rk4", "order_8", "gauss_4" and others of `rd.method` have a
             fixed one.
         step_s: Fixed step; made smaller where samples, ticks, switches and the end ask for it. Not to be given
@@ -52,6 +54,9 @@ class Setup(Value):
         engine: "interpreted"; "compiled", the run in machine code, right angles of the file written out in
             full; or "auto", which compiles where that pays.
         events: What to look out for: steps end there, and the run does if one is terminal.
+        accuracy: Largest error of q to have, over joints and times: a number for rad and m alike, or one of each, as
+            {"rad": 1e-8, "m": 1e-6}, of which the least holds. Pilot runs choose method and tolerance, and the error
+            estimate is the check.
     """
 
     plant: Plant
@@ -59,13 +64,14 @@ class Setup(Value):
     v0: Array = None
     duration_s: float = 1.0
     controller: Any = None
-    integrator: Any = "DOP853"
+    integrator: Any = "auto"
     step_s: float = 1e-3
     record_period_s: float = 0.0
     estimate_error: bool = True
     about: dict[str, str] = field(default_factory=dict, repr=False)
     engine: str = "auto"
     events: tuple[Event, ...] = ()
+    accuracy: Any = None
 
     def __post_init__(self) -> None:
         instance("plant", self.plant, Plant, "give one, as rd.Plant(robot)")
@@ -83,6 +89,8 @@ class Setup(Value):
             seconds = duration(name, getattr(self, name), zero=name == "record_period_s")
             object.__setattr__(self, name, seconds)
         truth("estimate_error", self.estimate_error)
+        if self.accuracy is not None:
+            self._check_accuracy()
         for text in (
             text for pair in instance("about", self.about, dict, "give texts by name").items() for text in pair
         ):
@@ -102,6 +110,14 @@ class Setup(Value):
         self.plant.actuation(np.zeros(len(names)))
         with suppress(OverflowedError):  # a start so far out is the outcome of a run
             self.plant.forward_dynamics(0.0, self.q0, self.v0, np.zeros(len(names)))  # a singular M is told at once
+
+    def _check_accuracy(self) -> None:
+        """That an accuracy is one, and that nothing else chooses method or tolerance."""
+        object.__setattr__(self, "accuracy", asked(self.accuracy, self.plant.dynamics))
+        if self.integrator != Adaptive(AUTO):
+            raise QueryError(f"accuracy: chooses method and tolerance; leave out integrator, got {self.integrator}")
+        if not self.estimate_error:
+            raise QueryError("accuracy: is held to the error estimate; leave out estimate_error=False")
 
     def _check_torques(self) -> None:
         """That what the controller and each effect return at the start is one number for each joint."""

@@ -8,17 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from fractions import Fraction
-from math import inf
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
 
 import numpy as np
 
 from robot_dyn.control.cartesian import CartesianReference
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.effects.plant import Plant
+from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, STIFF
 from robot_dyn.model.dynamics import Dynamics
+from robot_dyn.simulation.accuracy import run_to
 from robot_dyn.simulation.acting import acting
 from robot_dyn.simulation.choice import choose, most_interpreted
 from robot_dyn.simulation.error import ErrorEstimate, no_estimate
@@ -32,11 +32,12 @@ from robot_dyn.simulation.options import Options, setup_of, starts, takes_option
 from robot_dyn.simulation.origin import edits_of_machine_code, origin
 from robot_dyn.simulation.prepared import prepared
 from robot_dyn.simulation.record import Record
+from robot_dyn.simulation.remarks import Remark
 from robot_dyn.simulation.samples import columns
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import check_record
 from robot_dyn.simulation.state_equation import StateEquation
-from robot_dyn.simulation.stiffness import bounded_by_stability
+from robot_dyn.simulation.stiffness import StiffError, bounded_by_stability
 from robot_dyn.simulation.trajectory import Ending, Outcome, Statistics, Trajectory
 from robot_dyn.validate import function
 
@@ -61,81 +62,99 @@ def simulate(
         v0: Velocity at the start, (n,), in [rad/s] or [m/s]; 0, or that of the setup, unless given.
         on_progress: Called with the time reached, in [s], at each step; in machine code some ten times a second.
         **options: The other attributes of a `Setup`, with its defaults: duration_s, controller, integrator, step_s,
-            record_period_s, estimate_error, about and engine.
+            record_period_s, estimate_error, about, engine, events and accuracy.
 
     Raises:
         QueryError: If the setup is not allowed, or its record would not fit into memory. Whatever happens later is
             told by the trajectory's outcome.
+        AccuracyError: If the accuracy that is asked for cannot be had.
     """
     function("on_progress", on_progress, "the time reached")
     setup = setup_of("simulate", what, {**starts(q0, v0), **options})
+    if setup.accuracy is not None:
+        pilot = replace(setup, accuracy=None)
+        return run_to(pilot, setup.accuracy, lambda each: simulate(each, on_progress=on_progress))
     equation = StateEquation(setup.plant, setup.controller, setup.integrator.canonical, setup.events)
     check_record(setup, equation)
-    clock = [perf_counter()]
-    machine, engine = choose(setup, equation)
-    try:
-        clock.append(perf_counter())
-        observer = observer_of(setup, equation)
-        most = most_interpreted(setup, machine)
-        record = _run(setup, equation, machine, on_progress=on_progress, observer=observer, most=most)
-    except TooLongError as run:
-        machine, engine = choose(setup, equation, run.evaluations)
-        clock[1] = perf_counter()
-        observer = observer_of(setup, equation)
-        record = _run(setup, equation, machine, on_progress=on_progress, observer=observer)
-    clock.append(perf_counter())
-    error = None
+    began = perf_counter()
+    ran = _by_choice(setup, equation, on_progress)
+    setup, record, finished = ran.setup, ran.record, perf_counter()
+    error, spent = None, 0
+
+    def companion(pace: Any, of: Setup) -> Record:
+        nonlocal spent
+        made = prepared(of, equation, ran.machine, pace, samples=False).record()
+        if made.outcome.ending is Ending.STOPPED:
+            raise KeyboardInterrupt
+        spent += made.evaluations
+        return made
+
     if setup.estimate_error and record.outcome.ending is not Ending.STOPPED:
         try:
-            error = estimate(
-                setup, equation, record, lambda pace, of: _run(of, equation, machine, pace, companion=True)
-            )
+            error = estimate(setup, equation, record, companion)
         except KeyboardInterrupt:
             error = no_estimate("it was interrupted")
             if record.outcome.ending is Ending.FINISHED:
                 outcome = Outcome(Ending.STOPPED, record.outcome.t, "interrupted after the run, in its error estimate")
                 record = replace(record, outcome=outcome)
-    clock.append(perf_counter())
-    compiling, wall, companions = np.diff(clock).tolist()
-    companions = 0.0 if error is None else companions
+    estimated = perf_counter()
     step = 0.0 if setup.integrator.controls_error else record.outcome.t / max(record.steps, 1)
     statistics = Statistics(
-        setup.integrator.name, step, record.steps, record.evaluations, wall, companions, engine, compiling
-    )
-    observer.close()
-    edits = {} if machine is None else edits_of_machine_code(setup)
-    made = _trajectory(setup, equation, record, statistics, error, observer, edits)
-    return replace(made, statistics=replace(statistics, samples_s=perf_counter() - clock[-1]))
+        EXPLICIT if setup.integrator.name == AUTO else setup.integrator.name, step, record.steps, record.evaluations,
+        finished - ran.ready, 0.0 if error is None else estimated - finished, ran.engine, ran.ready - began,
+        companion_evaluations=spent,
+    )  # fmt: skip
+    ran.observer.close()
+    made = _trajectory(ran, equation, record, statistics, error)
+    return replace(made, statistics=replace(statistics, samples_s=perf_counter() - estimated))
 
 
-def _run(
-    setup: Setup,
-    equation: StateEquation,
-    machine: Machine | None,
-    pace: Fraction | np.ndarray = Fraction(1),
-    on_progress: Callable[[float], object] | None = None,
-    observer: Observer | None = None,
-    companion: bool = False,
-    most: float = inf,
-) -> Record:
-    """The run of a setup, or of a companion: with another pace of its steps, or on a mesh."""
-    run = prepared(setup, equation, machine, pace, on_progress, observer, not companion, most)
-    record = run.record()
-    if companion and record.outcome.ending is Ending.STOPPED:
-        raise KeyboardInterrupt
-    return record
+class _Ran(NamedTuple):
+    """A run that was made.
+
+    Attributes:
+        setup: Of the method that made it.
+        machine, engine: As of `choose`.
+        observer: What saw it.
+        record: What it left behind.
+        ready: When it began, on the clock.
+        said: Remarks on a run before it.
+    """
+
+    setup: Setup
+    machine: Machine | None
+    engine: str
+    observer: Observer
+    record: Record
+    ready: float
+    said: tuple[Remark, ...]
+
+
+def _by_choice(setup: Setup, equation: StateEquation, on_progress: Callable[[float], object] | None) -> _Ran:
+    """The run of a setup: begun again where another engine, or another method, turns out to be the one for it."""
+    seen, said, chooses = 0, (), setup.integrator.name == AUTO
+    while True:
+        machine, engine = choose(setup, equation, seen)
+        ready = perf_counter()
+        observer, most = observer_of(setup, equation), most_interpreted(setup, equation, machine)
+        try:
+            run = prepared(
+                setup, equation, machine, on_progress=on_progress, observer=observer, most=most, chooses=chooses
+            )
+            return _Ran(setup, machine, engine, observer, run.record(), ready, said)
+        except TooLongError as found:
+            seen = found.evaluations
+        except StiffError as found:
+            stiff = replace(setup.integrator, method=STIFF)
+            setup, chooses, said = replace(setup, integrator=stiff), False, (found.remark,)
 
 
 def _trajectory(
-    setup: Setup,
-    equation: StateEquation,
-    record: Record,
-    statistics: Statistics,
-    error: ErrorEstimate | None,
-    observer: Observer,
-    edits: dict[str, str],
+    ran: _Ran, equation: StateEquation, record: Record, statistics: Statistics, error: ErrorEstimate | None
 ) -> Trajectory:
     """The samples with what follows from them."""
+    setup, observer = ran.setup, ran.observer
+    edits = {} if ran.machine is None else edits_of_machine_code(setup)
     t = record.t
     q, v, a, u, W, P, E = columns(equation, t, record.y, record.made)
     desired, deviation = deviation_of(setup, t, q)
@@ -154,7 +173,10 @@ def _trajectory(
     return Trajectory(
         names, t, q, v, a, u, power, ledger, desired, deviation, record.outcome, statistics, error, about,
         wrenches(plant, t, q), at_stop(plant, q),
-        (*remarks(setup, observer, t, np.hstack([q, v, u]), power), *bounded_by_stability(setup, equation, record)),
+        (
+            *remarks(setup, observer, t, np.hstack([q, v, u]), power), *ran.said,
+            *bounded_by_stability(setup, equation, record),
+        ),
         observer.extremes, acting(setup),
         equation.controller_states(record.y), record.events, equation.effect_states(record.y),
     )  # fmt: skip

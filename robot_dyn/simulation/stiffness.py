@@ -15,6 +15,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.errors import RobotDynError
+from robot_dyn.integrate.adaptive import EXPLICIT, STIFF
 from robot_dyn.integrate.differences import by_state
 from robot_dyn.simulation.record import Record
 from robot_dyn.simulation.remarks import Kind, Remark
@@ -25,6 +26,9 @@ BODIES = "the motion of the bodies"
 _LEAST_STEPS = 1000  # of a run that is looked at
 _LOOKS = 9  # at steps of it
 _BOUND = (4.0, 9.0)  # h |λ| of explicit steps that stability bounds: by 6.1 for DOP853, about which they go up and down
+_WORTH = 1000  # steps yet to be made for which to begin again pays
+FIRST_LOOK = 500  # steps of a run whose method is to be chosen, then after as many again as there were
+_MEAN = 20  # steps whose mean length is looked at
 
 
 @final
@@ -53,6 +57,50 @@ class Fastest:
         return f"the fastest motion {how} with {abs(self.eigenvalue):.1e} per second, of joint {self.joint!r}, by {by}"
 
 
+class StiffError(Exception):
+    """A run by an explicit method that another one is to make.
+
+    Attributes:
+        remark: Why.
+    """
+
+    def __init__(self, remark: Remark):
+        super().__init__(remark.text)
+        self.remark = remark
+
+
+def changes_over(setup: Setup, equation: StateEquation, ends: Array, y: Array, held: Array | None) -> None:
+    """StiffError if stability bounds the latest steps of an explicit method, and many more would follow.
+
+    Args:
+        setup: What is run.
+        equation: The state equation where the run is.
+        ends: Ends of its steps so far, in [s].
+        y: The state at the last of them.
+        held: The actuation in zero-order hold, or None.
+    """
+    t, h = float(ends[-1]), float(ends[-1] - ends[-1 - _MEAN]) / _MEAN
+    if h * _WORTH > setup.duration_s - t:
+        return
+    try:
+        motion = fastest(equation, t, y, held)
+    except (RobotDynError, np.linalg.LinAlgError):
+        return
+    if _bounds(motion, h):
+        remedy = f"made by {STIFF} in place of {EXPLICIT}"
+        raise StiffError(_remark(motion, 0.0, t, t, remedy))
+
+
+def _bounds(motion: Fastest, h: float) -> bool:
+    """Whether stability bounds explicit steps of length h."""
+    return motion.decays and _BOUND[0] < abs(motion.eigenvalue) * h < _BOUND[1]
+
+
+def _remark(motion: Fastest, start: float, end: float, at: float, remedy: str) -> Remark:
+    size = abs(motion.eigenvalue)
+    return Remark(Kind.STIFF, motion.joint, "v", start, end - start, at, size, None, str(motion), remedy)
+
+
 def bounded_by_stability(setup: Setup, equation: StateEquation, record: Record) -> tuple[Remark, ...]:
     """A remark if stability, and not the tolerance, bounds the steps of an explicit method that chooses them.
 
@@ -69,18 +117,12 @@ def bounded_by_stability(setup: Setup, equation: StateEquation, record: Record) 
             motion = fastest(equation, float(t[k]), y[k], held)
         except (RobotDynError, np.linalg.LinAlgError):
             continue
-        size = abs(motion.eigenvalue)
-        if motion.decays and _BOUND[0] < size * (t[k + 1] - t[k]) < _BOUND[1]:
-            found.append((size, k, motion))
+        if _bounds(motion, float(t[k + 1] - t[k])):
+            found.append((abs(motion.eigenvalue), k, motion))
     if len(found) <= _LOOKS // 2:
         return ()
-    size, k, motion = max(found, key=lambda each: each[0])
-    at, end = float(t[k]), float(t[-1])
-    return (
-        Remark(
-            Kind.STIFF, motion.joint, "v", 0.0, end, at, size, None, str(motion), "take integrator='Rosenbrock'"
-        ),
-    )  # fmt: skip
+    _, k, motion = max(found, key=lambda each: each[0])
+    return (_remark(motion, 0.0, float(t[-1]), float(t[k]), f"take integrator={STIFF!r}"),)
 
 
 def fastest(equation: StateEquation, t: float, y: Array, held: Array | None) -> Fastest:
@@ -110,9 +152,10 @@ def fastest(equation: StateEquation, t: float, y: Array, held: Array | None) -> 
     w = left[:, np.argmin(np.abs(others - values[k]))]
     part = np.abs(w * x)
     joint = int(np.argmax(part[:n] + part[n : 2 * n]))
-    parts = {name: w[n : 2 * n] @ (A @ x) / (w @ x) for name, A in _accelerations(equation, t, y, held).items()}
-    parts[BODIES] = values[k] - sum(parts.values())
-    source = max(parts, key=lambda name: abs(parts[name]))
+    with np.errstate(all="ignore"):  # w x = 0 where λ is defective: no part is the largest then
+        parts = {name: w[n : 2 * n] @ (A @ x) / (w @ x) for name, A in _accelerations(equation, t, y, held).items()}
+        parts[BODIES] = values[k] - sum(parts.values())
+        source = max(reversed(parts), key=lambda name: np.nan_to_num(abs(parts[name]), nan=0.0))
     return Fastest(complex(values[k]), equation.plant.dynamics.joint_names[joint], source)
 
 

@@ -63,6 +63,7 @@ class Statistics:
         engine: Which loop ran, and why if another was possible.
         compile_s: Time before the run, for the choice of the loop and for compiling it.
         samples_s: Time after it, for what follows from the states of its samples.
+        companion_evaluations: Evaluations of the error estimate.
     """
 
     method: str
@@ -74,6 +75,40 @@ class Statistics:
     engine: str = "interpreted"
     compile_s: float = 0.0
     samples_s: float = 0.0
+    companion_evaluations: int = 0
+
+
+@final
+@dataclass(frozen=True)
+class Accuracy:
+    """An accuracy that was asked for, what was got, and what it took in evaluations of the equation of motion.
+
+    Attributes:
+        asked: Largest error of q over joints and times, in [rad] and [m].
+        estimated: The estimated one.
+        rtol: The tolerance that was chosen, atol a hundredth of it; 0 for a method of fixed step.
+        run: Of the run.
+        pilots: Of the runs before it, with their error estimates.
+        check: Of its own error estimate.
+        digit_more, digit_less: Of a run with an error ten times smaller, or larger, by the order of the method.
+    """
+
+    asked: float
+    estimated: float
+    rtol: float
+    run: int
+    pilots: int
+    check: int
+    digit_more: float
+    digit_less: float
+
+    def __str__(self) -> str:
+        at = f" at rtol {self.rtol:.1e}" if self.rtol else ""
+        return (
+            f"asked {self.asked:.1e}, estimated {self.estimated:.1e}{at}; {self.run} evaluations,"
+            f" pilots {self.pilots}, check {self.check}; a digit more about {self.digit_more:.0f}, a digit less"
+            f" {self.digit_less:.0f}"
+        )
 
 
 @final
@@ -105,6 +140,7 @@ class Trajectory(Value):
             were not recorded.
         events: Where effects switched, and those asked for, in the order of time.
         effect_states: z of each effect with states, by name, (m, z); empty if they were not recorded.
+        accuracy: What was asked for, and what it took; None if nothing was.
     """
 
     joint_names: tuple[str, ...]
@@ -129,6 +165,7 @@ class Trajectory(Value):
     controller_states: np.ndarray | None = None
     events: tuple[Occurrence, ...] = ()
     effect_states: dict[str, np.ndarray] = field(default_factory=dict)
+    accuracy: Accuracy | None = None
 
     def __post_init__(self) -> None:
         read_only(self)
@@ -167,6 +204,7 @@ class Trajectory(Value):
             f"energy ledger: {residual}" + _after(self.leak) if ledger.known else "energy ledger: was not recorded",
             f"error of q [{unit}]: {self.error or _NOT_ESTIMATED[self.outcome.ending is Ending.STOPPED]}",
         ]
+        lines += [] if self.accuracy is None else [f"accuracy: {self.accuracy}"]
         lines += ["between samples: not watched"] if self.extremes is None else []
         lines += [f"events: {_told(self.events)}"] if self.events else []
         lines += said(self.remarks)

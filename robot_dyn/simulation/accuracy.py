@@ -1,0 +1,143 @@
+"""A run to an accuracy that is asked for: a tolerance bounds the error of a step, what that leaves is measured.
+
+    e = c · tol,   c from a pilot run at a loose tolerance
+
+The error of a method of order p whose step is chosen by an estimate of that order is proportional to the tolerance.
+[Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed., 1993, II.4; Stetter 1980]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import inf, isfinite
+
+import numpy as np
+
+from robot_dyn.errors import RobotDynError
+from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, LEAST_RTOL, STIFF, Adaptive
+from robot_dyn.integrate.explicit import RK4
+from robot_dyn.simulation.setup import Setup
+from robot_dyn.simulation.state_equation import StateEquation
+from robot_dyn.simulation.stiffness import fastest
+from robot_dyn.simulation.trajectory import Accuracy, Ending, Trajectory
+
+_AIM = 0.3  # of what is asked: an estimate may be this part of the error
+_LOOSE, _LOOSEST = 0.75, 1e-3  # tolerance of the pilot: a power of what is asked, at most
+_ATOL = 0.01  # over rtol
+_TRIES = 4  # runs of a tolerance, at most
+_TOO_MUCH = 1e-3  # of what is asked: a run that is more accurate may cost too much
+_DECIDES = 1.5  # runs that the estimate takes, at most, where the tolerance decides on the steps
+_MANY = 20  # segments of sampled control, in each of which one step of RK4 may do
+_LONG = 500.0  # |λ| T: explicit steps, of |λ| h = 6 at most, are then as many as those of a run that is not stiff
+_ORDER = {EXPLICIT: 8, STIFF: 5, RK4.name: 4}
+_WEIGHT = {STIFF: 2}  # of its evaluations, Jacobians and eliminations included
+
+
+class AccuracyError(RobotDynError):
+    """An accuracy that cannot be had; says which can, and why."""
+
+
+def run_to(setup: Setup, asked: float, run: Callable[[Setup], Trajectory]) -> Trajectory:
+    """The run of a setup whose estimated error is at most what is asked; one that does not finish is returned as it is.
+
+    Args:
+        setup: What to run.
+        asked: Largest error of q at any time, over the joints, in [rad] and [m].
+        run: Runs a setup, and estimates its error.
+
+    Raises:
+        AccuracyError: If it cannot be had.
+    """
+    simple, spent = _in_each_segment(setup, asked, run)
+    if simple is not None:
+        return simple
+    best, least, method = inf, 1.01 * LEAST_RTOL, STIFF if _stiff(setup) else AUTO
+    rtol = max(least, min(_LOOSEST, asked**_LOOSE))
+    for k in range(_TRIES):
+        made = run(replace(setup, integrator=Adaptive(method, rtol, _ATOL * rtol)))
+        if method == AUTO and not _decides(made) and not _sampled(setup):
+            other = run(replace(setup, integrator=Adaptive(STIFF, rtol, _ATOL * rtol)))
+            made, less = sorted((made, other), key=lambda each: _predicted(each, asked))
+            spent += _in_all(less)
+        if made.outcome.ending is not Ending.FINISHED:
+            return made
+        error, method = _resolved(made), made.statistics.method
+        if error <= asked and (k > 0 or error > _TOO_MUCH * asked or not _decides(made) or rtol == _LOOSEST):
+            return _achieved(made, asked, rtol, spent)
+        best = min(best, error)
+        if rtol == least or k == _TRIES - 1:
+            raise AccuracyError(_refusal(made, asked, best, rtol))
+        spent += _in_all(made)
+        rtol = max(least, min(_LOOSEST, rtol * (_AIM * asked / error if isfinite(error) else 1e-2)))
+    raise AssertionError
+
+
+def _in_each_segment(setup: Setup, asked: float, run: Callable[[Setup], Trajectory]) -> tuple[Trajectory | None, int]:
+    """One step of RK4 between ticks of sampled control, if that is accurate enough; what it took if it is not."""
+    if not _sampled(setup) or len(setup.segments) < _MANY:
+        return None, 0
+    made = run(replace(setup, integrator=RK4, step_s=setup.duration_s))
+    good = made.outcome.ending is Ending.FINISHED and _resolved(made) <= asked
+    return (_achieved(made, asked, 0.0, 0), 0) if good else (None, _in_all(made))
+
+
+def _stiff(setup: Setup) -> bool:
+    """Whether explicit steps would be many for the fastest decay at the start."""
+    if _sampled(setup):
+        return False
+    equation = StateEquation(setup.plant, setup.controller)
+    try:
+        motion = fastest(equation, 0.0, equation.start(setup.q0, setup.v0), None)
+    except (RobotDynError, np.linalg.LinAlgError):
+        return False
+    return motion.decays and abs(motion.eigenvalue) * setup.duration_s > _LONG
+
+
+def _sampled(setup: Setup) -> bool:
+    return setup.controller is not None and setup.controller.period_s > 0
+
+
+def _decides(made: Trajectory) -> bool:
+    """Whether the tolerance decides on the steps: else stability, ticks or events do, and the estimate halves them."""
+    return made.statistics.companion_evaluations <= _DECIDES * made.statistics.evaluations
+
+
+def _in_all(made: Trajectory) -> int:
+    return made.statistics.evaluations + made.statistics.companion_evaluations
+
+
+def _predicted(made: Trajectory, asked: float) -> float:
+    """Cost of a run of its method with the error that is asked, in evaluations."""
+    if made.outcome.ending is not Ending.FINISHED:
+        return inf
+    name, factor = made.statistics.method, _resolved(made) / (_AIM * asked)
+    return made.statistics.evaluations * _WEIGHT.get(name, 1) * max(1.0, factor) ** (1 / _ORDER[name])
+
+
+def _resolved(made: Trajectory) -> float:
+    """The estimated error of a run; inf where it does not hold to the end."""
+    error = made.error
+    return error.final if error is not None and not error.note else inf
+
+
+def _achieved(made: Trajectory, asked: float, rtol: float, spent: int) -> Trajectory:
+    """With the evaluations of a run ten times as accurate, and of one a tenth: e = O(hᵖ)."""
+    s = made.statistics
+    factor = 10 ** (1 / _ORDER[s.method])
+    return replace(
+        made,
+        accuracy=Accuracy(
+            asked, _resolved(made), rtol, s.evaluations, spent, s.companion_evaluations, s.evaluations * factor,
+            s.evaluations / factor,
+        ),
+    )  # fmt: skip
+
+
+def _refusal(made: Trajectory, asked: float, best: float, rtol: float) -> str:
+    method, why = made.statistics.method, "" if made.error is None else made.error.note
+    if not why:
+        least = f"{method}'s least tolerance" if rtol <= 1.01 * LEAST_RTOL else "the tolerance"
+        why = f"the estimated error is {best:.1e} at {least}, {rtol:.1e}"
+    remedy = f"ask for {2 * best:.1e}" if isfinite(best) else "take a shorter run"
+    return f"accuracy {asked:.1e} cannot be had: {why}; {remedy}"
