@@ -18,7 +18,7 @@ from robot_dyn.accuracy.measured import measured
 from robot_dyn.accuracy.peers import found
 from robot_dyn.accuracy.reference_run import Reference, reference
 from robot_dyn.effects.plant import Plant
-from robot_dyn.errors import RobotDynError
+from robot_dyn.errors import QueryError, RobotDynError
 from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, STIFF
 from robot_dyn.integrate.methods import METHODS, as_method
 from robot_dyn.model.dynamics import Dynamics
