@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     from robot_dyn.effects.lugre import LuGreFriction as LuGreFriction
     from robot_dyn.effects.plant import Plant as Plant
     from robot_dyn.effects.spring import Spring as Spring
-    from robot_dyn.effects.threshold import Threshold as Threshold
+    from robot_dyn.threshold import Threshold as Threshold
     from robot_dyn.effects.wrench import ExternalWrench as ExternalWrench
     from robot_dyn.errors import ModelWarning as ModelWarning
     from robot_dyn.errors import RobotDynError as RobotDynError
@@ -129,7 +129,7 @@ _HOME = {
     "Spring": "effects.spring",
     "Stateful": "effects.effect",
     "Stateless": "control.controller",
-    "Threshold": "effects.threshold",
+    "Threshold": "threshold",
     "Trajectory": "simulation.trajectory",
     "ViscousFriction": "effects.friction",
     "WorkPrecision": "accuracy.work_precision",

@@ -24,8 +24,7 @@ from robot_dyn.simulation.choice import choose
 from robot_dyn.simulation.ledger import Ledger
 from robot_dyn.simulation.prepared import prepared
 from robot_dyn.simulation.record import Record
-from robot_dyn.simulation.setup import Setup
-from robot_dyn.simulation.smoothness import MOST_CUT, finds_events
+from robot_dyn.simulation.setup import MOST_CUT, Setup
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.trajectory import Ending
 
@@ -153,8 +152,8 @@ def own(setup: Setup, made: Any, engine: str, events: bool = True) -> Candidate:
     def steps() -> Iterator[float]:
         before = 0
         for step in step_ladder(setup.record_period_s, made.order):
-            count = replace(setup, integrator=made, step_s=step).steps
-            most = MOST_CUT if finds_events(replace(setup, integrator=made, step_s=step)) else _MOST_STEPS
+            changed = replace(setup, integrator=made, step_s=step)
+            count, most = changed.steps, MOST_CUT if changed.finds_events else _MOST_STEPS
             if count > most:
                 return
             if count > before:  # a step longer than a tick, or a segment, is that of the segment

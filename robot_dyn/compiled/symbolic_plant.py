@@ -170,6 +170,9 @@ class TracedController(Controller):
     def torque(self, t: Any, q: Array, v: Array, z: Array) -> Array:
         return self._traced(lambda: self.inner.torque(t, q, v, z), self.n)
 
+    def demand(self, t: Any, q: Array, v: Array, z: Array) -> Array:
+        return self._traced(lambda: self.inner.demand(t, q, v, z), self.n)
+
     def state_rate(self, t: Any, q: Array, v: Array, z: Array) -> Array:
         return self._traced(lambda: self.inner.state_rate(t, q, v, z), self.state_size)
 

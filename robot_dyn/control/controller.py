@@ -8,6 +8,7 @@ plant, a sampled one takes z⁺ = z + period · rate at its ticks and keeps its 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
 
@@ -19,6 +20,7 @@ from robot_dyn.coefficients import JOINTS, check_coefficients, declared
 from robot_dyn.control.reference import Reference
 from robot_dyn.errors import ControlError, shown
 from robot_dyn.model.dynamics import Dynamics
+from robot_dyn.threshold import Threshold
 from robot_dyn.validate import duration
 from robot_dyn.values import Value
 
@@ -91,6 +93,21 @@ class Controller(Value, ABC):
     def saturation(self) -> Array:
         """Greatest torque that it asks for, a scalar or (n,), in [N m] or [N]; inf where nothing limits it."""
         return np.inf
+
+    def thresholds(self) -> tuple[Threshold, ...]:
+        """Levels of its `demand`, where its formulas pass from one smooth one to another; `beyond` says to which.
+
+        Where it acts continuously, steps of integration end where one is passed.
+        """
+        return ()
+
+    def beyond(self, sides: Mapping[Threshold, int]) -> Controller:
+        """The controller as it is with each threshold passed (1) or not (−1), smooth wherever q, v and z are."""
+        return self
+
+    def demand(self, t: float, q: Array, v: Array, z: Array) -> Array:
+        """What it would ask for without a limit, (n,), in [N m] or [N]; its torque unless it limits that itself."""
+        return self.torque(t, q, v, z)
 
     @property
     @abstractmethod

@@ -5,16 +5,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, final
 
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.coefficients import coefficient
+from robot_dyn.coefficients import coefficient, with_values
 from robot_dyn.control.controller import Controller, Stateless
 from robot_dyn.control.reference import PiecewisePolynomial, numbers
 from robot_dyn.errors import ControlError, shown
+from robot_dyn.saturation import limits_reached, middle_of, piece, saturated
+from robot_dyn.threshold import Threshold
 
 STIFFNESS = coefficient("N m/rad", symbol="kp", least=0)
 DAMPING = coefficient("N m s/rad", symbol="kd", least=0)
@@ -77,9 +80,11 @@ class PID(Controller):
     effort_limit: Any = field(default=np.inf, metadata=coefficient("N m", above=0, infinite=True))
     tracking_time_s: Any = field(default=None, metadata=coefficient("s", shapes=((),), above=0, swept=False))
     period_s: float = 0.0
+    _middle: Any = field(default=None, init=False, repr=False, metadata=coefficient("N m", swept=False))
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        object.__setattr__(self, "_middle", middle_of(self.effort_limit))
         if self.tracking_time_s is None:
             kd, ki = np.broadcast_arrays(self.kd, self.ki)
             acts = (kd > 0) & (ki > 0)
@@ -100,6 +105,16 @@ class PID(Controller):
     def saturation(self) -> Array:
         return self.effort_limit
 
+    def thresholds(self) -> tuple[Threshold, ...]:
+        return limits_reached(self.effort_limit, self._middle, self.n)
+
+    def beyond(self, sides: Mapping[Threshold, int]) -> PID:
+        limit, middle = piece(self.effort_limit, self.n, sides)
+        return with_values(self, {"effort_limit": limit, "_middle": middle})
+
+    def demand(self, t: float, q: Array, v: Array, z: Array) -> Array:
+        return self._desired(t, q, v, z)[0]
+
     def torque(self, t: float, q: Array, v: Array, z: Array) -> Array:
         return self._saturated(self._desired(t, q, v, z)[0])
 
@@ -113,7 +128,7 @@ class PID(Controller):
         return self.kp * e + self.kd * (v_d - v) + z, e
 
     def _saturated(self, u: Array) -> Array:
-        return np.maximum(np.minimum(u, self.effort_limit), -self.effort_limit)
+        return saturated(u, self.effort_limit, self._middle)
 
 
 def gains_from(inertia_diagonal: Any, frequency: Any, damping_ratio: Any = 1.0) -> tuple[np.ndarray, np.ndarray]:

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import inf
-from typing import Any, final
-
-import numpy as np
+from typing import TYPE_CHECKING, Any, final
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.coefficients import URDF, coefficient
+from robot_dyn.coefficients import URDF, coefficient, with_values
 from robot_dyn.effects.effect import Bound, Effect, Stateful
 from robot_dyn.errors import EffectError
 from robot_dyn.model.dynamics import Dynamics
+from robot_dyn.saturation import limits_reached, middle_of, piece, saturated
+from robot_dyn.threshold import Threshold
+
+if TYPE_CHECKING:
+    import numpy as np
 
 
 @final
@@ -29,7 +33,20 @@ class EffortLimit(Bound):
         metadata=coefficient("N m", symbol="u_max", least=0, infinite=True, elsewhere=inf, stated="effort_limit")
     )
 
+    _middle: Any = field(default=None, init=False, repr=False, metadata=coefficient("N m", swept=False))
+
     term = "|u| ≤ u_max"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "_middle", middle_of(self.limit))
+
+    def thresholds(self, n: int) -> tuple[Threshold, ...]:
+        return limits_reached(self.limit, self._middle, n)
+
+    def beyond(self, n: int, sides: Mapping[Threshold, int]) -> EffortLimit:
+        limit, middle = piece(self.limit, n, sides)
+        return with_values(self, {"limit": limit, "_middle": middle})
 
     def on(self, dynamics: Any) -> Effect:
         made = super().on(dynamics)
@@ -38,7 +55,7 @@ class EffortLimit(Bound):
         return made
 
     def actuation(self, u: Array) -> Array:
-        return np.minimum(np.maximum(u, -self.limit), self.limit)
+        return saturated(u, self.limit, self._middle)
 
 
 @final

@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.coefficients import check_coefficients, declared
-from robot_dyn.effects.threshold import Threshold
+from robot_dyn.threshold import Threshold
 from robot_dyn.errors import EffectError
 from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.values import Value
@@ -77,7 +77,8 @@ class Effect(Value):
     def thresholds(self, n: int) -> tuple[Threshold, ...]:
         """Where it switches from one smooth formula to another, on an arm of n joints.
 
-        A step of integration ends where one is passed; `beyond` says what the effect is on either side.
+        A step of integration ends where one is passed; `beyond` says what the effect is on either side. Levels of the
+        actuation are for bounds: of what reaches them.
         """
         return ()
 

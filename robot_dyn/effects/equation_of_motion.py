@@ -113,10 +113,15 @@ class EquationOfMotion:
                 u = self._bounded(effect, u)
         return u
 
-    def applied(self, u: Array, z: Array) -> tuple[Array, Mapping[int, Array]]:
-        """What the other bounds leave of it, at states z of the effects; and what reaches each that has states."""
+    @cached_property
+    def bounds_at_all_times(self) -> range:
+        """Numbers of the effects whose bounds act between ticks too: those from the first bound with states on."""
+        return range(self._lags, len(self.effects))
+
+    def applied(self, u: Array, z: Array, of: range | None = None) -> tuple[Array, Mapping[int, Array]]:
+        """What the other bounds leave of it, at states z of the effects; and what reaches each: of those effects."""
         reached = {}
-        for k in range(self._lags, len(self.effects)):
+        for k in self.bounds_at_all_times if of is None else of:
             effect = self.effects[k]
             if isinstance(effect, Bound):
                 reached[k] = u

@@ -16,7 +16,7 @@ import numpy as np
 from robot_dyn.arithmetic import Array, positive_part
 from robot_dyn.coefficients import coefficient, with_values
 from robot_dyn.effects.effect import Conservative, Dissipative
-from robot_dyn.effects.threshold import Threshold
+from robot_dyn.threshold import Threshold
 from robot_dyn.errors import EffectError
 from robot_dyn.model.dynamics import Dynamics
 

@@ -40,7 +40,7 @@ def in_words(part: Any, joint_types: Sequence[str | None]) -> dict[str, str]:
     made = {}
     for name, each in declared(type(part)).items():
         values, symbol = getattr(part, name), each.symbol.partition(",")[0] or name
-        if values is None:
+        if values is None or name.startswith("_"):  # a run's own, not its user's
             continue
         if each.of_joints:
             values = np.broadcast_to(values, len(joint_types))

@@ -18,7 +18,7 @@ from robot_dyn.errors import RobotDynError
 from robot_dyn.foreign import call
 from robot_dyn.simulation.record import Path
 from robot_dyn.simulation.setup import Setup
-from robot_dyn.simulation.smoothness import LOOKS, extremes, finds_events, foreign, named
+from robot_dyn.simulation.smoothness import LOOKS, extremes, foreign, named
 from robot_dyn.simulation.state_equation import StateEquation
 
 _STANDS_OUT = 50.0  # times the change of the torque from step to step
@@ -45,7 +45,7 @@ def stepped_over(setup: Setup, equation: StateEquation, path: Path, error: float
     if len(path.t) < 2:
         return None
     q, v = path.y[:, : equation.plant.dynamics.n], equation.velocities(path.y)
-    effects = () if finds_events(setup) else setup.plant.effects
+    effects = () if setup.finds_events else setup.plant.effects
     found = [_stop(equation, effect, path, q, v, error) for effect in effects]
     found += [_code(equation, part, path, q, v, error) for part in foreign(setup)]
     return min((each for each in found if each is not None), key=lambda each: each.t, default=None)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from robot_dyn.errors import RobotDynError
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import segments
-from robot_dyn.simulation.smoothness import finds_events, foreign, named
+from robot_dyn.simulation.smoothness import foreign, named
 from robot_dyn.simulation.state_equation import StateEquation
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def _made(setup: Setup, equation: StateEquation) -> Machine:
     from robot_dyn.simulation.machine.making import machine
 
     method: Any = setup.integrator
-    return machine(equation, method if method.plain else None, jacobian=method.needs_jacobian, cuts=finds_events(setup))
+    return machine(equation, method if method.plain else None, jacobian=method.needs_jacobian, cuts=setup.finds_events)
 
 
 def _interpreted(setup: Setup, why: str = "") -> str:

@@ -16,19 +16,23 @@ from robot_dyn.integrate.primitives import between, evaluate
 from robot_dyn.simulation.time_loop import Functions, Rules, Runs
 
 _ROUNDING = 64 * np.finfo(float).eps  # of the coefficients of a polynomial
+_ROOM = 4.0  # times the change of a limited actuation in a step, or in the one before
 _LOOKS = 8  # at a switching function that is no coordinate, in each step
 _HALVINGS = 50
 _NEAR = 1e-4  # of a step: for the slope of a switching function that is no coordinate
 
 
 class Switches(NamedTuple):
-    """Switching functions: E coordinates of y that pass a level, and G functions of (t, y, p, own).
+    """Switching functions: E coordinates of y that pass a level, and G functions of (t, y, p, own) that pass one.
 
     Attributes:
-        rows, levels: Entry of y, and its level, (E,).
-        sides: 1 where the function is not negative, −1 where it is not positive, (E + G,).
-        functions: Gives the G values, as of `evaluate`.
-        then: Room for them, (G, 1).
+        rows: Entry of y, and then of the values of the functions, (E + G,).
+        levels: Its level, (E + G,).
+        sides: 1 where it is not below its level, −1 where it is not above, (E + G,).
+        functions: Gives the F values, as of `evaluate`.
+        asked: Number of the last functions that are looked at in each step, as the user's own.
+        then: Room for their values, (F, 1).
+        before, change: Those at the start of a step, and by how much they changed in the step before, (F,).
         size: Unit of rounding of each coordinate's level, (E,).
         b, stack: Room for `bernstein`.
     """
@@ -37,7 +41,10 @@ class Switches(NamedTuple):
     levels: Array
     sides: Array
     functions: Any
+    asked: int
     then: Array
+    before: Array
+    change: Array
     size: Array
     b: Array
     stack: Array
@@ -50,7 +57,7 @@ def approaches(y: Array, after: Array, h: float, before: Array, last: Array, rul
     it; as much room again is left on both sides.
     """
     n = 0 if rules.canonical else rules.n  # p' is no acceleration
-    for e in range(len(switches.rows)):
+    for e in range(len(switches.size)):
         row = switches.rows[e]
         x0, x1, d0, d1 = y[row, 0], after[row, 0], before[row, 0], last[row, 0]
         low, high = min(x0, x1), max(x0, x1)
@@ -70,12 +77,37 @@ def approaches(y: Array, after: Array, h: float, before: Array, last: Array, rul
     return False
 
 
+def remember(t: float, y: Array, p: Array, own: Array, switches: Switches) -> None:
+    """The functions at the start of a segment, or behind an event: what they did before says nothing."""
+    if has_functions(switches):
+        evaluate(switches.functions, t, y, p, own, switches.then)
+        for i in range(len(switches.then)):
+            switches.before[i], switches.change[i] = switches.then[i, 0], np.inf
+
+
+def nears(t: float, y: Array, p: Array, own: Array, switches: Switches) -> bool:
+    """Whether a function may pass its level in the step that ends at t: it comes near it, by its latest changes."""
+    if not has_functions(switches):
+        return False
+    E, found = len(switches.size), switches.asked > 0
+    evaluate(switches.functions, t, y, p, own, switches.then)
+    for e in range(E, len(switches.rows) - switches.asked):
+        i, level, side = switches.rows[e], switches.levels[e], switches.sides[e]
+        x0, x1 = switches.before[i], switches.then[i, 0]
+        room = _ROOM * max(abs(x1 - x0), switches.change[i])
+        found = found or not min(side * (x0 - level), side * (x1 - level)) > room
+    for i in range(len(switches.then)):
+        x = switches.then[i, 0]
+        switches.before[i], switches.change[i] = x, abs(x - switches.before[i])
+    return found
+
+
 def first_event(
     f: Functions, t: float, h: float, y: Array, p: Array, runs: Runs, F: Array, switches: Switches
 ) -> tuple[int, float]:
     """The switching function that changes sign first within a step, and θ; −1 without any."""
     event, first, b, own = -1, NONE, switches.b, runs.own
-    for e in range(len(switches.rows)):
+    for e in range(len(switches.size)):
         row, side = switches.rows[e], switches.sides[e]
         coefficients(y[row, 0] - switches.levels[e], F, row, b)
         if y[row, 0] == switches.levels[e]:
@@ -85,27 +117,42 @@ def first_event(
         theta = first_below(b, _ROUNDING * switches.size[e], switches.stack)
         if theta < first:
             event, first = e, theta
-    E, before, x = len(switches.rows), 0.0, runs.last
-    for i in range(1, _LOOKS + 1 if len(switches.then) > 0 else 0):
+    before, x = 0.0, runs.last
+    for i in range(1, _LOOKS + 1 if has_functions(switches) else 0):
         theta = i / _LOOKS
         values(f, t, h, theta, y, p, own, F, x, switches)
-        for g in range(len(switches.then)):
-            if switches.sides[E + g] * switches.then[g, 0] < 0.0 and before < first:
+        for g in range(len(switches.size), len(switches.rows)):
+            if passed(switches, g) and before < first:
                 low, high = before, theta
                 for _ in range(_HALVINGS):
                     middle = (low + high) / 2
                     values(f, t, h, middle, y, p, own, F, x, switches)
-                    if switches.sides[E + g] * switches.then[g, 0] < 0.0:
+                    if passed(switches, g):
                         high = middle
                     else:
                         low = middle
                 if high < first:
-                    event, first = E + g, high
+                    event, first = g, high
                 values(f, t, h, theta, y, p, own, F, x, switches)
         if event >= 0 and first <= theta:
             break
         before = theta
     return event, first
+
+
+def has_functions(switches: Switches) -> bool:
+    """Whether there are switching functions that are no coordinates."""
+    return len(switches.rows) > len(switches.size)
+
+
+def gap(switches: Switches, g: int) -> float:
+    """The latest value of a switching function that is no coordinate, less its level."""
+    return switches.then[switches.rows[g], 0] - switches.levels[g]
+
+
+def passed(switches: Switches, g: int) -> bool:
+    """Whether it is on the other side."""
+    return switches.sides[g] * gap(switches, g) < 0.0
 
 
 def values(
@@ -119,10 +166,9 @@ def values(
 
 def settle_sides(switches: Switches) -> None:
     """The side of functions that vanished at the start of the run."""
-    E = len(switches.rows)
-    for g in range(len(switches.then)):
-        if switches.sides[E + g] == 0.0:
-            switches.sides[E + g] = np.sign(switches.then[g, 0])
+    for g in range(len(switches.size), len(switches.rows)):
+        if switches.sides[g] == 0.0:
+            switches.sides[g] = np.sign(gap(switches, g))
 
 
 def correction(
@@ -130,16 +176,15 @@ def correction(
     event: int,
 ) -> float:  # fmt: skip
     """Newton's correction of the step h whose end is to be a root of a switching function."""
-    E = len(switches.rows)
-    if event < E:
+    if event < len(switches.size):
         row = switches.rows[event]
-        gap, slope = runs.after[row, 0] - switches.levels[event], work.last[row, 0]
+        left, slope = runs.after[row, 0] - switches.levels[event], work.last[row, 0]
     else:  # its slope from the dense output of the whole step
         theta = h / whole
         values(f, t, whole, theta + _NEAR, y, p, runs.own, work.F, runs.last, switches)
-        slope = switches.then[event - E, 0]
+        slope = gap(switches, event)
         values(f, t, whole, theta - _NEAR, y, p, runs.own, work.F, runs.last, switches)
-        slope = (slope - switches.then[event - E, 0]) / (2 * _NEAR * whole)
+        slope = (slope - gap(switches, event)) / (2 * _NEAR * whole)
         evaluate(switches.functions, t + h, runs.after, p, runs.own, switches.then)
-        gap = switches.then[event - E, 0]
-    return -gap / slope if slope != 0.0 else 0.0
+        left = gap(switches, event)
+    return -left / slope if slope != 0.0 else 0.0

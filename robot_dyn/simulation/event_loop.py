@@ -19,7 +19,7 @@ from robot_dyn.arithmetic import Array
 from robot_dyn.integrate.bernstein import NONE
 from robot_dyn.integrate.primitives import between, copy, evaluate
 from robot_dyn.integrate.step_control import At, chosen_step, finite, first_step
-from robot_dyn.simulation.crossings import Switches, approaches, correction, first_event, settle_sides
+from robot_dyn.simulation.crossings import Switches, approaches, correction, first_event, nears, remember, settle_sides
 from robot_dyn.simulation.time_loop import Ended, Functions, Now, Plan, Rules, Runs, act, conserve
 
 FASTEST = 1e6  # [rad/s] or [m/s]: such a method would follow an exploding state without end
@@ -96,7 +96,7 @@ def event_loop(
             if k == _ROOTS - 1 or not abs(shift) > np.spacing(abs(t + h)) or abs(shift) > abs(h):
                 break
             h += shift
-        if event < len(switches.rows):
+        if event < len(switches.size):
             after[switches.rows[event], 0] = switches.levels[event]
         return evaluations, h
 
@@ -123,6 +123,7 @@ def event_loop(
                 now[Now.EVALUATIONS] += begin(f, c, times.reached[0], y, p, own, work)
                 if not finite(work.K[0]):
                     return Ended.NOT_FINITE
+                remember(times.reached[0], y, p, own, switches)
                 if control[At.NEXT] == 0.0 and len(times.mesh) == 0:
                     now[Now.EVALUATIONS] += first_step(f, times.reached[0], end, y, p, own, after, work, control)
                 now[Now.STEP] = 2
@@ -136,8 +137,8 @@ def event_loop(
                 now[Now.EVALUATIONS] += accept(f, c, t, h, y, p, own, after, work)
                 has_dense, event, theta = False, -1, NONE
                 if len(switches.sides) > 0:
-                    near = len(switches.then) > 0 or approaches(y, after, h, work.K[0], work.last, rules, switches)
-                    if near:
+                    near = nears(t1, after, p, own, switches)
+                    if near or approaches(y, after, h, work.K[0], work.last, rules, switches):
                         now[Now.EVALUATIONS] += dense(f, c, t, h, y, p, own, after, work)
                         event, theta = first_event(f, t, h, y, p, runs, work.F, switches)
                         has_dense = event < 0

@@ -14,7 +14,7 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.effects.threshold import Threshold
+from robot_dyn.threshold import Threshold
 from robot_dyn.errors import OverflowedError, RobotDynError
 from robot_dyn.foreign import is_mistake
 from robot_dyn.integrate import hermite
@@ -125,7 +125,7 @@ class EventRun(Followed):
             np.empty((states, m)), np.empty(_CHUNK), np.empty((_CHUNK, m)), columns,
         )  # fmt: skip
         events = self.functions.events if self.compiled else self.switching.function
-        self.switches = self.switching.at(0.0, self.start, len(of.work.F), events)
+        self.switches = self.switching.at(0.0, self.start, len(of.work.F), events, own[:n, 0] if held else None)
         self.events: list[Occurrence] = []
         self._change_mode()
         self.now, self.stop = np.zeros(len(Now), np.int64), np.zeros(1, np.int64)
@@ -251,12 +251,13 @@ class EventRun(Followed):
         brief = latest[-1].t - latest[0].t <= _BRIEF * self.setup.duration_s
         return len(latest) == _CHATTER and brief and len({each.joint for each in latest} - {""}) == 1
 
-    def _drop(self, threshold: Threshold) -> None:
-        """Look for a threshold no longer, where steps would never get on."""
+    def _drop(self, each: Threshold) -> None:
+        """Look for the thresholds of a joint no longer, where steps would never get on."""
         last = self.events[-1]
         self.events.append(replace(last, name=f"{last.name} chatters, and is no longer looked for"))
-        self.switching = Switching(self.equation, self.switching.dropped | {threshold})
-        self.switches = self.switching.at(last.t, self.y, len(self.switches.b) - 1, self.switches.functions)
+        self.switching = Switching(self.equation, self.switching.dropped | {(each.joint, each.of_actuation)})
+        held = self.runs.own[: self.rules.held, 0] if self.rules.held else None
+        self.switches = self.switching.at(last.t, self.y, len(self.switches.b) - 1, self.switches.functions, held)
 
     def _event(self, t: float, y: np.ndarray) -> None:
         """Keep an event, and go on behind it; TerminalEvent ends the run."""

@@ -17,7 +17,6 @@ from robot_dyn.simulation.fixed_step import FixedStep
 from robot_dyn.simulation.observer import Observer
 from robot_dyn.simulation.schedule import mesh
 from robot_dyn.simulation.setup import Setup
-from robot_dyn.simulation.smoothness import finds_events
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.state_functions import interpreted
 from robot_dyn.simulation.time_loop import Functions
@@ -59,10 +58,10 @@ def prepared(
         if machine is None:
             return interpreted(of, watch), np.zeros(0)
         functions = machine.in_python if machine.loop is None else machine.equations.functions
-        return functions, machine.parameters if of is equation else machine.with_effects(of.plant.effects)
+        return functions, machine.parameters if of is equation else machine.with_parts(of.plant.effects, of.controller)
 
     loop, in_python = (None, None) if machine is None else (machine.loop, machine.in_python)
-    if finds_events(setup):
+    if setup.finds_events:
         ends = pace if isinstance(pace, np.ndarray) else None
         if not setup.integrator.controls_error:
             ends = mesh(setup.segments, cast(Fraction, pace))

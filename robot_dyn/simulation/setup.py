@@ -23,10 +23,12 @@ from robot_dyn.simulation.asked import asked
 from robot_dyn.simulation.event import Event
 from robot_dyn.simulation.schedule import LEAST_STEPS, Segment, cuts, steps_on
 from robot_dyn.simulation.size import check_segments
-from robot_dyn.simulation.smoothness import finds_events, may_switch
+from robot_dyn.simulation.smoothness import may_switch
+from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.validate import choice, duration, instance, integer, one_state, returned, truth
 from robot_dyn.values import Value
 
+MOST_CUT = 200_000  # steps of a run of fixed step that is cut at events
 ENGINES = ("auto", "interpreted", "compiled")
 _LONGEST_STEP_S, _LEAST_STEPS = 0.01, 200  # where something may switch between steps
 
@@ -100,11 +102,14 @@ class Setup(Value):
             raise QueryError(no_step(self.integrator.name))
         choice("engine", self.engine, ENGINES)
         object.__setattr__(self, "events", _events(self.events))
-        if self.events and not finds_events(self):
-            raise QueryError(f"events: {self.integrator.name} does not look for them; take integrator='DOP853'")
         object.__setattr__(self, "controller", _controller(self.controller, len(names)))
         self._check_model()
         check_segments(self)
+        if self.events and not self.finds_events:
+            raise QueryError(
+                f"events: runs of more than {MOST_CUT} steps of {self.integrator.name} are not cut; take longer steps, or"
+                " integrator='DOP853'"
+            )
         self._check_torques()
         self._check_events()
         self.plant.actuation(np.zeros(len(names)))
@@ -126,6 +131,8 @@ class Setup(Value):
             torques = self.plant.equation_of_motion.torques(0.0, self.q0, self.v0)
             for force, torque in zip(self.plant.forces, torques, strict=True):
                 returned(f"{type(force).__name__}.torque", torque, dynamics.n, error=EffectError)
+                if any(each.of_actuation for each in force.thresholds(dynamics.n)):
+                    raise EffectError(f"{force.name}: thresholds of the actuation are for bounds")
             equation = self.plant.equation_of_motion
             u, z = np.zeros(dynamics.n), np.zeros(equation.state_size)
             u, reached = equation.applied(u, z)
@@ -193,6 +200,14 @@ class Setup(Value):
         )
 
     stretches = former.Attribute("segments")
+
+    @cached_property
+    def finds_events(self) -> bool:
+        """Whether steps end where effects and the controller switch, and at events asked for."""
+        if self.integrator.controls_error:
+            return True
+        equation = StateEquation(self.plant, self.controller, self.integrator.canonical, self.events)
+        return equation.switches and self.steps <= MOST_CUT
 
     @property
     def steps(self) -> int:

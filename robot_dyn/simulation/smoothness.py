@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 STOPS = (JointStopSpring, JointStopDamper)
 _IN_LAYER = 4  # steps within |v| < v_s that show a method's order
 _NEAR_LIMIT = 0.95  # of the effort limit
-MOST_CUT = 200_000  # steps of a run of fixed step that is cut at events
 LOOKS = 4000  # at foreign code, between steps
 _LOOKS = 300  # states at which the actuation is computed
 
@@ -53,18 +52,9 @@ def looked_s(setup: Setup) -> float:
     return setup.duration_s / LOOKS
 
 
-def finds_events(setup: Setup) -> bool:
-    """Whether steps end where effects of this library switch."""
-    if setup.integrator.controls_error:
-        return True
-    n = setup.plant.dynamics.n
-    switches = bool(setup.events) or any(effect.thresholds(n) for effect in setup.plant.effects)
-    return switches and setup.steps <= MOST_CUT
-
-
 def may_switch(setup: Setup) -> bool:
     """Whether something may act between two steps without acting at either."""
-    if finds_events(setup):  # and windows are ends of segments
+    if setup.finds_events:  # and windows are ends of segments
         return bool(foreign(setup))
     effects = setup.plant.effects
     windows = any(0.0 < t < setup.duration_s for effect in effects for t in effect.switches)
@@ -89,9 +79,8 @@ def first_kink(setup: Setup, equation: StateEquation, path: Path) -> tuple[float
     n = equation.plant.dynamics.n
     q, v = path.y[:, :n], equation.velocities(path.y)
     found = [(np.inf, "")]
-    found_by_events = finds_events(setup)
     for effect in () if setup.integrator.controls_error else setup.plant.effects:
-        if isinstance(effect, STOPS) and not found_by_events:
+        if isinstance(effect, STOPS) and not setup.finds_events:
             low, high = extremes(path.t, q, v)
             found.append(_first(path.t, (low < effect.lower) | (high > effect.upper), "a joint touches its stop"))
         elif isinstance(effect, RegularisedCoulombFriction):
@@ -101,7 +90,8 @@ def first_kink(setup: Setup, equation: StateEquation, path: Path) -> tuple[float
             found.append(_first(path.t, crosses, "dry friction reverses within a few steps"))
         elif isinstance(effect, LuGreFriction):
             found.append(_first(path.t, v[:-1] * v[1:] <= 0, "a joint with bristles stands or reverses"))
-    found.append(_saturation(setup, equation, path, q, v))
+    if not setup.finds_events:
+        found.append(_saturation(setup, equation, path, q, v))
     return min(found)
 
 

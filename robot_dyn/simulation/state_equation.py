@@ -17,7 +17,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.control.controller import Controller
-from robot_dyn.effects.effect import Conservative, Stateful
+from robot_dyn.effects.effect import Bound, Conservative, Stateful
 from robot_dyn.effects.equation_of_motion import EquationOfMotion
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import RobotDynError
@@ -26,6 +26,7 @@ from robot_dyn.model.dynamics import acceleration
 from robot_dyn.simulation.event import Event
 
 CONTROL = "control"
+CONTROLLER = -1  # among the parts that switch, beside the numbers of the effects
 
 
 @final
@@ -191,6 +192,38 @@ class StateEquation:
             rates[place] = rate
         result[2 * n + self.states :] = equation.powers(v, u, torques)
         return result, u
+
+    @cached_property
+    def limited(self) -> tuple[int, ...]:
+        """Parts with thresholds of an actuation that changes between ticks: CONTROLLER, and numbers of effects."""
+        if self.controller is None:
+            return ()
+        effects, n = self.plant.effects, self.plant.dynamics.n
+        numbers = self.equation_of_motion.bounds_at_all_times if self.sampled else range(len(effects))
+        bounds = [k for k in numbers if isinstance(effects[k], Bound)]
+        declared = {k: effects[k].thresholds(n) for k in bounds}
+        if not self.sampled:
+            declared = {CONTROLLER: self.controller.thresholds()} | declared
+        return tuple(k for k, of in declared.items() if any(each.of_actuation for each in of))
+
+    @property
+    def switches(self) -> bool:
+        """Whether a part switches at a threshold, or there are events."""
+        parts = self.plant.effects, self.plant.dynamics.n
+        declared = [each for effect in parts[0] for each in effect.thresholds(parts[1])]
+        if self.controller is not None and not self.sampled:
+            declared += self.controller.thresholds()
+        return bool(self.events or self.limited or any(not each.of_actuation for each in declared))
+
+    def demands(self, t: float, q: Array, v: Array, z: Array, held: Array | None, of: tuple[int, ...]) -> list[Array]:
+        """What reaches those parts, (n,) each, which thresholds of the actuation are levels of: as of `limited`."""
+        if not of or self.controller is None:
+            return []
+        state, equation = (t, q, v, z[: self.state_size]), self.equation_of_motion
+        whole = range(len(equation.effects))
+        u, bounds = (call(self.controller.torque, *state), whole) if held is None else (held, None)
+        reached = equation.applied(u, z[self.state_size :], bounds)[1]
+        return [call(self.controller.demand, *state) if k == CONTROLLER else reached[k] for k in of]
 
     def switching(self, t: float, q: Array, v: Array) -> list[Any]:
         """The values of the events, in floats or symbols."""

@@ -136,7 +136,7 @@ def fastest(equation: StateEquation, t: float, y: Array, held: Array | None) -> 
 
     Raises:
         RobotDynError: If the equation has no answer near the state.
-        numpy.linalg.LinAlgError: If its eigenvalues are not found.
+        numpy.linalg.LinAlgError: If its eigenvalues are not found, or the fastest one is defective.
     """
     n, size = equation.plant.dynamics.n, 2 * equation.plant.dynamics.n + equation.states
 
@@ -150,6 +150,8 @@ def fastest(equation: StateEquation, t: float, y: Array, held: Array | None) -> 
     x = right[:, k]
     others, left = np.linalg.eig(J.T)
     w = left[:, np.argmin(np.abs(others - values[k]))]
+    if w @ x == 0:
+        raise np.linalg.LinAlgError(f"the eigenvalue {values[k]:.3g} is defective")
     part = np.abs(w * x)
     joint = int(np.argmax(part[:n] + part[n : 2 * n]))
     with np.errstate(all="ignore"):  # w x = 0 where λ is defective: no part is the largest then

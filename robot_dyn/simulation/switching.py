@@ -1,4 +1,4 @@
-"""Where a state equation switches: thresholds of the effects, events asked for, and what holds on either side."""
+"""Where a state equation switches: thresholds of its parts, events asked for, and what holds on either side."""
 
 from __future__ import annotations
 
@@ -9,80 +9,101 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.effects.plant import Plant
-from robot_dyn.effects.threshold import Threshold
 from robot_dyn.integrate.bernstein import room
 from robot_dyn.simulation.crossings import Switches
 from robot_dyn.simulation.event import Occurrence
-from robot_dyn.simulation.state_equation import StateEquation
+from robot_dyn.simulation.state_equation import CONTROLLER, StateEquation
+from robot_dyn.threshold import Threshold
+
+Quantity = tuple[int, bool]  # a joint, and whether it is its actuation that passes a level
 
 
 @final
 class Switching:
-    """The switching functions of a run.
+    """The switching functions of a run: of coordinates, of the actuation, and the user's own.
 
     Args:
-        equation: The state equation, of effects that switch by themselves, and with events asked for.
-        dropped: Thresholds that are not looked for: there the effects switch by themselves.
+        equation: The state equation, of parts that switch by themselves, and with events asked for.
+        dropped: What is no longer looked at: there the parts switch by themselves.
 
     Attributes:
-        thresholds: Of the effects, each once, E of them; the switching function is the coordinate less the level.
+        thresholds: Those of coordinates, each once, E of them, and then those of the actuation, part by part, A.
     """
 
-    def __init__(self, equation: StateEquation, dropped: frozenset[Threshold] = frozenset()) -> None:
+    def __init__(self, equation: StateEquation, dropped: frozenset[Quantity] = frozenset()) -> None:
         self.equation, self.events, self.dropped = equation, equation.events, dropped
-        n = equation.plant.dynamics.n
-        joints = {each.joint for each in dropped}  # the formulas of a joint hang together
-        self._of = [
-            tuple(
-                each
-                for each in effect.thresholds(n)
-                if each.joint not in joints and not (each.of_velocity and equation.canonical)
-            )
-            for effect in equation.plant.effects
-        ]
-        self.thresholds: tuple[Threshold, ...] = tuple(dict.fromkeys(each for of in self._of for each in of))
+        self._n = n = equation.plant.dynamics.n
+        parts = {k: effect.thresholds(n) for k, effect in enumerate(equation.plant.effects)}
+        if equation.controller is not None and not equation.sampled:
+            parts[CONTROLLER] = equation.controller.thresholds()
+        self._of = {k: tuple(each for each in of if self._looked_for(k, each)) for k, of in parts.items()}
+        coordinates = dict.fromkeys(each for of in self._of.values() for each in of if not each.of_actuation)
+        actuation = [(k, each) for k in equation.limited for each in self._of[k] if each.of_actuation]
+        self.coordinates = len(coordinates)
+        self.thresholds: tuple[Threshold, ...] = (*coordinates, *(each for _, each in actuation))
+        self._parts = (*(None for _ in coordinates), *(k for k, _ in actuation))
         self._known: dict[bytes, StateEquation] = {}
 
-    def at(self, t: float, y: np.ndarray, degree: int, functions: object) -> Switches:
+    def _looked_for(self, part: int, each: Threshold) -> bool:
+        if (each.joint, each.of_actuation) in self.dropped:  # the formulas of a joint hang together
+            return False
+        if each.of_actuation:
+            return part in self.equation.limited
+        return not (each.of_velocity and self.equation.canonical)
+
+    def at(self, t: float, y: np.ndarray, degree: int, functions: object, held: Array | None) -> Switches:
         """The switching functions, their sides those of a state y at t, for dense output of a degree."""
-        n, G = self.equation.plant.dynamics.n, len(self.events)
-        rows = np.array([each.joint + n * each.of_velocity for each in self.thresholds], np.int64)
+        n, E, G = self._n, self.coordinates, len(self.events)
+        rows = np.array([each.joint + n * each.of_velocity for each in self.thresholds[:E]], np.int64)
         levels = np.array([each.level for each in self.thresholds])
-        gaps = y[rows] - levels
+        gaps = y[rows] - levels[:E]
         moving = y[np.where(rows < n, rows + n, rows)]  # on the level itself, where it is going
         sides = np.where(gaps + (gaps == 0) * moving > 0, 1.0, -1.0)
         for i in np.flatnonzero((gaps == 0) & (moving == 0)):  # a stop is touched, and not passed
             sides[i] = 1.0 if self.thresholds[i].falling == "touched" else -1.0
-        values = self.values(t, y)
-        sides = np.append(sides, np.sign(values))  # 0 where y is a root: the next step tells
-        size = np.maximum(1.0, np.abs(levels))
+        place = {k: n * i for i, k in enumerate(self.equation.limited)}
+        actuation = [place[k] + each.joint for k, each in zip(self._parts[E:], self.thresholds[E:], strict=True)]
+        first = n * len(place)
+        values = self.values(t, y, held)
+        gaps = values[actuation] - levels[E:]
+        sides = np.concatenate([sides, np.where(gaps == 0, -np.sign(levels[E:]), np.sign(gaps))])  # a limit is reached
+        sides = np.append(sides, np.sign(values[first:]))  # 0 where y is a root: the next step tells
+        rows = np.concatenate([rows, actuation, first + np.arange(G)]).astype(np.int64)
+        size = np.maximum(1.0, np.abs(levels[:E]))
         return Switches(
-            rows, levels, sides, functions, np.zeros((G, 1)), size, np.zeros(degree + 1),
-            room(degree),
+            rows, np.append(levels, np.zeros(G)), sides, functions, G, np.zeros((len(values), 1)), values,
+            np.zeros(len(values)), size, np.zeros(degree + 1), room(degree),
         )  # fmt: skip
 
-    def values(self, t: float, y: np.ndarray) -> np.ndarray:
-        """The user's switching functions, (G,)."""
-        q, v, _, _ = self.equation.state(y)
-        return np.array(self.equation.switching(t, q, v), dtype=float)
+    def values(self, t: float, y: np.ndarray, held: Array | None) -> np.ndarray:
+        """What reaches each limited part, (n,) each, and the user's switching functions, (G,)."""
+        q, v, z, _ = self.equation.state(y)
+        demands = self.equation.demands(t, q, v, z, held, self.equation.limited)
+        return np.array([*np.ravel(demands), *self.equation.switching(t, q, v)], dtype=float)
 
     def function(self, t: float, y: Array, p: Array, own: Array, out: Array) -> None:
         """The same, as of `evaluate`."""
         x = y[:, 0].copy()
         x.setflags(write=False)
-        out[:, 0] = self.values(t, x)
+        held = own[: self._n, 0].copy() if self.equation.sampled else None
+        out[:, 0] = self.values(min(max(t, p[0]), p[1]), x, held)
 
     def on(self, sides: np.ndarray) -> StateEquation:
         """The state equation with each threshold on its side; smooth there."""
         key = sides[: len(self.thresholds)].tobytes()
         if key not in self._known:
-            of = {each: int(side) for each, side in zip(self.thresholds, sides, strict=False)}
-            plant, n = self.equation.plant, self.equation.plant.dynamics.n
-            effects = [
-                effect.beyond(n, {each: of[each] for each in mine}) if mine else effect
-                for effect, mine in zip(plant.effects, self._of, strict=True)
-            ]
-            self._known[key] = replace(self.equation, plant=Plant(plant.dynamics, effects))
+            of = {
+                (part, each): int(side) for part, each, side in zip(self._parts, self.thresholds, sides, strict=False)
+            }
+            at = {
+                k: {each: of[k if each.of_actuation else None, each] for each in mine} for k, mine in self._of.items()
+            }
+            equation, n = self.equation, self._n
+            effects = [effect.beyond(n, at[k]) if at[k] else effect for k, effect in enumerate(equation.plant.effects)]
+            controller = equation.controller
+            if controller is not None and at.get(CONTROLLER):
+                controller = controller.beyond(at[CONTROLLER])
+            self._known[key] = replace(equation, plant=Plant(equation.plant.dynamics, effects), controller=controller)
         return self._known[key]
 
     def occurrence(self, index: int, t: float, y: np.ndarray, side: float) -> Occurrence:

@@ -17,8 +17,9 @@ from robot_dyn.compiled.cache import default_store
 from robot_dyn.compiled.identity import digest
 from robot_dyn.compiled.llvm import machine_code
 from robot_dyn.compiled.llvm.lock_step import write_function
-from robot_dyn.compiled.parameters import Parameter, joined
+from robot_dyn.compiled.parameters import CONTROLLER, Parameter, Part, joined
 from robot_dyn.compiled.program import Program
+from robot_dyn.control.controller import Controller
 from robot_dyn.effects.effect import Effect
 from robot_dyn.errors import RobotDynError
 from robot_dyn.simulation.machine.jacobian_check import DIFFERENCES, by_differences
@@ -105,9 +106,9 @@ class Machine:
         """The values of the parameters, one row after the other."""
         return joined(self.known)
 
-    def with_effects(self, effects: Sequence[Effect]) -> np.ndarray:
-        """The values of the parameters where the effects have other coefficients."""
-        of = {("effect", i): effect for i, effect in enumerate(effects)}
+    def with_parts(self, effects: Sequence[Effect], controller: Controller | None) -> np.ndarray:
+        """The values of the parameters where effects and controller have other coefficients."""
+        of: dict[Part, Any] = {("effect", i): effect for i, effect in enumerate(effects)} | {CONTROLLER: controller}
         known = [
             replace(each, value=np.broadcast_to(getattr(of[each.part], each.key), each.value.shape))
             if each.part in of
@@ -194,7 +195,9 @@ class Machine:
             yield ours["rate"][m:], u
             yield from zip(np.split(ours["sample"], [m, m + n]), (rate, u, energy), strict=True)
         if "events" in ours:
-            yield ours["events"], np.array(self.equation.switching(t, *self.equation.state(y)[:2]), dtype=float)
+            q, v, z, _ = self.equation.state(y)
+            demands = self.equation.demands(t, q, v, z, held, self.equation.limited)
+            yield ours["events"], np.array([*np.ravel(demands), *self.equation.switching(t, q, v)], dtype=float)
         if "tick" in ours:
             after, command = self.equation.tick(t, y)
             yield ours["tick"][:n], np.asarray(command)

@@ -95,7 +95,9 @@ class OneByOne:
         )
 
         def made(of: StateEquation) -> tuple[Any, np.ndarray]:
-            return code.equations.functions, code.parameters if of is equation else code.with_effects(of.plant.effects)
+            return code.equations.functions, code.parameters if of is equation else code.with_parts(
+                of.plant.effects, of.controller
+            )
 
         run = EventRun(Watch(setup, equation), made, None, code.loop, in_python=code.in_python)
         self.going.add(run)

@@ -32,7 +32,7 @@ def structure(equation: StateEquation) -> tuple[tuple[Any, ...], tuple[Any, ...]
     period = None
     if controller is not None:  # without states, a sampled controller is one whatever its period
         period = controller.period_s if controller.state_size else controller.period_s > 0
-    return (described, period, equation.canonical), tuple(objects)
+    return (described, period, equation.canonical, equation.limited), tuple(objects)
 
 
 def _of(value: Any, objects: list[Any]) -> Any:

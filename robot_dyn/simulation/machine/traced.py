@@ -66,8 +66,11 @@ def trace(
         made["sample"] = np.concatenate(
             [rate, parts["u"], parts["energy"]] if single else [parts[x] for x in kept] or [[]]
         )
-        if equation.events:
-            made["events"] = np.concatenate([_value(event, time, q, v) for event in equation.events])
+        if single and (equation.events or equation.limited):
+            held_here = owns[:held].view(Symbols) if equation.sampled else None
+            demands = symbolic.demands(time, q, v, z, held_here, equation.limited)
+            values = [wide(each, n) for each in demands] + [_value(each, time, q, v) for each in equation.events]
+            made["events"] = np.concatenate(values)
         if equation.sampled and symbolic.controller is not None:
             after = z[: equation.state_size]
             if equation.state_size:

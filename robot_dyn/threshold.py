@@ -1,4 +1,4 @@
-"""Levels of the state at which an effect switches from one smooth formula to another."""
+"""Levels at which an effect, or a controller, switches from one smooth formula to another."""
 
 from __future__ import annotations
 
@@ -14,17 +14,18 @@ _MOST = 10**6  # joints
 @final
 @dataclass(frozen=True)
 class Threshold:
-    """A level of the position or the velocity of a joint.
+    """A level of the position or the velocity of a joint, or of its actuation.
 
     Attributes:
         joint: Its index.
-        level: In [rad] or [m], or [rad/s] or [m/s].
+        level: In [rad] or [m], [rad/s] or [m/s], or [N m] or [N].
         name: What it is, as "upper stop".
         rising, falling: What happens where the coordinate grows through it, or falls, as "touched" and "left".
         of_velocity: Whether the velocity passes it.
+        of_actuation: Whether the actuation passes it: what reaches a bound, or what a controller asks for.
 
     Raises:
-        EffectError: If an attribute is of another type, or the level is not finite.
+        EffectError: If an attribute is of another type, the level is not finite, or it is of both.
     """
 
     joint: int
@@ -33,10 +34,14 @@ class Threshold:
     rising: str
     falling: str
     of_velocity: bool = False
+    of_actuation: bool = False
 
     def __post_init__(self) -> None:
         integer("joint", self.joint, most=_MOST, error=EffectError)
         object.__setattr__(self, "level", number("level", self.level, error=EffectError))
         for name in ("name", "rising", "falling"):
             instance(name, getattr(self, name), str, "give a text", error=EffectError)
-        truth("of_velocity", self.of_velocity, error=EffectError)
+        for name in ("of_velocity", "of_actuation"):
+            truth(name, getattr(self, name), error=EffectError)
+        if self.of_velocity and self.of_actuation:
+            raise EffectError(f"{self.name}: a threshold is of the velocity or of the actuation, not of both")
