@@ -53,7 +53,6 @@ if TYPE_CHECKING:
     from robot_dyn.effects.lugre import LuGreFriction as LuGreFriction
     from robot_dyn.effects.plant import Plant as Plant
     from robot_dyn.effects.spring import Spring as Spring
-    from robot_dyn.threshold import Threshold as Threshold
     from robot_dyn.effects.wrench import ExternalWrench as ExternalWrench
     from robot_dyn.errors import ModelWarning as ModelWarning
     from robot_dyn.errors import RobotDynError as RobotDynError
@@ -79,6 +78,7 @@ if TYPE_CHECKING:
     from robot_dyn.simulation.setup import Setup as Setup
     from robot_dyn.simulation.simulate import simulate as simulate
     from robot_dyn.simulation.trajectory import Trajectory as Trajectory
+    from robot_dyn.threshold import Threshold as Threshold
     from robot_dyn.view.plots import plot as plot
     from robot_dyn.view.plots import save_plot as save_plot
     from robot_dyn.view.replay import replay as replay

@@ -2,7 +2,7 @@
 
     sat(u) = c + min(max(u − c, −l), l)
 
-With c = 0 and l = u_max it is the bound itself. With l = inf u passes, and with l = −u_max it is the constant c − u_max.
+With c = 0 and l = u_max it is the bound itself; with l = inf u passes; with l = −u_max it is the constant c − u_max.
 """
 
 from __future__ import annotations

@@ -35,10 +35,7 @@ NOMINAL = ARM.with_(payload=rd.Payload(ARM_TIP, 1.0))
 EVERYTHING = ("q", "v", "u", "energy", "work")
 
 
-@pytest.fixture(autouse=True)
-def uncut(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Single runs of fixed steps are not cut at effort limits and stops, as runs in lock step are not."""
-    monkeypatch.setattr(rd.Setup, "finds_events", property(lambda setup: setup.integrator.controls_error))
+pytestmark = pytest.mark.usefixtures("uncut")
 
 
 def starts(count: int, spread: float = 0.3) -> np.ndarray:

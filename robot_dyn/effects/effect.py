@@ -15,9 +15,9 @@ from typing import Any, ClassVar
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.coefficients import check_coefficients, declared
-from robot_dyn.threshold import Threshold
 from robot_dyn.errors import EffectError
 from robot_dyn.model.dynamics import Dynamics
+from robot_dyn.threshold import Threshold
 from robot_dyn.values import Value
 
 

@@ -14,7 +14,6 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.threshold import Threshold
 from robot_dyn.errors import OverflowedError, RobotDynError
 from robot_dyn.foreign import is_mistake
 from robot_dyn.integrate import hermite
@@ -37,6 +36,7 @@ from robot_dyn.simulation.switching import Switching
 from robot_dyn.simulation.time_loop import Ended, Functions, Now, Rules
 from robot_dyn.simulation.trajectory import Ending, Outcome
 from robot_dyn.simulation.watch import DivergedError, Watch, one_step
+from robot_dyn.threshold import Threshold
 
 _SAMPLES = 1000  # of a run without a record period
 _COMPARED = 1000  # times at which a run is compared with runs of other tolerances

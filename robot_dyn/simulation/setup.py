@@ -107,8 +107,8 @@ class Setup(Value):
         check_segments(self)
         if self.events and not self.finds_events:
             raise QueryError(
-                f"events: runs of more than {MOST_CUT} steps of {self.integrator.name} are not cut; take longer steps, or"
-                " integrator='DOP853'"
+                f"events: runs of more than {MOST_CUT} steps of {self.integrator.name} are not cut; take longer steps,"
+                " or integrator='DOP853'"
             )
         self._check_torques()
         self._check_events()

@@ -41,7 +41,7 @@ class Switching:
         actuation = [(k, each) for k in equation.limited for each in self._of[k] if each.of_actuation]
         self.coordinates = len(coordinates)
         self.thresholds: tuple[Threshold, ...] = (*coordinates, *(each for _, each in actuation))
-        self._parts = (*(None for _ in coordinates), *(k for k, _ in actuation))
+        self._parts: tuple[int | None, ...] = (*(None for _ in coordinates), *(k for k, _ in actuation))
         self._known: dict[bytes, StateEquation] = {}
 
     def _looked_for(self, part: int, each: Threshold) -> bool:
@@ -61,7 +61,7 @@ class Switching:
         sides = np.where(gaps + (gaps == 0) * moving > 0, 1.0, -1.0)
         for i in np.flatnonzero((gaps == 0) & (moving == 0)):  # a stop is touched, and not passed
             sides[i] = 1.0 if self.thresholds[i].falling == "touched" else -1.0
-        place = {k: n * i for i, k in enumerate(self.equation.limited)}
+        place: dict[int | None, int] = {k: n * i for i, k in enumerate(self.equation.limited)}
         actuation = [place[k] + each.joint for k, each in zip(self._parts[E:], self.thresholds[E:], strict=True)]
         first = n * len(place)
         values = self.values(t, y, held)
@@ -92,7 +92,7 @@ class Switching:
         """The state equation with each threshold on its side; smooth there."""
         key = sides[: len(self.thresholds)].tobytes()
         if key not in self._known:
-            of = {
+            of: dict[tuple[int | None, Threshold], int] = {
                 (part, each): int(side) for part, each, side in zip(self._parts, self.thresholds, sides, strict=False)
             }
             at = {
