@@ -107,7 +107,7 @@ class EventRun(Followed):
         self.stepper, self.control = _method(setup, equation)
         self.switching = Switching(equation)
         if not thresholds:
-            self.switching = Switching(equation, frozenset(self.switching.thresholds))
+            self.switching = Switching(equation, self.switching.quantities)
         self.functions, parameters = made(equation)
         own = np.concatenate([np.full(held, np.nan), parameters])[:, None]
         self.runs = runs_of(self.start[:, None], own, n, held, equation.state_size, m + n + 2)

@@ -44,6 +44,11 @@ class Switching:
         self._parts: tuple[int | None, ...] = (*(None for _ in coordinates), *(k for k, _ in actuation))
         self._known: dict[bytes, StateEquation] = {}
 
+    @property
+    def quantities(self) -> frozenset[Quantity]:
+        """All that pass a threshold."""
+        return frozenset((each.joint, each.of_actuation) for each in self.thresholds)
+
     def _looked_for(self, part: int, each: Threshold) -> bool:
         if (each.joint, each.of_actuation) in self.dropped:  # the formulas of a joint hang together
             return False
