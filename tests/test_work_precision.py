@@ -97,13 +97,15 @@ def test_chaotic_motion_is_cut_where_references_part() -> None:
     """
     setup = rd.Setup(rd.Plant(rd.load("planar_2r")), [2.4, 0.9], [0.3, -0.5], 60.0, engine="compiled")
     cut, truth = reference(whole(setup), Budget(1e3))
-    assert truth.parted_s is not None and truth.horizon_s == cut.duration_s < 40.0
+    assert truth.parted_s is not None and truth.lost_s is not None
+    assert truth.horizon_s == cut.duration_s <= truth.parted_s < truth.lost_s < 40.0
     runs = [
         rd.simulate(setup, integrator="order_8", step_s=step, record_period_s=1.0, estimate_error=False)
         for step in (1e-3, 5e-4)
     ]
     apart = np.abs(runs[0].q - runs[1].q).max(axis=1)
     assert apart[runs[0].t <= truth.horizon_s].max() < 1e-6 < 1.0 < apart.max()
+    assert truth.error < 1e-8
 
 
 def test_a_motion_without_reference_is_refused() -> None:
@@ -181,6 +183,8 @@ def test_the_sentence_marks_what_is_extrapolated() -> None:
     peer = of("Other RK", points(1e-4, 1e-6, 1e-8, each_s=0.5), engine="")
     said = invented(fast, slow, peer).sentence()
     assert said == "6 digits of q over 1 s: DOP853 2.8 ms; Other RK 1 s; explicit_euler would take 10 s (extrapolated)"
+    quick = of("Other RK", points(1e-4, 1e-6, 1e-8), engine="")
+    assert invented(fast, quick).sentence() == "6 digits of q over 1 s: Other RK 2 ms; DOP853 2.8 ms"
     assert invented(slow).sentence(3) == "3 digits of q were reached by no run"
     assert in_words(0.00031) == "310 µs" and in_words(7200.0) == "2 h"
 
@@ -219,6 +223,15 @@ def test_mujoco_makes_the_same_error_by_the_same_method() -> None:
 def test_programs_that_cannot_do_a_scene_are_left_out_with_the_reason() -> None:
     peers, why = found(recorded(whole(swing()), 0.5))
     assert not peers and "free motion" in why[0]
+
+
+def test_a_program_that_cannot_be_imported_is_left_out(monkeypatch) -> None:
+    def broken(_: object) -> list[Candidate]:
+        raise ImportError("no library")
+
+    monkeypatch.setattr("robot_dyn.accuracy.peers.PEERS", {"scipy": broken})
+    setup = recorded(whole(rd.Setup(rd.Plant(rd.load("pendulum")), [0.3])), 0.1)
+    assert found(setup) == ([], ["scipy: cannot be imported (no library)"])
 
 
 def test_json_and_csv_hold_the_runs(tmp_path) -> None:

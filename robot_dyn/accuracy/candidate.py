@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from math import ceil, gcd
+from math import ceil, gcd, inf
 from time import perf_counter
 from typing import Any, final
 
@@ -34,6 +34,7 @@ _ON_TIME = 1e-9  # of the record period: times that differ by less are one
 _MOST_STEPS = 10**8
 _HIGH = 5  # order from which twice as many steps leave a gap in a ladder
 _LOOSEST, _TIGHTEST = 2, 13  # tolerances 10⁻ᵏ
+_WARM = 64  # part of the record period, of steps that load machine code
 _UNKNOWN = 15  # an order, of a method that chooses its own
 _ATOL = 1e-2  # absolute tolerance, of the relative one, as of `Adaptive`
 ORDERS = {"DOP853": 8, "Rosenbrock": 5}  # of methods that choose their steps
@@ -67,6 +68,7 @@ class Candidate:
         method, engine, events, order, by: As of `Ladder`.
         settings: From coarse to fine.
         run: Runs one of them, within a limit of time.
+        warm: Loads what its runs need.
     """
 
     method: str
@@ -76,6 +78,7 @@ class Candidate:
     by: str
     settings: Callable[[], Iterator[float]]
     run: Callable[[float, Limit], Run]
+    warm: Callable[[], object] = tuple
 
     def growth(self, before: float, after: float) -> float:
         """By which the cost grows, about, from one setting to the next."""
@@ -137,6 +140,10 @@ def own(setup: Setup, made: Any, engine: str, events: bool = True) -> Candidate:
         engine: "compiled" or "interpreted".
         events: Whether steps end at the thresholds of the effects.
     """
+
+    def warm() -> None:
+        warmed(replace(setup, integrator=made, engine=engine))
+
     if made.controls_error:
         order = ORDERS.get(made.name)
 
@@ -147,7 +154,7 @@ def own(setup: Setup, made: Any, engine: str, events: bool = True) -> Candidate:
             changed = replace(setup, integrator=replace(made, rtol=rtol, atol=_ATOL * rtol), engine=engine)
             return timed(changed, limit, events)
 
-        return Candidate(made.name, engine, events, order, "tolerance", tolerances, tight)
+        return Candidate(made.name, engine, events, order, "tolerance", tolerances, tight, warm)
 
     def steps() -> Iterator[float]:
         before = 0
@@ -163,7 +170,7 @@ def own(setup: Setup, made: Any, engine: str, events: bool = True) -> Candidate:
     def short(step: float, limit: Limit) -> Run:
         return timed(replace(setup, integrator=made, step_s=step, engine=engine), limit, events)
 
-    return Candidate(made.name, engine, events, made.order, "step", steps, short)
+    return Candidate(made.name, engine, events, made.order, "step", steps, short, warm)
 
 
 def step_ladder(period_s: float, order: int) -> Iterator[float]:
@@ -174,6 +181,13 @@ def step_ladder(period_s: float, order: int) -> Iterator[float]:
         if parts > before:
             yield period_s / parts
         before, k = parts, k + 1
+
+
+def warmed(setup: Setup) -> None:
+    """A run of one step or a few, which loads the machine code that the setup needs."""
+    step = setup.record_period_s / _WARM
+    setup = setup if setup.integrator.controls_error else replace(setup, step_s=step)
+    timed(replace(setup, duration_s=2 * step, record_period_s=step), Limit(inf))
 
 
 def timed(setup: Setup, limit: Limit, events: bool = True) -> Run:

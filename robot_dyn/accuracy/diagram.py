@@ -96,11 +96,20 @@ def draw(result: WorkPrecision, theme: str = "light") -> Figure:
         raise DiagramError("no run ended, so there is nothing to draw; look at left_out")
     figure = Figure(figsize=(_WIDTH, _HEIGHT), facecolor=colours["paper"])
     grid = figure.add_gridspec(
-        3, 2, width_ratios=(2.1, 1), left=0.065, right=0.985, top=0.83, bottom=0.2, hspace=0.62, wspace=0.17
+        3, 2, width_ratios=(2.1, 1), left=0.065, right=0.985, top=0.845, bottom=0.195, hspace=0.62, wspace=0.17
     )
     ink = {"color": colours["ink"], "parse_math": False}
-    figure.text(0.012, 0.975, _lines(fill(result.sentence(), _SENTENCE)), fontsize=12.5, weight="bold", va="top", **ink)
-    figure.text(0.012, 0.905, _lines(_caption(result)), fontsize=8.5, va="top", linespacing=1.4, **ink)
+    said = fill(result.sentence(), _SENTENCE)
+    figure.text(0.012, 0.975, _lines(said), fontsize=12.5, weight="bold", va="top", **ink)
+    figure.text(
+        0.012,
+        0.945 - 0.027 * said.count("\n"),
+        _lines(_caption(result)),
+        fontsize=8.5,
+        va="top",
+        linespacing=1.4,
+        **ink,
+    )
     first = [each for each in result.ladders if each.events and (each.peer or each.engine != INTERPRETED)]
     first = first if any(not each.peer for each in first) else list(result.ladders)
     own = [each for each in first if not each.peer]
@@ -118,8 +127,8 @@ def draw(result: WorkPrecision, theme: str = "light") -> Figure:
     _legend(figure, first, without, colours)
     small = [figure.add_subplot(grid[k, 1]) for k in range(3)]
     _axes(small[0], result, colours, "evaluations of the equation of motion", "Error over evaluations")
-    for each in [each for each in first if any(p.evaluations for p in each.points)]:
-        _curve(small[0], each, colours, lambda p: p.evaluations, lambda p: p.error, 0.6)
+    for each in [each for each in first + without if any(p.evaluations for p in each.points)]:
+        _curve(small[0], each, colours, lambda p: p.evaluations, lambda p: p.error, 0.6, dashed=not each.events)
     _axes(small[1], result, colours, "error of q", "Energy residual, as a part of what was exchanged")
     for each in own:
         _curve(small[1], each, colours, lambda p: p.error, lambda p: p.energy, 0.6)

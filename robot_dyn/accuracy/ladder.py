@@ -16,6 +16,7 @@ import numpy as np
 
 COMPILED, INTERPRETED = "compiled", "interpreted"
 _RESOLVED = 0.1  # [rad] or [m]: runs with larger errors show no order
+_MORE = 1.1  # times the steps: with fewer, stability and not accuracy chose them
 _ABOVE = 10.0  # times the error of the reference: nearer to it, an error is partly that of the reference
 
 
@@ -100,7 +101,7 @@ class Ladder:
         slopes = [
             float(np.log(a.error / b.error) / np.log(b.steps / a.steps))
             for a, b in pairwise(shown)
-            if a.steps and b.steps and b.steps > a.steps
+            if a.steps and b.steps and b.steps >= _MORE * a.steps
         ]
         return median(slopes) if len(slopes) > 1 else None
 

@@ -16,6 +16,7 @@ from robot_dyn.accuracy.reference_run import Reference
 from robot_dyn.errors import RobotDynError
 
 _PART = {COMPILED: 1 / 400, INTERPRETED: 1 / 150, "": 1 / 200}  # of the budget, for one run
+_LATE = 3  # runs of a ladder that may take longer than that
 _HARD = 10.0  # times that, for a run that takes longer than was foreseen
 
 
@@ -37,7 +38,7 @@ class Walk:
 
     candidate: Candidate
     rungs: list[Rung] = field(default_factory=list)
-    ended: str = "there is no finer setting"
+    ended: str = ""
 
     @property
     def name(self) -> str:
@@ -83,24 +84,30 @@ def measured(
 
 def _walk(walk: Walk, reference: Reference, budget: Budget) -> None:
     """Run from coarse to fine, until the error of the reference is reached or the next run would take too long."""
-    candidate, longest, before = walk.candidate, walk.longest(budget), None
+    candidate, longest, before = walk.candidate, walk.longest(budget), 0.0
+    late = 0
     for setting in candidate.settings():
         if budget.left <= 0:
             walk.ended = f"the budget of {budget.seconds:g} s ended"
             return
-        if before is not None and isfinite(walk.rungs[-1].error):
+        if walk.rungs and isfinite(walk.rungs[-1].error):
             foreseen = candidate.growth(before, setting) * walk.rungs[-1].times[0]
             if foreseen > longest:
                 walk.ended = f"a finer run would take more than {longest:.2g} s"
                 return
         budget.tell(f"{walk.name}, {candidate.by} {setting:.3g}")
         try:
-            if before is None:
+            if not before:
+                budget.tell(f"{walk.name}: loading")
                 with budget.apart():  # what is compiled or loaded once
-                    candidate.run(setting, Limit(_HARD * longest))
+                    candidate.warm()
+            before = setting
             run = candidate.run(setting, Limit(_HARD * longest))
         except OvertimeError:
             walk.ended = f"a run with {candidate.by} {setting:.3g} takes more than {_HARD * longest:.2g} s"
+            late += 1
+            if late < _LATE and not any(isfinite(each.error) for each in walk.rungs):
+                continue  # steps that are too long may bring forth a motion that takes longer
             return
         except RobotDynError as error:
             walk.ended = str(error)
@@ -110,7 +117,7 @@ def _walk(walk: Walk, reference: Reference, budget: Budget) -> None:
         if error <= reference.error:
             walk.ended = "the error of the reference is reached"
             return
-        before = setting
+    walk.ended = "there is no finer setting"
 
 
 def _again(walk: Walk, rung: Rung, budget: Budget) -> None:

@@ -12,7 +12,7 @@ from typing import final
 import numpy as np
 
 from robot_dyn.accuracy.budget import Budget, Limit, OvertimeError
-from robot_dyn.accuracy.candidate import Run, common, recorded, step_ladder, timed
+from robot_dyn.accuracy.candidate import Run, common, recorded, step_ladder, timed, warmed
 from robot_dyn.accuracy.ladder import COMPILED, INTERPRETED
 from robot_dyn.errors import RobotDynError
 from robot_dyn.integrate.adaptive import Adaptive
@@ -26,6 +26,7 @@ _STAGNANT = 0.3  # decades that twice as many steps must win
 _ORDERLY = 1e-6  # distance at the first record, from which on that is judged
 _ENOUGH = {COMPILED: 0.0, INTERPRETED: 1e-12}  # distance that need not be less: where shorter steps take seconds
 _ROUGH, _ROUGHLY = 1e-11, 1e-6  # a tolerance, and where its run parts from the first one: beyond, nothing is resolved
+_LOST = 0.1  # [rad] or [m]: runs that far apart have nothing in common
 _LEAST = 1e-3  # of the duration: a horizon that is shorter shows nothing
 _ULPS = 4.0  # of rounding in any position
 _FIRST = (Adaptive("DOP853", 3e-14, 1e-15), Adaptive("Rosenbrock", 1e-12, 1e-14))
@@ -48,8 +49,9 @@ class Reference(Value):
         error: Distance of the two runs, in [rad] or [m]: no error below it is believed.
         methods: What made them, the one that q is of first.
         horizon_s: Time up to which it reaches, in [s].
-        parted_s: Time at which the two differed by 1e-9 of the positions, in [s], if that ended the horizon.
-        lost_s: Time at which they differed by a tenth, in [s]; None if it was not reached.
+        parted_s: Time at which they, or runs at tolerances of 3e-14 and 1e-11, parted, in [s]: it ends the horizon;
+            None if they did not.
+        lost_s: Time at which the latter differed by 0.1 rad or m, in [s]; None if they did not.
     """
 
     t: np.ndarray
@@ -79,12 +81,13 @@ def reference(setup: Setup, budget: Budget) -> tuple[Setup, Reference]:
     while True:
         setup = recorded(setup, setup.duration_s)
         first, run, q = _first(setup, budget)
-        if parted is None and (rough := _rough_end(setup, run, q, budget)) is not None:
-            setup, parted = replace(setup, duration_s=rough, record_period_s=0.0), rough
-            continue
+        if parted is None:
+            parted, lost = _rough_ends(setup, run, q, budget)
+            if parted is not None:
+                setup = replace(setup, duration_s=parted, record_period_s=0.0)
+                continue
         second, t, distance, refined = _second(setup, run, q, budget)
         size = max(1.0, float(np.abs(q).max()))
-        lost = _passes(t, distance, 0.1) or lost
         end = _passes(t, distance, size * (_PARTED if refined else _COARSE))
         if end is None:
             error = max(float(distance.max()), _ULPS * np.finfo(float).eps * size)
@@ -105,7 +108,7 @@ def _first(setup: Setup, budget: Budget) -> tuple[str, np.ndarray, np.ndarray]:
         budget.tell(f"reference: {words}")
         try:
             with budget.apart():
-                timed(_warm(replace(setup, integrator=each)), Limit(_longest(budget)))
+                warmed(replace(setup, integrator=each))
             run = timed(replace(setup, integrator=each), Limit(_longest(budget)))
         except OvertimeError:
             continue
@@ -117,13 +120,16 @@ def _first(setup: Setup, budget: Budget) -> tuple[str, np.ndarray, np.ndarray]:
     )
 
 
-def _rough_end(setup: Setup, t: np.ndarray, q: np.ndarray, budget: Budget) -> float | None:
-    """Where a run with a looser tolerance parts from the first one; None if it does not."""
+def _rough_ends(setup: Setup, t: np.ndarray, q: np.ndarray, budget: Budget) -> tuple[float | None, float | None]:
+    """When a run with a looser tolerance parts from the first one, and when nothing is left; None if it does not."""
     try:
         run = timed(replace(setup, integrator=Adaptive("DOP853", _ROUGH, _ROUGH)), Limit(_longest(budget)))
     except OvertimeError:
-        return None
-    return None if run.q is None else _passes(*_distance(t, q, run), _ROUGHLY * max(1.0, float(np.abs(q).max())))
+        return None, None
+    if run.q is None:
+        return None, None
+    times, distance = _distance(t, q, run)
+    return _passes(times, distance, _ROUGHLY * max(1.0, float(np.abs(q).max()))), _passes(times, distance, _LOST)
 
 
 def _longest(budget: Budget) -> float:
@@ -151,7 +157,7 @@ def _refined(
     """Runs with ever shorter steps, until these win nothing or take too long."""
     made, before, limit = method(name), np.inf, _longest(budget)
     with budget.apart():
-        timed(_warm(replace(setup, integrator=made)), Limit(limit))
+        warmed(replace(setup, integrator=made))
     for step in step_ladder(setup.record_period_s, 1):
         words = f"{name}, step {step:.3g} s"
         budget.tell(f"reference: {words}")
@@ -168,11 +174,6 @@ def _refined(
             before = size if distance[1] < _ORDERLY else np.inf
         if 2 * run.time_s > limit:
             return
-
-
-def _warm(setup: Setup) -> Setup:
-    """A short run, which loads the machine code that the setup needs."""
-    return replace(setup, duration_s=setup.record_period_s)
 
 
 def _distance(t: np.ndarray, q: np.ndarray, run: Run) -> tuple[np.ndarray, np.ndarray]:

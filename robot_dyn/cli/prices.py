@@ -58,10 +58,10 @@ def work_precision_tables(result: WorkPrecision) -> Iterator[Any]:
         f" reference: {of.methods[0]}, {of.error:.1e} from {of.methods[1]}: no error below that is believed"
     )
     if of.parted_s is not None:
-        lost = "" if of.lost_s is None else f", and by a tenth at {of.lost_s:.3g} s"
+        lost = "" if of.lost_s is None else f", and differ by 0.1 at {of.lost_s:.3g} s"
         yield (
-            f"horizon: {of.horizon_s:g} s of {result.duration_s:g} s: two methods at tight tolerances differ by 1e-9"
-            f" from there on{lost}"
+            f"horizon: {of.horizon_s:g} s of {result.duration_s:g} s: beyond it runs at tight tolerances part from each"
+            f" other{lost}"
         )
     columns = [digits for digits in _DIGITS if 10.0**-digits >= of.error]
     table = Table(box=None, pad_edge=False, header_style="bold")

@@ -12,6 +12,7 @@ from typing import Any
 from robot_dyn.accuracy.candidate import Candidate
 from robot_dyn.accuracy.peers import drake, heyoka, mujoco, scipy
 from robot_dyn.accuracy.peers.free_motion import FreeMotion, PeerError
+from robot_dyn.errors import shorten
 from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.setup import Setup
 
@@ -36,4 +37,6 @@ def found(setup: Setup) -> tuple[list[Candidate], list[str]]:
             made += PEERS[name](motion)
         except PeerError as error:
             left_out.append(f"{name}: {error}")
+        except ImportError as error:
+            left_out.append(f"{name}: cannot be imported ({shorten(error, 200)})")
     return made, left_out

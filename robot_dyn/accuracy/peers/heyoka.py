@@ -21,7 +21,7 @@ _TOLERANCES = (1e-6, 1e-10, 1e-14)  # each is compiled by itself, which takes ma
 
 
 def candidates(motion: FreeMotion) -> list[Candidate]:
-    """Its Taylor method; compiled when it first runs."""
+    """Its Taylor method."""
     hy: Any = import_module("heyoka")
     setup, n = motion.setup, motion.robot.n
     machine, _ = choose(setup, StateEquation(setup.plant, None))
@@ -35,11 +35,12 @@ def candidates(motion: FreeMotion) -> list[Candidate]:
     def tolerances() -> Iterator[float]:
         yield from _TOLERANCES
 
+    def warm() -> None:
+        system = list(zip(names, rates, strict=True))
+        for tolerance in _TOLERANCES:
+            made[tolerance] = hy.taylor_adaptive(system, start.tolist(), tol=tolerance, compact_mode=True)
+
     def run(tolerance: float, limit: Limit) -> Run:
-        if not made:
-            system = list(zip(names, rates, strict=True))
-            of = {each: hy.taylor_adaptive(system, start.tolist(), tol=each, compact_mode=True) for each in _TOLERANCES}
-            made.update(of)
         integrator = made[tolerance]
         integrator.time = 0.0
         integrator.state[:] = start
@@ -49,7 +50,7 @@ def candidates(motion: FreeMotion) -> list[Candidate]:
         limit(motion.times[-1])
         return motion.run(y[:, :n], y[:, n:], steps, None, spent)
 
-    return [Candidate("heyoka, Taylor", "", True, None, "tolerance", tolerances, run)]
+    return [Candidate("heyoka, Taylor", "", True, None, "tolerance", tolerances, run, warm)]
 
 
 def _in_heyoka(hy: Any, program: Program, y: list[Any], parameters: np.ndarray) -> list[Any]:
