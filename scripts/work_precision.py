@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from robot_dyn.scene.starters import starter
 
 PICTURES = Path(__file__).parents[1] / "docs" / "pictures"
 SCENES = ("pendulum", "double_pendulum", "ur5_pd", "panda", "flyball_governor", "stops")
+LONGEST_S = 3.0
 READY = np.array([0.3, 0.6, -0.4, -1.2, 0.5, 1.1, 0.2])
 
 
@@ -29,7 +31,8 @@ def setup(name: str) -> rd.Setup:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"{name}.toml"
         path.write_text(starter(name), encoding="utf-8")
-        return rd.read_scene(path)
+        made = rd.read_scene(path)
+    return replace(made, duration_s=min(made.duration_s, LONGEST_S))
 
 
 if __name__ == "__main__":

@@ -16,6 +16,7 @@ from robot_dyn.accuracy.reference_run import Reference
 from robot_dyn.errors import RobotDynError
 
 _PART = {COMPILED: 1 / 400, INTERPRETED: 1 / 150, "": 1 / 200}  # of the budget, for one run
+_SHORT = 1 / 3000  # of the budget: runs that are timed again before the longer ones
 _LATE = 3  # runs of a ladder that may take longer than that
 _HARD = 10.0  # times that, for a run that takes longer than was foreseen
 
@@ -70,13 +71,15 @@ def measured(
     try:
         for each in walks:
             _walk(each, reference, budget)
-        for k in range(repeats - 1):
-            for each in walks:
-                budget.tell(f"round {k + 2}: {each.name}")
-                for rung in each.rungs:
+        runs = [(each, rung) for each in walks for rung in each.rungs if isfinite(rung.error)]
+        short = [(each, rung) for each, rung in runs if rung.times[0] <= _SHORT * budget.seconds]
+        for among in (short, [each for each in runs if each not in short]):  # short ones are lost in noise most easily
+            for k in range(repeats - 1):
+                for walk, rung in among:
                     if budget.left <= 0:
                         return walks, False
-                    _again(each, rung, budget)
+                    budget.tell(f"round {k + 2}: {walk.name}")
+                    _again(walk, rung, budget)
     except KeyboardInterrupt:
         return walks, True
     return walks, False

@@ -26,6 +26,7 @@ _STAGNANT = 0.3  # decades that twice as many steps must win
 _ORDERLY = 1e-6  # distance at the first record, from which on that is judged
 _ENOUGH = {COMPILED: 0.0, INTERPRETED: 1e-12}  # distance that need not be less: where shorter steps take seconds
 _ROUGH, _ROUGHLY = 1e-11, 1e-6  # a tolerance, and where its run parts from the first one: beyond, nothing is resolved
+_LATE = 3  # runs of one method that may take too long
 _LOST = 0.1  # [rad] or [m]: runs that far apart have nothing in common
 _LEAST = 1e-3  # of the duration: a horizon that is shorter shows nothing
 _ULPS = 4.0  # of rounding in any position
@@ -155,7 +156,7 @@ def _refined(
     setup: Setup, name: str, t: np.ndarray, q: np.ndarray, budget: Budget
 ) -> Iterator[tuple[str, np.ndarray, np.ndarray, bool]]:
     """Runs with ever shorter steps, until these win nothing or take too long."""
-    made, before, limit = method(name), np.inf, _longest(budget)
+    made, before, limit, late = method(name), np.inf, _longest(budget), 0
     with budget.apart():
         warmed(replace(setup, integrator=made))
     for step in step_ladder(setup.record_period_s, 1):
@@ -164,7 +165,10 @@ def _refined(
         try:
             run = timed(replace(setup, integrator=made, step_s=step), Limit(limit))
         except OvertimeError:
-            return
+            late += 1
+            if late == _LATE:
+                return
+            continue  # steps that are too long may bring forth a motion that takes longer
         if run.q is not None:
             times, distance = _distance(t, q, run)
             size = float(np.log10(np.maximum(distance[1:], 1e-17)).mean())
@@ -172,8 +176,8 @@ def _refined(
             refined |= bool(distance.max() < _ENOUGH[setup.engine])
             yield words, times, distance, refined
             before = size if distance[1] < _ORDERLY else np.inf
-        if 2 * run.time_s > limit:
-            return
+            if 2 * run.time_s > limit:
+                return
 
 
 def _distance(t: np.ndarray, q: np.ndarray, run: Run) -> tuple[np.ndarray, np.ndarray]:
