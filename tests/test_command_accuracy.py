@@ -21,7 +21,7 @@ q = [0.4, 0.9]
 [[effect]]
 kind = "gravity"
 """
-FEW = ("--method", "rk4", "--method", "explicit_euler", "--budget", "3", "--no-peers")
+FEW = ("--method", "rk4", "--method", "explicit_euler", "--repeats", "1", "--no-peers")
 
 
 @pytest.fixture

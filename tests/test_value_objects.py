@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
+from robot_dyn.accuracy.reference_run import Reference
 
 ARM = rd.load("planar_2r")
 Q = np.array([0.3, -0.4])
@@ -27,7 +28,6 @@ def values() -> dict[str, Any]:
     """One of each public class, by its name, and of the values that they hold."""
     plant = rd.Plant(ARM, [rd.ViscousFriction([0.1, 0.2])])
     options: Any = {"duration_s": 0.05, "controller": rd.PD(PLAN, 10.0, 1.0), "integrator": "rk4", "step_s": 0.01}
-    options["engine"] = "interpreted"
     setup = rd.Setup(plant, Q, **options)
     run, runs = rd.simulate(setup), rd.rollouts(setup, q0=[Q, Q + 0.1], params={"kp": [1.0, 2.0]})
     spring, damper = rd.joint_stops([-1.0, -1.0], [1.0, 1.0])
@@ -44,7 +44,7 @@ def values() -> dict[str, Any]:
         rd.Samples([0.0, 1.0, 2.0], np.ones((3, 2))), LINE,
         setup, run, runs, run.ledger, run.error, run.statistics, run.outcome, ARM.couplings, ARM.edits,
         rd.task_dynamics(ARM, Q, Q, "tip", rows=(0, 2)), rd.method("rk4"), rd.method("gauss_4"), rd.method("sdirk_3"),
-        rd.work_precision(setup, methods=["rk4"], budget_s=0.3, repeats=1),
+        rd.WorkPrecision("arm", (), "rad", 1.0, Reference(Q, Q, 1e-12, ("a", "b"), 1.0), (), (), {}, 1.0, 1.0),
     ]  # fmt: skip
     named: dict[str, Any] = {type(each).__name__: each for each in made}
     return named | {"Compiled": rd.Compiled(ARM), "CompiledPlant": rd.Compiled(plant)}

@@ -79,7 +79,7 @@ def examples(folder: Path) -> dict[str, Example]:
     plant, own = rd.Plant(robot, [friction]), rd.Lagrangian(robot)
     setup = rd.Setup(plant, q, duration_s=0.01, integrator="rk4")
     run, several = rd.simulate(setup), rd.rollouts(setup, np.tile(q, (2, 1)))
-    measured = rd.work_precision(replace(setup, engine="interpreted"), methods=["rk4"], budget_s=0.5, repeats=1)
+    measured = rd.work_precision(replace(setup, engine="interpreted"), methods=["rk4"], repeats=1)
     saved, scene, urdf = rd.save_run(run, folder / "run"), folder / "scene.toml", folder / "arm.urdf"
     scene.write_text('robot = "cart_pole"\nduration_s = 0.01\n', encoding="utf-8")
     urdf.write_bytes(robot.description.xml)
@@ -258,7 +258,7 @@ def examples(folder: Path) -> dict[str, Example]:
         "WorkPrecision.sentence": (measured.sentence, {"digits": 6}),
         "work_precision": (
             rd.work_precision,
-            {"what": setup, "q0": q, "v0": v, "duration_s": 0.01, "methods": ["rk4"], "peers": False, "budget_s": 0.5,
+            {"what": setup, "q0": q, "v0": v, "duration_s": 0.01, "methods": ["rk4"], "peers": False, "budget_s": 30.0,
              "repeats": 1, "on_progress": print_nothing},
         ),
         "via_points": (rd.via_points, {"times_s": [0.0, 0.5, 1.0], "points": points, "kind": "cubic"}),

@@ -32,6 +32,7 @@ def accuracy(
     ] = None,
     csv: Annotated[str | None, typer.Option(metavar="TABLE.csv", help="Write all runs as a table.")] = None,
     budget: Annotated[float, typer.Option(metavar="SECONDS", help="Time to spend, compiling not counted.")] = 30.0,
+    repeats: Annotated[int, typer.Option(min=1, help="How often a run is timed at most, while the budget lasts.")] = 9,
     method: Annotated[
         list[str] | None, typer.Option(metavar="METHOD", help="Only this method; may be repeated; all by default.")
     ] = None,
@@ -55,7 +56,9 @@ def accuracy(
     table = csv and arguments.output(csv, TABLE, DiagramError, [*inputs, *([drawn] if drawn else [])], force)
     setup = _setup(what, q, v, duration, lock, package_dir)
     with spending(budget) as spent:
-        result = rd.work_precision(setup, methods=method, peers=peers, budget_s=budget, on_progress=spent)
+        result = rd.work_precision(
+            setup, methods=method, peers=peers, budget_s=budget, repeats=repeats, on_progress=spent
+        )
     theme = "dark" if dark else "light"
     try:  # the files first: a terminal or pipe may be gone
         written = [rd.save_work_precision(result, path, theme=theme) for path in (drawn, table) if path]
