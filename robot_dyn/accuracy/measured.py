@@ -18,7 +18,8 @@ from robot_dyn.errors import RobotDynError
 _PART = {COMPILED: 1 / 400, INTERPRETED: 1 / 150, "": 1 / 200}  # of the budget, for one run
 _SHORT = 1 / 3000  # of the budget: runs that are timed again before the longer ones
 _LATE = 3  # runs of a ladder that may take longer than that
-_HARD = 10.0  # times that, for a run that takes longer than was foreseen
+_KEPT = {COMPILED: 0.2, INTERPRETED: 0.4, "": 0.2}  # of the budget, for repeats
+_HARD = 4.0  # times that, for a run that takes longer than was foreseen
 
 
 @final
@@ -90,7 +91,7 @@ def _walk(walk: Walk, reference: Reference, budget: Budget) -> None:
     candidate, longest, before = walk.candidate, walk.longest(budget), 0.0
     late = 0
     for setting in candidate.settings():
-        if budget.left <= 0:
+        if budget.left <= _KEPT[candidate.engine] * budget.seconds:
             walk.ended = f"the budget of {budget.seconds:g} s ended"
             return
         if walk.rungs and isfinite(walk.rungs[-1].error):

@@ -183,7 +183,7 @@ def work_precision(
     setup, engines, left_out = _engines(whole(setup))
     asked = setup.duration_s
     setup, exact = reference(setup, budget)
-    variants = [(engine, True) for engine in engines] + [(engines[0], False)] * switches(setup)
+    variants = [(engines[0], True)] + [(engines[0], False)] * switches(setup) + [(each, True) for each in engines[1:]]
     candidates = [own(setup, each, engine, events) for engine, events in variants for each in made]
     others, refused = found(setup) if peers else ([], [])
     place = len(made)  # programs in machine code come before what is interpreted, which takes longest
