@@ -23,6 +23,7 @@ class Threshold:
         rising, falling: What happens where the coordinate grows through it, or falls, as "touched" and "left".
         of_velocity: Whether the velocity passes it.
         of_actuation: Whether the actuation passes it: what reaches a bound, or what a controller asks for.
+        slack: By how much a position or a velocity passes it before that counts, in its unit; no less than rounding.
 
     Raises:
         EffectError: If an attribute is of another type, the level is not finite, or it is of both.
@@ -35,10 +36,12 @@ class Threshold:
     falling: str
     of_velocity: bool = False
     of_actuation: bool = False
+    slack: float = 0.0
 
     def __post_init__(self) -> None:
         integer("joint", self.joint, most=_MOST, error=EffectError)
         object.__setattr__(self, "level", number("level", self.level, error=EffectError))
+        object.__setattr__(self, "slack", number("slack", self.slack, least=0, error=EffectError))
         for name in ("name", "rising", "falling"):
             instance(name, getattr(self, name), str, "give a text", error=EffectError)
         for name in ("of_velocity", "of_actuation"):

@@ -19,6 +19,10 @@ from robot_dyn.coefficients import coefficient
 from robot_dyn.effects.effect import Active, Stateful
 from robot_dyn.errors import EffectError
 from robot_dyn.model.dynamics import Dynamics
+from robot_dyn.threshold import Threshold
+
+_SLOW = 1e-6  # of v_s: where a joint moves to and fro more slowly, the bend matters to no digit
+_REVERSAL = "velocity", "turns positive", "turns negative"
 
 
 @final
@@ -28,7 +32,7 @@ class LuGreFriction(Stateful, Active):
 
     z' = v − σ₀ |v| z / g(v) and g(v) = f_c + (f_s − f_c) exp(−(v/v_s)²). The bristles store ½ σ₀ z² and give it back,
     so that its power may be positive; it is passive where σ₂ ≥ σ₁ (f_s / f_c − 1) [Barahanov, Ortega 2000]. Its rate
-    bends where v = 0, and is stiff: bristles settle within g / (σ₀ |v|) seconds.
+    bends where v = 0, where steps end, and is stiff: bristles settle within g / (σ₀ |v|) seconds.
 
     Attributes:
         bristle_stiffness: σ₀, a scalar or (n,), in [N m/rad] or [N/m], not negative.
@@ -64,6 +68,10 @@ class LuGreFriction(Stateful, Active):
     @property
     def widths(self) -> tuple[Any, Any]:
         return inf, self.stribeck_velocity
+
+    def thresholds(self, n: int) -> tuple[Threshold, ...]:
+        acts, slow = np.broadcast_to(self.bristle_stiffness, n) > 0, _SLOW * np.broadcast_to(self.stribeck_velocity, n)
+        return tuple(Threshold(i, 0.0, *_REVERSAL, of_velocity=True, slack=slow[i]) for i in range(n) if acts[i])
 
     def state_size(self, n: int) -> int:
         return n

@@ -15,7 +15,7 @@ from robot_dyn.integrate.bernstein import NONE, coefficients, first_below
 from robot_dyn.integrate.primitives import between, evaluate
 from robot_dyn.simulation.time_loop import Functions, Rules, Runs
 
-_ROUNDING = 64 * np.finfo(float).eps  # of the coefficients of a polynomial
+ROUNDING = 64 * np.finfo(float).eps  # of the coefficients of a polynomial
 _ROOM = 4.0  # times the change of a limited actuation in a step, or in the one before
 _LOOKS = 8  # at a switching function that is no coordinate, in each step
 _HALVINGS = 50
@@ -33,7 +33,7 @@ class Switches(NamedTuple):
         asked: Number of the last functions that are looked at in each step, as the user's own.
         then: Room for their values, (F, 1).
         before, change: Those at the start of a step, and by how much they changed in the step before, (F,).
-        size: Unit of rounding of each coordinate's level, (E,).
+        exact, slack: Rounding of each coordinate near its level, and by how much it passes it before that counts, (E,).
         b, stack: Room for `bernstein`.
     """
 
@@ -45,7 +45,8 @@ class Switches(NamedTuple):
     then: Array
     before: Array
     change: Array
-    size: Array
+    exact: Array
+    slack: Array
     b: Array
     stack: Array
 
@@ -57,7 +58,7 @@ def approaches(y: Array, after: Array, h: float, before: Array, last: Array, rul
     it; as much room again is left on both sides.
     """
     n = 0 if rules.canonical else rules.n  # p' is no acceleration
-    for e in range(len(switches.size)):
+    for e in range(len(switches.exact)):
         row = switches.rows[e]
         x0, x1, d0, d1 = y[row, 0], after[row, 0], before[row, 0], last[row, 0]
         low, high = min(x0, x1), max(x0, x1)
@@ -89,7 +90,7 @@ def nears(t: float, y: Array, p: Array, own: Array, switches: Switches) -> bool:
     """Whether a function may pass its level in the step that ends at t: it comes near it, by its latest changes."""
     if not has_functions(switches):
         return False
-    E, found = len(switches.size), switches.asked > 0
+    E, found = len(switches.exact), switches.asked > 0
     evaluate(switches.functions, t, y, p, own, switches.then)
     for e in range(E, len(switches.rows) - switches.asked):
         i, level, side = switches.rows[e], switches.levels[e], switches.sides[e]
@@ -107,21 +108,21 @@ def first_event(
 ) -> tuple[int, float]:
     """The switching function that changes sign first within a step, and θ; −1 without any."""
     event, first, b, own = -1, NONE, switches.b, runs.own
-    for e in range(len(switches.size)):
+    for e in range(len(switches.exact)):
         row, side = switches.rows[e], switches.sides[e]
         coefficients(y[row, 0] - switches.levels[e], F, row, b)
         if y[row, 0] == switches.levels[e]:
             b[0] = 0.0
         for j in range(len(b)):
             b[j] *= side
-        theta = first_below(b, _ROUNDING * switches.size[e], switches.stack)
+        theta = first_below(b, switches.slack[e], switches.stack)
         if theta < first:
             event, first = e, theta
     before, x = 0.0, runs.last
     for i in range(1, _LOOKS + 1 if has_functions(switches) else 0):
         theta = i / _LOOKS
         values(f, t, h, theta, y, p, own, F, x, switches)
-        for g in range(len(switches.size), len(switches.rows)):
+        for g in range(len(switches.exact), len(switches.rows)):
             if passed(switches, g) and before < first:
                 low, high = before, theta
                 for _ in range(_HALVINGS):
@@ -142,7 +143,7 @@ def first_event(
 
 def has_functions(switches: Switches) -> bool:
     """Whether there are switching functions that are no coordinates."""
-    return len(switches.rows) > len(switches.size)
+    return len(switches.rows) > len(switches.exact)
 
 
 def gap(switches: Switches, g: int) -> float:
@@ -166,7 +167,7 @@ def values(
 
 def settle_sides(switches: Switches) -> None:
     """The side of functions that vanished at the start of the run."""
-    for g in range(len(switches.size), len(switches.rows)):
+    for g in range(len(switches.exact), len(switches.rows)):
         if switches.sides[g] == 0.0:
             switches.sides[g] = np.sign(gap(switches, g))
 
@@ -176,7 +177,7 @@ def correction(
     event: int,
 ) -> float:  # fmt: skip
     """Newton's correction of the step h whose end is to be a root of a switching function."""
-    if event < len(switches.size):
+    if event < len(switches.exact):
         row = switches.rows[event]
         left, slope = runs.after[row, 0] - switches.levels[event], work.last[row, 0]
     else:  # its slope from the dense output of the whole step

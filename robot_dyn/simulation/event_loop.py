@@ -96,8 +96,10 @@ def event_loop(
             if k == _ROOTS - 1 or not abs(shift) > np.spacing(abs(t + h)) or abs(shift) > abs(h):
                 break
             h += shift
-        if event < len(switches.size):
-            after[switches.rows[event], 0] = switches.levels[event]
+        if event < len(switches.exact):
+            row, level = switches.rows[event], switches.levels[event]
+            if abs(after[row, 0] - level) <= switches.exact[event]:
+                after[row, 0] = level
         return evaluations, h
 
     def advance(

@@ -127,6 +127,7 @@ class EventRun(Followed):
         events = self.functions.events if self.compiled else self.switching.function
         self.switches = self.switching.at(0.0, self.start, len(of.work.F), events, own[:n, 0] if held else None)
         self.events: list[Occurrence] = []
+        self.beyond = inf
         self._change_mode()
         self.now, self.stop = np.zeros(len(Now), np.int64), np.zeros(1, np.int64)
 
@@ -208,6 +209,8 @@ class EventRun(Followed):
         if self.now[Now.EVALUATIONS] > self.most:
             raise TooLongError(int(self.now[Now.EVALUATIONS]))
         t, y = self.time, self.y
+        if t > self.beyond + self.setup.duration_s / _COMPARED:
+            raise TerminalEvent(self.beyond, "of the run")
         self.watch.pace(t, y, int(self.now[Now.STEPS]))
         where = f"at t = {t}, max |y| = {np.abs(y).max():.3g}: y grows without bound, or tolerances are too tight"
         if ended is Ended.EVENT:
@@ -274,8 +277,10 @@ class EventRun(Followed):
         event = self.setup.events[index - E]
         if event.direction in (0, int(side)):
             self.events.append(self.switching.occurrence(index, t, y, side))
-            if event.terminal:
+            if event.terminal and self.samples:
                 raise TerminalEvent(t, event.name)
+            if event.terminal:  # a companion goes on, past the states of the run at which they are compared
+                self.beyond = min(self.beyond, t)
 
     def _record(self, outcome: Outcome) -> Record:
         kept = self.kept

@@ -10,7 +10,7 @@ import numpy as np
 from robot_dyn.arithmetic import Array
 from robot_dyn.effects.plant import Plant
 from robot_dyn.integrate.bernstein import room
-from robot_dyn.simulation.crossings import Switches
+from robot_dyn.simulation.crossings import ROUNDING, Switches
 from robot_dyn.simulation.event import Occurrence
 from robot_dyn.simulation.state_equation import CONTROLLER, StateEquation
 from robot_dyn.threshold import Threshold
@@ -62,7 +62,7 @@ class Switching:
         rows = np.array([each.joint + n * each.of_velocity for each in self.thresholds[:E]], np.int64)
         levels = np.array([each.level for each in self.thresholds])
         gaps = y[rows] - levels[:E]
-        moving = y[np.where(rows < n, rows + n, rows)]  # on the level itself, where it is going
+        moving = self._moving(t, y, held, rows, gaps)  # on the level itself, where it is going
         sides = np.where(gaps + (gaps == 0) * moving > 0, 1.0, -1.0)
         for i in np.flatnonzero((gaps == 0) & (moving == 0)):  # a stop is touched, and not passed
             sides[i] = 1.0 if self.thresholds[i].falling == "touched" else -1.0
@@ -74,11 +74,21 @@ class Switching:
         sides = np.concatenate([sides, np.where(gaps == 0, -np.sign(levels[E:]), np.sign(gaps))])  # a limit is reached
         sides = np.append(sides, np.sign(values[first:]))  # 0 where y is a root: the next step tells
         rows = np.concatenate([rows, actuation, first + np.arange(G)]).astype(np.int64)
-        size = np.maximum(1.0, np.abs(levels[:E]))
+        exact = ROUNDING * np.maximum(1.0, np.abs(levels[:E]))
+        slack = np.maximum(exact, [each.slack for each in self.thresholds[:E]])
         return Switches(
             rows, np.append(levels, np.zeros(G)), sides, functions, G, np.zeros((len(values), 1)), values,
-            np.zeros(len(values)), size, np.zeros(degree + 1), room(degree),
+            np.zeros(len(values)), exact, slack, np.zeros(degree + 1), room(degree),
         )  # fmt: skip
+
+    def _moving(self, t: float, y: np.ndarray, held: Array | None, rows: np.ndarray, gaps: np.ndarray) -> np.ndarray:
+        """The rates of those entries of y; of a velocity where one lies on its level."""
+        n = self._n
+        if not (gaps[rows >= n] == 0).any():
+            return y[np.where(rows < n, rows + n, rows)]
+        if self.equation.sampled and (held is None or np.isnan(held).any()):  # before the first tick
+            y, held = self.equation.tick(t, y)
+        return self.equation.rate(t, y, held)[0][rows]
 
     def values(self, t: float, y: np.ndarray, held: Array | None) -> np.ndarray:
         """What reaches each limited part, (n,) each, and the user's switching functions, (G,)."""
