@@ -242,3 +242,23 @@ def test_names_of_a_file_are_text_and_no_code(browser, tmp_path) -> None:
         assert view.complaints == []
         assert evil in view.ask("document.querySelector('.plot').textContent")
         assert "alert(2)" in view.page.title()
+
+
+def test_events_are_marked_on_the_plots_and_named_as_they_occur(browser, tmp_path) -> None:
+    """A dotted line at each event, where the axis has its time; its name stands in the scene for a while after it."""
+    arm = rd.load("planar_2r")
+    struck = rd.Plant(arm, rd.joint_stops([-0.2, -1.5], [2.0, 1.5], 2e3, 20.0))
+    run = rd.simulate(struck, q0=[0.4, -0.7], duration_s=0.6, estimate_error=False, record_period_s=0.01)
+    assert len(run.events) > 1
+    first = run.events[0]
+    with opened(browser, rd.save_replay(run, tmp_path / "struck.html")) as view:
+        assert view.complaints == []
+        plots = int(view.ask("document.querySelectorAll('.plot').length"))
+        assert view.ask("document.querySelectorAll('.event').length") == plots * len(run.events)
+        at = float(view.ask("parseFloat(document.querySelector('.event').style.left)"))
+        wide = float(view.ask("document.querySelector('.u-over').clientWidth"))
+        assert at == pytest.approx(first.t / 0.6 * wide, abs=1.0)
+        view.ask(f"(replay.seek({first.t - 1e-3}), 0)")
+        assert view.ask("document.getElementById('event').textContent") == ""
+        view.ask(f"(replay.seek({first.t + 1e-3}), 0)")
+        assert first.name in view.ask("document.getElementById('event').textContent")

@@ -28,6 +28,7 @@ from robot_dyn.view.scenery import gravity_arrow, gravity_label, ground, scenery
 from robot_dyn.view.series import plots
 from robot_dyn.view.stage import Stage
 
+_MOST_EVENTS = 200  # of a run
 _FAR = 1e4  # [rad] or [m]; what diverged is not drawn beyond
 
 
@@ -98,6 +99,7 @@ def document(
         "remarks": remarks,
         "problems": problems,
         "gravity": _labels(shown),
+        "events": _events(shown),
         "notes": [*notes, *scale, *turned(gravity), f"the squares on the floor are {seen.square:g} m wide"],
         "scene": seen.as_json(),
         "plots": plots([each.run for each in shown], [each.stage for each in shown]),
@@ -108,6 +110,15 @@ def document(
 def _overlays(shown: Shown, radius: float, frame: str | None, ghost: bool) -> Overlays:
     own = frame if frame in shown.stage.linkage.links else None  # a ghost may be another robot
     return overlays(shown.stage, shown.run, radius, own, ghost)
+
+
+def _events(shown: list[Shown]) -> list[dict[str, Any]]:
+    """The events of all runs, the first ones of each; they are marked on the plots, and named as they occur."""
+    return [
+        {"t": event.t, "name": event.name if len(shown) == 1 else f"{each.name}: {event.name}"}
+        for each in shown
+        for event in each.run.events[:_MOST_EVENTS]
+    ]
 
 
 def _outcome(shown: Shown, count: int) -> str:

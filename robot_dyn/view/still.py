@@ -49,6 +49,7 @@ def still(robot: Robot, q: Array | None, package_dirs: Iterable[str | Path], ine
         "remarks": [],
         "problems": list(look.notes),
         "gravity": gravity_label(robot),
+        "events": [],
         "notes": [
             "q: " + ", ".join(f"{name} = {value:.4g} {unit}" for name, value, unit in values),
             *look.remarks,

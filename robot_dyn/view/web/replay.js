@@ -18,9 +18,10 @@ const gaps = (values) => Array.from(values, (value) => (Number.isNaN(value) ? nu
 const tick = (value) => (value !== 0 && (Math.abs(value) >= 1e5 || Math.abs(value) < 1e-3)
   ? value.toExponential(Number.isInteger(Math.log10(Math.abs(value))) ? 0 : 1) : String(Number(value.toPrecision(6))));
 const COLORS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#8c6d31", "#7f7f7f"];
+const SEEN = 0.05;  // of the run: for so long an event is named
 const DASHES = [[], [6, 3], [2, 3], [8, 3, 2, 3]];
 
-function makePlot(plot, seek) {
+function makePlot(plot, events, seek) {
   const box = document.createElement("section");
   box.className = "plot";
   const heading = document.createElement("h2");
@@ -40,7 +41,13 @@ function makePlot(plot, seek) {
     mark.style.left = left + "px";
     mark.hidden = !(left >= 0 && left <= figure.over.clientWidth);
     mark.dataset.t = now;
+    ticks.forEach((each, i) => {
+      const at = figure.valToPos(events[i].t, "x");
+      each.style.left = at + "px";
+      each.hidden = !(at >= 0 && at <= figure.over.clientWidth);
+    });
   };
+  const ticks = events.map((each) => Object.assign(document.createElement("div"), { className: "event", title: each.name }));
   const mark = document.createElement("div");
   mark.className = "mark";
   const wide = (u, low, high) => (low < high ? uPlot.rangeNum(low, high, 0.1, true) : [(low ?? 0) - 1, (low ?? 0) + 1]);
@@ -51,7 +58,7 @@ function makePlot(plot, seek) {
       { ...axis, label: plot.unit, labelSize: 18, size: 70, values: (u, ticks) => ticks.map(tick) }],
     series: [{ label: "t", value: (_, t) => (t == null ? "–" : t.toFixed(3) + " s") }, ...series],
   }, [plot.t, ...plot.series.map((each) => gaps(each.values))], box);
-  figure.over.append(mark);
+  figure.over.append(...ticks, mark);
   figure.over.addEventListener("click", (event) => seek(figure.posToVal(event.offsetX, "x")));
   new ResizeObserver(() => figure.setSize({ width: box.clientWidth, height: 230 })).observe(box);
   const read = () => figure.setLegend({ idx: figure.valToIdx(now) });
@@ -150,9 +157,11 @@ async function main() {
     viewer.animator.pause();
     viewer.animator.seek(t);
     marks.forEach((mark) => mark(t));
+    const latest = data.events.filter((each) => each.t <= t && t < each.t + SEEN * data.duration);
+    element("event").textContent = latest.map((each) => `${each.t.toFixed(3)} s: ${each.name}`).join("\n");
   };
   const clock = window.replay = makeClock(data.duration, show);
-  marks.push(...data.plots.map((plot) => makePlot(plot, (t) => { clock.play(false); clock.seek(t); })));
+  marks.push(...data.plots.map((plot) => makePlot(plot, data.events, (t) => { clock.play(false); clock.seek(t); })));
   clock.seek(0);
   const follow = () => {  // over a socket the animation comes when it comes
     if (viewer.animator.actions[0] !== loaded) { loaded = viewer.animator.actions[0]; clock.seek(clock.time); }
