@@ -73,7 +73,8 @@ def rollouts(
             "payload_com:tool0", (B, 3); "armature", (B, n); "mass_scale", (B,); mass and inertia of a link as of
             `Robot.with_`, as {"link3.mass": …, "link3.inertia": …}, (B,) and (B, 3, 3). Models of controllers keep
             theirs: they are "model.gravity", ….
-        record: Which of "q", "v", "u", "energy", "work" to keep at the samples.
+        record: Which of "q", "v", "u", "energy", "work" to keep at the samples; states of effects and controllers are
+            those of `simulate`.
         threads: Number of threads; None for all processors.
         most_bytes: Refuse to record more than this.
         on_progress: Called with the time that the runs have reached, the mean in [s], some ten times a second; with
