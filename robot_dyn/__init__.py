@@ -8,6 +8,8 @@ TYPE_CHECKING = False  # as of typing, whose import takes longer than all of thi
 if TYPE_CHECKING:
     from typing import Any
 
+    from robot_dyn.accuracy.advisor import Advice as Advice
+    from robot_dyn.accuracy.advisor import advise as advise
     from robot_dyn.accuracy.compare import Comparison as Comparison
     from robot_dyn.accuracy.compare import compare as compare
     from robot_dyn.accuracy.diagram import save_work_precision as save_work_precision
@@ -91,6 +93,7 @@ _HOME = {
     "Active": "effects.effect",
     "ActuatorLag": "effects.actuator",
     "Adaptive": "integrate.adaptive",
+    "Advice": "accuracy.advisor",
     "Ball": "arithmetic",
     "Bound": "effects.effect",
     "Comparison": "accuracy.compare",
@@ -133,6 +136,7 @@ _HOME = {
     "Trajectory": "simulation.trajectory",
     "ViscousFriction": "effects.friction",
     "WorkPrecision": "accuracy.work_precision",
+    "advise": "accuracy.advisor",
     "circle": "control.cartesian",
     "coefficient": "coefficients",
     "compare": "accuracy.compare",

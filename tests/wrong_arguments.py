@@ -29,6 +29,7 @@ NOT_TEXT = (None, 3, NAN, True, b"arm", object(), ["arm"], {}, np.ones(2), 10**5
 NOT_OBJECTS = (None, 3, NAN, True, "no such", object(), np.ones(2), MASKED, {"a": 1}, rd.Robot, 10**5000)
 
 RESULTS = {
+    "Advice",
     "Comparison",
     "Rollouts",
     "Trajectory",
@@ -254,6 +255,7 @@ def examples(folder: Path) -> dict[str, Example]:
             rd.task_dynamics,
             {"dynamics": robot, "q": q, "v": v, "frame": "pole", "rows": (0,), "threshold": 0.01},
         ),
+        "advise": (rd.advise, {"what": plant, "q0": q, "v0": v, "duration_s": 0.01}),
         "WorkPrecision.digits": (measured.digits, {"error": 1e-6}),
         "WorkPrecision.sentence": (measured.sentence, {"digits": 6}),
         "work_precision": (

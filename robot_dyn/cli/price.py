@@ -1,4 +1,4 @@
-"""Commands that say what digits cost: accuracy."""
+"""Commands that say what digits cost, and whether steps are short enough: accuracy, advise."""
 
 from __future__ import annotations
 
@@ -68,6 +68,19 @@ def accuracy(
         tell(f"written: {path}")
     if result.interrupted:
         raise typer.Exit(130)
+
+
+@app.command()
+def advise(
+    scene: Annotated[str, typer.Argument(metavar="SCENE.toml", help="A scene file.")], as_json: Json = False
+) -> None:
+    """Say whether step and control period are short enough, and what error to expect; exit code 1 if they are not."""
+    from robot_dyn.cli import prices
+
+    advice = rd.advise(rd.read_scene(scene))
+    say_json(prices.advice(advice)) if as_json else say(advice.text)
+    if not advice.stable:
+        raise typer.Exit(1)
 
 
 def _setup(

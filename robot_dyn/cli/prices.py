@@ -9,6 +9,7 @@ from typing import Any
 
 from rich.table import Table
 
+from robot_dyn.accuracy.advisor import Advice
 from robot_dyn.accuracy.work_precision import WorkPrecision, in_words
 
 Document = dict[str, Any]
@@ -45,6 +46,26 @@ def work_precision(result: WorkPrecision) -> Document:
         "budget_s": result.budget_s,
         "spent_s": result.spent_s,
         "interrupted": result.interrupted,
+    }  # fmt: skip
+
+
+def advice(made: Advice) -> Document:
+    """Limits, the fastest motion, and the error to expect."""
+    error = None if made.run is None else made.run.error
+    return {
+        "stable": made.stable,
+        "text": made.text.split("\n"),
+        "method": made.method,
+        "step_s": made.step_s,
+        "limits": {name: _finite(limit) for name, limit in made.limits.items()},
+        "period_s": made.period_s,
+        "longest_period_s": _finite(made.longest_period_s),
+        "fastest": {
+            "rate": abs(made.fastest.eigenvalue), "joint": made.fastest.joint, "source": made.fastest.source,
+            "decays": made.fastest.decays, "t": made.at,
+        },
+        "error": None if error is None else _finite(error.final),
+        "error_verdict": None if error is None else str(error.verdict),
     }  # fmt: skip
 
 

@@ -23,10 +23,11 @@ from robot_dyn.simulation.stiffness import fastest
 from robot_dyn.simulation.trajectory import Accuracy, Ending, Trajectory
 
 _AIM = 0.3  # of what is asked: an estimate may be this part of the error
-_LOOSE, _LOOSEST = 0.75, 1e-3  # tolerance of the pilot: a power of what is asked, at most
+_LOOSE = {EXPLICIT: 0.75, STIFF: 0.5}  # tolerance of the pilot, a power of what is asked; what is fast has decayed
+_LOOSEST = 1e-3
 _ATOL = 0.01  # over rtol
 _TRIES = 4  # runs of a tolerance, at most
-_TOO_MUCH = 1e-3  # of what is asked: a run that is more accurate may cost too much
+_TOO_MUCH = 1.7  # times the cost of a run with the error that is asked
 _DECIDES = 1.5  # runs that the estimate takes, at most, where the tolerance decides on the steps
 _MANY = 20  # segments of sampled control, in each of which one step of RK4 may do
 _LONG = 500.0  # |λ| T: explicit steps, of |λ| h = 6 at most, are then as many as those of a run that is not stiff
@@ -52,8 +53,9 @@ def run_to(setup: Setup, asked: float, run: Callable[[Setup], Trajectory]) -> Tr
     simple, spent = _in_each_segment(setup, asked, run)
     if simple is not None:
         return simple
-    best, least, method = inf, 1.01 * LEAST_RTOL, STIFF if _stiff(setup) else AUTO
-    rtol = max(least, min(_LOOSEST, asked**_LOOSE))
+    best, least, stiff = inf, 1.01 * LEAST_RTOL, _stiff(setup)
+    method = STIFF if stiff else AUTO
+    rtol = max(least, min(_LOOSEST, asked ** _LOOSE[STIFF if stiff else EXPLICIT]))
     for k in range(_TRIES):
         made = run(replace(setup, integrator=Adaptive(method, rtol, _ATOL * rtol)))
         if method == AUTO and not _decides(made) and not _sampled(setup):
@@ -63,7 +65,8 @@ def run_to(setup: Setup, asked: float, run: Callable[[Setup], Trajectory]) -> Tr
         if made.outcome.ending is not Ending.FINISHED:
             return made
         error, method = _resolved(made), made.statistics.method
-        if error <= asked and (k > 0 or error > _TOO_MUCH * asked or not _decides(made) or rtol == _LOOSEST):
+        least_cost = made.statistics.evaluations * _WEIGHT.get(method, 1) / _TOO_MUCH
+        if error <= asked and (k > 0 or rtol == _LOOSEST or not _decides(made) or _predicted(made, asked) > least_cost):
             return _achieved(made, asked, rtol, spent)
         best = min(best, error)
         if rtol == least or k == _TRIES - 1:
@@ -112,7 +115,7 @@ def _predicted(made: Trajectory, asked: float) -> float:
     if made.outcome.ending is not Ending.FINISHED:
         return inf
     name, factor = made.statistics.method, _resolved(made) / (_AIM * asked)
-    return made.statistics.evaluations * _WEIGHT.get(name, 1) * max(1.0, factor) ** (1 / _ORDER[name])
+    return made.statistics.evaluations * _WEIGHT.get(name, 1) * factor ** (1 / _ORDER[name])
 
 
 def _resolved(made: Trajectory) -> float:

@@ -1,0 +1,185 @@
+"""Whether steps are short enough: stability about states of a motion, and the error to expect.
+
+J, and the derivatives of a sampled loop, are taken at the fastest of some states along a pilot run with control at all
+times; a motion that leaves them behind may be stable with longer steps, or unstable with shorter ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from math import inf, isfinite
+from typing import Any, Unpack, final
+
+import numpy as np
+
+from robot_dyn.accuracy.sampled_loop import longest_period
+from robot_dyn.accuracy.stability import jacobian, longest_step
+from robot_dyn.arithmetic import Array
+from robot_dyn.coefficients import with_values
+from robot_dyn.effects.plant import Plant
+from robot_dyn.errors import QueryError, RobotDynError
+from robot_dyn.integrate.methods import FIXED_STEP, method
+from robot_dyn.model.dynamics import Dynamics
+from robot_dyn.simulation.options import Options, setup_of, starts, takes_options
+from robot_dyn.simulation.setup import Setup
+from robot_dyn.simulation.simulate import simulate
+from robot_dyn.simulation.state_equation import StateEquation
+from robot_dyn.simulation.stiffness import Fastest, fastest
+from robot_dyn.simulation.trajectory import Ending, Trajectory
+
+_LOOKS = 9  # states along the pilot run
+_FAST = 3  # of them, where motion is fastest: limits are looked for there
+_MOST_STEPS = 200_000  # of a run that is made for its error estimate
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Advice:
+    """What may be expected of a setup.
+
+    Attributes:
+        method: The method of the setup.
+        step_s: Its longest step, in [s]; 0 if it chooses its steps.
+        fastest: The fastest motion along a pilot run, with joint and source.
+        at: When it was met, in [s].
+        limits: Longest stable step of each method of fixed step, in [s]; inf where every step is stable.
+        period_s: Period of the sampled control, in [s]; 0 without.
+        longest_period_s: The longest stable one, in [s]; inf without sampled control.
+        run: The run of the setup with its error estimate; None if it is unstable, or has too many steps.
+    """
+
+    method: str
+    step_s: float
+    fastest: Fastest
+    at: float
+    limits: dict[str, float]
+    period_s: float
+    longest_period_s: float
+    run: Trajectory | None = None
+
+    @property
+    def stable(self) -> bool:
+        """Whether step and period are within their limits."""
+        return self.step_s <= self.limits.get(self.method, inf) and self.period_s <= self.longest_period_s
+
+    @property
+    def text(self) -> str:
+        """A line for each thing: the step, the period, the error, the fastest motion."""
+        parts = [self._of_step(), *self._of_period(), self._of_error(), f"{self.fastest}, at {self.at:.3g} s"]
+        return "\n".join(parts)
+
+    def _of_step(self) -> str:
+        limit = self.limits.get(self.method, inf)
+        if not self.step_s:
+            return f"{self.method} chooses its steps, so that none is unstable for long"
+        if not isfinite(limit):
+            return f"step {self.step_s:.3g} s: stable, as every step of {self.method} is here"
+        if self.step_s <= limit:
+            return f"step {self.step_s:.3g} s: stable; {self.method} is up to {limit:.3g} s"
+        others = [name for name, h in self.limits.items() if h >= self.step_s]
+        other = f", or integrator={others[0]!r}" if others else ""
+        return (
+            f"step {self.step_s:.3g} s: unstable; {self.method} is stable up to {limit:.3g} s: take"
+            f" step_s={_below(limit)}{other}"
+        )
+
+    def _of_period(self) -> Iterator[str]:
+        limit = self.longest_period_s
+        if self.period_s and self.period_s <= limit:
+            to = f"the loop is up to {limit:.3g} s" if isfinite(limit) else "as every period is here"
+            yield f"control period {self.period_s:.3g} s: stable; {to}"
+        elif self.period_s:
+            yield (
+                f"control period {self.period_s:.3g} s: unstable; the loop is stable up to {limit:.3g} s: take"
+                f" period_s={_below(limit)}, or lower gains"
+            )
+
+    def _of_error(self) -> str:
+        if self.run is None:
+            return "error to expect: not told of a run that is unstable, or of too many steps"
+        end = self.run.outcome
+        if end.ending is not Ending.FINISHED:
+            return f"the run {end.ending} at {end.t:.3g} s: {end.advice}"
+        return f"error of q to expect: {self.run.error}"
+
+
+@takes_options
+def advise(what: Setup | Plant | Dynamics, q0: Any = None, v0: Any = None, **options: Unpack[Options]) -> Advice:
+    """Whether the step of a setup and the period of its control are short enough, and what error to expect.
+
+    Args:
+        what: What to run, as of `simulate`.
+        q0: Position at the start, (n,), in [rad] or [m] by joint; required unless `what` is a setup.
+        v0: Velocity at the start, (n,), in [rad/s] or [m/s]; 0, or that of the setup, unless given.
+        **options: As of `simulate`.
+
+    Raises:
+        QueryError: If the setup is not allowed, or its motion cannot be linearised at any state of the pilot run.
+    """
+    setup = setup_of("advise", what, {**starts(q0, v0), **options})
+    plant, controller, duration = setup.plant, setup.controller, setup.duration_s
+    period = 0.0 if controller is None else controller.period_s
+    loop = StateEquation(plant, None if controller is None else with_values(controller, {"period_s": 0.0}))
+    states = _along(setup, loop)
+    motion, at, states = _fastest(loop, states)
+    matrices = [_between_ticks(plant, loop, t, y) if period else jacobian(loop, t, y, None) for t, y in states]
+    limits = {
+        name: min(longest_step(method(name), J, plant.dynamics.n, duration) for J in matrices) for name in FIXED_STEP
+    }
+    periods = [longest_period(plant, setup.controller, t, _own(loop, y), duration) for t, y in states if period]
+    chooses = setup.integrator.controls_error
+    made = Advice(
+        setup.integrator.name, 0.0 if chooses else setup.taken_step_s, motion, at, limits, period,
+        min(periods, default=inf),
+    )  # fmt: skip
+    makes = made.stable and (chooses or setup.steps <= _MOST_STEPS)
+    return replace(made, run=simulate(replace(setup, estimate_error=True))) if makes else made
+
+
+def _along(setup: Setup, loop: StateEquation) -> list[tuple[float, Array]]:
+    """Times and states y along a run with control at all times."""
+    run = simulate(
+        Setup(
+            setup.plant, setup.q0, setup.v0, setup.duration_s, loop.controller, engine=setup.engine,
+            record_period_s=setup.duration_s / (_LOOKS - 1), estimate_error=False,
+        )
+    )  # fmt: skip
+    z = [] if run.controller_states is None else [run.controller_states]
+    y = np.zeros((len(run.t), loop.size))
+    known = np.hstack([run.q, run.v, *z, *run.effect_states.values()])
+    y[:, : known.shape[1]] = known
+    good = np.isfinite(y).all(axis=1)
+    return list(zip(run.t[good].tolist(), y[good], strict=True))
+
+
+def _own(equation: StateEquation, y: Array) -> Array:
+    """(q, v, z) of y, without works."""
+    return y[: len(y) - len(equation.sources)]
+
+
+def _between_ticks(plant: Plant, loop: StateEquation, t: float, y: Array) -> Array:
+    """J where the actuation is held."""
+    free, n, z = StateEquation(plant, None), plant.dynamics.n, loop.state_size
+    bodies = np.concatenate([y[: 2 * n], _own(loop, y)[2 * n + z :], np.zeros(len(free.sources))])
+    return jacobian(free, t, bodies, np.zeros(n))
+
+
+def _fastest(
+    equation: StateEquation, states: list[tuple[float, Array]]
+) -> tuple[Fastest, float, list[tuple[float, Array]]]:
+    """The fastest motion at some states, when, and the states where motion is fastest."""
+    found: list[tuple[Fastest, float, Array]] = []
+    for t, y in states:
+        with suppress(RobotDynError, np.linalg.LinAlgError):
+            found.append((fastest(equation, t, y, None), t, y))
+    if not found:
+        raise QueryError("the motion cannot be linearised at any state of a run; take a shorter one")
+    found.sort(key=lambda each: -abs(each[0].eigenvalue))
+    return *found[0][:2], [each[1:] for each in found[:_FAST]]
+
+
+def _below(limit: float) -> str:
+    """A length safely below a limit, in one digit."""
+    return f"{float(f'{limit / 2:.0e}'):g}"

@@ -1,0 +1,97 @@
+"""The longest stable step of a method about states of a motion.
+
+    δx⁺ = Φ(h) δx on δx' = J δx,   stable while ρ(Φ(h)) grows no more than max(1, ρ(e^{hJ})) does
+
+[Hairer, Wanner, Solving Ordinary Differential Equations II, 2nd ed., 1996, IV.2]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import inf, log
+from typing import Any
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.errors import RobotDynError
+from robot_dyn.integrate.differences import by_state
+from robot_dyn.integrate.integrator import System
+from robot_dyn.simulation.state_equation import StateEquation
+
+_GROWTH = 1e3  # over the run, beyond that of the motion itself: a run that grows by more has blown up
+_RANGE = (1e-4, 1e3)  # h |λ| where limits are looked for
+_LEAST_STEPS = 20  # of a run: longer steps are not judged
+_SCAN = 5  # lengths in each factor of ten
+_SHARP = 1e-3  # of a limit
+
+
+def jacobian(equation: StateEquation, t: float, y: Array, held: Array | None) -> Array:
+    """∂y'/∂y without the works, which do not act back, by differences.
+
+    Args:
+        equation: The state equation.
+        t: Time, in [s].
+        y: State, (m,).
+        held: The actuation in zero-order hold, or None.
+    """
+    size = len(y) - len(equation.sources)
+
+    def f(at: Any, states: Array) -> Array:
+        rows = [equation.rate(t, row, held)[0] for row in states.reshape(-1, len(y))]
+        return np.array(rows).reshape(states.shape)
+
+    return np.moveaxis(by_state(f, t, y, equation.widths), 0, -1)[:size, :size]
+
+
+def longest_step(method: Any, J: Array, n: int, duration_s: float) -> float:
+    """The longest step of a method that is stable on δx' = J δx, in [s]; inf if every step of a run is.
+
+    Steps whose stages are not found, as long ones of Gauss methods by fixed-point iteration, count as unstable.
+
+    Args:
+        method: A method of fixed step.
+        J: (m, m).
+        n: Number of positions, the first entries of x.
+        duration_s: Of the run.
+    """
+    by_entry = np.concatenate([J.T, np.zeros((1, len(J)))])
+
+    def exact(t: Any, y: Array) -> Array:
+        return np.broadcast_to(by_entry.reshape(-1, *(1,) * (y.ndim - 1), len(J)), (len(J) + 1, *y.shape)).copy()
+
+    system = System(lambda t, y: y @ J.T, n, exact=exact)
+    return longest(lambda h: np.asarray(method.step(system, 0.0, np.eye(len(J)), h)).T, J, duration_s)
+
+
+def longest(matrix: Callable[[float], Array], J: Array, duration_s: float) -> float:
+    """The longest h for which the powers of a matrix grow no more than the motion, with J, does; inf if each is.
+
+    It is looked for from short to long, so that what is stable again beyond does not count.
+    """
+    rates = np.linalg.eigvals(J)
+    size, growth = float(np.abs(rates).max()), max(0.0, float(rates.real.max()))
+
+    def stable(h: float) -> bool:
+        try:
+            radius = float(np.abs(np.linalg.eigvals(matrix(h))).max())
+        except (RobotDynError, np.linalg.LinAlgError):
+            return False
+        return bool(np.log(radius) - h * growth <= log(_GROWTH) * h / duration_s)
+
+    if not size > 0:
+        return inf
+    low, high = _RANGE[0] / size, min(_RANGE[1] / size, duration_s / _LEAST_STEPS)
+    if low >= high:
+        return inf
+    before, after = 0.0, inf
+    with np.errstate(all="ignore"):
+        for h in np.geomspace(low, high, 2 + int(_SCAN * np.log10(high / low))).tolist():
+            if not stable(h):
+                after = h
+                break
+            before = h
+        while after < inf and after - before > _SHARP * after:
+            middle = (before + after) / 2
+            before, after = (middle, after) if stable(middle) else (before, middle)
+    return before if after < inf else inf

@@ -1,0 +1,117 @@
+"""Advice on steps and control periods: limits are those of the book, and where runs blow up."""
+
+from __future__ import annotations
+
+import json
+from math import inf
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import robot_dyn as rd
+from robot_dyn.accuracy.stability import longest_step
+from tests.command import run
+from tests.estimates.advised import blow_up, limited
+from tests.estimates.scenes import RAIL
+
+BLOCK = rd.Robot.from_text(RAIL)  # 1 kg
+OSCILLATOR = np.array([[0.0, 1.0], [-400.0, 0.0]])  # ω = 20/s
+
+
+@pytest.mark.parametrize(
+    ("name", "limit"),
+    [("explicit_euler", 2.0), ("midpoint", 2.0), ("rk4", 2.785293563405282), ("sdirk_3", inf), ("rosenbrock_5", inf)],
+)
+def test_limits_on_a_decay_are_those_of_the_stability_function(name: str, limit: float) -> None:
+    """|R(z)| = 1 at z = −2, and −2.785… for RK4 [Hairer, Wanner 1996, IV.2]; the others are A-stable."""
+    found = longest_step(rd.method(name), np.diag([-100.0, -1.0]), 1, 1e4)
+    assert found == pytest.approx(limit / 100, rel=2e-3)  # it is bisected to 1e-3
+
+
+def test_an_oscillation_bounds_some_methods_only() -> None:
+    """ω h ≤ 2 for semi-implicit Euler, 2.828 for RK4; explicit Euler grows by (1 + ω² h²)^½ in each step."""
+    of = {
+        name: longest_step(rd.method(name), OSCILLATOR, 1, 10.0) for name in ("semi_implicit_euler", "rk4", "sdirk_3")
+    }
+    assert of["semi_implicit_euler"] * 20 == pytest.approx(2.0, rel=2e-2)  # beyond, growth sets in as a square root
+    assert of["rk4"] * 20 == pytest.approx(2 * np.sqrt(2), rel=2e-2)
+    assert of["sdirk_3"] == inf
+    grows = longest_step(rd.method("explicit_euler"), OSCILLATOR, 1, 10.0)
+    assert np.log1p((20 * grows) ** 2) / 2 * 10.0 / grows == pytest.approx(np.log(1e3), rel=1e-2)
+
+
+@pytest.mark.parametrize("ki", [0.0, 900.0])
+def test_the_period_of_a_loop_about_a_block_is_that_of_its_discrete_matrix(ki: float) -> None:
+    """A mass under PID in zero-order hold, q and v in closed form between ticks."""
+    kp, kd = 100.0, 20.0
+    law = rd.PID(rd.hold([0.0]), kp, ki, kd, period_s=0.02) if ki else rd.PD(rd.hold([0.0]), kp, kd, period_s=0.02)
+    advice = rd.advise(BLOCK, [0.1], duration_s=5.0, controller=law)
+
+    def radius(T: float) -> float:
+        u = np.array([-kp, -kd, ki])
+        loop = np.array([[1.0, T, 0.0], [0.0, 1.0, 0.0], [-T, 0.0, 1.0]])
+        loop += np.outer([T**2 / 2, T, 0.0], u)
+        return np.abs(np.linalg.eigvals(loop if ki else loop[:2, :2])).max()
+
+    # it is where 5 s of steps grow by 1e3; limits are bisected to 1e-3, which the radius shows tenfold
+    limit = advice.longest_period_s
+    assert np.log(radius(limit)) == pytest.approx(np.log(1e3) * limit / 5.0, abs=0.02)
+    assert advice.stable
+    assert "control period 0.02 s: stable" in advice.text
+
+
+def test_the_panda_under_sampled_control() -> None:
+    """Values by the exponential of the sampled system, found apart from this library."""
+    arm = rd.load("panda").with_(lock={"panda_finger_joint1": 0.0})
+    q0 = np.array([0.3, 0.6, -0.4, -1.2, 0.5, 1.1, 0.2])
+    law = rd.PDGravity(arm, rd.hold(q0), 1000.0, 60.0, period_s=2.5e-4)
+    advice = rd.advise(arm, q0, controller=law, integrator="rk4", duration_s=0.2)
+    assert advice.longest_period_s == pytest.approx(0.211e-3, rel=0.01)  # three digits, and growth over the run
+    assert advice.fastest.joint == "panda_joint7"
+    assert advice.fastest.source == "control"
+    assert not advice.stable
+    assert (
+        "control period 0.00025 s: unstable; the loop is stable up to 0.000211 s: take period_s=0.0001" in advice.text
+    )
+    assert advice.run is None
+
+
+def test_runs_blow_up_where_the_limit_says() -> None:
+    """Within a factor of 1.5: it is linear, at nine states of the motion."""
+    scene = limited(1, 6)
+    advice = rd.advise(scene.setup)
+    limit = advice.longest_period_s
+    assert 1 / 1.5 < limit / blow_up(scene, limit) < 1.5
+
+
+def test_a_step_that_is_short_enough_is_told_with_its_error() -> None:
+    plant = rd.Plant(rd.load("planar_2r"), [rd.ViscousFriction(60.0)])
+    fine = rd.advise(plant, [0.4, -0.7], integrator="rk4", step_s=1e-4, duration_s=0.2)
+    assert fine.stable
+    assert f"error of q to expect: {fine.run.error}" in fine.text
+    coarse = rd.advise(plant, [0.4, -0.7], integrator="rk4", step_s=1e-2, duration_s=0.2)
+    assert coarse.limits == fine.limits
+    assert not coarse.stable
+    assert "step 0.01 s: unstable; rk4 is stable up to" in coarse.text
+    assert rd.simulate(plant, [0.4, -0.7], integrator="rk4", step_s=1e-2, duration_s=0.2).outcome.ending == "diverged"
+    chosen = rd.advise(plant, [0.4, -0.7], duration_s=0.2)
+    assert chosen.stable
+    assert "auto chooses its steps" in chosen.text
+
+
+def test_the_command_prints_it_and_its_exit_code_tells(tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    text = 'robot = "planar_2r"\nduration_s = 0.1\nmethod = "rk4"\nstep_s = {}\n[[effect]]\nkind = "viscous_friction"\n'
+    scene.write_text(text.format("1e-2") + "damping_N_m_s_per_rad = 60.0\n")
+    result = run("advise", scene)
+    assert (result.returncode, result.stderr) == (1, "")
+    assert "unstable; rk4 is stable up to" in result.stdout
+    scene.write_text(text.format("1e-4") + "damping_N_m_s_per_rad = 60.0\n")
+    result = run("advise", scene, "--json")
+    made = json.loads(result.stdout)
+    assert result.returncode == 0
+    assert made["stable"] is True
+    assert made["limits"]["sdirk_3"] is None
+    assert made["error"] < 1e-6
+    assert made["fastest"]["source"] == "viscous_friction"
