@@ -59,10 +59,14 @@ def test_bristles_at_rest_reverse_no_more() -> None:
 
 
 def test_companions_of_a_run_that_an_event_ends_go_on_past_it() -> None:
-    """They end a little earlier or later: the estimate reaches the end of the run, whatever the time of the event."""
-    for angle in np.linspace(-0.30, -0.31, 8):
-        end = rd.Event(lambda t, q, v, angle=angle: q[0] - angle, terminal=True, name="there")
-        made = rd.simulate(ARM, START, duration_s=2.0, events=[end], integrator=rd.Adaptive("DOP853", 1e-6, 1e-6))
+    """The event falls on times at which runs are compared, ± 3e-8 s: a companion may meet it before, the run behind."""
+    options = {"duration_s": 2.0, "integrator": rd.Adaptive("DOP853", 1e-6, 1e-6), "record_period_s": 0.1}
+    free = rd.simulate(ARM, START, estimate_error=False, **options)
+    for k in range(2, 10):
+        way = np.sign(free.v[k, 0])
+        angle = free.q[k, 0] + 1e-11 * way
+        end = rd.Event(lambda t, q, v, angle=angle: q[0] - angle, direction=int(way), terminal=True, name="there")
+        made = rd.simulate(ARM, START, events=[end], **options)
+        assert made.outcome.t == pytest.approx(free.t[k], abs=1e-7)
         assert made.error is not None
         assert made.error.note == ""
-        assert made.error.resolved_until > made.outcome.t - 0.002 - 1e-9
