@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -69,7 +68,7 @@ class Controller(Value, ABC):
         """What it follows, by attribute."""
         return {name: value for name, value in vars(self).items() if isinstance(value, Reference)}
 
-    @cached_property
+    @property
     def models(self) -> dict[str, Dynamics]:
         """Its own models of the arm, by attribute."""
         others = np.ndarray, float, int, str, Reference, type(None)  # a protocol takes longer to ask for
