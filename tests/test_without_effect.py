@@ -135,7 +135,7 @@ CONTROL = '[control]\nkind = "{}"\nfrequency_rad_per_s = 10.0\n'
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (SCENE + "step_s = 0.001\n", "step_s: has no effect, since DOP853 chooses its own step; remove it, or name"),
+        (SCENE + "step_s = 0.001\n", "step_s: has no effect, since auto chooses its own step; remove it, or name"),
         (SCENE + 'method = "rk4"\nrtol = 1e-8\n', "rtol: has no effect, since rk4 has a fixed step"),
         (SCENE + 'method = "gauss_6"\natol = 1e-8\n', "atol: has no effect, since gauss_6 has a fixed step"),
         (SCENE + 2 * GRAVITY, "effect: gravity is named 2 times, and only the last would act; keep one"),

@@ -12,7 +12,7 @@ from robot_dyn.coefficients import with_values
 from tests.estimates.scenes import arms
 
 METHODS = ("explicit_euler", "semi_implicit_euler", "midpoint", "rk4", "order_8")
-_FAR = 0.3  # [rad] or [m] from the motion: a run that is farther off has blown up
+_FAR, _LEAST = 30.0, 1e-4  # times as far from the motion as with half the length, and [rad] or [m] more: blown up
 _NEAR = 1.02  # of a limit that is bisected
 
 
@@ -46,21 +46,27 @@ def limited(seed: int, index: int) -> Limited:
         gains = rd.gains_from(scale, fast * rng.uniform(0.1, 0.5), rng.uniform(0.7, 1.5))
         controller = rd.PD(rd.hold(q + rng.uniform(-0.05, 0.05, n)), *gains, period_s=1e-4 if sampled else 0.0)
     setup = rd.Setup(
-        rd.Plant(arm, effects), q, np.zeros(n), 0.5, controller, method, 1e-4, estimate_error=False,
-        record_period_s=0.05,
+        rd.Plant(arm, effects), q, np.zeros(n), 0.5, controller, method, 1e-4, estimate_error=False
     )  # fmt: skip
     return Limited(setup, sampled, f"{seed}/{index} {name} {method} {'sampled' if sampled else 'continuous'}")
 
 
 def blow_up(scene: Limited, near: float) -> float:
     """The length at which runs begin to blow up, bisected between a third and three times a length."""
-    exact = rd.simulate(scene.of(near / 20), integrator="rk4" if scene.sampled else "sdirk_3").q
+    exact = rd.simulate(scene.of(near / 20), integrator="rk4" if scene.sampled else "sdirk_3")
+    usual = _off(rd.simulate(scene.of(near / 2)), exact)
+    return _bisected(
+        lambda length: _off(rd.simulate(scene.of(length)), exact) > _FAR * usual + _LEAST, near / 3, near * 3
+    )
 
-    def blows(length: float) -> bool:
-        run = rd.simulate(scene.of(length))
-        return run.outcome.ending != "finished" or bool(np.abs(run.q[-1] - exact[-1]).max() > _FAR)
 
-    return _bisected(blows, near / 3, near * 3)
+def _off(run: rd.Trajectory, exact: rd.Trajectory) -> float:
+    """How far a run is from the motion in its second half; inf if it ended before its time."""
+    if run.outcome.ending != "finished":
+        return np.inf
+    late = run.t > run.t[-1] / 2
+    motion = [np.interp(run.t[late], exact.t, q) for q in exact.q.T]
+    return float(np.abs(run.q[late].T - motion).max())
 
 
 def _bisected(blows: Callable[[float], bool], low: float, high: float) -> float:
