@@ -178,3 +178,19 @@ def test_a_run_that_takes_more_steps_than_was_guessed_goes_on_in_machine_code() 
     assert run.statistics.evaluations > 20_000
     assert run.statistics.engine == "compiled"
     assert rd.simulate(plant, [0.3, 0.4], duration_s=1e-4, estimate_error=False).statistics.engine != "compiled"
+
+
+def test_a_long_run_that_cannot_be_compiled_is_made_in_python(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Begun again once, and then to its end: nothing else is left to try."""
+    tried: list[float] = []
+
+    def refuse(*_: object) -> None:
+        tried.append(1.0)
+        raise rd.RobotDynError("not here")
+
+    monkeypatch.setattr("robot_dyn.simulation.choice._machine", refuse)
+    monkeypatch.setattr("robot_dyn.simulation.choice._COMPILED", 500)
+    run = rd.simulate(ARM, [0.3, 0.4], duration_s=0.4, estimate_error=False, integrator=rd.Adaptive(rtol=3e-14, atol=1e-15))
+    assert run.statistics.evaluations > 500
+    assert run.statistics.engine == "interpreted (not here)"
+    assert len(tried) == 1

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from math import inf
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
 
@@ -136,7 +137,8 @@ def _by_choice(setup: Setup, equation: StateEquation, on_progress: Callable[[flo
     while True:
         machine, engine = choose(setup, equation, seen)
         ready = perf_counter()
-        observer, most = observer_of(setup, equation), most_interpreted(setup, equation, machine)
+        observer = observer_of(setup, equation)
+        most = inf if seen else most_interpreted(setup, equation, machine)  # else what cannot compile would never end
         try:
             run = prepared(
                 setup, equation, machine, on_progress=on_progress, observer=observer, most=most, chooses=chooses
