@@ -190,7 +190,8 @@ def test_a_long_run_that_cannot_be_compiled_is_made_in_python(monkeypatch: pytes
 
     monkeypatch.setattr("robot_dyn.simulation.choice._machine", refuse)
     monkeypatch.setattr("robot_dyn.simulation.choice._COMPILED", 500)
-    run = rd.simulate(ARM, [0.3, 0.4], duration_s=0.4, estimate_error=False, integrator=rd.Adaptive(rtol=3e-14, atol=1e-15))
+    tight = rd.Adaptive(rtol=3e-14, atol=1e-15)
+    run = rd.simulate(ARM, [0.3, 0.4], duration_s=0.4, estimate_error=False, integrator=tight)
     assert run.statistics.evaluations > 500
     assert run.statistics.engine == "interpreted (not here)"
     assert len(tried) == 1

@@ -15,7 +15,7 @@ from typing import Any, Unpack, final
 import numpy as np
 
 from robot_dyn.accuracy.sampled_loop import longest_period
-from robot_dyn.accuracy.stability import jacobian, longest_step
+from robot_dyn.accuracy.stability import longest_step
 from robot_dyn.arithmetic import Array
 from robot_dyn.coefficients import with_values
 from robot_dyn.effects.plant import Plant
@@ -26,7 +26,7 @@ from robot_dyn.simulation.options import Options, setup_of, starts, takes_option
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.simulate import simulate
 from robot_dyn.simulation.state_equation import StateEquation
-from robot_dyn.simulation.stiffness import Fastest, fastest
+from robot_dyn.simulation.stiffness import Fastest, fastest, jacobian
 from robot_dyn.simulation.trajectory import Ending, Trajectory
 
 _LOOKS = 9  # states along the pilot run

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.accuracy.stability import jacobian, longest
+from robot_dyn.accuracy.stability import longest
 from robot_dyn.arithmetic import Array
 from robot_dyn.coefficients import with_values
 from robot_dyn.control.controller import Controller
@@ -21,6 +21,7 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.foreign import call
 from robot_dyn.integrate.differences import by_state
 from robot_dyn.simulation.state_equation import StateEquation
+from robot_dyn.simulation.stiffness import jacobian
 
 
 def longest_period(plant: Plant, controller: Controller, t: float, y: Array, duration_s: float) -> float:

@@ -15,33 +15,13 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.errors import RobotDynError
-from robot_dyn.integrate.differences import by_state
 from robot_dyn.integrate.integrator import System
-from robot_dyn.simulation.state_equation import StateEquation
 
 _GROWTH = 1e3  # over the run, beyond that of the motion itself: a run that grows by more has blown up
 _RANGE = (1e-4, 1e3)  # h |λ| where limits are looked for
 _LEAST_STEPS = 20  # of a run: longer steps are not judged
 _SCAN = 5  # lengths in each factor of ten
 _SHARP = 1e-3  # of a limit
-
-
-def jacobian(equation: StateEquation, t: float, y: Array, held: Array | None) -> Array:
-    """∂y'/∂y without the works, which do not act back, by differences.
-
-    Args:
-        equation: The state equation.
-        t: Time, in [s].
-        y: State, (m,).
-        held: The actuation in zero-order hold, or None.
-    """
-    size = len(y) - len(equation.sources)
-
-    def f(at: Any, states: Array) -> Array:
-        rows = [equation.rate(t, row, held)[0] for row in states.reshape(-1, len(y))]
-        return np.array(rows).reshape(states.shape)
-
-    return np.moveaxis(by_state(f, t, y, equation.widths), 0, -1)[:size, :size]
 
 
 def longest_step(method: Any, J: Array, n: int, duration_s: float) -> float:

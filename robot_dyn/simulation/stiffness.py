@@ -125,6 +125,24 @@ def bounded_by_stability(setup: Setup, equation: StateEquation, record: Record) 
     return (_remark(motion, 0.0, float(t[-1]), float(t[k]), f"take integrator={STIFF!r}"),)
 
 
+def jacobian(equation: StateEquation, t: float, y: Array, held: Array | None) -> Array:
+    """∂y'/∂y without the works, which do not act back, by differences.
+
+    Args:
+        equation: The state equation.
+        t: Time, in [s].
+        y: State, (m,).
+        held: The actuation in zero-order hold, or None.
+    """
+    size = len(y) - len(equation.sources)
+
+    def f(at: Any, states: Array) -> Array:
+        rows = [equation.rate(t, row, held)[0] for row in states.reshape(-1, len(y))]
+        return np.array(rows).reshape(states.shape)
+
+    return np.moveaxis(by_state(f, t, y, equation.widths), 0, -1)[:size, :size]
+
+
 def fastest(equation: StateEquation, t: float, y: Array, held: Array | None) -> Fastest:
     """The fastest motion near a state, by differences of the interpreted equation.
 
@@ -138,13 +156,7 @@ def fastest(equation: StateEquation, t: float, y: Array, held: Array | None) -> 
         RobotDynError: If the equation has no answer near the state.
         numpy.linalg.LinAlgError: If its eigenvalues are not found, or the fastest one is defective.
     """
-    n, size = equation.plant.dynamics.n, 2 * equation.plant.dynamics.n + equation.states
-
-    def f(at: Any, states: Array) -> Array:
-        rows = [equation.rate(t, row, held)[0] for row in states.reshape(-1, len(y))]
-        return np.array(rows).reshape(states.shape)
-
-    J = np.moveaxis(by_state(f, t, y, equation.widths), 0, -1)[:size, :size]  # works do not act back
+    n, J = equation.plant.dynamics.n, jacobian(equation, t, y, held)
     values, right = np.linalg.eig(J)
     k = int(np.argmax(np.abs(values)))
     x = right[:, k]
