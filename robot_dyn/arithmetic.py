@@ -7,6 +7,7 @@ midpoint ± radius that is certain to hold the exact value [Johansson, Arb, 2017
 
 from __future__ import annotations
 
+import sys
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -20,6 +21,7 @@ import numpy as np
 
 from robot_dyn.errors import QueryError, shown
 from robot_dyn.validate import integer, real
+from robot_dyn.verified_solve import verified_solve
 
 Array = Any  # numpy.ndarray of floats, or of flint.arb objects; NumPy's own types do not tell them apart
 
@@ -289,7 +291,7 @@ def _is_regular(pivot: Array, least: Array, whole: Array) -> bool:
 
 
 def cholesky_solve(M: Array, b: Array) -> Array:
-    """Solve M x = b for symmetric positive definite M by its factorisation L D Lᵀ.
+    """Solve M x = b for symmetric positive definite M by its factorisation L D Lᵀ; balls by a verified solution.
 
     Args:
         M: Shape (..., n, n).
@@ -304,9 +306,44 @@ def cholesky_solve(M: Array, b: Array) -> Array:
 
     Source: Golub and Van Loan, Matrix Computations, 4th ed., 2013, alg. 4.1.2.
     """
-    n = M.shape[-1]
     if M.dtype == b.dtype == np.float64 and (x := _lapack_solve(M, b)) is not None:
         return x
+    if _are_balls(M) and (x := _verified_solves(M, b)) is not None:
+        return x
+    return _eliminate(M, b)
+
+
+def _are_balls(x: Array) -> bool:
+    if x.dtype != object or "flint" not in sys.modules:
+        return False
+    from flint import arb
+
+    return any(isinstance(each, arb) for each in x.flat)
+
+
+def _verified_solves(M: Array, b: Array) -> Array | None:
+    """The same of balls, without the loss of digits by elimination; None where a pivot is in doubt."""
+
+    def solve(M: Array, B: Array) -> Array | None:
+        try:
+            return _eliminate(M[None], B)
+        except NotPositiveDefiniteError:
+            return None
+
+    n = M.shape[-1]
+    batch = np.broadcast_shapes(M.shape[:-2], b.shape[:-1])
+    x, rows = np.empty((*batch, n), dtype=object), np.broadcast_to(b, (*batch, n))
+    for k in np.ndindex(batch):
+        one = verified_solve(np.broadcast_to(M, (*batch, n, n))[k], rows[k], solve)
+        if one is None:
+            return None
+        x[k] = one
+    return x
+
+
+def _eliminate(M: Array, b: Array) -> Array:
+    """Solve M x = b by L D Lᵀ, in any arithmetic."""
+    n = M.shape[-1]
     least = 4 * n * np.finfo(M.dtype).eps if M.dtype.kind == "f" else 0
     L, x = M.copy(), b.copy()  # unit lower triangle of L, and the pivots D on its diagonal
     for j in range(n):
