@@ -53,6 +53,7 @@ class Engine:
         threads: For batches.
         store: Where compiled code is kept, or None.
         singular: Whether M is singular everywhere: what is solved has no answer, and its errors are for others to word.
+        parameters: What all states share, the last argument of each trace; none if it is empty.
     """
 
     traced: Callable[[str], Traced]
@@ -65,6 +66,7 @@ class Engine:
     threads: int
     store: Store | None
     singular: bool = False
+    parameters: np.ndarray = field(default_factory=lambda: np.zeros(0))
     traces: OnFirstUse = field(init=False, repr=False)
     paying: OnFirstUse = field(init=False, repr=False)
     kernels: OnFirstUse = field(init=False, repr=False)
@@ -195,7 +197,9 @@ class Engine:
         times = asked.arguments[0] == "t"
         program = program_of(self.traces[quantity].function)
         about = f"{self.self_check.dynamics.name}: {quantity}, {self.dtype}"
-        return Kernel(program, self.shape(quantity), self.dtype, times, asked.doubtful, self.store, about)
+        return Kernel(
+            program, self.shape(quantity), self.dtype, times, asked.doubtful, self.store, about, self.parameters
+        )  # fmt: skip
 
     def _one(self, quantity: str) -> Any:
         """The checked kernel for one state."""

@@ -7,7 +7,7 @@ reports them; the words are found on the slow path.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import Any, final
 
@@ -37,13 +37,14 @@ class Kernel:
     """A function of states as machine code, compiled when first asked for.
 
     Attributes:
-        program: Its instructions.
+        program: Its instructions; its inputs are x₁, x₂, …, and the parameters if there are any.
         shape: Shape of the result for one state.
         dtype: "float64" or "float32".
         times: Whether the first input is a time: a number in `call`, (B, 1) in `many`.
         doubtful: Results whose absolute values sum to more are reported.
         store: Where compiled code is kept, or None.
         about: What it is of, for a reader of the store.
+        parameters: Numbers that all states share, (P,); two kernels that differ in them alone run the same code.
     """
 
     program: Program
@@ -53,6 +54,7 @@ class Kernel:
     doubtful: float = np.inf
     store: Store | None = None
     about: str = ""
+    parameters: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     @cached_property
     def call(self) -> Callable[..., int]:
@@ -60,13 +62,13 @@ class Kernel:
 
         It takes any objects; those that are not such arrays it reports.
         """
-        return python_function(self._address("call", "one state", self._write_state), self.dtype)
+        return self._function("one state", self._write_state)
 
     @cached_property
     def any_angle(self) -> Callable[..., int]:
         """As `call`, with the sine and cosine of the C library, for angles beyond the range of ours."""
         write = partial(self._write_state, any_angle=True)
-        return python_function(self._address("call", "one state, any angle", write), self.dtype)
+        return self._function("one state, any angle", write)
 
     @property
     def state(self) -> int:
@@ -76,7 +78,7 @@ class Kernel:
     @cached_property
     def batch(self) -> Callable[..., int]:
         """(x₁, …, y, start, stop) → Status, for states start … stop − 1 of arrays (B, nᵢ) and y (B, m)."""
-        return python_function(self._address("call", "batch", self._write_batch), self.dtype)
+        return self._function("batch", self._write_batch)
 
     @property
     def lanes(self) -> int:
@@ -117,13 +119,29 @@ class Kernel:
         return Limits(_LARGEST[self.dtype], self.doubtful)
 
     def _write_state(self, module: Any, name: str, any_angle: bool = False) -> None:
-        state = state_function(module, f"{name}state", self.program, self._kind, self._limits, any_angle)
-        write_state_entry(module, f"{name}call", state, self.program.inputs, self.shape, self.times)
+        given = self.program, self._kind, self._limits, any_angle, self._parametrised
+        state = state_function(module, f"{name}state", *given)
+        write_state_entry(module, f"{name}call", state, self._of_states, self.shape, self.times, self._parametrised)
 
     def _write_batch(self, module: Any, name: str) -> None:
-        batch = batch_function(module, f"{name}batch", self.program, self._kind, self._limits)
-        write_batch_entry(module, f"{name}call", batch, self.program.inputs, len(self.program.outputs))
+        given = self.program, self._kind, self._limits, self._parametrised
+        batch = batch_function(module, f"{name}batch", *given)
+        outputs = len(self.program.outputs)
+        write_batch_entry(module, f"{name}call", batch, self._of_states, outputs, self._parametrised)
+
+    @property
+    def _parametrised(self) -> bool:
+        return self.parameters.size > 0
+
+    @property
+    def _of_states(self) -> tuple[int, ...]:
+        """Lengths of the inputs that states have."""
+        return self.program.inputs[: len(self.program.inputs) - self._parametrised]
+
+    def _function(self, what: str, write: Callable[[Any, str], None]) -> Callable[..., int]:
+        return python_function(self._address("call", what, write), np.array(self.parameters, self.dtype))
 
     def _address(self, function: str, what: str, write: Callable[[Any, str], None]) -> int:
-        key = digest([what, str(self.program), str(self.shape), self.dtype, str(self.times), repr(self.doubtful)])
+        form = str(self.shape), self.dtype, str(self.times), repr(self.doubtful), str(self._parametrised)
+        key = digest([what, str(self.program), *form])
         return machine_code.address(function, key, write, self.store, f"{self.about}, {what}")

@@ -1,6 +1,7 @@
 """CompiledPlant: a plant as machine code, M(q) a + C(q, v) v + N(t, q, v) = Υ, effects and bounds in the kernel.
 
 The effects are traced from the lines that the interpreted plant runs; what a plant does not name is not in the kernel.
+Coefficients, gravity and payloads are inputs of the code: plants that differ in them alone share it.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from robot_dyn.compiled.dynamics import CompiledDynamics
 from robot_dyn.compiled.engine import Engine
 from robot_dyn.compiled.from_casadi import instructions
 from robot_dyn.compiled.interrupts import interrupts_later
+from robot_dyn.compiled.parameters import ROBOT, Parameter, joined, parameters, split
 from robot_dyn.compiled.self_check import SelfCheck
 from robot_dyn.compiled.symbolic import Symbolic, Symbols, column, inputs
 from robot_dyn.compiled.symbolic_dynamics import SymbolicDynamics
@@ -77,6 +79,7 @@ class CompiledPlant:
             self.dynamics.engine.threads,
             default_store() if self.dynamics.cache else None,
             robot.joint_without_inertia is not None,
+            joined(self._known),
         )
 
     @property
@@ -91,10 +94,11 @@ class CompiledPlant:
     def instructions_by_effect(self) -> dict[str, int]:
         """Instructions of each effect by itself."""
         (t, ts), (q, qs), (v, vs), _ = self._inputs
+        given = [t, q, v, *self._numbers[0]]
         counts: dict[str, int] = {}
         torques = self._symbolic.equation_of_motion.torques(ts[0], qs, vs)
         for effect, torque in zip(self.plant.forces, torques, strict=True):
-            function = ca.Function("f", [t, q, v], [ca.cse(ca.densify(column(torque)))])
+            function = ca.Function("f", given, [ca.cse(ca.densify(column(torque)))])
             counts[effect.name] = counts.get(effect.name, 0) + instructions(function)
         return counts
 
@@ -152,14 +156,26 @@ class CompiledPlant:
         return tuple((vector, array.view(Symbols)) for vector, array in made)
 
     @cached_property
+    def _known(self) -> tuple[Parameter, ...]:
+        """The coefficients of the effects, gravity and payloads: inputs, so that to change one compiles nothing."""
+        return parameters(self.dynamics.robot, self.plant.effects, None)
+
+    @cached_property
+    def _numbers(self) -> tuple[tuple[Any, ...], Any]:
+        """Their values as a CasADi vector, if there are any, and as an array of symbols."""
+        vector, array = inputs("p", sum(each.size for each in self._known))
+        return (vector,) if len(array) else (), array.view(Symbols)
+
+    @cached_property
     def _bodies(self) -> SymbolicDynamics:
         """The rigid bodies in symbols."""
-        return SymbolicDynamics(self.dynamics.robot)
+        known = [each for each in self._known if each.part == ROBOT]
+        return SymbolicDynamics(self.dynamics.robot, known).of(split(self._known, self._numbers[1]).get(ROBOT, {}))
 
     @cached_property
     def _symbolic(self) -> Plant:
         """The plant in symbols."""
-        return symbolic_plant(self.plant, self._bodies)
+        return symbolic_plant(self.plant, self._bodies, split(self._known, self._numbers[1]))
 
     @interrupts_later()
     def _traced(self, quantity: str) -> Traced:
@@ -174,7 +190,7 @@ class CompiledPlant:
                 "forward_dynamics": lambda: equation.acceleration(qs, vs, equation.actuation(us) + torque),
             }
             answer = column(made[quantity]())
-        given = [t, q, v, u][: len(PLANT[quantity].arguments)]
+        given = [*[t, q, v, u][: len(PLANT[quantity].arguments)], *self._numbers[0]]
         function = ca.Function("f", given, [ca.cse(ca.densify(answer))])
         formulation = "effects" if quantity == "torque" else self._bodies.formulation(quantity)
         return Traced(function, formulation, {formulation: instructions(function)})

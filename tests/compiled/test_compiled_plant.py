@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
+from robot_dyn.compiled.llvm import machine_code
 from robot_dyn.compiled.plant import Compiled, CompiledPlant
 from robot_dyn.compiled.symbolic import TraceError
 from robot_dyn.compiled.trace import Trace
@@ -60,6 +61,27 @@ def test_a_batch_of_a_plant_is_its_states_one_by_one() -> None:
     assert np.max(np.abs(batch - single)) <= 1e-12 * np.max(np.abs(single))
     back = compiled.inverse_dynamics(t, q, v, batch)
     assert np.max(np.abs(back - np.clip(u, -5, 5))) <= 1e-9
+
+
+def test_plants_that_differ_in_numbers_share_their_machine_code(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Other coefficients, an infinite limit, gravity and a payload: nothing is compiled, and each answer is its own."""
+    q, v, u = states(2, 40)
+    t = np.linspace(0, 1, 40)
+
+    def answers(damping: Any, limit: Any, gravity: float, mass: float) -> None:
+        robot = ROBOT.with_(gravity=(0, 0, gravity), payload=rd.Payload(ROBOT.frame_names[-1], mass, (0.1, 0, 0)))
+        effects = [rd.ViscousFriction(damping), rd.EffortLimit(limit), rd.RegularisedCoulombFriction(mass, 0.1)]
+        compiled = Compiled(rd.Plant(robot, effects), cache=False)
+        expected = np.array([compiled.interpreted.forward_dynamics(*row) for row in zip(t, q, v, u, strict=True)])
+        batch = compiled.forward_dynamics(t, q, v, u)
+        single = [compiled.forward_dynamics(*row) for row in zip(t, q, v, u, strict=True)]
+        for ours in (batch, single):
+            assert np.max(np.abs(ours - expected)) <= 1e-12 * np.max(np.abs(expected))
+
+    answers([0.3, 0.1], [0.2, np.inf], -9.81, 0.5)
+    monkeypatch.setattr(machine_code, "object_file", None)  # from here on nothing can be compiled
+    answers(0.7, [np.inf, 3.0], -1.62, 1.5)
+    answers([0.0, 2.0], 0.6, -9.81, 0.1)
 
 
 def test_what_is_off_costs_no_instruction() -> None:

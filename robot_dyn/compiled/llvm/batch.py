@@ -11,7 +11,7 @@ from typing import Any
 from llvmlite import ir
 
 from robot_dyn.compiled.llvm.lanes import F32
-from robot_dyn.compiled.llvm.one_state import Limits, distinct, judged
+from robot_dyn.compiled.llvm.one_state import Limits, distinct, judged, numbers
 from robot_dyn.compiled.llvm.rows import loaded, prefetch, store
 from robot_dyn.compiled.llvm.vectors import I64
 from robot_dyn.compiled.llvm.writer import Writer
@@ -25,8 +25,11 @@ def lanes(kind: Any) -> int:
     return REGISTER // (4 if kind is F32 else 8)
 
 
-def batch_function(module: Any, name: str, program: Program, kind: Any, limits: Limits) -> Any:
-    """The function for a batch of at least L states; the last vector may overlap the one before."""
+def batch_function(module: Any, name: str, program: Program, kind: Any, limits: Limits, parameters: bool) -> Any:
+    """The function for a batch of at least L states; the last vector may overlap the one before.
+
+    With `parameters` the last input is one row, the same for all states.
+    """
     pointers = [kind.as_pointer()] * (len(program.inputs) + 1)
     function = ir.Function(module, ir.FunctionType(I64, [*pointers, I64, I64]), name)
     *arrays, start, stop = function.args
@@ -42,7 +45,7 @@ def batch_function(module: Any, name: str, program: Program, kind: Any, limits: 
         phi.add_incoming(value, opening)
     last, after = builder.sub(stop, step), builder.add(base, step)
     at = builder.select(builder.icmp_signed("<", base, last), base, last)
-    sums = _group(writer, program, arrays, at, before)
+    sums = _group(writer, program, arrays, at, before, parameters)
     for phi, value in zip(seen, (after, *sums), strict=True):
         phi.add_incoming(value, loop)
     builder.cbranch(builder.icmp_signed("<", after, stop), loop, end)
@@ -55,14 +58,19 @@ def batch_function(module: Any, name: str, program: Program, kind: Any, limits: 
     return function
 
 
-def _group(writer: Writer, program: Program, arrays: list[Any], at: Any, before: list[Any]) -> tuple[Any, Any, Any]:
+def _group(
+    writer: Writer, program: Program, arrays: list[Any], at: Any, before: list[Any], parameters: bool
+) -> tuple[Any, Any, Any]:
     """L states from `at` on: loaded, computed, stored; Σ |x|, Σ |y| and angles beyond the range, with those before."""
     vectors, (*inputs, y) = writer.vectors, arrays
-    for array, n in zip(inputs, program.inputs, strict=True):
+    given = list(zip(inputs, program.inputs, strict=True))
+    of_states, alike = (given[:-1], given[-1:]) if parameters else (given, [])
+    for array, n in of_states:
         prefetch(vectors, array, at, n, False)
     prefetch(vectors, y, at, len(program.outputs), True)
-    columns = [loaded(vectors, array, at, n) for array, n in zip(inputs, program.inputs, strict=True)]
-    written = writer.write(program, columns)
+    columns = [loaded(vectors, array, at, n) for array, n in of_states]
+    rows = [[vectors.of([x] * vectors.count) for x in numbers(vectors.builder, *each)] for each in alike]
+    written = writer.write(program, [*columns, *rows])
     store(vectors, y, at, written.results)
     arguments = vectors.absolute_sum((x for each in columns for x in each), before[0])
     results = vectors.absolute_sum(distinct(program, written.results), before[1])

@@ -1,7 +1,7 @@
 """Entries for Python: (x₁, …, y) → Status, of NumPy's arrays as they stand.
 
 They take any objects; what is not an array of the right form is reported. The `self` of the function is an array of the
-dtype that the others must have.
+dtype that the others must have: of its parameters, if it has any.
 """
 
 from __future__ import annotations
@@ -18,9 +18,12 @@ from robot_dyn.compiled.status import Status
 
 
 def write_state_entry(
-    module: Any, name: str, state: Any, inputs: tuple[int, ...], shape: tuple[int, ...], timed: bool
+    module: Any, name: str, state: Any, inputs: tuple[int, ...], shape: tuple[int, ...], timed: bool, parameters: bool
 ) -> None:
-    """The entry (x₁, …, y) of a function for one state: arrays (nᵢ,), y of `shape`; x₁ a number if it is a time."""
+    """The entry (x₁, …, y) of a function for one state: arrays (nᵢ,), y of `shape`; x₁ a number if it is a time.
+
+    With `parameters` the function takes the numbers of `self` before y.
+    """
     builder, like, objects, refuse = _entry(module, name, len(inputs) + 1)
     kind = state.args[0].type.pointee
     rest = objects[timed:]
@@ -35,10 +38,12 @@ def write_state_entry(
     for t in times:
         pointers.insert(0, builder.alloca(kind))
         builder.store(t, pointers[0])
-    _answer(builder, builder.call(state, pointers))
+    _answer(builder, builder.call(state, _with_own(builder, pointers, like, parameters)))
 
 
-def write_batch_entry(module: Any, name: str, batch: Any, inputs: tuple[int, ...], outputs: int) -> None:
+def write_batch_entry(
+    module: Any, name: str, batch: Any, inputs: tuple[int, ...], outputs: int, parameters: bool
+) -> None:
     """The entry (x₁, …, y, start, stop) of a function for batches: arrays (B, nᵢ), y (B, m), that do not overlap it."""
     builder, like, objects, refuse = _entry(module, name, len(inputs) + 3)
     kind = batch.args[0].type.pointee
@@ -57,7 +62,7 @@ def write_batch_entry(module: Any, name: str, batch: Any, inputs: tuple[int, ...
     _require(builder, apart, refuse)
     bounds = [api(builder, "PyLong_AsLongLong", each) for each in (start, stop)]
     thread = api(builder, "PyEval_SaveThread")  # other threads may run Python meanwhile
-    status = builder.call(batch, [*pointers, *bounds])
+    status = builder.call(batch, [*_with_own(builder, pointers, like, parameters), *bounds])
     api(builder, "PyEval_RestoreThread", thread)
     _answer(builder, status)
 
@@ -71,6 +76,12 @@ def _entry(module: Any, name: str, count: int) -> tuple[Any, Any, list[Any], Any
     like, arguments, number = function.args
     _require(builder, [builder.icmp_signed("==", number, ir.Constant(I64, count))], refuse)
     return builder, like, [builder.load(builder.gep(arguments, [ir.Constant(I32, i)])) for i in range(count)], refuse
+
+
+def _with_own(builder: Any, pointers: list[Any], like: Any, parameters: bool) -> list[Any]:
+    """The pointers to x₁, …, y, and before y that to the parameters."""
+    own = [arrays.data(builder, like, pointers[-1].type.pointee)] if parameters else []
+    return [*pointers[:-1], *own, pointers[-1]]
 
 
 def _require(builder: Any, conditions: list[Any], refuse: Any) -> None:

@@ -1,7 +1,7 @@
 """One state as machine code: state(x₁, …, y) → Status, of pointers to the numbers of each input and to the results.
 
 The sums of absolute values tell what is not finite or too large. Results are written if nothing is in doubt, after all
-inputs are read: y may be an input.
+inputs are read: y may be an input. Parameters, the last input if there are any, were checked when they were made.
 """
 
 from __future__ import annotations
@@ -26,7 +26,9 @@ class Limits:
     results: float
 
 
-def state_function(module: Any, name: str, program: Program, kind: Any, limits: Limits, any_angle: bool) -> Any:
+def state_function(
+    module: Any, name: str, program: Program, kind: Any, limits: Limits, any_angle: bool, parameters: bool
+) -> Any:
     """The function for one state; with `any_angle`, sine and cosine are the C library's and no angle is too far."""
     pointers = [kind.as_pointer()] * (len(program.inputs) + 1)
     function = ir.Function(module, ir.FunctionType(I64, pointers), name)
@@ -34,9 +36,10 @@ def state_function(module: Any, name: str, program: Program, kind: Any, limits: 
     *inputs, y = function.args
     writer = Writer(builder, kind, 1, any_angle)
     vectors, total, columns = writer.vectors, ir.Constant(kind, 0.0), []
-    for array, n in zip(inputs, program.inputs, strict=True):
-        columns.append([builder.load(builder.gep(array, [ir.Constant(I64, k)])) for k in range(n)])
-        total = _add_absolute(vectors, array, n, total)
+    for i, (array, n) in enumerate(zip(inputs, program.inputs, strict=True), start=1):
+        columns.append(numbers(builder, array, n))
+        if not parameters or i < len(inputs):
+            total = _add_absolute(vectors, array, n, total)
     written = writer.write(program, columns)
     size = vectors.absolute_sum(distinct(program, written.results), ir.Constant(kind, 0.0))
     status, fine = judged(builder, total, size, written.beyond, limits.arguments, ir.Constant(kind, limits.results))
@@ -45,6 +48,11 @@ def state_function(module: Any, name: str, program: Program, kind: Any, limits: 
             builder.store(value, builder.gep(y, [ir.Constant(I64, k)]))
     builder.ret(status)
     return function
+
+
+def numbers(builder: Any, array: Any, n: int) -> list[Any]:
+    """The n numbers behind a pointer."""
+    return [builder.load(builder.gep(array, [ir.Constant(I64, k)])) for k in range(n)]
 
 
 def distinct(program: Program, results: list[Any]) -> list[Any]:

@@ -39,17 +39,13 @@ class _Method(ctypes.Structure):
     ]
 
 
-_methods: list[_Method] = []
-
-
 def addresses() -> dict[str, int]:
     """Where the functions of Python's C API are, by name."""
     return {name: ctypes.cast(getattr(ctypes.pythonapi, name), ctypes.c_void_p).value or 0 for name in _API}
 
 
-@cache
-def python_function(address: int, dtype: str) -> Callable[..., int]:
-    """The Python function of machine code that reads arrays, whose `self` is an array of this dtype.
+def python_function(address: int, like: np.ndarray) -> Callable[..., int]:
+    """The Python function of machine code that reads arrays, whose `self` is this array.
 
     Raises:
         ArrayStructureError: If this NumPy keeps the fields of arrays elsewhere.
@@ -57,9 +53,12 @@ def python_function(address: int, dtype: str) -> Callable[..., int]:
     check_structure()
     made = ctypes.pythonapi.PyCFunction_NewEx
     made.restype, made.argtypes = ctypes.py_object, [ctypes.c_void_p, ctypes.py_object, ctypes.py_object]
-    method = _Method(b"kernel", address, _FASTCALL, None)
-    _methods.append(method)  # the function does not keep it
-    return made(ctypes.addressof(method), np.empty(0, dtype), None)
+    return made(ctypes.addressof(_method(address)), like, None)
+
+
+@cache  # the function does not keep it
+def _method(address: int) -> _Method:
+    return _Method(b"kernel", address, _FASTCALL, None)
 
 
 def function_of(module: Any, name: str) -> Any:
