@@ -57,6 +57,7 @@ if TYPE_CHECKING:
     from robot_dyn.effects.spring import Spring as Spring
     from robot_dyn.effects.wrench import ExternalWrench as ExternalWrench
     from robot_dyn.errors import ModelWarning as ModelWarning
+    from robot_dyn.errors import PrecisionWarning as PrecisionWarning
     from robot_dyn.errors import RobotDynError as RobotDynError
     from robot_dyn.integrate.adaptive import Adaptive as Adaptive
     from robot_dyn.integrate.methods import method as method
@@ -122,6 +123,7 @@ _HOME = {
     "Payload": "model.edits",
     "PiecewisePolynomial": "control.reference",
     "Plant": "effects.plant",
+    "PrecisionWarning": "errors",
     "RegularisedCoulombFriction": "effects.friction",
     "Robot": "model.robot",
     "RobotDynError": "errors",

@@ -104,6 +104,10 @@ class ModelWarning(RobotDynWarning):
     """A robot that loads although some of its bodies cannot exist, or cannot be drawn, as described."""
 
 
+class PrecisionWarning(RobotDynWarning):
+    """An answer with fewer digits than asked for by `Robot.warn_below`."""
+
+
 def announce(robot: str, findings: Sequence[str]) -> None:
     """One ModelWarning of findings about a robot, if there are any, at the line that called the caller."""
     if findings:

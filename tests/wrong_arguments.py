@@ -157,6 +157,8 @@ def examples(folder: Path) -> dict[str, Example]:
         "Robot.from_pinocchio": (rd.Robot.from_pinocchio, {"model": robot.model}),
         "Robot.from_text": (rd.Robot.from_text, {"urdf": robot.description.xml.decode(), "source": "arm"}),
         "Robot.random_configuration": (getattr(robot, "random_configuration", None), {"rng": np.random.default_rng(0)}),
+        "Robot.digits": (lambda quantity, q: robot.digits(quantity, q), {"quantity": "N", "q": q}),
+        "Robot.warn_below": (robot.warn_below, {"digits": 12.0}),
         "Robot.with_": (
             robot.with_,
             {"gravity": (1.0, 0.0, -9.0), "lock": {"hinge": 0.1}, "payload": rd.Payload("pole", 1.0), "armature": 0.1,

@@ -8,7 +8,7 @@ M a = τ may differ by max(tolerance, 8 n u κ) of the terms of τ, κ the condi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -35,9 +35,9 @@ def floored(scale: np.ndarray) -> np.ndarray:
 
 
 def diagonal_scale(M: np.ndarray) -> np.ndarray:
-    """√(M_ii M_jj), which no |M_ij| of a positive definite matrix (n, n) exceeds."""
-    d = np.sqrt(np.abs(np.diagonal(M)))
-    return np.outer(d, d)
+    """√(M_ii M_jj), which no |M_ij| of positive definite matrices (..., n, n) exceeds."""
+    d = np.sqrt(np.abs(np.diagonal(M, axis1=-2, axis2=-1)))
+    return d[..., :, None] * d[..., None, :]
 
 
 def joint_units(M: np.ndarray) -> np.ndarray:
@@ -45,15 +45,20 @@ def joint_units(M: np.ndarray) -> np.ndarray:
     return np.sqrt(np.maximum(np.diagonal(M, axis1=-2, axis2=-1), 1e-300))
 
 
-def mass_norm(M: np.ndarray, x: np.ndarray) -> float:
-    """‖x‖_M = √(xᵀ M x)."""
-    return float(np.sqrt(max(x @ apply(M, x), 0.0)))
+def mass_norm(M: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """‖x‖_M = √(xᵀ M x) of x (..., n)."""
+    return np.sqrt(np.maximum((x * apply(M, x)).sum(axis=-1), 0.0))
+
+
+def unit_diagonal_conditions(M: np.ndarray) -> np.ndarray:
+    """κ of each of matrices (..., n, n) scaled to a unit diagonal."""
+    d = joint_units(M)
+    return np.linalg.cond(M / (d[..., :, None] * d[..., None, :]))
 
 
 def unit_diagonal_condition(M: np.ndarray) -> float:
-    """κ of M scaled to a unit diagonal; the largest of matrices (..., n, n)."""
-    d = joint_units(M)
-    return float(np.max(np.linalg.cond(M / (d[..., :, None] * d[..., None, :]))))
+    """The largest of them."""
+    return float(np.max(unit_diagonal_conditions(M)))
 
 
 def solved_tolerance(least: float, M: np.ndarray, dtype: str = "float64") -> float:
@@ -61,13 +66,17 @@ def solved_tolerance(least: float, M: np.ndarray, dtype: str = "float64") -> flo
     return max(least, 8 * M.shape[-1] * float(np.finfo(dtype).eps) / 2 * unit_diagonal_condition(M))
 
 
-def acceleration_norm(M: np.ndarray, torques: Sequence[np.ndarray], terms: np.ndarray) -> float:
-    """Scale of ‖a − a'‖_M at one state: Σ ‖M⁻¹ τ_k‖_M of the torques that are solved, or ‖D⁻¹ terms‖ if that is more.
+def solved_norm(M: np.ndarray, torques: Iterable[np.ndarray]) -> np.ndarray:
+    """Σ ‖M⁻¹ τ_k‖_M of torques (..., n)."""
+    return np.sum([mass_norm(M, np.linalg.solve(M, torque[..., None])[..., 0]) for torque in torques], axis=0)
+
+
+def acceleration_norm(M: np.ndarray, torques: Iterable[np.ndarray], terms: np.ndarray) -> float:
+    """Scale of ‖a − a'‖_M at one state: that of the torques that are solved, or ‖D⁻¹ terms‖ if that is more.
 
     Of sums such as C v and N only their terms, (n,), keep the digits.
     """
-    whole = sum(mass_norm(M, np.linalg.solve(M, torque)) for torque in torques)
-    return max(whole, float(np.linalg.norm(terms / joint_units(M))))
+    return max(float(solved_norm(M, torques)), float(np.linalg.norm(terms / joint_units(M))))
 
 
 def acceleration_entries(d: np.ndarray, terms: np.ndarray, a: np.ndarray) -> np.ndarray:

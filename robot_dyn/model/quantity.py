@@ -16,6 +16,7 @@ import numpy as np
 from robot_dyn.arithmetic import Array
 
 DOUBTFUL = 1e10  # of ‖a‖: M may be singular at this q, which rounding hides
+MOST_DIGITS = 20  # of an answer that are counted
 
 State = Mapping[str, Array]
 

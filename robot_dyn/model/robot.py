@@ -22,6 +22,8 @@ from robot_dyn.errors import (
     DescriptionError,
     EditError,
     ModelWarning,
+    PrecisionWarning,
+    QueryError,
     SingularError,
     UndecidedError,
     announce,
@@ -37,9 +39,9 @@ from robot_dyn.model.gravity import gravity_acts, no_torque
 from robot_dyn.model.inertial_parameters import NAMES as PARAMETERS
 from robot_dyn.model.inertial_parameters import Parametrised, ordered
 from robot_dyn.model.kernels import Kernel, Scratch, frozen
-from robot_dyn.model.quantity import ALL, DOUBTFUL
+from robot_dyn.model.quantity import ALL, DOUBTFUL, MOST_DIGITS
 from robot_dyn.model.structure import structure
-from robot_dyn.validate import instance, is_moderate, is_state, shaped
+from robot_dyn.validate import instance, is_moderate, is_state, number, shaped
 
 
 @final
@@ -50,12 +52,20 @@ class Robot(Dynamics, Parametrised):
     Attributes:
         description: The checked file.
         edits: Gravity, locks, payloads, armature.
+        least_digits: Of answers, below which queries warn; None if they do not. See `warn_below`.
     """
 
     description: Description
     edits: Edits = field(default_factory=Edits)
+    least_digits: float | None = None
 
     def __post_init__(self) -> None:
+        if self.least_digits is not None:
+            object.__setattr__(self, "least_digits", number("digits", self.least_digits, above=0))
+            if self.least_digits > MOST_DIGITS:
+                raise QueryError(
+                    f"digits must be at most {MOST_DIGITS}, got {self.least_digits:g}: no more are counted"
+                )
         instance("edits", self.edits, Edits, "give those of another robot, or use with_", error=EditError)
         if not isinstance(self.description, Description):
             given = type(self.description).__name__
@@ -97,7 +107,7 @@ class Robot(Dynamics, Parametrised):
         return robot
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Robot, (self.description, self.edits)
+        return Robot, (self.description, self.edits, self.least_digits)
 
     def with_(self, **changes: Unpack[Changes]) -> Robot:
         """A new robot with more edits. Locks and payloads add up; the others replace what was given before.
@@ -118,7 +128,43 @@ class Robot(Dynamics, Parametrised):
         if gravity != self.edits.gravity and any(gravity) and not gravity_acts(robot):
             remedy = "give its direction in base axes, or (0, 0, 0)"
             warnings.warn(f"{robot.name}: {no_torque(gravity)}; {remedy}", ModelWarning, stacklevel=2)
-        return robot
+        return robot if self.least_digits is None else robot.warn_below(self.least_digits)
+
+    def digits(self, quantity: str, *state: Array) -> float:
+        """Number of decimal digits that hold of the answer to a query, counted against true values in balls.
+
+            −log10(error),  from 0 to 20
+
+        Errors are relative to √(M_ii M_jj) for M; for C, N and inverse dynamics to the largest entry in the units
+        √M_ii of the joints; for forward dynamics to Σ ‖M⁻¹ τ_k‖ of τ, C v and N, in the norm of M. An answer that
+        cancels to nearly nothing has few digits. Numbers of the file count as the decimals that are written there.
+        Takes milliseconds.
+
+        Args:
+            quantity: "M", "C", "N", "inverse_dynamics" or "forward_dynamics".
+            *state: Its arguments at one state, shape (n,) each, as of the method of that name.
+
+        Raises:
+            QueryError: If there is no such quantity, or an argument is wrong.
+            SingularError: Of forward dynamics where M is singular; names the joint.
+        """
+        from robot_dyn.accuracy.digits import digits  # the one import upward: who asks holds a Robot
+
+        return digits(self, quantity, state)
+
+    def warn_below(self, digits: float | None) -> Robot:
+        """A robot whose queries warn where their answers have fewer digits, as `digits` counts them.
+
+        Of M, C, N, inverse and forward dynamics. An estimate, 8 n u κ of the terms, is made first; digits are counted
+        only where it is below. Takes milliseconds a state, and does not reach machine code made of the robot.
+
+        Args:
+            digits: From above 0 to 20; None for no warnings, and no cost.
+
+        Raises:
+            QueryError: If it is not such a number.
+        """
+        return Robot(self.description, self.edits, digits)
 
     @property
     def name(self) -> str:
@@ -361,8 +407,8 @@ class Robot(Dynamics, Parametrised):
 
     @cached_property
     def _shape(self) -> tuple[int] | None:
-        """Shape of a state that goes straight to Pinocchio; None if joints are coupled."""
-        return (self.n,) if self.couplings.trivial else None
+        """Shape of a state that goes straight to Pinocchio; None if joints are coupled, or digits are looked at."""
+        return (self.n,) if self.couplings.trivial and self.least_digits is None else None
 
     @property
     def joint_without_inertia(self) -> str | None:
@@ -374,7 +420,7 @@ class Robot(Dynamics, Parametrised):
         """Makes the error of a robot without forward dynamics."""
         q = np.linspace(0.3, 0.9, self.n)  # a configuration without symmetries
         try:
-            acceleration(self.M(q), q, self.joint_names)
+            acceleration(self._equation(pin.crba, self.couplings.matrix)(q), q, self.joint_names)
         except UndecidedError as error:
             return partial(UndecidedError, error.joint, "at any q", "float64")
         except SingularError as error:
@@ -398,6 +444,11 @@ class Robot(Dynamics, Parametrised):
     def _answered(self, quantity: str, errors: str, equation: Callable[..., ndarray], state: dict[str, Array]) -> Any:
         arrays = {name: shaped(name, x, self.joint_names) for name, x in state.items()}
         answer = answered(equation, arrays, ALL[quantity].shape(self.sizes), self.joint_names, errors)
+        if self.least_digits is not None:
+            from robot_dyn.accuracy.digits import doubt
+
+            if said := doubt(self, quantity, arrays, answer, self.least_digits):
+                warnings.warn(said, PrecisionWarning, stacklevel=4)
         return answer if answer.ndim else float(answer)
 
     def _forward_dynamics(self, errors: str, q: Array, v: Array, tau: Array) -> ndarray:
