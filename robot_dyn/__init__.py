@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from robot_dyn.accuracy.advisor import advise as advise
     from robot_dyn.accuracy.compare import Comparison as Comparison
     from robot_dyn.accuracy.compare import compare as compare
+    from robot_dyn.accuracy.cost import Cost as Cost
+    from robot_dyn.accuracy.cost import cost as cost
+    from robot_dyn.accuracy.cost_diagram import save_cost as save_cost
     from robot_dyn.accuracy.diagram import save_work_precision as save_work_precision
     from robot_dyn.accuracy.work_precision import WorkPrecision as WorkPrecision
     from robot_dyn.accuracy.work_precision import work_precision as work_precision
@@ -102,6 +105,7 @@ _HOME = {
     "ComputedTorque": "control.computed_torque",
     "Conservative": "effects.effect",
     "Controller": "control.controller",
+    "Cost": "accuracy.cost",
     "Dissipative": "effects.effect",
     "Dynamics": "model.dynamics",
     "EffortLimit": "effects.actuator",
@@ -142,6 +146,7 @@ _HOME = {
     "circle": "control.cartesian",
     "coefficient": "coefficients",
     "compare": "accuracy.compare",
+    "cost": "accuracy.cost",
     "euler_lagrange": "lagrange.euler_lagrange",
     "gains_from": "control.independent_joint",
     "hold": "control.reference",
@@ -160,6 +165,7 @@ _HOME = {
     "read_scene": "scene.scene",
     "replay": "view.replay",
     "rollouts": "simulation.rollout",
+    "save_cost": "accuracy.cost_diagram",
     "save_plot": "view.plots",
     "save_replay": "view.replay",
     "save_rollouts": "simulation.rollouts_file",

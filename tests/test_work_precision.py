@@ -108,6 +108,12 @@ def test_chaotic_motion_is_cut_where_references_part() -> None:
     assert truth.error < 1e-8
 
 
+def test_an_accuracy_of_the_setup_is_not_used() -> None:
+    """It would choose the method, which differs from run to run here."""
+    (only,) = rd.work_precision(replace(swing(0.1), accuracy=1e-6), methods=["rk4"], repeats=1).ladders
+    assert only.points
+
+
 def test_a_motion_without_reference_is_refused() -> None:
     with pytest.raises(HorizonError, match=r"no run of 0\.3 s ends by DOP853 or Rosenbrock"):
         rd.work_precision(replace(swing(), controller=lambda t, q, v: 1e9 * v))

@@ -31,6 +31,7 @@ NOT_OBJECTS = (None, 3, NAN, True, "no such", object(), np.ones(2), MASKED, {"a"
 RESULTS = {
     "Advice",
     "Comparison",
+    "Cost",
     "Rollouts",
     "Trajectory",
     "WorkPrecision",
@@ -81,6 +82,7 @@ def examples(folder: Path) -> dict[str, Example]:
     setup = rd.Setup(plant, q, duration_s=0.01, integrator="rk4")
     run, several = rd.simulate(setup), rd.rollouts(setup, np.tile(q, (2, 1)))
     measured = rd.work_precision(replace(setup, engine="interpreted"), methods=["rk4"], repeats=1)
+    priced = rd.cost(setup, budget_s=1e-9, repeats=1)
     saved, scene, urdf = rd.save_run(run, folder / "run"), folder / "scene.toml", folder / "arm.urdf"
     scene.write_text('robot = "cart_pole"\nduration_s = 0.01\n', encoding="utf-8")
     urdf.write_bytes(robot.description.xml)
@@ -258,6 +260,12 @@ def examples(folder: Path) -> dict[str, Example]:
             {"dynamics": robot, "q": q, "v": v, "frame": "pole", "rows": (0,), "threshold": 0.01},
         ),
         "advise": (rd.advise, {"what": plant, "q0": q, "v0": v, "duration_s": 0.01}),
+        "Cost.of": (priced.of, {"what": "gravity"}),
+        "cost": (
+            rd.cost,
+            {"what": setup, "q0": q, "v0": v, "budget_s": 1e-9, "repeats": 1, "on_progress": print_nothing},
+        ),
+        "save_cost": (rd.save_cost, {"result": priced, "path": folder / "cost.csv", "theme": "dark"}),
         "WorkPrecision.digits": (measured.digits, {"error": 1e-6}),
         "WorkPrecision.sentence": (measured.sentence, {"digits": 6}),
         "work_precision": (

@@ -59,13 +59,20 @@ def save_work_precision(result: WorkPrecision, path: str | Path, *, theme: str =
         DiagramError: If it cannot be written, or there is nothing to draw.
     """
     instance("result", result, WorkPrecision, "give that of rd.work_precision")
+    return written(path, theme, TABLE, lambda: table(result), lambda: draw(result, theme))
+
+
+def written(
+    path: str | Path, theme: str, kind: files.Kind, text: Callable[[], str], figure: Callable[[], Figure]
+) -> Path:
+    """Write a figure, or a table of that kind, by the suffix; errors as of `save_work_precision`."""
     choice("theme", theme, THEMES)
-    path = files.target(path, (*PICTURES, TABLE), DiagramError)
+    path = files.target(path, (*PICTURES, kind), DiagramError)
     stream = io.BytesIO()
-    if path.suffix.lower() == TABLE.suffix:
-        stream.write(table(result).encode())
+    if path.suffix.lower() == kind.suffix:
+        stream.write(text().encode())
     else:
-        draw(result, theme).savefig(stream, format=path.suffix[1:].lower(), dpi=120)
+        figure().savefig(stream, format=path.suffix[1:].lower(), dpi=120)
     return files.save(path, lambda file: file.write(stream.getvalue()), DiagramError)
 
 
@@ -100,11 +107,11 @@ def draw(result: WorkPrecision, theme: str = "light") -> Figure:
     )
     ink = {"color": colours["ink"], "parse_math": False}
     said = fill(result.sentence(), _SENTENCE)
-    figure.text(0.012, 0.975, _lines(said), fontsize=12.5, weight="bold", va="top", **ink)
+    figure.text(0.012, 0.975, drawable_lines(said), fontsize=12.5, weight="bold", va="top", **ink)
     figure.text(
         0.012,
         0.945 - 0.027 * said.count("\n"),
-        _lines(_caption(result)),
+        drawable_lines(_caption(result)),
         fontsize=8.5,
         va="top",
         linespacing=1.4,
@@ -144,7 +151,8 @@ def draw(result: WorkPrecision, theme: str = "light") -> Figure:
     return figure
 
 
-def _lines(text: str) -> str:
+def drawable_lines(text: str) -> str:
+    """Lines of which no sign is missing in the fonts of a figure."""
     return "\n".join(map(drawable, text.split("\n")))
 
 
@@ -178,11 +186,17 @@ def _shown(ladder: Ladder) -> list[Point]:
 def _axes(axes: Any, result: WorkPrecision, colours: Mapping[str, Any], x: str, title: str) -> None:
     from matplotlib.ticker import NullFormatter
 
-    ink = {"color": colours["ink"], "parse_math": False}
-    axes.set_facecolor(colours["paper"])
     axes.set(xscale="log", yscale="log")
     axes.xaxis.set_minor_formatter(NullFormatter())
     axes.yaxis.set_minor_formatter(NullFormatter())
+    styled(axes, colours, x, title)
+    axes.set_ylabel(f"error of q [{result.unit}]", fontsize=8.5, color=colours["ink"], parse_math=False)
+
+
+def styled(axes: Any, colours: Mapping[str, Any], x: str, title: str) -> None:
+    """Axes in the colours of a theme."""
+    ink = {"color": colours["ink"], "parse_math": False}
+    axes.set_facecolor(colours["paper"])
     axes.grid(color=colours["grid"], linewidth=0.5)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
@@ -190,7 +204,6 @@ def _axes(axes: Any, result: WorkPrecision, colours: Mapping[str, Any], x: str, 
     axes.tick_params(which="both", colors=colours["ink"], labelsize=8)
     axes.set_title(title, loc="left", fontsize=9, **ink)
     axes.set_xlabel(x, fontsize=8.5, labelpad=1, **ink)
-    axes.set_ylabel(f"error of q [{result.unit}]", fontsize=8.5, **ink)
 
 
 def _curve(

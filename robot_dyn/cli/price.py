@@ -1,4 +1,4 @@
-"""Commands that say what digits cost, and whether steps are short enough: accuracy, advise."""
+"""Commands that say what digits, effects and algorithms cost, and whether steps are short enough."""
 
 from __future__ import annotations
 
@@ -64,6 +64,41 @@ def accuracy(
         written = [rd.save_work_precision(result, path, theme=theme) for path in (drawn, table) if path]
     finally:
         say_json(prices.work_precision(result)) if as_json else say(*prices.work_precision_tables(result))
+    for path in written:
+        tell(f"written: {path}")
+    if result.interrupted:
+        raise typer.Exit(130)
+
+
+@app.command()
+def cost(
+    scene: Annotated[str, typer.Argument(metavar="SCENE.toml", help="A scene file.")],
+    output: Annotated[
+        str | None, typer.Option("-o", "--output", metavar="PLOT.png", help="Draw it, as a .png, .svg or .pdf.")
+    ] = None,
+    csv: Annotated[str | None, typer.Option(metavar="TABLE.csv", help="Write all alternatives as a table.")] = None,
+    budget: Annotated[float, typer.Option(metavar="SECONDS", help="Time to spend, compiling not counted.")] = 10.0,
+    repeats: Annotated[int, typer.Option(min=1, help="How often each is timed at most, while the budget lasts.")] = 25,
+    dark: Annotated[bool, typer.Option("--dark", help="Draw for dark screens.")] = False,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Count and time effects, control and terms of a scene, on and off, and algorithms beside each other."""
+    from robot_dyn.accuracy.cost_diagram import TABLE
+    from robot_dyn.accuracy.diagram import DiagramError
+    from robot_dyn.cli import prices
+    from robot_dyn.view.plots import PICTURES
+
+    drawn = output and arguments.output(output, PICTURES, DiagramError, [scene], force)
+    table = csv and arguments.output(csv, TABLE, DiagramError, [scene, *([drawn] if drawn else [])], force)
+    setup = rd.read_scene(scene)
+    with spending(budget) as spent:
+        result = rd.cost(setup, budget_s=budget, repeats=repeats, on_progress=spent)
+    theme = "dark" if dark else "light"
+    try:  # the files first: a terminal or pipe may be gone
+        written = [rd.save_cost(result, path, theme=theme) for path in (drawn, table) if path]
+    finally:
+        say_json(prices.cost(result)) if as_json else say(*prices.cost_tables(result))
     for path in written:
         tell(f"written: {path}")
     if result.interrupted:

@@ -10,6 +10,8 @@ from typing import Any
 from rich.table import Table
 
 from robot_dyn.accuracy.advisor import Advice
+from robot_dyn.accuracy.alternative import Alternative
+from robot_dyn.accuracy.cost import Cost
 from robot_dyn.accuracy.work_precision import WorkPrecision, in_words
 
 Document = dict[str, Any]
@@ -67,6 +69,52 @@ def advice(made: Advice) -> Document:
         "error": None if error is None else _finite(error.final),
         "error_verdict": None if error is None else str(error.verdict),
     }  # fmt: skip
+
+
+def cost(result: Cost) -> Document:
+    """All alternatives, what the parts add, and what was left out."""
+    return {
+        "robot": result.name,
+        "acting": list(result.acting),
+        "sentence": result.sentence,
+        "alternatives": [
+            asdict(each) | {"instructions_ratio": _finite(each.instructions_ratio), "time_ratio": each.time_ratio}
+            for each in result.alternatives
+        ],
+        "parts": result.parts,
+        "shared": result.shared,
+        "left_out": list(result.left_out),
+        "environment": result.environment,
+        "budget_s": result.budget_s,
+        "spent_s": result.spent_s,
+        "interrupted": result.interrupted,
+    }
+
+
+def cost_tables(result: Cost) -> Iterator[Any]:
+    """The sentence, and a line for each alternative, by what they are of."""
+    yield result.sentence
+    yield f"\n{result.name}: {', '.join(result.acting) or 'no effects'}"
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for heading in ("per", "what", "first / second", "instructions", "ratio", "time", "ratio"):
+        table.add_column(heading, justify="left" if heading in ("per", "what", "first / second") else "right")
+    for k, each in enumerate(result.alternatives):
+        again = k > 0 and result.alternatives[k - 1].per == each.per
+        table.add_row("" if again else each.per, *_cells(each))
+    yield table
+    yield "instructions are exact; times are medians of runs that take turns, in machine code, on one thread"
+    yield from (f"left out: {each}" for each in result.left_out)
+    yield f"{', '.join(f'{name} {value}' for name, value in result.environment.items())}"
+
+
+def _cells(each: Alternative) -> Iterator[str]:
+    first, second = each.first, each.second
+    yield each.what
+    yield f"{first.name} / {second.name}"
+    yield f"{first.instructions} / {second.instructions}"
+    yield f"{each.instructions_ratio:.3g}" if isfinite(each.instructions_ratio) else "—"
+    yield " / ".join("—" if of.time_s is None else in_words(of.time_s) for of in (first, second))
+    yield "—" if each.time_ratio is None else f"{each.time_ratio:.2f}"
 
 
 def work_precision_tables(result: WorkPrecision) -> Iterator[Any]:

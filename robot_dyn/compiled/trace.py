@@ -102,13 +102,17 @@ class Trace:
 
     @interrupts_later()
     @in_arithmetic
-    def quantity(self, name: str) -> Traced:
-        """A quantity of the `Dynamics` protocol, or "forward_dynamics_derivatives": ∂a/∂q, ∂a/∂v, ∂a/∂τ."""
+    def formulations(self, name: str) -> dict[str, ca.Function]:
+        """A quantity by each formulation that is worth a trace."""
         arguments = [*(self.symbols[argument][0] for argument in QUANTITIES[name].arguments), *self.given]
-        functions = {
+        return {
             formulation: ca.Function("f", arguments, [ca.cse(ca.densify(make()))])
             for formulation, make in self._roads(name)
         }
+
+    def quantity(self, name: str) -> Traced:
+        """A quantity of the `Dynamics` protocol, or "forward_dynamics_derivatives": ∂a/∂q, ∂a/∂v, ∂a/∂τ."""
+        functions = self.formulations(name)
         counts = {formulation: instructions(function) for formulation, function in functions.items()}
         least = min(counts, key=counts.__getitem__)
         return Traced(functions[least], least, counts)

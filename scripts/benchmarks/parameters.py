@@ -14,15 +14,12 @@ import numpy as np
 
 import robot_dyn as rd
 from benchmarks.measure import Effort, arms, row, table
-from robot_dyn.compiled.from_casadi import program_of
 from robot_dyn.compiled.right_angles import completed
-from robot_dyn.compiled.symbolic_dynamics import SymbolicDynamics
 from robot_dyn.integrate.methods import method
 from robot_dyn.simulation.fixed_step import FixedStep
 from robot_dyn.simulation.machine.batch import LANES, Batch
-from robot_dyn.simulation.machine.machine import Equations, Machine
-from robot_dyn.simulation.machine.making import machine
-from robot_dyn.simulation.machine.traced import trace
+from robot_dyn.simulation.machine.machine import Machine
+from robot_dyn.simulation.machine.making import machine, machine_of_constants
 from robot_dyn.simulation.size import MOST_BYTES
 from robot_dyn.simulation.state_equation import StateEquation
 
@@ -54,9 +51,12 @@ def parameters(effort: Effort) -> None:
         began = perf_counter()
         rd.simulate(other)
         again = perf_counter() - began
-        made = {"constants": _constant(setup, 1), "inputs": machine(_equation(setup), _rk4(setup))}
+        made = {
+            "constants": machine_of_constants(_equation(setup), _rk4(setup)),
+            "inputs": machine(_equation(setup), _rk4(setup)),
+        }
         lanes = {
-            "constants": _constant(setup, LANES),
+            "constants": machine_of_constants(_equation(setup), _rk4(setup), lanes=LANES),
             "inputs": machine(_equation(setup), _rk4(setup), lanes=LANES, kept=()),
         }
         counts = {kind: len(each.equations.programs["rate"]) for kind, each in made.items()}
@@ -75,15 +75,6 @@ def _equation(setup: rd.Setup) -> StateEquation:
 
 def _rk4(setup: rd.Setup) -> Any:
     return setup.integrator
-
-
-def _constant(setup: rd.Setup, lanes: int) -> Machine:
-    """The machine code with all numbers as constants."""
-    equation = _equation(setup)
-    functions = trace(equation, lambda dynamics, part: SymbolicDynamics(dynamics), (), None if lanes == 1 else ())
-    programs = {name: program_of(each) for name, each in functions.items()}
-    like = machine(equation, _rk4(setup))
-    return Machine(equation, Equations(programs, lanes, "constants"), (), like.loop)
 
 
 def _one(setup: rd.Setup, made: Machine) -> Any:

@@ -120,6 +120,23 @@ def machine(
     return Machine(own, equations, known, None if method is None else _loop(method, cuts), swept)
 
 
+def machine_of_constants(equation: StateEquation, method: Integrator, *, lanes: int = 1) -> Machine:
+    """The machine of a state equation whose numbers are constants of the code: none of them can be changed.
+
+    Args:
+        equation: As of `machine`.
+        method: One whose steps are machine code too.
+        lanes: Runs in lock step, of which no sample is kept.
+
+    Raises:
+        TraceError: As of `machine`.
+    """
+    robot = _robot(equation.plant.dynamics)
+    own = replace(equation, plant=Plant(robot, equation.plant.effects))
+    programs = _traced(own, (), None if lanes == 1 else (), method.needs_jacobian, constants=True)
+    return Machine(own, Equations(programs, lanes, robot.name), (), _loop(method, False))
+
+
 def _shared(
     equation: StateEquation, known: tuple[Parameter, ...], lanes: int, swept: tuple[str, ...]
 ) -> dict[int, int]:
@@ -151,8 +168,9 @@ def _programs(
 
 @interrupts_later()
 def _traced(
-    equation: StateEquation, known: tuple[Parameter, ...], kept: tuple[str, ...] | None, jacobian: bool
-) -> dict[str, Program]:
+    equation: StateEquation, known: tuple[Parameter, ...], kept: tuple[str, ...] | None, jacobian: bool,
+    constants: bool = False,
+) -> dict[str, Program]:  # fmt: skip
     from robot_dyn.compiled.from_casadi import program_of
     from robot_dyn.compiled.symbolic_dynamics import SymbolicDynamics
     from robot_dyn.simulation.machine.traced import trace
@@ -160,6 +178,8 @@ def _traced(
     def bodies(dynamics: Any, part: Part) -> SymbolicDynamics:
         """Its equations in symbols, traced once for a file and its edits."""
         robot, own = _robot(dynamics), tuple(each for each in known if each.part == part)
+        if constants:  # what is kept tells robots apart but for the numbers that are inputs
+            return SymbolicDynamics(robot)
         (described, *_), _ = structure(StateEquation(Plant(robot), None))
         inputs = tuple(each.place for each in own)
         return _symbols.get((), (described, inputs), lambda: SymbolicDynamics(robot, own))
