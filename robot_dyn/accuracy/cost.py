@@ -13,13 +13,13 @@ from robot_dyn.accuracy.environment import environment
 from robot_dyn.accuracy.query_cost import QueryCost
 from robot_dyn.accuracy.work_precision import in_words
 from robot_dyn.effects.plant import Plant
-from robot_dyn.errors import QueryError, RobotDynError
+from robot_dyn.errors import RobotDynError
 from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.acting import acting
 from robot_dyn.simulation.options import setup_of, starts
 from robot_dyn.simulation.setup import Setup
-from robot_dyn.validate import function, integer, number
+from robot_dyn.validate import choice, function, integer, number
 
 _MOST_REPEATS = 1000
 
@@ -55,11 +55,8 @@ class Cost:
         Raises:
             QueryError: If it is not among them.
         """
-        for each in self.alternatives:
-            if each.what == what:
-                return each
-        known = ", ".join(each.what for each in self.alternatives)
-        raise QueryError(f"what: nothing was measured of {what!r}; there are {known}")
+        known = {each.what: each for each in self.alternatives}
+        return known[choice("cost of", what, known)]
 
     @property
     def parts(self) -> dict[str, int]:
