@@ -10,6 +10,9 @@ if TYPE_CHECKING:
 
     from robot_dyn.accuracy.advisor import Advice as Advice
     from robot_dyn.accuracy.advisor import advise as advise
+    from robot_dyn.accuracy.certificate import Certificate as Certificate
+    from robot_dyn.accuracy.certificate_diagram import save_certificate as save_certificate
+    from robot_dyn.accuracy.certify import certify as certify
     from robot_dyn.accuracy.compare import Comparison as Comparison
     from robot_dyn.accuracy.compare import compare as compare
     from robot_dyn.accuracy.cost import Cost as Cost
@@ -100,6 +103,7 @@ _HOME = {
     "Advice": "accuracy.advisor",
     "Ball": "arithmetic",
     "Bound": "effects.effect",
+    "Certificate": "accuracy.certificate",
     "Comparison": "accuracy.compare",
     "Compiled": "compiled.plant",
     "ComputedTorque": "control.computed_torque",
@@ -143,6 +147,7 @@ _HOME = {
     "ViscousFriction": "effects.friction",
     "WorkPrecision": "accuracy.work_precision",
     "advise": "accuracy.advisor",
+    "certify": "accuracy.certify",
     "circle": "control.cartesian",
     "coefficient": "coefficients",
     "compare": "accuracy.compare",
@@ -165,6 +170,7 @@ _HOME = {
     "read_scene": "scene.scene",
     "replay": "view.replay",
     "rollouts": "simulation.rollout",
+    "save_certificate": "accuracy.certificate_diagram",
     "save_cost": "accuracy.cost_diagram",
     "save_plot": "view.plots",
     "save_replay": "view.replay",

@@ -30,6 +30,7 @@ NOT_OBJECTS = (None, 3, NAN, True, "no such", object(), np.ones(2), MASKED, {"a"
 
 RESULTS = {
     "Advice",
+    "Certificate",
     "Comparison",
     "Cost",
     "Rollouts",
@@ -78,6 +79,7 @@ def examples(folder: Path) -> dict[str, Example]:
     robot = rd.load("cart_pole")
     q, v, u = np.array([0.3, -0.4]), np.array([0.7, 1.1]), np.array([1.3, 0.9])
     friction, hold = rd.ViscousFriction(0.1), rd.hold(q)
+    certified = rd.certify(robot, samples=100, repeats=1)
     plant, own = rd.Plant(robot, [friction]), rd.Lagrangian(robot)
     setup = rd.Setup(plant, q, duration_s=0.01, integrator="rk4")
     run, several = rd.simulate(setup), rd.rollouts(setup, np.tile(q, (2, 1)))
@@ -182,6 +184,15 @@ def examples(folder: Path) -> dict[str, Example]:
             {"joint": 1, "level": 0.5, "name": "stop", "rising": "touched", "falling": "left", "of_velocity": True},
         ),
         "ViscousFriction": (rd.ViscousFriction, {"damping": [0.1, 0.2]}),
+        "certify": (
+            rd.certify,
+            {"robot": robot, "q": q, "v": v, "a": u, "tau": u, "samples": 100, "seed": 3, "repeats": 1,
+             "on_progress": lambda part, what: None},
+        ),
+        "Certificate.of": (certified.of, {"quantity": "M", "road": "Pinocchio"}),
+        "save_certificate": (
+            rd.save_certificate, {"result": certified, "path": folder / "digits.csv", "theme": "dark"},
+        ),
         "circle": (
             rd.circle,
             {"centre": [0.1, 0.2, 0.3], "radius": 0.1, "normal": [0.0, 0.1, 1.0], "period_s": 1.0, "turns": 1.0,

@@ -3,7 +3,7 @@
     radius ≤ 1e-20 · scale
 
 The scale of M_ij is √(M_ii M_jj); of accelerations, in the norm of M, Σ ‖M⁻¹ τ_k‖_M of τ, C v and N; of another entry
-its typical size where that is given, otherwise the largest entry, in the units √M_ii of the joints.
+itself or its typical size if that is given and more, otherwise the largest entry, in the units √M_ii of the joints.
 """
 
 from __future__ import annotations
@@ -137,7 +137,7 @@ class Exact:
         if quantity.definite:
             return Scale(floored(diagonal_scale(midpoint(values))))
         if typical is not None and not quantity.solves:
-            return Scale(typical)
+            return Scale(np.maximum(typical, np.abs(midpoint(values))))
         inertia = midpoint(M.ask(engine, state))
         if quantity.solves:
             torques = (state["tau"], *(midpoint(each.ask(engine, state)) for each in (CORIOLIS_TORQUE, N)))

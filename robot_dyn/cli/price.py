@@ -10,7 +10,7 @@ import typer
 
 import robot_dyn as rd
 from robot_dyn.cli import arguments, completion
-from robot_dyn.cli.app import Force, Json, Lock, PackageDir, app, spending
+from robot_dyn.cli.app import Force, Json, Lock, Name, PackageDir, app, spending
 from robot_dyn.cli.terminal import say, say_json, tell
 from robot_dyn.errors import QueryError
 
@@ -99,6 +99,52 @@ def cost(
         written = [rd.save_cost(result, path, theme=theme) for path in (drawn, table) if path]
     finally:
         say_json(prices.cost(result)) if as_json else say(*prices.cost_tables(result))
+    for path in written:
+        tell(f"written: {path}")
+    if result.interrupted:
+        raise typer.Exit(130)
+
+
+@app.command()
+def certify(
+    robot: Name,
+    output: Annotated[
+        str | None, typer.Option("-o", "--output", metavar="PLOT.png", help="Draw it, as a .png, .svg or .pdf.")
+    ] = None,
+    csv: Annotated[str | None, typer.Option(metavar="TABLE.csv", help="Write all digits as a table.")] = None,
+    samples: Annotated[int, typer.Option(help="Number of random states.")] = 10_000,
+    seed: Annotated[int, typer.Option(help="Of the random states.")] = 0,
+    repeats: Annotated[int, typer.Option(min=1, help="How often each query is timed.")] = 7,
+    q: Annotated[str | None, typer.Option(help="A state to look at too: as of query.")] = None,
+    v: Annotated[str | None, typer.Option(help="Its velocities; 0 by default.")] = None,
+    a: Annotated[str | None, typer.Option(help="Its accelerations, of inverse dynamics; 0 by default.")] = None,
+    tau: Annotated[str | None, typer.Option(help="Its torques, of forward dynamics; 0 by default.")] = None,
+    dark: Annotated[bool, typer.Option("--dark", help="Draw for dark screens.")] = False,
+    force: Force = False,
+    lock: Lock = None,
+    package_dir: PackageDir = None,
+    as_json: Json = False,
+) -> None:
+    """Count the digits of M, C, N, inverse and forward dynamics that are true, by program and numbers, beside times."""
+    from robot_dyn.accuracy.certificate_diagram import DIGITS
+    from robot_dyn.accuracy.diagram import DiagramError
+    from robot_dyn.cli import certificates
+    from robot_dyn.view.plots import PICTURES
+
+    inputs = [robot] if os.path.isfile(robot) else []
+    drawn = output and arguments.output(output, PICTURES, DiagramError, inputs, force)
+    table = csv and arguments.output(csv, DIGITS, DiagramError, [*inputs, *([drawn] if drawn else [])], force)
+    arm = arguments.load(robot, lock, package_dir)
+    given = {"q": q, "v": v, "a": a, "tau": tau}
+    state = {key: arguments.vector(f"--{key}", x, arm.joint_names) for key, x in given.items() if x is not None}
+    with spending(1.0) as done:
+        result = rd.certify(arm, **state, samples=samples, seed=seed, repeats=repeats, on_progress=done)
+    try:  # the files first: a terminal or pipe may be gone
+        written = [
+            rd.save_certificate(result, path, theme="dark" if dark else "light") for path in (drawn, table) if path
+        ]
+    finally:
+        say_json(certificates.certificate(result)) if as_json else say(*certificates.tables(result))
     for path in written:
         tell(f"written: {path}")
     if result.interrupted:

@@ -37,7 +37,7 @@ def work_precision(result: WorkPrecision) -> Document:
                 "name": each.name, "method": each.method, "engine": each.engine, "events": each.events, "by": each.by,
                 "order": each.order, "measured_order": each.measured_order, "ended": each.ended,
                 "points": [
-                    {key: _finite(value) for key, value in asdict(point).items()} | {"on_front": id(point) in front}
+                    {key: finite(value) for key, value in asdict(point).items()} | {"on_front": id(point) in front}
                     for point in each.points
                 ],
             }
@@ -59,14 +59,14 @@ def advice(made: Advice) -> Document:
         "text": made.text.split("\n"),
         "method": made.method,
         "step_s": made.step_s,
-        "limits": {name: _finite(limit) for name, limit in made.limits.items()},
+        "limits": {name: finite(limit) for name, limit in made.limits.items()},
         "period_s": made.period_s,
-        "longest_period_s": _finite(made.longest_period_s),
+        "longest_period_s": finite(made.longest_period_s),
         "fastest": {
             "rate": abs(made.fastest.eigenvalue), "joint": made.fastest.joint, "source": made.fastest.source,
             "decays": made.fastest.decays, "t": made.at,
         },
-        "error": None if error is None else _finite(error.final),
+        "error": None if error is None else finite(error.final),
         "error_verdict": None if error is None else str(error.verdict),
     }  # fmt: skip
 
@@ -78,7 +78,7 @@ def cost(result: Cost) -> Document:
         "acting": list(result.acting),
         "sentence": result.sentence,
         "alternatives": [
-            asdict(each) | {"instructions_ratio": _finite(each.instructions_ratio), "time_ratio": each.time_ratio}
+            asdict(each) | {"instructions_ratio": finite(each.instructions_ratio), "time_ratio": each.time_ratio}
             for each in result.alternatives
         ],
         "parts": result.parts,
@@ -156,6 +156,6 @@ def _price(seconds: float, extrapolated: bool, least: bool) -> str:
     return f"{words}{' *' if least else ''}"
 
 
-def _finite(x: Any) -> Any:
+def finite(x: Any) -> Any:
     """JSON has no infinity: the error of a run that diverged is null."""
     return None if isinstance(x, float) and not isfinite(x) else x

@@ -61,7 +61,7 @@ class Body:
 
     def step(self, q: Array) -> Step:
         """The change of frame from the parent at the joint's coordinate q (...,)."""
-        zero, one = np.zeros_like(self.axis), np.eye(3, dtype=self.axis.dtype)
+        zero, one = np.zeros_like(self.axis), np.broadcast_to(np.eye(3, dtype=self.axis.dtype), (*q.shape, 3, 3))
         slide = q[..., None] * self.axis
         motion = (rotation(self.axis, q), zero) if self.revolute else (one, slide)
         origin = self.pose.p if self.revolute else self.pose.p + apply(self.pose.R, slide)

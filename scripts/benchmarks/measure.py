@@ -1,14 +1,13 @@
-"""Measuring: median times of calls that take turns, so that the machine's moods meet all sides."""
+"""Measuring: what benchmarks share."""
 
 from __future__ import annotations
 
-import timeit
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from statistics import median
 from typing import final
 
 import robot_dyn as rd
+from robot_dyn.accuracy.timing import in_turns
 
 BATCH = 4096
 
@@ -27,23 +26,9 @@ class Effort:
         return self.repeats < 5
 
 
-def seconds(call: Callable[[], object], at_least: float) -> float:
-    """Time of one call, over a loop of about `at_least` seconds."""
-    timer, number = timeit.Timer(call), 1
-    while (taken := timer.timeit(number)) < at_least:
-        number = max(2 * number, int(1.2 * number * at_least / max(taken, 1e-9)))
-    return taken / number
-
-
 def alternate(calls: Mapping[str, Callable[[], object]], effort: Effort) -> dict[str, float]:
     """Median time of each call in µs; the calls take turns."""
-    times: dict[str, list[float]] = {name: [] for name in calls}
-    for call in calls.values():
-        call()
-    for _ in range(effort.repeats):
-        for name, call in calls.items():
-            times[name].append(seconds(call, effort.at_least))
-    return {name: 1e6 * median(samples) for name, samples in times.items()}
+    return {name: 1e6 * time for name, time in in_turns(calls, effort.repeats, effort.at_least).items()}
 
 
 def arms() -> dict[str, rd.Robot]:

@@ -1,0 +1,134 @@
+"""Counting of digits: errors of a road at many states against finer numbers, and at the worst of them against balls."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from robot_dyn.accuracy.digits import digits_of
+from robot_dyn.accuracy.exact import Exact, Scale, Truth
+from robot_dyn.accuracy.road import Road, asked
+from robot_dyn.accuracy.worst_state import Batch, Search, row
+from robot_dyn.lagrange.manipulator import Lagrangian
+from robot_dyn.lagrange.scale import diagonal_scale, floored, joint_units, solved_norm
+from robot_dyn.model.quantity import CORIOLIS_TORQUE, M, N, Quantity
+from robot_dyn.model.robot import Robot
+
+FEWER = 100  # random states for each one that balls judge, where no other numbers are fine enough; 8 at least
+_SIDE_BY_SIDE = 8  # states of a batch that machine code answers at once: as in the search, so in the judgement
+_NOTHING = 1e-12  # of the inertia: what is less at all random states is rounding of zero
+
+
+@final
+@dataclass(frozen=True)
+class Found:
+    """Digits of one quantity by one road; as of `Held`."""
+
+    given: float | None
+    typical: float
+    random: float
+    searched: float
+    samples: int
+    state: dict[str, np.ndarray]
+
+
+@final
+class Counting:
+    """The counting for one robot.
+
+    Args:
+        robot: The robot.
+        states: Random ones.
+        given: A state to look at, or None.
+        rng: Of the search.
+    """
+
+    def __init__(self, robot: Robot, states: Batch, given: dict[str, np.ndarray] | None, rng: np.random.Generator):
+        self.robot, self.states, self.given, self._rng = robot, states, given, rng
+        self.decimals: dict[str, float] = {}
+        self.right_angles: dict[str, float] = {}
+        self.bits = 0
+        self._exact, self._rounded = {robot: Exact(robot)}, Exact(robot, rounded=True)
+        self._own = Lagrangian(robot)
+        self._sizes: dict[Quantity, np.ndarray] = {}
+        self._fine: dict[tuple[Robot, Quantity], np.ndarray] = {}
+
+    def count(self, road: Road, quantity: Quantity) -> Found:
+        """The digits of one road."""
+        states = self.states
+        search = Search(states, self._rng)
+        if road.fine is None:
+            states = {name: x[: max(len(x) // FEWER, 8)] for name, x in states.items()}
+            search = Search(states, self._rng, parents=4, children=5, generations=5)
+        known = self._errors(road, quantity, states)
+        at = row(states, int(np.nanargmax(known)))
+        worst, _ = search.worst(lambda young: self._errors(road, quantity, young), known, quantity.arguments)
+        judged = [(self._judged(road, quantity, state), state) for state in (at, row(worst, 0))]
+        searched, state = max(judged, key=lambda each: each[0])
+        given = None if self.given is None else digits_of(self._judged(road, quantity, self.given))
+        typical = digits_of(float(np.nanmedian(known)))
+        self._of_file(road, quantity, state)
+        return Found(given, typical, digits_of(judged[0][0]), digits_of(searched), len(known), state)
+
+    def truth(self, robot: Robot, quantity: Quantity, state: dict[str, np.ndarray]) -> Truth:
+        """True values at a state."""
+        exact = self._exact.setdefault(robot, Exact(robot))
+        truth = exact.at(quantity, state, None if quantity.definite or quantity.solves else self._size(quantity))
+        self.bits = max(self.bits, truth.bits)
+        return truth
+
+    def _judged(self, road: Road, quantity: Quantity, state: dict[str, np.ndarray]) -> float:
+        """The error at a state, by balls."""
+        several = {name: np.tile(x, (_SIDE_BY_SIDE, 1)) for name, x in state.items()}
+        return self.truth(road.robot, quantity, state).error(road.ask(quantity, several)[0])
+
+    def _errors(self, road: Road, quantity: Quantity, states: Batch) -> np.ndarray:
+        """Errors at states (S, n); NaN where there is no answer."""
+        if road.fine is None:
+            answers = road.ask(quantity, states)
+            rows = (row(states, k) for k in range(len(answers)))
+            return np.array([self.truth(road.robot, quantity, x).error(y) for x, y in zip(rows, answers, strict=True)])
+        key = (road.robot, quantity)
+        if states is not self.states:
+            fine = asked(road.fine, quantity, states)
+        elif key in self._fine:
+            fine = self._fine[key]
+        else:
+            fine = self._fine[key] = asked(road.fine, quantity, states)
+        error = (road.ask(quantity, states) - fine).astype(float)
+        relative = self._scale(quantity, states, fine).relative(error)
+        return relative.reshape(len(error), -1).max(axis=1)
+
+    def _scale(self, quantity: Quantity, states: Batch, fine: np.ndarray) -> Scale:
+        """Of errors at states, from fine answers; that of `truth`, but for rounding."""
+        if not (quantity.definite or quantity.solves):
+            return Scale(np.maximum(self._size(quantity), np.abs(fine).astype(float)))
+        inertia = asked(self._own, M, states)
+        if quantity.definite:
+            return Scale(np.array([floored(each) for each in diagonal_scale(inertia)]))
+        inertia[~np.all(np.isfinite(fine), axis=-1)] = np.eye(self.robot.n)  # where there is no answer
+        torques = (states["tau"], asked(self._own, CORIOLIS_TORQUE, states), asked(self._own, N, states))
+        return Scale(solved_norm(inertia, torques), inertia)
+
+    def _size(self, quantity: Quantity) -> np.ndarray:
+        """The typical size of each entry; of one that is zero always, the largest beside it."""
+        if quantity not in self._sizes:
+            answers, inertia = asked(self._own, quantity, self.states), asked(self._own, M, self.states)
+            units = np.mean(joint_units(inertia), axis=0)
+            whole = np.outer(units, units) if answers.ndim == 3 else units * units.max()
+            size = np.sqrt(np.nanmean(answers**2, axis=0))
+            size = np.where(size > _NOTHING * whole, size, 0.0)
+            self._sizes[quantity] = floored(size) if size.any() else whole
+        return self._sizes[quantity]
+
+    def _of_file(self, road: Road, quantity: Quantity, state: dict[str, np.ndarray]) -> None:
+        """What the float64 of the file's decimals leaves at a state, and what right angles do."""
+        truth = self.truth(self.robot, quantity, state)
+        known = None if quantity.definite or quantity.solves else self._size(quantity)
+        both = [(self.decimals, self._rounded.at(quantity, state, known))]
+        if road.robot is not self.robot:
+            both.append((self.right_angles, self.truth(road.robot, quantity, state)))
+        for table, other in both:
+            table[quantity.name] = min(digits_of(truth.error(other.values)), table.get(quantity.name, np.inf))
