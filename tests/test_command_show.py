@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import re
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 
 import robot_dyn as rd
+from robot_dyn.cli import demo
+from robot_dyn.errors import RobotDynError
 from robot_dyn.view.plots import PLOTS
 from tests.browser import opened
 from tests.command import run, said
+
+PROGRAMS = {"scipy": "SciPy", "mujoco": "MuJoCo", "pydrake": "Drake", "heyoka": "heyoka"}
 
 
 @pytest.fixture(scope="module")
@@ -19,16 +25,43 @@ def file(tmp_path_factory) -> Path:
 
 
 def test_the_demo_ends_with_a_replay_a_plot_and_a_run(tmp_path, browser) -> None:
-    """It shows arm and cross-check, then names four files that are there; the page opens with the network off."""
+    """It shows arm and cross-check, then names four files that are there; the page opens with the network off.
+
+    Last comes what 1e-8 rad takes, here and by the programs that are installed; those that are not are named. Where
+    the machine is busy, the budget may end before a run reaches that.
+    """
     text = said("demo", "--output", tmp_path / "new" / "demo")
     assert "M, mass matrix [" in text and "1 of 1 agree" in text and "finished at t = 1.5 s" in text
-    named = [Path(line.split()[0]) for line in text.partition("Now look:")[2].splitlines() if line.strip()]
+    files, _, price = text.partition("Now look:")[2].partition("What 1e-8 rad takes here: 1 s of the same arm")
+    named = [Path(line.split()[0]) for line in files.splitlines() if line.strip()]
     assert [path.name for path in named] == ["panda.html", "panda.png", "panda.npz", "panda.toml"]
     assert all(path.stat().st_size > 100 for path in named)
+    assert re.search(r"\n  robot_dyn.*: ([\d.]+ [µm]?s|reached by no run)", price)
+    for module, program in PROGRAMS.items():
+        installed = find_spec(module) is not None
+        assert bool(re.search(rf"\n  {program}.*: (.* times as long|reached by no run)", price)) is installed
+        assert (f"left out: {module}: is not installed" in price) is not installed
     assert rd.load_run(named[2]).outcome.ending == "finished"
     with opened(browser, named[0], offline=True) as view:
         assert view.complaints == []
         assert view.ask("replay.duration") == 1.5
+
+
+def test_the_price_needs_no_other_program(monkeypatch) -> None:
+    """Without any, and where there is no reference, the demo says so and goes on."""
+    swing = rd.Setup(rd.Plant(rd.load("pendulum")), [0.3], duration_s=0.2, engine="compiled")
+    monkeypatch.setattr("robot_dyn.accuracy.peers.find_spec", lambda name: None)
+    lines = list(demo._price(swing))
+    assert re.match(r"  robot_dyn.*: ([\d.]+ [µm]?s|reached by no run)", lines[1])
+    assert [line for line in lines if "left out" in line] == [
+        f"  left out: {name}: is not installed" for name in PROGRAMS
+    ]
+
+    def refuse(*_: object, **__: object) -> None:
+        raise RobotDynError("no reference")
+
+    monkeypatch.setattr(rd, "work_precision", refuse)
+    assert list(demo._price(swing))[1:] == ["left out: no reference"]
 
 
 def test_a_plot_is_written_beside_the_run_unless_told(file, tmp_path) -> None:

@@ -12,10 +12,12 @@ from rich.table import Table
 from robot_dyn.accuracy.advisor import Advice
 from robot_dyn.accuracy.alternative import Alternative
 from robot_dyn.accuracy.cost import Cost
+from robot_dyn.accuracy.ladder import Ladder
 from robot_dyn.accuracy.work_precision import WorkPrecision, in_words
 
 Document = dict[str, Any]
 _DIGITS = (3, 6, 9)
+_OWN = "robot_dyn"
 
 
 def work_precision(result: WorkPrecision) -> Document:
@@ -149,6 +151,28 @@ def work_precision_tables(result: WorkPrecision) -> Iterator[Any]:
     yield "times of the loop alone, medians of runs that take turns; * the least; ( ) extrapolated by the order"
     yield from (f"left out: {each}" for each in result.left_out)
     yield f"{', '.join(f'{name} {value}' for name, value in result.environment.items())}"
+
+
+def programs(result: WorkPrecision, error: float) -> Iterator[str]:
+    """What an error takes by the cheapest method of each program, this library first; and what was left out."""
+    best = {_program(ladder): (ladder, price) for ladder, price in reversed(result.digits(error))}
+    own = best.get(_OWN)
+    for program in dict.fromkeys([_OWN, *best, *map(_program, result.ladders)]):
+        if program in best:
+            ladder, price = best[program]
+            name = f"{_OWN} {ladder.name}" if program == _OWN else ladder.name
+            times = f", {float(f'{price.value / own[1].value:.2g}'):g} times as long" if own and program != _OWN else ""
+            yield f"  {name}: {in_words(price.value)}{times}{' (extrapolated)' if price.extrapolated else ''}"
+        else:
+            ended = dict.fromkeys(each.ended for each in result.ladders if _program(each) == program)
+            yield f"  {program}: reached by no run ({'; '.join(ended)})"
+    yield "  times of the loop alone, medians of runs that take turns"
+    yield from (f"  left out: {each}" for each in result.left_out)
+
+
+def _program(ladder: Ladder) -> str:
+    """The program that a ladder is of."""
+    return ladder.method.split(" ")[0] if ladder.peer else _OWN
 
 
 def _price(seconds: float, extrapolated: bool, least: bool) -> str:

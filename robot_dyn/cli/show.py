@@ -1,4 +1,4 @@
-"""Commands that show a robot or a run: show, replay, plot; and the demo."""
+"""Commands that show a robot or a run: show, replay, plot."""
 
 from __future__ import annotations
 
@@ -110,47 +110,6 @@ def plot(
     theme = "dark" if dark else "light"
     file = rd.save_plot(rd.load_run(run), path, *(only or ()), only=joint or None, theme=theme)
     say(f"written: {file}")
-
-
-@app.command()
-def demo(
-    output: Annotated[str, typer.Option("-o", "--output", metavar="FOLDER", help="Where its files go.")] = "demo",
-    force: Force = False,
-) -> None:
-    """Load a real arm, compare Pinocchio with the own Lagrangian, simulate it, write a replay and a plot."""
-    from robot_dyn.cli import report
-    from robot_dyn.files import save
-    from robot_dyn.scene.scene import SCENE, SceneError
-    from robot_dyn.scene.starters import starter
-    from robot_dyn.simulation.run_file import RUN, RunFileError
-    from robot_dyn.view.plots import PICTURES, PlotError
-    from robot_dyn.view.replay import PAGE, ReplayError
-
-    folder = Path(output)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise QueryError(f"--output {output}: {error.strerror}; name a folder that can be written") from None
-    kinds = (("toml", SCENE, SceneError), ("html", PAGE, ReplayError), ("png", PICTURES, PlotError))
-    kinds += (("npz", RUN, RunFileError),)
-    files = {end: checked_output(folder / f"panda.{end}", kind, error, (), force) for end, kind, error in kinds}
-    save(files["toml"], lambda stream: stream.write(starter("panda_computed_torque").encode()), SceneError)
-    panda = rd.load("panda").with_(lock={"panda_finger_joint1": 0.0})
-    say(*report.demo_tables(panda), "\nThe same arm under computed torque, its model 20 % too heavy\n")
-    run = rd.simulate(rd.read_scene(files["toml"]))
-    if run.outcome.ending == "stopped":
-        say(run.summary)
-        raise typer.Exit(130)
-    rd.save_run(run, files["npz"])
-    rd.save_replay(run, files["html"])
-    rd.save_plot(run, files["png"])
-    say(run.summary)
-    say(f"""
-Now look:
-  {files["html"]}  the replay: open it in a browser
-  {files["png"]}   its plots
-  {files["npz"]}   the run itself
-  {files["toml"]}  its scene: change it, then robot-dyn simulate {files["toml"]}""")
 
 
 def _tell_file(file: Path, browse: bool) -> None:
