@@ -155,7 +155,9 @@ def work_precision_tables(result: WorkPrecision) -> Iterator[Any]:
 
 def programs(result: WorkPrecision, error: float) -> Iterator[str]:
     """What an error takes by the cheapest method of each program, this library first; and what was left out."""
-    best = {_program(ladder): (ladder, price) for ladder, price in reversed(result.digits(error))}
+    best: dict[str, Any] = {}
+    for ladder, price in result.digits(error):
+        best.setdefault(_program(ladder), (ladder, price))
     own = best.get(_OWN)
     for program in dict.fromkeys([_OWN, *best, *map(_program, result.ladders)]):
         if program in best:
