@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
 import pytest
 
 import robot_dyn as rd
+from robot_dyn.simulation.seconds import in_words
 from tests.browser import opened, until
 
 UR5_Q = np.array([0.3, -1.1, 0.9, -0.6, 1.2, 0.4])
@@ -262,3 +264,53 @@ def test_events_are_marked_on_the_plots_and_named_as_they_occur(browser, tmp_pat
         assert view.ask("document.getElementById('event').textContent") == ""
         view.ask(f"(replay.seek({first.t + 1e-3}), 0)")
         assert first.name in view.ask("document.getElementById('event').textContent")
+
+
+def test_the_price_of_a_run_stands_beside_its_plots(browser, tmp_path) -> None:
+    """Its numbers are those of the run; in light and dark its letters are read (contrast of WCAG AA, 4.5)."""
+    arm = rd.Plant(rd.load("planar_2r"), [rd.ViscousFriction(0.2)])
+    run = rd.simulate(arm, [0.4, -0.7], duration_s=0.3, accuracy=1e-6, engine="interpreted")
+    coarse = rd.simulate(arm, [0.4, -0.7], duration_s=0.3, integrator="rk4", step_s=0.01, estimate_error=False)
+    accuracy = run.accuracy
+    assert accuracy is not None and run.error is not None
+    rows = "[...document.querySelectorAll('.price tr')].map((row) => [...row.cells].map((cell) => cell.textContent))"
+    box = (
+        "JSON.stringify([...document.querySelectorAll('#plots > section')].map((each) => each.getBoundingClientRect()))"
+    )
+    colours = (
+        "[getComputedStyle(document.querySelector('.price td')).color, getComputedStyle(document.body).backgroundColor]"
+    )
+    with opened(browser, rd.save_replay(run, tmp_path / "two.html", coarse)) as view:
+        assert view.complaints == []
+        head, *table = view.ask(rows)
+        told = {line[0]: line[1:] for line in table}
+        assert head == ["", "planar_2r", "planar_2r (ghost)"]
+        assert told["method"] == [run.statistics.method, "rk4, step 0.01 s"]
+        assert told["steps"] == [str(run.statistics.steps), "30"]
+        assert told["evaluations"] == [str(run.statistics.evaluations), "120"]
+        assert told["estimated error of q [rad]"] == [str(run.error), "not estimated"]
+        assert told["time of the loop"] == [in_words(each.statistics.wall_s) for each in (run, coarse)]
+        assert told["a digit more"][0].startswith(f"about {accuracy.digit_more:.0f} evaluations, ")
+        assert told["a digit less"] == [told["a digit less"][0], "–"]
+        boxes = json.loads(view.ask(box))
+        price = boxes.pop()
+        assert all(
+            price["left"] >= each["right"] or each["left"] >= price["right"] or price["top"] >= each["bottom"]
+            for each in boxes
+        )
+        for scheme in ("light", "dark"):
+            view.page.emulate_media(color_scheme=scheme)
+            bright, dim = sorted(map(luminance, view.ask(colours)), reverse=True)
+            assert (bright + 0.05) / (dim + 0.05) > 4.5
+
+
+def luminance(colour: str) -> float:
+    """Relative luminance of "rgb(r, g, b)" [WCAG 2.2]."""
+    parts = np.array([int(x) / 255 for x in re.findall(r"\d+", colour)[:3]])
+    linear = np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
+    return float(linear @ [0.2126, 0.7152, 0.0722])
+
+
+def test_a_robot_without_a_run_has_no_price(browser, tmp_path) -> None:
+    with opened(browser, rd.save_show(rd.load("planar_2r"), tmp_path / "still.html")) as view:
+        assert view.complaints == [] and not view.ask("document.querySelectorAll('.price').length")

@@ -21,11 +21,11 @@ from robot_dyn.accuracy.ladder import Ladder, Point
 from robot_dyn.accuracy.measured import Rung, Walk, measured
 from robot_dyn.accuracy.peers import found
 from robot_dyn.accuracy.reference_run import HorizonError, Reference, reference
-from robot_dyn.accuracy.work_precision import in_words
 from robot_dyn.cli import prices
 from robot_dyn.errors import QueryError
 from robot_dyn.integrate.explicit import ExplicitRungeKutta
 from robot_dyn.integrate.tableau import ButcherTableau
+from robot_dyn.simulation.seconds import in_words
 
 UNTIL_DONE = Limit(math.inf)
 

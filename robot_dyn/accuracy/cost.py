@@ -11,13 +11,13 @@ from robot_dyn.accuracy.alternative import Alternative, Pair, in_turns
 from robot_dyn.accuracy.budget import Budget
 from robot_dyn.accuracy.environment import environment
 from robot_dyn.accuracy.query_cost import QueryCost
-from robot_dyn.accuracy.work_precision import in_words
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import RobotDynError
 from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.acting import acting
 from robot_dyn.simulation.options import setup_of, starts
+from robot_dyn.simulation.seconds import in_words
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.validate import choice, function, integer, number
 

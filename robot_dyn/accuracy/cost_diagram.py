@@ -14,7 +14,7 @@ from robot_dyn.accuracy.alternative import Alternative
 from robot_dyn.accuracy.cost import Cost
 from robot_dyn.accuracy.diagram import DiagramError, drawable_lines, styled, written
 from robot_dyn.accuracy.step_cost import EVERYTHING
-from robot_dyn.accuracy.work_precision import in_words
+from robot_dyn.simulation.seconds import in_words
 from robot_dyn.validate import instance
 from robot_dyn.view.figure import THEMES
 

@@ -26,6 +26,7 @@ from robot_dyn.model.units import units
 from robot_dyn.simulation.acting import acting
 from robot_dyn.simulation.choice import choose
 from robot_dyn.simulation.options import setup_of, starts
+from robot_dyn.simulation.seconds import in_words
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.validate import function, instance, integer, number, truth
@@ -128,14 +129,6 @@ class WorkPrecision:
             for ladder, price in said
         ]
         return f"{digits} digits of q over {self.reference.horizon_s:g} s: {'; '.join(parts)}"
-
-
-def in_words(seconds: float) -> str:
-    """A time in two digits, with its unit."""
-    for size, unit in ((86400.0, "days"), (3600.0, "h"), (60.0, "min"), (1.0, "s"), (1e-3, "ms")):
-        if seconds >= size:
-            return f"{float(f'{seconds / size:.2g}'):g} {unit}"
-    return f"{float(f'{seconds * 1e6:.2g}'):g} µs"
 
 
 def work_precision(

@@ -13,7 +13,8 @@ from robot_dyn.accuracy.advisor import Advice
 from robot_dyn.accuracy.alternative import Alternative
 from robot_dyn.accuracy.cost import Cost
 from robot_dyn.accuracy.ladder import Ladder
-from robot_dyn.accuracy.work_precision import WorkPrecision, in_words
+from robot_dyn.accuracy.work_precision import WorkPrecision
+from robot_dyn.simulation.seconds import in_words
 
 Document = dict[str, Any]
 _DIGITS = (3, 6, 9)

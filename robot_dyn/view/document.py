@@ -24,6 +24,7 @@ from robot_dyn.view.arrows import arrows
 from robot_dyn.view.geometry.visuals import Drawing, drawing
 from robot_dyn.view.keyframes import Keyframes, keyframes
 from robot_dyn.view.overlays import GHOST, Overlays, overlays
+from robot_dyn.view.price import price
 from robot_dyn.view.scenery import gravity_arrow, gravity_label, ground, scenery, turned, upright
 from robot_dyn.view.series import plots
 from robot_dyn.view.stage import Stage
@@ -103,6 +104,7 @@ def document(
         "notes": [*notes, *scale, *turned(gravity), f"the squares on the floor are {seen.square:g} m wide"],
         "scene": seen.as_json(),
         "plots": plots([each.run for each in shown], [each.stage for each in shown]),
+        "price": price([(each.name, each.run) for each in shown]),
         "commands": [*found, commands.set_animation(tracks)],
     }
 

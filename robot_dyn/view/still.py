@@ -58,6 +58,7 @@ def still(robot: Robot, q: Array | None, package_dirs: Iterable[str | Path], ine
         ],
         "scene": seen.as_json(),
         "plots": [],
+        "price": {"runs": [], "rows": []},
         "commands": [
             ground(seen),
             *gravity_arrow(seen, gravity),

@@ -71,6 +71,20 @@ function makePlot(plot, events, seek) {
   };
 }
 
+function makePrice(price) {
+  const make = (tag, text) => Object.assign(document.createElement(tag), { textContent: text });
+  const box = Object.assign(document.createElement("section"), { className: "price" }), table = document.createElement("table");
+  const row = (cells, tag) => {
+    const line = document.createElement("tr");
+    line.append(...cells.map((text, i) => make(i ? tag : "th", text)));
+    table.append(line);
+  };
+  if (price.runs.length > 1) row(["", ...price.runs], "th");
+  price.rows.forEach((cells) => row(cells, "td"));
+  box.append(make("h2", "What it took"), table);
+  element("plots").append(box);
+}
+
 function makeViewer(scene) {
   const viewer = new MeshCat.Viewer(element("view"));
   const [x, y, z] = scene.center, away = scene.radius;  // the camera's frame has y up
@@ -162,6 +176,7 @@ async function main() {
   };
   const clock = window.replay = makeClock(data.duration, show);
   marks.push(...data.plots.map((plot) => makePlot(plot, data.events, (t) => { clock.play(false); clock.seek(t); })));
+  if (data.price.rows.length) makePrice(data.price);
   clock.seek(0);
   const follow = () => {  // over a socket the animation comes when it comes
     if (viewer.animator.actions[0] !== loaded) { loaded = viewer.animator.actions[0]; clock.seek(clock.time); }
