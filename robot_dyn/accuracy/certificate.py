@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from math import log10
 from typing import final
 
-from robot_dyn.accuracy.work_precision import in_words
 from robot_dyn.errors import QueryError
+from robot_dyn.simulation.seconds import in_words
 from robot_dyn.validate import choice
 
 

@@ -10,8 +10,8 @@ from typing import Any
 from rich.table import Table
 
 from robot_dyn.accuracy.certificate import Certificate, Held
-from robot_dyn.accuracy.work_precision import in_words
 from robot_dyn.cli.prices import finite
+from robot_dyn.simulation.seconds import in_words
 
 _HEADINGS = ("quantity", "road", "given", "typical", "worst of", "random", "searched", "time")
 
