@@ -42,7 +42,7 @@ class Search:
         among: The random states.
         rng: Of the steps.
         parents, children: How many are kept, and how many each has in a generation.
-        generations: How many there are.
+        generations: How many there are; five times as many while nothing worse than the random states is found.
     """
 
     def __init__(
@@ -64,13 +64,15 @@ class Search:
         known = np.where(np.isfinite(known), known, -np.inf)
         order = np.argsort(known)[::-1][: self._parents]
         best, size = {name: x[order] for name, x in self.among.items()}, known[order]
-        for _ in range(self._generations):
+        for generation in range(5 * self._generations):
+            if generation >= self._generations and size[0] > known[order[0]]:
+                break
             young = self._born(best, arguments)
             found = errors(young)
             size = np.concatenate([size, np.where(np.isfinite(found), found, -np.inf)])
-            order = np.argsort(size, kind="stable")[::-1][: self._parents]
-            best = {name: np.concatenate([x, young[name]])[order] for name, x in best.items()}
-            size = size[order]
+            kept = np.argsort(-size, kind="stable")[: self._parents]
+            best = {name: np.concatenate([x, young[name]])[kept] for name, x in best.items()}
+            size = size[kept]
         return {name: x[:1] for name, x in best.items()}, float(size[0])
 
     def _born(self, parents: Batch, arguments: tuple[str, ...]) -> Batch:
