@@ -12,6 +12,7 @@ import pytest
 from flint import arb, ctx
 
 import robot_dyn as rd
+from robot_dyn.accuracy import exact as exact_module
 from robot_dyn.accuracy.digits import QUANTITIES, digits_of
 from robot_dyn.accuracy.exact import RESOLUTION, Exact
 from robot_dyn.model.quantity import FORWARD_DYNAMICS, INVERSE_DYNAMICS, C, M, N
@@ -54,6 +55,19 @@ def test_truth_by_other_recursions_in_400_bits_lies_inside(name: str) -> None:
             assert all(ball.overlaps(each) for ball, each in zip(truth.values.flat, other.flat, strict=True))
         assert np.all(truth.scale.relative(0 * rd.midpoint(truth.values), rd.radius(truth.values)) <= RESOLUTION)
         assert truth.error(other) <= 2 * RESOLUTION
+
+
+@pytest.mark.parametrize("quantity", [M, N, FORWARD_DYNAMICS], ids=lambda each: each.name)
+def test_bits_are_doubled_until_the_balls_are_narrow(monkeypatch, quantity) -> None:
+    """1e-20 is 66 bits; 16 leave a relative radius of 1e-4, and M undecided."""
+    robot = rd.load("ur5")
+    x, few = state(robot), exact_module._FIRST_BITS
+    fine = Exact(robot).at(quantity, x)
+    monkeypatch.setattr(exact_module, "_FIRST_BITS", 16)
+    truth = Exact(robot).at(quantity, x)
+    assert truth.bits in (few, few * 2)
+    assert np.all(truth.scale.relative(0 * rd.midpoint(truth.values), rd.radius(truth.values)) <= RESOLUTION)
+    assert fine.error(truth.values) <= 2 * RESOLUTION
 
 
 @pytest.mark.parametrize("name", ["ur5", "panda"])
