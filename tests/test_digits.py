@@ -182,6 +182,9 @@ def test_a_singular_arm_is_refused_by_its_joint() -> None:
     with pytest.raises(rd.RobotDynError, match="no forward dynamics: joint 'pointer_joint' carries no inertia"):
         robot.digits("forward_dynamics", q, q, q)
     assert robot.digits("M", q) > 15
+    truth = Exact(robot).at(N, {"q": q})  # the joint has no unit of its own, in which all errors would be small
+    assert digits_of(truth.error(robot.N(q))) > 14
+    assert digits_of(truth.error(robot.N(q) * (1 + 1e-5))) < 6
 
 
 def test_balls_of_rounded_literals_hold_the_float64_of_the_file() -> None:

@@ -3,8 +3,8 @@
     digits = −log₁₀(error),   error against balls of radius 1e-20
 
 Errors of M_ij are relative to √(M_ii M_jj); of accelerations, in the norm of M, to Σ ‖M⁻¹ τ_k‖ of τ, C v and N; of C, N
-and inverse dynamics to the entry, or to its root mean square over the random states if that is more: an entry that
-vanishes at a state is no loss.
+and inverse dynamics to the largest entry in the units √M_ii of the joints, or its root mean square over the random
+states if that is more: an answer that vanishes at a state is no loss.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from robot_dyn.accuracy.certificate import Certificate, Condition, Held
-from robot_dyn.accuracy.counting import FEWER, Counting
+from robot_dyn.accuracy.counting import Counting
 from robot_dyn.accuracy.digits import QUANTITIES
 from robot_dyn.accuracy.environment import environment
 from robot_dyn.accuracy.road import Road, asked, roads
@@ -31,7 +31,7 @@ from robot_dyn.model.robot import Robot
 from robot_dyn.validate import function, instance, integer, joint_values
 
 _AT_LEAST_S = 1e-3  # of a loop that is timed
-_MOST_REPEATS, _MOST_SAMPLES = 1000, 10**6
+_MOST_REPEATS, _LEAST_SAMPLES, _MOST_SAMPLES = 1000, 100, 10**6
 
 
 def certify(
@@ -51,7 +51,7 @@ def certify(
     Roads are Pinocchio, the Lagrangian in float32, float64 and longdouble, articulated bodies, machine code (judged
     by its own right angles) and balls. Random states are as of `compare`, in numbers of float32, so that no road rounds
     them. Their errors, and those of the search that begins at the worst of them, are taken against longdouble; balls
-    judge the worst of each. Errors of longdouble are taken against balls, at 1/100 of the states.
+    judge the worst of each. Errors of longdouble are taken against balls, at 1/250 of the states.
 
     Args:
         robot: The robot.
@@ -68,7 +68,7 @@ def certify(
         QueryError: If an argument is wrong.
     """
     robot = instance("robot", robot, Robot, "give one of rd.load").warn_below(None)
-    samples = integer("samples", samples, least=FEWER, most=_MOST_SAMPLES)
+    samples = integer("samples", samples, least=_LEAST_SAMPLES, most=_MOST_SAMPLES)
     seed, repeats = integer("seed", seed, most=2**128 - 1), integer("repeats", repeats, least=1, most=_MOST_REPEATS)
     tell = function("on_progress", on_progress, "(part, what)") or (lambda part, what: None)
     given = _given(robot, q, v, a, tau)

@@ -8,17 +8,16 @@ from typing import final
 import numpy as np
 
 from robot_dyn.accuracy.digits import digits_of
-from robot_dyn.accuracy.exact import Exact, Scale, Truth
+from robot_dyn.accuracy.exact import NOTHING, Exact, Scale, Truth, entry_units, in_joint_units
 from robot_dyn.accuracy.road import Road, asked
 from robot_dyn.accuracy.worst_state import Batch, Search, row
 from robot_dyn.lagrange.manipulator import Lagrangian
-from robot_dyn.lagrange.scale import diagonal_scale, floored, joint_units, solved_norm
+from robot_dyn.lagrange.scale import diagonal_scale, floored, solved_norm
 from robot_dyn.model.quantity import CORIOLIS_TORQUE, M, N, Quantity
 from robot_dyn.model.robot import Robot
 
-FEWER = 100  # random states for each one that balls judge, where no other numbers are fine enough; 8 at least
+FEWER = 250  # random states for each one that balls judge, where no other numbers are fine enough; 8 at least
 _SIDE_BY_SIDE = 8  # states of a batch that machine code answers at once: as in the search, so in the judgement
-_NOTHING = 1e-12  # of the inertia: what is less at all random states is rounding of zero
 
 
 @final
@@ -52,7 +51,7 @@ class Counting:
         self.bits = 0
         self._exact, self._rounded = {robot: Exact(robot)}, Exact(robot, rounded=True)
         self._own = Lagrangian(robot)
-        self._sizes: dict[Quantity, np.ndarray] = {}
+        self._sizes: dict[Quantity, float] = {}
         self._fine: dict[tuple[Robot, Quantity], np.ndarray] = {}
 
     def count(self, road: Road, quantity: Quantity) -> Found:
@@ -61,7 +60,7 @@ class Counting:
         search = Search(states, self._rng)
         if road.fine is None:
             states = {name: x[: max(len(x) // FEWER, 8)] for name, x in states.items()}
-            search = Search(states, self._rng, parents=4, children=5, generations=5)
+            search = Search(states, self._rng, parents=4, children=4, generations=3)
         known = self._errors(road, quantity, states)
         at = row(states, int(np.nanargmax(known)))
         worst, _ = search.worst(lambda young: self._errors(road, quantity, young), known, quantity.arguments)
@@ -75,7 +74,7 @@ class Counting:
     def truth(self, robot: Robot, quantity: Quantity, state: dict[str, np.ndarray]) -> Truth:
         """True values at a state."""
         exact = self._exact.setdefault(robot, Exact(robot))
-        truth = exact.at(quantity, state, None if quantity.definite or quantity.solves else self._size(quantity))
+        truth = exact.at(quantity, state, self._typical(quantity))
         self.bits = max(self.bits, truth.bits)
         return truth
 
@@ -104,7 +103,8 @@ class Counting:
     def _scale(self, quantity: Quantity, states: Batch, fine: np.ndarray) -> Scale:
         """Of errors at states, from fine answers; that of `truth`, but for rounding."""
         if not (quantity.definite or quantity.solves):
-            return Scale(np.maximum(self._size(quantity), np.abs(fine).astype(float)))
+            inertia = asked(self._own, M, states)
+            return Scale(in_joint_units(fine.astype(float), inertia, self._typical(quantity)))
         inertia = asked(self._own, M, states)
         if quantity.definite:
             return Scale(np.array([floored(each) for each in diagonal_scale(inertia)]))
@@ -112,22 +112,20 @@ class Counting:
         torques = (states["tau"], asked(self._own, CORIOLIS_TORQUE, states), asked(self._own, N, states))
         return Scale(solved_norm(inertia, torques), inertia)
 
-    def _size(self, quantity: Quantity) -> np.ndarray:
-        """The typical size of each entry; of one that is zero always, the largest beside it."""
+    def _typical(self, quantity: Quantity) -> float:
+        """The largest root mean square of an entry at random states, in the units of the joints; 1 if it is zero."""
+        if quantity.definite or quantity.solves:
+            return 0.0
         if quantity not in self._sizes:
             answers, inertia = asked(self._own, quantity, self.states), asked(self._own, M, self.states)
-            units = np.mean(joint_units(inertia), axis=0)
-            whole = np.outer(units, units) if answers.ndim == 3 else units * units.max()
-            size = np.sqrt(np.nanmean(answers**2, axis=0))
-            size = np.where(size > _NOTHING * whole, size, 0.0)
-            self._sizes[quantity] = floored(size) if size.any() else whole
+            size = float(np.sqrt(np.nanmean((answers / entry_units(answers, inertia)) ** 2, axis=0)).max())
+            self._sizes[quantity] = size if size > NOTHING else 1.0
         return self._sizes[quantity]
 
     def _of_file(self, road: Road, quantity: Quantity, state: dict[str, np.ndarray]) -> None:
         """What the float64 of the file's decimals leaves at a state, and what right angles do."""
         truth = self.truth(self.robot, quantity, state)
-        known = None if quantity.definite or quantity.solves else self._size(quantity)
-        both = [(self.decimals, self._rounded.at(quantity, state, known))]
+        both = [(self.decimals, self._rounded.at(quantity, state, self._typical(quantity)))]
         if road.robot is not self.robot:
             both.append((self.right_angles, self.truth(road.robot, quantity, state)))
         for table, other in both:

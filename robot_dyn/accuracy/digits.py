@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.accuracy.exact import RESOLUTION, Exact
+from robot_dyn.accuracy.exact import RESOLUTION, Exact, entry_units
 from robot_dyn.errors import QueryError
 from robot_dyn.lagrange.magnitude import magnitudes
 from robot_dyn.lagrange.manipulator import Lagrangian
-from robot_dyn.lagrange.scale import acceleration_norm, diagonal_scale, joint_units, solved_norm, solved_tolerance
+from robot_dyn.lagrange.scale import acceleration_norm, solved_norm, solved_tolerance
 from robot_dyn.model.quantity import FORWARD_DYNAMICS, INVERSE_DYNAMICS, MOST_DIGITS, C, M, N, Quantity, by_name
 from robot_dyn.model.robot import Robot
 from robot_dyn.validate import choice, shaped
@@ -93,7 +93,7 @@ def _bound(robot: Robot, quantity: Quantity, state: dict[str, np.ndarray], answe
         torques = (state["tau"], robot.coriolis_torque(state["q"], state["v"]), robot.N(state["q"]))
         more = acceleration_norm(inertia, torques, terms) / max(float(solved_norm(inertia, torques)), 1e-300)
         return solved_tolerance(0.0, inertia) * more
-    units = diagonal_scale(inertia) if len(quantity.axes) == 2 else joint_units(inertia)
+    units = entry_units(answer, inertia)
     return least * float(np.max(terms / units)) / max(float(np.max(np.abs(answer) / units)), 1e-300)
 
 

@@ -2,8 +2,8 @@
 
     radius ≤ 1e-20 · scale
 
-The scale of M_ij is √(M_ii M_jj); of accelerations, in the norm of M, Σ ‖M⁻¹ τ_k‖_M of τ, C v and N; of another entry
-itself or its typical size if that is given and more, otherwise the largest entry, in the units √M_ii of the joints.
+The scale of M_ij is √(M_ii M_jj); of accelerations, in the norm of M, Σ ‖M⁻¹ τ_k‖_M of τ, C v and N; of other entries
+the largest of them in the units √M_ii of the joints, or what they typically are if that is given and more.
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ from robot_dyn.model.tree import Described
 
 RESOLUTION = 10.0**-MOST_DIGITS
 _FIRST_BITS, _MOST_BITS = 128, 4096
+
+NOTHING = 1e-12  # in the units of the joints: a joint, or an answer, that is less is rounding of zero
 
 State = Mapping[str, np.ndarray]  # q, v, a, tau
 
@@ -69,6 +71,23 @@ class Scale:
         return scaled(mass_norm(self.M, error) + (radius * joint_units(self.M)).sum(axis=-1), self.size)
 
 
+def entry_units(values: np.ndarray, M: np.ndarray) -> np.ndarray:
+    """√(M_ii M_jj) for entries of C, (..., n, n), √M_ii for torques, (..., n).
+
+    A joint without inertia has no unit of its own: it gets 1e-12 of the largest.
+    """
+    units = joint_units(M)
+    units = np.maximum(units, NOTHING * units.max(axis=-1, keepdims=True))
+    return units[..., :, None] * units[..., None, :] if values.ndim == M.ndim else units
+
+
+def in_joint_units(values: np.ndarray, M: np.ndarray, least: float = 0.0) -> np.ndarray:
+    """The largest entry of C or of torques in the units of the joints, or `least` if that is more, for each entry."""
+    units = entry_units(values, M)
+    axes = (-2, -1) if values.ndim == M.ndim else (-1,)
+    return units * np.maximum(np.max(np.abs(values) / units, axis=axes, keepdims=True), least)
+
+
 @final
 @dataclass(frozen=True, eq=False)
 class Truth:
@@ -107,13 +126,13 @@ class Exact:
         self._robot, self._rounded = robot, rounded
         self._engines: dict[int, Lagrangian] = {}
 
-    def at(self, quantity: Quantity, state: State, typical: np.ndarray | None = None) -> Truth:
+    def at(self, quantity: Quantity, state: State, typical: float = 0.0) -> Truth:
         """The truth at one state, (n,) each.
 
         Args:
             quantity: M, C, N, inverse or forward dynamics.
             state: Its arguments, by name.
-            typical: Sizes of the entries of C, N and inverse dynamics, of the shape of the quantity.
+            typical: Least size of C, N and inverse dynamics that errors are relative to, in the units of the joints.
 
         Raises:
             SingularError: Of forward dynamics where M is singular; names the joint.
@@ -131,20 +150,15 @@ class Exact:
                     raise
             bits *= 2
 
-    def _scale(
-        self, engine: Lagrangian, quantity: Quantity, state: State, values: Array, typical: np.ndarray | None
-    ) -> Scale:
+    def _scale(self, engine: Lagrangian, quantity: Quantity, state: State, values: Array, typical: float) -> Scale:
         if quantity.definite:
             return Scale(floored(diagonal_scale(midpoint(values))))
-        if typical is not None and not quantity.solves:
-            return Scale(np.maximum(typical, np.abs(midpoint(values))))
         inertia = midpoint(M.ask(engine, state))
         if quantity.solves:
             torques = (state["tau"], *(midpoint(each.ask(engine, state)) for each in (CORIOLIS_TORQUE, N)))
             return Scale(solved_norm(inertia, torques), inertia)
-        units = diagonal_scale(inertia) if len(quantity.axes) == 2 else joint_units(inertia)
-        known = np.where(np.abs(midpoint(values)) > radius(values), np.abs(midpoint(values)), 0.0)
-        return Scale(units * np.max(known / units))
+        known = np.where(np.abs(midpoint(values)) > radius(values), midpoint(values), 0.0)
+        return Scale(in_joint_units(known, inertia, typical))
 
     def _engine(self, bits: int) -> Lagrangian:
         if bits not in self._engines:

@@ -46,7 +46,7 @@ class Search:
     """
 
     def __init__(
-        self, among: Batch, rng: np.random.Generator, parents: int = 8, children: int = 12, generations: int = 16
+        self, among: Batch, rng: np.random.Generator, parents: int = 8, children: int = 12, generations: int = 8
     ) -> None:
         self.among, self._rng = among, rng
         self._parents, self._children, self._generations = parents, children, generations

@@ -40,8 +40,8 @@ def tables(made: Certificate) -> Iterator[Any]:
     yield made.sentence
     yield (
         f"\n{made.robot}: decimal digits that hold, against balls of {made.bits} bits: error of M_ij relative to"
-        " √(M_ii M_jj); of C, N and inverse\ndynamics to the entry, or its rms over the random states if that is more;"
-        " of forward dynamics to M⁻¹τ, M⁻¹C v and M⁻¹N, in the norm of M"
+        " √(M_ii M_jj); of C, N and inverse\ndynamics to the largest entry in the units √M_ii of the joints, or its rms"
+        " at random states if that is more;\nof forward dynamics to M⁻¹τ, M⁻¹C v and M⁻¹N, in the norm of M"
     )
     given = any(each.given is not None for each in made.held)
     table = Table(box=None, pad_edge=False, header_style="bold")
