@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,6 +21,7 @@ from robot_dyn.cli import prices
 from robot_dyn.compiled.from_casadi import program_of
 from robot_dyn.compiled.parameters import parameters
 from robot_dyn.errors import QueryError, RobotDynError
+from robot_dyn.scene.starters import starter
 from robot_dyn.simulation.machine.making import machine, machine_of_constants
 from robot_dyn.simulation.state_equation import StateEquation
 
@@ -149,6 +152,17 @@ def test_what_cannot_be_done_is_said_with_the_reason() -> None:
         odd.of("wind")
 
 
+def test_the_page_has_the_counts_of_today(tmp_path) -> None:
+    """Those of the parts; `python scripts/cost.py` makes its table and figure."""
+    scene = tmp_path / "scene.toml"
+    scene.write_text(starter("panda_computed_torque"), encoding="utf-8")
+    pairs = step_cost.pairs_of_parts(rd.read_scene(scene))
+    counted = {each.what: f"{each.first.instructions} / {each.second.instructions}" for each in pairs}
+    page = (Path(__file__).parents[1] / "docs" / "accuracy_and_time.md").read_text(encoding="utf-8")
+    told = re.findall(r"^\|[^|]*\| (\w+) \| on / off \| (\d+ / \d+) \|", page, flags=re.MULTILINE)
+    assert dict(told) == counted
+
+
 def test_a_budget_that_ends_says_what_was_not_timed() -> None:
     found = rd.cost(setup(), **TINY)
     assert all(each.time_ratio is None and each.first.repeats == 0 for each in found.alternatives)
@@ -178,14 +192,36 @@ def test_times_are_medians_of_turns_and_what_fails_is_left_out() -> None:
     assert found.first == Version("a", 10, 3.0, 1.0, 3)
     assert found.second == Version("b", 20, 2.0, 0.0, 3)
     assert said == ["a", "a", "b", "b", "a", "b", "a", "b"]
-    assert (found.instructions_ratio, found.time_ratio, found.time_between_s) == (0.5, 1.5, None)
+    assert found.instructions_ratio == 0.5
+    assert (found.time_ratio, found.time_ratio_spread, found.time_between_s) == (1.5, 0.5, None)
+    assert pair.first.times == [5.0, 1.0, 3.0] and bad.alternative().time_ratio is None
+
+
+def test_ratios_are_of_the_same_turn_and_a_difference_lost_in_them_is_not_told() -> None:
+    """A machine that is slow in some turns slows both: the ratio has no spread. Noise of either sign is no time."""
+    slow = np.array([1.0, 7.0, 2.0, 9.0])
+    pair = Pair("algorithms", "sum", "state", *(Way(x, 1, float) for x in "ab"))
+    pair.first.times, pair.second.times = (3 * slow).tolist(), slow.tolist()
+    assert (pair.alternative().time_ratio, pair.alternative().time_ratio_spread) == (3.0, 0.0)
+    assert pair.alternative().time_between_s == 2 * np.median(slow)
+    pair.first.times = (slow + np.array([0.1, -0.1, 0.2, -0.2])).tolist()
+    assert pair.alternative().time_between_s is None
 
 
 def test_json_csv_and_figure_hold_the_alternatives(tmp_path) -> None:
     result = rd.cost(setup(FRICTION, controller=CONTROLLERS["sampled"]), budget_s=0.5, repeats=2)
     read = json.loads(json.dumps(prices.cost(result), allow_nan=False))
     kept = [
-        Alternative(x["group"], x["what"], x["per"], Version(**x["first"]), Version(**x["second"]))
+        Alternative(
+            x["group"],
+            x["what"],
+            x["per"],
+            Version(**x["first"]),
+            Version(**x["second"]),
+            x["time_ratio"],
+            x["time_ratio_spread"],
+            x["time_between_s"],
+        )
         for x in read["alternatives"]
     ]
     assert tuple(kept) == result.alternatives

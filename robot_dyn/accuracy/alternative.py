@@ -1,6 +1,6 @@
 """Two ways to one result, or a part on and off: their instructions counted, their times medians of turns.
 
-ratio = first / second
+ratio = first / second, of times in each turn, so that the machine's moods meet both
 """
 
 from __future__ import annotations
@@ -14,6 +14,8 @@ import numpy as np
 from robot_dyn.accuracy.budget import Budget
 from robot_dyn.errors import RobotDynError
 
+_QUARTILES = (25, 50, 75)
+
 
 @final
 @dataclass(frozen=True)
@@ -23,7 +25,7 @@ class Version:
     Attributes:
         name: What sets it apart, such as "on".
         instructions: Of its program, exact.
-        time_s: Median of its times, in [s]; None if it was not timed.
+        time_s: Median of its times of the processor, in [s]; None if it was not timed.
         spread_s: Half of the interquartile range of its times, in [s]; likewise.
         repeats: Number of times it was timed.
     """
@@ -45,6 +47,10 @@ class Alternative:
         what: What differs.
         per: What instructions and time are of.
         first, second: The two.
+        time_ratio: Time of the first by that of the second, the median over the turns; None if one was not timed.
+        time_ratio_spread: Half of the interquartile range of that; likewise.
+        time_between_s: Time of the first less that of the second, in [s], the median over the turns; None if the middle
+            half of the turns do not agree on its sign.
     """
 
     group: str
@@ -52,27 +58,14 @@ class Alternative:
     per: str
     first: Version
     second: Version
+    time_ratio: float | None = None
+    time_ratio_spread: float | None = None
+    time_between_s: float | None = None
 
     @property
     def instructions_ratio(self) -> float:
         """Instructions of the first by those of the second; inf if that has none."""
         return self.first.instructions / self.second.instructions if self.second.instructions else float("inf")
-
-    @property
-    def time_ratio(self) -> float | None:
-        """Likewise of times; None if one was not timed."""
-        if self.first.time_s is None or self.second.time_s is None:
-            return None
-        return self.first.time_s / self.second.time_s
-
-    @property
-    def time_between_s(self) -> float | None:
-        """Time of the first less that of the second, in [s]; None if it is lost in their spreads, or not timed."""
-        times = self.first.time_s, self.second.time_s, self.first.spread_s, self.second.spread_s
-        if None in times:
-            return None
-        first, second, *spreads = (float(x) for x in times if x is not None)
-        return first - second if abs(first - second) > sum(spreads) else None
 
 
 @final
@@ -92,13 +85,15 @@ class Way:
     factor: int = 1
     times: list[float] = field(default_factory=list)
 
+    @property
+    def times_s(self) -> np.ndarray:
+        """Its times, in [s]."""
+        return self.factor * np.array(self.times)
+
     def version(self) -> Version:
         """What was found."""
-        if not self.times:
-            return Version(self.name, self.factor * self.instructions, None, None, 0)
-        low, middle, high = self.factor * np.percentile(self.times, (25, 50, 75))
-        spread = float(high - low) / 2
-        return Version(self.name, self.factor * self.instructions, float(middle), spread, len(self.times))
+        time, spread = _middle(self.times_s)
+        return Version(self.name, self.factor * self.instructions, time, spread, len(self.times))
 
     def named(self, name: str, factor: int = 1) -> Way:
         """The same under another name, and so many of it; its times are shared."""
@@ -118,7 +113,21 @@ class Pair:
 
     def alternative(self) -> Alternative:
         """What was found."""
-        return Alternative(self.group, self.what, self.per, self.first.version(), self.second.version())
+        turns = min(len(self.first.times), len(self.second.times))
+        first, second = self.first.times_s[:turns], self.second.times_s[:turns]
+        low, between, high = np.percentile(first - second, _QUARTILES).tolist() if turns else (0.0, 0.0, 0.0)
+        return Alternative(
+            self.group, self.what, self.per, self.first.version(), self.second.version(), *_middle(first / second),
+            between if low * high > 0 else None,
+        )  # fmt: skip
+
+
+def _middle(values: np.ndarray) -> tuple[float | None, float | None]:
+    """Median of some values, and half of their interquartile range; None without any."""
+    if not len(values):
+        return None, None
+    low, middle, high = np.percentile(values, _QUARTILES).tolist()
+    return middle, (high - low) / 2
 
 
 def in_turns(pairs: Iterable[Pair], budget: Budget, repeats: int) -> list[str]:

@@ -99,7 +99,8 @@ def cost(
 ) -> Cost:
     """Instructions and time of each effect, controller and term, on and off, and of algorithms beside each other.
 
-    Parts are compared in a step of RK4 in machine code, whatever the method of a setup.
+    Parts are compared in a step of RK4 in machine code, whatever the method of a setup. Times are those of the
+    processor, so that other programs on the machine matter little.
 
     Args:
         what: A setup, or a plant or robot with a start.
@@ -143,8 +144,8 @@ def cost(
 def _questions(setup: Setup) -> Iterator[tuple[str, Callable[[], list[Pair]]]]:
     """What is compared, by name."""
     yield "parts", lambda: list(step_cost.pairs_of_parts(setup))
-    yield step_cost.SIDE_BY_SIDE, lambda: [step_cost.side_by_side(setup)]
     yield step_cost.NUMBERS, lambda: [step_cost.numbers(setup)]
+    yield step_cost.SIDE_BY_SIDE, lambda: [step_cost.side_by_side(setup)]
     robot = getattr(setup.plant.dynamics, "robot", setup.plant.dynamics)
     if isinstance(robot, Robot):
         yield from ((name, lambda make=make: [make()]) for name, make in QueryCost(robot).pairs())

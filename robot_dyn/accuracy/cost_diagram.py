@@ -25,6 +25,7 @@ TABLE = files.Kind("a table of costs", ".csv", b"group,what")
 _COLUMNS = (
     "group", "what", "per", "first", "first_instructions", "first_time_s", "first_spread_s", "first_repeats", "second",
     "second_instructions", "second_time_s", "second_spread_s", "second_repeats", "instructions_ratio", "time_ratio",
+    "time_ratio_spread", "time_between_s",
 )  # fmt: skip
 _WIDTH, _HEIGHT, _ROW, _SENTENCE = 13.0, 2.3, 0.42, 118  # [inch], and letters of a line
 _BAR = 0.36
@@ -57,7 +58,8 @@ def table(result: Cost) -> str:
     for each in result.alternatives:
         versions = (each.first, each.second)
         cells = [x for of in versions for x in (of.name, of.instructions, of.time_s, of.spread_s, of.repeats)]
-        writer.writerow([each.group, each.what, each.per, *cells, each.instructions_ratio, each.time_ratio])
+        writer.writerow([each.group, each.what, each.per, *cells, each.instructions_ratio, each.time_ratio,
+             each.time_ratio_spread, each.time_between_s])  # fmt: skip
     return text.getvalue()
 
 
@@ -95,7 +97,7 @@ def _caption(result: Cost) -> str:
     versions = result.environment
     programs = ", ".join(f"{k} {x}" for k, x in versions.items() if k in ("robot-dyn", "pin", "numba", "casadi"))
     return (
-        f"{result.name}: {', '.join(result.acting) or 'no effects'}. Times: medians of runs that take turns."
+        f"{result.name}: {', '.join(result.acting) or 'no effects'}. Times of the processor: medians over turns."
         f" {programs}; {versions.get('processor', '')}."
     )
 

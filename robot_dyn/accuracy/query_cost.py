@@ -9,14 +9,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from math import ceil
-from time import perf_counter
-from typing import Any, final
+from time import process_time
+from typing import final
 
 import casadi as ca
 import numpy as np
 
 from robot_dyn.accuracy.alternative import Pair, Way
+from robot_dyn.accuracy.timing import seconds
 from robot_dyn.compiled.cache import default_store
 from robot_dyn.compiled.engine import LARGEST_KERNEL
 from robot_dyn.compiled.from_casadi import program_of
@@ -29,7 +29,7 @@ from robot_dyn.errors import QueryError, RobotDynError
 from robot_dyn.model.robot import Robot
 
 STATES = 1024  # side by side
-PER_STATE = f"state of {STATES}"
+PER_STATE = f"state, {STATES} side by side"
 _LEAST_S = 2e-3  # of a loop that is timed
 _FORWARD, _DERIVATIVES = "forward_dynamics", "forward_dynamics_derivatives"
 
@@ -125,18 +125,16 @@ class QueryCost:
         """The time per state of a program."""
         outputs = shape or (len(program.outputs),)
         kernel = Kernel(program, outputs, dtype, store=default_store(), about=f"{self.given.name}: {name}, {dtype}")
-        rng, loops = np.random.default_rng(8), [0]
+        rng = np.random.default_rng(8)
         inputs = [rng.normal(size=(STATES, length)).astype(dtype) for length in program.inputs]
         y = np.empty((STATES, len(program.outputs)), dtype)
 
         def run() -> float:
-            if not loops[0]:
-                if len(program) > LARGEST_KERNEL:
-                    raise RobotDynError(f"{len(program)} instructions, more than the {LARGEST_KERNEL} worth compiling")
-                if kernel.many(inputs, y) is not Status.FINE:
-                    raise RobotDynError("its results at random states are doubtful")
-                loops[0] = ceil(_LEAST_S / _timed(lambda: kernel.many(inputs, y), 1))
-            return _timed(lambda: kernel.many(inputs, y), loops[0]) / STATES
+            if len(program) > LARGEST_KERNEL:
+                raise RobotDynError(f"{len(program)} instructions, more than the {LARGEST_KERNEL} worth compiling")
+            if kernel.many(inputs, y) is not Status.FINE:
+                raise RobotDynError("its results at random states are doubtful")
+            return seconds(lambda: kernel.many(inputs, y), _LEAST_S, process_time) / STATES
 
         return Way(name, len(program), run)
 
@@ -146,10 +144,3 @@ _WITHOUT = {
     " not traced",
     "articulated body": "joints are coupled: articulated bodies take those that are free, so M is solved with",
 }
-
-
-def _timed(call: Callable[[], Any], times: int) -> float:
-    began = perf_counter()
-    for _ in range(times):
-        call()
-    return (perf_counter() - began) / times

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from fractions import Fraction
-from time import perf_counter
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -32,7 +32,7 @@ from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.trajectory import Ending
 
 RUNS = 4096  # side by side
-PER_STEP, PER_RUN = "step of RK4", "step and run"
+PER_STEP, PER_RUN = "step of RK4", "step of RK4 and run"
 EVERYTHING, NUMBERS, SIDE_BY_SIDE = "everything", "numbers of the setup", "runs"
 _EVALUATIONS = 4  # of RK4, in a step
 _STEP_S, _STEPS, _STEPS_OF_MANY = 1e-7, 4000, 25
@@ -107,9 +107,9 @@ def side_by_side(setup: Setup) -> Pair:
 
     def run() -> float:
         batch = Batch(short, made, *starts, {}, (), (), MOST_BYTES)
-        began = perf_counter()
+        began = process_time()
         batch.run(1)
-        return (perf_counter() - began) / (RUNS * short.steps)
+        return (process_time() - began) / (RUNS * short.steps)
 
     several = Way(f"{RUNS} side by side", instructions(made), run)
     return Pair("machine code", SIDE_BY_SIDE, PER_RUN, one_run(setup).named("one"), several)
@@ -132,9 +132,9 @@ def _alone(short: Setup, made: Machine) -> Way:
         steps = FixedStep(
             short, made.equation, made.equations.functions, Fraction(1), made.loop, parameters=made.parameters
         )
-        began = perf_counter()
+        began = process_time()
         record = steps.record()
-        spent = perf_counter() - began
+        spent = process_time() - began
         if record.outcome.ending is Ending.STOPPED:
             raise KeyboardInterrupt
         if record.outcome.ending is not Ending.FINISHED:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import timeit
 from collections.abc import Callable, Mapping
 from statistics import median
+from time import perf_counter
 
 
-def seconds(call: Callable[[], object], at_least: float) -> float:
+def seconds(call: Callable[[], object], at_least: float, clock: Callable[[], float] = perf_counter) -> float:
     """Time of one call in [s], over a loop of about `at_least` seconds."""
-    timer, number = timeit.Timer(call), 1
+    timer, number = timeit.Timer(call, timer=clock), 1
     while (taken := timer.timeit(number)) < at_least:
         number = max(2 * number, int(1.2 * number * at_least / max(taken, 1e-9)))
     return taken / number

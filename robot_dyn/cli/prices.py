@@ -101,13 +101,20 @@ def cost_tables(result: Cost) -> Iterator[Any]:
     table = Table(box=None, pad_edge=False, header_style="bold")
     for heading in ("per", "what", "first / second", "instructions", "ratio", "time", "ratio"):
         table.add_column(heading, justify="left" if heading in ("per", "what", "first / second") else "right")
-    for k, each in enumerate(result.alternatives):
-        again = k > 0 and result.alternatives[k - 1].per == each.per
-        table.add_row("" if again else each.per, *_cells(each))
+    for row in cost_rows(result):
+        table.add_row(*row)
     yield table
-    yield "instructions are exact; times are medians of runs that take turns, in machine code, on one thread"
+    yield "instructions are exact; times of the processor, in machine code on one thread, and their ratios are medians"
+    yield "over turns; ± half of the interquartile range"
     yield from (f"left out: {each}" for each in result.left_out)
     yield f"{', '.join(f'{name} {value}' for name, value in result.environment.items())}"
+
+
+def cost_rows(result: Cost) -> Iterator[list[str]]:
+    """A row for each alternative: per, what, versions, instructions and their ratio, times and theirs."""
+    for k, each in enumerate(result.alternatives):
+        again = k > 0 and result.alternatives[k - 1].per == each.per
+        yield ["" if again else each.per, *_cells(each)]
 
 
 def _cells(each: Alternative) -> Iterator[str]:
@@ -117,7 +124,7 @@ def _cells(each: Alternative) -> Iterator[str]:
     yield f"{first.instructions} / {second.instructions}"
     yield f"{each.instructions_ratio:.3g}" if isfinite(each.instructions_ratio) else "—"
     yield " / ".join("—" if of.time_s is None else in_words(of.time_s) for of in (first, second))
-    yield "—" if each.time_ratio is None else f"{each.time_ratio:.2f}"
+    yield "—" if each.time_ratio is None else f"{each.time_ratio:.2f} ± {each.time_ratio_spread:.2f}"
 
 
 def work_precision_tables(result: WorkPrecision) -> Iterator[Any]:
