@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from robot_dyn.control.samples import Samples as Samples
     from robot_dyn.effects.actuator import ActuatorLag as ActuatorLag
     from robot_dyn.effects.actuator import EffortLimit as EffortLimit
+    from robot_dyn.effects.dry_friction import DryFriction as DryFriction
     from robot_dyn.effects.effect import Active as Active
     from robot_dyn.effects.effect import Bound as Bound
     from robot_dyn.effects.effect import Conservative as Conservative
@@ -60,6 +61,7 @@ if TYPE_CHECKING:
     from robot_dyn.effects.line_spring_damper import LineSpringDamper as LineSpringDamper
     from robot_dyn.effects.lugre import LuGreFriction as LuGreFriction
     from robot_dyn.effects.plant import Plant as Plant
+    from robot_dyn.effects.rigid_stops import RigidStops as RigidStops
     from robot_dyn.effects.spring import Spring as Spring
     from robot_dyn.effects.wrench import ExternalWrench as ExternalWrench
     from robot_dyn.errors import ModelWarning as ModelWarning
@@ -111,6 +113,7 @@ _HOME = {
     "Controller": "control.controller",
     "Cost": "accuracy.cost",
     "Dissipative": "effects.effect",
+    "DryFriction": "effects.dry_friction",
     "Dynamics": "model.dynamics",
     "EffortLimit": "effects.actuator",
     "Event": "simulation.event",
@@ -133,6 +136,7 @@ _HOME = {
     "Plant": "effects.plant",
     "PrecisionWarning": "errors",
     "RegularisedCoulombFriction": "effects.friction",
+    "RigidStops": "effects.rigid_stops",
     "Robot": "model.robot",
     "RobotDynError": "errors",
     "Rollouts": "simulation.rollout_result",

@@ -46,6 +46,15 @@ def test_grazed_and_struck_stops_are_met_as_in_closed_form(seed: int) -> None:
         assert abs(run.q[-1, 0] - exact) < 1e-11, (excess, k)
 
 
+def test_a_run_that_ends_far_from_its_start_has_an_estimate() -> None:
+    """Of fixed steps that are cut: how far a joint turns in a step is told from its path, which begins at the start."""
+    plant = rd.Plant(ARM.with_(gravity=(0, 0, 0)), rd.joint_stops([-9.0, -9.0], [9.0, 9.0]))
+    run = rd.simulate(plant, [0.1, 0.2], [3.0, 0.5], duration_s=2.5, integrator="rk4", step_s=0.01)
+    assert np.abs(run.q[-1] - run.q[0]).max() > np.pi
+    assert run.error is not None
+    assert not run.error.note
+
+
 def test_near_misses_are_no_events() -> None:
     """1e-12 … 1e-4 m below a stop of 1e8 N/m."""
     rng = np.random.default_rng(3)

@@ -20,8 +20,10 @@ from robot_dyn.control.controller import Controller
 from robot_dyn.control.reference import polynomial
 from robot_dyn.effects.effect import Active, Bound, Conservative, Effect, Stateful
 from robot_dyn.effects.plant import Plant
+from robot_dyn.effects.set_valued import Interval, Mode, SetValued
 from robot_dyn.foreign import because
 
+_INTERPRETED = "ask the plant itself, or simulate it"
 REMEDY = "write it in robot_dyn.arithmetic and NumPy's operators, or take engine='interpreted'"
 
 
@@ -84,7 +86,11 @@ class Piece:
 
 
 def _traced(effect: Effect, values: Mapping[str, Array]) -> Effect:
-    own = with_values(effect, values)
+    own: Any = with_values(effect, values)
+    if isinstance(effect, SetValued):
+        if own.held is None:
+            raise TraceError(f"effect {effect.name} holds joints, and which ones a run finds out: {_INTERPRETED}")
+        return _TracedSetValued(own)
     if isinstance(effect, Stateful):
         return _StatefulBound(own) if isinstance(effect, Bound) else _StatefulForce(own)
     if isinstance(effect, Bound):
@@ -116,6 +122,21 @@ class _Torque(_Part):
 
 class _TracedForce(_Torque, Active):
     """A torque."""
+
+
+class _TracedSetValued(_Torque, SetValued):
+    """An effect that may hold joints, in a mode."""
+
+    @property
+    def held(self) -> Any:
+        """1 for each joint that is held."""
+        return self.inner.held
+
+    def in_mode(self, mode: Mode) -> SetValued:
+        return _TracedSetValued(self.inner.in_mode(mode))
+
+    def at_rest(self, q: np.ndarray) -> Interval:
+        return self.inner.at_rest(q)
 
 
 class _TracedConservative(_Torque, Conservative):

@@ -16,9 +16,10 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.effects.effect import Bound, Conservative, Effect, Force, Stateful
+from robot_dyn.effects.set_valued import SetValued, settled
 from robot_dyn.errors import EffectError
 from robot_dyn.foreign import call, users_line
-from robot_dyn.model.dynamics import Dynamics
+from robot_dyn.model.dynamics import Dynamics, acceleration
 from robot_dyn.validate import integer
 
 
@@ -39,6 +40,11 @@ class EquationOfMotion:
     def forces(self) -> tuple[Force, ...]:
         """The effects that are torques."""
         return tuple(effect for effect in self.effects if isinstance(effect, Force))
+
+    @cached_property
+    def set_valued(self) -> tuple[SetValued, ...]:
+        """The effects that may hold joints."""
+        return tuple(effect for effect in self.effects if isinstance(effect, SetValued))
 
     @cached_property
     def states(self) -> Mapping[int, slice]:
@@ -156,7 +162,25 @@ class EquationOfMotion:
 
     def acceleration(self, q: Array, v: Array, total: Array) -> Array:
         """The acceleration under the total torque Υ + Σ τ_effect."""
-        return self.dynamics.forward_dynamics(q, v, total)
+        if not self.set_valued:
+            return self.dynamics.forward_dynamics(q, v, total)
+        return self.with_reaction(q, v, total)[0]
+
+    def with_reaction(self, q: Array, v: Array, total: Array) -> tuple[Array, Array]:
+        """The acceleration of one state, and the reaction λ of what holds joints: M a + C v + ∂V/∂q = total + λ.
+
+        A joint that is held has a = 0, the others have λ = 0. Effects without a mode hold what they can at v = 0.
+        """
+        M, load = self.dynamics.M(q), total - self.dynamics.inverse_dynamics(q, v, 0 * v)
+        held = self.set_valued[0].held
+        if held is None:
+            a = settled(self.set_valued, M, load, q, v)[0]
+            held = (a == 0).astype(float)
+        else:
+            free = 1 - held
+            alone = M * (free[:, None] * free[None, :]) + held * np.eye(len(load))
+            a = acceleration(alone, free * load, self.dynamics.joint_names)
+        return a, held * (M @ a - load)
 
     def momentum_rate(self, q: Array, v: Array, total: Array) -> Array:
         """The rate of the momentum p = M v under the total torque."""

@@ -108,7 +108,14 @@ class Plant:
 
     def forward_dynamics(self, t: float, q: Array, v: Array, u: Array) -> Array:
         """Acceleration under the actuation u, (..., n)."""
-        return self.equation_of_motion.acceleration(q, v, self.actuation(u) + self.torque(t, q, v))
+        total = self.actuation(u) + self.torque(t, q, v)
+        if not self.equation_of_motion.set_valued:
+            return self.equation_of_motion.acceleration(q, v, total)
+        q, v = self._states(q=q, v=v)
+        batch, n = check_batches(q=q, v=v, u=total), self.dynamics.n
+        rows = zip(*(np.broadcast_to(x, (*batch, n)).reshape(-1, n) for x in (q, v, total)), strict=True)
+        made = [self.equation_of_motion.acceleration(*row) for row in rows]
+        return np.array(made).reshape(*batch, n)
 
     @cached_property
     def _arithmetic(self) -> Arithmetic:

@@ -41,6 +41,23 @@ def coefficients(start: float, F: Array, e: int, b: Array) -> None:
         b[j] += start
 
 
+def rate_coefficients(F: Array, e: int, h: float, b: Array) -> None:
+    """Coefficients of the derivative of entry e by time, on a step of length h: the first d of b (d + 1,)."""
+    d = len(F)
+    coefficients(0.0, F, e, b)
+    for j in range(d):
+        b[j] = d * (b[j + 1] - b[j]) / h
+
+
+def value(b: Array, theta: float) -> float:
+    """The polynomial at θ."""
+    total, power, d = 0.0, 1.0, len(b) - 1
+    for j in range(d + 1):  # b_j C(d, j) θʲ (1 − θ)^(d−j)
+        total += b[j] * power * (1 - theta) ** (d - j)
+        power *= theta * (d - j) / (j + 1)
+    return total
+
+
 def first_below(b: Array, slack: float, stack: Array) -> float:
     """The first θ from which a polynomial is below −slack, up to the halving of floats; NONE if it never is.
 

@@ -39,6 +39,7 @@ class Declared(Acting):
         arguments = {
             name: per_joint(name, getattr(self, key), robot, elsewhere=each.elsewhere)
             for key, (name, each) in self.keys.items()
+            if getattr(self, key) is not None
         }
         made = type(self).make(**arguments)
         return made if isinstance(made, tuple) else (made,)

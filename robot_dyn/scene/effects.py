@@ -8,11 +8,13 @@ from typing import Annotated, Literal, Union, get_args
 from pydantic import Field
 
 from robot_dyn.effects.actuator import ActuatorLag, EffortLimit
+from robot_dyn.effects.dry_friction import DryFriction
 from robot_dyn.effects.effect import Effect
 from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFriction
 from robot_dyn.effects.joint_limit import JointStopDamper, JointStopSpring, joint_stops
 from robot_dyn.effects.line_spring_damper import LineSpringDamper
 from robot_dyn.effects.lugre import LuGreFriction
+from robot_dyn.effects.rigid_stops import RigidStops
 from robot_dyn.effects.spring import Spring
 from robot_dyn.effects.wrench import ExternalWrench
 from robot_dyn.errors import SceneError
@@ -135,12 +137,14 @@ EDITS = Gravity, Lock, Load, Armature
 ACTING = (
     declared_part("viscous_friction", ViscousFriction),
     declared_part("regularised_coulomb_friction", RegularisedCoulombFriction),
+    declared_part("dry_friction", DryFriction),
     declared_part("lugre_friction", LuGreFriction),
     declared_part("spring", Spring),
     declared_part(
         "joint_stops", JointStopSpring, JointStopDamper, make=joint_stops,
         text="Soft joint stops: τ = k (δ₋ − δ₊) − c (δ₋ + δ₊) v, with δ the depth beyond a stop.",
     ),
+    declared_part("rigid_stops", RigidStops),
     Line,
     Wrench,
     declared_part("effort_limit", EffortLimit),

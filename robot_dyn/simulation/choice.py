@@ -66,6 +66,7 @@ def _made(setup: Setup, equation: StateEquation) -> Machine:
     from robot_dyn.simulation.machine.making import machine
 
     method: Any = setup.integrator
+    equation = equation.in_a_mode
     return machine(equation, method if method.plain else None, jacobian=method.needs_jacobian, cuts=setup.finds_events)
 
 

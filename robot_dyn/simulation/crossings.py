@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.integrate.bernstein import NONE, coefficients, first_below
+from robot_dyn.integrate.bernstein import NONE, coefficients, first_below, rate_coefficients, value
 from robot_dyn.integrate.primitives import between, evaluate
 from robot_dyn.simulation.time_loop import Functions, Rules, Runs
 
@@ -23,12 +23,14 @@ _NEAR = 1e-4  # of a step: for the slope of a switching function that is no coor
 
 
 class Switches(NamedTuple):
-    """Switching functions: E coordinates of y that pass a level, and G functions of (t, y, p, own) that pass one.
+    """Switching functions: E coordinates of y, or rates of these, that pass a level, and G functions that pass one.
 
     Attributes:
         rows: Entry of y, and then of the values of the functions, (E + G,).
         levels: Its level, (E + G,).
         sides: 1 where it is not below its level, −1 where it is not above, (E + G,).
+        rates: Whether each of the first is the rate of that entry, (E,).
+        zeroed: Entries of y that are set to 0 after each step: of those only the rates matter.
         functions: Gives the F values, as of `evaluate`.
         asked: Number of the last functions that are looked at in each step, as the user's own.
         then: Room for their values, (F, 1).
@@ -40,6 +42,8 @@ class Switches(NamedTuple):
     rows: Array
     levels: Array
     sides: Array
+    rates: Array
+    zeroed: Array
     functions: Any
     asked: int
     then: Array
@@ -55,10 +59,12 @@ def approaches(y: Array, after: Array, h: float, before: Array, last: Array, rul
     """Whether a coordinate may pass its level in a step, by Hermite's polynomial through rates at both ends.
 
     Its coefficients in Bernstein's form, from values and two derivatives of a position and one of a velocity, enclose
-    it; as much room again is left on both sides.
+    it; as much room again is left on both sides. Rates are always looked at.
     """
     n = 0 if rules.canonical else rules.n  # p' is no acceleration
     for e in range(len(switches.exact)):
+        if switches.rates[e]:
+            return True
         row = switches.rows[e]
         x0, x1, d0, d1 = y[row, 0], after[row, 0], before[row, 0], last[row, 0]
         low, high = min(x0, x1), max(x0, x1)
@@ -109,13 +115,18 @@ def first_event(
     """The switching function that changes sign first within a step, and θ; −1 without any."""
     event, first, b, own = -1, NONE, switches.b, runs.own
     for e in range(len(switches.exact)):
-        row, side = switches.rows[e], switches.sides[e]
-        coefficients(y[row, 0] - switches.levels[e], F, row, b)
-        if y[row, 0] == switches.levels[e]:
-            b[0] = 0.0
-        for j in range(len(b)):
+        row, side, d = switches.rows[e], switches.sides[e], len(b) - switches.rates[e]
+        if switches.rates[e]:
+            rate_coefficients(F, row, h, b)
+            for j in range(d):
+                b[j] -= switches.levels[e]
+        else:
+            coefficients(y[row, 0] - switches.levels[e], F, row, b)
+            if y[row, 0] == switches.levels[e]:
+                b[0] = 0.0
+        for j in range(d):
             b[j] *= side
-        theta = first_below(b, switches.slack[e], switches.stack)
+        theta = first_below(b[:d], switches.slack[e], switches.stack)
         if theta < first:
             event, first = e, theta
     before, x = 0.0, runs.last
@@ -177,7 +188,12 @@ def correction(
     event: int,
 ) -> float:  # fmt: skip
     """Newton's correction of the step h whose end is to be a root of a switching function."""
-    if event < len(switches.exact):
+    if event < len(switches.exact) and switches.rates[event]:  # its slope likewise
+        row, b, theta = switches.rows[event], switches.b, h / whole
+        rate_coefficients(work.F, row, whole, b)
+        slope = (value(b[:-1], theta + _NEAR) - value(b[:-1], theta - _NEAR)) / (2 * _NEAR * whole)
+        left = work.last[row, 0] - switches.levels[event]
+    elif event < len(switches.exact):
         row = switches.rows[event]
         left, slope = runs.after[row, 0] - switches.levels[event], work.last[row, 0]
     else:  # its slope from the dense output of the whole step

@@ -25,6 +25,7 @@ from robot_dyn.simulation.time_loop import Ended, Functions, Now, Plan, Rules, R
 FASTEST = 1e6  # [rad/s] or [m/s]: such a method would follow an exploding state without end
 _EARLY = 1e-9  # of a period: a sample at the end of a segment belongs to the next one
 _ROOTS = 6  # steps made anew for an event, at most
+_SHORT = 1e-8  # of a step: over so little of it y is a straight line, to rounding
 _WATCHED = 8  # steps between looks at the energy
 
 
@@ -82,25 +83,26 @@ def event_loop(
     def cut(
         f: Functions, c: Any, t: float, whole: float, theta: float, p: Array, runs: Runs, work: Any,
         switches: Switches, event: int,
-    ) -> tuple[int, float]:  # fmt: skip
-        """The step made anew, up to where a switching function vanishes after it: its evaluations and its length."""
+    ) -> tuple[int, float, float]:  # fmt: skip
+        """The step made anew, up to where a switching function vanishes after it, but for the last bit of its length.
+
+        Its evaluations, its length, and that bit, over which y is a straight line.
+        """
         h, evaluations, y, after = theta * whole, 0, runs.y, runs.after
-        if abs(h) <= np.spacing(abs(t)):  # at once, as right behind another event
-            copy(after, y)
-            copy(work.last, work.K[0])
-            return 0, 0.0
         for k in range(_ROOTS):
+            if abs(h) <= np.spacing(abs(t)):  # at once, as right behind another event
+                copy(after, y)
+                copy(work.last, work.K[0])
+                return evaluations, 0.0, 0.0
             evaluations += step(f, c, t, h, y, p, runs.own, after, work, runs.lost)
             evaluations += accept(f, c, t, h, y, p, runs.own, after, work)
             shift = correction(f, t, h, whole, y, p, runs, work, switches, event)
-            if k == _ROOTS - 1 or not abs(shift) > np.spacing(abs(t + h)) or abs(shift) > abs(h):
-                break
-            h += shift
-        if event < len(switches.exact):
-            row, level = switches.rows[event], switches.levels[event]
-            if abs(after[row, 0] - level) <= switches.exact[event]:
-                after[row, 0] = level
-        return evaluations, h
+            if not abs(shift) > _SHORT * h:
+                return evaluations, h, shift
+            if k == _ROOTS - 1 or (abs(shift) > h and event >= len(switches.exact)):
+                break  # a function that jumps, say: where it is bracketed
+            h = max(h + shift, 0.0)
+        return evaluations, h, 0.0
 
     def advance(
         f: Functions, plan: Plan, runs: Runs, kept: Kept, times: Times, rules: Rules, c: Any, work: Any,
@@ -137,7 +139,7 @@ def event_loop(
                     return Ended.TOO_SMALL
                 h, t1 = control[At.TAKEN], control[At.END]
                 now[Now.EVALUATIONS] += accept(f, c, t, h, y, p, own, after, work)
-                has_dense, event, theta = False, -1, NONE
+                has_dense, event, theta, rest = False, -1, NONE, 0.0
                 if len(switches.sides) > 0:
                     near = nears(t1, after, p, own, switches)
                     if near or approaches(y, after, h, work.K[0], work.last, rules, switches):
@@ -145,11 +147,11 @@ def event_loop(
                         event, theta = first_event(f, t, h, y, p, runs, work.F, switches)
                         has_dense = event < 0
                     if event >= 0:
-                        made, h = cut(f, c, t, h, theta, p, runs, work, switches, event)
+                        made, h, rest = cut(f, c, t, h, theta, p, runs, work, switches, event)
                         now[Now.EVALUATIONS] += made
                         if runs.lost[0] != 0 or not finite(after):
                             return Ended.TOO_SMALL
-                        t1 = t + h
+                        t1 = t + (h + rest)
                         control[At.NEXT] = max(control[At.NEXT], abs(control[At.TAKEN]))  # the cut is no error
                         switches.sides[event] = -switches.sides[event]
                 if h > 0.0 and asked(times, now, t1, end):
@@ -157,6 +159,10 @@ def event_loop(
                         now[Now.EVALUATIONS] += dense(f, c, t, h, y, p, own, after, work)
                     inside(f, runs, kept, times, now, t, h, t1, end, p, work.F)
                 copy(y, after)
+                if event >= 0:
+                    arrive(y, work.last, rest, switches, event)
+                for e in switches.zeroed:
+                    y[e, 0] = 0.0
                 times.reached[0] = t1
                 copy(work.K[0], work.last)
                 if times.every and event < 0 and t1 < end:
@@ -180,6 +186,16 @@ def event_loop(
         return Ended.DONE
 
     return advance
+
+
+def arrive(y: Array, rate: Array, rest: float, switches: Switches, event: int) -> None:
+    """The last bit of a step up to an event; what passes its level there lies on it, but for rounding."""
+    for e in range(len(y)):
+        y[e, 0] += rest * rate[e, 0]
+    if event < len(switches.exact) and not switches.rates[event]:
+        row, level = switches.rows[event], switches.levels[event]
+        if abs(y[row, 0] - level) <= switches.exact[event]:
+            y[row, 0] = level
 
 
 def node(f: Functions, runs: Runs, kept: Kept, times: Times, now: Array, t: float, p: Array) -> None:

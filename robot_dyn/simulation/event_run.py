@@ -23,6 +23,7 @@ from robot_dyn.simulation.event import Occurrence
 from robot_dyn.simulation.event_loop import Kept, Times, event_loop
 from robot_dyn.simulation.fixed_step import runs_of
 from robot_dyn.simulation.followed import Followed
+from robot_dyn.simulation.modes import Guard
 from robot_dyn.simulation.observer import Observer
 from robot_dyn.simulation.plan import plan_of
 from robot_dyn.simulation.record import MOST_SHARED, Path, Record
@@ -124,6 +125,8 @@ class EventRun(Followed):
             np.empty(rows), np.empty((rows, m, 1)), np.empty((rows, m + n + 2, 1)), np.empty(states),
             np.empty((states, m)), np.empty(_CHUNK), np.empty((_CHUNK, m)), columns,
         )  # fmt: skip
+        if self.switching.modes is not None:
+            self.switching.modes.start(self.start)
         events = self.functions.events if self.compiled else self.switching.function
         self.switches = self.switching.at(0.0, self.start, len(of.work.F), events, own[:n, 0] if held else None)
         self.events: list[Occurrence] = []
@@ -242,7 +245,7 @@ class EventRun(Followed):
 
     def _change_mode(self) -> None:
         """Let the functions be those of the sides that the switching functions are on."""
-        if self.switching.thresholds or self.switching.dropped:
+        if self.switching.thresholds or self.switching.dropped or self.switching.modes is not None:
             self.functions, parameters = self.made(self.switching.on(self.switches.sides))
             self.runs.own[self.rules.held :, 0] = parameters
         if not self.compiled:
@@ -260,12 +263,32 @@ class EventRun(Followed):
         self.events.append(replace(last, name=f"{last.name} chatters, and is no longer looked for"))
         self.switching = Switching(self.equation, self.switching.dropped | {(each.joint, each.of_actuation)})
         held = self.runs.own[: self.rules.held, 0] if self.rules.held else None
-        self.switches = self.switching.at(last.t, self.y, len(self.switches.b) - 1, self.switches.functions, held)
+        self._watch_anew(last.t, held)
+
+    def _end_mode(self, t: float, y: np.ndarray, guard: Guard) -> None:
+        """Go on in another mode, from the state behind the event."""
+        modes, held = self.switching.modes, self.runs.own[: self.rules.held, 0] if self.rules.held else None
+        assert modes is not None
+        self.runs.y[:, 0], happened = modes.after(t, y, held, guard)
+        self.events = sorted([*self.events, *happened], key=lambda each: each.t)
+        self._watch_anew(t, held)
+        if self.setup.integrator.needs_jacobian:
+            self.control[At.NEXT] = 0.0
+        self._change_mode()
+
+    def _watch_anew(self, t: float, held: Array | None) -> None:
+        """The switching functions of the state reached."""
+        degree, functions = len(self.switches.b) - 1, self.switches.functions
+        self.switches = self.switching.at(t, self.y, degree, functions, held)
 
     def _event(self, t: float, y: np.ndarray) -> None:
         """Keep an event, and go on behind it; TerminalEvent ends the run."""
         index, E = int(self.now[Now.EVENT]), len(self.switching.thresholds)
         side = float(self.switches.sides[index])
+        index, guard = self.switching.place(index)
+        if guard is not None:
+            self._end_mode(t, y, guard)
+            return
         if index < E:
             self.events.append(self.switching.occurrence(index, t, y, side))
             if self.setup.integrator.needs_jacobian:

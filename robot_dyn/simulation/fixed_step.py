@@ -186,7 +186,7 @@ def runs_of(y: np.ndarray, own: np.ndarray, n: int, held: int, states: int, made
     """Runs at the states y (m, W) with their own numbers (O, W)."""
     m, W = y.shape
     return Runs(
-        np.ascontiguousarray(y), np.ascontiguousarray(own), np.empty((m, W)), np.empty((made, W)),
+        np.array(y, order="C"), np.array(own, order="C"), np.empty((m, W)), np.empty((made, W)),
         np.empty((held + states, W)), np.empty((2, W)), np.empty(W), np.zeros(W, np.int64), np.ones(W, np.int64),
         np.zeros(W, np.int64), np.zeros(W), np.zeros((m, W)), np.zeros(W), np.ones(W), np.zeros(W),
     )  # fmt: skip

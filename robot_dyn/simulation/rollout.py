@@ -101,6 +101,11 @@ def rollouts(
             f"rollouts run by an explicit, Gauss or Rosenbrock method, or by one that chooses its steps, not by"
             f" {setup.integrator.name}: give integrator='rk4' and its step_s; simulate takes any method"
         )
+    if (held := setup.plant.equation_of_motion.set_valued) and not setup.integrator.controls_error:
+        raise QueryError(
+            f"rollouts: {held[0].name} holds joints and lets them go, and steps in lock step do not end there; take"
+            " integrator='DOP853', by which runs go one after the other"
+        )
     if setup.events:
         raise QueryError("rollouts: events has no effect, since runs in lock step are not cut; simulate takes them")
     if params is not None and not (isinstance(params, Mapping) and all(isinstance(name, str) for name in params)):

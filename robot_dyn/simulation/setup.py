@@ -15,6 +15,7 @@ from robot_dyn.arithmetic import Array, Ball
 from robot_dyn.control.control_law import ControlLaw
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.plant import Plant
+from robot_dyn.effects.rigid_stops import RigidStops
 from robot_dyn.errors import ControlError, EffectError, OverflowedError, QueryError, shown
 from robot_dyn.foreign import call
 from robot_dyn.integrate.adaptive import AUTO, Adaptive
@@ -110,6 +111,7 @@ class Setup(Value):
                 f"events: runs of more than {MOST_CUT} steps of {self.integrator.name} are not cut; take longer steps,"
                 " or integrator='DOP853'"
             )
+        self._check_set_valued()
         self._check_torques()
         self._check_events()
         self.plant.actuation(np.zeros(len(names)))
@@ -123,6 +125,26 @@ class Setup(Value):
             raise QueryError(f"accuracy: chooses method and tolerance; leave out integrator, got {self.integrator}")
         if not self.estimate_error:
             raise QueryError("accuracy: is held to the error estimate; leave out estimate_error=False")
+
+    def _check_set_valued(self) -> None:
+        """That steps can end where joints are held and let go, and that the start is not beyond a rigid stop."""
+        effects = self.plant.equation_of_motion.set_valued
+        method: Any = self.integrator
+        for fails, why in (
+            (method.canonical, "integrates momenta"),
+            (not method.controls_error and method.order < 2, "is of order 1, too low to find where"),
+            (not self.finds_events, f"takes more than {MOST_CUT} steps"),
+        ):
+            if effects and fails:
+                raise QueryError(
+                    f"{effects[0].name}: steps must end where it holds a joint or lets it go, and {method.name} {why};"
+                    " take integrator='DOP853'"
+                )
+        for each in effects:
+            if isinstance(each, RigidStops) and (depth := each.beyond_by(self.q0)).any():
+                i = int(np.argmax(depth))
+                name, which = self.plant.dynamics.joint_names[i], "lower" if each.touched(self.q0)[i] < 0 else "upper"
+                raise QueryError(f"q0: {name!r} is {depth[i]:.3g} beyond its {which} stop; start between the stops")
 
     def _check_torques(self) -> None:
         """That what the controller and each effect return at the start is one number for each joint."""

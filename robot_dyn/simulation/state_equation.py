@@ -1,7 +1,7 @@
 """The state equation: the motion of a plant as a first-order system y' = f(t, y), with y = (q, v or p, z, W).
 
     q' = v,   v' = M⁻¹ (u + Σ τ − C v − N)   or   p' = u + Σ τ + Cᵀ v − N with p = M v,
-    z' = rate of the states of the controller, then of the effects,
+    z' = rate of the states of the controller, then of the effects; then J' = λ, the reactions of what holds joints,
     W_k' = τ_kᵀ v: the work of the control and of each effect without a potential
 
 [Murray, Li, Sastry 1994, ch. 4; Hairer, Lubich, Wanner 2006, §VI.1 for canonical coordinates]
@@ -9,7 +9,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, final
 
@@ -20,6 +20,7 @@ from robot_dyn.control.controller import Controller
 from robot_dyn.effects.effect import Bound, Conservative, Stateful
 from robot_dyn.effects.equation_of_motion import EquationOfMotion
 from robot_dyn.effects.plant import Plant
+from robot_dyn.effects.set_valued import Mode, SetValued
 from robot_dyn.errors import RobotDynError
 from robot_dyn.foreign import call
 from robot_dyn.model.dynamics import acceleration
@@ -63,8 +64,23 @@ class StateEquation:
 
     @cached_property
     def states(self) -> int:
-        """Number of states of the controller and of the effects."""
-        return self.state_size + self.equation_of_motion.state_size
+        """Number of states of the controller and of the effects, and of the impulses of reactions."""
+        return self.state_size + self.equation_of_motion.state_size + self.impulses
+
+    @cached_property
+    def impulses(self) -> int:
+        """Number of the impulses of reactions, the last of the states: n where joints may be held, or 0."""
+        return self.plant.dynamics.n if self.equation_of_motion.set_valued else 0
+
+    @cached_property
+    def in_a_mode(self) -> StateEquation:
+        """The equation in a mode, one in which nothing is held; itself where nothing may be."""
+        if not self.impulses:
+            return self
+        n = self.plant.dynamics.n
+        mode = Mode(np.zeros(n), np.zeros(n))
+        effects = [x.in_mode(mode) if isinstance(x, SetValued) else x for x in self.plant.effects]
+        return replace(self, plant=Plant(self.plant.dynamics, effects))
 
     @property
     def size(self) -> int:
@@ -182,15 +198,18 @@ class StateEquation:
         total = sum(torques, start=u)
         result = np.empty_like(y)
         result[:n] = v
-        second = equation.momentum_rate if self.canonical else equation.acceleration
-        result[n : 2 * n] = second(q, v, total)
-        end = 2 * n + self.state_size
+        end, W = 2 * n + self.state_size, 2 * n + self.states
+        if self.impulses:
+            result[n : 2 * n], result[W - n : W] = equation.with_reaction(q, v, total)
+        else:
+            second = equation.momentum_rate if self.canonical else equation.acceleration
+            result[n : 2 * n] = second(q, v, total)
         remembers = held is None and controller is not None and self.state_size > 0
         result[2 * n : end] = call(controller.state_rate, t, q, v, of_controller) if remembers and controller else 0.0
         rates = result[end : end + equation.state_size]
         for place, rate in equation.state_rates(t, q, v, u, reached, of_effects):
             rates[place] = rate
-        result[2 * n + self.states :] = equation.powers(v, u, torques)
+        result[W:] = equation.powers(v, u, torques)
         return result, u
 
     @cached_property
@@ -213,7 +232,7 @@ class StateEquation:
         declared = [each for effect in parts[0] for each in effect.thresholds(parts[1])]
         if self.controller is not None and not self.sampled:
             declared += self.controller.thresholds()
-        return bool(self.events or self.limited or any(not each.of_actuation for each in declared))
+        return bool(self.events or self.limited or self.impulses or any(not each.of_actuation for each in declared))
 
     def demands(self, t: float, q: Array, v: Array, z: Array, held: Array | None, of: tuple[int, ...]) -> list[Array]:
         """What reaches those parts, (n,) each, which thresholds of the actuation are levels of: as of `limited`."""

@@ -8,10 +8,13 @@ from typing import final
 import numpy as np
 
 from robot_dyn.arithmetic import Array
+from robot_dyn.effects.effect import Effect
 from robot_dyn.effects.plant import Plant
+from robot_dyn.effects.set_valued import SetValued
 from robot_dyn.integrate.bernstein import room
 from robot_dyn.simulation.crossings import ROUNDING, Switches
 from robot_dyn.simulation.event import Occurrence
+from robot_dyn.simulation.modes import Guard, Modes
 from robot_dyn.simulation.state_equation import CONTROLLER, StateEquation
 from robot_dyn.threshold import Threshold
 
@@ -27,7 +30,9 @@ class Switching:
         dropped: What is no longer looked at: there the parts switch by themselves.
 
     Attributes:
-        thresholds: Those of coordinates, each once, E of them, and then those of the actuation, part by part, A.
+        thresholds: Those of coordinates, each once, and then those of the actuation, part by part.
+        modes: What joints may be held by; None where nothing may hold one.
+        guards: What ends the mode, as of the last call of `at`: its switching functions come between the two.
     """
 
     def __init__(self, equation: StateEquation, dropped: frozenset[Quantity] = frozenset()) -> None:
@@ -42,6 +47,8 @@ class Switching:
         self.coordinates = len(coordinates)
         self.thresholds: tuple[Threshold, ...] = (*coordinates, *(each for _, each in actuation))
         self._parts: tuple[int | None, ...] = (*(None for _ in coordinates), *(k for k, _ in actuation))
+        self.modes = Modes(equation) if equation.impulses else None
+        self.guards: list[Guard] = []
         self._known: dict[bytes, StateEquation] = {}
 
     @property
@@ -57,8 +64,9 @@ class Switching:
         return not (each.of_velocity and self.equation.canonical)
 
     def at(self, t: float, y: np.ndarray, degree: int, functions: object, held: Array | None) -> Switches:
-        """The switching functions, their sides those of a state y at t, for dense output of a degree."""
+        """The switching functions, on their sides of a state y at t and of the mode, for dense output of a degree."""
         n, E, G = self._n, self.coordinates, len(self.events)
+        self.guards = guards = self.modes.guards(y) if self.modes is not None else []
         rows = np.array([each.joint + n * each.of_velocity for each in self.thresholds[:E]], np.int64)
         levels = np.array([each.level for each in self.thresholds])
         gaps = y[rows] - levels[:E]
@@ -73,11 +81,15 @@ class Switching:
         gaps = values[actuation] - levels[E:]
         sides = np.concatenate([sides, np.where(gaps == 0, -np.sign(levels[E:]), np.sign(gaps))])  # a limit is reached
         sides = np.append(sides, np.sign(values[first:]))  # 0 where y is a root: the next step tells
-        rows = np.concatenate([rows, actuation, first + np.arange(G)]).astype(np.int64)
-        exact = ROUNDING * np.maximum(1.0, np.abs(levels[:E]))
-        slack = np.maximum(exact, [each.slack for each in self.thresholds[:E]])
+        rows = np.concatenate([rows, [each.row for each in guards], actuation, first + np.arange(G)]).astype(np.int64)
+        levels = np.insert(np.append(levels, np.zeros(G)), E, [each.level for each in guards])
+        sides = np.insert(sides, E, [each.side for each in guards])
+        exact = ROUNDING * np.maximum(1.0, np.abs(levels[: E + len(guards)]))
+        slack = np.maximum(exact, [each.slack for each in self.thresholds[:E]] + [0.0] * len(guards))
+        rates = np.array([False] * E + [each.rate for each in guards], bool)
+        zeroed = np.zeros(0, np.int64) if self.modes is None else self.modes.impulses
         return Switches(
-            rows, np.append(levels, np.zeros(G)), sides, functions, G, np.zeros((len(values), 1)), values,
+            rows, levels, sides, rates, zeroed, functions, G, np.zeros((len(values), 1)), values,
             np.zeros(len(values)), exact, slack, np.zeros(degree + 1), room(degree),
         )  # fmt: skip
 
@@ -104,8 +116,10 @@ class Switching:
         out[:, 0] = self.values(min(max(t, p[0]), p[1]), x, held)
 
     def on(self, sides: np.ndarray) -> StateEquation:
-        """The state equation with each threshold on its side; smooth there."""
-        key = sides[: len(self.thresholds)].tobytes()
+        """The state equation with each threshold on its side, in the mode that is known; smooth there."""
+        E, mode = self.coordinates, None if self.modes is None else self.modes.mode
+        sides = np.concatenate([sides[:E], sides[E + len(self.guards) :][: len(self.thresholds) - E]])
+        key = sides.tobytes() + (b"" if self.modes is None else self.modes.key)
         if key not in self._known:
             of: dict[tuple[int | None, Threshold], int] = {
                 (part, each): int(side) for part, each, side in zip(self._parts, self.thresholds, sides, strict=False)
@@ -114,15 +128,26 @@ class Switching:
                 k: {each: of[k if each.of_actuation else None, each] for each in mine} for k, mine in self._of.items()
             }
             equation, n = self.equation, self._n
-            effects = [effect.beyond(n, at[k]) if at[k] else effect for k, effect in enumerate(equation.plant.effects)]
+            effects: list[Effect] = [
+                effect.beyond(n, at[k]) if at[k] else effect for k, effect in enumerate(equation.plant.effects)
+            ]
+            if mode is not None:
+                effects = [x.in_mode(mode) if isinstance(x, SetValued) else x for x in effects]
             controller = equation.controller
             if controller is not None and at.get(CONTROLLER):
                 controller = controller.beyond(at[CONTROLLER])
             self._known[key] = replace(equation, plant=Plant(equation.plant.dynamics, effects), controller=controller)
         return self._known[key]
 
+    def place(self, index: int) -> tuple[int, Guard | None]:
+        """The number of a switching function among thresholds and events asked for, or the guard that it is."""
+        k = index - self.coordinates
+        if 0 <= k < len(self.guards):
+            return -1, self.guards[k]
+        return index - (len(self.guards) if k >= 0 else 0), None
+
     def occurrence(self, index: int, t: float, y: np.ndarray, side: float) -> Occurrence:
-        """The event of a switching function whose sign is now `side`."""
+        """The event of the threshold, or of the function asked for, of this number; its sign is now `side`."""
         q, v, joint = *self.equation.state(y)[:2], ""
         if index < len(self.thresholds):
             each = self.thresholds[index]

@@ -60,7 +60,7 @@ class OneByOne:
         if self.sweep:
             plant, controller = with_parameters(plant, controller, {name: x[run] for name, x in self.sweep.items()})
         equation, method = StateEquation(plant, controller), self.setup.integrator
-        code = machine(equation, method, swept=tuple(self.sweep), jacobian=method.needs_jacobian, cuts=True)
+        code = machine(equation.in_a_mode, method, swept=tuple(self.sweep), jacobian=method.needs_jacobian, cuts=True)
         return equation, code
 
     def run(self, threads: int, on_progress: Callable[[float], object] | None = None) -> Rollouts:

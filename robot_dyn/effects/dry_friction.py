@@ -1,0 +1,74 @@
+"""Dry friction that sticks: τ = −f(|v|) sign(v) where a joint slides, and up to f_s either way where it rests."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.coefficients import coefficient, with_values
+from robot_dyn.effects.set_valued import Interval, Mode, SetValued
+from robot_dyn.errors import EffectError
+from robot_dyn.model.dynamics import Dynamics
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class DryFriction(SetValued):
+    """Coulomb's friction: τ = −f sign(v) where v ≠ 0, and any |τ| ≤ f_s that keeps the joint at rest where v = 0.
+
+    A joint at rest stays exactly there for as long as the load does not exceed f_s. Then it slides, with f = f_k, or
+    by Stribeck's curve, f = f_k + (f_s − f_k) exp(−(v/v_s)²), if v_s is given. Where f_s > f_k, rest and sliding are
+    both consistent with some loads: what rests goes on resting. [Armstrong-Hélouvry, Dupont, Canudas de Wit, A survey
+    of models, analysis tools and compensation methods for the control of machines with friction, 1994]
+
+    Attributes:
+        level: f_k, of sliding, a scalar or (n,), in [N m] or [N], not negative.
+        static: f_s, of rest, not less than f_k; f_k unless given.
+        stribeck_velocity: v_s, a scalar or (n,), in [rad/s] or [m/s], positive; unless given, friction falls from f_s
+            to f_k at once where sliding starts.
+    """
+
+    level: Any = field(metadata=coefficient("N m", symbol="f_k", least=0, stated="friction"))
+    static: Any = field(default=None, metadata=coefficient("N m", symbol="f_s", least=0))
+    stribeck_velocity: Any = field(default=None, metadata=coefficient("rad/s", symbol="v_s", above=0, elsewhere=1.0))
+
+    held: Any = field(default=None, init=False, repr=False, metadata=coefficient(swept=False))
+    _direction: Any = field(default=None, init=False, repr=False, metadata=coefficient(swept=False))
+
+    term = "−f(v) sign(v); |τ| ≤ f_s at v = 0"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.stribeck_velocity is not None and self.static is None:
+            raise EffectError("stribeck_velocity: has no effect without static, the friction of rest; give both")
+        try:
+            less = self.static is not None and np.any(np.less(self.static, self.level))
+        except (TypeError, ValueError):  # by name, or of other numbers of joints: checked when the joints are known
+            return
+        if less:
+            raise EffectError(f"static must not be less than level, got {self.static} and {self.level}")
+
+    def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
+        direction = np.sign(v) if self._direction is None else self._direction
+        return -self.sliding(v) * direction
+
+    def sliding(self, v: Array) -> Array:
+        """The friction of sliding, f(v)."""
+        if self.static is None or self.stribeck_velocity is None:
+            return self.level + 0 * v
+        return self.level + (self.static - self.level) * np.exp(-((v / self.stribeck_velocity) ** 2))
+
+    @property
+    def breakaway(self) -> Any:
+        """The load at which a joint starts to slide, f_s."""
+        return self.level if self.static is None else self.static
+
+    def in_mode(self, mode: Mode) -> DryFriction:
+        return with_values(self, {"held": mode.held, "_direction": mode.direction})
+
+    def at_rest(self, q: np.ndarray) -> Interval:
+        most = np.broadcast_to(np.asarray(self.breakaway, float), q.shape).copy()
+        return Interval(-most, most)

@@ -1,0 +1,85 @@
+"""Rigid joint stops: a joint never passes them; it bounces off with a restitution, or comes to rest and is held."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import inf
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.coefficients import coefficient, with_values
+from robot_dyn.effects.set_valued import Interval, Mode, SetValued
+from robot_dyn.errors import EffectError
+from robot_dyn.model.dynamics import Dynamics
+
+_NEAR = 1e-13  # of a stop, or in its unit: as close as rounding leaves an event
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class RigidStops(SetValued):
+    """Stops that are not passed: lower ≤ q ≤ upper, with Newton's law v⁺ = −e v⁻ for each one that is struck.
+
+    All that strike or touch at one time are solved together, and no impact adds energy. At rest at a stop the torque
+    is any that pushes away from it. [Moreau 1988; Glocker, Set-Valued Force Laws, 2001]
+
+    Attributes:
+        lower: Position of the lower stop, −inf for none, a scalar or (n,), in [rad] or [m]; "urdf" for the file's.
+        upper: Position of the upper stop, inf for none, above the lower one.
+        restitution: e, a scalar or (n,), 0 to 1; 0 unless given.
+    """
+
+    lower: Any = field(metadata=coefficient("rad", symbol="Lower stop", infinite=True, elsewhere=-inf, stated="lower"))
+    upper: Any = field(metadata=coefficient("rad", symbol="Upper stop", infinite=True, elsewhere=inf, stated="upper"))
+    restitution: Any = field(default=0.0, metadata=coefficient(symbol="e", least=0))
+
+    held: Any = field(default=None, init=False, repr=False, metadata=coefficient(swept=False))
+
+    term = "lower ≤ q ≤ upper, v⁺ = −e v⁻"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if isinstance(self.restitution, float | np.ndarray) and np.any(np.greater(self.restitution, 1)):
+            raise EffectError(f"restitution must not be greater than 1, got {self.restitution}")
+        try:
+            crossed = not np.all(np.less(self.lower, self.upper))
+        except (TypeError, ValueError):  # by name, or of other numbers of joints: checked when the joints are known
+            return
+        if crossed:
+            raise EffectError(f"lower stops must lie below upper ones, got {self.lower} and {self.upper}")
+
+    def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
+        return 0 * v
+
+    def in_mode(self, mode: Mode) -> RigidStops:
+        return with_values(self, {"held": mode.held})
+
+    def at_rest(self, q: np.ndarray) -> Interval:
+        side = self.touched(q)
+        return Interval(np.where(side > 0, -inf, 0.0), np.where(side < 0, inf, 0.0))
+
+    def touched(self, q: np.ndarray) -> np.ndarray:
+        """−1 for each joint at its lower stop, to rounding, or beyond it, 1 at the upper one, 0 elsewhere, (n,)."""
+        lower, upper = self._levels(q)
+        return np.where(q <= lower + _near(lower), -1, np.where(q >= upper - _near(upper), 1, 0))
+
+    def beyond_by(self, q: np.ndarray) -> np.ndarray:
+        """How far each joint is beyond a stop, more than by rounding, (n,); 0 for the others."""
+        lower, upper = self._levels(q)
+        depth = np.maximum(lower - q, q - upper)
+        return np.where(depth > _near(np.where(q < lower, lower, upper)), depth, 0.0)
+
+    def snapped(self, q: np.ndarray) -> np.ndarray:
+        """The same position with each joint that touches a stop exactly there."""
+        lower, upper = self._levels(q)
+        side = self.touched(q)
+        return np.where(side < 0, lower, np.where(side > 0, upper, q))
+
+    def _levels(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return np.broadcast_to(self.lower, q.shape), np.broadcast_to(self.upper, q.shape)
+
+
+def _near(level: np.ndarray) -> np.ndarray:
+    return np.where(np.isfinite(level), _NEAR * np.maximum(1.0, np.abs(level)), 0.0)

@@ -1,0 +1,104 @@
+"""Effects that hold a joint: where it rests, their torque is any of an interval, that which keeps it there.
+
+    τ ∈ −F(v):   one value where v ≠ 0,   an interval where v = 0
+
+A run knows at each time which joints they hold, and in which direction the others slide: its mode. Within a mode the
+equation of motion is smooth; where a torque would leave its interval, or a velocity reaches 0, the mode changes.
+[Moreau 1988; Glocker, Set-Valued Force Laws, 2001]
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.convex import minimum
+from robot_dyn.effects.effect import Dissipative
+
+
+class Interval(NamedTuple):
+    """What an effect may exert on joints at rest, each (n,), in [N m] or [N]; (0, 0) where it does not act."""
+
+    least: np.ndarray
+    most: np.ndarray
+
+
+class Mode(NamedTuple):
+    """What is held, and which way the others slide, each (n,).
+
+    Attributes:
+        held: 1 for each joint that is held, 0 for the others.
+        direction: 1 or −1 for each joint that slides or is about to; 0 for those held, and those that nothing can hold.
+    """
+
+    held: np.ndarray
+    direction: np.ndarray
+
+
+class SetValued(Dissipative):
+    """An effect with a mode.
+
+    Attributes:
+        held: 1 for each joint that it holds and 0 for the others, (n,); None where no run has chosen a mode.
+    """
+
+    held: Any
+
+    @abstractmethod
+    def in_mode(self, mode: Mode) -> SetValued:
+        """The effect in a mode of the plant: smooth in q and v."""
+
+    def sliding(self, v: Array) -> Array:
+        """Its friction where joints slide, not negative, (..., n); 0 unless it says otherwise."""
+        return 0 * v
+
+    @abstractmethod
+    def at_rest(self, q: np.ndarray) -> Interval:
+        """What it may exert on joints whose velocity is 0, at q."""
+
+
+def settled(
+    effects: Sequence[SetValued],
+    M: np.ndarray,
+    load: np.ndarray,
+    q: np.ndarray,
+    v: np.ndarray,
+    forced: Mapping[int, int] | None = None,
+) -> tuple[np.ndarray, Mode]:
+    """The acceleration of least constraint, (n,), and the mode from there on; joints that stay at rest have exactly 0.
+
+    Where a joint breaks away whose friction of rest is above that of sliding, the others are solved again.
+
+    Args:
+        effects: What may hold joints.
+        M: Mass matrix, (n, n).
+        load: All other torques less C v and ∂V/∂q, with the friction of the joints that slide, (n,).
+        q: Position, (n,).
+        v: Velocity, (n,).
+        forced: The direction of joints at rest that are known to break away.
+    """
+    forced, zero = dict(forced or {}), np.zeros_like(v)
+    intervals = [each.at_rest(q) for each in effects]
+    least, most = (sum((each[k] for each in intervals), start=zero) for k in (0, 1))
+    rests = (v == 0) & ((least < 0) | (most > 0))
+    friction = np.where(rests, np.where(np.isfinite(most), most, -least), 0.0)
+    lower, upper = np.where(rests & (most == np.inf), 0.0, -np.inf), np.where(rests & (least == -np.inf), 0.0, np.inf)
+    slides = sum((each.sliding(zero) for each in effects), start=zero)
+    while True:
+        p, f = load.copy(), friction.copy()
+        for i, direction in forced.items():
+            p[i], f[i] = load[i] - slides[i] * direction, 0.0
+        a = minimum(M, p, f, lower, upper)
+        broken = [i for i in np.flatnonzero(rests & (a != 0) & (slides < friction)) if i not in forced]
+        if not broken:
+            break
+        forced |= {int(i): int(np.sign(a[i])) for i in broken}
+    held = rests & (a == 0)
+    direction = np.where(v != 0, np.sign(v), np.sign(a) * rests)
+    for i, way in forced.items():  # its load has just reached what held it: it may be 0 yet
+        held[i], direction[i] = False, way
+    return a, Mode(held.astype(float), direction)

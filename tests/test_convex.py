@@ -1,0 +1,73 @@
+"""The convex problem of dry friction and rigid stops: its optimality conditions, degenerate cases, another solver."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from robot_dyn.convex import minimum, residual
+
+SEEDS = [1, 20261127]
+
+
+def problem(rng: np.random.Generator, degenerate: bool) -> tuple[np.ndarray, ...]:
+    """M, p, f, lower, upper: condition numbers up to 1e6; degenerate ones are loaded exactly at their limits."""
+    n = int(rng.choice([1, 2, 3, 7, 12]))
+    U, _ = np.linalg.qr(rng.normal(size=(n, n)))
+    M = U @ np.diag(np.geomspace(1, 10 ** -rng.uniform(0, 6), n)) @ U.T
+    M = (M + M.T) / 2
+    f = rng.uniform(0, 2, n) * (rng.random(n) < 0.7)
+    ends = [rng.uniform(0, 2, n) * (rng.random(n) < 0.6) for _ in range(2)]
+    lower, upper = (np.where(rng.random(n) < 0.4, end, np.inf) for end in ends)
+    p = rng.normal(size=n) * 10 ** rng.uniform(-2, 1)
+    if degenerate:
+        x = np.clip(np.where(rng.random(n) < 0.5, 0.0, rng.normal(size=n)), -lower, upper)
+        p = M @ x + np.where(x != 0, f * np.sign(x), f * rng.choice([-1, 0, 0.5, 1], n))
+    return M, p, f, -lower, upper
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("degenerate", [False, True])
+def test_the_minimum_obeys_its_optimality_conditions(seed: int, degenerate: bool) -> None:
+    """P − M x ∈ f ∂|x| + N(x), to 1e-13 of the terms added: rounding of one Cholesky solution leaves 3e-15."""
+    rng = np.random.default_rng([seed, degenerate])
+    for _ in range(250):
+        given = problem(rng, degenerate)
+        assert residual(*given, minimum(*given)) <= 1e-13
+
+
+def test_no_other_point_has_less() -> None:
+    """½ xᵀM x − pᵀx + Σ f|x| grows in all directions that the bounds leave."""
+    rng = np.random.default_rng(3)
+    for _ in range(60):
+        M, p, f, lower, upper = given = problem(rng, False)
+        x = minimum(*given)
+
+        def cost(y: np.ndarray, M=M, p=p, f=f) -> float:
+            return float(y @ M @ y / 2 - p @ y + f @ np.abs(y))
+
+        others = np.clip(x + rng.normal(size=(40, len(x))) * 10 ** rng.uniform(-3, 1, (40, 1)), lower, upper)
+        assert min(map(cost, others)) >= cost(x) - 1e-13 * (1 + abs(cost(x)))
+
+
+def test_the_residual_sees_a_point_that_is_off() -> None:
+    rng = np.random.default_rng(4)
+    for _ in range(40):
+        given = problem(rng, False)
+        x = minimum(*given)
+        i = int(rng.integers(len(x)))
+        x[i] += 1e-3 if x[i] < given[4][i] - 1e-3 else -1e-3
+        assert residual(*given, x) > 1e-10
+
+
+def test_a_load_at_its_limit_leaves_exact_zeros() -> None:
+    """X = 0 for every p with |p| ≤ f, to the last float; beyond it is not."""
+    rng = np.random.default_rng(5)
+    for _ in range(100):
+        M, _, f, *_ = problem(rng, False)
+        n, free = len(f), np.full(len(f), np.inf)
+        p = f * rng.choice([-1.0, 1.0], n)
+        assert (minimum(M, p, f, -free, free) == 0).all()
+        if (f > 0).any():
+            p[np.argmax(f)] *= 1 + 1e-12
+            assert (minimum(M, p, f, -free, free) != 0).any()

@@ -1,0 +1,143 @@
+"""Dry friction that sticks: what holds does not move, what slides stops where and when closed forms say."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import robot_dyn as rd
+from tests.estimates.scenes import arms
+
+ENGINES = ["interpreted", "compiled"]
+RAIL = arms()["rail"]  # 1 kg on a vertical rail
+ARM = rd.load("planar_2r")
+TIGHT = rd.Adaptive(rtol=1e-12, atol=1e-12)
+OPTIONS = {"estimate_error": False, "integrator": TIGHT}
+
+
+def DRIVE(t, q, v):
+    """A push to and fro, about as large as friction."""
+    return np.array([4.0 * np.sin(3 * t), 1.6 * np.cos(5 * t)])
+
+
+def level(robot: rd.Robot, g: float = 0.0) -> rd.Robot:
+    """The rail in gravity −g along it."""
+    return robot.with_(gravity=(0, 0, -g))
+
+
+@pytest.mark.parametrize("part", [0.3, 0.97, 1.0, 1 + 1e-15])
+def test_a_load_within_friction_moves_nothing(part: float) -> None:
+    """A block on an incline for an hour: 0.0 to the last bit, also with the load exactly at the limit."""
+    g = 9.80665 * np.sin(np.radians(20))
+    run = rd.simulate(rd.Plant(level(RAIL, g), [rd.DryFriction(g / part)]), [0.25], duration_s=3600.0, **OPTIONS)
+    assert (run.q == 0.25).all()
+    assert (run.v == 0).all()
+    assert run.outcome.ending == "finished"
+
+
+def test_a_load_above_friction_moves_by_what_is_left() -> None:
+    """1e-9 above: q = −(g − f) t²/2, to the rounding of the load itself."""
+    run = rd.simulate(rd.Plant(level(RAIL, 5.0), [rd.DryFriction(5.0 * (1 - 1e-9))]), [0.0], duration_s=4.0, **OPTIONS)
+    assert run.q[-1, 0] == pytest.approx(-5e-9 * 8, rel=1e-6)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(("v0", "g"), [(1.7, 2.0), (-2.3, 2.0), (0.9, 0.0)])
+def test_a_sliding_block_stops_when_and_where_it_must(engine: str, v0: float, g: float) -> None:
+    """At t = |v₀| / (f ± g) and v₀² / 2 (f ± g), to 1e-12, and stays there: f > g."""
+    f = 3.0
+    run = rd.simulate(
+        rd.Plant(level(RAIL, g), [rd.DryFriction(f)]), [0.1], [v0], duration_s=3.0, engine=engine, **OPTIONS
+    )
+    slows = f + g * np.sign(v0)
+    (stop,) = run.events
+    assert stop.name.endswith("sticks")
+    assert stop.t == pytest.approx(abs(v0) / slows, rel=1e-12)
+    assert run.q[-1, 0] == pytest.approx(0.1 + v0 * abs(v0) / (2 * slows), rel=1e-12)
+    assert run.v[-1, 0] == 0.0
+    assert run.ledger.work["dry_friction"][-1] == pytest.approx(-f * abs(run.q[-1, 0] - 0.1), rel=1e-12)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_stick_slip_has_the_period_of_its_closed_form(engine: str) -> None:
+    """A spring k drawn at speed V, f_s of rest and f_k of sliding.
+
+    r = (f_s − f_k) / k,  T = 2 r / V + (2/ω) (π − atan(ω r / V)),  slips of V t_slip + 2 r; 1e-9 in all.
+    """
+    k, V, fs, fk = 9.0, 0.1, 1.4, 1.0
+    omega, r = np.sqrt(k), (fs - fk) / k
+    slip = 2 / omega * (np.pi - np.arctan(omega * r / V))
+    drawn = lambda t, q, v: k * (V * t - q)  # noqa: E731
+    plant = rd.Plant(level(RAIL), [rd.DryFriction(fk, fs)])
+    run = rd.simulate(plant, [0.0], duration_s=60.0, controller=drawn, engine=engine, **OPTIONS)
+    starts = np.array([each.t for each in run.events if each.name.endswith("slides")])
+    stops = np.array([each.t for each in run.events if each.name.endswith("sticks")])
+    places = np.array([each.q[0] for each in run.events if each.name.endswith("sticks")])
+    assert len(starts) > 10
+    assert starts[0] == pytest.approx(fs / (k * V), abs=1e-10)
+    assert np.diff(starts)[1:] == pytest.approx(2 * r / V + slip, abs=1e-9)
+    assert stops[1:] - starts[1 : len(stops)] == pytest.approx(slip, abs=1e-9)
+    assert np.diff(places)[1:] == pytest.approx(V * slip + 2 * r, abs=1e-9)
+
+
+def test_stribecks_curve_is_followed_while_sliding() -> None:
+    """V' = −f(v) of 1 kg against SciPy, from 2 m/s; friction of rest holds what sliding would not."""
+    from scipy.integrate import solve_ivp
+
+    fk, fs, vs = 1.0, 1.6, 0.5
+    plant = rd.Plant(level(RAIL), [rd.DryFriction(fk, fs, vs)])
+    run = rd.simulate(plant, [0.0], [2.0], duration_s=3.0, record_period_s=0.1, **OPTIONS)
+    stops = lambda t, y: y[1]  # noqa: E731
+    stops.terminal = True
+    of = solve_ivp(
+        lambda t, y: [y[1], -(fk + (fs - fk) * np.exp(-((y[1] / vs) ** 2)))], (0, 3), [0.0, 2.0], "DOP853",
+        rtol=1e-13, atol=1e-13, events=stops,
+    )  # fmt: skip
+    assert run.events[0].t == pytest.approx(of.t_events[0][0], rel=1e-11)
+    assert run.q[-1, 0] == pytest.approx(of.y[0, -1], rel=1e-11)
+
+
+def test_an_arm_obeys_the_law_of_friction_at_every_sample() -> None:
+    """Where a joint slides M a + C v + N = u − f sign(v); where it rests the torque that is missing is at most f."""
+    f = np.array([3.0, 1.0])
+    run = rd.simulate(rd.Plant(ARM, [rd.DryFriction(f)]), [-1.4, 0.2], duration_s=4.0, controller=DRIVE, **OPTIONS)
+    missing = ARM.inverse_dynamics(run.q, run.v, run.a) - run.u
+    events = np.array([each.t for each in run.events])
+    apart = np.abs(run.t[:, None] - events).min(axis=1) > 1e-9
+    rests = (run.v == 0) & apart[:, None]
+    slides = (run.v != 0) & apart[:, None]
+    assert rests.any()
+    assert (np.abs(missing) <= f + 1e-9)[rests].all()
+    assert np.abs(missing + f * np.sign(run.v))[slides].max() <= 1e-9
+    ledger = run.ledger
+    energy = ledger.kinetic + ledger.potential - sum(ledger.work.values())
+    assert np.abs(energy - energy[0]).max() <= 1e-9
+
+
+def test_both_engines_switch_alike() -> None:
+    """The same events in the same order; times to 1e-10, since roundings differ."""
+    plant = rd.Plant(ARM, [rd.DryFriction([3.0, 1.0], [3.5, 1.0])])
+    runs = [
+        rd.simulate(plant, [-1.4, 0.2], duration_s=3.0, controller=DRIVE, engine=engine, **OPTIONS)
+        for engine in ENGINES
+    ]
+    names = [[each.name for each in run.events] for run in runs]
+    assert names[0] == names[1]
+    assert len(names[0]) > 5
+    for one, other in zip(*(run.events for run in runs), strict=True):
+        assert abs(one.t - other.t) < 1e-10
+
+
+@pytest.mark.parametrize(("method", "order"), [("rk4", 4), ("midpoint", 2), ("order_8", 8)])
+def test_fixed_steps_keep_their_order_across_sticking(method: str, order: int) -> None:
+    """Mean slope over three halvings, against DOP853 at 1e-12; within 1 of the order of the method."""
+    plant = rd.Plant(ARM, [rd.DryFriction([3.0, 1.0])])
+    options = {"duration_s": 2.0, "controller": DRIVE, "estimate_error": False, "record_period_s": 2.0}
+    exact = rd.simulate(plant, [-1.4, 0.2], integrator=TIGHT, **options).q[-1]
+    steps = [0.05 / 2**k for k in range(4)] if method != "order_8" else [0.1 / 2**k for k in range(3)]
+    errors = [
+        np.abs(rd.simulate(plant, [-1.4, 0.2], integrator=method, step_s=h, **options).q[-1] - exact).max()
+        for h in steps
+    ]
+    slope = np.log2(errors[0] / errors[-1]) / (len(steps) - 1)
+    assert slope > order - 1

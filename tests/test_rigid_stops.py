@@ -1,0 +1,146 @@
+"""Rigid stops: never passed, struck by Newton's law, and at rest against them what closed forms say."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import robot_dyn as rd
+from robot_dyn.errors import EffectError, QueryError
+from tests.estimates.scenes import arms
+
+ENGINES = ["interpreted", "compiled"]
+G = 9.80665
+RAIL = arms()["rail"]  # 1 kg on a vertical rail
+ARM = rd.load("planar_2r")
+TIGHT = rd.Adaptive(rtol=1e-12, atol=1e-12)
+OPTIONS = {"estimate_error": False, "integrator": TIGHT}
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(("e", "most"), [(0.5, 100), (0.9, 500)])
+def test_a_bouncing_joint_comes_to_rest_when_and_where_it_must(engine: str, e: float, most: int) -> None:
+    """From height h: at T = √(2h/g) (1 + e) / (1 − e), to 1e-9, exactly at the stop; the energy it had is lost."""
+    h = 0.8
+    plant = rd.Plant(RAIL, [rd.RigidStops(0.0, np.inf, e)])
+    T = np.sqrt(2 * h / G) * (1 + e) / (1 - e)
+    run = rd.simulate(plant, [h], duration_s=T + 0.5, engine=engine, **OPTIONS)
+    (rest,) = [each for each in run.events if "rest" in each.name]
+    assert rest.t == pytest.approx(T, abs=1e-9)
+    assert run.q[-1, 0] == 0.0
+    assert run.v[-1, 0] == 0.0
+    assert (run.q >= 0).all()
+    assert run.statistics.steps <= most
+    assert run.ledger.work["rigid_stops"][-1] == pytest.approx(-G * h, rel=1e-11)
+
+
+def test_without_loss_energy_stays_over_a_thousand_impacts() -> None:
+    """E = 1, prismatic: 1e-12 of the energy, to rounding of some ten thousand stages."""
+    h = 0.3
+    T = 1000 * 2 * np.sqrt(2 * h / G)
+    plant = rd.Plant(RAIL, [rd.RigidStops(0.0, np.inf, 1.0)])
+    run = rd.simulate(plant, [h], duration_s=T, record_period_s=T / 200, engine="compiled", **OPTIONS)
+    energy = run.ledger.kinetic + run.ledger.potential
+    assert len(run.events) in (999, 1000, 1001)
+    assert np.abs(energy / energy[0] - 1).max() <= 1e-12
+
+
+def test_an_impact_obeys_newtons_law_and_the_momentum_of_the_others_stays() -> None:
+    """v⁺ = −e v⁻ at the joint that strikes; M (v⁺ − v⁻) has no entry at the other one; ΔK as booked."""
+    e = 0.6
+    plant = rd.Plant(ARM.with_(gravity=(0, 0, 0)), [rd.RigidStops([-9.0, -9.0], [0.7, 9.0], e)])
+    q0, v0 = np.array([0.2, 0.5]), np.array([1.3, -0.8])
+    run = rd.simulate(plant, q0, v0, duration_s=0.6, **OPTIONS)
+    struck = run.events[0]
+    free = rd.simulate(plant.dynamics, q0, v0, duration_s=struck.t, record_period_s=struck.t, **OPTIONS)
+    before, after, M = free.v[-1], np.array(struck.v), ARM.M(np.array(struck.q))
+    assert struck.q[0] == 0.7
+    assert after[0] == pytest.approx(-e * before[0], rel=1e-10)
+    assert abs((M @ (after - before))[1]) <= 1e-9
+    lost = (after @ M @ after - before @ M @ before) / 2
+    assert run.ledger.work["rigid_stops"][-1] == pytest.approx(lost, rel=1e-9)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_joint_rests_at_its_stop_under_load_and_leaves_it_when_pulled(engine: str) -> None:
+    """1 kg at rest on a stop; a pull 4 t lifts it at t = g/4, and then q = ∫∫ (4 t − g)."""
+    plant = rd.Plant(RAIL, [rd.RigidStops(0.0, 5.0)])
+    run = rd.simulate(
+        plant, [0.0], duration_s=3.0, controller=lambda t, q, v: np.array([4.0 * t]), engine=engine, **OPTIONS
+    )
+    (leaves,) = run.events
+    assert leaves.name.endswith("leaves its lower stop")
+    assert leaves.t == pytest.approx(G / 4, rel=1e-12)
+    assert run.q[-1, 0] == pytest.approx(4 * (3 - G / 4) ** 3 / 6, rel=1e-11)
+
+
+def test_stops_are_never_passed_and_the_ledger_closes() -> None:
+    """Twenty random runs of two joints between stops, with friction, some starting at a stop: every one ends."""
+    rng = np.random.default_rng(20261128)
+    for k in range(20):
+        lower, upper = -rng.uniform(0.3, 1.2, 2), rng.uniform(0.3, 1.2, 2)
+        stops = rd.RigidStops(lower, upper, rng.uniform(0, 1, 2))
+        level = rng.uniform(0, 4, 2)
+        plant = rd.Plant(ARM, [rd.DryFriction(level, level * rng.uniform(1, 1.5)), rd.ViscousFriction(0.1), stops])
+        q0 = rng.uniform(lower, upper)
+        q0[0] = upper[0] if k % 3 == 0 else q0[0]
+        run = rd.simulate(plant, q0, rng.normal(size=2), duration_s=1.5, engine="compiled", estimate_error=False,
+                          integrator=rd.Adaptive(rtol=1e-10, atol=1e-10))  # fmt: skip
+        assert run.outcome.ending == "finished", (k, run.outcome)
+        assert (run.q >= lower).all(), k
+        assert (run.q <= upper).all(), k
+        ledger = run.ledger
+        energy = ledger.kinetic + ledger.potential - sum(ledger.work.values())
+        assert np.abs(energy - energy[0]).max() <= 1e-7, k
+        steps = np.diff([each.t for each in run.events])
+        assert (np.diff(ledger.work["rigid_stops"]) <= 1e-12).all(), k  # no impact adds energy
+        assert (steps >= 0).all()
+
+
+def test_joints_that_strike_together_are_solved_together() -> None:
+    """Both at once, v⁺ = −e v⁻ for each; with different restitution no energy is made."""
+    stops = rd.RigidStops([-9.0, -9.0], [0.5, 0.5], [0.2, 0.9])
+    plant = rd.Plant(ARM.with_(gravity=(0, 0, 0)), [stops])
+    run = rd.simulate(plant, [0.5, 0.5], [1.0, 2.0], duration_s=0.01, **OPTIONS)
+    assert [each.t for each in run.events] == [0.0, 0.0]
+    assert run.events[0].v == pytest.approx((-0.2, -1.8), rel=1e-13)
+    assert run.ledger.work["rigid_stops"][-1] < 0
+
+
+def test_a_start_beyond_a_stop_is_refused_by_name() -> None:
+    plant = rd.Plant(ARM, [rd.RigidStops([-1.0, -1.0], [1.0, 1.0])])
+    with pytest.raises(QueryError, match=r"q0: 'joint_2' is 0\.2 beyond its upper stop"):
+        rd.simulate(plant, [0.3, 1.2])
+
+
+@pytest.mark.parametrize(("method", "why"), [("gauss_4", "momenta"), ("explicit_euler", "order 1")])
+def test_methods_whose_steps_cannot_end_there_are_refused(method: str, why: str) -> None:
+    with pytest.raises(QueryError, match=f"dry_friction: .* {why}.*DOP853"):
+        rd.simulate(rd.Plant(ARM, [rd.DryFriction(1.0)]), [0.3, 0.2], integrator=method)
+    with pytest.raises(QueryError, match="rollouts: dry_friction .*DOP853"):
+        rd.rollouts(rd.Plant(ARM, [rd.DryFriction(1.0)]), [0.3, 0.2], integrator="rk4")
+
+
+def test_rollouts_are_the_runs_of_simulate() -> None:
+    """To the last bit, by DOP853, friction swept."""
+    plant = rd.Plant(ARM, [rd.DryFriction([3.0, 1.0]), rd.RigidStops([-1.5, -2.0], [1.0, 2.0], 0.5)])
+    setup = rd.Setup(plant, [0.3, 0.4], duration_s=1.0, record_period_s=0.1, engine="compiled", integrator="DOP853",
+                     estimate_error=False)  # fmt: skip
+    levels = np.array([[3.0, 1.0], [0.5, 2.0]])
+    runs = rd.rollouts(setup, params={"dry_friction.level": levels})
+    for i, level in enumerate(levels):
+        one = rd.simulate(rd.Plant(ARM, [rd.DryFriction(level), plant.effects[1]]), [0.3, 0.4], duration_s=1.0,
+                          record_period_s=0.1, engine="compiled", integrator="DOP853", estimate_error=False)  # fmt: skip
+        assert runs.q is not None
+        assert (runs.q[i] == one.q).all()
+
+
+def test_what_makes_no_sense_is_refused() -> None:
+    with pytest.raises(EffectError, match="restitution must not be greater than 1"):
+        rd.RigidStops(-1.0, 1.0, 1.5)
+    with pytest.raises(EffectError, match="must lie below"):
+        rd.RigidStops(1.0, -1.0)
+    with pytest.raises(EffectError, match="static must not be less"):
+        rd.DryFriction(2.0, 1.0)
+    with pytest.raises(EffectError, match="no effect without static"):
+        rd.DryFriction(2.0, stribeck_velocity=0.1)
