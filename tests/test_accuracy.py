@@ -43,6 +43,15 @@ def test_a_tolerance_is_not_the_error() -> None:
     assert f"accuracy: asked 1.0e-10, estimated {of[1e-10].estimated:.1e} at rtol" in runs[1e-10].summary
 
 
+@pytest.mark.parametrize("index", [1, 36])
+def test_a_trial_step_that_goes_too_far_does_not_end_a_run(index: int) -> None:
+    """Interpreted, into stiff stops at a loose tolerance: stages that overflow are those of steps that are refused."""
+    scene, asked = asked_scene(20261126, index)
+    run = rd.simulate(replace(scene.setup, engine="interpreted"), accuracy=asked)
+    assert run.outcome.ending == "finished"
+    assert run.accuracy is not None
+
+
 def test_stiff_and_sampled_runs_are_made_by_their_methods() -> None:
     stiff = rd.simulate(rd.Plant(ARM, [rd.ViscousFriction(1e5)]), START, duration_s=1.0, accuracy=1e-6)
     assert stiff.statistics.method == "Rosenbrock"

@@ -58,6 +58,8 @@ FORMULAS = {
     rd.RegularisedCoulombFriction(F, V_S): lambda t, q, v: (
         -F * (np.exp(v / V_S) - np.exp(-v / V_S)) / (np.exp(v / V_S) + np.exp(-v / V_S))
     ),
+    rd.DryFriction(F): lambda t, q, v: -F * np.sign(v),
+    rd.DryFriction(F, 2 * F, V_S): lambda t, q, v: -F * (1 + np.exp(-((v / V_S) ** 2))) * np.sign(v),
     rd.Spring(K, Q0): lambda t, q, v: K * (Q0 - q),
     rd.JointStopSpring(LOWER, UPPER, K): lambda t, q, v: K * (depth(q)[0] - depth(q)[1]),
     rd.JointStopDamper(LOWER, UPPER, B): lambda t, q, v: -B * (depth(q)[0] + depth(q)[1]) * v,

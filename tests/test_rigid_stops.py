@@ -117,7 +117,7 @@ def test_a_start_beyond_a_stop_is_refused_by_name() -> None:
 def test_methods_whose_steps_cannot_end_there_are_refused(method: str, why: str) -> None:
     with pytest.raises(QueryError, match=f"dry_friction: .* {why}.*DOP853"):
         rd.simulate(rd.Plant(ARM, [rd.DryFriction(1.0)]), [0.3, 0.2], integrator=method)
-    with pytest.raises(QueryError, match="rollouts: dry_friction .*DOP853"):
+    with pytest.raises(QueryError, match=r"rollouts: dry_friction .*DOP853"):
         rd.rollouts(rd.Plant(ARM, [rd.DryFriction(1.0)]), [0.3, 0.2], integrator="rk4")
 
 
@@ -129,8 +129,7 @@ def test_rollouts_are_the_runs_of_simulate() -> None:
     levels = np.array([[3.0, 1.0], [0.5, 2.0]])
     runs = rd.rollouts(setup, params={"dry_friction.level": levels})
     for i, level in enumerate(levels):
-        one = rd.simulate(rd.Plant(ARM, [rd.DryFriction(level), plant.effects[1]]), [0.3, 0.4], duration_s=1.0,
-                          record_period_s=0.1, engine="compiled", integrator="DOP853", estimate_error=False)  # fmt: skip
+        one = rd.simulate(setup, plant=rd.Plant(ARM, [rd.DryFriction(level), plant.effects[1]]))
         assert runs.q is not None
         assert (runs.q[i] == one.q).all()
 

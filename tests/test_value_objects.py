@@ -40,6 +40,7 @@ def values() -> dict[str, Any]:
         rd.OperationalSpace(ARM, "tip", LINE, 1.0, 1.0, posture=Q, rows=(0, 2)), rd.EffortLimit([1.0, 2.0]),
         rd.ExternalWrench("tip", np.ones(6)), spring, damper, rd.RegularisedCoulombFriction([0.1, 0.2]), strut,
         *strut.parts, rd.Spring([1.0, 2.0]), rd.ViscousFriction([1.0, 2.0]), PLAN,
+        rd.DryFriction([1.0, 2.0], 2.0, 0.1), rd.RigidStops(-1.0, [1.0, 2.0], 0.5),
         rd.ActuatorLag([0.1, 0.2]), rd.LuGreFriction(9.0, 1.0, 1.0, [1.0, 2.0], 2.0, 0.1),
         rd.Samples([0.0, 1.0, 2.0], np.ones((3, 2))), LINE,
         setup, run, runs, run.ledger, run.error, run.statistics, run.outcome, ARM.couplings, ARM.edits,
@@ -121,6 +122,8 @@ def test_values_keep_copies_of_what_they_are_given() -> None:
         (rd.Spring(x, x), ("stiffness", "rest")),
         (rd.joint_stops(-x, x, x)[0], ("upper", "stiffness")),
         (rd.EffortLimit(x), ("limit",)),
+        (rd.DryFriction(x, x, x), ("level", "static", "stribeck_velocity")),
+        (rd.RigidStops(-x, x, x), ("upper", "restitution")),
         (rd.ExternalWrench("tip", six), ("wrench",)),
         (
             rd.LineSpringDamper("tip", None, three, three, stiffness=1.0, damping=1.0, length=1.0),

@@ -40,7 +40,7 @@ RESULTS = {
 # What time loops and traces call, with numbers that were checked before, or symbols.
 INTERFACES = (Effect, Controller, Arithmetic)
 FOR_LOOPS = {name for kind in (Force, Conservative, Bound, Stateful, Controller, Arithmetic) for name in dir(kind)}
-FOR_LOOPS |= {"task_acceleration"}
+FOR_LOOPS |= {"task_acceleration", "in_mode", "at_rest", "sliding", "touched", "snapped", "beyond_by"}
 LAX = {  # arguments that may be infinite or unknown, or of any shape
     "ExternalWrench.acts": {"t"},
     "Adaptive": {"max_step_s"}, "Adaptive.with_tolerances": {"longest_s"},
@@ -49,7 +49,7 @@ LAX = {  # arguments that may be infinite or unknown, or of any shape
     "PiecewisePolynomial.at": {"t"}, "Samples.at": {"t"},
     "Rollouts.outcome": {"run"}, "Robot.with_": {"lock", "armature"},
     "midpoint": {"x"}, "radius": {"x"}, "coefficient": {"elsewhere"},
-    "joint_stops": {"lower", "upper"}, "plot": {"limits"},
+    "joint_stops": {"lower", "upper"}, "RigidStops": {"lower", "upper"}, "plot": {"limits"},
 }  # fmt: skip
 SIGNED = {"Adaptive": ("rtol", "atol", "max_step_s"), "Payload": ("mass",), "Setup": ("duration_s", "step_s")}
 
@@ -120,6 +120,7 @@ def examples(folder: Path) -> dict[str, Example]:
         "Compiled": (rd.Compiled, {"robot_or_plant": robot, "dtype": "float64", "threads": 1, "cache": False}),
         "ComputedTorque": (rd.ComputedTorque, pair),
         "ActuatorLag": (rd.ActuatorLag, {"time_constant": [0.1, 0.2]}),
+        "DryFriction": (rd.DryFriction, {"level": [1.0, 2.0], "static": [1.5, 2.0], "stribeck_velocity": 0.1}),
         "EffortLimit": (rd.EffortLimit, {"limit": [1.0, 2.0]}),
         "Event": (rd.Event, {"function": lambda t, q, v: 1.0, "direction": 1, "terminal": True, "name": "high"}),
         "ExternalWrench": (
@@ -219,6 +220,7 @@ def examples(folder: Path) -> dict[str, Example]:
                 "breakaway": [1.5, 1.2], "stribeck_velocity": 0.1,
             },
         ),
+        "RigidStops": (rd.RigidStops, stops | {"restitution": 0.5}),
         "LineDamper": (rd.LineDamper, strut | {"damping": 0.1}),
         "LineSpring": (rd.LineSpring, strut | {"stiffness": 10.0, "length": 0.2}),
         "LineSpringDamper": (rd.LineSpringDamper, strut | {"stiffness": 10.0, "damping": 0.1, "length": 0.2}),

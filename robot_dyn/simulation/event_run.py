@@ -14,7 +14,7 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.errors import OverflowedError, RobotDynError
+from robot_dyn.errors import NotFiniteError, OverflowedError, RobotDynError
 from robot_dyn.foreign import is_mistake
 from robot_dyn.integrate import hermite
 from robot_dyn.integrate.adaptive import STEPPERS
@@ -131,6 +131,7 @@ class EventRun(Followed):
         self.switches = self.switching.at(0.0, self.start, len(of.work.F), events, own[:n, 0] if held else None)
         self.events: list[Occurrence] = []
         self.beyond = inf
+        self.met: RobotDynError | None = None
         self._change_mode()
         self.now, self.stop = np.zeros(len(Now), np.int64), np.zeros(1, np.int64)
 
@@ -227,6 +228,8 @@ class EventRun(Followed):
             self.watch.look(t, y)
         elif ended is Ended.TOO_SMALL and not self.setup.integrator.controls_error:
             self._step_in_words()
+        elif self.met is not None and ended in (Ended.TOO_SMALL, Ended.NOT_FINITE):
+            raise DivergedError(t, f"{self.met}, at t = {t}")
         elif ended is Ended.TOO_SMALL:
             raise DivergedError(t, f"the step became smaller than the spacing of floats {where}")
         elif ended is Ended.NOT_FINITE:
@@ -249,7 +252,19 @@ class EventRun(Followed):
             self.functions, parameters = self.made(self.switching.on(self.switches.sides))
             self.runs.own[self.rules.held :, 0] = parameters
         if not self.compiled:
-            self.functions = _ready(self.functions)
+            self.functions = self._lenient(self.functions)
+
+    def _lenient(self, functions: Functions) -> Functions:
+        """The functions in Python, with a rate that is nan where a trial step goes too far: a shorter one is tried."""
+
+        def rate(t: float, y: Array, p: Array, own: Array, out: Array) -> None:
+            try:
+                functions.rate(t, y, p, own, out)
+            except (OverflowedError, NotFiniteError) as error:
+                self.met, out[...] = error, np.nan
+
+        made: Any = functions._replace(rate=rate)
+        return made
 
     def _chatters(self) -> bool:
         """Whether the latest events were all of one threshold, in next to no time."""
@@ -344,16 +359,3 @@ def _times(setup: Setup, mesh: np.ndarray | None, samples: bool) -> Times:
         np.zeros(1), period if samples else inf, compared, samples and every, samples and every and not chosen,
         setup.duration_s, np.zeros(0) if mesh is None else mesh,
     )  # fmt: skip
-
-
-def _ready(functions: Functions) -> Functions:
-    """The functions in Python, with a rate that is nan where a trial step goes too far: a shorter one is tried."""
-
-    def rate(t: float, y: Array, p: Array, own: Array, out: Array) -> None:
-        try:
-            functions.rate(t, y, p, own, out)
-        except OverflowedError:
-            out[...] = np.nan
-
-    made: Any = functions._replace(rate=rate)
-    return made
