@@ -162,7 +162,7 @@ class Modes:
                 i, f"{'comes to rest at' if i in last else 'strikes'} its {_STOP[int(side[i])]}",
                 t + (float(left[i]) if i in last else 0.0), y, int(side[i]),
             )
-            for i in strike
+            for i in strike.tolist()
         ]  # fmt: skip
 
     def _work(self, stops: RigidStops) -> int:
