@@ -87,6 +87,8 @@ EFFECTS = {
     "external_wrench": 'frame = "tip"\nforce_N = [1.0, 0.0, 0.0]',
     "effort_limit": "limit_N_m = 3.0",
     "actuator_lag": "time_constant_s = {joint_1 = 0.02, joint_2 = 0.05}",
+    "dry_friction": "level_N_m = {joint_1 = 0.4, joint_2 = 0.2}\nstatic_N_m = 0.6",
+    "rigid_stops": "lower_rad = -1.0\nupper_rad = {joint_1 = 1.0}\nrestitution = 0.3",
     "lugre_friction": (
         "bristle_stiffness_N_m_per_rad = 300.0\nbristle_damping_N_m_s_per_rad = 1.0\nviscous_N_m_s_per_rad = 0.4\n"
         "coulomb_N_m = {joint_1 = 0.7}\nbreakaway_N_m = [1.1, 1.2]\nstribeck_velocity_rad_per_s = 0.1"
