@@ -85,7 +85,7 @@ def every_effect(base: type) -> set[type]:
 
 
 def test_no_effect_escapes_the_contract() -> None:
-    """Those with states are held to theirs in test_effect_states, rigid stops, which act at once, in test_rigid_stops."""
+    """Those with states are held to theirs in test_effect_states; rigid stops in test_rigid_stops."""
     assert {type(effect) for effect in EFFECTS} == {
         each for each in every_effect(Force) if not issubclass(each, rd.Stateful | rd.RigidStops)
     }

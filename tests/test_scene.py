@@ -122,6 +122,8 @@ def test_effect_of_a_scene_is_that_of_python(write, kind: str) -> None:
         "effort_limit": lambda: rd.Plant(robot, [rd.EffortLimit(3.0)]),
         "actuator_lag": lambda: rd.Plant(robot, [rd.ActuatorLag([0.02, 0.05])]),
         "lugre_friction": lambda: rd.Plant(robot, [rd.LuGreFriction(300.0, 1.0, 0.4, [0.7, 1.0], [1.1, 1.2], 0.1)]),
+        "dry_friction": lambda: rd.Plant(robot, [rd.DryFriction([0.4, 0.2], 0.6)]),
+        "rigid_stops": lambda: rd.Plant(robot, [rd.RigidStops(-1.0, [1.0, np.inf], 0.3)]),
         "payload": lambda: rd.Plant(robot.with_(payload=rd.Payload("tip", 0.5))),
         "armature": lambda: rd.Plant(robot.with_(armature=0.1)),
         "lock": lambda: rd.Plant(robot.with_(lock={"joint_1": 0.2})),
