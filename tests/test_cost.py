@@ -152,6 +152,15 @@ def test_what_cannot_be_done_is_said_with_the_reason() -> None:
         odd.of("wind")
 
 
+def test_long_programs_are_counted_and_not_timed(monkeypatch) -> None:
+    monkeypatch.setattr("robot_dyn.accuracy.query_cost._MOST_TIMED", 30)
+    found = rd.cost(setup(), budget_s=20.0, repeats=1)
+    row = found.of("forward dynamics")
+    assert row.first.instructions > 30 and row.first.time_s is None
+    why = f"time of forward dynamics, M, Cholesky: {row.first.instructions} instructions, more than 30, take long"
+    assert any(each.startswith(why) for each in found.left_out)
+
+
 def test_the_page_has_the_counts_of_today(tmp_path) -> None:
     """Those of the parts; `python scripts/cost.py` makes its table and figure."""
     scene = tmp_path / "scene.toml"

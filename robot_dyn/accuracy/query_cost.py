@@ -18,7 +18,6 @@ import numpy as np
 from robot_dyn.accuracy.alternative import Pair, Way
 from robot_dyn.accuracy.timing import seconds
 from robot_dyn.compiled.cache import default_store
-from robot_dyn.compiled.engine import LARGEST_KERNEL
 from robot_dyn.compiled.from_casadi import program_of
 from robot_dyn.compiled.kernel import Kernel
 from robot_dyn.compiled.program import Program
@@ -31,6 +30,7 @@ from robot_dyn.model.robot import Robot
 STATES = 1024  # side by side
 PER_STATE = f"state, {STATES} side by side"
 _LEAST_S = 2e-3  # of a loop that is timed
+_MOST_TIMED = 30_000  # instructions, some seconds of compiling; longer programs are counted alone
 _FORWARD, _DERIVATIVES = "forward_dynamics", "forward_dynamics_derivatives"
 
 
@@ -130,8 +130,8 @@ class QueryCost:
         y = np.empty((STATES, len(program.outputs)), dtype)
 
         def run() -> float:
-            if len(program) > LARGEST_KERNEL:
-                raise RobotDynError(f"{len(program)} instructions, more than the {LARGEST_KERNEL} worth compiling")
+            if len(program) > _MOST_TIMED:
+                raise RobotDynError(f"{len(program)} instructions, more than {_MOST_TIMED}, take long to compile")
             if kernel.many(inputs, y) is not Status.FINE:
                 raise RobotDynError("its results at random states are doubtful")
             return seconds(lambda: kernel.many(inputs, y), _LEAST_S, process_time) / STATES
