@@ -48,7 +48,7 @@ def of_robots(documents: dict[str, Document]) -> None:
         found = [digits(made, FORWARD, road) for road in ROADS]
         cells = ["—" if each is None else f"{each[0]:.1f} → {each[1]:.1f}" for each in found]
         of, decimals = made["condition"], made["decimals"].get(FORWARD)
-        kappa = [f"{of[key]:.2g}" if of[key] and of[key] < 1e15 else "∞" for key in ("typical", "searched")]
+        kappa = [f"{of[key]:.3g}" if of[key] and of[key] < 1e15 else "∞" for key in ("typical", "searched")]
         print(f"| {name} | {len(made['joints'])} | {' | '.join(kappa)} | {' | '.join(cells)} | "
               f"{'—' if decimals is None else f'{decimals:.1f}'} |")  # fmt: skip
 

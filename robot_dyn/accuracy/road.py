@@ -73,9 +73,9 @@ class Road:
 
 
 def asked(engine: Any, quantity: Quantity, states: dict[str, np.ndarray]) -> np.ndarray:
-    """Answers at states (S, n), some at a time; NaN where there is none."""
+    """Answers at states (S, n), some at a time, eight of machine code side by side; NaN where there is none."""
     rows = [states[name] for name in quantity.arguments]
-    parts = [slice(k, k + 500) for k in range(0, len(rows[0]), 500)]
+    parts = [slice(k, k + 512) for k in range(0, len(rows[0]), 512)]
     answer = getattr(engine, quantity.name)
     return np.concatenate([answer(*(x[part] for x in rows), errors="nan") for part in parts])
 
