@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
+from robot_dyn.effects.set_valued import settled
 from tests.estimates.scenes import arms
 
 ENGINES = ["interpreted", "compiled"]
@@ -126,6 +127,25 @@ def test_both_engines_switch_alike() -> None:
     assert len(names[0]) > 5
     for one, other in zip(*(run.events for run in runs), strict=True):
         assert abs(one.t - other.t) < 1e-10
+
+
+def test_joints_that_break_away_together_move_the_way_they_were_let_go() -> None:
+    """Coupled joints loaded at f_s, some beyond, f_k < f_s: |λ| ≤ f_s of those held, a along the slip of the others."""
+    rng, panda = np.random.default_rng(5), rd.load("panda")
+    arms = ARM, panda.with_(lock=dict.fromkeys(panda.joint_names[7:], 0.0))
+    for k in range(300):
+        arm = arms[k % 2]
+        n, q = arm.n, rng.uniform(-1, 1, arm.n)
+        M, fk = arm.M(q), rng.uniform(0.1, 3, n)
+        fs = fk * rng.uniform(1, 1.8, n)
+        load = fs * rng.choice([-1, 1], n) * rng.choice([0.5, 1, 1, 1.001, 1.3], n)
+        i = int(rng.integers(n))
+        forced = {i: int(np.sign(load[i]))} if k % 3 == 0 and abs(load[i]) >= fs[i] else {}
+        _, mode = settled([rd.DryFriction(fk, fs)], M, load, q, np.zeros(n), forced)
+        free = 1 - mode.held
+        a = np.linalg.solve(M * np.outer(free, free) + np.diag(mode.held), free * (load - fk * mode.direction))
+        assert (np.abs(load - M @ a)[mode.held > 0] <= (1 + 1e-9) * fs[mode.held > 0]).all(), k
+        assert (a * mode.direction >= -1e-9 * np.abs(a).max()).all(), k
 
 
 @pytest.mark.parametrize(("method", "order"), [("rk4", 4), ("midpoint", 2), ("order_8", 8)])

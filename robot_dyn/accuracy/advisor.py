@@ -121,7 +121,7 @@ def advise(what: Setup | Plant | Dynamics, q0: Any = None, v0: Any = None, **opt
     setup = setup_of("advise", what, {**starts(q0, v0), **options})
     plant, controller, duration = setup.plant, setup.controller, setup.duration_s
     period = 0.0 if controller is None else controller.period_s
-    loop = StateEquation(plant, None if controller is None else with_values(controller, {"period_s": 0.0}))
+    loop = StateEquation(plant, None if controller is None else with_values(controller, {"period_s": 0.0})).in_a_mode
     states = _along(setup, loop)
     motion, at, states = _fastest(loop, states)
     matrices = [_between_ticks(plant, loop, t, y) if period else jacobian(loop, t, y, None) for t, y in states]
@@ -161,7 +161,7 @@ def _own(equation: StateEquation, y: Array) -> Array:
 
 def _between_ticks(plant: Plant, loop: StateEquation, t: float, y: Array) -> Array:
     """J where the actuation is held."""
-    free, n, z = StateEquation(plant, None), plant.dynamics.n, loop.state_size
+    free, n, z = StateEquation(plant, None).in_a_mode, plant.dynamics.n, loop.state_size
     bodies = np.concatenate([y[: 2 * n], _own(loop, y)[2 * n + z :], np.zeros(len(free.sources))])
     return jacobian(free, t, bodies, np.zeros(n))
 

@@ -14,7 +14,7 @@ import numpy as np
 from robot_dyn.accuracy.budget import Budget, Limit, OvertimeError
 from robot_dyn.accuracy.candidate import Run, common, recorded, step_ladder, timed, warmed
 from robot_dyn.accuracy.ladder import COMPILED, INTERPRETED
-from robot_dyn.errors import RobotDynError
+from robot_dyn.errors import QueryError, RobotDynError
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.integrate.methods import method
 from robot_dyn.simulation.setup import Setup
@@ -142,6 +142,10 @@ def _second(setup: Setup, t: np.ndarray, q: np.ndarray, budget: Budget) -> tuple
     """Words for the other run, times, its distance from q there, and whether shorter steps win nothing more."""
     best: tuple[str, np.ndarray, np.ndarray, bool] | None = None
     for name in _SECOND:
+        try:
+            replace(setup, integrator=method(name))
+        except QueryError:  # it cannot end its steps where joints are held, say
+            continue
         for best in _refined(setup, name, t, q, budget):
             if best[-1]:
                 return best

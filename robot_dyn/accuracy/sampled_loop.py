@@ -36,7 +36,7 @@ def longest_period(plant: Plant, controller: Controller, t: float, y: Array, dur
     """
     from scipy.linalg import expm
 
-    n, size, free = plant.dynamics.n, controller.state_size, StateEquation(plant, None)
+    n, size, free = plant.dynamics.n, controller.state_size, StateEquation(plant, None).in_a_mode
     law = y[: 2 * n + size]
     x = np.concatenate([y[: 2 * n], y[2 * n + size :], np.zeros(len(free.sources))])
     u = _law(controller, controller.torque, t, n)(t, law)

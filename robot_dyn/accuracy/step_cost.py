@@ -145,7 +145,7 @@ def _alone(short: Setup, made: Machine) -> Way:
 
 
 def _equation(setup: Setup) -> StateEquation:
-    return StateEquation(setup.plant, setup.controller)
+    return StateEquation(setup.plant, setup.controller).in_a_mode
 
 
 def _short(setup: Setup, steps: int) -> Setup:

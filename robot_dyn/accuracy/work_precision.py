@@ -176,6 +176,7 @@ def work_precision(
     setup, engines, left_out = _engines(whole(setup))
     asked = setup.duration_s
     setup, exact = reference(setup, budget)
+    made, unable = _able(setup, made)
     variants = [(engines[0], True)] + [(engines[0], False)] * switches(setup) + [(each, True) for each in engines[1:]]
     candidates = [own(setup, each, engine, events) for engine, events in variants for each in made]
     others, refused = found(setup) if peers else ([], [])
@@ -183,7 +184,7 @@ def work_precision(
     candidates[place:place] = others
     walked, interrupted = measured(candidates, exact, budget, repeats)
     ladders = tuple(each.ladder(exact.error) for each in walked if each.rungs)
-    left_out += refused + [f"{each.name}: {each.ended}" for each in walked if not each.rungs]
+    left_out += unable + refused + [f"{each.name}: {each.ended}" for each in walked if not each.rungs]
     left_out += ["what was to come when it was interrupted"] * interrupted
     dynamics: Any = setup.plant.dynamics
     types = getattr(dynamics, "joint_types", (None,))
@@ -208,6 +209,17 @@ def _engines(setup: Setup) -> tuple[Setup, tuple[str, ...], list[str]]:
     except (ImportError, RobotDynError) as error:
         return replace(setup, engine=INTERPRETED), (INTERPRETED,), [f"machine code: {error}"]
     return replace(setup, engine=COMPILED), (COMPILED, INTERPRETED), []
+
+
+def _able(setup: Setup, made: list[Any]) -> tuple[list[Any], list[str]]:
+    """The methods that take the setup, and why not the others."""
+    able, why = [], []
+    for each in made:
+        try:
+            able.append(replace(setup, integrator=each).integrator)
+        except QueryError as error:
+            why.append(f"{each.name}: {error}")
+    return able, why
 
 
 def _several(methods: Any) -> tuple[Any, ...]:

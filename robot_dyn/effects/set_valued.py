@@ -19,6 +19,8 @@ from robot_dyn.arithmetic import Array
 from robot_dyn.convex import minimum
 from robot_dyn.effects.effect import Dissipative
 
+_ROUNDING = 1e-12  # of the largest acceleration
+
 
 class Interval(NamedTuple):
     """What an effect may exert on joints at rest, each (n,), in [N m] or [N]; (0, 0) where it does not act."""
@@ -71,7 +73,8 @@ def settled(
 ) -> tuple[np.ndarray, Mode]:
     """The acceleration of least constraint, (n,), and the mode from there on; joints that stay at rest have exactly 0.
 
-    Where a joint breaks away whose friction of rest is above that of sliding, the others are solved again.
+    Where friction of rest is above that of sliding, joints break away one by one, the one of most energy first, and the
+    others are solved again; one that would move the other way then is taken back, and rests on.
 
     Args:
         effects: What may hold joints.
@@ -88,15 +91,22 @@ def settled(
     friction = np.where(rests, np.where(np.isfinite(most), most, -least), 0.0)
     lower, upper = np.where(rests & (most == np.inf), 0.0, -np.inf), np.where(rests & (least == -np.inf), 0.0, np.inf)
     slides = sum((each.sliding(zero) for each in effects), start=zero)
-    while True:
+    held_on = set[int]()  # that broke away, and would move the other way now that another one slides
+    for _ in range(4 * len(v) + 1):
         p, f = load.copy(), friction.copy()
         for i, direction in forced.items():
             p[i], f[i] = load[i] - slides[i] * direction, 0.0
         a = minimum(M, p, f, lower, upper)
-        broken = [i for i in np.flatnonzero(rests & (a != 0) & (slides < friction)) if i not in forced]
-        if not broken:
+        if back := [i for i, direction in forced.items() if a[i] * direction < -_ROUNDING * np.abs(a).max()]:
+            held_on |= set(back)
+            forced = {i: direction for i, direction in forced.items() if i not in held_on}
+            continue
+        broken = rests & (a != 0) & (slides < friction)
+        broken[[*forced, *held_on]] = False
+        if not broken.any():
             break
-        forced |= {int(i): int(np.sign(a[i])) for i in broken}
+        first = int(np.argmax(np.where(broken, np.abs(a) * np.sqrt(np.diag(M)), -1.0)))
+        forced[first] = int(np.sign(a[first]))
     held = rests & (a == 0)
     direction = np.where(v != 0, np.sign(v), np.sign(a) * rests)
     for i, way in forced.items():  # its load has just reached what held it: it may be 0 yet

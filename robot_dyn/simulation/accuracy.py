@@ -92,7 +92,7 @@ def _stiff(setup: Setup) -> bool:
     """Whether explicit steps would be many for the fastest decay at the start."""
     if _sampled(setup):
         return False
-    equation = StateEquation(setup.plant, setup.controller)
+    equation = StateEquation(setup.plant, setup.controller).in_a_mode
     try:
         motion = fastest(equation, 0.0, equation.start(setup.q0, setup.v0), None)
     except (RobotDynError, np.linalg.LinAlgError):
