@@ -92,7 +92,7 @@ def settled(
     lower, upper = np.where(rests & (most == np.inf), 0.0, -np.inf), np.where(rests & (least == -np.inf), 0.0, np.inf)
     slides = sum((each.sliding(zero) for each in effects), start=zero)
     held_on = set[int]()  # that broke away, and would move the other way now that another one slides
-    for _ in range(4 * len(v) + 1):
+    while True:  # each joint breaks away once, and is taken back once, at most
         p, f = load.copy(), friction.copy()
         for i, direction in forced.items():
             p[i], f[i] = load[i] - slides[i] * direction, 0.0

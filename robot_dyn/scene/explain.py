@@ -20,6 +20,7 @@ from robot_dyn.scene.scene import Scene
 from robot_dyn.scene.schema import Part
 from robot_dyn.simulation.origin import edits_of_machine_code
 from robot_dyn.simulation.setup import Setup
+from robot_dyn.simulation.state_equation import StateEquation
 
 _TERMS = {kind_of(part): part.term for part in ACTING}
 _BOUNDS = [kind_of(part) for part in ACTING if issubclass(part, Declared) and part.make in (EffortLimit, ActuatorLag)]
@@ -78,7 +79,7 @@ def _machine_code(setup: Setup) -> Iterator[str]:
     from robot_dyn.compiled.plant import Compiled
 
     try:
-        compiled: Any = Compiled(setup.plant)
+        compiled: Any = Compiled(StateEquation(setup.plant, None).in_a_mode.plant)
         by_effect, which = compiled.instructions_by_effect, compiled.engine.traces["forward_dynamics"]
     except RobotDynError as error:
         yield f"\nmachine code: none, {error}"
