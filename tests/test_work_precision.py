@@ -15,6 +15,7 @@ import pytest
 from scipy.special import ellipj, ellipk
 
 import robot_dyn as rd
+from robot_dyn.accuracy.beyond import beyond
 from robot_dyn.accuracy.budget import Budget, Limit
 from robot_dyn.accuracy.candidate import Candidate, own, recorded, whole
 from robot_dyn.accuracy.ladder import Ladder, Point
@@ -106,6 +107,23 @@ def test_chaotic_motion_is_cut_where_references_part() -> None:
     apart = np.abs(runs[0].q - runs[1].q).max(axis=1)
     assert apart[runs[0].t <= truth.horizon_s].max() < 1e-6 < 1.0 < apart.max()
     assert truth.error < 1e-8
+
+
+def test_beyond_the_horizon_energy_and_the_way_back_judge() -> None:
+    """Two joints there and back: a method of higher order comes back nearer; with friction nothing comes back."""
+    rubbed, methods = swing(2.0), {name: rd.method(name) for name in ("rk4", "order_8")}
+    setup = replace(rubbed, plant=rd.Plant(rubbed.plant.dynamics))
+    made = [
+        Ladder(name, "interpreted", True, order, "step", (Point(step, 1, 1, 1e-3, 0.0, 1e-6, 1, True),), "", 0.0)
+        for name, order, step in (("rk4", 4, 0.02), ("order_8", 8, 0.02))
+    ]
+    other = Ladder("MuJoCo RK4", "", True, 4, "step", made[0].points, "", 0.0)
+    rk4, order_8 = beyond(setup, 1.0, [*made, other], methods, Budget(1e3))
+    assert (rk4.name, order_8.name) == ("rk4", "order_8")
+    assert 1e-10 < order_8.returned < 1e-2 * rk4.returned < 1e-2  # swung through, where both magnify what they err
+    assert order_8.energy < 1e-2 * rk4.energy < 1e-4
+    assert [each.returned for each in beyond(rubbed, 1.0, made, methods, Budget(1e3))] == [None, None]
+    assert beyond(setup, 1.0, made, methods, Budget(1e-6)) == ()  # no run is short enough
 
 
 def test_an_accuracy_of_the_setup_is_not_used() -> None:

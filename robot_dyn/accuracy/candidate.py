@@ -36,7 +36,7 @@ _HIGH = 5  # order from which twice as many steps leave a gap in a ladder
 _LOOSEST, _TIGHTEST = 2, 13  # tolerances 10⁻ᵏ
 _WARM = 64  # part of the record period, of steps that load machine code
 _UNKNOWN = 15  # an order, of a method that chooses its own
-_ATOL = 1e-2  # absolute tolerance, of the relative one, as of `Adaptive`
+ATOL = 1e-2  # absolute tolerance, of the relative one, as of `Adaptive`
 ORDERS = {"DOP853": 8, "Rosenbrock": 5}  # of methods that choose their steps
 
 
@@ -151,7 +151,7 @@ def own(setup: Setup, made: Any, engine: str, events: bool = True) -> Candidate:
             yield from (10.0**-k for k in range(_LOOSEST, _TIGHTEST + 1))
 
         def tight(rtol: float, limit: Limit) -> Run:
-            changed = replace(setup, integrator=replace(made, rtol=rtol, atol=_ATOL * rtol), engine=engine)
+            changed = replace(setup, integrator=replace(made, rtol=rtol, atol=ATOL * rtol), engine=engine)
             return timed(changed, limit, events)
 
         return Candidate(made.name, engine, events, order, "tolerance", tolerances, tight, warm)

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from math import floor, isfinite, log10
 from typing import Any, final
 
+from robot_dyn.accuracy.beyond import Beyond, beyond
 from robot_dyn.accuracy.budget import Budget
 from robot_dyn.accuracy.candidate import own, recorded, whole
 from robot_dyn.accuracy.environment import environment
@@ -55,6 +56,7 @@ class WorkPrecision:
         budget_s: That was allowed, in [s].
         spent_s: That was spent, without compiling, in [s].
         interrupted: Whether it was ended by the user.
+        beyond: Of chaotic motion, energy and the way back over all of the duration, by method; else nothing.
     """
 
     name: str
@@ -68,6 +70,7 @@ class WorkPrecision:
     budget_s: float
     spent_s: float
     interrupted: bool = False
+    beyond: tuple[Beyond, ...] = ()
 
     @property
     def front(self) -> tuple[tuple[Ladder, Point], ...]:
@@ -174,7 +177,7 @@ def work_precision(
     integer("repeats", repeats, least=1, most=_MOST_REPEATS)
     budget = Budget(number("budget_s", budget_s, above=0), function("on_progress", on_progress, "(spent, what)"))
     setup, engines, left_out = _engines(whole(setup))
-    asked = setup.duration_s
+    asked, everything = setup.duration_s, setup
     setup, exact = reference(setup, budget)
     made, unable = _able(setup, made)
     variants = [(engines[0], True)] + [(engines[0], False)] * switches(setup) + [(each, True) for each in engines[1:]]
@@ -186,11 +189,13 @@ def work_precision(
     ladders = tuple(each.ladder(exact.error) for each in walked if each.rungs)
     left_out += unable + refused + [f"{each.name}: {each.ended}" for each in walked if not each.rungs]
     left_out += ["what was to come when it was interrupted"] * interrupted
+    cut = exact.parted_s is not None and not interrupted
+    later = beyond(everything, exact.horizon_s, ladders, {x.name: x for x in made}, budget) if cut else ()
     dynamics: Any = setup.plant.dynamics
     types = getattr(dynamics, "joint_types", (None,))
     return WorkPrecision(
         getattr(dynamics, "name", type(dynamics).__name__), acting(setup), units("q", types), asked, exact, ladders,
-        tuple(left_out), environment(), budget.seconds, budget.spent, interrupted,
+        tuple(left_out), environment(), budget.seconds, budget.spent, interrupted, later,
     )  # fmt: skip
 
 

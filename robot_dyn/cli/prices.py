@@ -46,6 +46,7 @@ def work_precision(result: WorkPrecision) -> Document:
             }
             for each in result.ladders
         ],
+        "beyond": [{key: finite(value) for key, value in asdict(each).items()} for each in result.beyond],
         "left_out": list(result.left_out),
         "environment": result.environment,
         "budget_s": result.budget_s,
@@ -157,8 +158,26 @@ def work_precision_tables(result: WorkPrecision) -> Iterator[Any]:
         table.add_row(each.name, order, seen, *cells, error if isfinite(finest.error) else "—", in_words(finest.time_s))
     yield table
     yield "times of the loop alone, medians of runs that take turns; * the least; ( ) extrapolated by the order"
+    if result.beyond:
+        yield from _beyond(result)
     yield from (f"left out: {each}" for each in result.left_out)
     yield f"{', '.join(f'{name} {value}' for name, value in result.environment.items())}"
+
+
+def _beyond(result: WorkPrecision) -> Iterator[Any]:
+    """Energy and the way back where no error can be measured, a line for each method."""
+    returns = any(each.returned is not None for each in result.beyond)
+    yield f"\nover all of {result.duration_s:g} s, where no error can be measured, the finest runs:"
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for heading in ("method", "setting", "energy", *["there and back"] * returns):
+        table.add_column(heading, no_wrap=True, justify="left" if heading == "method" else "right")
+    for each in result.beyond:
+        back = "—" if each.returned is None else f"{each.returned:.1e}"
+        table.add_row(each.name, f"{each.setting:.3g}", f"{each.energy:.1e}", *[back] * returns)
+    yield table
+    yield "energy: largest residual, as a part of the energy exchanged" + (
+        f"; there and back: |q − q₀| in {result.unit} of a run that turns round at the end" if returns else ""
+    )
 
 
 def programs(result: WorkPrecision, error: float) -> Iterator[str]:
