@@ -270,3 +270,17 @@ def test_remarks_are_said_wherever_a_run_is_shown(joint, tmp_path) -> None:
 def test_a_run_that_was_not_watched_says_so(joint, tmp_path) -> None:
     run = replace(rd.simulate(damped(joint, 0.5)), extremes=None, remarks=())
     assert "not watched" in rd.load_run(rd.save_run(run, tmp_path / "run")).summary
+
+
+def test_regularised_friction_that_creeps_is_named_with_its_speed(joint) -> None:
+    """Under a load τ < f at v_s artanh(τ / f), once v has settled; dry friction, and a load above f, give no remark."""
+    f, scale, tau = 2.0, 0.01, 1.2
+    load = {"controller": lambda t, q, v: np.array([tau]), "duration_s": 0.5, "estimate_error": False}
+    run = rd.simulate(rd.Plant(joint, [rd.RegularisedCoulombFriction(f, scale)]), [0.1], **load)
+    (remark,) = run.remarks
+    assert remark.kind is Kind.CREEPS
+    assert remark.value == pytest.approx(scale * np.arctanh(tau / f), rel=1e-3)
+    assert "under 1.2 of 2 N m; dry_friction would hold" in run.summary
+    assert rd.simulate(rd.Plant(joint, [rd.DryFriction(f)]), [0.1], **load).remarks == ()
+    load["controller"] = lambda t, q, v: np.array([3.0])
+    assert rd.simulate(rd.Plant(joint, [rd.RegularisedCoulombFriction(f, scale)]), [0.1], **load).remarks == ()

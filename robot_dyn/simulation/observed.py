@@ -12,6 +12,7 @@ from robot_dyn.effects.effect import Dissipative, Stateful
 from robot_dyn.errors import RobotDynError
 from robot_dyn.model.robot import Robot
 from robot_dyn.model.units import unit
+from robot_dyn.simulation.creep import creeping
 from robot_dyn.simulation.levels import Level, levels
 from robot_dyn.simulation.observer import Observer, Visit
 from robot_dyn.simulation.remarks import Kind, Remark
@@ -50,7 +51,9 @@ def remarks(
     for kind in (Kind.EFFORT_REACHED, Kind.STOP_REACHED, Kind.BEYOND):
         visits = {level: visit for level, visit in observer.visits.items() if level.kind is kind}
         found += _passed(setup, visits, units)
-    return (*found, *_coarse(setup, observer, t, samples, units), *_gaining(setup, t, power))
+    v = samples[:, len(units) : 2 * len(units)]
+    creeps = creeping(setup, t, v, units)
+    return (*found, *_coarse(setup, observer, t, samples, units), *_gaining(setup, t, power), *creeps)
 
 
 def _gaining(setup: Setup, t: np.ndarray, power: dict[str, np.ndarray]) -> Iterator[Remark]:

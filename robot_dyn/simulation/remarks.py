@@ -1,7 +1,7 @@
 """Remarks on a run: what its samples need not show, seen at the end of every step.
 
 chatter · an effort limit or a stop reached · beyond a limit that the file states · a record coarser than the motion ·
-an effect declared dissipative that does positive work · steps that stability bounds
+an effect declared dissipative that does positive work · friction that creeps · steps that stability bounds
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ class Kind(StrEnum):
     BEYOND = "beyond_limit_of_file"
     COARSE = "record_too_coarse"
     GAINS = "dissipative_effect_gains"
+    CREEPS = "regularised_friction_creeps"
     STIFF = "steps_bounded_by_stability"
 
 
@@ -33,6 +34,7 @@ _HEADINGS = {
     Kind.BEYOND: "beyond the file's limits",
     Kind.COARSE: "record too coarse",
     Kind.GAINS: "a dissipative effect does positive work",
+    Kind.CREEPS: "regularised friction creeps",
     Kind.STIFF: "steps bounded by stability",
 }
 
