@@ -62,6 +62,7 @@ class Modes:
         self._n = n = equation.plant.dynamics.n
         self.impulses = np.arange(2 * n + equation.states - n, 2 * n + equation.states)
         self.mode = Mode(np.zeros(n), np.zeros(n))
+        self._rubs = sum((each.sliding(np.zeros(n)) for each in self.effects), start=np.zeros(n)) > 0  # has friction
 
     def start(self, y: np.ndarray) -> None:
         """The mode at the start: all that may be held is, until the reactions are known."""
@@ -99,12 +100,6 @@ class Modes:
                     if np.isfinite(position) and not leaves:
                         made.append(Guard(i, i, position, side, False))
         return made
-
-    @property
-    def _rubs(self) -> np.ndarray:
-        """Whether each joint has friction, (n,)."""
-        zero = np.zeros(self._n)
-        return sum((each.sliding(zero) for each in self.effects), start=zero) > 0
 
     def after(
         self, t: float, y: np.ndarray, held: Array | None, guard: Guard | None
