@@ -81,6 +81,14 @@ def test_stick_slip_has_the_period_of_its_closed_form(engine: str) -> None:
     assert np.diff(places)[1:] == pytest.approx(V * slip + 2 * r, abs=1e-9)
 
 
+def test_friction_of_rest_alone_catches_what_turns_round() -> None:
+    """f_k = 0: 1 kg thrown up on a rail slides freely to its highest point, and stays there."""
+    run = rd.simulate(rd.Plant(level(RAIL, 2.0), [rd.DryFriction(0.0, 3.0)]), [0.0], [1.0], duration_s=2.0, **OPTIONS)
+    (stop,) = run.events
+    assert stop.t == pytest.approx(0.5, rel=1e-12)
+    assert run.q[-1, 0] == pytest.approx(0.25, rel=1e-12)
+
+
 def test_stribecks_curve_is_followed_while_sliding() -> None:
     """V' = −f(v) of 1 kg against SciPy, from 2 m/s; friction of rest holds what sliding would not."""
     from scipy.integrate import solve_ivp

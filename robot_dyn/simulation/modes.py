@@ -62,7 +62,8 @@ class Modes:
         self._n = n = equation.plant.dynamics.n
         self.impulses = np.arange(2 * n + equation.states - n, 2 * n + equation.states)
         self.mode = Mode(np.zeros(n), np.zeros(n))
-        self._rubs = sum((each.sliding(np.zeros(n)) for each in self.effects), start=np.zeros(n)) > 0  # has friction
+        rubs = (each.at_rest(np.zeros(n)).most > 0 for each in self.effects if not isinstance(each, RigidStops))
+        self._rubs = sum(rubs, start=np.zeros(n, bool))  # what may stick where its velocity is 0
 
     def start(self, y: np.ndarray) -> None:
         """The mode at the start: all that may be held is, until the reactions are known."""
