@@ -127,7 +127,7 @@ def planar_chain(n: int) -> rd.Robot:
 
 @pytest.mark.parametrize(
     ("n", "dtype", "rounding", "enough"),
-    [(64, np.float32, "float32", np.float64), (16, rd.Ball(53), "balls of 53 bits", rd.Ball(300))],
+    [(64, np.float32, "float32", np.float64), (16, rd.Ball(20), "balls of 20 bits", rd.Ball(300))],
     ids=["float32", "balls"],
 )
 def test_a_pivot_lost_in_rounding_accuses_no_joint(n: int, dtype: Any, rounding: str, enough: Any) -> None:
