@@ -107,6 +107,20 @@ def test_joints_that_strike_together_are_solved_together() -> None:
     assert run.ledger.work["rigid_stops"][-1] < 0
 
 
+def test_stops_that_are_struck_in_turn_come_to_rest_together() -> None:
+    """A cart and its pole driven into a corner: each impact kicks the other joint off its stop, ever less."""
+    arm = rd.load("cart_pole")
+    stops = rd.RigidStops([-0.6556, 0.5434], [-0.0705, 0.9402], [0.6, 0.0])
+    drive = rd.PD(rd.hold([-0.7727, 0.6249]), [370.0, 4.3], [17.3, 1.14])
+    run = rd.simulate(
+        rd.Plant(arm, [rd.ViscousFriction([3.6, 0.52]), stops]), [-0.5163, 0.7435], [0.6811, 0.9512], duration_s=1.0,
+        controller=drive, estimate_error=False, integrator=rd.Adaptive(rtol=1e-4, atol=1e-6),
+    )  # fmt: skip
+    assert run.outcome.ending == "finished"
+    assert len(run.events) < 300
+    assert (np.diff(run.ledger.work["rigid_stops"]) <= 1e-12).all()
+
+
 def test_a_start_beyond_a_stop_is_refused_by_name() -> None:
     plant = rd.Plant(ARM, [rd.RigidStops([-1.0, -1.0], [1.0, 1.0])])
     with pytest.raises(QueryError, match=r"q0: 'joint_2' is 0\.2 beyond its upper stop"):

@@ -142,15 +142,16 @@ class Modes:
         before = y[n : 2 * n].copy()
         strike = np.flatnonzero(side * before > 0)
         e = np.broadcast_to(stops.restitution, n).astype(float)
-        y[n : 2 * n] = _impact(M, before, side, e)
+        y[n : 2 * n] = _impact(M, before, side, e, np.zeros(n, bool))
         a = settled(self.effects, M, self._load(t, y, held), y[:n], y[n : 2 * n])[0]
         v = y[n : 2 * n]
         returns = (side * a > 0) & (side * v < 0) & (e < 1)
         with np.errstate(divide="ignore", invalid="ignore"):
             left = np.where(returns, 2 * np.abs(v) / (np.abs(a) * (1 - e)), np.inf)
-        last = [i for i in strike if left[i] < _ACCUMULATED]
-        if last:
-            y[n : 2 * n] = _impact(M, before, side, np.where(np.isin(np.arange(n), last), 0.0, e))
+        still = left < _ACCUMULATED  # those that are kicked off their stops by others, too
+        last = [i for i in strike if still[i]]
+        if still.any():
+            y[n : 2 * n] = _impact(M, before, side, e, still)
         v = y[n : 2 * n]
         y[self._work(stops)] += (v + before) @ M @ (v - before) / 2
         return [
@@ -193,12 +194,16 @@ class Modes:
         return Occurrence(t, f"{joint} {what}", direction, tuple(y[:n].tolist()), tuple(y[n : 2 * n].tolist()), joint)
 
 
-def _impact(M: np.ndarray, v: np.ndarray, side: np.ndarray, e: np.ndarray) -> np.ndarray:
-    """The velocity behind an impact at the stops on those sides; friction is finite, and takes no part."""
+def _impact(M: np.ndarray, v: np.ndarray, side: np.ndarray, e: np.ndarray, still: np.ndarray) -> np.ndarray:
+    """The velocity behind an impact at the stops on those sides; friction is finite, and takes no part.
+
+    Joints that are to be still have 0: a projection in the norm of M, which adds no energy.
+    """
     n = len(v)
-    bound = -(1 + e) * v
+    bound = np.where(still, -v, -(1 + e) * v)
     meets = side * v >= 0
-    lower = np.where((side < 0) & meets, bound, -np.inf)
-    upper = np.where((side > 0) & meets, bound, np.inf)
+    lower = np.where((side < 0) & meets | still, bound, -np.inf)
+    upper = np.where((side > 0) & meets | still, bound, np.inf)
     change = minimum(M, np.zeros(n), np.zeros(n), lower, upper)
-    return np.where((change == bound) & (side != 0) & meets, -e * v, v + change)
+    after = np.where((change == bound) & (side != 0) & meets, -e * v, v + change)
+    return np.where(still, 0.0, after)
