@@ -7,6 +7,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.effects.set_valued import settled
+from robot_dyn.errors import EffectError, SingularError
 from tests.estimates.scenes import arms
 
 ENGINES = ["interpreted", "compiled"]
@@ -87,6 +88,18 @@ def test_friction_of_rest_alone_catches_what_turns_round() -> None:
     (stop,) = run.events
     assert stop.t == pytest.approx(0.5, rel=1e-12)
     assert run.q[-1, 0] == pytest.approx(0.25, rel=1e-12)
+
+
+def test_what_cannot_be_decided_is_refused() -> None:
+    """A joint without inertia is named, as without friction; balls and longdouble do not decide what is held."""
+    with pytest.warns(rd.ModelWarning):
+        tip = rd.load("massless_tip")
+    with pytest.raises(SingularError, match="'pointer_joint' carries no inertia"):
+        rd.Plant(tip, [rd.DryFriction(1.0)]).forward_dynamics(0.0, [0.3, 0.4], [0.0, 0.0], [0.0, 0.0])
+    for arithmetic in (rd.Ball(80), np.longdouble):
+        plant = rd.Plant(rd.Lagrangian(ARM, arithmetic), [rd.DryFriction(1.0)])
+        with pytest.raises(EffectError, match="dry_friction: which joints it holds is decided in float64"):
+            plant.forward_dynamics(0.0, [0.3, 0.4], [0.0, 0.0], [0.0, 0.0])
 
 
 def test_stribecks_curve_is_followed_while_sliding() -> None:

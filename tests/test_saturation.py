@@ -163,6 +163,22 @@ def test_a_limit_that_chatters_is_named_and_does_not_hang(method: str, engine: s
     assert any("effort limit of slide" in each.name and "chatters" in each.name for each in run.events)
 
 
+def test_what_is_held_stays_held_when_a_limit_is_no_longer_looked_for() -> None:
+    """The limit of joint 1 chatters, and is dropped; dry friction holds joint 2 all the while, to the last bit."""
+    arm = rd.load("planar_2r").with_(gravity=(0, 0, 0))
+
+    def drive(t, q, v):
+        return np.array([np.where(q[0] + 2.0 * v[0] < 0.5, 3.0, -3.0), 0.0])
+
+    plant = rd.Plant(arm, [rd.EffortLimit([1.0, np.inf]), rd.DryFriction([0.0, 60.0])])
+    run = rd.simulate(
+        plant, [0.3, 0.7], duration_s=0.6, controller=drive, integrator="rk4", step_s=0.002,
+        estimate_error=False,
+    )  # fmt: skip
+    assert any("chatters" in each.name for each in run.events)
+    assert (run.q[:, 1] == 0.7).all()
+
+
 def test_sweeps_of_the_limit_are_cut_as_single_runs_are() -> None:
     """A limit of none for the first, and two that are reached."""
     controller, _ = control("computed_torque")

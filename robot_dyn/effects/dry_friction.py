@@ -24,6 +24,9 @@ class DryFriction(SetValued):
     both consistent with some loads: what rests goes on resting. [Armstrong-Hélouvry, Dupont, Canudas de Wit, A survey
     of models, analysis tools and compensation methods for the control of machines with friction, 1994]
 
+    The acceleration of a plant holds what friction can hold; its N, torque and inverse dynamics have 0 for the friction
+    of a joint at rest, which depends on the load.
+
     Attributes:
         level: f_k, of sliding, a scalar or (n,), in [N m] or [N], not negative.
         static: f_s, of rest, not less than f_k; f_k unless given.

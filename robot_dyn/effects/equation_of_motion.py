@@ -174,6 +174,12 @@ class EquationOfMotion:
         M, load = self.dynamics.M(q), total - self.dynamics.inverse_dynamics(q, v, 0 * v)
         held = self.set_valued[0].held
         if held is None:
+            acceleration(M, load, self.dynamics.joint_names)  # is told of M that is singular, as without friction
+            if M.dtype not in (np.float32, np.float64):
+                raise EffectError(
+                    f"{self.set_valued[0].name}: which joints it holds is decided in float64, not in {M.dtype}; ask a"
+                    " plant of the robot, or of its Lagrangian in float64"
+                )
             a = settled(self.set_valued, M, load, q, v)[0]
             held = (a == 0).astype(float)
         else:

@@ -276,7 +276,8 @@ class EventRun(Followed):
         """Look for the thresholds of a joint no longer, where steps would never get on."""
         last = self.events[-1]
         self.events.append(replace(last, name=f"{last.name} chatters, and is no longer looked for"))
-        self.switching = Switching(self.equation, self.switching.dropped | {(each.joint, each.of_actuation)})
+        dropped = self.switching.dropped | {(each.joint, each.of_actuation)}
+        self.switching = Switching(self.equation, dropped, self.switching.modes)
         held = self.runs.own[: self.rules.held, 0] if self.rules.held else None
         self._watch_anew(last.t, held)
 

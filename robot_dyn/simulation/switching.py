@@ -28,6 +28,7 @@ class Switching:
     Args:
         equation: The state equation, of parts that switch by themselves, and with events asked for.
         dropped: What is no longer looked at: there the parts switch by themselves.
+        modes: What is held now; nothing yet unless given.
 
     Attributes:
         thresholds: Those of coordinates, each once, and then those of the actuation, part by part.
@@ -35,7 +36,9 @@ class Switching:
         guards: What ends the mode, as of the last call of `at`: its switching functions come between the two.
     """
 
-    def __init__(self, equation: StateEquation, dropped: frozenset[Quantity] = frozenset()) -> None:
+    def __init__(
+        self, equation: StateEquation, dropped: frozenset[Quantity] = frozenset(), modes: Modes | None = None
+    ) -> None:
         self.equation, self.events, self.dropped = equation, equation.events, dropped
         self._n = n = equation.plant.dynamics.n
         parts = {k: effect.thresholds(n) for k, effect in enumerate(equation.plant.effects)}
@@ -47,7 +50,7 @@ class Switching:
         self.coordinates = len(coordinates)
         self.thresholds: tuple[Threshold, ...] = (*coordinates, *(each for _, each in actuation))
         self._parts: tuple[int | None, ...] = (*(None for _ in coordinates), *(k for k, _ in actuation))
-        self.modes = Modes(equation) if equation.impulses else None
+        self.modes = (modes or Modes(equation)) if equation.impulses else None
         self.guards: list[Guard] = []
         self._known: dict[bytes, StateEquation] = {}
 
