@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import quadprog
 
 from robot_dyn.convex import minimum, residual
 
@@ -71,3 +72,36 @@ def test_a_load_at_its_limit_leaves_exact_zeros() -> None:
         if (f > 0).any():
             p[np.argmax(f)] *= 1 + 1e-12
             assert (minimum(M, p, f, -free, free) != 0).any()
+
+
+def by_quadprog(
+    M: np.ndarray, p: np.ndarray, f: np.ndarray, lower: np.ndarray, upper: np.ndarray, eps: float = 1e-5
+) -> np.ndarray:
+    """The same minimum by quadprog: t ≥ |x| for |x|, and ε |t − t_k|² / 2, since it asks for a definite matrix.
+
+    The minimum of one pass is the next t_k: the proximal point method, whose limit does not depend on ε.
+    """
+    n, one, none = len(p), np.eye(len(p)), np.zeros((len(p), len(p)))
+    same, low, high = lower == upper, np.isfinite(lower) & (lower < upper), np.isfinite(upper) & (lower < upper)
+    x, t_and_x, t_less_x = (np.hstack(pair) for pair in ((one, none), (one, one), (-one, one)))
+    rows = np.vstack([x[same], t_and_x, t_less_x, x[low], -x[high]])
+    least = np.concatenate([lower[same], np.zeros(2 * n), lower[low], -upper[high]])
+    G, t = np.block([[M, none], [none, eps * one]]), np.zeros(n)
+    for _ in range(10):
+        y = quadprog.solve_qp(G, np.concatenate([p, eps * t - f]), rows.T, least, int(same.sum()))[0]
+        t = y[n:]
+    return y[:n]
+
+
+@pytest.mark.parametrize("degenerate", [False, True])
+def test_quadprog_has_the_same_minimum(degenerate: bool) -> None:
+    """M x to 1e-10 of the largest term: its own rounding, that of the matrix it factorises, 1e-16 M / ε."""
+    rng, compared = np.random.default_rng([11, degenerate]), 0
+    for _ in range(300):
+        M, p, f, *_ = given = problem(rng, degenerate)
+        x = minimum(*given)
+        largest = (np.abs(p) + np.abs(M) @ np.abs(x) + f).max()
+        if np.linalg.cond(M) <= 1e4:
+            compared += 1
+            assert np.abs(M @ (x - by_quadprog(*given))).max() <= 1e-10 * largest
+    assert compared > 150

@@ -169,28 +169,46 @@ def test_joints_that_break_away_together_move_the_way_they_were_let_go() -> None
         assert (a * mode.direction >= -1e-9 * np.abs(a).max()).all(), k
 
 
-def test_an_arm_of_seven_joints_sticks_and_slides_to_eleven_digits() -> None:
-    """Panda, driven about its weight, some 55 switches in 2 s: errors of at most ten times the tolerance."""
+def driven_panda(integrator: rd.Integrator | rd.Adaptive | str, **options) -> rd.Trajectory:
+    """Panda, driven about its weight against dry and viscous friction, some 55 switches in 2 s."""
     panda = rd.load("panda")
     panda = panda.with_(lock=dict.fromkeys(panda.joint_names[7:], 0.0))
     q0 = np.array([0, -0.5, 0.2, -1.9, 0.1, 1.4, 0.5])
     A, omega = np.array([6, 10, 5, 8, 2, 1.5, 0.6]), np.array([4, 5, 6, 4.5, 7, 5.5, 8])
     weight, levels = panda.N(q0), [3, 6, 2, 4, 1, 0.8, 0.3]
-    plant = rd.Plant(panda, [rd.ViscousFriction(0.1), rd.DryFriction(levels)])
+    return rd.simulate(
+        rd.Plant(panda, [rd.ViscousFriction(0.1), rd.DryFriction(levels)]), q0, duration_s=2.0,
+        controller=lambda t, q, v: 0.8 * weight + A * np.sin(omega * t + 0.3), engine="compiled",
+        estimate_error=False, integrator=integrator, **options,
+    )  # fmt: skip
 
-    def run(tolerance: float) -> rd.Trajectory:
-        return rd.simulate(
-            plant, q0, duration_s=2.0, controller=lambda t, q, v: 0.8 * weight + A * np.sin(omega * t + 0.3),
-            engine="compiled", estimate_error=False, integrator=rd.Adaptive(rtol=tolerance, atol=tolerance),
-            record_period_s=0.02,
-        )  # fmt: skip
 
-    exact = run(1e-13)
+def names(run: rd.Trajectory) -> list[str]:
+    return [each.name for each in run.events]
+
+
+def test_an_arm_of_seven_joints_sticks_and_slides_to_eleven_digits() -> None:
+    """Errors of at most ten times the tolerance."""
+    exact, *others = (
+        driven_panda(rd.Adaptive(rtol=tolerance, atol=tolerance), record_period_s=0.02)
+        for tolerance in (1e-13, 1e-8, 1e-12)
+    )
     assert len(exact.events) > 50
-    for tolerance in (1e-8, 1e-12):
-        other = run(tolerance)
-        assert [each.name for each in other.events] == [each.name for each in exact.events]
+    for tolerance, other in zip((1e-8, 1e-12), others, strict=True):
+        assert names(other) == names(exact)
         assert np.abs(other.q - exact.q).max() <= 10 * tolerance
+
+
+@pytest.mark.parametrize(("method", "coarsest", "order"), [("order_8", 32, 5.0), ("rk4", 64, 3.5)])
+def test_fixed_steps_keep_their_order_on_an_arm_of_seven_joints(method: str, coarsest: int, order: float) -> None:
+    """Mean slope over four halvings from 1/16 s or 1/32 s, where the events are already those of the exact motion."""
+    exact = driven_panda(rd.Adaptive(rtol=1e-13, atol=1e-13), record_period_s=2.0)
+    errors = []
+    for k in range(5):
+        run = driven_panda(method, step_s=2.0 / (coarsest * 2**k), record_period_s=2.0)
+        assert names(run) == names(exact)
+        errors.append(np.abs(run.q[-1] - exact.q[-1]).max())
+    assert np.log2(errors[0] / errors[-1]) / 4 >= order
 
 
 @pytest.mark.parametrize(("method", "order"), [("rk4", 4), ("midpoint", 2), ("order_8", 8)])
