@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from robot_dyn.control.samples import Samples as Samples
     from robot_dyn.effects.actuator import ActuatorLag as ActuatorLag
     from robot_dyn.effects.actuator import EffortLimit as EffortLimit
+    from robot_dyn.effects.dahl import DahlFriction as DahlFriction
     from robot_dyn.effects.dry_friction import DryFriction as DryFriction
     from robot_dyn.effects.effect import Active as Active
     from robot_dyn.effects.effect import Bound as Bound
@@ -112,6 +113,7 @@ _HOME = {
     "Conservative": "effects.effect",
     "Controller": "control.controller",
     "Cost": "accuracy.cost",
+    "DahlFriction": "effects.dahl",
     "Dissipative": "effects.effect",
     "DryFriction": "effects.dry_friction",
     "Dynamics": "model.dynamics",

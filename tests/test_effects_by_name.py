@@ -65,6 +65,7 @@ def test_an_effect_has_one_name_in_python_scene_ledger_and_rollouts() -> None:
         "regularised_coulomb_friction": [rd.RegularisedCoulombFriction(0.2)],
         "dry_friction": [rd.DryFriction(0.2)],
         "lugre_friction": [rd.LuGreFriction(100.0, 0.1, 0.2, 1.0, 1.2, 0.1)],
+        "dahl_friction": [rd.DahlFriction(100.0, 1.0, 1.5)],
         "spring": [rd.Spring(2.0)],
         "joint_stops": rd.joint_stops(-1.0, 1.0),
         "rigid_stops": [rd.RigidStops(-1.0, 1.0)],
@@ -80,8 +81,8 @@ def test_an_effect_has_one_name_in_python_scene_ledger_and_rollouts() -> None:
     plant = rd.Plant(robot, [effect for effects in built.values() for effect in effects])
     run = rd.simulate(plant, q0=[0.3, 0.4], duration_s=0.01, estimate_error=False)
     assert list(run.power) == [
-        "control", "viscous_friction", "regularised_coulomb_friction", "dry_friction", "lugre_friction", "joint_stops",
-        "rigid_stops", "line_spring_damper", "external_wrench",
+        "control", "viscous_friction", "regularised_coulomb_friction", "dry_friction", "lugre_friction", "dahl_friction",
+        "joint_stops", "rigid_stops", "line_spring_damper", "external_wrench",
     ]  # fmt: skip
 
 

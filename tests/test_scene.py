@@ -93,6 +93,7 @@ EFFECTS = {
         "bristle_stiffness_N_m_per_rad = 300.0\nbristle_damping_N_m_s_per_rad = 1.0\nviscous_N_m_s_per_rad = 0.4\n"
         "coulomb_N_m = {joint_1 = 0.7}\nbreakaway_N_m = [1.1, 1.2]\nstribeck_velocity_rad_per_s = 0.1"
     ),
+    "dahl_friction": "bristle_stiffness_N_m_per_rad = 300.0\ncoulomb_N_m = {joint_1 = 0.7}\nexponent = 1.5",
     "payload": 'frame = "tip"\nmass_kg = 0.5',
     "armature": "inertia_kg_m2 = 0.1",
     "lock": "joints = {joint_1 = 0.2}",
@@ -122,6 +123,7 @@ def test_effect_of_a_scene_is_that_of_python(write, kind: str) -> None:
         "effort_limit": lambda: rd.Plant(robot, [rd.EffortLimit(3.0)]),
         "actuator_lag": lambda: rd.Plant(robot, [rd.ActuatorLag([0.02, 0.05])]),
         "lugre_friction": lambda: rd.Plant(robot, [rd.LuGreFriction(300.0, 1.0, 0.4, [0.7, 1.0], [1.1, 1.2], 0.1)]),
+        "dahl_friction": lambda: rd.Plant(robot, [rd.DahlFriction(300.0, [0.7, 1.0], 1.5)]),
         "dry_friction": lambda: rd.Plant(robot, [rd.DryFriction([0.4, 0.2], 0.6)]),
         "rigid_stops": lambda: rd.Plant(robot, [rd.RigidStops(-1.0, [1.0, np.inf], 0.3)]),
         "payload": lambda: rd.Plant(robot.with_(payload=rd.Payload("tip", 0.5))),

@@ -220,6 +220,7 @@ def examples(folder: Path) -> dict[str, Example]:
                 "breakaway": [1.5, 1.2], "stribeck_velocity": 0.1,
             },
         ),
+        "DahlFriction": (rd.DahlFriction, {"bristle_stiffness": 90.0, "coulomb": [1.5, 1.2], "exponent": 1.5}),
         "RigidStops": (rd.RigidStops, stops | {"restitution": 0.5}),
         "LineDamper": (rd.LineDamper, strut | {"damping": 0.1}),
         "LineSpring": (rd.LineSpring, strut | {"stiffness": 10.0, "length": 0.2}),

@@ -107,8 +107,10 @@ class Symbol:
         return NotImplemented if (x := _symbol(other)) is None else x / self
 
     def __pow__(self, exponent: Any) -> Symbol:
-        if (x := _symbol(exponent)) is None or x.node is not None:
+        if (x := _symbol(exponent)) is None:
             return NotImplemented
+        if x.node is not None:
+            return _made(0.0, 1, self.expression**x.expression)
         if self.node is None:
             return Symbol(self.constant**x.constant)
         if x.constant == 2:

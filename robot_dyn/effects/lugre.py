@@ -70,8 +70,7 @@ class LuGreFriction(Stateful, Active):
         return inf, self.stribeck_velocity
 
     def thresholds(self, n: int) -> tuple[Threshold, ...]:
-        acts, slow = np.broadcast_to(self.bristle_stiffness, n) > 0, _SLOW * np.broadcast_to(self.stribeck_velocity, n)
-        return tuple(Threshold(i, 0.0, *_REVERSAL, of_velocity=True, slack=slow[i]) for i in range(n) if acts[i])
+        return reversals(self.bristle_stiffness, _SLOW * np.asarray(self.stribeck_velocity), n)
 
     def state_size(self, n: int) -> int:
         return n
@@ -90,3 +89,9 @@ class LuGreFriction(Stateful, Active):
 
     def stored_energy(self, dynamics: Dynamics, t: float, q: Array, z: Array) -> Array:
         return (self.bristle_stiffness * z**2 / 2).sum(axis=-1)
+
+
+def reversals(stiffness: Any, slack: Any, n: int) -> tuple[Threshold, ...]:
+    """Where the velocity of a joint with bristles of some stiffness turns, passed by the slack, (n,)."""
+    acts, slow = np.broadcast_to(stiffness, n) > 0, np.broadcast_to(slack, n)
+    return tuple(Threshold(i, 0.0, *_REVERSAL, of_velocity=True, slack=slow[i]) for i in range(n) if acts[i])

@@ -8,6 +8,7 @@ from typing import Annotated, Literal, Union, get_args
 from pydantic import Field
 
 from robot_dyn.effects.actuator import ActuatorLag, EffortLimit
+from robot_dyn.effects.dahl import DahlFriction
 from robot_dyn.effects.dry_friction import DryFriction
 from robot_dyn.effects.effect import Effect
 from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFriction
@@ -139,6 +140,7 @@ ACTING = (
     declared_part("regularised_coulomb_friction", RegularisedCoulombFriction),
     declared_part("dry_friction", DryFriction),
     declared_part("lugre_friction", LuGreFriction),
+    declared_part("dahl_friction", DahlFriction),
     declared_part("spring", Spring),
     declared_part(
         "joint_stops", JointStopSpring, JointStopDamper, make=joint_stops,
