@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -41,13 +42,13 @@ def curve(start: float, path: np.ndarray, side: float, exponent: float) -> np.nd
 @pytest.mark.parametrize("exponent", [None, 1.0, 1.5, 3.0])
 @BOTH
 def test_the_hysteresis_is_that_of_the_closed_form(exponent: float | None, engine: str) -> None:
-    """From reversal to reversal F is a function of the path alone; tolerances of 1e-12 leave 1e-9 after six branches."""
+    """From reversal to reversal F is a function of the path alone; 1e-12 of tolerance leaves 1e-9 after six branches."""
     swing = run(exponent, engine, integrator=rd.Adaptive("DOP853", 1e-12, 1e-14))
     turns = [(each.t, each.q[0]) for each in swing.events]
     assert len(turns) > 4
     at, place = np.array([0.0, *(t for t, _ in turns), np.inf]), np.array([0.0, *(q for _, q in turns)])
     force, expected = 0.0, np.empty(len(swing.t))
-    for k, (start, end) in enumerate(zip(at[:-1], at[1:], strict=True)):
+    for k, (start, end) in enumerate(pairwise(at)):
         inside = (swing.t >= start) & (swing.t < end)
         way = swing.q[inside, 0] - place[k]
         side = float(np.sign(way.sum()))

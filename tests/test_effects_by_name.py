@@ -81,8 +81,8 @@ def test_an_effect_has_one_name_in_python_scene_ledger_and_rollouts() -> None:
     plant = rd.Plant(robot, [effect for effects in built.values() for effect in effects])
     run = rd.simulate(plant, q0=[0.3, 0.4], duration_s=0.01, estimate_error=False)
     assert list(run.power) == [
-        "control", "viscous_friction", "regularised_coulomb_friction", "dry_friction", "lugre_friction", "dahl_friction",
-        "joint_stops", "rigid_stops", "line_spring_damper", "external_wrench",
+        "control", "viscous_friction", "regularised_coulomb_friction", "dry_friction", "lugre_friction",
+        "dahl_friction", "joint_stops", "rigid_stops", "line_spring_damper", "external_wrench",
     ]  # fmt: skip
 
 

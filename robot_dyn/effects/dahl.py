@@ -2,8 +2,8 @@
 
     s = sign(v),   τ = −σ z
 
-From rest it is a spring of stiffness σ; sliding on, |F| goes to f_c, and behind a reversal F runs along the other branch
-of the hysteresis. Time does not matter to it, only the path. [Dahl 1968; Dahl 1976; Bliman 1992]
+From rest it is a spring of stiffness σ; sliding on, |F| goes to f_c, and behind a reversal F runs along the other
+branch of the hysteresis. Time does not matter to it, only the path. [Dahl 1968; Dahl 1976; Bliman 1992]
 """
 
 from __future__ import annotations

@@ -89,7 +89,9 @@ def first_kink(setup: Setup, equation: StateEquation, path: Path) -> tuple[float
             crosses = (v[:-1] * v[1:] <= 0) & (np.abs(np.diff(v, axis=0)) * _IN_LAYER > effect.velocity_scale * steps)
             crosses &= np.broadcast_to(np.asarray(effect.friction) > 0, crosses.shape)
             found.append(_first(path.t, crosses, "dry friction reverses within a few steps"))
-        elif isinstance(effect, LuGreFriction | DahlFriction) and not (setup.finds_events and not setup.integrator.canonical):
+        elif isinstance(effect, LuGreFriction | DahlFriction) and not (
+            setup.finds_events and not setup.integrator.canonical
+        ):
             found.append(_first(path.t, v[:-1] * v[1:] <= 0, "a joint with bristles stands or reverses"))
     if not setup.finds_events:
         found.append(_saturation(setup, equation, path, q, v))
