@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from robot_dyn.control.samples import Samples as Samples
     from robot_dyn.effects.actuator import ActuatorLag as ActuatorLag
     from robot_dyn.effects.actuator import EffortLimit as EffortLimit
+    from robot_dyn.effects.carried_payload import CarriedPayload as CarriedPayload
     from robot_dyn.effects.dahl import DahlFriction as DahlFriction
     from robot_dyn.effects.dry_friction import DryFriction as DryFriction
     from robot_dyn.effects.effect import Active as Active
@@ -106,6 +107,7 @@ _HOME = {
     "Advice": "accuracy.advisor",
     "Ball": "arithmetic",
     "Bound": "effects.effect",
+    "CarriedPayload": "effects.carried_payload",
     "Certificate": "accuracy.certificate",
     "Comparison": "accuracy.compare",
     "Compiled": "compiled.plant",

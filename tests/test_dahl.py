@@ -42,7 +42,7 @@ def curve(start: float, path: np.ndarray, side: float, exponent: float) -> np.nd
 @pytest.mark.parametrize("exponent", [None, 1.0, 1.5, 3.0])
 @BOTH
 def test_the_hysteresis_is_that_of_the_closed_form(exponent: float | None, engine: str) -> None:
-    """From reversal to reversal F is a function of the path alone; 1e-12 of tolerance leaves 1e-9 after six branches."""
+    """From reversal to reversal F is a function of the path alone; a tolerance of 1e-12 leaves 1e-9."""
     swing = run(exponent, engine, integrator=rd.Adaptive("DOP853", 1e-12, 1e-14))
     turns = [(each.t, each.q[0]) for each in swing.events]
     assert len(turns) > 4

@@ -42,7 +42,7 @@ def values() -> dict[str, Any]:
         *strut.parts, rd.Spring([1.0, 2.0]), rd.ViscousFriction([1.0, 2.0]), PLAN,
         rd.DryFriction([1.0, 2.0], 2.0, 0.1), rd.RigidStops(-1.0, [1.0, 2.0], 0.5),
         rd.ActuatorLag([0.1, 0.2]), rd.LuGreFriction(9.0, 1.0, 1.0, [1.0, 2.0], 2.0, 0.1),
-        rd.DahlFriction(9.0, [1.0, 2.0], 1.5),
+        rd.DahlFriction(9.0, [1.0, 2.0], 1.5), rd.CarriedPayload(rd.Payload("tip", 1.0)),
         rd.Samples([0.0, 1.0, 2.0], np.ones((3, 2))), LINE,
         setup, run, runs, run.ledger, run.error, run.statistics, run.outcome, ARM.couplings, ARM.edits,
         rd.task_dynamics(ARM, Q, Q, "tip", rows=(0, 2)), rd.method("rk4"), rd.method("gauss_4"), rd.method("sdirk_3"),

@@ -44,7 +44,8 @@ FOR_LOOPS |= {"task_acceleration", "in_mode", "at_rest", "sliding", "touched", "
 LAX = {  # arguments that may be infinite or unknown, or of any shape
     "ExternalWrench.acts": {"t"},
     "Adaptive": {"max_step_s"}, "Adaptive.with_tolerances": {"longest_s"},
-    "EffortLimit": {"limit"}, "Event": {"direction"}, "ExternalWrench": {"start_s", "end_s"},
+    "CarriedPayload": {"end_s"}, "EffortLimit": {"limit"}, "Event": {"direction"},
+    "ExternalWrench": {"start_s", "end_s"},
     "JointStopDamper": {"lower", "upper"}, "JointStopSpring": {"lower", "upper"}, "PID": {"effort_limit"},
     "PiecewisePolynomial.at": {"t"}, "Samples.at": {"t"},
     "Rollouts.outcome": {"run"}, "Robot.with_": {"lock", "armature"},
@@ -153,6 +154,7 @@ def examples(folder: Path) -> dict[str, Example]:
         "Plant.C": (plant.C, {"q": q, "v": v}),
         "Plant.M": (plant.M, {"q": q}),
         "Plant.N": (plant.N, {"t": 0.1, "q": q, "v": v}),
+        "Plant.at": (plant.at, {"t": 0.1}),
         "Plant.actuation": (plant.actuation, {"u": u}),
         "Plant.forward_dynamics": (plant.forward_dynamics, {"t": 0.1, "q": q, "v": v, "u": u}),
         "Plant.inverse_dynamics": (plant.inverse_dynamics, {"t": 0.1, "q": q, "v": v, "a": u}),
@@ -221,6 +223,9 @@ def examples(folder: Path) -> dict[str, Example]:
             },
         ),
         "DahlFriction": (rd.DahlFriction, {"bristle_stiffness": 90.0, "coulomb": [1.5, 1.2], "exponent": 1.5}),
+        "CarriedPayload": (
+            rd.CarriedPayload, {"payload": rd.Payload("pole", 0.5), "start_s": 0.1, "end_s": 0.5, "at_rest": True}
+        ),
         "RigidStops": (rd.RigidStops, stops | {"restitution": 0.5}),
         "LineDamper": (rd.LineDamper, strut | {"damping": 0.1}),
         "LineSpring": (rd.LineSpring, strut | {"stiffness": 10.0, "length": 0.2}),

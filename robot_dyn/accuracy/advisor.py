@@ -120,6 +120,8 @@ def advise(what: Setup | Plant | Dynamics, q0: Any = None, v0: Any = None, **opt
     """
     setup = setup_of("advise", what, {**starts(q0, v0), **options})
     plant, controller, duration = setup.plant, setup.controller, setup.duration_s
+    if plant.equation_of_motion.payloads:
+        raise QueryError("advise: carried_payload changes the bodies in the run; ask of plant.at(t), t in [s]")
     period = 0.0 if controller is None else controller.period_s
     loop = StateEquation(plant, None if controller is None else with_values(controller, {"period_s": 0.0})).in_a_mode
     states = _along(setup, loop)

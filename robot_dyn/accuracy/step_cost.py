@@ -30,6 +30,8 @@ from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import MOST_BYTES
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.trajectory import Ending
+from robot_dyn.simulation.transfers import Transfers
+from robot_dyn.simulation.watch import Watch
 
 RUNS = 4096  # side by side
 PER_STEP, PER_RUN = "step of RK4", "step of RK4 and run"
@@ -129,9 +131,9 @@ def instructions(made: Machine) -> int:
 
 def _alone(short: Setup, made: Machine) -> Way:
     def run() -> float:
-        steps = FixedStep(
-            short, made.equation, made.equations.functions, Fraction(1), made.loop, parameters=made.parameters
-        )
+        functions, equation = (made.equations.functions, made.parameters), made.equation
+        watch, transfers = Watch(short, equation), Transfers(equation)
+        steps = FixedStep(watch, transfers, lambda _: functions, Fraction(1), made.loop)
         began = process_time()
         record = steps.record()
         spent = process_time() - began

@@ -18,6 +18,7 @@ from robot_dyn.compiled.parameters import CONTROLLER, Part
 from robot_dyn.compiled.symbolic import Symbols, TraceError, column, every_branch
 from robot_dyn.control.controller import Controller
 from robot_dyn.control.reference import polynomial
+from robot_dyn.effects.carried_payload import CarriedPayload
 from robot_dyn.effects.effect import Active, Bound, Conservative, Effect, Stateful
 from robot_dyn.effects.plant import Plant
 from robot_dyn.effects.set_valued import Interval, Mode, SetValued
@@ -86,6 +87,10 @@ class Piece:
 
 
 def _traced(effect: Effect, values: Mapping[str, Array]) -> Effect:
+    if isinstance(effect, CarriedPayload):
+        if effect.carried is None:
+            raise TraceError(f"effect {effect.name} comes and goes: ask plant.at(t), t in [s], or simulate the plant")
+        return effect
     own: Any = with_values(effect, values)
     if isinstance(effect, SetValued):
         if own.held is None:

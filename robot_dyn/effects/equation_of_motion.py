@@ -15,6 +15,7 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.arithmetic import Array
+from robot_dyn.effects.carried_payload import CarriedPayload
 from robot_dyn.effects.effect import Bound, Conservative, Effect, Force, Stateful
 from robot_dyn.effects.set_valued import SetValued, settled
 from robot_dyn.errors import EffectError
@@ -45,6 +46,11 @@ class EquationOfMotion:
     def set_valued(self) -> tuple[SetValued, ...]:
         """The effects that may hold joints."""
         return tuple(effect for effect in self.effects if isinstance(effect, SetValued))
+
+    @cached_property
+    def payloads(self) -> tuple[CarriedPayload, ...]:
+        """The payloads that come and go."""
+        return tuple(effect for effect in self.effects if isinstance(effect, CarriedPayload))
 
     @cached_property
     def states(self) -> Mapping[int, slice]:

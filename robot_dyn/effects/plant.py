@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import isfinite
@@ -11,6 +11,7 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.arithmetic import FLOAT64, Arithmetic, Array
+from robot_dyn.effects.carried_payload import CarriedPayload, in_hand, known, robot_with
 from robot_dyn.effects.effect import Bound, Conservative, Effect, Force, Stateful
 from robot_dyn.effects.equation_of_motion import EquationOfMotion
 from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFriction
@@ -44,7 +45,7 @@ class Plant:
             raise EffectError(f"effects must be several, such as [rd.ViscousFriction(0.1)], got {shown(effects)}")
         parts = [part for effect in effects for part in (effect.parts if isinstance(effect, Effect) else (effect,))]
         for part in parts:
-            if not isinstance(part, Force | Bound):
+            if not isinstance(part, Force | Bound | CarriedPayload):
                 raise EffectError(
                     f"{shown(part)} is neither a Force nor a Bound, so nothing would evaluate it; subclass"
                     " Conservative, Dissipative, Active or Bound"
@@ -58,6 +59,29 @@ class Plant:
         """Its equation of motion, of arguments that are not checked."""
         return EquationOfMotion(self.dynamics, self.effects)
 
+    @cached_property
+    def _comes_and_goes(self) -> tuple[CarriedPayload, ...]:
+        """The payloads of which a run knows which are carried, and this plant does not."""
+        return tuple(each for each in self.effects if isinstance(each, CarriedPayload) and each.carried is None)
+
+    def at(self, t: float) -> Plant:
+        """The plant with the payloads that it carries at time t in [s] fixed to it; itself if none comes or goes.
+
+        Raises:
+            QueryError: If t is not a finite number.
+        """
+        t, payloads = number("t", t), self._comes_and_goes
+        if not payloads:
+            return self
+        held = [each.payload for each in payloads if in_hand(each, t)]
+        robot: Any = self.dynamics
+        others = [each for each in self.effects if each not in payloads]
+        return Plant(robot.with_(payload=held), others)
+
+    def _whenever(self, what: str) -> None:
+        if self._comes_and_goes:
+            raise EffectError(f"{what} depends on what is carried, and so on the time: ask plant.at(t), t in [s]")
+
     @property
     def forces(self) -> tuple[Force, ...]:
         """The effects that are torques."""
@@ -69,16 +93,18 @@ class Plant:
         return self.equation_of_motion.actuation(u)
 
     def M(self, q: Array) -> Array:
-        """Mass matrix, (..., n, n)."""
+        """Mass matrix, (..., n, n); EffectError if a payload comes or goes: ask that of `at` a time."""
+        self._whenever("M")
         return self.dynamics.M(q)
 
     def C(self, q: Array, v: Array) -> Array:
-        """Coriolis matrix, (..., n, n)."""
+        """Coriolis matrix, (..., n, n); EffectError as of M."""
+        self._whenever("C")
         return self.dynamics.C(q, v)
 
     def N(self, t: float, q: Array, v: Array) -> Array:
         """Every force but actuation, as what must be overcome: N = ∂V/∂q − Σ τ_effect, (..., n)."""
-        return self._finite(self.equation_of_motion.N(q, self.torque(t, q, v)))
+        return self._finite(self.at(t).equation_of_motion.N(q, self.torque(t, q, v)))
 
     def torque(self, t: float, q: Array, v: Array) -> Array:
         """Σ τ_effect, the torque of all effects on the joints, (..., n); 0 without effects.
@@ -104,17 +130,17 @@ class Plant:
 
     def inverse_dynamics(self, t: float, q: Array, v: Array, a: Array) -> Array:
         """Actuation Υ = M a + C v + N that gives the acceleration a, (..., n)."""
-        return self._finite(self.equation_of_motion.inverse_dynamics(q, v, a, self.torque(t, q, v)))
+        return self._finite(self.at(t).equation_of_motion.inverse_dynamics(q, v, a, self.torque(t, q, v)))
 
     def forward_dynamics(self, t: float, q: Array, v: Array, u: Array) -> Array:
         """Acceleration under the actuation u, (..., n)."""
-        total = self.actuation(u) + self.torque(t, q, v)
-        if not self.equation_of_motion.set_valued:
-            return self.equation_of_motion.acceleration(q, v, total)
+        total, equation = self.actuation(u) + self.torque(t, q, v), self.at(t).equation_of_motion
+        if not equation.set_valued:
+            return equation.acceleration(q, v, total)
         q, v = self._states(q=q, v=v)
         batch, n = check_batches(q=q, v=v, u=total), self.dynamics.n
         rows = zip(*(np.broadcast_to(x, (*batch, n)).reshape(-1, n) for x in (q, v, total)), strict=True)
-        made = [self.equation_of_motion.acceleration(*row) for row in rows]
+        made = [equation.acceleration(*row) for row in rows]
         return np.array(made).reshape(*batch, n)
 
     @cached_property
@@ -137,6 +163,14 @@ class Plant:
         if not self._arithmetic.finite(result).all():
             raise OverflowedError("the arguments are so large that the result overflows")
         return result
+
+
+def carrying(plant: Plant, carried: Sequence[bool]) -> Plant:
+    """The plant of a run with these of its payloads in its bodies; its other effects are the same."""
+    payloads = plant.equation_of_motion.payloads
+    of = {each: known(each, taken) for each, taken in zip(payloads, carried, strict=True)}
+    effects = [of[each] if isinstance(each, CarriedPayload) else each for each in plant.effects]
+    return Plant(robot_with(plant.dynamics, payloads, carried), effects)
 
 
 def stated_friction(dynamics: Any) -> tuple[Effect, ...]:

@@ -8,6 +8,7 @@ from typing import Annotated, Literal, Union, get_args
 from pydantic import Field
 
 from robot_dyn.effects.actuator import ActuatorLag, EffortLimit
+from robot_dyn.effects.carried_payload import CarriedPayload
 from robot_dyn.effects.dahl import DahlFriction
 from robot_dyn.effects.dry_friction import DryFriction
 from robot_dyn.effects.effect import Effect
@@ -77,6 +78,33 @@ class Armature(Part):
     def edit(self, robot: Robot) -> Robot:
         """The robot with these drives."""
         return robot.with_(armature=self.inertia_kg_m2)
+
+
+class Carried(Acting):
+    """A rigid body on a link that is picked up and dropped: in M, C and N for start_s ≤ t < end_s."""
+
+    term = CarriedPayload.term
+
+    kind: Literal["carried_payload"]
+    frame: str
+    """The link that carries it."""
+    mass_kg: NotNegative
+    """Mass."""
+    com_m: Vector3 = Load.model_fields["com_m"].default
+    """Centre of mass, in the frame of the link."""
+    inertia_kg_m2: tuple[Vector3, Vector3, Vector3] = Load.model_fields["inertia_kg_m2"].default
+    """Inertia about the centre of mass, three rows, in axes parallel to the link's."""
+    start_s: NotNegative = 0.0
+    """When it is picked up; 0 if the arm starts with it."""
+    end_s: Positive | None = None
+    """When it is dropped."""
+    picked_up: Literal["at_rest", "at_speed_of_link"] = "at_rest"
+    """Whether it rests until it is picked up, an impact that loses energy, or moves with the link by then."""
+
+    def build(self, robot: Robot) -> tuple[Effect, ...]:
+        body = Payload(self.frame, self.mass_kg, self.com_m, self.inertia_kg_m2)
+        end = inf if self.end_s is None else self.end_s
+        return (CarriedPayload(body, self.start_s, end, self.picked_up == "at_rest"),)
 
 
 class Wrench(Acting):
@@ -149,6 +177,7 @@ ACTING = (
     declared_part("rigid_stops", RigidStops),
     Line,
     Wrench,
+    Carried,
     declared_part("effort_limit", EffortLimit),
     declared_part("actuator_lag", ActuatorLag),
 )  # fmt: skip

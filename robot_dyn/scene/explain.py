@@ -15,7 +15,7 @@ from robot_dyn.integrate.adaptive import ADAPTIVE
 from robot_dyn.model.units import in_words
 from robot_dyn.scene.control import LAWS, Control
 from robot_dyn.scene.declared import Acting, Declared
-from robot_dyn.scene.effects import ACTING, kind_of
+from robot_dyn.scene.effects import ACTING, Carried, kind_of
 from robot_dyn.scene.scene import Scene
 from robot_dyn.scene.schema import Part
 from robot_dyn.simulation.origin import edits_of_machine_code
@@ -24,6 +24,7 @@ from robot_dyn.simulation.state_equation import StateEquation
 
 _TERMS = {kind_of(part): part.term for part in ACTING}
 _BOUNDS = [kind_of(part) for part in ACTING if issubclass(part, Declared) and part.make in (EffortLimit, ActuatorLag)]
+_BODIES = [kind_of(Carried)]  # no torques
 _EDITS = {
     "gravity": "∂V/∂q in N, with V = −Σ m gᵀ p",
     "lock": "a joint held at a value, its link part of the link before",
@@ -35,7 +36,7 @@ _EDITS = {
 def explain(scene: Scene, setup: Setup) -> Iterator[str]:
     """The explanation, line by line."""
     named = {effect.kind for effect in scene.effect}
-    forces = [kind for kind in _TERMS if kind in named and kind not in _BOUNDS]
+    forces = [kind for kind in _TERMS if kind in named and kind not in _BOUNDS + _BODIES]
     gravity = ["∂V/∂q"] if "gravity" in named else []
     N = " ".join([*gravity, *(f"− τ_{kind}" for kind in forces)]).removeprefix("− ") or "0"
     N = f"−{N}" if not gravity and forces else N

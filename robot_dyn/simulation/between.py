@@ -116,7 +116,7 @@ def _states_of(equation: StateEquation, part: Any) -> slice | None:
 def _displacement(equation: StateEquation, path: Path, q: np.ndarray, k: int, torque: np.ndarray) -> float:
     """How far, at the end of the run, a torque during step k moves a joint: M⁻¹ τ h (T − t), in [rad] or [m]."""
     try:
-        a = np.linalg.solve(equation.plant.M(q[k]), torque)
+        a = np.linalg.solve(equation.plant.at(float(path.t[k])).M(q[k]), torque)
     except (RobotDynError, np.linalg.LinAlgError):
         return np.inf
     return float(np.abs(a).max() * (path.t[k + 1] - path.t[k]) * (path.t[-1] - path.t[k]))

@@ -113,6 +113,8 @@ def event_loop(
         while now[Now.SEGMENT] <= last:
             s = now[Now.SEGMENT]
             start, p = plan.starts[s], plan.parameters[s]
+            if plan.transfers[s] == 1:
+                return Ended.TRANSFER
             if now[Now.STEP] == 0:
                 if plan.ticks[s] == 1 and not act(f, runs, rules, start, plan.at_ticks[s]):
                     return Ended.TICK

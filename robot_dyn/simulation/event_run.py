@@ -36,6 +36,7 @@ from robot_dyn.simulation.stiffness import FIRST_LOOK, changes_over
 from robot_dyn.simulation.switching import Switching
 from robot_dyn.simulation.time_loop import Ended, Functions, Now, Rules
 from robot_dyn.simulation.trajectory import Ending, Outcome
+from robot_dyn.simulation.transfers import Transfers
 from robot_dyn.simulation.watch import DivergedError, Watch, one_step
 from robot_dyn.threshold import Threshold
 
@@ -77,6 +78,7 @@ class EventRun(Followed):
 
     Args:
         watch: Of the setup, and its state equation.
+        transfers: What it carries.
         made: Gives the functions of a state equation, for the loop, and their parameters (P,).
         mesh: Where steps end, (k,); None for error control.
         samples: Whether samples are kept.
@@ -92,14 +94,14 @@ class EventRun(Followed):
     first = 200
 
     def __init__(
-        self, watch: Watch, made: Made, mesh: np.ndarray | None,
+        self, watch: Watch, transfers: Transfers, made: Made, mesh: np.ndarray | None,
         machine_code: Advance | None = None,
         on_progress: Callable[[float], object] | None = None, observer: Observer | None = None,
         in_python: Functions | None = None, samples: bool = True, most: float = inf,
         thresholds: bool = True, chooses: bool = False,
     ) -> None:  # fmt: skip
         setup, equation, self.most, self._look = watch.setup, watch.equation, most, FIRST_LOOK if chooses else 0
-        self.watch, self.plan, self.in_python = watch, plan_of(setup), in_python
+        self.watch, self.transfers, self.plan, self.in_python = watch, transfers, plan_of(setup), in_python
         self.setup, self.equation, self.made, self.samples = setup, equation, made, samples
         self.on_progress, self.observer, self.compiled = on_progress, observer, machine_code is not None
         n, m = equation.plant.dynamics.n, equation.size
@@ -219,6 +221,8 @@ class EventRun(Followed):
         where = f"at t = {t}, max |y| = {np.abs(y).max():.3g}: y grows without bound, or tolerances are too tight"
         if ended is Ended.EVENT:
             self._event(t, y)
+        elif ended is Ended.TRANSFER:
+            self._transfer(int(self.now[Now.SEGMENT]), y)
         elif ended is Ended.TICK:
             s = int(self.now[Now.SEGMENT])
             y, held = self.watch.tick(float(self.plan.starts[s]), y)
@@ -248,8 +252,9 @@ class EventRun(Followed):
 
     def _change_mode(self) -> None:
         """Let the functions be those of the sides that the switching functions are on."""
-        if self.switching.thresholds or self.switching.dropped or self.switching.modes is not None:
-            self.functions, parameters = self.made(self.switching.on(self.switches.sides))
+        switching = self.switching
+        if switching.thresholds or switching.dropped or switching.modes is not None or self.transfers.any:
+            self.functions, parameters = self.made(switching.on(self.switches.sides))
             self.runs.own[self.rules.held :, 0] = parameters
         if not self.compiled:
             self.functions = self._lenient(self.functions)
@@ -287,6 +292,23 @@ class EventRun(Followed):
         assert modes is not None
         self.runs.y[:, 0], happened = modes.after(t, y, held, guard)
         self.events = sorted([*self.events, *happened], key=lambda each: each.t)
+        self._watch_anew(t, held)
+        if self.setup.integrator.needs_jacobian:
+            self.control[At.NEXT] = 0.0
+        self._change_mode()
+
+    def _transfer(self, s: int, y: np.ndarray) -> None:
+        """Go on with what is carried from the start of a segment on."""
+        t, held = float(self.plan.starts[s]), self.runs.own[: self.rules.held, 0] if self.rules.held else None
+        y, happened = self.transfers.over(t, y)
+        self.equation = self.watch.equation = self.transfers.equation
+        self.switching = self.switching.of(self.equation)
+        if (modes := self.switching.modes) is not None:
+            y, more = modes.after(t, y, held, None)
+            happened += more
+        self.runs.y[:, 0] = y
+        self.events += happened
+        self.plan.transfers[s] = 0
         self._watch_anew(t, held)
         if self.setup.integrator.needs_jacobian:
             self.control[At.NEXT] = 0.0

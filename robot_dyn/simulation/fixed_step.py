@@ -13,7 +13,7 @@ from typing import cast, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import FLOAT64, Array
+from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.errors import RobotDynError
 from robot_dyn.foreign import is_mistake
 from robot_dyn.integrate.integrator import Integrator
@@ -27,13 +27,13 @@ from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.state_functions import interpreted, system
 from robot_dyn.simulation.time_loop import WATCHED, Ended, Functions, Now, Records, Rules, Runs, time_loop
 from robot_dyn.simulation.trajectory import Ending, Outcome
+from robot_dyn.simulation.transfers import Transfers
 from robot_dyn.simulation.watch import DivergedError, Watch, one_step
 
 _DOUBTFUL = 1e6  # of Σ |y| in machine code, which does not see that M becomes singular
 
-_NONE = np.zeros(0)
-
 Advance = Callable[..., int]
+Made = Callable[[StateEquation], tuple[Functions, np.ndarray]]
 
 
 @final
@@ -41,27 +41,29 @@ class FixedStep(Followed):
     """A run on its way.
 
     Args:
-        setup: What to run.
-        motion: Its equation of motion.
-        functions: The same, for the loop.
+        watch: Of the setup, and its state equation.
+        transfers: What it carries.
+        made: Gives the functions of a state equation, for the loop, and their parameters (P,).
         pace: Length of a step, in steps of the setup; 1 keeps samples.
         machine_code: The time loop of the method as machine code; then the functions are, too.
         on_progress: Called with the time reached, at each step or some ten times a second.
         observer: Sees each step.
-        parameters: Of the functions, (P,).
     """
 
     first = 1000
 
     def __init__(
-        self, setup: Setup, equation: StateEquation, functions: Functions, pace: Fraction,
+        self, watch: Watch, transfers: Transfers, made: Made, pace: Fraction,
         machine_code: Advance | None = None, on_progress: Callable[[float], object] | None = None,
-        observer: Observer | None = None, parameters: Array = _NONE,
+        observer: Observer | None = None,
     ) -> None:  # fmt: skip
+        setup, equation = watch.setup, watch.equation
         method = cast(Integrator, setup.integrator)
-        self.setup, self.equation, self.functions, self.compiled = setup, equation, functions, machine_code is not None
+        self.setup, self.equation, self.compiled = setup, equation, machine_code is not None
+        self.transfers, self.made, self.events = transfers, made, []
+        self.functions, parameters = made(equation)
         self.on_progress, self.observer = on_progress, observer
-        self.segments, self.plan, self.watch = paced(setup.segments, pace), plan_of(setup, pace), Watch(setup, equation)
+        self.segments, self.plan, self.watch = paced(setup.segments, pace), plan_of(setup, pace), watch
         n, m = equation.plant.dynamics.n, equation.size
         held = n if equation.sampled else 0
         self.start = equation.start(setup.q0, setup.v0)
@@ -137,6 +139,12 @@ class FixedStep(Followed):
             y, held = self.watch.tick(t, y)
             self.runs.y[:, 0], self.runs.own[: self.rules.held, 0] = y, held
             self.plan.ticks[s] = 0
+        elif ended is Ended.TRANSFER:
+            self.runs.y[:, 0], happened = self.transfers.over(t, y)
+            self.events += happened
+            self.equation = self.watch.equation = self.transfers.equation
+            self.functions, self.runs.own[self.rules.held :, 0] = self.made(self.equation)
+            self.plan.transfers[s] = 0
         elif ended is Ended.DOUBTFUL:
             self._step(s, t, y)
         else:
@@ -178,7 +186,7 @@ class FixedStep(Followed):
         path = Path(self._keys(at), self._times(at), shared[:, :m])
         return Record(
             outcome, self._times(kept.place[:rows]), kept.y[:rows, :, 0], kept.made[:rows, :, 0], path, path,
-            int(self.now[Now.STEPS]), int(self.now[Now.EVALUATIONS]), float(self.runs.peak[0]),
+            int(self.now[Now.STEPS]), int(self.now[Now.EVALUATIONS]), float(self.runs.peak[0]), tuple(self.events),
         )  # fmt: skip
 
 

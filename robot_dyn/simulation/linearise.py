@@ -40,6 +40,7 @@ def linearise(
     """
     if not isinstance(plant, Plant):
         plant = Plant(plant)
+    plant = plant.at(t)
     names, n = plant.dynamics.joint_names, plant.dynamics.n
     q, v = one_state("q", q, names), one_state("v", np.zeros(n) if v is None else v, names)
     u = plant.inverse_dynamics(t, q, v, np.zeros(n)) if u is None else one_state("u", u, names)

@@ -165,7 +165,8 @@ class Modes:
     def _work(self, stops: RigidStops) -> int:
         """The entry of y that is the work of stops."""
         works = [each for each in self.equation.plant.forces if not isinstance(each, Conservative)]
-        return self.equation.size - len(works) + next(i for i, each in enumerate(works) if each is stops)
+        first = self.equation.size - len(self.equation.sources) + 1
+        return first + next(i for i, each in enumerate(works) if each is stops)
 
     def _load(self, t: float, y: np.ndarray, held: Array | None) -> np.ndarray:
         """All torques but the reactions, less C v and ∂V/∂q."""

@@ -135,7 +135,7 @@ def _remedy(setup: Setup, t: float, q: np.ndarray, period: float) -> str:
         with np.errstate(all="ignore"):
             u = [controller.torque(t, q, v + side * dv, z) for dv in 1e-6 * np.eye(n) for side in (1, -1)]
             slope = np.array([(plus - minus) / 2e-6 for plus, minus in zip(u[::2], u[1::2], strict=True)]).T
-            ratio = float(np.abs(np.linalg.eigvals(np.linalg.solve(setup.plant.M(q), -slope))).max()) * period
+            ratio = float(np.abs(np.linalg.eigvals(np.linalg.solve(setup.plant.at(t).M(q), -slope))).max()) * period
     except (RobotDynError, np.linalg.LinAlgError):
         return general
     if not 1 < ratio < np.inf:

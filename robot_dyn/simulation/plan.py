@@ -36,9 +36,16 @@ def plan_of(setup: Setup, pace: Fraction = Fraction(1)) -> Plan:
         np.append((ends - starts[:-1]) / counts, 0.0),
         np.append(counts, 1).astype(np.int64),
         np.append(ticks, _sampled(setup)).astype(np.int64),
+        np.append(np.isin(starts[:-1], _transfers(setup)), False).astype(np.int64),
         np.vstack([inside, at_ticks[-1:]]),
         at_ticks,
     )
+
+
+def _transfers(setup: Setup) -> list[float]:
+    """Times after the start at which payloads are picked up or dropped, in [s]."""
+    payloads = setup.plant.equation_of_motion.payloads
+    return [t for each in payloads for t in each.switches if t > 0]
 
 
 def _sampled(setup: Setup) -> bool:

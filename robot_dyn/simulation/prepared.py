@@ -20,6 +20,7 @@ from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.state_functions import interpreted
 from robot_dyn.simulation.time_loop import Functions
+from robot_dyn.simulation.transfers import Transfers
 from robot_dyn.simulation.watch import Watch
 
 if TYPE_CHECKING:
@@ -52,13 +53,14 @@ def prepared(
         thresholds: Whether steps end at the thresholds of the effects.
         chooses: Whether it gives up with a StiffError where another method is to make the run.
     """
-    watch = Watch(setup, equation)
+    transfers = Transfers(equation)
+    watch = Watch(setup, transfers.equation)
 
     def made(of: StateEquation) -> tuple[Functions, np.ndarray]:
         if machine is None:
             return interpreted(of, watch), np.zeros(0)
         functions = machine.in_python if machine.loop is None else machine.equations.functions
-        return functions, machine.parameters if of is equation else machine.with_parts(of.plant.effects, of.controller)
+        return functions, machine.parameters if of is equation else machine.of(of)
 
     loop, in_python = (None, None) if machine is None else (machine.loop, machine.in_python)
     if setup.finds_events:
@@ -66,7 +68,6 @@ def prepared(
         if not setup.integrator.controls_error:
             ends = mesh(setup.segments, cast(Fraction, pace))
         return EventRun(
-            watch, made, ends, loop, on_progress, observer, in_python, samples, most, thresholds, chooses
+            watch, transfers, made, ends, loop, on_progress, observer, in_python, samples, most, thresholds, chooses
         )  # fmt: skip
-    functions, parameters = made(equation)
-    return FixedStep(setup, equation, functions, cast(Fraction, pace), loop, on_progress, observer, parameters)
+    return FixedStep(watch, transfers, made, cast(Fraction, pace), loop, on_progress, observer)

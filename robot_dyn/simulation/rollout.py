@@ -106,6 +106,11 @@ def rollouts(
             f"rollouts: {held[0].name} holds joints and lets them go, and steps in lock step do not end there; take"
             " integrator='DOP853', by which runs go one after the other"
         )
+    if setup.plant.equation_of_motion.payloads and not setup.integrator.controls_error:
+        raise QueryError(
+            "rollouts: carried_payload changes the state at once, and runs in lock step do not stop there; take"
+            " integrator='DOP853', by which runs go one after the other"
+        )
     if setup.events:
         raise QueryError("rollouts: events has no effect, since runs in lock step are not cut; simulate takes them")
     if params is not None and not (isinstance(params, Mapping) and all(isinstance(name, str) for name in params)):

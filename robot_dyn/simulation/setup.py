@@ -112,6 +112,7 @@ class Setup(Value):
                 " or integrator='DOP853'"
             )
         self._check_set_valued()
+        self._check_payloads()
         self._check_torques()
         self._check_events()
         self.plant.actuation(np.zeros(len(names)))
@@ -145,6 +146,14 @@ class Setup(Value):
                 i = int(np.argmax(depth))
                 name, which = self.plant.dynamics.joint_names[i], "lower" if each.touched(self.q0)[i] < 0 else "upper"
                 raise QueryError(f"q0: {name!r} is {depth[i]:.3g} beyond its {which} stop; start between the stops")
+
+    def _check_payloads(self) -> None:
+        """That the state is one of velocities where payloads come and go."""
+        if self.plant.equation_of_motion.payloads and self.integrator.canonical:
+            raise QueryError(
+                f"carried_payload: what is picked up or dropped changes momenta, which {self.integrator.name}"
+                " integrates; take integrator='DOP853'"
+            )
 
     def _check_torques(self) -> None:
         """That what the controller and each effect return at the start is one number for each joint."""

@@ -19,7 +19,7 @@ from robot_dyn.arithmetic import Array
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.effect import Bound, Conservative, Stateful
 from robot_dyn.effects.equation_of_motion import EquationOfMotion
-from robot_dyn.effects.plant import Plant
+from robot_dyn.effects.plant import Plant, carrying
 from robot_dyn.effects.set_valued import Mode, SetValued
 from robot_dyn.errors import RobotDynError
 from robot_dyn.foreign import call
@@ -27,6 +27,7 @@ from robot_dyn.model.dynamics import acceleration
 from robot_dyn.simulation.event import Event
 
 CONTROL = "control"
+PICK_UP = "pick_up"  # the work of impacts where payloads at rest are picked up
 CONTROLLER = -1  # among the parts that switch, beside the numbers of the effects
 
 
@@ -54,8 +55,24 @@ class StateEquation:
 
     @cached_property
     def sources(self) -> tuple[str, ...]:
-        """Names of the works in y: control, then effects; a second effect of a name gets a number."""
-        return numbered(CONTROL, *(x.name for x in self.plant.forces if not isinstance(x, Conservative)))
+        """Names of the works in y: control, then effects, of a second effect of a name with a number.
+
+        Payloads that come and go, and the impacts of their picking up, work at once, not by a power: they come last.
+        """
+        payloads = self.equation_of_motion.payloads
+        impacts = [PICK_UP] * any(each.at_rest and each.start_s > 0 for each in payloads)
+        return numbered(CONTROL, *self._working, *(x.name for x in payloads), *impacts)
+
+    @cached_property
+    def _working(self) -> list[str]:
+        """Names of the forces that work by a power."""
+        return [x.name for x in self.plant.forces if not isinstance(x, Conservative)]
+
+    @cached_property
+    def of_payloads(self) -> range:
+        """Numbers of the works of payloads that come and go."""
+        first = 1 + len(self._working)
+        return range(first, first + len(self.equation_of_motion.payloads))
 
     @cached_property
     def state_size(self) -> int:
@@ -74,7 +91,9 @@ class StateEquation:
 
     @cached_property
     def in_a_mode(self) -> StateEquation:
-        """The equation in a mode, one in which nothing is held; itself where nothing may be."""
+        """The equation in a mode, one in which nothing is held and all payloads are carried; or itself."""
+        if payloads := [each for each in self.equation_of_motion.payloads if each.carried is None]:
+            return replace(self, plant=carrying(self.plant, [True] * len(payloads))).in_a_mode
         if not self.impulses:
             return self
         n = self.plant.dynamics.n
@@ -209,8 +228,13 @@ class StateEquation:
         rates = result[end : end + equation.state_size]
         for place, rate in equation.state_rates(t, q, v, u, reached, of_effects):
             rates[place] = rate
-        result[W:] = equation.powers(v, u, torques)
+        result[W:] = self._powers(v, u, torques)
         return result, u
+
+    def _powers(self, v: Array, u: Array, torques: list[Array]) -> list[Array]:
+        """Of each source; those that work at once have none."""
+        powers = self.equation_of_motion.powers(v, u, torques)
+        return powers + [0.0] * (len(self.sources) - len(powers))
 
     @cached_property
     def limited(self) -> tuple[int, ...]:
@@ -255,7 +279,7 @@ class StateEquation:
     def powers(self, t: float, q: Array, v: Array, z: Array, u: Array) -> list[float]:
         """Power of the control and of the effects that work, in the order of `sources`."""
         equation = self.equation_of_motion
-        return equation.powers(v, u, equation.torques(t, q, v, z=z[self.state_size :]))
+        return self._powers(v, u, equation.torques(t, q, v, z=z[self.state_size :]))
 
 
 def numbered(*names: str) -> tuple[str, ...]:

@@ -54,6 +54,13 @@ class Switching:
         self.guards: list[Guard] = []
         self._known: dict[bytes, StateEquation] = {}
 
+    def of(self, equation: StateEquation) -> Switching:
+        """The same of the equation with other bodies, in the mode that is known."""
+        modes = None if self.modes is None else Modes(equation)
+        if modes is not None and self.modes is not None:
+            modes.mode = self.modes.mode
+        return Switching(equation, self.dropped, modes)
+
     @property
     def quantities(self) -> frozenset[Quantity]:
         """All that pass a threshold."""

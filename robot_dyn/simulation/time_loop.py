@@ -32,6 +32,7 @@ class Ended(IntEnum):
     NOT_FINITE = 6  # the rate at y
     FAST = 7  # a joint moves without bound; y is the state after the step
     EVENT = 8  # y is the state at it
+    TRANSFER = 9  # a payload is picked up or dropped; y is the state before it
 
 
 class Why(IntEnum):
@@ -90,6 +91,7 @@ class Plan(NamedTuple):
     Attributes:
         starts, lengths: When it starts and its step, (S,), in [s].
         counts, ticks: Its steps, and 1 where a sampled controller acts at its start, (S,).
+        transfers: 1 where a payload is picked up or dropped at its start, (S,).
         parameters: p of the state equation on it, (S, P).
         at_ticks: The same at its start alone.
     """
@@ -98,6 +100,7 @@ class Plan(NamedTuple):
     lengths: Array
     counts: Array
     ticks: Array
+    transfers: Array
     parameters: Array
     at_ticks: Array
 
@@ -191,6 +194,8 @@ def time_loop(step: Callable[..., int]) -> Callable[..., int]:
         while now[Now.SEGMENT] <= last:
             s = now[Now.SEGMENT]
             start, h, p = plan.starts[s], plan.lengths[s], plan.parameters[s]
+            if plan.transfers[s] == 1:
+                return Ended.TRANSFER
             if now[Now.STEP] == 0 and plan.ticks[s] == 1 and not act(functions, runs, rules, start, plan.at_ticks[s]):
                 return Ended.TICK
             while now[Now.STEP] < plan.counts[s]:

@@ -22,6 +22,8 @@ from robot_dyn.simulation.machine.machine import Machine
 from robot_dyn.simulation.machine.making import machine, machine_of_constants
 from robot_dyn.simulation.size import MOST_BYTES
 from robot_dyn.simulation.state_equation import StateEquation
+from robot_dyn.simulation.transfers import Transfers
+from robot_dyn.simulation.watch import Watch
 
 READY = np.array([0.3, 0.6, -0.4, -1.2, 0.5, 1.1, 0.2])
 
@@ -79,9 +81,9 @@ def _rk4(setup: rd.Setup) -> Any:
 
 def _one(setup: rd.Setup, made: Machine) -> Any:
     def run() -> float:
-        advance = FixedStep(
-            setup, made.equation, made.equations.functions, Fraction(1), made.loop, parameters=made.parameters
-        )
+        functions, equation = (made.equations.functions, made.parameters), made.equation
+        watch, transfers = Watch(setup, equation), Transfers(equation)
+        advance = FixedStep(watch, transfers, lambda _: functions, Fraction(1), made.loop)
         began = perf_counter()
         advance.record()
         return perf_counter() - began

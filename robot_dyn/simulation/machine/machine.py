@@ -17,7 +17,7 @@ from robot_dyn.compiled.cache import default_store
 from robot_dyn.compiled.identity import digest
 from robot_dyn.compiled.llvm import machine_code
 from robot_dyn.compiled.llvm.lock_step import write_function
-from robot_dyn.compiled.parameters import CONTROLLER, Parameter, Part, joined
+from robot_dyn.compiled.parameters import CONTROLLER, ROBOT, Parameter, Part, joined, parameters
 from robot_dyn.compiled.program import Program
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.effect import Effect
@@ -106,16 +106,31 @@ class Machine:
         """The values of the parameters, one row after the other."""
         return joined(self.known)
 
-    def with_parts(self, effects: Sequence[Effect], controller: Controller | None) -> np.ndarray:
-        """The values of the parameters where effects and controller have other coefficients."""
+    def with_parts(self, effects: Sequence[Effect], controller: Controller | None, dynamics: Any = None) -> np.ndarray:
+        """The values of the parameters where effects and controller have other coefficients, and bodies other numbers.
+
+        Args:
+            effects: As of the plant.
+            controller: As of the equation.
+            dynamics: A robot that carries something else; unless given, the same.
+        """
         of: dict[Part, Any] = {("effect", i): effect for i, effect in enumerate(effects)} | {CONTROLLER: controller}
         known = [
             replace(each, value=np.broadcast_to(getattr(of[each.part], each.key), each.value.shape))
-            if each.part in of
+            if each.part in of and getattr(of[each.part], each.key) is not None  # no mode is chosen yet
             else each
             for each in self.known
         ]
+        if dynamics is not None:
+            bodies = {each.key: each.value for each in parameters(dynamics, (), None, self.swept)}
+            known = [replace(each, value=bodies[each.key]) if each.part == ROBOT else each for each in known]
         return joined(known)
+
+    def of(self, equation: StateEquation) -> np.ndarray:
+        """The values of the parameters of a state equation with other numbers."""
+        plant = equation.plant
+        changes = bool(plant.equation_of_motion.payloads)
+        return self.with_parts(plant.effects, equation.controller, plant.dynamics if changes else None)
 
     def own(self, swept: Mapping[str, np.ndarray]) -> np.ndarray:
         """The numbers of W runs, (O, W): what is held, then row by row what is swept, (W, size) each, then the others.

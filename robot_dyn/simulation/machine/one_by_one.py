@@ -22,6 +22,7 @@ from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import samples, too_large
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.trajectory import Ending, Outcome, Statistics
+from robot_dyn.simulation.transfers import Transfers
 from robot_dyn.simulation.watch import Watch
 
 _Q, _V, _U, _WORK, _ENERGY = 0, 1, 3, 4, 6  # of what `columns` gives
@@ -95,11 +96,10 @@ class OneByOne:
         )
 
         def made(of: StateEquation) -> tuple[Any, np.ndarray]:
-            return code.equations.functions, code.parameters if of is equation else code.with_parts(
-                of.plant.effects, of.controller
-            )
+            return code.equations.functions, code.parameters if of is equation else code.of(of)
 
-        run = EventRun(Watch(setup, equation), made, None, code.loop, in_python=code.in_python)
+        transfers = Transfers(equation)
+        run = EventRun(Watch(setup, transfers.equation), transfers, made, None, code.loop, in_python=code.in_python)
         self.going.add(run)
         try:
             self.records[i] = run.record()

@@ -16,7 +16,7 @@ import numpy as np
 from robot_dyn.coefficients import declared
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.control.samples import Samples
-from robot_dyn.model.edits import Edits
+from robot_dyn.model.edits import Edits, Payload
 from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.state_equation import StateEquation
 
@@ -42,6 +42,8 @@ def _of(value: Any, objects: list[Any]) -> Any:
         return value
     if isinstance(value, tuple | list):
         return tuple(_of(each, objects) for each in value)
+    if isinstance(value, Payload):  # its numbers are those of the bodies
+        return "payload", value.frame
     if isinstance(value, np.ndarray):
         return value.dtype.str, value.shape, value.tobytes()
     robot = getattr(value, "robot", value)
