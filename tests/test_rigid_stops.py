@@ -180,6 +180,17 @@ def test_rollouts_are_the_runs_of_simulate() -> None:
         assert (runs.q[i] == one.q).all()
 
 
+def test_the_stops_of_the_file_are_the_limits_of_its_joints() -> None:
+    ur5 = rd.load("ur5")
+    (both,) = rd.Plant(ur5, [rd.RigidStops("urdf", "urdf")]).effects
+    (one,) = rd.Plant(ur5, [rd.RigidStops(-1.0, "urdf")]).effects
+    assert (both.lower == ur5.lower).all()
+    assert (both.upper == ur5.upper).all()
+    assert (one.upper == ur5.upper).all()
+    with pytest.raises(EffectError, match="must lie below"):
+        rd.Plant(ur5, [rd.RigidStops(7.0, "urdf")])
+
+
 def test_what_makes_no_sense_is_refused() -> None:
     with pytest.raises(EffectError, match="restitution must not be greater than 1"):
         rd.RigidStops(-1.0, 1.0, 1.5)

@@ -43,9 +43,11 @@ class RigidStops(SetValued):
         super().__post_init__()
         if isinstance(self.restitution, float | np.ndarray) and np.any(np.greater(self.restitution, 1)):
             raise EffectError(f"restitution must not be greater than 1, got {self.restitution}")
+        if isinstance(self.lower, str) or isinstance(self.upper, str):  # checked when the joints are known
+            return
         try:
             crossed = not np.all(np.less(self.lower, self.upper))
-        except (TypeError, ValueError):  # by name, or of other numbers of joints: checked when the joints are known
+        except (TypeError, ValueError):  # by name, or of other numbers of joints: so are these
             return
         if crossed:
             raise EffectError(f"lower stops must lie below upper ones, got {self.lower} and {self.upper}")
