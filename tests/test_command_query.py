@@ -135,6 +135,78 @@ def test_why_adds_up(given: str):
         }  # fmt: skip
 
 
+HELD = """robot = "planar_2r"
+duration_s = 1.0
+[start]
+q = [0.3, 0.4]
+[[effect]]
+kind = "gravity"
+[[effect]]
+kind = "dry_friction"
+level_N_m = 3.0
+static_N_m = {joint_1 = 4.0, joint_2 = 20.0}
+[[effect]]
+kind = "rigid_stops"
+lower_rad = {joint_1 = 0.3, joint_2 = -1.0}
+upper_rad = 1.0
+[control]
+kind = "pd"
+kp = 10.0
+kd = 1.0
+[reference]
+kind = "hold"
+q = [0.3, 0.5]
+"""
+
+
+def test_a_scene_is_asked_at_its_start_for_what_is_held_and_how_firmly(tmp_path: Path):
+    """Joint 1 lies on its stop and joint 2 sticks: λ = N − u, of which joint 2 could bear f_s either way."""
+    scene = tmp_path / "held.toml"
+    scene.write_text(HELD)
+    setup, robot = rd.read_scene(scene), rd.load("planar_2r")
+    u, N = np.array([0.0, 1.0]), robot.N([0.3, 0.4])
+    answer = document("query", scene, "--why", "joint_2")
+    assert answer["q"] == [0.3, 0.4]
+    assert answer["tau"] == pytest.approx(u, rel=1e-14)
+    assert answer["a"] == [0, 0]
+    one, two = answer["held"]
+    assert (one["joint"], one["by"]) == ("joint_1", ["dry_friction", "rigid_stops"])
+    assert (two["joint"], two["by"]) == ("joint_2", ["dry_friction"])
+    assert (one["load"], two["load"]) == pytest.approx(u - N, rel=1e-13)
+    assert (one["least"], one["most"]) == (None, 4.0)
+    assert (two["least"], two["most"]) == (-20.0, 20.0)
+    assert one["margin"] == pytest.approx(4.0 - one["load"])
+    assert two["margin"] == pytest.approx(20.0 - abs(two["load"]))
+    why = answer["why"]
+    assert why["at_rest"] == pytest.approx(two["load"], rel=1e-13)
+    shares = [share[cause] for share in why["shares"] for cause in ("inertia", "coriolis", "gravity")]
+    assert sum(shares) + sum(why["effects"].values()) + why["at_rest"] == pytest.approx(1.0, abs=1e-12)
+    text = said("query", scene, "--why", "joint_2")
+    assert re.search(r"^joint_2 +dry_friction +-\d\S+ +-20 +20 ", text, re.M)
+    assert re.search(r"^dry friction and stops, at rest ", text, re.M)
+    assert [(each.joint, each.load) for each in setup.plant.held(0.0, setup.q0, setup.v0, u)] == [
+        ("joint_1", one["load"]), ("joint_2", two["load"])
+    ]  # fmt: skip
+
+
+def test_of_a_joint_that_breaks_away_the_friction_of_sliding_is_a_share(tmp_path: Path):
+    """Beside one that slides; their shares add up to u too."""
+    scene = tmp_path / "held.toml"
+    scene.write_text(HELD.replace("joint_2 = 20.0", "joint_2 = 3.0").replace("joint_1 = 0.3, joint_2", "joint_2"))
+    for joint, v in (("joint_1", "joint_2=0.2"), ("joint_1", "joint_2=-0.1")):
+        answer = document("query", scene, "--v", v, "--why", joint)
+        why = answer["why"]
+        shares = [share[cause] for share in why["shares"] for cause in ("inertia", "coriolis", "gravity")]
+        assert sum(shares) + sum(why["effects"].values()) + why["at_rest"] == pytest.approx(why["tau"], abs=1e-10)
+        assert abs(why["at_rest"]) == pytest.approx(3.0, rel=1e-10)
+
+
+@pytest.mark.parametrize("option", [["--effects", "urdf"], ["--lock", "joint_1=0"], ["--package-dir", "."]])
+def test_a_scene_states_its_own_edits(option: list[str], tmp_path: Path):
+    (tmp_path / "held.toml").write_text(HELD)
+    assert "is of a robot; a scene states its own" in refusal(["query", str(tmp_path / "held.toml"), *option])
+
+
 def test_query_and_why_as_text():
     text = said("query", "ur5", "--q", Q, "--why", "elbow_joint", "--effects", "urdf")
     for part in (

@@ -180,6 +180,20 @@ def test_rollouts_are_the_runs_of_simulate() -> None:
         assert (runs.q[i] == one.q).all()
 
 
+def test_an_impact_may_throw_a_joint_against_the_load_that_just_let_it_go() -> None:
+    """Joint 2 breaks away downwards at t = 0, as joint 1 strikes its stop, whose impact throws joint 2 upwards.
+
+    No energy is lost but by friction and the impact: the ledger closes to rounding.
+    """
+    plant = rd.Plant(ARM.with_(gravity=(0, 0, 0)), [rd.DryFriction([0, 2.0], [0, 2.5]), rd.RigidStops(-9.0, 0.5, 0.5)])
+    run = rd.simulate(
+        plant, [0.5, 0.4], [1.0, 0.0], duration_s=0.05, controller=lambda t, q, v: np.array([0.0, -6.0]), **OPTIONS
+    )
+    assert [each.t for each in run.events[:2]] == [0.0, 0.0]
+    assert run.events[1].v[1] > 3
+    assert run.ledger.closure <= 1e-12
+
+
 def test_the_stops_of_the_file_are_the_limits_of_its_joints() -> None:
     ur5 = rd.load("ur5")
     (both,) = rd.Plant(ur5, [rd.RigidStops("urdf", "urdf")]).effects

@@ -157,6 +157,7 @@ def examples(folder: Path) -> dict[str, Example]:
         "Plant.at": (plant.at, {"t": 0.1}),
         "Plant.actuation": (plant.actuation, {"u": u}),
         "Plant.forward_dynamics": (plant.forward_dynamics, {"t": 0.1, "q": q, "v": v, "u": u}),
+        "Plant.held": (plant.held, {"t": 0.1, "q": q, "v": v, "u": u}),
         "Plant.inverse_dynamics": (plant.inverse_dynamics, {"t": 0.1, "q": q, "v": v, "a": u}),
         "Plant.torque": (plant.torque, {"t": 0.1, "q": q, "v": v}),
         "RegularisedCoulombFriction": (rd.RegularisedCoulombFriction, {"friction": 0.1, "velocity_scale": [0.1, 0.2]}),

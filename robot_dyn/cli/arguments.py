@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from robot_dyn.model.robot import Robot
+    from robot_dyn.simulation.setup import Setup
 
 
 def load(
@@ -32,6 +33,17 @@ def load(
         expansion = None if xacro is None else dict(_name_and_value("--xacro", text) for text in xacro if text)
         robot = rd.load(name, package_dirs=package_dirs or (), xacro=expansion)
     return robot.with_(lock=assignments("--lock", lock)) if lock else robot
+
+
+def scene(what: str, given: Mapping[str, object]) -> Setup | None:
+    """The setup of a scene file; None of a robot. A scene states what it is of: QueryError if options do so too."""
+    import robot_dyn as rd
+
+    if not what.lower().endswith(".toml"):
+        return None
+    if of_robots := [name for name, value in given.items() if value]:
+        raise QueryError(f"{of_robots[0]}: is of a robot; a scene states its own, so leave it out")
+    return rd.read_scene(what)
 
 
 def assignments(option: str, texts: list[str]) -> dict[str, float]:

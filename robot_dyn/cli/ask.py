@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -11,6 +11,9 @@ from robot_dyn.cli import arguments, completion
 from robot_dyn.cli.app import Json, Lock, Name, PackageDir, Xacro, app, progress
 from robot_dyn.cli.terminal import say, say_json
 from robot_dyn.errors import QueryError, RobotDynError
+
+if TYPE_CHECKING:
+    import numpy as np
 
 
 @app.command("list")
@@ -46,7 +49,14 @@ def info(
 
 @app.command()
 def query(
-    robot: Name,
+    what: Annotated[
+        str,
+        typer.Argument(
+            metavar="ROBOT|SCENE.toml",
+            help="A robot; or a scene file, with its robot, effects and start.",
+            autocompletion=completion.robots,
+        ),
+    ],
     q: Annotated[
         str | None, typer.Option(help="Positions in rad or m: 0.1,-0.2,… or joint=0.1,…; 0 by default.")
     ] = None,
@@ -65,18 +75,38 @@ def query(
     xacro: Xacro = None,
     as_json: Json = False,
 ) -> None:
-    """Ask for M, C, N at a state, and for the torque of an acceleration or the acceleration of a torque."""
+    """Ask for M, C, N at a state, and for the torque of an acceleration or the acceleration of a torque.
+
+    Of a scene: at its start, under the actuation of its control; what dry friction and rigid stops hold is listed.
+    """
     from robot_dyn.cli import report
 
-    loaded = arguments.load(robot, lock, package_dir, xacro)
     if a is not None and tau is not None:
         raise QueryError("give --a or --tau, not both: one follows from the other")
-    state = {name: arguments.vector(f"--{name}", text, loaded.joint_names) for name, text in (("q", q), ("v", v))}
-    given = None if tau is None else arguments.vector("--tau", tau, loaded.joint_names)
-    answer = report.query(loaded, effects or "", **state, a=arguments.vector("--a", a, loaded.joint_names), tau=given)
+    setup = arguments.scene(
+        what, {"--effects": effects, "--lock": lock, "--package-dir": package_dir, "--xacro": xacro}
+    )
+    plant = rd.Plant(arguments.load(what, lock, package_dir, xacro), effects or ()) if setup is None else setup.plant
+    names = plant.dynamics.joint_names
+    at = setup.q0 if setup is not None and q is None else arguments.vector("--q", q, names)
+    speed = setup.v0 if setup is not None and v is None else arguments.vector("--v", v, names)
+    torque = None if tau is None else arguments.vector("--tau", tau, names)
+    if setup is not None and a is None and tau is None:
+        torque = _actuation(setup, at, speed)
+    answer = report.query(plant, at, speed, arguments.vector("--a", a, names), torque)
     if why is not None:
-        answer |= report.why(loaded, effects or "", answer, why)
+        answer |= report.why(plant, answer, why)
     say_json(answer) if as_json else say(*report.query_tables(answer))
+
+
+def _actuation(setup: rd.Setup, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """What the control of a setup does at t = 0, within the bounds of the plant, (n,)."""
+    from robot_dyn.simulation.state_equation import StateEquation
+
+    equation = StateEquation(setup.plant, setup.controller)
+    y, held = equation.tick(0.0, equation.start(q, v))
+    q, v, z, _ = equation.state(y)
+    return equation.actuation(0.0, q, v, z, held)
 
 
 @app.command()

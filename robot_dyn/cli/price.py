@@ -169,11 +169,9 @@ def _setup(
     package_dir: list[str] | None,
 ) -> rd.Setup:  # fmt: skip
     """The setup of a scene file, or of the free swing of a robot."""
-    if what.lower().endswith(".toml"):
-        given = {"--q": q, "--v": v, "--duration": duration, "--lock": lock, "--package-dir": package_dir}
-        if of_robots := [name for name, value in given.items() if value]:
-            raise QueryError(f"{of_robots[0]}: is of a robot; a scene states its own, so leave it out")
-        return rd.read_scene(what)
+    given = {"--q": q, "--v": v, "--duration": duration, "--lock": lock, "--package-dir": package_dir}
+    if setup := arguments.scene(what, given):
+        return setup
     import numpy as np
 
     robot = arguments.load(what, lock, package_dir)

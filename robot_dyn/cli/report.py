@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from math import isfinite
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from rich.table import Table
@@ -13,6 +13,7 @@ from rich.table import Table
 from robot_dyn.accuracy.compare import Comparison, compare
 from robot_dyn.coefficients import declared, with_values
 from robot_dyn.effects.effect import Force
+from robot_dyn.effects.hold import Hold
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import QueryError, nearest
 from robot_dyn.lagrange.breakdown import breakdown
@@ -22,6 +23,7 @@ from robot_dyn.model.quantity import PLANT, C, M
 from robot_dyn.model.robot import Robot
 from robot_dyn.model.units import in_words, unit, units
 from robot_dyn.simulation.ledger import largest
+from robot_dyn.simulation.state_equation import numbered
 from robot_dyn.simulation.trajectory import Trajectory
 from robot_dyn.validate import joint_values
 
@@ -53,14 +55,17 @@ def info(robot: Robot) -> Document:
     }
 
 
-def query(robot: Robot, effects: str, q: np.ndarray, v: np.ndarray, a: np.ndarray, tau: np.ndarray | None) -> Document:
-    """M, C, N and the effects at a state; tau from a, or a from tau where tau is given."""
-    plant = Plant(robot, effects or ())
+def query(plant: Plant, q: np.ndarray, v: np.ndarray, a: np.ndarray, tau: np.ndarray | None) -> Document:
+    """M, C, N and the effects of a plant of a robot at t = 0; tau from a, or a from tau where tau is given."""
+    robot: Any = plant.dynamics
+    held: tuple[Hold, ...] = ()
     if tau is None:
         tau = plant.inverse_dynamics(0.0, q, v, a)
     else:
-        a = plant.forward_dynamics(0.0, q, v, joint_values("tau", tau, robot.joint_names))
-    acting = {effect.name: effect.torque(robot, 0.0, q, v).tolist() for effect in plant.forces}
+        tau = plant.actuation(joint_values("tau", tau, robot.joint_names))
+        a, held = plant.forward_dynamics(0.0, q, v, tau), plant.held(0.0, q, v, tau)
+    torques = plant.equation_of_motion.torques(0.0, q, v, q.shape)
+    acting = {name: torque.tolist() for name, torque in zip(_names(plant), torques, strict=True)}
     state = {"q": q, "v": v, "a": a, "tau": tau}
     terms = {each.name: each.ask(plant, state | {"t": 0.0}) for each in (M, C, PLANT["N"])}
     return {
@@ -71,16 +76,21 @@ def query(robot: Robot, effects: str, q: np.ndarray, v: np.ndarray, a: np.ndarra
         "types": list(robot.joint_types),
         **{name: array.tolist() for name, array in (state | terms).items()},
         "effects": acting,
+        "held": [
+            {"joint": each.joint, "by": list(each.by)}
+            | {key: _finite(getattr(each, key)) for key in ("load", "least", "most", "margin")}
+            for each in held
+        ],
     }
 
 
-def why(robot: Robot, effects: str, answer: Document, joint: str) -> Document:
+def why(plant: Plant, answer: Document, joint: str) -> Document:
     """One joint's torque in an answer of `query`, split by link and cause.
 
     Raises:
         QueryError: If the joint is unknown.
     """
-    joints = answer["joints"]
+    joints, robot = answer["joints"], cast(Robot, plant.dynamics)
     if joint not in joints:
         raise QueryError(f"--why: no joint {joint!r}; {nearest(joint, joints)}")
     i = joints.index(joint)
@@ -89,11 +99,24 @@ def why(robot: Robot, effects: str, answer: Document, joint: str) -> Document:
         {"source": part.source, "inertia": part.M[i] @ a, "coriolis": part.C[i] @ v, "gravity": float(part.N[i])}
         for part in breakdown(Lagrangian(robot), q, v)
     ]
-    torques = {name: -torque[i] for name, torque in answer["effects"].items()}
-    forces = Plant(robot, effects or ()).forces
-    numbers = {force.name: list(in_words(_at(force, i), answer["types"][i : i + 1]).values()) for force in forces}
+    torques = {name: 0.0 - torque[i] for name, torque in answer["effects"].items()}
+    named = zip(_names(plant), plant.forces, strict=True)
+    numbers = {name: list(in_words(_at(force, i), answer["types"][i : i + 1]).values()) for name, force in named}
+    needed = sum(each["inertia"] + each["coriolis"] + each["gravity"] for each in shares) + sum(torques.values())
+    at_rest = answer["tau"][i] - needed if v[i] == 0 and _holding(plant) else 0.0
     share = {"joint": joint, "tau": answer["tau"][i], "unit": unit("tau", answer["types"][i])}
-    return {"why": share | {"shares": shares, "effects": torques, "coefficients": numbers}}
+    parts = {"shares": shares, "effects": torques, "at_rest": float(at_rest), "coefficients": numbers}
+    return {"why": share | parts}
+
+
+def _holding(plant: Plant) -> list[str]:
+    """Names of the effects that may hold joints."""
+    return [each.name for each in plant.equation_of_motion.set_valued]
+
+
+def _names(plant: Plant) -> tuple[str, ...]:
+    """Of its forces; a second one of a name gets a number."""
+    return numbered(*(force.name for force in plant.forces))
 
 
 def _at(force: Force, i: int) -> Force:
@@ -203,8 +226,21 @@ def query_tables(answer: Document) -> Iterator[Any]:
         yield from (f"  {_row(row)}  {joint}" for row, joint in zip(rows, joints, strict=True))
     if not answer["gravity_acts"]:
         yield f"\n{no_torque(tuple(answer['gravity']))} without effects"
+    yield from _held_table(answer)
     if "why" in answer:
         yield from _why_tables(answer["why"])
+
+
+def _held_table(answer: Document) -> Iterator[Any]:
+    """The joints that are held, each with its load and what it would bear."""
+    if not answer["held"]:
+        return
+    yield f"\nheld at rest [{units('tau', answer['types'])}]:"
+    table = _table("joint", "from", "load", "slides below", "slides above", "margin")
+    for each in answer["held"]:
+        numbers = ("—" if each[key] is None else f"{each[key]:.6g}" for key in ("load", "least", "most", "margin"))
+        table.add_row(each["joint"], ", ".join(each["by"]), *numbers)
+    yield table
 
 
 def _why_tables(why: Document) -> Iterator[Any]:
@@ -213,6 +249,7 @@ def _why_tables(why: Document) -> Iterator[Any]:
     rows = [(s["source"], s["inertia"], s["coriolis"], s["gravity"], 0.0) for s in why["shares"]]
     named = {effect: ", ".join((effect, *numbers)) for effect, numbers in why["coefficients"].items()}
     rows += [(named[effect], 0.0, 0.0, 0.0, torque) for effect, torque in why["effects"].items()]
+    rows += [("dry friction and stops, at rest", 0.0, 0.0, 0.0, why["at_rest"])] if why["at_rest"] else []
     inertia, coriolis, gravity, effect = (sum(column) for column in list(zip(*rows, strict=True))[1:])
     rows.append(("sum", inertia, coriolis, gravity, effect))
     for source, *terms in rows:
@@ -256,7 +293,7 @@ def demo_tables(robot: Robot) -> Iterator[Any]:
     yield from info_tables(robot)
     q, v, a = np.round(np.random.default_rng(7).uniform(-1, 1, (3, robot.n)), 2)
     yield "\nM(q) a + C(q, v) v + N(q) = tau at a general state\n"
-    yield from query_tables(query(robot, "", q, v, a, None))
+    yield from query_tables(query(Plant(robot), q, v, a, None))
     yield ""
     yield from comparison_tables([(robot.name, compare(robot, samples=20))], {})
 

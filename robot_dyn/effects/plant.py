@@ -15,7 +15,8 @@ from robot_dyn.effects.carried_payload import CarriedPayload, in_hand, known, ro
 from robot_dyn.effects.effect import Bound, Conservative, Effect, Force, Stateful
 from robot_dyn.effects.equation_of_motion import EquationOfMotion
 from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFriction
-from robot_dyn.errors import EffectError, OverflowedError, shown
+from robot_dyn.effects.hold import Hold, held
+from robot_dyn.errors import EffectError, OverflowedError, QueryError, shown
 from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.validate import check_batches, is_moderate, is_state, joint_values, number
 
@@ -142,6 +143,24 @@ class Plant:
         rows = zip(*(np.broadcast_to(x, (*batch, n)).reshape(-1, n) for x in (q, v, total)), strict=True)
         made = [equation.acceleration(*row) for row in rows]
         return np.array(made).reshape(*batch, n)
+
+    def held(self, t: float, q: Array, v: Array, u: Array) -> tuple[Hold, ...]:
+        """The joints that dry friction and rigid stops hold in one state, each with its load and what it would bear.
+
+        Args:
+            t: Time, in [s].
+            q: Position, (n,).
+            v: Velocity, (n,).
+            u: Actuation, (n,).
+
+        Raises:
+            QueryError: If an argument has another shape or is not finite.
+            EffectError: If which joints are held is not decided in the arithmetic of the dynamics.
+        """
+        q, v, u = self._states(q=q, v=v, u=u)
+        if any(x.shape != (self.dynamics.n,) for x in (q, v, u)):
+            raise QueryError(f"held is of one state: q, v and u must have shape ({self.dynamics.n},)")
+        return held(self.equation_of_motion, q, v, self.actuation(u) + self.torque(t, q, v))
 
     @cached_property
     def _arithmetic(self) -> Arithmetic:

@@ -129,6 +129,7 @@ class Modes:
             side = stops.touched(q)
             if (side * v > 0).any():
                 happened += self._struck(t, y, held, M, k, side)
+        forced = {i: way for i, way in forced.items() if v[i] == 0}  # the impact may have thrown it the other way
         self.mode = settled(self.effects, M, self._load(t, y, held), q, v, forced)[1]
         struck = {each.joint for each in happened}
         others = [i for i, name in enumerate(self.equation.plant.dynamics.joint_names) if name not in struck]

@@ -1,0 +1,61 @@
+"""How firmly dry friction and rigid stops hold a joint that rests: its load, and the loads at which it breaks away.
+
+    M a + C v + ∂V/∂q = u + Σ τ_effect + λ,    load = −λ
+
+λ solves the convex problem of all joints at once: the load of one depends on those that slide, and on those held.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from robot_dyn.effects.equation_of_motion import EquationOfMotion
+
+
+@final
+@dataclass(frozen=True)
+class Hold:
+    """A joint that is held at rest.
+
+    Attributes:
+        joint: Its name.
+        by: Names of the effects that can exert something on it.
+        load: The torque that they balance, in [N m] or [N].
+        least, most: The loads beyond which it breaks away; −inf or inf towards a stop.
+    """
+
+    joint: str
+    by: tuple[str, ...]
+    load: float
+    least: float
+    most: float
+
+    @property
+    def margin(self) -> float:
+        """How much the load may change, either way, before the joint breaks away, in [N m] or [N]; not negative."""
+        return max(min(self.load - self.least, self.most - self.load), 0.0)
+
+
+def held(equation: EquationOfMotion, q: np.ndarray, v: np.ndarray, total: np.ndarray) -> tuple[Hold, ...]:
+    """The joints that are held under a total torque; arguments are not checked.
+
+    Args:
+        equation: The equation of motion, of effects without a mode.
+        q: Position, (n,).
+        v: Velocity, (n,).
+        total: Υ + Σ τ_effect, (n,).
+    """
+    if not equation.set_valued:
+        return ()
+    a, reaction = equation.with_reaction(q, v, total)
+    intervals = [(each.name, each.at_rest(q)) for each in equation.set_valued]
+    least, most = (sum(interval[k] for _, interval in intervals) for k in (0, 1))
+    found = []
+    for i in np.flatnonzero((v == 0) & (a == 0) & (np.less(least, 0) | np.greater(most, 0))):
+        by = tuple(name for name, each in intervals if each.least[i] < 0 or each.most[i] > 0)
+        ends = -float(most[i]), -float(least[i])  # pyright: ignore[reportIndexIssue]
+        found.append(Hold(equation.dynamics.joint_names[i], by, -float(reaction[i]) + 0.0, *(x + 0.0 for x in ends)))
+    return tuple(found)
