@@ -86,7 +86,11 @@ def query(
     setup = arguments.scene(
         what, {"--effects": effects, "--lock": lock, "--package-dir": package_dir, "--xacro": xacro}
     )
-    plant = rd.Plant(arguments.load(what, lock, package_dir, xacro), effects or ()) if setup is None else setup.plant
+    plant = (
+        rd.Plant(arguments.load(what, lock, package_dir, xacro), effects or ())
+        if setup is None
+        else setup.plant.at(0.0)
+    )
     names = plant.dynamics.joint_names
     at = setup.q0 if setup is not None and q is None else arguments.vector("--q", q, names)
     speed = setup.v0 if setup is not None and v is None else arguments.vector("--v", v, names)
