@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from robot_dyn.arithmetic import radius as radius
     from robot_dyn.coefficients import coefficient as coefficient
     from robot_dyn.compiled.plant import Compiled as Compiled
+    from robot_dyn.control.block import Block as Block
     from robot_dyn.control.cartesian import circle as circle
     from robot_dyn.control.cartesian import line as line
     from robot_dyn.control.computed_torque import ComputedTorque as ComputedTorque
@@ -33,11 +34,18 @@ if TYPE_CHECKING:
     from robot_dyn.control.computed_torque import PDGravity as PDGravity
     from robot_dyn.control.controller import Controller as Controller
     from robot_dyn.control.controller import Stateless as Stateless
+    from robot_dyn.control.differences import Differences as Differences
     from robot_dyn.control.independent_joint import PD as PD
     from robot_dyn.control.independent_joint import PID as PID
     from robot_dyn.control.independent_joint import gains_from as gains_from
+    from robot_dyn.control.loop import Loop as Loop
+    from robot_dyn.control.low_pass import LowPass as LowPass
+    from robot_dyn.control.multirate import Multirate as Multirate
+    from robot_dyn.control.noise import Noise as Noise
     from robot_dyn.control.operational_space import OperationalSpace as OperationalSpace
     from robot_dyn.control.operational_space import task_dynamics as task_dynamics
+    from robot_dyn.control.quantisation import Quantisation as Quantisation
+    from robot_dyn.control.rate_limit import RateLimit as RateLimit
     from robot_dyn.control.reference import PiecewisePolynomial as PiecewisePolynomial
     from robot_dyn.control.reference import hold as hold
     from robot_dyn.control.reference import quintic as quintic
@@ -106,6 +114,7 @@ _HOME = {
     "Adaptive": "integrate.adaptive",
     "Advice": "accuracy.advisor",
     "Ball": "arithmetic",
+    "Block": "control.block",
     "Bound": "effects.effect",
     "CarriedPayload": "effects.carried_payload",
     "Certificate": "accuracy.certificate",
@@ -116,6 +125,7 @@ _HOME = {
     "Controller": "control.controller",
     "Cost": "accuracy.cost",
     "DahlFriction": "effects.dahl",
+    "Differences": "control.differences",
     "Dissipative": "effects.effect",
     "DryFriction": "effects.dry_friction",
     "Dynamics": "model.dynamics",
@@ -129,8 +139,12 @@ _HOME = {
     "LineDamper": "effects.line_spring_damper",
     "LineSpring": "effects.line_spring_damper",
     "LineSpringDamper": "effects.line_spring_damper",
+    "Loop": "control.loop",
+    "LowPass": "control.low_pass",
     "LuGreFriction": "effects.lugre",
     "ModelWarning": "errors",
+    "Multirate": "control.multirate",
+    "Noise": "control.noise",
     "OperationalSpace": "control.operational_space",
     "PD": "control.independent_joint",
     "PDGravity": "control.computed_torque",
@@ -139,6 +153,8 @@ _HOME = {
     "PiecewisePolynomial": "control.reference",
     "Plant": "effects.plant",
     "PrecisionWarning": "errors",
+    "Quantisation": "control.quantisation",
+    "RateLimit": "control.rate_limit",
     "RegularisedCoulombFriction": "effects.friction",
     "RigidStops": "effects.rigid_stops",
     "Robot": "model.robot",

@@ -8,9 +8,9 @@ that machine code takes it as an input.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from copy import copy
-from dataclasses import MISSING, Field, dataclass, fields, is_dataclass
+from dataclasses import MISSING, Field, dataclass, fields, is_dataclass, replace
 from functools import cache
 from typing import Any, final
 
@@ -162,10 +162,46 @@ def check_coefficients(part: Any, error: type[RobotDynError], *, resolved: bool 
 
 
 def with_values(part: Any, values: Mapping[str, Any]) -> Any:
-    """A copy of a part with other coefficients, such as symbols, which its own checks would refuse."""
+    """A copy of a part with other coefficients, such as symbols, which its own checks would refuse.
+
+    A name may be a path to a part of it, as "controller.kp" or "position.0.resolution".
+    """
     if not values:
         return part
-    made = copy(part)
+    made, inside = copy(part), _by_head(values)
     for name, value in values.items():
-        object.__setattr__(made, name, value)
+        if "." not in name:
+            object.__setattr__(made, name, value)
+    for head, below in inside.items():
+        object.__setattr__(made, head, _within(getattr(made, head), below, with_values))
     return made
+
+
+def rebuilt(part: Any, values: Mapping[str, Any]) -> Any:
+    """The same, made anew, so that its own checks refuse what has no meaning."""
+    inside = {head: _within(getattr(part, head), below, rebuilt) for head, below in _by_head(values).items()}
+    return replace(part, **{name: value for name, value in values.items() if "." not in name}, **inside)
+
+
+def value_at(part: Any, path: str) -> Any:
+    """The attribute of a part at a path."""
+    for name in path.split("."):
+        part = part[int(name)] if isinstance(part, tuple) else getattr(part, name)
+    return part
+
+
+def _by_head(values: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Of values by path, those inside a part: by its attribute, then by the rest of the path."""
+    made: dict[str, dict[str, Any]] = {}
+    for name, value in values.items():
+        head, _, rest = name.partition(".")
+        if rest:
+            made.setdefault(head, {})[rest] = value
+    return made
+
+
+def _within(part: Any, values: dict[str, Any], change: Callable[[Any, Mapping[str, Any]], Any]) -> Any:
+    if not isinstance(part, tuple):
+        return change(part, values)
+    inside = _by_head(values)
+    return tuple(change(each, inside[str(k)]) if str(k) in inside else each for k, each in enumerate(part))

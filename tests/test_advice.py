@@ -5,15 +5,18 @@ from __future__ import annotations
 import json
 from math import inf
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import robot_dyn as rd
+from robot_dyn.accuracy.sampled_loop import longest_period
 from robot_dyn.accuracy.stability import longest_step
 from tests.command import run
 from tests.estimates.advised import blow_up, limited
 from tests.estimates.scenes import RAIL
+from tests.loops import growth
 
 BLOCK = rd.Robot.from_text(RAIL)  # 1 kg
 OSCILLATOR = np.array([[0.0, 1.0], [-400.0, 0.0]])  # ω = 20/s
@@ -83,6 +86,56 @@ def test_runs_blow_up_where_the_limit_says() -> None:
     advice = rd.advise(scene.setup)
     limit = advice.longest_period_s
     assert 1 / 1.5 < limit / blow_up(scene, limit) < 1.5
+
+
+@pytest.mark.parametrize("late", [(0.0, 0.0), (0.0, 0.5), (1.0, 0.5), (0.4, 1.3), (2.0, 1.0)])
+@pytest.mark.parametrize("name", ["kinova", "xarm7"])
+def test_the_period_of_a_loop_with_delays_is_that_of_its_exact_map(name: str, late: tuple[float, float]) -> None:
+    """Within 1 %: limits are bisected to 1e-3, and 20 s may grow by 1e3."""
+    arm = rd.load(name)
+    q = 0.3 * np.cos(np.arange(arm.n) + 0.4)
+    inertia = np.diag(arm.M(q))
+    gains = 400 * inertia, 36 * inertia
+    law = rd.PD(rd.hold(q + arm.N(q) / gains[0]), *gains, 1e-3)  # which holds the arm where it is
+    loop = rd.Loop(law, measurement_delay=late[0], actuation_delay=late[1])
+    found = longest_period(rd.Plant(arm), loop, 0.0, np.concatenate([q, 0 * q]), 20.0)
+    assert growth(arm, q, gains, 0.99 * found, late) <= 1 + 1e-6  # gravity's slope is by differences
+    assert growth(arm, q, gains, 1.01 * found, late) > 1 + 1e-4
+
+
+def test_blocks_and_rates_of_a_loop_bound_its_period() -> None:
+    """A mass under PD by differences through a filter, with a slow spring beside: its exact map, over two periods."""
+    mass, kp, kd, slow, cutoff = 1.0, 100.0, 14.0, 60.0, 150.0
+    law = rd.PD(rd.hold([0.0]), kp, kd, 0.002)
+    both = rd.Multirate(law, rd.PD(rd.hold([0.0]), slow, 0.0, 0.004))
+    blocks: dict[str, Any] = {"velocity": [rd.Differences(), rd.LowPass(cutoff, 1)], "position": rd.Quantisation(1e-4)}
+    loop = rd.Loop(both, **blocks, actuation=[rd.RateLimit(9.0), rd.Noise(0.1)], measurement_delay=1.0)
+    found = longest_period(rd.Plant(BLOCK), loop, 0.0, np.zeros(2), 20.0)
+
+    def radius(T: float) -> float:
+        """Of (q, v, q̂, the difference's q̂₋, the filter's y₋ and x₋, the slow torque)."""
+        K = np.tan(cutoff * T / 2)
+        made = np.eye(7)
+        for k in range(2):
+            rate = np.array([0, 0, 1 / T, -1 / T, 0, 0, 0])
+            y = (K * (rate + np.eye(7)[5]) + (1 - K) * np.eye(7)[4]) / (1 + K)
+            late = np.eye(7)[2]
+            held = -slow * late if k == 0 else np.eye(7)[6]
+            u = (-kp * late - kd * y + held) / mass
+            q, v = np.eye(7)[:2]
+            made = np.array([q + T * v + T * T / 2 * u, v + T * u, q, late, y, rate, held]) @ made
+        return float(np.abs(np.linalg.eigvals(made)).max())
+
+    assert radius(0.99 * found) <= 1 + 1e-9
+    assert radius(1.01 * found) > 1 + 1e-4
+
+
+def test_a_loop_that_no_period_makes_stable_says_so() -> None:
+    loop = rd.Loop(rd.PD(rd.hold([0.0]), 1e4, 20.0, 1e-3), velocity=rd.LowPass(5.0), actuation=rd.LowPass(30.0))
+    advice = rd.advise(BLOCK, [0.1], duration_s=50.0, controller=loop)
+    assert advice.longest_period_s == 0.0
+    assert not advice.stable
+    assert "unstable, as every period is: take lower gains, or less delay" in advice.text
 
 
 def test_a_step_that_is_short_enough_is_told_with_its_error() -> None:

@@ -32,6 +32,11 @@ def values() -> dict[str, Any]:
     run, runs = rd.simulate(setup), rd.rollouts(setup, q0=[Q, Q + 0.1], params={"kp": [1.0, 2.0]})
     spring, damper = rd.joint_stops([-1.0, -1.0], [1.0, 1.0])
     strut = rd.LineSpringDamper("tip", None, stiffness=9.0, damping=1.0, length=0.3)
+    loop = rd.Loop(
+        rd.Multirate(rd.PD(PLAN, [1.0, 2.0], 1.0, 0.01), rd.PD(PLAN, 1.0, 1.0, 0.02)),
+        [rd.Noise([0.1, 0.2]), rd.Quantisation(0.1)], [rd.Differences(), rd.LowPass(9.0)],
+        rd.RateLimit([1.0, 2.0]), 1.5,
+    )  # fmt: skip
     made = [
         rd.Event(height), rd.Threshold(0, 0.5, "upper stop", "touched", "left"),
         rd.Adaptive(), rd.Ball(100), rd.compare(ARM, samples=2), rd.Payload("tip", 1.0), ARM, rd.Lagrangian(ARM), plant,
@@ -44,6 +49,7 @@ def values() -> dict[str, Any]:
         rd.ActuatorLag([0.1, 0.2]), rd.LuGreFriction(9.0, 1.0, 1.0, [1.0, 2.0], 2.0, 0.1),
         rd.DahlFriction(9.0, [1.0, 2.0], 1.5), rd.CarriedPayload(rd.Payload("tip", 1.0)),
         rd.Samples([0.0, 1.0, 2.0], np.ones((3, 2))), LINE,
+        loop, loop.controller, *loop.position, *loop.velocity, *loop.actuation,
         setup, run, runs, run.ledger, run.error, run.statistics, run.outcome, ARM.couplings, ARM.edits,
         rd.task_dynamics(ARM, Q, Q, "tip", rows=(0, 2)), rd.method("rk4"), rd.method("gauss_4"), rd.method("sdirk_3"),
         rd.WorkPrecision("arm", (), "rad", 1.0, Reference(Q, Q, 1e-12, ("a", "b"), 1.0), (), (), {}, 1.0, 1.0),

@@ -38,8 +38,10 @@ RESULTS = {
     "WorkPrecision",
 }  # made by the library: their constructors take what it computed
 # What time loops and traces call, with numbers that were checked before, or symbols.
-INTERFACES = (Effect, Controller, Arithmetic)
-FOR_LOOPS = {name for kind in (Force, Conservative, Bound, Stateful, Controller, Arithmetic) for name in dir(kind)}
+INTERFACES = (Effect, Controller, rd.Block, Arithmetic)
+FOR_LOOPS = {
+    name for kind in (Force, Conservative, Bound, Stateful, Controller, rd.Block, Arithmetic) for name in dir(kind)
+}
 FOR_LOOPS |= {"task_acceleration", "in_mode", "at_rest", "sliding", "touched", "snapped", "beyond_by"}
 LAX = {  # arguments that may be infinite or unknown, or of any shape
     "ExternalWrench.acts": {"t"},
@@ -111,6 +113,7 @@ def examples(folder: Path) -> dict[str, Example]:
     strut = {"frame": "pole", "other_frame": "cart", "point": [0.1, 0.2, 0.3], "other_point": [0.4, 0.2, 0.1]}
     pair = {"model": robot, "reference": hold, "kp": 9.0, "kd": [6.0, 2.0], "period_s": 0.01}
     points, eye = [q, u, v], np.eye(3)
+    sampled = rd.PD(hold, 9.0, 6.0, 0.01)
     path: Any = rd.line([0.1, 0.2, 0.3], [0.4, 0.2, 0.1], 1.0)
     return made | {
         "Adaptive": (rd.Adaptive, {"method": "Rosenbrock", "rtol": 1e-8, "atol": 1e-9, "max_step_s": 0.5}),
@@ -121,6 +124,7 @@ def examples(folder: Path) -> dict[str, Example]:
         "Compiled": (rd.Compiled, {"robot_or_plant": robot, "dtype": "float64", "threads": 1, "cache": False}),
         "ComputedTorque": (rd.ComputedTorque, pair),
         "ActuatorLag": (rd.ActuatorLag, {"time_constant": [0.1, 0.2]}),
+        "Differences": (rd.Differences, {}),
         "DryFriction": (rd.DryFriction, {"level": [1.0, 2.0], "static": [1.5, 2.0], "stribeck_velocity": 0.1}),
         "EffortLimit": (rd.EffortLimit, {"limit": [1.0, 2.0]}),
         "Event": (rd.Event, {"function": lambda t, q, v: 1.0, "direction": 1, "terminal": True, "name": "high"}),
@@ -131,6 +135,16 @@ def examples(folder: Path) -> dict[str, Example]:
         "ExternalWrench.acts": (rd.ExternalWrench("pole", np.ones(6)).acts, {"t": 0.1}),
         "ExternalWrench.at": (rd.ExternalWrench("pole", np.ones(6)).at, {"placement": np.eye(4)}),
         "FeedForward": (rd.FeedForward, pair),
+        "Loop": (
+            rd.Loop,
+            {"controller": sampled, "position": [rd.Quantisation(1e-3)], "velocity": [rd.Differences()],
+             "actuation": [rd.RateLimit(9.0)], "measurement_delay": 1.5, "actuation_delay": 0.5, "seed": 3, "run": 1},
+        ),
+        "LowPass": (rd.LowPass, {"cutoff": [9.0, 8.0], "order": 1}),
+        "Multirate": (rd.Multirate, {"fast": sampled, "slow": rd.PD(hold, 1.0, 1.0, 0.02)}),
+        "Noise": (rd.Noise, {"deviation": [0.1, 0.2]}),
+        "Quantisation": (rd.Quantisation, {"resolution": [0.1, 0.2]}),
+        "RateLimit": (rd.RateLimit, {"rate": [0.1, 0.2]}),
         "JointStopDamper": (rd.JointStopDamper, stops | {"damping": 0.1}),
         "JointStopSpring": (rd.JointStopSpring, stops | {"stiffness": 0.1}),
         "Lagrangian": (rd.Lagrangian, {"robot": robot, "dtype": np.float32}),

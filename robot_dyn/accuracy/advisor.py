@@ -17,7 +17,6 @@ import numpy as np
 from robot_dyn.accuracy.sampled_loop import longest_period
 from robot_dyn.accuracy.stability import longest_step
 from robot_dyn.arithmetic import Array
-from robot_dyn.coefficients import with_values
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import QueryError, RobotDynError
 from robot_dyn.integrate.methods import FIXED_STEP, method
@@ -90,6 +89,8 @@ class Advice:
         if self.period_s and self.period_s <= limit:
             to = f"the loop is up to {limit:.3g} s" if isfinite(limit) else "as every period is here"
             yield f"control period {self.period_s:.3g} s: stable; {to}"
+        elif self.period_s and not limit:
+            yield f"control period {self.period_s:.3g} s: unstable, as every period is: take lower gains, or less delay"
         elif self.period_s:
             yield (
                 f"control period {self.period_s:.3g} s: unstable; the loop is stable up to {limit:.3g} s: take"
@@ -123,7 +124,7 @@ def advise(what: Setup | Plant | Dynamics, q0: Any = None, v0: Any = None, **opt
     if plant.equation_of_motion.payloads:
         raise QueryError("advise: carried_payload changes the bodies in the run; ask of plant.at(t), t in [s]")
     period = 0.0 if controller is None else controller.period_s
-    loop = StateEquation(plant, None if controller is None else with_values(controller, {"period_s": 0.0})).in_a_mode
+    loop = StateEquation(plant, None if controller is None else controller.at_period(0.0)).in_a_mode
     states = _along(setup, loop)
     motion, at, states = _fastest(loop, states)
     matrices = [_between_ticks(plant, loop, t, y) if period else jacobian(loop, t, y, None) for t, y in states]

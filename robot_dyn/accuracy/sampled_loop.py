@@ -1,9 +1,11 @@
 """The longest stable period of a sampled control loop, linearised at a state.
 
-    δx⁺ = e^{AT} δx + (∫₀ᵀ e^{As} ds) B δu,   δu = K δx + K_z δz,   δz⁺ = L δx + L_z δz
+    from one tick to the next:  δx⁺ = e^{Aδ} δx + (∫₀^δ e^{As} ds) B δu,   δz⁺ = δz,   δu⁺ = δu
+    at a tick:                  δu = K δx + K_z δz,   δz⁺ = L δx + L_z δz
 
-A and B are of the plant, K and L of the controller, z its states. [Åström, Wittenmark, Computer-Controlled Systems,
-3rd ed., 1997, ch. 2]
+A and B are of the plant, K and L of the controller; z holds its states, and what is on its way in a loop with delays.
+The two integrals are one exponential. [Åström, Wittenmark, Computer-Controlled Systems, 3rd ed., 1997, ch. 2; Van Loan
+1978]
 """
 
 from __future__ import annotations
@@ -15,7 +17,6 @@ import numpy as np
 
 from robot_dyn.accuracy.stability import longest
 from robot_dyn.arithmetic import Array
-from robot_dyn.coefficients import with_values
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foreign import call
@@ -25,44 +26,65 @@ from robot_dyn.simulation.stiffness import jacobian
 
 
 def longest_period(plant: Plant, controller: Controller, t: float, y: Array, duration_s: float) -> float:
-    """The longest stable period, in [s]; inf if every period of a run is.
+    """The longest stable period, in [s]; inf if every period of a run is. Delays are as many periods at each.
 
     Args:
         plant: What is controlled.
         controller: What controls it.
         t: Time, in [s].
-        y: State (q, v, z), z of the controller and then of the effects.
+        y: State (q, v, z), z of the continuous controller and then of the effects.
         duration_s: Of the run.
     """
     from scipy.linalg import expm
 
-    n, size, free = plant.dynamics.n, controller.state_size, StateEquation(plant, None).in_a_mode
+    controller = controller.small_signal()
+    continuous = controller.at_period(0.0)
+    n, size, free = plant.dynamics.n, continuous.state_size, StateEquation(plant, None).in_a_mode
     law = y[: 2 * n + size]
     x = np.concatenate([y[: 2 * n], y[2 * n + size :], np.zeros(len(free.sources))])
-    u = _law(controller, controller.torque, t, n)(t, law)
+    u = _law(continuous, continuous.torque, t, n)(t, law)
     A = jacobian(free, t, x, u)
     m = len(A)
     B = by_state(_rows(lambda each: free.rate(t, x, each)[0][:m]), t, u).T
-    K = _wide(by_state(_law(controller, controller.torque, t, n), t, law).T, n, m)
+    K = by_state(_law(continuous, continuous.torque, t, n), t, law).T[:, : 2 * n]
     driven = np.block([[A, B], [np.zeros((n, m + n))]])
 
-    def loop(period: float) -> Array:
-        held = expm(driven * period)
-        made = np.zeros((m + size, m + size))
-        made[:m] = held[:m, m:] @ K
-        made[:m, :m] += held[:m, :m]
-        if size:
-            of_period: Any = with_values(controller, {"period_s": period})
-            made[m:] = _wide(by_state(_law(of_period, of_period.next_state, t, n), t, law).T, n, m)
+    def cycle(period: float) -> Array:
+        of_period = controller.at_period(period)
+        z = of_period.settled(t, law[:n], law[n : 2 * n], law[2 * n :])
+        made = np.eye(m + n + len(z))
+        parts = of_period.instants
+        flows = [expm(driven * (period * length)) for length in np.diff([*parts, 1.0])]
+        for _ in range(of_period.cycle):
+            for flow in flows:
+                made = _between(flow, len(z)) @ _tick(of_period, t, law[: 2 * n], z, m) @ made
+                z = np.asarray(call(of_period.next_state, t, law[:n], law[n : 2 * n], z), dtype=float)
         return made
 
-    return longest(loop, A + B @ K[:, :m], duration_s)
+    loop = A.copy()
+    loop[:, : 2 * n] += B @ K
+    return longest(cycle, loop, duration_s, controller.cycle)
 
 
-def _wide(columns: Array, n: int, m: int) -> Array:
-    """Derivatives by (q, v, z) as ones by (q, v, states of effects, z)."""
-    made = np.zeros((len(columns), m + columns.shape[1] - 2 * n))
-    made[:, : 2 * n], made[:, m:] = columns[:, : 2 * n], columns[:, 2 * n :]
+def _between(flow: Array, size: int) -> Array:
+    """From one tick to the next: of (x, u, z), z constant."""
+    made = np.eye(len(flow) + size)
+    made[: len(flow), : len(flow)] = flow
+    return made
+
+
+def _tick(controller: Controller, t: float, joints: Array, z: Array, m: int) -> Array:
+    """A tick: of (x, u, z), x constant, with joints the first entries (q, v) of x, of which there are m."""
+    n = len(joints) // 2
+    law = np.concatenate([joints, z])
+    of_u = by_state(_law(controller, controller.torque, t, n), t, law).T
+    made = np.eye(m + n + len(z))
+    made[m : m + n] = 0
+    made[m : m + n, : 2 * n], made[m : m + n, m + n :] = of_u[:, : 2 * n], of_u[:, 2 * n :]
+    if len(z):
+        of_z = by_state(_law(controller, controller.next_state, t, n), t, law).T
+        made[m + n :] = 0
+        made[m + n :, : 2 * n], made[m + n :, m + n :] = of_z[:, : 2 * n], of_z[:, 2 * n :]
     return made
 
 

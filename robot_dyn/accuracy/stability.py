@@ -44,10 +44,11 @@ def longest_step(method: Any, J: Array, n: int, duration_s: float) -> float:
     return longest(lambda h: np.asarray(method.step(system, 0.0, np.eye(len(J)), h)).T, J, duration_s)
 
 
-def longest(matrix: Callable[[float], Array], J: Array, duration_s: float) -> float:
-    """The longest h for which the powers of a matrix grow no more than the motion, with J, does; inf if each is.
+def longest(matrix: Callable[[float], Array], J: Array, duration_s: float, steps: int = 1) -> float:
+    """The longest h for which the powers of a matrix, of so many steps h, grow no more than the motion with J does.
 
-    It is looked for from short to long, so that what is stable again beyond does not count.
+    It is inf if each is, and 0 if none is. It is looked for from short to long, so that what is stable again beyond
+    does not count.
     """
     rates = np.linalg.eigvals(J)
     size, growth = float(np.abs(rates).max()), max(0.0, float(rates.real.max()))
@@ -57,7 +58,7 @@ def longest(matrix: Callable[[float], Array], J: Array, duration_s: float) -> fl
             radius = float(np.abs(np.linalg.eigvals(matrix(h))).max())
         except (RobotDynError, np.linalg.LinAlgError):
             return False
-        return bool(np.log(radius) - h * growth <= log(_GROWTH) * h / duration_s)
+        return bool(np.log(radius) / steps - h * growth <= log(_GROWTH) * h / duration_s)
 
     if not size > 0:
         return inf
@@ -71,7 +72,7 @@ def longest(matrix: Callable[[float], Array], J: Array, duration_s: float) -> fl
                 after = h
                 break
             before = h
-        while after < inf and after - before > _SHARP * after:
+        while low * _SHARP < after < inf and after - before > _SHARP * after:
             middle = (before + after) / 2
             before, after = (middle, after) if stable(middle) else (before, middle)
     return before if after < inf else inf

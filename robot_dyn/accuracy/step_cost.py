@@ -154,7 +154,7 @@ def _short(setup: Setup, steps: int) -> Setup:
     """So many short steps of RK4 from the start, with a tick at each where the control is sampled."""
     controller: Any = setup.controller
     if controller is not None and controller.period_s:
-        controller = with_values(controller, {"period_s": _STEP_S})
+        controller = controller.at_period(_STEP_S)
     duration = steps * _STEP_S
     return replace(
         setup, controller=controller, integrator=method("rk4"), step_s=_STEP_S, duration_s=duration,

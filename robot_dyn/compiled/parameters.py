@@ -98,20 +98,27 @@ def parameters(
         made += _of_part(effects[i], ("effect", i), f"{name}.", n)
     if controller is not None:
         made += _of_part(controller, CONTROLLER, "", n)
+        for path, label, part in controller.parts:
+            made += _of_part(part, CONTROLLER, label, n, f"{path}.")
         for name, reference in controller.references.items():
-            made += _of_part(reference, ("reference", name), f"{name}.", n)
+            made += _of_part(reference, ("reference", name), f"{_named(name)}.", n)
         for name, model in controller.models.items():
-            made += _of_robot(model, ("model", name), f"{name}.", swept)
+            made += _of_robot(model, ("model", name), f"{_named(name)}.", swept)
     return tuple(made)
 
 
-def _of_part(part: Any, place: Part, prefix: str, n: int) -> Iterator[Parameter]:
+def _named(path: str) -> str:
+    """The name in sweeps of what a controller holds: without that of a controller in a loop."""
+    return path.removeprefix("controller.")
+
+
+def _of_part(part: Any, place: Part, prefix: str, n: int, path: str = "") -> Iterator[Parameter]:
     for key, each in declared(type(part)).items():
         value = getattr(part, key)
         if value is not None:
             value = np.asarray(value, dtype=float)
             value = np.broadcast_to(value, (n,)) if each.of_joints else value
-            yield Parameter(place, key, prefix + key, value, each, tuple(range(value.size)))
+            yield Parameter(place, path + key, prefix + key, value, each, tuple(range(value.size)))
 
 
 def _of_robot(dynamics: Any, place: Part, prefix: str, swept: Collection[str]) -> Iterator[Parameter]:

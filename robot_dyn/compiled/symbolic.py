@@ -75,6 +75,8 @@ _OF_SYMBOLS: dict[Any, tuple[Callable[..., Any], int]] = {
     np.minimum: (lambda x, y: node(ca.fmin(symbol(x).expression, symbol(y).expression)), 2),
     np.arctan2: (lambda y, x: node(ca.atan2(symbol(y).expression, symbol(x).expression)), 2),
     np.sign: (_sign, 1),
+    np.floor: (lambda x: node(ca.floor(symbol(x).expression)), 1),
+    np.ceil: (lambda x: node(ca.ceil(symbol(x).expression)), 1),
     np.less: (lambda x, y: symbol(x) < y, 2),
     np.less_equal: (lambda x, y: symbol(x) <= y, 2),
     np.greater: (lambda x, y: symbol(x) > y, 2),

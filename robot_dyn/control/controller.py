@@ -8,20 +8,34 @@ plant, a sampled one takes z⁺ = z + period · rate at its ticks and keeps its 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Iterator, Mapping
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from robot_dyn import former
 from robot_dyn.arithmetic import Array
-from robot_dyn.coefficients import JOINTS, check_coefficients, declared
+from robot_dyn.coefficients import JOINTS, check_coefficients, declared, with_values
 from robot_dyn.control.reference import Reference
 from robot_dyn.errors import ControlError, shown
 from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.threshold import Threshold
 from robot_dyn.validate import duration
 from robot_dyn.values import Value
+
+
+class Nested(NamedTuple):
+    """A part of a controller that is made of others.
+
+    Attributes:
+        path: Where it is, as "controller" or "position.0".
+        label: What its coefficients begin with in sweeps, as "position.quantisation.".
+        part: A controller or a block.
+    """
+
+    path: str
+    label: str
+    part: Any
 
 
 class Controller(Value, ABC):
@@ -42,6 +56,7 @@ class Controller(Value, ABC):
         period_s: Time between samples in [s], with the torque constant between them; 0 for continuous control.
     """
 
+    outermost: ClassVar[bool] = False  # whether it may not be part of another controller
     period_s: float = 0.0
 
     memory_size, memory_rate, next_memory = map(former.Attribute, ("state_size", "state_rate", "next_state"))
@@ -64,19 +79,31 @@ class Controller(Value, ABC):
         return type(self).__name__
 
     @property
+    def parts(self) -> tuple[Nested, ...]:
+        """Controllers and blocks that it is made of, those in these among them; none for a control law."""
+        return ()
+
+    @property
     def references(self) -> dict[str, Reference]:
-        """What it follows, by attribute."""
-        return {name: value for name, value in vars(self).items() if isinstance(value, Reference)}
+        """What it follows, by attribute, or by path."""
+        return {name: value for name, value in self._attributes() if isinstance(value, Reference)}
 
     @property
     def models(self) -> dict[str, Dynamics]:
-        """Its own models of the arm, by attribute."""
-        others = np.ndarray, float, int, str, Reference, type(None)  # a protocol takes longer to ask for
-        return {
+        """Its own models of the arm, by attribute, or by path."""
+        others = np.ndarray, float, int, str, Reference, tuple, dict, Controller, type(None)
+        return {  # a protocol takes longer to ask for
             name: value
-            for name, value in vars(self).items()
+            for name, value in self._attributes()
             if not isinstance(value, others) and isinstance(value, Dynamics)
         }
+
+    def _attributes(self) -> Iterator[tuple[str, Any]]:
+        """Its attributes, and those of controllers in it by path."""
+        yield from vars(self).items()
+        for path, _, part in self.parts:
+            if isinstance(part, Controller):
+                yield from ((f"{path}.{name}", value) for name, value in vars(part).items())
 
     @property
     def desired(self) -> Reference | None:
@@ -134,6 +161,42 @@ class Controller(Value, ABC):
     def next_state(self, t: float, q: Array, v: Array, z: Array) -> Array:
         """States of a sampled controller after its tick at t: z⁺ = z + period · ż, shape (state_size,)."""
         return z + self.period_s * self.state_rate(t, q, v, z)
+
+    @property
+    def instants(self) -> tuple[float, ...]:
+        """When it has its ticks, in each period, as parts of it: the first is 0."""
+        return (0.0,)
+
+    @property
+    def cycle(self) -> int:
+        """Number of periods after which it does the same again."""
+        return 1
+
+    @property
+    def deviates(self) -> int:
+        """Number of its last states that are standard normal deviates, drawn anew before each tick."""
+        return 0
+
+    @property
+    def noise_key(self) -> tuple[int, int]:
+        """Seed and number of the run, of which these deviates are."""
+        return 0, 0
+
+    def of_run(self, run: int) -> Controller:
+        """The controller of the run of that number of a batch, with noise of its own."""
+        return self
+
+    def at_period(self, period_s: float) -> Controller:
+        """The controller with another period, in [s]; with 0 the continuous one."""
+        return with_values(self, {"period_s": period_s})
+
+    def small_signal(self) -> Controller:
+        """The controller without what small signals do not show, as rounding."""
+        return self
+
+    def settled(self, t: float, q: Array, v: Array, z: Array) -> Array:
+        """States of the sampled controller behind a motion of constant velocity, of those z of the continuous one."""
+        return z
 
 
 class Stateless(Controller):

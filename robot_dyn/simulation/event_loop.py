@@ -116,7 +116,7 @@ def event_loop(
             if plan.transfers[s] == 1:
                 return Ended.TRANSFER
             if now[Now.STEP] == 0:
-                if plan.ticks[s] == 1 and not act(f, runs, rules, start, plan.at_ticks[s]):
+                if plan.ticks[s] > 0 and not act(f, runs, rules, start, plan.at_ticks[s], plan.ticks[s]):
                     return Ended.TICK
                 node(f, runs, kept, times, now, start, p)
                 times.reached[0] = start
@@ -171,7 +171,7 @@ def event_loop(
                     keep(f, runs, kept, now, t1, y, p)
                 now[Now.STEPS] += 1
                 now[Now.BUDGET] -= 1
-                walk(runs, kept, rules, now, t1, work.last, plan.ticks[s] == 1 and t == start)
+                walk(runs, kept, rules, now, t1, work.last, plan.ticks[s] > 0 and t == start)
                 if event >= 0:
                     now[Now.EVENT] = event
                     now[Now.STEP] = 1

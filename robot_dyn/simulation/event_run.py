@@ -21,7 +21,7 @@ from robot_dyn.integrate.adaptive import STEPPERS
 from robot_dyn.integrate.step_control import At, ControlledStepper, control_of
 from robot_dyn.simulation.event import Occurrence
 from robot_dyn.simulation.event_loop import Kept, Times, event_loop
-from robot_dyn.simulation.fixed_step import runs_of
+from robot_dyn.simulation.fixed_step import rules_of, runs_of
 from robot_dyn.simulation.followed import Followed
 from robot_dyn.simulation.modes import Guard
 from robot_dyn.simulation.observer import Observer
@@ -34,7 +34,7 @@ from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.state_functions import interpreted, system
 from robot_dyn.simulation.stiffness import FIRST_LOOK, changes_over
 from robot_dyn.simulation.switching import Switching
-from robot_dyn.simulation.time_loop import Ended, Functions, Now, Rules
+from robot_dyn.simulation.time_loop import Ended, Functions, Now
 from robot_dyn.simulation.trajectory import Ending, Outcome
 from robot_dyn.simulation.transfers import Transfers
 from robot_dyn.simulation.watch import DivergedError, Watch, one_step
@@ -113,11 +113,11 @@ class EventRun(Followed):
             self.switching = Switching(equation, self.switching.quantities)
         self.functions, parameters = made(equation)
         own = np.concatenate([np.full(held, np.nan), parameters])[:, None]
-        self.runs = runs_of(self.start[:, None], own, n, held, equation.state_size, m + n + 2)
+        self.runs = runs_of(equation, self.start[:, None], own, m + n + 2)
         self.runs.energy[0], self.runs.scale[0] = self.watch.energy, self.watch.scale
         of = self.stepper
         self.advance = machine_code or event_loop(of.begin, of.step, of.error, of.accept, of.dense)
-        self.rules = Rules(n, len(equation.sources), equation.state_size, held, equation.canonical, True, inf, 0, 1, 0)
+        self.rules = rules_of(equation, True, inf)
         self.times = _times(setup, mesh, samples)
         compared = self.times.compared
         S, rows = len(self.plan.counts), int(most_samples(setup)) + 2 if samples else 0
@@ -369,8 +369,12 @@ def _method(setup: Setup, equation: StateEquation) -> tuple[ControlledStepper, n
     if not method.controls_error:
         stepper = hermite.stepper(method, m, n, m + n, equation.widths)
         return stepper, control_of(stepper, 0.0, 0.0, inf)
-    stepper = STEPPERS[method.method](m, m + n, m - len(equation.sources))
-    return stepper, control_of(stepper, method.rtol, method.atol, min(method.max_step_s, setup.longest_step_s))
+    bounded = m - len(equation.sources)
+    stepper = STEPPERS[method.method](m, m + n, bounded)
+    still = equation.state_size if equation.sampled else 0  # between ticks: without them in the mean of squares
+    part = np.sqrt(1 - still / bounded)
+    longest = min(method.max_step_s, setup.longest_step_s)
+    return stepper, control_of(stepper, part * method.rtol, part * method.atol, longest)
 
 
 def _times(setup: Setup, mesh: np.ndarray | None, samples: bool) -> Times:

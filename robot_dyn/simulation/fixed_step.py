@@ -32,6 +32,8 @@ from robot_dyn.simulation.watch import DivergedError, Watch, one_step
 
 _DOUBTFUL = 1e6  # of Σ |y| in machine code, which does not see that M becomes singular
 
+_FIRST = np.zeros(1, np.int64)
+
 Advance = Callable[..., int]
 Made = Callable[[StateEquation], tuple[Functions, np.ndarray]]
 
@@ -68,15 +70,13 @@ class FixedStep(Followed):
         held = n if equation.sampled else 0
         self.start = equation.start(setup.q0, setup.v0)
         own = np.concatenate([np.full(held, np.nan), parameters])[:, None]
-        self.runs = runs_of(self.start[:, None], own, n, held, equation.state_size, m + n + 2)
+        self.runs = runs_of(equation, self.start[:, None], own, m + n + 2)
         self.runs.energy[0], self.runs.scale[0] = self.watch.energy, self.watch.scale
         self.stepper = method.stepper(FLOAT64, m, n, m + n, 1, equation.widths)
         self.advance = machine_code or time_loop(self.stepper.step)
         every, thin = self._shared(pace)
         largest = _DOUBTFUL if self.compiled else inf
-        self.rules = Rules(
-            n, len(equation.sources), equation.state_size, held, equation.canonical, True, largest, every, thin, 0
-        )
+        self.rules = rules_of(equation, True, largest, every, thin)
         rows = samples_at_most(setup, self.plan.counts) if pace == 1 else 1
         states = int((-(-self.plan.counts // every)).sum()) // thin + 2
         columns = np.empty((2 + 3 * n, 0)) if observer is None else observer.columns
@@ -190,13 +190,28 @@ class FixedStep(Followed):
         )  # fmt: skip
 
 
-def runs_of(y: np.ndarray, own: np.ndarray, n: int, held: int, states: int, made: int) -> Runs:
-    """Runs at the states y (m, W) with their own numbers (O, W)."""
+def rules_of(
+    equation: StateEquation, alone: bool, largest: float, every: int = 0, thin: int = 1, base: int = 0
+) -> Rules:
+    """The rules of a loop over a state equation."""
+    n, controller = equation.plant.dynamics.n, equation.controller
+    deviates, instants = (0, 1) if controller is None else (controller.deviates, len(controller.instants))
+    return Rules(
+        n, len(equation.sources), equation.state_size, n if equation.sampled else 0, instants, deviates,
+        equation.canonical, alone, largest, every, thin, base,
+    )  # fmt: skip
+
+
+def runs_of(equation: StateEquation, y: np.ndarray, own: np.ndarray, made: int, numbers: np.ndarray = _FIRST) -> Runs:
+    """Runs at the states y (m, W) with their own numbers (O, W), of these numbers in a batch (W,)."""
     m, W = y.shape
+    held, states = equation.plant.dynamics.n if equation.sampled else 0, equation.state_size
+    seed, run = (0, 0) if equation.controller is None else equation.controller.noise_key
+    keys = np.array([np.full(W, seed, np.uint64), np.uint64(run) + numbers.astype(np.uint64)])
     return Runs(
         np.array(y, order="C"), np.array(own, order="C"), np.empty((m, W)), np.empty((made, W)),
         np.empty((held + states, W)), np.empty((2, W)), np.empty(W), np.zeros(W, np.int64), np.ones(W, np.int64),
-        np.zeros(W, np.int64), np.zeros(W), np.zeros((m, W)), np.zeros(W), np.ones(W), np.zeros(W),
+        np.zeros(W, np.int64), np.zeros(W), np.zeros((m, W)), np.zeros(W), np.ones(W), np.zeros(W), keys,
     )  # fmt: skip
 
 

@@ -24,7 +24,7 @@ def plan_of(setup: Setup, pace: Fraction = Fraction(1)) -> Plan:
     segments = paced(setup.segments, pace)
     counts = np.array([each.steps for each in segments])
     starts, ends = (np.array([getattr(each, name) for each in segments]) for name in ("start", "end"))
-    ticks = np.array([each.tick and _sampled(setup) for each in segments])
+    ticks = np.array([*(each.tick for each in segments), setup.ends_on_tick]) & _sampled(setup)
     bounds = np.column_stack([np.nextafter(starts, np.inf), np.nextafter(ends, -np.inf)])
     followed = polynomials(setup.controller)
     inside = np.hstack([bounds, *(_pieces(each, starts, ends) for each in followed)])
@@ -35,7 +35,7 @@ def plan_of(setup: Setup, pace: Fraction = Fraction(1)) -> Plan:
         starts,
         np.append((ends - starts[:-1]) / counts, 0.0),
         np.append(counts, 1).astype(np.int64),
-        np.append(ticks, _sampled(setup)).astype(np.int64),
+        np.where(ticks, np.cumsum(ticks), 0),
         np.append(np.isin(starts[:-1], _transfers(setup)), False).astype(np.int64),
         np.vstack([inside, at_ticks[-1:]]),
         at_ticks,

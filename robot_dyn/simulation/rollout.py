@@ -15,7 +15,8 @@ from typing import Any, Unpack, cast
 import numpy as np
 
 from robot_dyn import former
-from robot_dyn.compiled.parameters import link_parameters, names_of, parameters
+from robot_dyn.coefficients import rebuilt
+from robot_dyn.compiled.parameters import CONTROLLER, link_parameters, names_of, parameters
 from robot_dyn.compiled.threads import thread_count
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import QueryError, nearest, shown
@@ -200,4 +201,7 @@ def _values(setup: Setup, name: str, values: Any) -> np.ndarray:
         for row in np.unique(rows, axis=0):
             value = row.reshape(mine[0].value.shape)
             replace(plant.effects[part[1]], **{mine[0].key: value})  # refuses what has no meaning
+    for part in (each for each in mine if each.part == CONTROLLER and "." in each.key):
+        for row in np.unique(rows, axis=0):
+            rebuilt(setup.controller, {part.key: row.reshape(part.value.shape)})
     return rows

@@ -69,6 +69,8 @@ def _own(runs: Rollouts, setup: Setup, run: int) -> Setup:
             setup.plant, setup.controller, {name: x[run] for name, x in runs.params.items()}
         )
         setup = replace(setup, plant=plant, controller=controller)
+    if setup.controller is not None:
+        setup = replace(setup, controller=setup.controller.of_run(run))
     return setup
 
 

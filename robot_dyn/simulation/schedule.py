@@ -44,8 +44,10 @@ class Segment:
     pace: Fraction = Fraction(1)
 
 
-def cuts(duration_s: float, period_s: float, switches: Iterable[float]) -> list[tuple[float, bool]]:
-    """Times at which segments start, and whether each is a tick.
+def cuts(
+    duration_s: float, period_s: float, switches: Iterable[float], instants: tuple[float, ...] = (0.0,)
+) -> list[tuple[float, bool]]:
+    """Times at which segments start, and whether each is a tick; the last is the end of the run.
 
     A switch keeps its exact time. A tick, whose time is the rounded product k · period, moves onto a switch, or onto
     the end, that lies within rounding of it.
@@ -54,6 +56,7 @@ def cuts(duration_s: float, period_s: float, switches: Iterable[float]) -> list[
         duration_s: Length of the run, in [s].
         period_s: Period of a sampled controller, in [s]; 0 for none.
         switches: Times at which something switches, in [s].
+        instants: Parts of a period at which there is a tick, ascending from 0.
 
     Raises:
         QueryError: If two switches lie so close together that no segment fits between them.
@@ -66,11 +69,14 @@ def cuts(duration_s: float, period_s: float, switches: Iterable[float]) -> list[
                 "size can tell: make them one, or move them apart"
             )
     count = ceil(duration_s / period_s - _ROUNDED) if period_s > 0 else 1
-    ticks, fixed = period_s * np.arange(max(1, count)), np.array([*inside, duration_s])
+    ticks, fixed = (
+        period_s * np.add.outer(np.arange(max(1, count) + 1), instants).ravel(),
+        np.array([*inside, duration_s]),
+    )
     near = _near(fixed, ticks)
     ticks = np.where(np.abs(near - ticks) <= _ROUNDED * period_s + ULPS * np.spacing(near), near, ticks)
-    acting = set(ticks.tolist())
-    return [(t, t in acting) for t in sorted({*inside, *acting} - {duration_s})]
+    acting = set(ticks[ticks <= duration_s].tolist()) if period_s > 0 else {0.0}
+    return [(t, t in acting) for t in sorted({*inside, *acting, duration_s})]
 
 
 def _near(fixed: np.ndarray, t: np.ndarray) -> np.ndarray:

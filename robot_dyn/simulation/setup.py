@@ -214,10 +214,8 @@ class Setup(Value):
         Raises:
             QueryError: If two switches lie closer together than floats can tell.
         """
-        switches = {t for effect in self.plant.effects for t in effect.switches}
-        switches |= set(self.controller.knots if self.controller else ())
-        starts = cuts(self.duration_s, self.controller.period_s if self.controller else 0.0, switches)
-        step, ends = self.step_s, [*(t for t, _ in starts[1:]), self.duration_s]
+        starts, step = self._cuts[:-1], self.step_s
+        ends = [t for t, _ in self._cuts[1:]]
         counts = [
             steps_on(end - start, step, self.record_period_s) for (start, _), end in zip(starts, ends, strict=True)
         ]
@@ -231,6 +229,18 @@ class Setup(Value):
         )
 
     stretches = former.Attribute("segments")
+
+    @cached_property
+    def _cuts(self) -> list[tuple[float, bool]]:
+        switches = {t for effect in self.plant.effects for t in effect.switches}
+        switches |= set(self.controller.knots if self.controller else ())
+        period, instants = (self.controller.period_s, self.controller.instants) if self.controller else (0.0, (0.0,))
+        return cuts(self.duration_s, period, switches, instants)
+
+    @property
+    def ends_on_tick(self) -> bool:
+        """Whether the controller acts at the end of the run."""
+        return self._cuts[-1][1]
 
     @cached_property
     def finds_events(self) -> bool:

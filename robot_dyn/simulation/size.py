@@ -61,7 +61,7 @@ def too_large(what: str, size: float, most: float, or_else: str = "") -> QueryEr
 def segments(setup: Setup) -> float:
     """At most so many segments between ticks, breaks and switches."""
     controller = setup.controller
-    period = controller.period_s if controller else 0.0
+    period = controller.period_s / len(controller.instants) if controller else 0.0
     cuts = sum(len(effect.switches) for effect in setup.plant.effects) + len(controller.knots if controller else ())
     return 2.0 + cuts + (setup.duration_s / period if period > 0 else 0.0)
 

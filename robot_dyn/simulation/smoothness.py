@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from robot_dyn.control.block import Block
 from robot_dyn.control.control_law import ControlLaw
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.actuator import EffortLimit
@@ -36,6 +37,7 @@ def foreign(setup: Setup) -> tuple[Any, ...]:
     parts = (setup.plant.dynamics, *setup.plant.effects, setup.controller, setup.integrator)
     if setup.controller is not None:
         parts += (*setup.controller.models.values(), *setup.controller.references.values())
+        parts += tuple(each.part for each in setup.controller.parts)
     return tuple(part for part in parts if part is not None and _is_foreign(part))
 
 
@@ -46,6 +48,11 @@ def _is_foreign(part: Any) -> bool:
 def named(part: Any) -> str:
     """Its name for people: that of its class, or of the function that it is."""
     return part.name if isinstance(part, Controller) else type(part).__name__
+
+
+def rounds(part: Any) -> bool:
+    """Whether it is a block of a loop whose output jumps."""
+    return isinstance(part, Block) and part.rounds
 
 
 def looked_s(setup: Setup) -> float:
@@ -75,6 +82,8 @@ def first_kink(setup: Setup, equation: StateEquation, path: Path) -> tuple[float
             0.0,
             f"{named(parts[0])} may switch, and what is shorter than {looked_s(setup):.1g} s is not seen",
         )
+    if setup.controller is not None and any(rounds(each.part) for each in setup.controller.parts):
+        return 0.0, "what is rounded at a tick may be rounded the other way"
     if len(path.t) < 2:
         return np.inf, ""
     n = equation.plant.dynamics.n

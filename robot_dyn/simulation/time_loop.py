@@ -15,6 +15,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.integrate.primitives import copy, evaluate, sizes
+from robot_dyn.simulation.philox import draw
 
 WATCHED = 64  # steps between looks at the energy
 RUNAWAY = 1e3  # times all the energy there was, that may come from nowhere
@@ -90,7 +91,7 @@ class Plan(NamedTuple):
 
     Attributes:
         starts, lengths: When it starts and its step, (S,), in [s].
-        counts, ticks: Its steps, and 1 where a sampled controller acts at its start, (S,).
+        counts, ticks: Its steps, and the number, from 1, of the tick of a sampled controller at its start, or 0, (S,).
         transfers: 1 where a payload is picked up or dropped at its start, (S,).
         parameters: p of the state equation on it, (S, P).
         at_ticks: The same at its start alone.
@@ -115,6 +116,7 @@ class Runs(NamedTuple):
         last: Its state where it ended, (m, W).
         energy, scale: E(0), and 1 + |K(0)| + |V(0)|.
         peak: Largest K at the looks at the energy.
+        keys: Seed and number of the run, of which its noise is, (2, W), as uint64.
     """
 
     y: Array
@@ -132,6 +134,7 @@ class Runs(NamedTuple):
     energy: Array
     scale: Array
     peak: Array
+    keys: Array
 
 
 class Records(NamedTuple):
@@ -160,6 +163,8 @@ class Rules(NamedTuple):
         n, works: Number of joints, and of works at the end of y.
         states: Number of states of the controller, behind q and v.
         held: Number of torques in the zero-order hold of a sampled controller; 0 for any other.
+        instants: Ticks of the controller in each of its periods.
+        deviates: Number of its last states that are drawn anew before each tick.
         canonical: Whether y has momenta in place of velocities.
         alone: Whether what may end a run is looked at by its driver.
         largest: Σ |y| beyond which a step is doubtful, or a run in lock step ends.
@@ -171,6 +176,8 @@ class Rules(NamedTuple):
     works: int
     states: int
     held: int
+    instants: int
+    deviates: int
     canonical: bool
     alone: bool
     largest: float
@@ -196,7 +203,8 @@ def time_loop(step: Callable[..., int]) -> Callable[..., int]:
             start, h, p = plan.starts[s], plan.lengths[s], plan.parameters[s]
             if plan.transfers[s] == 1:
                 return Ended.TRANSFER
-            if now[Now.STEP] == 0 and plan.ticks[s] == 1 and not act(functions, runs, rules, start, plan.at_ticks[s]):
+            tick, at_tick = plan.ticks[s], plan.at_ticks[s]
+            if now[Now.STEP] == 0 and tick > 0 and not act(functions, runs, rules, start, at_tick, tick):
                 return Ended.TICK
             while now[Now.STEP] < plan.counts[s]:
                 k = now[Now.STEP]
@@ -214,7 +222,7 @@ def time_loop(step: Callable[..., int]) -> Callable[..., int]:
                 now[Now.STEP] += 1
                 now[Now.STEPS] += 1
                 now[Now.BUDGET] -= 1
-                show(runs, records, rules, work.K, now, t + h, rules.held == 0 or (k == 0 and plan.ticks[s] == 1))
+                show(runs, records, rules, work.K, now, t + h, rules.held == 0 or (k == 0 and plan.ticks[s] > 0))
                 if now[Now.STEPS] % WATCHED == 0 and not conserve(functions, runs, rules, t + h, p):
                     return Ended.GAINS
                 if now[Now.BUDGET] <= 0 or stop[0] != 0:
@@ -226,9 +234,11 @@ def time_loop(step: Callable[..., int]) -> Callable[..., int]:
     return advance
 
 
-def act(functions: Functions, runs: Runs, rules: Rules, t: float, p: Array) -> bool:
+def act(functions: Functions, runs: Runs, rules: Rules, t: float, p: Array, number: int) -> bool:
     """A tick: what the controller holds from now on, and its next states; whether a single run may go on."""
     n, held, z = rules.n, rules.held, rules.states
+    if rules.deviates > 0:
+        draw(runs.y, 2 * n + z - rules.deviates, rules.deviates, runs.keys, (number - 1) // rules.instants)
     evaluate(functions.tick, t, runs.y, p, runs.own, runs.command)
     sizes(runs.command, runs.size)
     if rules.alone and not runs.size[0] < np.inf:

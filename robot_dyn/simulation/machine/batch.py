@@ -19,7 +19,7 @@ from robot_dyn.coefficients import with_values
 from robot_dyn.compiled.right_angles import robot_of
 from robot_dyn.effects.plant import Plant
 from robot_dyn.integrate.integrator import PlainMethod
-from robot_dyn.simulation.fixed_step import runs_of, samples_at_most
+from robot_dyn.simulation.fixed_step import rules_of, runs_of, samples_at_most
 from robot_dyn.simulation.machine.machine import Machine
 from robot_dyn.simulation.origin import origin
 from robot_dyn.simulation.plan import plan_of
@@ -27,7 +27,7 @@ from robot_dyn.simulation.rollout_result import Rollouts
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import samples, too_large
 from robot_dyn.simulation.state_equation import StateEquation
-from robot_dyn.simulation.time_loop import Ended, Now, Records, Rules, Runs, Why
+from robot_dyn.simulation.time_loop import Ended, Now, Records, Runs, Why
 from robot_dyn.simulation.trajectory import Statistics, diverged_advice
 
 LANES = 64  # runs in a tile: with 8, 16 or 32 a step of RK4 took 1.5, 1.1 and 1.05 times as long
@@ -112,18 +112,10 @@ class Batch:
 
     def _runs(self, tile: int) -> Runs:
         """The runs of a tile at their start; a tile that is not full repeats a run."""
-        equation, n = self.machine.equation, self.machine.equation.plant.dynamics.n
+        equation = self.machine.equation
         index = np.minimum(np.arange(tile * LANES, (tile + 1) * LANES), len(self.y) - 1)
-        held = n * equation.sampled
         own = self.machine.own({name: values[index] for name, values in self.values.items()})
-        return runs_of(self.y[index].T, own, n, held, equation.state_size, self.made.shape[1])
-
-    def _rules(self, base: int) -> Rules:
-        equation, n = self.machine.equation, self.machine.equation.plant.dynamics.n
-        held = n * equation.sampled
-        return Rules(
-            n, len(equation.sources), equation.state_size, held, equation.canonical, False, _LARGEST, 0, 1, base
-        )  # fmt: skip
+        return runs_of(equation, self.y[index].T, own, self.made.shape[1], index)
 
     def _tile(self, tile: int) -> None:
         equation, n = self.machine.equation, self.machine.equation.plant.dynamics.n
@@ -137,8 +129,9 @@ class Batch:
             np.array(self.columns, np.int64), np.empty((len(self.out_y), 2), np.int64), self.out_y, self.made,
             np.empty((0, equation.size + 2)), np.empty((2 + 3 * n, 0)),
         )  # fmt: skip
+        rules = rules_of(equation, False, _LARGEST, base=own.start)
         ended = self.machine.loop(
-            functions, self.plan, runs, records, self._rules(own.start), stepper.coefficients, stepper.work, now,
+            functions, self.plan, runs, records, rules, stepper.coefficients, stepper.work, now,
             self.clocks[tile], self.stop,
         )  # fmt: skip
         self.unfinished[tile], self.evaluations[tile] = ended != Ended.DONE, now[Now.EVALUATIONS]

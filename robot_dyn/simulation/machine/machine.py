@@ -13,6 +13,7 @@ from typing import Any, final
 
 import numpy as np
 
+from robot_dyn.coefficients import value_at
 from robot_dyn.compiled.cache import default_store
 from robot_dyn.compiled.identity import digest
 from robot_dyn.compiled.llvm import machine_code
@@ -116,8 +117,8 @@ class Machine:
         """
         of: dict[Part, Any] = {("effect", i): effect for i, effect in enumerate(effects)} | {CONTROLLER: controller}
         known = [
-            replace(each, value=np.broadcast_to(getattr(of[each.part], each.key), each.value.shape))
-            if each.part in of and getattr(of[each.part], each.key) is not None  # no mode is chosen yet
+            replace(each, value=np.broadcast_to(value_at(of[each.part], each.key), each.value.shape))
+            if each.part in of and value_at(of[each.part], each.key) is not None  # no mode is chosen yet
             else each
             for each in self.known
         ]

@@ -60,6 +60,8 @@ class OneByOne:
         plant, controller = self.setup.plant, self.setup.controller
         if self.sweep:
             plant, controller = with_parameters(plant, controller, {name: x[run] for name, x in self.sweep.items()})
+        if controller is not None:
+            controller = controller.of_run(run)
         equation, method = StateEquation(plant, controller), self.setup.integrator
         code = machine(equation.in_a_mode, method, swept=tuple(self.sweep), jacobian=method.needs_jacobian, cuts=True)
         return equation, code
@@ -89,7 +91,8 @@ class OneByOne:
     def _run(self, i: int) -> None:
         if self.stopped:
             return
-        equation, code = self._of(i) if self.sweep else (self.equation, self.machine)
+        noisy = self.equation.controller is not None and self.equation.controller.deviates
+        equation, code = self._of(i) if self.sweep or noisy else (self.equation, self.machine)
         setup = with_values(
             self.setup,
             {"plant": equation.plant, "controller": equation.controller, "q0": self.q0[i], "v0": self.v0[i]},

@@ -60,7 +60,7 @@ def _of(value: Any, objects: list[Any]) -> Any:
 def _of_field(part: Any, name: str, objects: list[Any]) -> Any:
     """A field of a part of this library: of a parameter, whether it has a value, and the shape if it varies."""
     value = getattr(part, name)
-    if name == "period_s":
+    if name in ("period_s", "seed", "run"):  # of a loop; noise is drawn outside of machine code
         return None
     if name in (known := declared(type(part))):
         return value is None or (None if known[name].of_joints else np.shape(value))

@@ -1,0 +1,302 @@
+"""The loop of a real controller: what is measured comes late and rounded, and what is asked for acts late and limited.
+
+    q, v at t_k − τ_m ─ blocks ─► q̂, v̂ ─ controller at t_k ─► blocks ─► u from t_k + τ_u on
+
+All of it is a map of the states z of a sampled controller: z holds what is on its way, and the states of the blocks.
+A delay that is no whole number of periods makes a second instant in each, at which z passes it on.
+[Åström, Wittenmark, Computer-Controlled Systems, 3rd ed., 1997, sec. 2.3 and ch. 9]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import ceil
+from typing import Any, ClassVar, NamedTuple, final
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.coefficients import declared, with_values
+from robot_dyn.control.block import Block
+from robot_dyn.control.controller import Controller, Nested
+from robot_dyn.control.differences import Differences
+from robot_dyn.control.nested import check_sampled, nested
+from robot_dyn.errors import ControlError, shown
+from robot_dyn.validate import integer, number
+
+LINES = ("position", "velocity", "actuation")
+_LEAST = 1e-6  # of a period, between two instants
+_MOST = 1000  # periods of a delay: each is a state of every joint
+
+
+class Instant(NamedTuple):
+    """A part of each period, and what happens there: measuring, computing, or a torque that begins to act."""
+
+    part: float
+    measures: bool
+    computes: bool
+    acts: bool
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Loop(Controller):
+    """A sampled controller with delays, and blocks between it and the arm.
+
+    Delays are in periods T. The controller computes at t_k = k T, with the reference of that time and what was measured
+    at t_k − measurement_delay · T; its torque acts from t_k + actuation_delay · T on. Before the start the arm has been
+    where it starts, with the velocity it has there, and the torque is 0 until the first one acts. The actuation of a
+    run is the torque that acts.
+
+    Attributes:
+        controller: A sampled controller, whose period is that of the loop.
+        position: Blocks of the measured position, in the order from the joints to the controller.
+        velocity: Blocks of the measured velocity; `Differences` as the first takes the position behind its blocks.
+        actuation: Blocks of the torque, in the order from the controller to the joints.
+        measurement_delay: Of position and velocity, in periods, not negative.
+        actuation_delay: Of the torque, time to compute it and on its way, in periods, not negative.
+        seed: Of noise, a whole number.
+        run: Number of the run whose noise it is; `rollouts` counts on from it.
+
+    Raises:
+        ControlError: If the controller is continuous, or a loop itself, or a block or delay is not allowed.
+    """
+
+    outermost: ClassVar[bool] = True
+
+    controller: Controller
+    position: tuple[Block, ...] = ()
+    velocity: tuple[Block, ...] = ()
+    actuation: tuple[Block, ...] = ()
+    measurement_delay: float = 0.0
+    actuation_delay: float = 0.0
+    seed: int = 0
+    run: int = 0
+    period_s: float = field(init=False, default=0.0)
+
+    def __post_init__(self) -> None:
+        check_sampled("controller", self.controller)
+        object.__setattr__(self, "period_s", self.controller.period_s)
+        for line in LINES:
+            object.__setattr__(self, line, _blocks(line, getattr(self, line)))
+        for name in ("measurement_delay", "actuation_delay"):
+            object.__setattr__(self, name, _delay(name, getattr(self, name)))
+        for name in ("seed", "run"):
+            object.__setattr__(self, name, integer(name, getattr(self, name), most=2**63 - 1, error=ControlError))
+        parts = [each.part for each in self._instants]
+        if (np.diff([*parts, 1.0]) < _LEAST).any():
+            raise ControlError(
+                f"measurement_delay = {self.measurement_delay!r} and actuation_delay = {self.actuation_delay!r} make"
+                f" instants that lie closer together than {_LEAST:g} of a period; make them one, or move them apart"
+            )
+        super().__post_init__()
+        self._check_blocks(self.period_s)
+        self._places  # noqa: B018  # while the controller in it has numbers: a trace puts symbols in their place
+
+    def _check_blocks(self, period_s: float) -> None:
+        for line, i, block in self._all:
+            if isinstance(block, Differences) and (line, i) != ("velocity", 0):
+                raise ControlError(f"{line}: Differences may only be the first block of velocity; move it there")
+            for name, each in declared(type(block)).items():
+                shape = np.shape(getattr(block, name))
+                if each.of_joints and shape not in ((), (self.n,)):
+                    raise ControlError(f"{line}: {name} must be one number or of shape ({self.n},), got {shape}")
+            block.check(period_s)
+
+    @property
+    def _all(self) -> Iterator[tuple[str, int, Block]]:
+        """Line, number and block of each."""
+        return ((line, i, block) for line in LINES for i, block in enumerate(getattr(self, line)))
+
+    @cached_property
+    def n(self) -> int:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Number of joints it drives."""
+        return self.controller.n
+
+    @property
+    def parts(self) -> tuple[Nested, ...]:
+        made = [*nested(self, "controller", "")]
+        for line in LINES:
+            names = [block.name for block in getattr(self, line)]
+            for i, (name, block) in enumerate(zip(names, getattr(self, line), strict=True)):
+                number = f" {names[: i + 1].count(name)}" if names.count(name) > 1 else ""
+                made.append(Nested(f"{line}.{i}", f"{line}.{name}{number}.", block))
+        return tuple(made)
+
+    @property
+    def task_frame(self) -> str | None:
+        return self.controller.task_frame
+
+    @property
+    def saturation(self) -> Array:
+        return self.controller.saturation
+
+    @property
+    def cycle(self) -> int:
+        return self.controller.cycle
+
+    @property
+    def instants(self) -> tuple[float, ...]:
+        return tuple(each.part for each in self._instants)
+
+    @property
+    def deviates(self) -> int:
+        return self.n * sum(block.random for _, _, block in self._all)
+
+    @property
+    def noise_key(self) -> tuple[int, int]:
+        return self.seed, self.run
+
+    def of_run(self, run: int) -> Loop:
+        return with_values(self, {"run": self.run + run})
+
+    @property
+    def state_size(self) -> int:
+        return max((each.stop for each in self._places.values()), default=0)
+
+    @cached_property
+    def _instants(self) -> tuple[Instant, ...]:
+        """In each period, the first at its start."""
+        measured, acted = -self.measurement_delay % 1.0, self.actuation_delay % 1.0
+        parts = sorted({0.0, measured, acted})
+        return tuple(Instant(part, part == measured, part == 0.0, part == acted) for part in parts)
+
+    @property
+    def _differs(self) -> bool:
+        """Whether the velocity is that of differences."""
+        return bool(self.velocity) and isinstance(self.velocity[0], Differences)
+
+    @cached_property
+    def _places(self) -> dict[str, slice]:
+        """Where z has what."""
+        n, several = self.n, len(self._instants) > 1
+        measured = n if self._differs else 2 * n
+        whole = int(self.measurement_delay), int(self.actuation_delay)
+        blocks = {f"{line}.{i}": block for line, i, block in self._all}
+        sizes = {"controller": self.controller.state_size, "instant": several, "begun": 0}
+        sizes["sample"] = measured * (self.measurement_delay % 1.0 > 0)
+        sizes["past"] = measured * whole[0]
+        sizes |= {name: block.state_size(n) for name, block in blocks.items() if not block.random}
+        sizes["begun"] = any(sizes[name] for name in sizes if name not in ("controller", "instant"))
+        sizes["coming"] = n * whole[1]
+        sizes["computed"] = n * (self.actuation_delay % 1.0 > 0)
+        sizes["acting"] = n * several
+        sizes |= {name: block.state_size(n) for name, block in blocks.items() if block.random}
+        ends = np.cumsum([0, *sizes.values()]).tolist()
+        return {name: slice(a, b) for name, a, b in zip(sizes, ends, ends[1:], strict=False)}
+
+    def torque(self, t: float, q: Array, v: Array, z: Array) -> Array:
+        return self._tick(t, q, v, z)[0]
+
+    def state_rate(self, t: float, q: Array, v: Array, z: Array) -> Array:
+        return 0 * z
+
+    def next_state(self, t: float, q: Array, v: Array, z: Array) -> Array:
+        return self._tick(t, q, v, z)[1]
+
+    def _tick(self, t: float, q: Array, v: Array, z: Array) -> tuple[Array, Array]:
+        """The torque that acts from a tick on, and z⁺."""
+        i, begun = 0, z[self._places["begun"]]
+        for count in z[self._places["instant"]]:
+            while i < len(self._instants) - 1 and count > i + 0.5:
+                i += 1
+        if len(begun) and begun[0] < 0.5:
+            z = self._at_rest(q, v, z)
+        at, fresh = self._instants[i], q if self._differs else np.concatenate([q, v])
+        made = {name: z[place] for name, place in self._places.items()}
+        made["begun"] = np.ones(len(begun))
+        u = made["acting"]
+        if at.computes:
+            u = self._computed(t, fresh, made)
+            if self.actuation_delay % 1.0:
+                u, made["computed"] = made["acting"], u
+        elif at.acts:
+            u = made["computed"]
+        if at.measures and not at.computes:
+            made["sample"] = fresh
+        if len(self._instants) > 1:
+            made["acting"], made["instant"] = u, np.array([(i + 1.0) % len(self._instants)])
+        return u, np.concatenate([*made.values()])
+
+    def _computed(self, t: float, fresh: Array, made: dict[str, Array]) -> Array:
+        """What the torque is to be that the whole periods of its delay let through; the states in `made` go on."""
+        newest = made["sample"] if len(made["sample"]) else fresh
+        measured, made["past"] = _shifted(newest, made["past"])
+        q = self._through("position", measured[: self.n], made)
+        v = self._through("velocity", q if self._differs else measured[self.n :], made)
+        z = made["controller"]
+        u = self._through("actuation", self.controller.torque(t, q, v, z), made)
+        made["controller"] = self.controller.next_state(t, q, v, z)
+        u, made["coming"] = _shifted(u, made["coming"])
+        return u
+
+    def _through(self, line: str, x: Array, made: dict[str, Array]) -> Array:
+        """The signal behind the blocks of a line, whose states go on."""
+        for i, block in enumerate(getattr(self, line)):
+            s, name = made[f"{line}.{i}"], f"{line}.{i}"
+            if not block.random:
+                made[name] = block.next_state(x, s, self.period_s)
+            x = block.output(x, s, self.period_s)
+        return x
+
+    def _at_rest(self, q: Array, v: Array, z: Array) -> Array:
+        """The states of a loop in which q and v have been measured at all times, and no torque was asked for."""
+        made = {name: z[place] for name, place in self._places.items()}
+        fresh = q if self._differs else np.concatenate([q, v])
+        for name in ("sample", "past"):
+            made[name] = np.concatenate([fresh] * (len(made[name]) // len(fresh)) or [fresh[:0]])
+        signals = {"position": q, "velocity": v, "actuation": 0 * q}
+        for line, i, block in self._all:
+            if line == "velocity" and i == 0 and self._differs:
+                signals[line] = signals["position"]
+            if not block.random:
+                x = signals[line]
+                made[f"{line}.{i}"] = s = block.start(x, self.period_s)
+                signals[line] = block.output(x, s, self.period_s)
+        return np.concatenate([*made.values()])
+
+    def at_period(self, period_s: float) -> Controller:
+        inside = self.controller.at_period(period_s)
+        if not period_s:
+            return inside
+        self._check_blocks(period_s)
+        return with_values(self, {"controller": inside, "period_s": period_s})
+
+    def small_signal(self) -> Loop:
+        lines: Any = {line: tuple(block for block in getattr(self, line) if block.linear) for line in LINES}
+        return replace(self, controller=self.controller.small_signal(), **lines)
+
+    def settled(self, t: float, q: Array, v: Array, z: Array) -> Array:
+        inside = self.controller.settled(t, q, v, z)
+        z = np.concatenate([inside, np.zeros(self.state_size - len(inside))])
+        late = ceil(self.measurement_delay) + ceil(self.actuation_delay) + 2
+        for k in range(-self.cycle * ceil(late / self.cycle), 0):
+            for part in self.instants:
+                s = (k + part) * self.period_s
+                z = self.next_state(t + s, q + s * v, v, z)
+        return z
+
+
+def _shifted(x: Array, past: Array) -> tuple[Array, Array]:
+    """What leaves a delay of whole periods, and what is in it then, the newest first."""
+    if not len(past):
+        return x, past
+    return past[-len(x) :], np.concatenate([x, past[: -len(x)]])
+
+
+def _blocks(line: str, given: Any) -> tuple[Block, ...]:
+    """The blocks that are meant: several, or one."""
+    made = (given,) if isinstance(given, Block) else given
+    if not isinstance(made, tuple | list) or not all(isinstance(each, Block) for each in made):
+        raise ControlError(f"{line} must be blocks, such as [rd.Quantisation(1e-4)], got {shown(given)}")
+    return tuple(made)
+
+
+def _delay(name: str, given: Any) -> float:
+    """A delay in periods; within rounding of a whole number of them it is that."""
+    delay = number(name, given, error=ControlError)
+    if not 0 <= delay <= _MOST:
+        raise ControlError(f"{name} must be from 0 to {_MOST} periods, got {delay:g}; take another period")
+    return float(round(delay)) if abs(delay - round(delay)) < 1e-9 else delay
