@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import quadprog
 
-from robot_dyn.convex import minimum, residual
+from robot_dyn.convex import active_set, minimum, residual
 
 SEEDS = [1, 20261127]
 
@@ -34,11 +34,27 @@ def test_the_minimum_obeys_its_optimality_conditions(seed: int, degenerate: bool
     rng = np.random.default_rng([seed, degenerate])
     for _ in range(250):
         given = problem(rng, degenerate)
-        assert residual(*given, minimum(*given)) <= 1e-13
+        x = minimum(*given)
+        assert residual(*given, x) <= 1e-13
+        assert ((given[3] <= x) & (x <= given[4])).all()
+
+
+@pytest.mark.parametrize("degenerate", [False, True])
+def test_changing_one_place_at_a_time_leads_to_the_same_minimum(degenerate: bool) -> None:
+    """The active set alone, which is taken where Newton's method cycles: M (x − y) = 0 to the same rounding."""
+    rng = np.random.default_rng([9, degenerate])
+    for _ in range(150):
+        M, p, f, lower, upper = given = problem(rng, degenerate)
+        x, place = np.full(len(p), np.nan), np.full(len(p), np.nan)
+        assert active_set(*given, x, place)
+        assert residual(*given, x) <= 1e-13
+        assert ((lower <= x) & (x <= upper)).all()
+        scale = np.abs(M) @ np.abs(x) + np.abs(p) + f
+        assert (np.abs(M @ (x - minimum(*given))) <= 1e-9 * scale.max()).all()
 
 
 def test_no_other_point_has_less() -> None:
-    """½ xᵀM x − pᵀx + Σ f|x| grows in all directions that the bounds leave."""
+    """½ xᵀM x − pᵀx + Σ f|x| grows in all directions that the bounds leave, but for the rounding of its sums."""
     rng = np.random.default_rng(3)
     for _ in range(60):
         M, p, f, lower, upper = given = problem(rng, False)
@@ -48,7 +64,8 @@ def test_no_other_point_has_less() -> None:
             return float(y @ M @ y / 2 - p @ y + f @ np.abs(y))
 
         others = np.clip(x + rng.normal(size=(40, len(x))) * 10 ** rng.uniform(-3, 1, (40, 1)), lower, upper)
-        assert min(map(cost, others)) >= cost(x) - 1e-13 * (1 + abs(cost(x)))
+        added = max(np.abs(y) @ np.abs(M) @ np.abs(y) + np.abs(p) @ np.abs(y) + f @ np.abs(y) for y in others)
+        assert min(map(cost, others)) >= cost(x) - 2 * len(x) * np.finfo(float).eps * added
 
 
 def test_the_residual_sees_a_point_that_is_off() -> None:
