@@ -20,6 +20,7 @@ from robot_dyn.arithmetic import Array, NotPositiveDefiniteError, cholesky_solve
 from robot_dyn.errors import RobotDynError
 
 PASSES = 8  # of Newton's method, before one place is changed at a time: 6 were enough in 18 000 steps of an arm
+LARGE = 1e300  # a bound beyond is none; a comparison with infinity is no symbol
 ROUNDING = 16 * float(np.finfo(float).eps)
 
 
@@ -44,8 +45,8 @@ def minimum(M: np.ndarray, p: np.ndarray, f: np.ndarray, lower: np.ndarray, uppe
             if (after == place).all():
                 return x
             place = after
-        x, place = np.zeros(len(p)), np.zeros(len(p))
-        if active_set(M, p, f, lower, upper, x, place):
+        n, x = len(p), np.zeros(len(p))
+        if active_set(M, p, f, lower, upper, x, place, np.empty((n + 1, n))):
             return x
     except NotPositiveDefiniteError:
         pass
@@ -64,8 +65,10 @@ def residual(M: np.ndarray, p: np.ndarray, f: np.ndarray, lower: np.ndarray, upp
 def newton(M: Array, p: Array, f: Array, lower: Array, upper: Array, place: Array) -> tuple[Array, Array]:
     """A semismooth Newton step: x with each coordinate at its place, and the places with all violated ones changed.
 
-    Where no place changes, x is the minimum. In floats or symbols, without a branch.
+    Where no place changes, x is the minimum. In floats or symbols, without a branch; a place at a bound that is not
+    there, as where the places of a problem before are taken, is that beside it.
     """
+    place = np.minimum(np.maximum(place, np.where(lower > -LARGE, -2.0, -1.0)), np.where(upper < LARGE, 2.0, 1.0))
     free = place * place * (4 - place * place) / 3
     middle = np.minimum(np.maximum(0 * p, lower), upper)
     low, high = place < -1.5, place > 1.5
@@ -85,13 +88,16 @@ def _one(condition: Array) -> Array:
     return np.where(condition, 1.0, 0.0)
 
 
-def active_set(M: Array, p: Array, f: Array, lower: Array, upper: Array, x: Array, place: Array) -> bool:
+def active_set(
+    M: Array, p: Array, f: Array, lower: Array, upper: Array, x: Array, place: Array, room: Array
+) -> bool:  # fmt: skip
     """Write the minimum into x and its places, from coordinates in the middle; whether it was found.
 
-    The value falls from face to face, so that no face comes twice. A plain function of arrays, as of `machine_code`.
+    The value falls from face to face, so that no face comes twice. A plain function of arrays, which machine code
+    takes as it stands; `room` is (n + 1, n).
     """
-    n = len(p)
-    L, there = np.zeros((n, n)), np.zeros(n)
+    n, L = len(p), room
+    there = room[n]
     for i in range(n):
         place[i], x[i] = 0.0, min(max(0.0, lower[i]), upper[i])
     for _ in range(100 * n + 100):

@@ -45,6 +45,8 @@ def main() -> None:
     if "rollouts" in what:
         rollouts.one_step(effort)
         rollouts.thousands(effort)
+        rollouts.sticking(effort)
+        rollouts.sticking(effort)
     if "parameters" in what:
         parameters.parameters(effort)
     if "growth" in what:

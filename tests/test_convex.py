@@ -46,7 +46,7 @@ def test_changing_one_place_at_a_time_leads_to_the_same_minimum(degenerate: bool
     for _ in range(150):
         M, p, f, lower, upper = given = problem(rng, degenerate)
         x, place = np.full(len(p), np.nan), np.full(len(p), np.nan)
-        assert active_set(*given, x, place)
+        assert active_set(*given, x, place, np.empty((len(p) + 1, len(p))))
         assert residual(*given, x) <= 1e-13
         assert ((lower <= x) & (x <= upper)).all()
         scale = np.abs(M) @ np.abs(x) + np.abs(p) + f

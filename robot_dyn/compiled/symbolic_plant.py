@@ -93,8 +93,6 @@ def _traced(effect: Effect, values: Mapping[str, Array]) -> Effect:
         return effect
     own: Any = with_values(effect, values)
     if isinstance(effect, SetValued):
-        if own.held is None:
-            raise TraceError(f"effect {effect.name} holds joints, and which ones a run finds out: {_INTERPRETED}")
         return _TracedSetValued(own)
     if isinstance(effect, Stateful):
         return _StatefulBound(own) if isinstance(effect, Bound) else _StatefulForce(own)
@@ -135,7 +133,27 @@ class _TracedSetValued(_Torque, SetValued):
     @property
     def held(self) -> Any:
         """1 for each joint that is held."""
+        if self.inner.held is None:
+            raise TraceError(f"effect {self.name} holds joints, and which ones a run finds out: {_INTERPRETED}")
         return self.inner.held
+
+    @property
+    def rubs(self) -> bool:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """Whether it is friction."""
+        return self.inner.rubs
+
+    @property
+    def stops(self) -> bool:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """Whether it bounds velocities."""
+        return self.inner.stops
+
+    def friction(self, v: Array) -> Array:
+        return self.traced(lambda: self.inner.friction(v), len(v))
+
+    def bounds(self, q: Array, v: Array) -> tuple[Array, Array]:
+        n = len(v)
+        both = self.traced(lambda: np.concatenate([wide(x, n) for x in self.inner.bounds(q, v)]), 2 * n)
+        return both[:n], both[n:]
 
     def in_mode(self, mode: Mode) -> SetValued:
         return _TracedSetValued(self.inner.in_mode(mode))

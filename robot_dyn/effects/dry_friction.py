@@ -41,6 +41,7 @@ class DryFriction(SetValued):
     held: Any = field(default=None, init=False, repr=False, metadata=coefficient(swept=False))
     _direction: Any = field(default=None, init=False, repr=False, metadata=coefficient(swept=False))
 
+    rubs = True
     term = "−f(v) sign(v); |τ| ≤ f_s at v = 0"
 
     def __post_init__(self) -> None:
@@ -63,6 +64,9 @@ class DryFriction(SetValued):
         if self.static is None or self.stribeck_velocity is None:
             return self.level + 0 * v
         return self.level + (self.static - self.level) * np.exp(-((v / self.stribeck_velocity) ** 2))
+
+    def friction(self, v: Array) -> Array:
+        return np.where(np.abs(v) > 0, self.sliding(v), self.breakaway + 0 * v)
 
     @property
     def breakaway(self) -> Any:

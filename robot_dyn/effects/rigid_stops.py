@@ -37,6 +37,7 @@ class RigidStops(SetValued):
 
     held: Any = field(default=None, init=False, repr=False, metadata=coefficient(swept=False))
 
+    stops = True
     term = "lower ≤ q ≤ upper, v⁺ = −e v⁻"
 
     def __post_init__(self) -> None:
@@ -61,6 +62,11 @@ class RigidStops(SetValued):
     def at_rest(self, q: np.ndarray) -> Interval:
         side = self.touched(q)
         return Interval(np.where(side > 0, -inf, 0.0), np.where(side < 0, inf, 0.0))
+
+    def bounds(self, q: Array, v: Array) -> tuple[Array, Array]:
+        back = -self.restitution * v
+        lower = np.where(q <= self.lower + 0 * q, np.maximum(back, 0 * v), 0 * v - inf)
+        return lower, np.where(q >= self.upper + 0 * q, np.minimum(back, 0 * v), 0 * v + inf)
 
     def touched(self, q: np.ndarray) -> np.ndarray:
         """−1 for each joint at its lower stop, to rounding, or beyond it, 1 at the upper one, 0 elsewhere, (n,)."""

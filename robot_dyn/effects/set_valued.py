@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -46,9 +46,12 @@ class SetValued(Dissipative):
 
     Attributes:
         held: 1 for each joint that it holds and 0 for the others, (n,); None where no run has chosen a mode.
+        rubs, stops: Whether it is friction, and whether it has `bounds`, for time stepping.
     """
 
     held: Any
+    rubs: ClassVar[bool] = False
+    stops: ClassVar[bool] = False
 
     @abstractmethod
     def in_mode(self, mode: Mode) -> SetValued:
@@ -57,6 +60,14 @@ class SetValued(Dissipative):
     def sliding(self, v: Array) -> Array:
         """Its friction where joints slide, not negative, (..., n); 0 unless it says otherwise."""
         return 0 * v
+
+    def friction(self, v: Array) -> Array:
+        """Its friction at most, at the velocity at the start of a step, (n,)."""
+        return 0 * v
+
+    def bounds(self, q: Array, v: Array) -> tuple[Array, Array]:
+        """Bounds of the velocity at the end of a step, each (n,), from its middle q and the velocity at its start."""
+        return 0 * v - np.inf, 0 * v + np.inf
 
     @abstractmethod
     def at_rest(self, q: np.ndarray) -> Interval:

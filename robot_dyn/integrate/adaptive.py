@@ -109,6 +109,7 @@ class Adaptive:
     controls_error: ClassVar[bool] = True
     plain: ClassVar[bool] = True
     evaluations_per_step: ClassVar[int | None] = None
+    nonsmooth: ClassVar[bool] = False
 
     @property
     def needs_jacobian(self) -> bool:

@@ -76,10 +76,14 @@ class RightSide(NamedTuple):
     Attributes:
         rate: y', (r, W).
         jacobian: ∂f/∂y_j in out[j] and ∂f/∂t in out[m], (m + 1, m, W); 0 unless the method needs it.
+        problem, newton, behind: Of a method for velocities that jump; 0 for others. See `time_stepping`.
     """
 
     rate: Any
     jacobian: Any = 0
+    problem: Any = 0
+    newton: Any = 0
+    behind: Any = 0
 
 
 class Stepper(NamedTuple):
@@ -116,6 +120,7 @@ class Integrator(ABC):
         plain: Whether its step is a plain function, which machine code and runs in lock step take.
         controls_error: Whether it chooses its steps, as `Adaptive` does.
         needs_jacobian: Whether its step asks for ∂f/∂y.
+        nonsmooth: Whether velocities may jump within its step, as at impacts; it asks for a convex problem then.
     """
 
     name: str
@@ -126,6 +131,7 @@ class Integrator(ABC):
     plain: ClassVar[bool] = False
     controls_error: ClassVar[bool] = False
     needs_jacobian: ClassVar[bool] = False
+    nonsmooth: ClassVar[bool] = False
 
     @abstractmethod
     def step(self, system: System, t: Any, y: Array, h: Any) -> Array:

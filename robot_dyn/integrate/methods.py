@@ -18,6 +18,7 @@ from robot_dyn.integrate.gauss import Gauss
 from robot_dyn.integrate.implicit import SDIRK_3, LinearlyImplicitEuler
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.integrate.rosenbrock import ROSENBROCK_5
+from robot_dyn.integrate.time_stepping import TimeStepping
 from robot_dyn.validate import choice
 
 _READY = (
@@ -31,6 +32,7 @@ _READY = (
     LinearlyImplicitEuler(),
     SDIRK_3,
     ROSENBROCK_5,
+    TimeStepping(),
 )
 
 # How to get each; order_8 takes its coefficients from SciPy when asked for, so that this module stays light.

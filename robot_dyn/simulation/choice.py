@@ -66,8 +66,10 @@ def _made(setup: Setup, equation: StateEquation) -> Machine:
     from robot_dyn.simulation.machine.making import machine
 
     method: Any = setup.integrator
-    equation = equation.in_a_mode
-    return machine(equation, method if method.plain else None, jacobian=method.needs_jacobian, cuts=setup.finds_events)
+    return machine(
+        equation if method.nonsmooth else equation.in_a_mode, method if method.plain else None,
+        jacobian=method.needs_jacobian, cuts=setup.finds_events, nonsmooth=method.nonsmooth,
+    )  # fmt: skip
 
 
 def _interpreted(setup: Setup, why: str = "") -> str:

@@ -45,6 +45,11 @@ def estimate(setup: Setup, equation: StateEquation, run: Record, companion: Comp
     """
     if len(run.shared.t) < 2:
         return no_estimate("it ended in its first step")
+    if equation.impulses and setup.integrator.nonsmooth:
+        return no_estimate(
+            "the error of time stepping falls with the step, but from step to step by no order; compare it with"
+            " step_s / 4, or with integrator='DOP853'"
+        )
     n = equation.plant.dynamics.n
     kink, why = first_kink(setup, equation, run.walked)
     estimated = Estimated(run.shared, n, kink, rounding(run.shared, n), meaningless(run.walked, n))

@@ -24,7 +24,7 @@ from robot_dyn.simulation.record import MOST_SHARED, Path, Record
 from robot_dyn.simulation.schedule import paced
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.state_equation import StateEquation
-from robot_dyn.simulation.state_functions import interpreted, system
+from robot_dyn.simulation.state_functions import interpreted, sample, system
 from robot_dyn.simulation.time_loop import WATCHED, Ended, Functions, Now, Records, Rules, Runs, time_loop
 from robot_dyn.simulation.trajectory import Ending, Outcome
 from robot_dyn.simulation.transfers import Transfers
@@ -154,10 +154,12 @@ class FixedStep(Followed):
         """One step by the interpreted equation."""
         h, method, observer = float(self.plan.lengths[s]), cast(Integrator, self.setup.integrator), self.observer
         seen = None if observer is None else observer.seen
-        right_side = system(
-            interpreted(self.equation, self.watch), self.equation, self.plan.parameters[s], self.runs.own, seen
-        )
-        self.runs.y[:, 0] = y = one_step(method, right_side, t, y, h, self.watch)
+        functions, p = interpreted(self.equation, self.watch), self.plan.parameters[s]
+        if method.nonsmooth:
+            self.runs.y[:, 0] = y = self._jump(functions, t, h, p)
+        else:
+            right_side = system(functions, self.equation, p, self.runs.own, seen)
+            self.runs.y[:, 0] = y = one_step(method, right_side, t, y, h, self.watch)
         if observer is not None:
             ticked = self.now[Now.STEP] == 0 and self.segments[s].tick
             observer.step(t + h, y, ticked or not self.equation.sampled)
@@ -165,6 +167,15 @@ class FixedStep(Followed):
         self.now[Now.STEPS] += 1
         if self.now[Now.STEPS] % WATCHED == 0:
             self.watch.look(t + h, y)
+
+    def _jump(self, functions: Functions, t: float, h: float, p: Array) -> Array:
+        """The state behind a step in which velocities may jump."""
+        (step, coefficients, work), runs = self.stepper, self.runs
+        arguments = functions, coefficients, t, h, runs.y, p, runs.own, runs.after, work, runs.lost
+        self.watch.answer(t, self.y, lambda: step(*arguments))
+        if runs.lost[0] or not np.isfinite(runs.after).all():
+            raise self.watch.diverged(t, self.y, "a number overflowed")
+        return runs.after[:, 0].copy()
 
     def _times(self, places: np.ndarray) -> np.ndarray:
         """Times of (segment, step), in [s]."""
@@ -176,11 +187,19 @@ class FixedStep(Followed):
         pace = np.array([*(float(each.pace) for each in self.segments), 1.0])[places[:, 0]]
         return first + np.rint(places[:, 1] * pace).astype(np.int64)
 
+    def _accelerate(self, rows: int) -> None:
+        """The rates at samples, where machine code has none: which joints rest is for the equation to find."""
+        kept, held = self.records, slice(self.equation.size, self.equation.size + self.equation.plant.dynamics.n)
+        for t, y, made in zip(self._times(kept.place[:rows]), kept.y[:rows, :, 0], kept.made[:rows, :, 0], strict=True):
+            sample(self.equation, float(t), y, made[held].copy() if self.equation.sampled else None, made)
+
     def _record(self, outcome: Outcome) -> Record:
         rows, m, kept = int(self.now[Now.ROW]), self.equation.size, self.records
         if not rows:  # interrupted, or without a tick, at once
             kept.place[0], kept.y[0, :, 0], kept.made[0] = 0, self.start, np.nan
             rows = 1
+        if self.compiled and cast(Integrator, self.setup.integrator).nonsmooth:
+            self._accelerate(rows)
         shared = kept.shared[: int(self.now[Now.SHARED])]
         at = shared[:, m:].astype(np.int64)
         path = Path(self._keys(at), self._times(at), shared[:, :m])

@@ -102,10 +102,11 @@ def rollouts(
             f"rollouts run by an explicit, Gauss or Rosenbrock method, or by one that chooses its steps, not by"
             f" {setup.integrator.name}: give integrator='rk4' and its step_s; simulate takes any method"
         )
-    if (held := setup.plant.equation_of_motion.set_valued) and not setup.integrator.controls_error:
+    held, method = setup.plant.equation_of_motion.set_valued, setup.integrator
+    if held and not (method.controls_error or method.nonsmooth):
         raise QueryError(
             f"rollouts: {held[0].name} holds joints and lets them go, and steps in lock step do not end there; take"
-            " integrator='DOP853', by which runs go one after the other"
+            " integrator='time_stepping' with a step_s, or 'DOP853', by which runs go one after the other"
         )
     if setup.plant.equation_of_motion.payloads and not setup.integrator.controls_error:
         raise QueryError(
@@ -137,6 +138,7 @@ def rollouts(
         kept=kept,
         swept=tuple(sweep),
         jacobian=setup.integrator.needs_jacobian,
+        nonsmooth=setup.integrator.nonsmooth,
     )
     made.check(setup)
     runs = Batch(setup, made, q, v, sweep, recorded, kept, most_bytes).run(thread_count(threads), on_progress)

@@ -108,8 +108,10 @@ class Setup(Value):
         check_segments(self)
         if self.events and not self.finds_events:
             raise QueryError(
-                f"events: runs of more than {MOST_CUT} steps of {self.integrator.name} are not cut; take longer steps,"
-                " or integrator='DOP853'"
+                f"events: steps of {self.integrator.name} are not cut; take integrator='DOP853'"
+                if self.integrator.nonsmooth
+                else f"events: runs of more than {MOST_CUT} steps of {self.integrator.name} are not cut; take longer"
+                " steps, or integrator='DOP853'"
             )
         self._check_set_valued()
         self._check_payloads()
@@ -136,11 +138,13 @@ class Setup(Value):
             (not method.controls_error and method.order < 2, "is of order 1, too low to find where"),
             (not self.finds_events, f"takes more than {MOST_CUT} steps"),
         ):
-            if effects and fails:
+            if effects and fails and not method.nonsmooth:
                 raise QueryError(
                     f"{effects[0].name}: steps must end where it holds a joint or lets it go, and {method.name} {why};"
-                    " take integrator='DOP853'"
+                    " take integrator='DOP853', or 'time_stepping' with a step_s"
                 )
+        if method.nonsmooth and (other := [x for x in effects if not (x.rubs or x.stops)]):
+            raise QueryError(f"{other[0].name}: has no law for {method.name}; take integrator='DOP853'")
         for each in effects:
             if isinstance(each, RigidStops) and (depth := each.beyond_by(self.q0)).any():
                 i = int(np.argmax(depth))
@@ -245,8 +249,8 @@ class Setup(Value):
     @cached_property
     def finds_events(self) -> bool:
         """Whether steps end where effects and the controller switch, and at events asked for."""
-        if self.integrator.controls_error:
-            return True
+        if self.integrator.controls_error or self.integrator.nonsmooth:
+            return not self.integrator.nonsmooth
         equation = StateEquation(self.plant, self.controller, self.integrator.canonical, self.events)
         return equation.switches and self.steps <= MOST_CUT
 

@@ -76,6 +76,7 @@ class Functions(NamedTuple):
         sample: What a sample holds.
         jacobian: As of `RightSide`.
         events: Values of the events.
+        problem, newton, behind: As of `RightSide`.
     """
 
     rate: Any
@@ -84,6 +85,9 @@ class Functions(NamedTuple):
     sample: Any
     jacobian: Any = 0
     events: Any = 0
+    problem: Any = 0
+    newton: Any = 0
+    behind: Any = 0
 
 
 class Plan(NamedTuple):

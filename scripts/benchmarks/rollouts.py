@@ -1,4 +1,4 @@
-"""Simulation against MuJoCo's C: the RK4 step of one run, and thousands of runs at once; contacts and constraints off.
+"""Simulation against MuJoCo's C: the RK4 step of one run, and thousands of runs at once, without and with dry friction.
 
 ratio = t(MuJoCo) / t(robot_dyn), both in µs per step
 """
@@ -20,6 +20,8 @@ mujoco_rollout: Any = import_module("mujoco.rollout")
 
 READY = np.array([0.3, 0.6, -0.4, -1.2, 0.5, 1.1, 0.2])
 GAINS, DAMPING, THREADS = (100.0, 10.0), 0.5, 2
+LEVEL = np.array([3.0, 6.0, 2.0, 4.0, 1.0, 0.8, 0.3])
+LOWER, UPPER = READY - 0.15, READY + 0.25
 
 
 def one_step(effort: Effort) -> None:
@@ -58,16 +60,32 @@ def one_step(effort: Effort) -> None:
 
 def thousands(effort: Effort) -> None:
     """Runs of 1000 RK4 steps under PD and viscous friction on 2 threads; every q and v is recorded on both sides."""
+    model: Any = mujoco_model(mujoco, arms()["Panda-7"], GAINS, DAMPING, bare=True)
+    _side_by_side(effort, model, [], "rk4", "RK4 steps, PD and friction")
+
+
+def sticking(effort: Effort) -> None:
+    """The same with dry friction and rigid stops, e = 0, by time stepping; MuJoCo with its stiffest settings."""
+    model: Any = mujoco_model(mujoco, arms()["Panda-7"], GAINS, DAMPING)
+    model.opt.integrator = mujoco.mjtIntegrator.mjINT_EULER
+    model.dof_frictionloss[:], model.jnt_limited[:] = LEVEL, 1
+    model.jnt_range[:] = np.column_stack([LOWER, UPPER])
+    for stiffness, width in ((model.dof_solref, model.dof_solimp), (model.jnt_solref, model.jnt_solimp)):
+        stiffness[:], width[:, :2] = (2 * STEP_S, 1.0), 0.9999
+    held = [rd.DryFriction(LEVEL), rd.RigidStops(LOWER, UPPER)]
+    _side_by_side(effort, model, held, "time_stepping", "steps, PD, dry friction and rigid stops")
+
+
+def _side_by_side(effort: Effort, model: Any, held: list[Any], method: str, what: str) -> None:
     panda, runs, steps = arms()["Panda-7"], (128 if effort.quick else BATCH), (40 if effort.quick else 1000)
-    model: Any = mujoco_model(mujoco, panda, GAINS, DAMPING, bare=True)
-    goal, starts = READY + 0.2, READY + 0.1 * np.random.default_rng(0).normal(size=(runs, 7))
+    goal, starts = READY + 0.2, READY + 0.1 * np.random.default_rng(0).uniform(-1, 1, size=(runs, 7))
     control = rd.PD(rd.hold(goal), *GAINS)
     setup = rd.Setup(
-        rd.Plant(panda, [rd.ViscousFriction(DAMPING)]),
+        rd.Plant(panda, [rd.ViscousFriction(DAMPING), *held]),
         READY,
         duration_s=steps * STEP_S,
         controller=control,
-        integrator="rk4",
+        integrator=method,
     )
     first = np.zeros((runs, 1 + 14))
     first[:, 1:8] = starts
@@ -86,7 +104,7 @@ def thousands(effort: Effort) -> None:
                 times.append((perf_counter() - began) / (runs * steps))
     a, b, c = (1e6 * np.median(times) for times in (theirs, ours, alone))
     table("what", "MuJoCo, µs", "robot_dyn, µs", "ratio", "robot_dyn, 1 thread, µs", "2 threads over 1")
-    what = f"{runs} runs of {steps} RK4 steps, PD and friction, {THREADS} threads, per step"
+    what = f"{runs} runs of {steps} {what}, {THREADS} threads, per step"
     row(what, f"{a:.2f}", f"{b:.4f}", f"{a / b:.1f}", f"{c:.4f}", f"{c / b:.2f}")
     assert made.q is not None
     apart = np.abs(made.q[:, 1:] - state[:, :, 1:8]).max()

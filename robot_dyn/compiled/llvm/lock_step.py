@@ -15,7 +15,7 @@ from llvmlite import ir
 
 from robot_dyn.compiled.llvm.lanes import F64, wide
 from robot_dyn.compiled.llvm.vectors import I1, I64, Vectors
-from robot_dyn.compiled.llvm.writer import Writer
+from robot_dyn.compiled.llvm.writer import Writer, Written
 from robot_dyn.compiled.program import Program
 
 SIDE = 8  # runs in a vector: a 512-bit register, or two or four smaller ones
@@ -24,7 +24,9 @@ _NOTHING: Mapping[int, int] = MappingProxyType({})
 _ARGUMENTS = [F64, *[F64.as_pointer()] * 4]
 
 
-def write_function(module: Any, name: str, program: Program, runs: int, shared: Mapping[int, int] = _NOTHING) -> None:
+def write_function(
+    module: Any, name: str, program: Program, runs: int, shared: Mapping[int, int] = _NOTHING, passes: int = 1
+) -> None:
     """A function of a program with the inputs t (1,), y, p and own.
 
     Args:
@@ -34,6 +36,8 @@ def write_function(module: Any, name: str, program: Program, runs: int, shared: 
         runs: 1 or a multiple of SIDE.
         shared: Of those numbers of `own` that are the same for all runs, where in it each stands once; the others come
             row by row in their order.
+        passes: How often it is computed at most, for the runs of each vector until the last output is 0 for all of
+            them: the outputs before that one are then `own` of the next pass.
     """
     rows = [k for k in range(program.inputs[-1]) if k not in shared]
     own = {k: (row, False) for row, k in enumerate(rows)} | {k: (at, True) for k, at in shared.items()}
@@ -46,7 +50,8 @@ def write_function(module: Any, name: str, program: Program, runs: int, shared: 
     at = builder.phi(I64)
     at.add_incoming(ir.Constant(I64, 0), before)
     writer = Writer(builder, F64, min(SIDE, runs))
-    written = writer.write(program, _inputs(writer.vectors, function.args, program, runs, at, own))
+    given = _inputs(writer.vectors, function.args, program, runs, at, own)
+    written = writer.write(program, given) if passes == 1 else _repeated(writer, program, given, passes)
     for k, value in enumerate(written.results):
         builder.store(value, _place(writer.vectors, function.args[-1], k, runs, at), align=8)
     with builder.if_then(writer.vectors.any(written.beyond), likely=False):
@@ -56,6 +61,27 @@ def write_function(module: Any, name: str, program: Program, runs: int, shared: 
     builder.cbranch(builder.icmp_signed("<", following, ir.Constant(I64, runs)), body, end)
     builder.position_at_end(end)
     builder.ret_void()
+
+
+def _repeated(writer: Writer, program: Program, given: list[list[Any]], passes: int) -> Written:
+    """The program of one vector of runs, pass after pass."""
+    builder, vectors = writer.builder, writer.vectors
+    before, again, done = builder.block, builder.append_basic_block(), builder.append_basic_block()
+    builder.branch(again)
+    builder.position_at_end(again)
+    count, own = builder.phi(I64), [builder.phi(vectors.type) for _ in given[-1]]
+    written = writer.write(program, [*given[:-1], own])
+    *_, changed = written.results
+    after = builder.add(count, ir.Constant(I64, 1))
+    first, following = [ir.Constant(I64, 0), *given[-1]], [after, *written.results[-1 - len(own) : -1]]
+    for phi, start, value in zip([count, *own], first, following, strict=True):
+        phi.add_incoming(start, before)
+        phi.add_incoming(value, builder.block)
+    goes_on = vectors.any(builder.fcmp_ordered(">", changed, vectors.constant(0.0)))
+    less = builder.icmp_signed("<", after, ir.Constant(I64, passes))
+    builder.cbranch(builder.and_(goes_on, less), again, done)
+    builder.position_at_end(done)
+    return written
 
 
 def _any_angle(module: Any, name: str, program: Program, runs: int, own: Own) -> Any:

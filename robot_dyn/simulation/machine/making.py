@@ -84,6 +84,7 @@ def machine(
     swept: tuple[str, ...] = (),
     jacobian: bool = False,
     cuts: bool = False,
+    nonsmooth: bool = False,
 ) -> Machine:
     """The machine of a state equation, from the latest ones if it is among them; not compiled yet.
 
@@ -95,6 +96,7 @@ def machine(
         swept: Names of the parameters that differ from run to run.
         jacobian: Whether the method needs that of the rate.
         cuts: Whether steps are chosen, or cut at events.
+        nonsmooth: Whether velocities may jump within steps.
 
     Raises:
         TraceError: If a part of the equation cannot be compiled; names it, with the remedy.
@@ -107,11 +109,11 @@ def machine(
     described = described, tuple(each.place for each in known)
 
     def make() -> Equations:
-        programs = _programs(own, known, kept, jacobian, None if objects else described)
+        programs = _programs(own, known, kept, jacobian, nonsmooth, None if objects else described)
         return Equations(programs, lanes, robot.name, _shared(own, known, lanes, swept))
 
     names = tuple(name for name in dict.fromkeys(each.name for each in known) if name in swept)
-    equations = _equations.get(objects, (described, lanes, kept, names, jacobian), make)
+    equations = _equations.get(objects, (described, lanes, kept, names, jacobian, nonsmooth), make)
     if equations.instructions > _MOST_INSTRUCTIONS:
         raise TraceError(
             f"the run takes {equations.instructions} instructions, more than the {_MOST_INSTRUCTIONS} worth compiling;"
@@ -133,7 +135,7 @@ def machine_of_constants(equation: StateEquation, method: Integrator, *, lanes: 
     """
     robot = _robot(equation.plant.dynamics)
     own = replace(equation, plant=Plant(robot, equation.plant.effects))
-    programs = _traced(own, (), None if lanes == 1 else (), method.needs_jacobian, constants=True)
+    programs = _traced(own, (), None if lanes == 1 else (), method.needs_jacobian, method.nonsmooth, constants=True)
     return Machine(own, Equations(programs, lanes, robot.name), (), _loop(method, False))
 
 
@@ -151,15 +153,16 @@ def _shared(
 
 
 def _programs(
-    equation: StateEquation, known: tuple[Parameter, ...], kept: tuple[str, ...] | None, jacobian: bool, described: Any
-) -> dict[str, Program]:
+    equation: StateEquation, known: tuple[Parameter, ...], kept: tuple[str, ...] | None, jacobian: bool,
+    nonsmooth: bool, described: Any,
+) -> dict[str, Program]:  # fmt: skip
     """The programs of a state equation, from the store if the structure of all its parts is known."""
     store = None if described is None else default_store()
-    key = digest(["programs", repr(described), repr(kept), repr(jacobian)])
+    key = digest(["programs", repr(described), repr(kept), repr(jacobian), repr(nonsmooth)])
     if store is not None and (payload := store.load(key)) is not None:
         texts = payload.decode().split("\n\n")
         return {name: Program.read(text) for name, _, text in (each.partition("\n") for each in texts)}
-    programs = _traced(equation, known, kept, jacobian)
+    programs = _traced(equation, known, kept, jacobian, nonsmooth)
     if store is not None:
         text = "\n\n".join(f"{name}\n{program}" for name, program in programs.items())
         store.save(key, text.encode(), f"the equations of {equation.plant.dynamics.name}")  # pyright: ignore
@@ -169,7 +172,7 @@ def _programs(
 @interrupts_later()
 def _traced(
     equation: StateEquation, known: tuple[Parameter, ...], kept: tuple[str, ...] | None, jacobian: bool,
-    constants: bool = False,
+    nonsmooth: bool = False, constants: bool = False,
 ) -> dict[str, Program]:  # fmt: skip
     from robot_dyn.compiled.from_casadi import program_of
     from robot_dyn.compiled.symbolic_dynamics import SymbolicDynamics
@@ -184,7 +187,8 @@ def _traced(
         inputs = tuple(each.place for each in own)
         return _symbols.get((), (described, inputs), lambda: SymbolicDynamics(robot, own))
 
-    return {name: program_of(each) for name, each in trace(equation, bodies, known, kept, jacobian).items()}
+    traced = trace(equation, bodies, known, kept, jacobian, nonsmooth)
+    return {name: program_of(each) for name, each in traced.items()}
 
 
 def _loop(method: Any, cuts: bool) -> Callable[..., int]:

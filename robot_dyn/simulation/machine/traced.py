@@ -23,6 +23,7 @@ from robot_dyn.compiled.symbolic_plant import Piece, symbolic_controller, symbol
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.foreign import call
 from robot_dyn.simulation.event import Event
+from robot_dyn.simulation.moreau_jean import behind, problem, solution
 from robot_dyn.simulation.plan import BOUNDS, lengths, polynomials
 from robot_dyn.simulation.state_equation import StateEquation
 
@@ -35,6 +36,7 @@ def trace(
     known: Sequence[Parameter],
     kept: tuple[str, ...] | None,
     jacobian: bool = False,
+    nonsmooth: bool = False,
 ) -> dict[str, ca.Function]:
     """The state equation as CasADi Functions: rate, energy, tick if it is sampled, sample, and jacobian if asked for.
 
@@ -45,6 +47,7 @@ def trace(
         kept: Which of "u", "v" and "energy" a sample of runs in lock step holds; None for a single run, whose rate
             gives u as well and whose samples hold y', u, K and V.
         jacobian: Whether a method needs it.
+        nonsmooth: Whether the method asks for the convex problem of each step in place of the rate.
 
     Raises:
         TraceError: If a part cannot be traced; names it.
@@ -58,8 +61,12 @@ def trace(
     state, time = ys.view(Symbols), np.minimum(np.maximum(ts.view(Symbols), ps[:1]), ps[1:2])[0]
     with Symbolic().scope():
         symbolic = _symbolic(equation, bodies, split(known, owns[held:].view(Symbols)), _pieces(followed, ps[BOUNDS:]))
-        rate, u = symbolic.rate(time, state, owns[:held].view(Symbols) if equation.sampled else None)
+        held_here = owns[:held].view(Symbols) if equation.sampled else None
         q, v, z, _ = symbolic.state(state)
+        rate = np.full(equation.size, np.nan, dtype=object)
+        u = symbolic.actuation(time, q, v, z, held_here) if nonsmooth else None
+        if u is None:
+            rate, u = symbolic.rate(time, state, held_here)
         parts = {"u": wide(u, n), "v": v, "energy": symbolic.energies(time, q, v)}
         single = kept is None
         made = {"rate": np.concatenate([rate, parts["u"]]) if single else rate, "energy": parts["energy"]}
@@ -67,7 +74,6 @@ def trace(
             [rate, parts["u"], parts["energy"]] if single else [parts[x] for x in kept] or [[]]
         )
         if single and (equation.events or equation.limited):
-            held_here = owns[:held].view(Symbols) if equation.sampled else None
             demands = symbolic.demands(time, q, v, z, held_here, equation.limited)
             values = [wide(each, n) for each in demands] + [_value(each, time, q, v) for each in equation.events]
             made["events"] = np.concatenate(values)
@@ -80,10 +86,37 @@ def trace(
         if jacobian:
             # of the time before it is bounded: a segment goes on, for its derivatives
             unbounded, [free] = inputs("time", 1)
-            changing, _ = symbolic.rate(free, state, owns[:held].view(Symbols) if equation.sampled else None)
+            changing, _ = symbolic.rate(free, state, held_here)
             J = ca.jacobian(column(changing), ca.vertcat(y, unbounded))
             columns["jacobian"] = ca.vec(ca.substitute(J, unbounded, column(time)))
-    return {name: ca.Function("f", [t, y, p, own], [ca.cse(ca.densify(x))]) for name, x in columns.items()}
+        given: dict[str, list[Any]] = {name: [t, y, p, own] for name in columns}
+        if nonsmooth:
+            del columns["rate"]
+            for name, (arguments, x) in _of_step(symbolic, time, [t, p, own], held_here).items():
+                given[name], columns[name] = arguments, x
+    return {name: ca.Function("f", given[name], [ca.cse(ca.densify(x))]) for name, x in columns.items()}
+
+
+def _of_step(
+    symbolic: StateEquation, time: Any, shared: list[Any], held: Array | None
+) -> dict[str, tuple[list[Any], Any]]:
+    """Arguments and column of `problem`, `newton` and `behind`."""
+    n, (t, p, own) = symbolic.plant.dynamics.n, shared
+    x, xs = inputs("x", symbolic.size + 1)
+    nothing = ca.SX.sym("nothing", 0)
+    given = problem(symbolic, time, xs.view(Symbols), held)
+    known, knowns = inputs("known", len(given))
+    place, places = inputs("place", n)
+    solved, solveds = inputs("solved", 2 * n + 1 + len(given))
+    step = (
+        solution(n, knowns.view(Symbols), places.view(Symbols)),
+        behind(symbolic, xs.view(Symbols), solveds.view(Symbols)),
+    )
+    return {
+        "problem": ([t, x, p, own], column(given)),
+        "newton": ([t, known, nothing, place], column(step[0])),
+        "behind": ([t, x, nothing, solved], column(step[1])),
+    }
 
 
 def _value(event: Event, t: Any, q: Array, v: Array) -> Array:

@@ -1,0 +1,142 @@
+"""Time stepping by Moreau and Jean: velocities that jump, at impacts and where dry friction takes hold, within a step.
+
+    q_m = q + h/2 v,   v⁺ from M(q_m) (v⁺ − v) = h (u + Σ τ − C v − N) + the impulses of what holds joints,
+    q⁺ = q_m + h/2 v⁺
+
+The impulses are those of a convex problem in v⁺. What happens within a step happens once, whenever and however often:
+no event is looked for, and the order is 1. Without what holds joints it is the method of Störmer and Verlet in its form
+for positions, with forces that may depend on v. [Moreau 1988; Jean, The non-smooth contact dynamics method, 1999;
+Acary, Brogliato, Numerical Methods for Nonsmooth Dynamical Systems, 2008, §10.1]
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, NamedTuple, final
+
+import numpy as np
+
+from robot_dyn.arithmetic import Arithmetic, Array
+from robot_dyn.convex import active_set
+from robot_dyn.integrate.integrator import PlainMethod, RightSide, Stepper, System, arithmetic_like
+from robot_dyn.integrate.primitives import copy, evaluate
+
+
+class Problem(NamedTuple):
+    """First rows of the numbers of a convex problem of n joints in an array: behind v⁺, its places, and `changed`.
+
+    Attributes:
+        changed: How many places have changed.
+        M: The upper triangle of the mass matrix, by rows.
+        p: M v and the impulses that are known, (n,).
+        f: Impulses of friction at most, (n,).
+        lower, upper: Bounds of v⁺, (n,).
+        u: The actuation, the first of the torques that work, (n,).
+        rest: The other torques that work, then the rates of states of controller and effects, then shares of effects.
+    """
+
+    changed: int
+    M: int
+    p: int
+    f: int
+    lower: int
+    upper: int
+    u: int
+    rest: int
+
+
+def problem_rows(n: int) -> Problem:
+    """The rows of the problem of n joints."""
+    M = 2 * n + 1
+    p = M + n * (n + 1) // 2
+    return Problem(2 * n, M, p, *(p + k * n for k in range(1, 6)))
+
+
+class Work(NamedTuple):
+    """The arrays of a step.
+
+    Attributes:
+        K: v and u of the latest step, where a rate has them, (1, r, W).
+        y: The state and, in its last row, the step, (m + 1, W).
+        problem: Rows as of `Problem`, (R, W).
+        solved: Those of v⁺ and its places, (2n + 1, W).
+        M, one, room: For the problem of one run, (n, n), (6, n) and (n + 1, n).
+    """
+
+    K: Array
+    y: Array
+    problem: Array
+    solved: Array
+    M: Array
+    one: Array
+    room: Array
+
+
+def time_step(
+    f: RightSide, rows: Problem, t: Any, h: Any, y: Array, p: Array, own: Array, after: Array, work: Work, lost: Array
+) -> int:  # fmt: skip
+    """A step; arguments as of `Stepper`. The places of the step before are where the solution starts."""
+    n, m = len(work.M), len(y)
+    copy(work.y[:m], y)
+    for b in range(y.shape[1]):
+        work.y[m, b], lost[b] = h, 0
+    evaluate(f.problem, t + h / 2, work.y, p, own, work.problem[rows.M :])
+    evaluate(f.newton, t, work.problem[rows.M :], p, work.problem[n : 2 * n], work.solved)
+    copy(work.problem[: rows.M], work.solved)
+    for b in range(y.shape[1]):
+        if work.problem[rows.changed, b] > 0.0 and not solved_alone(rows, work, b):
+            lost[b] = 1
+    evaluate(f.behind, t, work.y, p, work.problem, after)
+    copy(work.K[0, :n], y[n : 2 * n])
+    copy(work.K[0, m : m + n], work.problem[rows.u : rows.u + n])
+    return 1
+
+
+def solved_alone(rows: Problem, work: Work, b: int) -> bool:
+    """The problem of run b by the active set, where Newton's method cycles."""
+    n, k, one = len(work.M), rows.M, work.one
+    for i in range(n):
+        for j in range(i, n):
+            work.M[i, j] = work.M[j, i] = work.problem[k, b]
+            k += 1
+    for i in range(n):
+        for row in range(4):
+            one[row, i] = work.problem[rows.p + row * n + i, b]
+    found = active_set(work.M, one[0], one[1], one[2], one[3], one[4], one[5], work.room)
+    for i in range(n):
+        work.problem[i, b], work.problem[n + i, b] = one[4, i], one[5, i]
+    return found
+
+
+@final
+@dataclass(frozen=True)
+class TimeStepping(PlainMethod):
+    """The method of Moreau and Jean: of order 1, through impacts and sticking friction, without events.
+
+    On an equation y' = f(t, y) without anything that jumps it is a method like others, with y = (q, v, quadratures)
+    and q' = v.
+    """
+
+    name: str = "time_stepping"
+    order: int = field(default=1, init=False)
+    evaluations_per_step: int | None = field(default=1, init=False)
+
+    nonsmooth: ClassVar[bool] = True
+
+    def stepper(
+        self, kind: Arithmetic, m: int, n: int, rows: int, runs: int = 1, widths: Array | None = None
+    ) -> Stepper:
+        of, most = problem_rows(n), (m - 2 * n) * (n + 1)
+        made = (np.zeros((size, runs)) for size in (m + 1, of.rest + most, 2 * n + 1))
+        room = (np.empty(shape) for shape in ((n, n), (6, n), (n + 1, n)))
+        return Stepper(time_step, of, Work(np.zeros((1, rows, runs)), *made, *room))
+
+    def step(self, system: System, t: Any, y: Array, h: Any) -> Array:
+        n, h = system.n, arithmetic_like(y).number(h)
+        half = h / 2
+        middle, after = np.array(y), np.array(y)
+        middle[..., :n] = y[..., :n] + y[..., n : 2 * n] * half
+        rate = system.rate(t + half, middle)
+        after[..., n:] = y[..., n:] + rate[..., n:] * h
+        after[..., :n] = middle[..., :n] + after[..., n : 2 * n] * half
+        return after
