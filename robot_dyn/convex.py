@@ -38,7 +38,7 @@ def minimum(M: np.ndarray, p: np.ndarray, f: np.ndarray, lower: np.ndarray, uppe
         RobotDynError: If no minimum is found, as with numbers that are not finite or M that is not positive definite.
     """
     lower, upper = (np.asarray(each, float) for each in (lower, upper))
-    place = np.zeros(len(p))
+    place = np.where((f == 0) & (lower < 0) & (upper > 0), 1.0, 0.0)
     try:
         for _ in range(PASSES):
             x, after = newton(M, p, f, lower, upper, place)
@@ -80,7 +80,9 @@ def newton(M: Array, p: Array, f: Array, lower: Array, upper: Array, place: Arra
     least = np.where(high, f, np.where(low, -np.inf, np.where(middle > lower, -f, -np.inf)))
     most = np.where(low, -f, np.where(high, np.inf, np.where(middle < upper, f, np.inf)))
     released = _one(s > most + slack) - _one(s < least - slack)
-    met = _one(x >= np.where(place > 0, upper, middle)) - _one(x <= np.where(place > 0, middle, lower))
+    rough = np.where(middle > lower, np.where(middle < upper, f, 1.0), 1.0) > 0  # else it is one piece, with f = 0
+    below, above = np.where(rough, middle, lower), np.where(rough, middle, upper)
+    met = _one(x >= np.where(place > 0, upper, above)) - _one(x <= np.where(place > 0, below, lower))
     return x, place + np.where(free > 0.5, met, released)
 
 
