@@ -199,3 +199,21 @@ def test_it_estimates_no_error_and_finds_no_events() -> None:
         rd.simulate(rd.Plant(ARM, [rd.RigidStops(-1, 0.3)]), [0.3 + 1e-6, 0.0], step_s=1e-3, integrator="time_stepping")
     with pytest.raises(QueryError, match="'time_stepping' with a step_s"):
         rd.rollouts(plant, [0.3, 0.2], integrator="rk4", step_s=1e-3)
+
+
+def test_it_takes_over_where_events_accumulate(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A ball that bounces, with a limit of 12 changes in a hundredth of the run: made by time stepping, and said."""
+    from robot_dyn.simulation import event_run
+
+    monkeypatch.setattr(event_run, "_ACCUMULATED", 12)
+    monkeypatch.setattr(event_run, "_BRIEF", 1e-2)
+    plant = rd.Plant(RAIL, [rd.RigidStops(0.0, 2.0, 0.5)])
+    run = rd.simulate(plant, [0.4], duration_s=2.0)
+    assert run.outcome.ending == "finished"
+    assert run.statistics.method == "time_stepping"
+    (said,) = [each for each in run.remarks if each.kind == "events_accumulate"]
+    assert "made by time stepping with steps of 0.001 s" in said.remedy
+    assert abs(run.q[-1, 0]) <= 3e-3  # of a step at the velocity of the first impact
+    named = rd.simulate(plant, [0.4], duration_s=2.0, integrator="DOP853")
+    assert named.outcome.ending == "diverged"
+    assert "take integrator='time_stepping'" in named.outcome.advice

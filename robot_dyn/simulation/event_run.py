@@ -6,6 +6,7 @@ that within a step the right-hand side is smooth.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 from math import inf
@@ -27,6 +28,7 @@ from robot_dyn.simulation.modes import Guard
 from robot_dyn.simulation.observer import Observer
 from robot_dyn.simulation.plan import plan_of
 from robot_dyn.simulation.record import MOST_SHARED, Path, Record
+from robot_dyn.simulation.remarks import Kind, Remark
 from robot_dyn.simulation.schedule import nodes
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import samples as most_samples
@@ -43,6 +45,7 @@ from robot_dyn.threshold import Threshold
 _SAMPLES = 1000  # of a run without a record period
 _COMPARED = 1000  # times at which a run is compared with runs of other tolerances
 _CHATTER, _BRIEF = 20, 1e-9  # events of one threshold, in that part of the run
+_ACCUMULATED = 1000  # changes of the mode, in that part of the run: no motion that ends them is left between
 _CHUNK = 1024  # ends of steps for which there is room at first
 
 Advance = Callable[..., int]
@@ -62,6 +65,18 @@ class TooLongError(Exception):
     def __init__(self, evaluations: int) -> None:
         super().__init__()
         self.evaluations = evaluations
+
+
+class AccumulationError(Exception):
+    """Internal: a run whose events accumulate, which time stepping is to make.
+
+    Attributes:
+        remark: Why.
+    """
+
+    def __init__(self, remark: Remark) -> None:
+        super().__init__(remark.text)
+        self.remark = remark
 
 
 class TerminalEvent(Exception):  # noqa: N818
@@ -88,7 +103,7 @@ class EventRun(Followed):
         in_python: The functions as Python calls them, where they are machine code.
         most: Evaluations after which it gives up with a TooLongError.
         thresholds: Whether those of the effects are looked for; if not, the effects switch by themselves within steps.
-        chooses: Whether it gives up with a StiffError where another method is to make the run.
+        chooses: Whether it gives up with a StiffError or AccumulationError where another method is to make the run.
     """
 
     first = 200
@@ -101,6 +116,7 @@ class EventRun(Followed):
         thresholds: bool = True, chooses: bool = False,
     ) -> None:  # fmt: skip
         setup, equation, self.most, self._look = watch.setup, watch.equation, most, FIRST_LOOK if chooses else 0
+        self._chooses, self._changes = chooses, deque[float](maxlen=_ACCUMULATED)  # times of changes of the mode
         self.watch, self.transfers, self.plan, self.in_python = watch, transfers, plan_of(setup), in_python
         self.setup, self.equation, self.made, self.samples = setup, equation, made, samples
         self.on_progress, self.observer, self.compiled = on_progress, observer, machine_code is not None
@@ -292,6 +308,9 @@ class EventRun(Followed):
         assert modes is not None
         self.runs.y[:, 0], happened = modes.after(t, y, held, guard)
         self.events = sorted([*self.events, *happened], key=lambda each: each.t)
+        self._changes.append(t)
+        if len(self._changes) == _ACCUMULATED and t - self._changes[0] <= _BRIEF * self.setup.duration_s:
+            self._accumulated(t, y, self.equation.plant.dynamics.joint_names[guard.joint])
         self._watch_anew(t, held)
         if self.setup.integrator.needs_jacobian:
             self.control[At.NEXT] = 0.0
@@ -313,6 +332,22 @@ class EventRun(Followed):
         if self.setup.integrator.needs_jacobian:
             self.control[At.NEXT] = 0.0
         self._change_mode()
+
+    def _accumulated(self, t: float, y: np.ndarray, joint: str) -> None:
+        """AccumulationError if another method may make the run, else DivergedError."""
+        first = self._changes[0]
+        what = f"{_ACCUMULATED} changes of what holds joints in {t - first:.1e} s, the last of joint {joint!r}"
+        if not self._chooses:
+            raise DivergedError(
+                t, f"events accumulate at t = {t}: {what}; take integrator='time_stepping' and a step_s"
+            )
+        velocity = float(np.abs(y[self.rules.n : 2 * self.rules.n]).max())
+        remedy = f"made by time stepping with steps of {Setup.step_s} s, without an estimate of its error"
+        raise AccumulationError(
+            Remark(
+                Kind.ACCUMULATE, joint, "v", first, t - first, t, velocity, None, f"{what}, at t = {t:.6g} s", remedy
+            )
+        )
 
     def _watch_anew(self, t: float, held: Array | None) -> None:
         """The switching functions of the state reached."""

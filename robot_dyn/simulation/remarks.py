@@ -24,6 +24,7 @@ class Kind(StrEnum):
     COARSE = "record_too_coarse"
     GAINS = "dissipative_effect_gains"
     CREEPS = "regularised_friction_creeps"
+    ACCUMULATE = "events_accumulate"
     STIFF = "steps_bounded_by_stability"
 
 
@@ -35,6 +36,7 @@ _HEADINGS = {
     Kind.COARSE: "record too coarse",
     Kind.GAINS: "a dissipative effect does positive work",
     Kind.CREEPS: "regularised friction creeps",
+    Kind.ACCUMULATE: "events accumulate",
     Kind.STIFF: "steps bounded by stability",
 }
 

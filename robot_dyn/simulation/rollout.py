@@ -60,7 +60,8 @@ def rollouts(
     """Run a plant or a robot from many starts, or a setup with the options that are given in place of its own.
 
     By an explicit, Gauss or Rosenbrock method of fixed step, such as `integrator="rk4"`, the runs go side by side in
-    machine code, and are not cut where a stop is touched. By a method that chooses its steps, such as the default, they
+    machine code, and are not cut where a stop is touched; through dry friction that sticks and rigid stops by
+    `integrator="time_stepping"`. By a method that chooses its steps, such as the default, they
     go one after the other on each thread, each as `simulate` makes it.
 
     Args:

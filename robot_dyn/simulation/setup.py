@@ -158,6 +158,11 @@ class Setup(Value):
                 f"carried_payload: what is picked up or dropped changes momenta, which {self.integrator.name}"
                 " integrates; take integrator='DOP853'"
             )
+        if self.plant.equation_of_motion.payloads and self.integrator.nonsmooth:
+            raise QueryError(
+                f"carried_payload: steps of {self.integrator.name} do not end where it comes and goes; take"
+                " integrator='DOP853'"
+            )
 
     def _check_torques(self) -> None:
         """That what the controller and each effect return at the start is one number for each joint."""

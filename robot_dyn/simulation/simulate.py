@@ -18,13 +18,14 @@ from robot_dyn.control.cartesian import CartesianReference
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.effects.plant import Plant
 from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, STIFF
+from robot_dyn.integrate.time_stepping import TimeStepping
 from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.simulation.accuracy import run_to
 from robot_dyn.simulation.acting import acting
 from robot_dyn.simulation.choice import choose, most_interpreted
 from robot_dyn.simulation.error import ErrorEstimate, no_estimate
 from robot_dyn.simulation.estimate import estimate
-from robot_dyn.simulation.event_run import TooLongError
+from robot_dyn.simulation.event_run import AccumulationError, TooLongError
 from robot_dyn.simulation.ledger import Ledger
 from robot_dyn.simulation.loads import at_stop, link_of, wrenches
 from robot_dyn.simulation.observed import observer_of, remarks
@@ -149,6 +150,8 @@ def _by_choice(setup: Setup, equation: StateEquation, on_progress: Callable[[flo
         except StiffError as found:
             stiff = replace(setup.integrator, method=STIFF)
             setup, chooses, said = replace(setup, integrator=stiff), False, (found.remark,)
+        except AccumulationError as found:
+            setup, chooses, said = replace(setup, integrator=TimeStepping()), False, (*said, found.remark)
 
 
 def _trajectory(
