@@ -13,7 +13,7 @@ from typing import cast, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import FLOAT64
+from robot_dyn.arithmetic import FLOAT64, Array
 from robot_dyn.errors import RobotDynError
 from robot_dyn.foreign import is_mistake
 from robot_dyn.integrate.integrator import Integrator

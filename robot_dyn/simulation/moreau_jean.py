@@ -68,11 +68,10 @@ def solution(n: int, known: Array, place: Array) -> Array:
 
 def solved(n: int, known: Array, place: Array) -> Array:
     """The same after as many Newton steps as it takes, but for PASSES at most; in floats."""
-    for _ in range(PASSES):
-        made = solution(n, known, place)
-        place = made[n : 2 * n]
-        if not made[2 * n] > 0:
-            break
+    made = solution(n, known, place)
+    for _ in range(PASSES - 1):
+        if made[2 * n] > 0:
+            made = solution(n, known, made[n : 2 * n])
     return made
 
 
