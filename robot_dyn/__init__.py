@@ -60,6 +60,7 @@ if TYPE_CHECKING:
     from robot_dyn.effects.effect import Bound as Bound
     from robot_dyn.effects.effect import Conservative as Conservative
     from robot_dyn.effects.effect import Dissipative as Dissipative
+    from robot_dyn.effects.effect import Drive as Drive
     from robot_dyn.effects.effect import Stateful as Stateful
     from robot_dyn.effects.friction import RegularisedCoulombFriction as RegularisedCoulombFriction
     from robot_dyn.effects.friction import ViscousFriction as ViscousFriction
@@ -72,6 +73,7 @@ if TYPE_CHECKING:
     from robot_dyn.effects.lugre import LuGreFriction as LuGreFriction
     from robot_dyn.effects.plant import Plant as Plant
     from robot_dyn.effects.rigid_stops import RigidStops as RigidStops
+    from robot_dyn.effects.series_elastic import SeriesElastic as SeriesElastic
     from robot_dyn.effects.spring import Spring as Spring
     from robot_dyn.effects.wrench import ExternalWrench as ExternalWrench
     from robot_dyn.errors import ModelWarning as ModelWarning
@@ -127,6 +129,7 @@ _HOME = {
     "DahlFriction": "effects.dahl",
     "Differences": "control.differences",
     "Dissipative": "effects.effect",
+    "Drive": "effects.effect",
     "DryFriction": "effects.dry_friction",
     "Dynamics": "model.dynamics",
     "EffortLimit": "effects.actuator",
@@ -162,6 +165,7 @@ _HOME = {
     "Rollouts": "simulation.rollout_result",
     "STANDARD_GRAVITY": "model.edits",
     "Samples": "control.samples",
+    "SeriesElastic": "effects.series_elastic",
     "Setup": "simulation.setup",
     "Spring": "effects.spring",
     "Stateful": "effects.effect",

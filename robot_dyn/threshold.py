@@ -23,6 +23,7 @@ class Threshold:
         rising, falling: What happens where the coordinate grows through it, or falls, as "touched" and "left".
         of_velocity: Whether the velocity passes it.
         of_actuation: Whether the actuation passes it: what reaches a bound, or what a controller asks for.
+        state: Index of the state of the effect that passes it, in place of a coordinate of the joint; None for none.
         slack: By how much a position or a velocity passes it before that counts, in its unit; no less than rounding.
 
     Raises:
@@ -37,14 +38,22 @@ class Threshold:
     of_velocity: bool = False
     of_actuation: bool = False
     slack: float = 0.0
+    state: int | None = None
 
     def __post_init__(self) -> None:
         integer("joint", self.joint, most=_MOST, error=EffectError)
         object.__setattr__(self, "level", number("level", self.level, error=EffectError))
         object.__setattr__(self, "slack", number("slack", self.slack, least=0, error=EffectError))
+        if self.state is not None:
+            integer("state", self.state, most=_MOST, error=EffectError)
         for name in ("name", "rising", "falling"):
             instance(name, getattr(self, name), str, "give a text", error=EffectError)
         for name in ("of_velocity", "of_actuation"):
             truth(name, getattr(self, name), error=EffectError)
-        if self.of_velocity and self.of_actuation:
-            raise EffectError(f"{self.name}: a threshold is of the velocity or of the actuation, not of both")
+        if self.of_velocity + self.of_actuation + (self.state is not None) > 1:
+            raise EffectError(f"{self.name}: a threshold is of the velocity, the actuation or a state, not of both")
+
+    @property
+    def own(self) -> bool:
+        """Whether it is of what belongs to its effect, and of no coordinate, which effects share."""
+        return self.of_actuation or self.state is not None

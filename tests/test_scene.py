@@ -95,8 +95,11 @@ EFFECTS = {
     ),
     "dahl_friction": "bristle_stiffness_N_m_per_rad = 300.0\ncoulomb_N_m = {joint_1 = 0.7}\nexponent = 1.5",
     "carried_payload": 'frame = "tip"\nmass_kg = 0.5\nend_s = 0.07\npicked_up = "at_speed_of_link"',
+    "series_elastic": (
+        "stiffness_N_m_per_rad = {joint_2 = 80.0}\ninertia_kg_m2 = 0.02\nratio = 5.0\nbacklash_rad = 0.01"
+    ),
     "payload": 'frame = "tip"\nmass_kg = 0.5',
-    "armature": "inertia_kg_m2 = 0.1",
+    "armature": "inertia_kg_m2 = {joint_1 = 0.002, joint_2 = 0.001}\ngear_ratio = {joint_1 = 9.0}",
     "lock": "joints = {joint_1 = 0.2}",
 }
 
@@ -128,10 +131,11 @@ def test_effect_of_a_scene_is_that_of_python(write, kind: str) -> None:
         "carried_payload": lambda: rd.Plant(
             robot, [rd.CarriedPayload(rd.Payload("tip", 0.5), end_s=0.07, at_rest=False)]
         ),
+        "series_elastic": lambda: rd.Plant(robot, [rd.SeriesElastic([0.0, 80.0], 0.02, 5.0, backlash=0.01)]),
         "dry_friction": lambda: rd.Plant(robot, [rd.DryFriction([0.4, 0.2], 0.6)]),
         "rigid_stops": lambda: rd.Plant(robot, [rd.RigidStops(-1.0, [1.0, np.inf], 0.3)]),
         "payload": lambda: rd.Plant(robot.with_(payload=rd.Payload("tip", 0.5))),
-        "armature": lambda: rd.Plant(robot.with_(armature=0.1)),
+        "armature": lambda: rd.Plant(robot.with_(armature=[0.002 * 81.0, 0.001])),
         "lock": lambda: rd.Plant(robot.with_(lock={"joint_1": 0.2})),
     }[kind]()
     plant = rd.read_scene(write(text)).plant

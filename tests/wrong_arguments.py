@@ -15,7 +15,7 @@ import numpy as np
 import robot_dyn as rd
 from robot_dyn.arithmetic import Arithmetic
 from robot_dyn.control.controller import Controller
-from robot_dyn.effects.effect import Bound, Conservative, Effect, Force, Stateful
+from robot_dyn.effects.effect import Bound, Conservative, Drive, Effect, Force, Stateful
 from robot_dyn.integrate.integrator import System
 from tests.queries import ARGUMENTS, FRAMED
 
@@ -40,7 +40,9 @@ RESULTS = {
 # What time loops and traces call, with numbers that were checked before, or symbols.
 INTERFACES = (Effect, Controller, rd.Block, Arithmetic)
 FOR_LOOPS = {
-    name for kind in (Force, Conservative, Bound, Stateful, Controller, rd.Block, Arithmetic) for name in dir(kind)
+    name
+    for kind in (Force, Conservative, Bound, Stateful, Drive, Controller, rd.Block, Arithmetic)
+    for name in dir(kind)
 }
 FOR_LOOPS |= {"task_acceleration", "in_mode", "at_rest", "sliding", "touched", "snapped", "beyond_by"}
 LAX = {  # arguments that may be infinite or unknown, or of any shape
@@ -240,6 +242,10 @@ def examples(folder: Path) -> dict[str, Example]:
         "DahlFriction": (rd.DahlFriction, {"bristle_stiffness": 90.0, "coulomb": [1.5, 1.2], "exponent": 1.5}),
         "CarriedPayload": (
             rd.CarriedPayload, {"payload": rd.Payload("pole", 0.5), "start_s": 0.1, "end_s": 0.5, "at_rest": True}
+        ),
+        "SeriesElastic": (
+            rd.SeriesElastic,
+            {"stiffness": [90.0, 1.0], "inertia": 0.1, "ratio": 3.0, "damping": 0.1, "friction": 0.2, "backlash": 0.01},
         ),
         "RigidStops": (rd.RigidStops, stops | {"restitution": 0.5}),
         "LineDamper": (rd.LineDamper, strut | {"damping": 0.1}),

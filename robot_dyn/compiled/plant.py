@@ -187,7 +187,9 @@ class CompiledPlant:
                 "torque": lambda: torque,
                 "N": lambda: equation.N(qs, torque),
                 "inverse_dynamics": lambda: equation.inverse_dynamics(qs, vs, us, torque),
-                "forward_dynamics": lambda: equation.acceleration(qs, vs, equation.actuation(us) + torque),
+                "forward_dynamics": lambda: equation.acceleration(
+                    qs, vs, equation.on_joints(equation.actuation(us)) + torque
+                ),
             }
             answer = column(made[quantity]())
         given = [*[t, q, v, u][: len(PLANT[quantity].arguments)], *self._numbers[0]]

@@ -19,7 +19,7 @@ from robot_dyn.compiled.symbolic import Symbols, TraceError, column, every_branc
 from robot_dyn.control.controller import Controller
 from robot_dyn.control.reference import polynomial
 from robot_dyn.effects.carried_payload import CarriedPayload
-from robot_dyn.effects.effect import Active, Bound, Conservative, Effect, Stateful
+from robot_dyn.effects.effect import Active, Bound, Conservative, Drive, Effect, Stateful
 from robot_dyn.effects.plant import Plant
 from robot_dyn.effects.set_valued import Interval, Mode, SetValued
 from robot_dyn.foreign import because
@@ -94,6 +94,8 @@ def _traced(effect: Effect, values: Mapping[str, Array]) -> Effect:
     own: Any = with_values(effect, values)
     if isinstance(effect, SetValued):
         return _TracedSetValued(own)
+    if isinstance(effect, Drive):
+        return _TracedDrive(own)
     if isinstance(effect, Stateful):
         return _StatefulBound(own) if isinstance(effect, Bound) else _StatefulForce(own)
     if isinstance(effect, Bound):
@@ -182,12 +184,25 @@ class _States(_Part, Stateful):
     def state_size(self, n: int) -> int:
         return self.inner.state_size(n)
 
+    def start(self, dynamics: Any, q: Array, v: Array) -> Array:
+        return self.inner.start(dynamics, q, v)
+
     def state_rate(self, dynamics: Any, t: Any, q: Array, v: Array, u: Array, z: Array) -> Array:
         return self.traced(lambda: self.inner.state_rate(dynamics, t, q, v, u, z), len(z))
 
 
 class _StatefulForce(_States, _TracedForce):
     """A torque with states."""
+
+
+class _TracedDrive(_StatefulForce, Drive):
+    """A drive."""
+
+    def driven(self, n: int) -> Sequence[int]:
+        return self.inner.driven(n)
+
+    def speeds(self, z: Array) -> Array:
+        return self.inner.speeds(z)
 
 
 class _StatefulBound(_States, _TracedBound):

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import inf
 from typing import Any, ClassVar
+
+import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.coefficients import check_coefficients, declared
@@ -120,16 +122,21 @@ class Active(Force):
 
 
 class Stateful(Effect, ABC):
-    """An effect with states z of its own, ż = rate(t, q, v, u, z), z(0) = 0, which are integrated with the plant.
+    """An effect with states z of its own, ż = rate(t, q, v, u, z), which are integrated with the plant.
 
     It is of another kind besides. The torque of such a force is torque(dynamics, t, q, v, z), and what such a bound
     leaves is actuation(u, z). A dissipative one obeys torqueᵀ v + dE/dt ≤ 0, with E the energy that its states store.
-    A plant that is asked for one state takes z = 0, and its actuation as it is.
+    A plant that is asked for one state takes those of the start, and its actuation as it is.
     """
 
     @abstractmethod
     def state_size(self, n: int) -> int:
         """Number of its states on an arm of n joints."""
+
+    def start(self, dynamics: Dynamics, q: Array, v: Array) -> Array:
+        """Its states at the start of a run from q, v, (..., n), shape (..., state_size); 0 unless it says otherwise."""
+        shape = (*v.shape[:-1], self.state_size(dynamics.n))
+        return np.zeros(shape, dtype=v.dtype).view(type(v))
 
     @abstractmethod
     def state_rate(self, dynamics: Dynamics, t: float, q: Array, v: Array, u: Array, z: Array) -> Array:
@@ -147,6 +154,21 @@ class Stateful(Effect, ABC):
     def stored_energy(self, dynamics: Dynamics, t: float, q: Array, z: Array) -> Array:
         """Energy E that its states hold, in [J], for the ledger; 0 unless it says otherwise."""
         return 0 * q[..., 0]
+
+
+class Drive(Stateful, Force, ABC):
+    """A force with states that the actuation of some joints drives in place of these: it works on motors, not on them.
+
+    Its work in the ledger is that of its torque on the joints less that of the actuation on its motors.
+    """
+
+    @abstractmethod
+    def driven(self, n: int) -> Sequence[int]:
+        """Indices of the joints whose actuation it takes, on an arm of n joints."""
+
+    @abstractmethod
+    def speeds(self, z: Array) -> Array:
+        """Velocities at which the actuation of these joints works, in the order of `driven`."""
 
 
 class Bound(Effect, ABC):

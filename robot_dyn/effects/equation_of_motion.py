@@ -18,7 +18,7 @@ import numpy as np
 from robot_dyn.arithmetic import Array
 from robot_dyn.convex import LARGE
 from robot_dyn.effects.carried_payload import CarriedPayload
-from robot_dyn.effects.effect import Bound, Conservative, Effect, Force, Stateful
+from robot_dyn.effects.effect import Bound, Conservative, Drive, Effect, Force, Stateful
 from robot_dyn.effects.set_valued import SetValued, settled
 from robot_dyn.errors import EffectError
 from robot_dyn.foreign import call, users_line
@@ -69,6 +69,25 @@ class EquationOfMotion:
         """Number of states of all effects."""
         return max((place.stop for place in self.states.values()), default=0)
 
+    @cached_property
+    def drives(self) -> Mapping[int, Drive]:
+        """The effects that take the actuation of joints, by their number."""
+        found = {k: effect for k, effect in enumerate(self.effects) if isinstance(effect, Drive)}
+        joints = [i for drive in found.values() for i in drive.driven(self.dynamics.n)]
+        for i in joints:
+            if joints.count(i) > 1:
+                raise EffectError(f"joint {self.dynamics.joint_names[i]!r} has two drives; keep one")
+        return found
+
+    def on_joints(self, u: Array) -> Array:
+        """What of the actuation u, (..., n), acts on joints: 0 where it acts on the motor of a drive."""
+        if not self.drives:
+            return u
+        direct = np.ones(self.dynamics.n)
+        for drive in self.drives.values():
+            direct[list(drive.driven(self.dynamics.n))] = 0.0
+        return u * direct
+
     def torques(
         self, t: float, q: Array, v: Array, shape: tuple[int, ...] | None = None, z: Array | None = None
     ) -> list[Array]:
@@ -78,19 +97,22 @@ class EquationOfMotion:
             EffectError: If one does not fit the joints.
         """
         return [
-            self._torque_of(force, (t, q, v, *self._own(k, v, z)), shape)
+            self._torque_of(force, (t, q, v, *self._own(k, q, v, z)), shape)
             for k, force in enumerate(self.effects)
             if isinstance(force, Force)
         ]
 
-    def _own(self, k: int, v: Array, z: Array | None) -> tuple[Array, ...]:
+    def _own(self, k: int, q: Array, v: Array, z: Array | None) -> tuple[Array, ...]:
         """The states of an effect, as its last argument; nothing if it has none."""
-        if k not in self.states:
+        effect = self.effects[k]
+        if not isinstance(effect, Stateful):
             return ()
-        place = self.states[k]
-        if z is None:
-            return (np.zeros((*v.shape[:-1], place.stop - place.start), dtype=v.dtype).view(type(v)),)
-        return (z[place],)
+        return (effect.start(self.dynamics, q, v) if z is None else z[self.states[k]],)
+
+    def start(self, q: Array, v: Array) -> Array:
+        """The states of the effects at the start of a run, (state_size,)."""
+        own = [effect.start(self.dynamics, q, v) for effect in self.effects if isinstance(effect, Stateful)]
+        return np.concatenate([*own, np.zeros(0)])
 
     def _torque_of(self, force: Force, state: tuple[Any, ...], shape: tuple[int, ...] | None) -> Array:
         v = state[2]
@@ -139,7 +161,7 @@ class EquationOfMotion:
             effect = self.effects[k]
             if isinstance(effect, Bound):
                 reached[k] = u
-                u = self._bounded(effect, u, *self._own(k, u, z))
+                u = self._bounded(effect, u, *self._own(k, u, u, z))
         return u, reached
 
     def _bounded(self, bound: Bound, u: Array, *own: Array) -> Array:
@@ -247,7 +269,12 @@ class EquationOfMotion:
                 potential = potential + call(force.potential, self.dynamics, t, q)
         return self.dynamics.kinetic_energy(q, v), potential
 
-    def powers(self, v: Array, u: Array, torques: list[Array]) -> list[Array]:
-        """Power of the actuation, and of each force without a potential, at one state."""
+    def powers(self, v: Array, u: Array, torques: list[Array], z: Array) -> list[Array]:
+        """Power of the actuation, and of each force without a potential, at one state and states z of the effects."""
         each = zip(self.forces, torques, strict=True)
-        return [u @ v, *(torque @ v for force, torque in each if not isinstance(force, Conservative))]
+        powers = {force: torque @ v for force, torque in each if not isinstance(force, Conservative)}
+        control = self.on_joints(u) @ v
+        for k, drive in self.drives.items():
+            on_motors = u[list(drive.driven(self.dynamics.n))] @ drive.speeds(z[self.states[k]])
+            control, powers[drive] = control + on_motors, powers[drive] - on_motors
+        return [control, *powers.values()]

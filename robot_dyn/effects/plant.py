@@ -135,7 +135,8 @@ class Plant:
 
     def forward_dynamics(self, t: float, q: Array, v: Array, u: Array) -> Array:
         """Acceleration under the actuation u, (..., n)."""
-        total, equation = self.actuation(u) + self.torque(t, q, v), self.at(t).equation_of_motion
+        equation = self.at(t).equation_of_motion
+        total = equation.on_joints(self.actuation(u)) + self.torque(t, q, v)
         if not equation.set_valued:
             return equation.acceleration(q, v, total)
         q, v = self._states(q=q, v=v)

@@ -17,13 +17,14 @@ from robot_dyn.effects.joint_limit import JointStopDamper, JointStopSpring, join
 from robot_dyn.effects.line_spring_damper import LineSpringDamper
 from robot_dyn.effects.lugre import LuGreFriction
 from robot_dyn.effects.rigid_stops import RigidStops
+from robot_dyn.effects.series_elastic import SeriesElastic
 from robot_dyn.effects.spring import Spring
 from robot_dyn.effects.wrench import ExternalWrench
 from robot_dyn.errors import SceneError
 from robot_dyn.model.edits import STANDARD_GRAVITY, Payload
 from robot_dyn.model.robot import Robot
 from robot_dyn.scene.declared import Acting, declared_part
-from robot_dyn.scene.schema import NotNegative, Number, Part, PerJoint, Positive, Vector3
+from robot_dyn.scene.schema import NotNegative, Number, Part, PerJoint, Positive, Vector3, per_joint
 
 
 class Gravity(Part):
@@ -73,11 +74,14 @@ class Armature(Part):
 
     kind: Literal["armature"]
     inertia_kg_m2: PerJoint
-    """Inertia by joint."""
+    """Inertia by joint, of the rotor where there is a gear."""
+    gear_ratio: PerJoint = 1.0
+    """n: the joint feels n² times the inertia of the rotor; joints left out have 1."""
 
     def edit(self, robot: Robot) -> Robot:
         """The robot with these drives."""
-        return robot.with_(armature=self.inertia_kg_m2)
+        inertia = per_joint("armature", self.inertia_kg_m2, robot)
+        return robot.with_(armature=per_joint("gear_ratio", self.gear_ratio, robot, elsewhere=1.0) ** 2 * inertia)
 
 
 class Carried(Acting):
@@ -178,6 +182,7 @@ ACTING = (
     Line,
     Wrench,
     Carried,
+    declared_part("series_elastic", SeriesElastic),
     declared_part("effort_limit", EffortLimit),
     declared_part("actuator_lag", ActuatorLag),
 )  # fmt: skip

@@ -41,6 +41,9 @@ def linearise(
     if not isinstance(plant, Plant):
         plant = Plant(plant)
     plant = plant.at(t)
+    if drives := plant.equation_of_motion.drives:
+        name = next(iter(drives.values())).name
+        raise QueryError(f"linearise: {name} has motors of its own, which are no part of (q, v); leave it out")
     names, n = plant.dynamics.joint_names, plant.dynamics.n
     q, v = one_state("q", q, names), one_state("v", np.zeros(n) if v is None else v, names)
     u = plant.inverse_dynamics(t, q, v, np.zeros(n)) if u is None else one_state("u", u, names)

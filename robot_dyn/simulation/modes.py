@@ -174,7 +174,7 @@ class Modes:
         equation, motion = self.equation, self.equation.equation_of_motion
         q, v, z, _ = equation.state(y)
         u = equation.actuation(t, q, v, z, held)
-        total = sum(motion.torques(t, q, v, z=z[equation.state_size :]), start=u)
+        total = sum(motion.torques(t, q, v, z=z[equation.state_size :]), start=motion.on_joints(u))
         return total - equation.plant.dynamics.inverse_dynamics(q, v, 0 * v)
 
     def _changed(self, i: int, before: Mode, t: float, y: np.ndarray) -> Occurrence | None:

@@ -19,6 +19,7 @@ from robot_dyn.effects.dahl import DahlFriction
 from robot_dyn.effects.friction import RegularisedCoulombFriction
 from robot_dyn.effects.joint_limit import JointStopDamper, JointStopSpring
 from robot_dyn.effects.lugre import LuGreFriction
+from robot_dyn.effects.series_elastic import SeriesElastic
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.record import Path
@@ -102,6 +103,8 @@ def first_kink(setup: Setup, equation: StateEquation, path: Path) -> tuple[float
             setup.finds_events and not setup.integrator.canonical
         ):
             found.append(_first(path.t, v[:-1] * v[1:] <= 0, "a joint with bristles stands or reverses"))
+        elif isinstance(effect, SeriesElastic) and effect.backlash is not None and not setup.finds_events:
+            found.append((0.0, "a backlash opens or closes"))
     if not setup.finds_events:
         found.append(_saturation(setup, equation, path, q, v))
     return min(found)

@@ -117,9 +117,12 @@ class StateEquation:
         return widths
 
     def start(self, q: Array, v: Array) -> Array:
-        """Y at the start: states of controller and effects, and works, are zero."""
+        """Y at the start: states of the controller, and works, are zero."""
         second = self.plant.dynamics.momentum(q, v) if self.canonical else v
-        return np.concatenate([q, second, np.zeros(self.states + len(self.sources))])
+        y = np.concatenate([q, second, np.zeros(self.states + len(self.sources))])
+        first = 2 * len(q) + self.state_size
+        y[first : first + self.equation_of_motion.state_size] = self.equation_of_motion.start(q, v)
+        return y
 
     def state(self, y: Array) -> tuple[Array, Array, Array, Array]:
         """q, v, z, W of y, with z the states of the controller, then of the effects."""
@@ -183,7 +186,8 @@ class StateEquation:
     def acceleration(self, t: float, q: Array, v: Array, z: Array, u: Array) -> Array:
         """The acceleration under the actuation u within all bounds."""
         equation = self.equation_of_motion
-        return equation.acceleration(q, v, sum(equation.torques(t, q, v, z=z[self.state_size :]), start=u))
+        torques = equation.torques(t, q, v, z=z[self.state_size :])
+        return equation.acceleration(q, v, sum(torques, start=equation.on_joints(u)))
 
     @property
     def sampled(self) -> bool:
@@ -214,7 +218,7 @@ class StateEquation:
         of_controller, of_effects = z[: self.state_size], z[self.state_size :]
         u, reached = equation.applied(self.command(t, q, v, z) if held is None else held, of_effects)
         torques = equation.torques(t, q, v, z=of_effects)
-        total = sum(torques, start=u)
+        total = sum(torques, start=equation.on_joints(u))
         result = np.empty_like(y)
         result[:n] = v
         end, W = 2 * n + self.state_size, 2 * n + self.states
@@ -228,12 +232,12 @@ class StateEquation:
         rates = result[end : end + equation.state_size]
         for place, rate in equation.state_rates(t, q, v, u, reached, of_effects):
             rates[place] = rate
-        result[W:] = self._powers(v, u, torques)
+        result[W:] = self._powers(v, u, torques, of_effects)
         return result, u
 
-    def _powers(self, v: Array, u: Array, torques: list[Array]) -> list[Array]:
+    def _powers(self, v: Array, u: Array, torques: list[Array], z: Array) -> list[Array]:
         """Of each source; those that work at once have none."""
-        powers = self.equation_of_motion.powers(v, u, torques)
+        powers = self.equation_of_motion.powers(v, u, torques, z)
         return powers + [0.0] * (len(self.sources) - len(powers))
 
     @cached_property
@@ -279,7 +283,8 @@ class StateEquation:
     def powers(self, t: float, q: Array, v: Array, z: Array, u: Array) -> list[float]:
         """Power of the control and of the effects that work, in the order of `sources`."""
         equation = self.equation_of_motion
-        return self._powers(v, u, equation.torques(t, q, v, z=z[self.state_size :]))
+        own = z[self.state_size :]
+        return self._powers(v, u, equation.torques(t, q, v, z=own), own)
 
 
 def numbered(*names: str) -> tuple[str, ...]:

@@ -192,5 +192,5 @@ def _torque(equation: StateEquation, k: int, t: float, x: Array, held: Array | N
     n = equation.plant.dynamics.n
     q, v, z = x[:n], x[n : 2 * n], x[2 * n :]
     if k == 0:
-        return equation.actuation(t, q, v, z, held)
+        return equation.equation_of_motion.on_joints(equation.actuation(t, q, v, z, held))
     return equation.equation_of_motion.torques(t, q, v, (n,), z[equation.state_size :])[k - 1]

@@ -11,6 +11,7 @@ from robot_dyn.arithmetic import Array
 from robot_dyn.effects.effect import Effect
 from robot_dyn.effects.plant import Plant
 from robot_dyn.effects.set_valued import SetValued
+from robot_dyn.errors import EffectError
 from robot_dyn.integrate.bernstein import room
 from robot_dyn.simulation.crossings import ROUNDING, Switches
 from robot_dyn.simulation.event import Occurrence
@@ -45,11 +46,13 @@ class Switching:
         if equation.controller is not None and not equation.sampled:
             parts[CONTROLLER] = equation.controller.thresholds()
         self._of = {k: tuple(each for each in of if self._looked_for(k, each)) for k, of in parts.items()}
-        coordinates = dict.fromkeys(each for of in self._of.values() for each in of if not each.of_actuation)
+        coordinates = dict.fromkeys(
+            (k if each.own else None, each) for k, of in self._of.items() for each in of if not each.of_actuation
+        )
         actuation = [(k, each) for k in equation.limited for each in self._of[k] if each.of_actuation]
         self.coordinates = len(coordinates)
-        self.thresholds: tuple[Threshold, ...] = (*coordinates, *(each for _, each in actuation))
-        self._parts: tuple[int | None, ...] = (*(None for _ in coordinates), *(k for k, _ in actuation))
+        self.thresholds: tuple[Threshold, ...] = tuple(each for _, each in (*coordinates, *actuation))
+        self._parts: tuple[int | None, ...] = tuple(k for k, _ in (*coordinates, *actuation))
         self.modes = (modes or Modes(equation)) if equation.impulses else None
         self.guards: list[Guard] = []
         self._known: dict[bytes, StateEquation] = {}
@@ -77,7 +80,7 @@ class Switching:
         """The switching functions, on their sides of a state y at t and of the mode, for dense output of a degree."""
         n, E, G = self._n, self.coordinates, len(self.events)
         self.guards = guards = self.modes.guards(y) if self.modes is not None else []
-        rows = np.array([each.joint + n * each.of_velocity for each in self.thresholds[:E]], np.int64)
+        rows = np.array([self._row(*each) for each in zip(self._parts[:E], self.thresholds, strict=False)], np.int64)
         levels = np.array([each.level for each in self.thresholds])
         gaps = y[rows] - levels[:E]
         moving = self._moving(t, y, held, rows, gaps)  # on the level itself, where it is going
@@ -102,6 +105,15 @@ class Switching:
             rows, levels, sides, rates, zeroed, functions, G, np.zeros((len(values), 1)), values,
             np.zeros(len(values)), exact, slack, np.zeros(degree + 1), room(degree),
         )  # fmt: skip
+
+    def _row(self, part: int | None, each: Threshold) -> int:
+        """The entry of y that passes a threshold."""
+        if each.state is None or part is None:
+            return each.joint + self._n * each.of_velocity
+        if part not in self.equation.equation_of_motion.states:
+            raise EffectError(f"{each.name}: is a threshold of a state, and what declares it has none")
+        first = 2 * self._n + self.equation.state_size
+        return first + self.equation.equation_of_motion.states[part].start + each.state
 
     def _moving(self, t: float, y: np.ndarray, held: Array | None, rows: np.ndarray, gaps: np.ndarray) -> np.ndarray:
         """The rates of those entries of y; of a velocity where one lies on its level."""
@@ -134,9 +146,7 @@ class Switching:
             of: dict[tuple[int | None, Threshold], int] = {
                 (part, each): int(side) for part, each, side in zip(self._parts, self.thresholds, sides, strict=False)
             }
-            at = {
-                k: {each: of[k if each.of_actuation else None, each] for each in mine} for k, mine in self._of.items()
-            }
+            at = {k: {each: of[k if each.own else None, each] for each in mine} for k, mine in self._of.items()}
             equation, n = self.equation, self._n
             effects: list[Effect] = [
                 effect.beyond(n, at[k]) if at[k] else effect for k, effect in enumerate(equation.plant.effects)

@@ -207,6 +207,6 @@ class Batch:
 
 def _starts(equation: StateEquation, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """The states at the starts of runs, (B, m)."""
-    if equation.canonical:
+    if equation.canonical or equation.equation_of_motion.drives:
         return np.stack([equation.start(*each) for each in zip(q, v, strict=True)])
     return np.column_stack([q, v, np.zeros((len(q), equation.size - 2 * q.shape[1]))])
