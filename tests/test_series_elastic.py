@@ -220,5 +220,7 @@ def test_what_has_no_meaning_is_refused() -> None:
         rd.Setup(rd.Plant(ARM, [rd.SeriesElastic({"joint_2": 9.0}, 1.0), rd.SeriesElastic(9.0, 1.0)]), Q)
     with pytest.raises(QueryError, match="linearise: series_elastic has motors of its own"):
         rd.linearise(rd.Plant(ARM, [rd.SeriesElastic(9.0, 1.0)]), Q)
+    with pytest.raises(QueryError, match="series_elastic: time_stepping takes no motors of a drive"):
+        rd.Setup(rd.Plant(ARM, [rd.SeriesElastic(9.0, 1.0)]), Q, integrator="time_stepping")
     with pytest.raises(EffectError, match="inertia must be positive"):
         rd.SeriesElastic(9.0, 0.0)

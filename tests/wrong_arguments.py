@@ -44,7 +44,9 @@ FOR_LOOPS = {
     for kind in (Force, Conservative, Bound, Stateful, Drive, Controller, rd.Block, Arithmetic)
     for name in dir(kind)
 }
-FOR_LOOPS |= {"task_acceleration", "in_mode", "at_rest", "sliding", "touched", "snapped", "beyond_by"}
+FOR_LOOPS |= {
+    "task_acceleration", "in_mode", "at_rest", "sliding", "touched", "snapped", "beyond_by", "friction", "bounds",
+}  # fmt: skip
 LAX = {  # arguments that may be infinite or unknown, or of any shape
     "ExternalWrench.acts": {"t"},
     "Adaptive": {"max_step_s"}, "Adaptive.with_tolerances": {"longest_s"},

@@ -161,7 +161,8 @@ class Plant:
         q, v, u = self._states(q=q, v=v, u=u)
         if any(x.shape != (self.dynamics.n,) for x in (q, v, u)):
             raise QueryError(f"held is of one state: q, v and u must have shape ({self.dynamics.n},)")
-        return held(self.at(t).equation_of_motion, q, v, self.actuation(u) + self.torque(t, q, v))
+        equation = self.at(t).equation_of_motion
+        return held(equation, q, v, equation.on_joints(self.actuation(u)) + self.torque(t, q, v))
 
     @cached_property
     def _arithmetic(self) -> Arithmetic:

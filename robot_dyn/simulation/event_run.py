@@ -337,7 +337,8 @@ class EventRun(Followed):
         """AccumulationError if another method may make the run, else DivergedError."""
         first = self._changes[0]
         what = f"{_ACCUMULATED} changes of what holds joints in {t - first:.1e} s, the last of joint {joint!r}"
-        if not self._chooses:
+        motion = self.equation.equation_of_motion
+        if not self._chooses or motion.payloads or motion.drives:  # which time stepping does not take
             raise DivergedError(
                 t, f"events accumulate at t = {t}: {what}; take integrator='time_stepping' and a step_s"
             )

@@ -115,6 +115,7 @@ class Setup(Value):
             )
         self._check_set_valued()
         self._check_payloads()
+        self._check_drives()
         self._check_torques()
         self._check_events()
         self.plant.actuation(np.zeros(len(names)))
@@ -163,6 +164,14 @@ class Setup(Value):
                 f"carried_payload: steps of {self.integrator.name} do not end where it comes and goes; take"
                 " integrator='DOP853'"
             )
+
+    def _check_drives(self) -> None:
+        """That the method integrates motors with the joints that they drive."""
+        for drive in self.plant.equation_of_motion.drives.values():
+            if self.integrator.nonsmooth:
+                raise QueryError(
+                    f"{drive.name}: {self.integrator.name} takes no motors of a drive; take integrator='DOP853'"
+                )
 
     def _check_torques(self) -> None:
         """That what the controller and each effect return at the start is one number for each joint."""
