@@ -180,6 +180,19 @@ def test_rollouts_are_the_runs_of_simulate() -> None:
         assert (runs.q[i] == one.q).all()
 
 
+def test_impacts_that_another_joint_feeds_come_to_an_end() -> None:
+    """Joint 2 is pressed on a stop without loss, joint 1 sticks and slides at each of its ever smaller bounces."""
+    plant = rd.Plant(ARM, [rd.DryFriction([5.355, 0.0], [6.356, 0.0]), rd.ViscousFriction(0.1),
+                           rd.RigidStops([-0.2, -0.3], [0.6, 0.7], [0.5, 1.0])])  # fmt: skip
+    drive = rd.PD(rd.hold([0.322, -0.759]), [215.56, 19.219], [3.593, 0.32])
+    run = rd.simulate(
+        plant, [0.3, 0.4], [0.238, 1.792], duration_s=2.0, controller=drive, engine="compiled", estimate_error=False,
+        integrator=rd.Adaptive(rtol=1e-9, atol=1e-9),
+    )  # fmt: skip
+    assert run.outcome.ending == "finished"
+    assert run.ledger.closure <= 1e-8
+
+
 def test_an_impact_may_throw_a_joint_against_the_load_that_just_let_it_go() -> None:
     """Joint 2 breaks away downwards at t = 0, as joint 1 strikes its stop, whose impact throws joint 2 upwards.
 

@@ -23,6 +23,7 @@ from robot_dyn.simulation.event import Occurrence
 from robot_dyn.simulation.state_equation import StateEquation
 
 _ACCUMULATED = 1e-6  # [s] for all impacts that are still to come: what ends there has no effect beyond its square
+_CROWDED = 20  # impacts within that time: they go on for ever, whatever the restitution
 _STILL = 1e-14  # [rad/s] or [m/s]: joints this slow stop together with the one that stops
 _STOP = {-1: "lower stop", 1: "upper stop"}
 
@@ -62,6 +63,7 @@ class Modes:
         self._n = n = equation.plant.dynamics.n
         self.impulses = np.arange(2 * n + equation.states - n, 2 * n + equation.states)
         self.mode = Mode(np.zeros(n), np.zeros(n))
+        self._impacts: list[float] = []  # times of the latest
         rubs = (each.at_rest(np.zeros(n)).most > 0 for each in self.effects if not isinstance(each, RigidStops))
         self._rubs = sum(rubs, start=np.zeros(n, bool))  # what may stick where its velocity is 0
 
@@ -150,6 +152,9 @@ class Modes:
         with np.errstate(divide="ignore", invalid="ignore"):
             left = np.where(returns, 2 * np.abs(v) / (np.abs(a) * (1 - e)), np.inf)
         still = left < _ACCUMULATED  # those that are kicked off their stops by others, too
+        self._impacts = [*self._impacts[1 - _CROWDED :], t]
+        if len(self._impacts) == _CROWDED and t - self._impacts[0] < _ACCUMULATED:  # as several stops in turn
+            still |= (side != 0) & (2 * np.abs(v) <= np.abs(a) * _ACCUMULATED)
         last = [i for i in strike if still[i]]
         if still.any():
             y[n : 2 * n] = _impact(M, before, side, e, still)
@@ -158,7 +163,7 @@ class Modes:
         return [
             self._occurrence(
                 i, f"{'comes to rest at' if i in last else 'strikes'} its {_STOP[int(side[i])]}",
-                t + (float(left[i]) if i in last else 0.0), y, int(side[i]),
+                t + (float(left[i]) if left[i] < _ACCUMULATED else 0.0), y, int(side[i]),
             )
             for i in strike.tolist()
         ]  # fmt: skip
