@@ -9,7 +9,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.errors import SceneError
-from robot_dyn.scene import control, effects, scene
+from robot_dyn.scene import control, effects, loop, scene
 from robot_dyn.scene.effects import kinds
 from robot_dyn.scene.manual import manual
 from robot_dyn.scene.schema import Part
@@ -18,7 +18,7 @@ from robot_dyn.scene.starters import starter, starters
 PAGE = Path(__file__).parents[1] / "docs" / "scenes.md"
 PARTS = [
     each
-    for module in (scene, control, effects)
+    for module in (scene, control, effects, loop)
     for each in vars(module).values()
     if isinstance(each, type) and issubclass(each, Part) and each is not Part
 ]

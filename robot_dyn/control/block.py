@@ -46,8 +46,8 @@ class Block(Value, ABC):
 
     @property
     def name(self) -> str:
-        """Its name in sweeps: that of its class in small letters."""
-        return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", type(self).__name__).lower()
+        """Its name in sweeps and scenes."""
+        return name_of(type(self))
 
     def check(self, period_s: float) -> None:
         """ControlError if it has no meaning at a period."""
@@ -67,3 +67,8 @@ class Block(Value, ABC):
     def next_state(self, x: Array, s: Array, period_s: float) -> Array:
         """Its states after the tick, (state_size(n),)."""
         return s
+
+
+def name_of(kind: type[Block]) -> str:
+    """The name of a class of blocks in small letters, as "low_pass"."""
+    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", kind.__name__).lower()

@@ -12,6 +12,8 @@ from robot_dyn.control.cartesian import CartesianReference, circle, line
 from robot_dyn.control.computed_torque import ComputedTorque, FeedForward, PDGravity
 from robot_dyn.control.controller import Controller
 from robot_dyn.control.independent_joint import PD, PID, gains_from
+from robot_dyn.control.loop import Loop
+from robot_dyn.control.multirate import Multirate
 from robot_dyn.control.operational_space import OperationalSpace
 from robot_dyn.control.reference import PiecewisePolynomial, hold, numbers, quintic, via_points
 from robot_dyn.control.samples import Samples
@@ -19,6 +21,7 @@ from robot_dyn.effects.actuator import stated_efforts
 from robot_dyn.errors import SceneError
 from robot_dyn.model.robot import Robot
 from robot_dyn.scene.effects import Edit
+from robot_dyn.scene.loop import ActuationBlock, PositionBlock, VelocityBlock
 from robot_dyn.scene.schema import (
     NotNegative,
     Number,
@@ -173,6 +176,29 @@ LAWS = {
 }
 
 
+class Slow(Part):
+    """A second controller with a longer period, whose torque is added; a table of `[control]`."""
+
+    kind: Literal["pd", "pd_gravity", "feed_forward", "computed_torque"]
+    """The control law."""
+    period_s: Positive
+    """Time between samples, a whole number of those of the first."""
+    kp: PerJoint = 0.0
+    """Stiffness, in N m/rad (N/m for a prismatic joint); in 1/s² for computed_torque."""
+    kd: PerJoint = 0.0
+    """Damping, in N m s/rad (N s/m for a prismatic joint); in 1/s for computed_torque."""
+
+    def build(self, model: Robot, desired: Any) -> Controller:
+        """The controller, with the model and the reference of the first."""
+        kp, kd = (per_joint(name, getattr(self, name), model) for name in ("kp", "kd"))
+        if self.kind == "pd":
+            return PD(desired, kp, kd, self.period_s)
+        return _WITH_MODEL[self.kind](model, desired, kp, kd, self.period_s)
+
+
+_WITH_MODEL = {"pd_gravity": PDGravity, "feed_forward": FeedForward, "computed_torque": ComputedTorque}
+
+
 class Control(Part):
     """A controller. Its gains are kp and kd, or follow from the frequency ω and the damping ratio ζ of the closed loop.
 
@@ -200,12 +226,38 @@ class Control(Part):
     """Of operational_space: the link under control."""
     model: Model = Model()
     """The controller's model of the arm; that of the plant by default."""
+    slow: Slow | None = None
+    """A second controller with a longer period, whose torque is added."""
+    measurement_delay_periods: NotNegative = 0.0
+    """How late position and velocity are measured, in periods."""
+    actuation_delay_periods: NotNegative = 0.0
+    """How late a torque acts, in periods."""
+    position: tuple[PositionBlock, ...] = ()  # pyright: ignore[reportInvalidTypeForm]
+    """Blocks of the measured position, one after the other."""
+    velocity: tuple[VelocityBlock, ...] = ()  # pyright: ignore[reportInvalidTypeForm]
+    """Blocks of the measured velocity, one after the other."""
+    actuation: tuple[ActuationBlock, ...] = ()  # pyright: ignore[reportInvalidTypeForm]
+    """Blocks of the torque, one after the other."""
+    noise_seed: Annotated[int, Field(ge=0, strict=True)] = 0
+    """Seed of noise; other seeds give other noise of the same kind."""
 
     @property
     def unused(self) -> set[str]:
         """Keys that this kind, with these gains, does not read."""
         of_others = {key for key, kinds in _OF_ONE_KIND.items() if self.kind not in kinds}
-        return of_others | ({"damping_ratio"} if self.kp is not None else set())
+        return of_others | ({"damping_ratio"} if self.kp is not None else set()) | ({"noise_seed"} - self._with_noise)
+
+    @property
+    def _with_noise(self) -> set[str]:
+        """The key of the seed, if a block draws noise."""
+        blocks = (*self.position, *self.velocity, *self.actuation)
+        return {"noise_seed"} if any(each.make.random for each in blocks) else set()
+
+    @property
+    def loops(self) -> bool:
+        """Whether anything stands between the arm and the controller."""
+        late = self.measurement_delay_periods or self.actuation_delay_periods
+        return bool(late or self.position or self.velocity or self.actuation)
 
     def build(self, described: Robot, robot: Robot, q0: np.ndarray, reference: Any) -> Controller:
         """The controller for a reference.
@@ -216,26 +268,43 @@ class Control(Part):
         for key, kinds in _OF_ONE_KIND.items():
             if key in self.model_fields_set and self.kind not in kinds:
                 raise SceneError(f"control.{key}: has no effect on {self.kind}, only on {', '.join(kinds)}; remove it")
+        if "noise_seed" in self.model_fields_set and not self._with_noise:
+            raise SceneError("control.noise_seed: has no effect without a block of kind noise; remove it")
+        made = self._controller(described, robot, q0, reference)
+        if not self.loops:
+            return made
+        lines = [[each.build(robot) for each in line] for line in (self.position, self.velocity, self.actuation)]
+        return Loop(made, *lines, self.measurement_delay_periods, self.actuation_delay_periods, self.noise_seed)
+
+    def _controller(self, described: Robot, robot: Robot, q0: np.ndarray, reference: Any) -> Controller:
+        """What is in the loop: one controller, or two."""
         model, desired = self.model.build(described, robot), reference.build(robot, q0, self.frame)
         cartesian = isinstance(desired, CartesianReference)
         if cartesian != (self.kind == "operational_space"):
             need = "line or circle" if self.kind == "operational_space" else "hold, quintic, via_points or samples"
             raise SceneError(f"reference.kind: {self.kind} follows {need}, got {reference.kind!r}")
+        made = self._law(model, robot, q0, desired, cartesian)
+        if self.slow is None:
+            return made
+        if cartesian:
+            raise SceneError("control.slow: follows hold, quintic, via_points or samples; remove it")
+        return Multirate(made, self.slow.build(model, desired))
+
+    def _law(self, model: Robot, robot: Robot, q0: np.ndarray, desired: Any, cartesian: bool) -> Controller:
+        """The first controller."""
         kp, kd = self._gains(model, q0)
         if cartesian:
             return OperationalSpace(
                 model, _frame(self.frame), desired, kp, kd, q0, kp.max() / 10, 2 * np.sqrt(kp.max() / 10),
                 period_s=self.period_s,
             )  # fmt: skip
-        if self.kind == "computed_torque":
-            return ComputedTorque(model, desired, kp, kd, self.period_s)
         if self.kind == "pid":
             limit = per_joint("effort_limit_N_m", self.effort_limit_N_m, robot, elsewhere=np.inf)
             limit = stated_efforts(robot) if limit is URDF else limit
             return PID(desired, kp, kp * self.integral_rate_per_s, kd, limit, period_s=self.period_s)
         if self.kind == "pd":
             return PD(desired, kp, kd, self.period_s)
-        return (PDGravity if self.kind == "pd_gravity" else FeedForward)(model, desired, kp, kd, self.period_s)
+        return _WITH_MODEL[self.kind](model, desired, kp, kd, self.period_s)
 
     def _gains(self, model: Robot, q0: np.ndarray) -> tuple[Any, Any]:
         """Stiffness and damping, as stated or of ω and ζ."""

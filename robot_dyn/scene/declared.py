@@ -75,10 +75,10 @@ def declared_part(
 def keys_of(make: Callable[..., Any], *classes: type) -> dict[str, tuple[str, Coefficient]]:
     """The keys of the coefficients that classes declare and `make` takes, with the argument of each."""
     known = {name: each for kind in reversed(classes) for name, each in declared(kind).items()}
-    return {_key(name, known[name]): (name, known[name]) for name in signature(make).parameters if name in known}
+    return {key_of(name, known[name].unit): (name, known[name]) for name in signature(make).parameters if name in known}
 
 
-def _key(name: str, each: Coefficient) -> str:
+def key_of(name: str, unit: str) -> str:
     """A name and its unit, as "damping_N_m_s_per_rad"."""
-    unit = "".join(_SPELLED.get(letter, letter) for letter in each.unit)
-    return f"{name}_{unit}" if unit else name
+    spelled = "".join(_SPELLED.get(letter, letter) for letter in unit)
+    return f"{name}_{spelled}" if spelled else name

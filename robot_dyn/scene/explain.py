@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from robot_dyn.control.loop import LINES
 from robot_dyn.effects.actuator import ActuatorLag, EffortLimit
 from robot_dyn.effects.effect import Effect
 from robot_dyn.errors import RobotDynError
@@ -16,6 +17,7 @@ from robot_dyn.model.units import in_words
 from robot_dyn.scene.control import LAWS, Control
 from robot_dyn.scene.declared import Acting, Declared
 from robot_dyn.scene.effects import ACTING, Carried, kind_of
+from robot_dyn.scene.loop import BLOCKS
 from robot_dyn.scene.scene import Scene
 from robot_dyn.scene.schema import Part
 from robot_dyn.simulation.origin import edits_of_machine_code
@@ -25,6 +27,7 @@ from robot_dyn.simulation.state_equation import StateEquation
 _TERMS = {kind_of(part): part.term for part in ACTING}
 _BOUNDS = [kind_of(part) for part in ACTING if issubclass(part, Declared) and part.make in (EffortLimit, ActuatorLag)]
 _BODIES = [kind_of(Carried)]  # no torques
+_DELAYS = "measurement_delay_periods", "actuation_delay_periods"
 _EDITS = {
     "gravity": "∂V/∂q in N, with V = −Σ m gᵀ p",
     "lock": "a joint held at a value, its link part of the link before",
@@ -44,7 +47,8 @@ def explain(scene: Scene, setup: Setup) -> Iterator[str]:
     yield f"{scene.robot}: {n} joint{'s' if n > 1 else ''}, {', '.join(names)}"
     yield "\n    M(q) a + C(q, v) v + N = u"
     yield f"    N = {N}"
-    yield f"    u = {'0' if scene.control is None else LAWS[scene.control.kind].removeprefix('u = ')}"
+    slow = "" if scene.control is None or scene.control.slow is None else " + u_slow"
+    yield f"    u = {'0' if scene.control is None else LAWS[scene.control.kind].removeprefix('u = ')}{slow}"
     yield "\neffects:" if scene.effect else "\neffects: none"
     made = iter(setup.plant.effects)
     for effect in scene.effect:
@@ -55,10 +59,13 @@ def explain(scene: Scene, setup: Setup) -> Iterator[str]:
     yield "\nnot simulated, since the scene does not name it:"
     missing = [kind for kind in (*_EDITS, *_TERMS) if kind not in named]
     yield f"  {', '.join(missing)}"
+    if scene.control is not None and (ideal := _ideal(scene.control)):
+        yield f"  of the control: {', '.join(ideal)}"
     if scene.control is not None:
         every = f"every {scene.control.period_s:g} s, constant between" if scene.control.period_s else "continuously"
         yield f"\ncontrol: {scene.control.kind}, {every}"
         yield from _numbers(scene.control, "  ")
+        yield from _blocks(scene.control)
         yield f"reference: {scene.reference.kind}"
         yield from _numbers(scene.reference, "  ")
     if scene.accuracy is not None:
@@ -72,6 +79,8 @@ def explain(scene: Scene, setup: Setup) -> Iterator[str]:
     yield "start:"
     yield from _numbers(scene.start, "  ")
     yield from _machine_code(setup)
+    if scene.control is not None and scene.control.period_s:
+        yield from _of_tick(scene.control, setup)
     yield f"\nthe file of the robot: {setup.plant.dynamics.description.source}"  # pyright: ignore[reportAttributeAccessIssue]
 
 
@@ -92,6 +101,40 @@ def _machine_code(setup: Setup) -> Iterator[str]:
         yield f"  edited there: {edits['right_angles']}"
 
 
+def _of_tick(control: Control, setup: Setup) -> Iterator[str]:
+    """What a tick costs, and what of it are the loop and the slow controller."""
+    from robot_dyn.simulation.machine.making import machine
+
+    controller: Any = setup.controller
+    inside: Any = controller.controller if control.loops else controller
+    inside = inside if control.slow is None else inside.fast
+    try:
+        counts = [
+            len(machine(StateEquation(setup.plant, each).in_a_mode, None).equations.programs["tick"])
+            for each in dict.fromkeys((controller, inside))
+        ]
+    except RobotDynError:  # the reason is told of the acceleration, or the run is interpreted
+        return
+    more = f"; {control.kind} alone takes {counts[1]}" if len(counts) > 1 else ""
+    yield f"machine code of a tick of the control: {counts[0]} instructions{more}"
+
+
+def _ideal(control: Control) -> list[str]:
+    """What a loop could have, and this one has not."""
+    delays = [key.removesuffix("_periods") for key in _DELAYS if not getattr(control, key)]
+    named = {block.kind for line in LINES for block in getattr(control, line)}
+    kinds = dict.fromkeys(kind_of(part) for parts in BLOCKS.values() for part in parts)
+    return [*delays, *(kind for kind in kinds if kind not in named)]
+
+
+def _blocks(control: Control) -> Iterator[str]:
+    """The blocks of the loop of a controller, line by line."""
+    for line in LINES:
+        for block in getattr(control, line):
+            yield f"  {line}: {block.kind}, {block.make.term}"
+            yield from _numbers(block, "    ")
+
+
 def _in_words(effects: Iterable[Effect], setup: Setup) -> Iterator[str]:
     """Coefficients of the parts of an effect as they act, with units."""
     dynamics: Any = setup.plant.dynamics
@@ -101,7 +144,7 @@ def _in_words(effects: Iterable[Effect], setup: Setup) -> Iterator[str]:
 
 
 def _numbers(part: Part, indent: str) -> Iterator[str]:
-    unused = part.unused if isinstance(part, Control) else ()
+    unused = {*part.unused, *LINES} if isinstance(part, Control) else ()
     for key in type(part).model_fields:
         if key != "kind" and getattr(part, key) is not None and key not in unused:
             yield f"{indent}{key} = {_shown(getattr(part, key))}  ({_source(part, key)})"

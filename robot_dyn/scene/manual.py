@@ -10,8 +10,9 @@ from pydantic.fields import FieldInfo
 
 from robot_dyn.integrate.adaptive import ADAPTIVE
 from robot_dyn.integrate.methods import FIXED_STEP
-from robot_dyn.scene.control import LAWS, AnyReference, Control, Model
+from robot_dyn.scene.control import LAWS, AnyReference, Control, Model, Slow
 from robot_dyn.scene.effects import ACTING, EDITS, kind_of
+from robot_dyn.scene.loop import BLOCKS
 from robot_dyn.scene.scene import Scene, Start
 from robot_dyn.scene.schema import Part
 
@@ -31,13 +32,18 @@ integrates, and where each number comes from. This page is written from the sche
 # by the end of a key, the longest first
 _UNITS = {
     "_N_m_s_per_rad2": "N m s/rad²", "_N_m_s_per_rad": "N m s/rad", "_N_m_per_rad": "N m/rad", "_rad_per_s": "rad/s",
-    "_kg_m2": "kg m²", "_m_s2": "m/s²", "_per_s": "1/s", "_N_m": "N m", "_rad": "rad", "_kg": "kg", "_N": "N",
-    "_N_s_per_m": "N s/m", "_N_per_m": "N/m", "_m": "m", "_s": "s",
+    "_N_m_per_s": "N m/s", "_periods": "periods", "_kg_m2": "kg m²", "_m_s2": "m/s²", "_per_s": "1/s", "_N_m": "N m",
+    "_rad": "rad", "_kg": "kg", "_N": "N", "_N_s_per_m": "N s/m", "_N_per_m": "N/m", "_m": "m", "_s": "s",
 }  # fmt: skip
 _UNITS_OF_KEYS = {
     "q": "rad", "v": "rad/s", "joints": "rad", "points": "rad", "kp": "N m/rad", "kd": "N m s/rad",
     "atol": "rad, rad/s",
 }  # fmt: skip
+_LINES = {
+    "position": "measured position, from the joints to the controller",
+    "velocity": "measured velocity, from the joints to the controller",
+    "actuation": "torque, from the controller to the joints",
+}
 _FORMS = {float: "number", int: "integer", bool: "true or false", str: "text"}
 
 
@@ -57,6 +63,11 @@ def manual() -> str:
     parts += _section("`[control]`", _text(Control), Control)
     parts += ["| kind | law |\n|---|---|", *(f"| `{kind}` | {_cell(law)} |" for kind, law in LAWS.items()), ""]
     parts += _section("`[control.model]`", _text(Model), Model)
+    parts += _section("`[control.slow]`", _text(Slow), Slow)
+    for line, blocks in BLOCKS.items():
+        parts += [f"## `[[control.{line}]]`\n\nBlocks of the {_LINES[line]}; one table for each, with its `kind`.\n"]
+        for part in blocks:
+            parts += _section(f'`kind = "{kind_of(part)}"`', _text(part), part, level=3)
     parts += ["## `[reference]`\n\nWhat the controller follows; one table, with its `kind`.\n"]
     for part in get_args(get_args(AnyReference)[0]):
         parts += _section(f'`kind = "{kind_of(part)}"`', _text(part), part, level=3)
@@ -65,7 +76,7 @@ def manual() -> str:
 
 def _section(title: str, text: str, part: type[Part], level: int = 2) -> Iterator[str]:
     yield f"{'#' * level} {title}\n\n{text}\n"
-    fields = {key: field for key, field in part.model_fields.items() if key != "kind" or part is Control}
+    fields = {key: field for key, field in part.model_fields.items() if key != "kind" or part in (Control, Slow)}
     if fields:
         yield "| key | value | unit | default | meaning |\n|---|---|---|---|---|"
         yield from (_row(key, field) for key, field in fields.items())
@@ -91,7 +102,7 @@ def _of(annotation: Any) -> str:
         return _FORMS[annotation]
     origin, args = get_origin(annotation), [each for each in get_args(annotation) if each is not NoneType]
     if origin is Literal:
-        return " or ".join(f'`"{each}"`' for each in args)
+        return " or ".join(f"`{_toml(each)}`" for each in args)
     if origin is None:
         return "table"  # a part
     first = _of(args[0])

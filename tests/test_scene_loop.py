@@ -1,0 +1,127 @@
+"""Loops in scenes: what a file says is the controller made by hand; what has no meaning is refused at its place."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import robot_dyn as rd
+from robot_dyn.errors import SceneError
+from tests.command import run
+
+HEAD = """robot = "planar_2r"
+duration_s = 0.1
+method = "rk4"
+step_s = 1e-3
+estimate_error = false
+engine = "interpreted"
+[start]
+q = [0.3, -0.4]
+[[effect]]
+kind = "gravity"
+"""
+LOOP = """[control]
+kind = "pd"
+kp = 50.0
+kd = [5.0, 4.0]
+period_s = 0.004
+measurement_delay_periods = 1.0
+actuation_delay_periods = 0.4
+noise_seed = 5
+[[control.position]]
+kind = "noise"
+deviation_rad = 1e-3
+[[control.position]]
+kind = "quantisation"
+resolution_rad = {joint_1 = 1e-4, joint_2 = 2e-4}
+[[control.velocity]]
+kind = "differences"
+[[control.velocity]]
+kind = "low_pass"
+cutoff_rad_per_s = 300.0
+order = 1
+[[control.actuation]]
+kind = "low_pass"
+cutoff_rad_per_s = 400.0
+[[control.actuation]]
+kind = "quantisation"
+resolution_N_m = 0.01
+[[control.actuation]]
+kind = "rate_limit"
+rate_N_m_per_s = 2000.0
+[control.slow]
+kind = "pd_gravity"
+kd = 0.1
+period_s = 0.012
+[reference]
+kind = "hold"
+q = [0.5, 0.1]
+"""
+
+
+def by_hand() -> rd.Loop:
+    q = rd.hold([0.5, 0.1])
+    return rd.Loop(
+        rd.Multirate(rd.PD(q, 50.0, [5.0, 4.0], 0.004), rd.PDGravity(rd.load("planar_2r"), q, 0.0, 0.1, 0.012)),
+        [rd.Noise(1e-3), rd.Quantisation([1e-4, 2e-4])], [rd.Differences(), rd.LowPass(300.0, 1)],
+        [rd.LowPass(400.0), rd.Quantisation(0.01), rd.RateLimit(2000.0)], 1.0, 0.4, 5,
+    )  # fmt: skip
+
+
+def test_a_loop_of_a_scene_is_that_of_python(tmp_path: Path) -> None:
+    file = tmp_path / "loop.toml"
+    file.write_text(HEAD + LOOP, encoding="utf-8")
+    setup = rd.read_scene(file)
+    one, two = rd.simulate(setup), rd.simulate(setup, controller=by_hand())
+    np.testing.assert_array_equal(one.q, two.q)
+    np.testing.assert_array_equal(one.controller_states, two.controller_states)
+    saved = rd.load_run(rd.save_run(one, tmp_path / "run"))
+    np.testing.assert_array_equal(saved.controller_states, one.controller_states)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("period_s = 0.004\n", "", "give PD a period_s"),
+        ("period_s = 0.012", "period_s = 0.013", "whole number"),
+        ("order = 1", "order = 3", "control: velocity 2 .low_pass.: order"),
+        ("cutoff_rad_per_s = 300.0", "cutoff_rad_per_s = 900.0", "cutoff must be less than"),
+        ("resolution_N_m = 0.01", "resolution_rad = 0.01", "resolution_rad"),
+        ('[[control.position]]\nkind = "noise"\ndeviation_rad = 1e-3\n', "", "noise_seed: has no effect"),
+        ("joint_2 = 2e-4", "elbow = 2e-4", "elbow"),
+        ("actuation_delay_periods = 0.4", "actuation_delay_periods = -0.4", "actuation_delay_periods"),
+        ('kind = "differences"', 'kind = "rate_limit"', "line 25: control: velocity 1 .rate_limit.: kind: no kind"),
+    ],
+)
+def test_loops_of_scenes_that_have_no_meaning_are_refused(tmp_path: Path, old: str, new: str, words: str) -> None:
+    file = tmp_path / "loop.toml"
+    assert old in LOOP
+    file.write_text(HEAD + LOOP.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(SceneError, match=words):
+        rd.read_scene(file)
+
+
+def test_explain_says_what_stands_in_the_loop_and_what_it_takes(tmp_path: Path) -> None:
+    file = tmp_path / "loop.toml"
+    file.write_text(HEAD + LOOP, encoding="utf-8")
+    said = run("explain", str(file)).stdout
+    for line in (
+        "u = kp (q_d − q) + kd (v_d − v) + u_slow",
+        "measurement_delay_periods = 1.0  (scene)",
+        "position: quantisation, y = Δ ⌊x/Δ + ½⌋",
+        "resolution_rad = {'joint_1': 0.0001, 'joint_2': 0.0002}  (scene)",
+        "order = 2  (default)",
+        "machine code of a tick of the control: ",
+        "; pd alone takes 8",
+    ):
+        assert line in said, line
+    assert "of the control" not in said.partition("\ncontrol: ")[0]  # nothing is left out
+    file.write_text(HEAD + LOOP.partition("measurement_delay")[0], encoding="utf-8")
+    said = run("explain", str(file)).stdout
+    assert (
+        "of the control: measurement_delay, actuation_delay, noise, quantisation, low_pass, differences, rate_limit"
+        in said
+    )
+    assert "machine code of a tick of the control: 8 instructions\n" in said
