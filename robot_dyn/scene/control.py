@@ -12,7 +12,7 @@ from robot_dyn.control.cartesian import CartesianReference, circle, line
 from robot_dyn.control.computed_torque import ComputedTorque, FeedForward, PDGravity
 from robot_dyn.control.controller import Controller
 from robot_dyn.control.independent_joint import PD, PID, gains_from
-from robot_dyn.control.loop import Loop
+from robot_dyn.control.loop import LINES, Loop
 from robot_dyn.control.multirate import Multirate
 from robot_dyn.control.operational_space import OperationalSpace
 from robot_dyn.control.reference import PiecewisePolynomial, hold, numbers, quintic, via_points
@@ -273,8 +273,9 @@ class Control(Part):
         made = self._controller(described, robot, q0, reference)
         if not self.loops:
             return made
-        lines = [[each.build(robot) for each in line] for line in (self.position, self.velocity, self.actuation)]
-        return Loop(made, *lines, self.measurement_delay_periods, self.actuation_delay_periods, self.noise_seed)
+        lines: Any = {line: [each.build(robot) for each in getattr(self, line)] for line in LINES}
+        late = {"measurement_delay": self.measurement_delay_periods, "actuation_delay": self.actuation_delay_periods}
+        return Loop(made, **lines, **late, seed=self.noise_seed)
 
     def _controller(self, described: Robot, robot: Robot, q0: np.ndarray, reference: Any) -> Controller:
         """What is in the loop: one controller, or two."""

@@ -21,7 +21,7 @@ from robot_dyn.model.robot import Robot
 from robot_dyn.scene.declared import key_of
 from robot_dyn.scene.schema import Part, PerJoint, per_joint
 
-_UNITS = dict(zip(LINES, ("rad", "rad/s", "N m"), strict=True))
+_UNITS: dict[str, str] = dict(zip(LINES, ("rad", "rad/s", "N m"), strict=True))
 
 
 class BlockPart(Part):
@@ -39,7 +39,7 @@ class BlockPart(Part):
         )
 
 
-def _part(line: str, of: type[Block]) -> type[BlockPart]:
+def _part(line: str, of: Any) -> type[BlockPart]:
     """The part of a scene that describes a block in a line."""
     known, keys = declared(of), dict[str, tuple[str, Coefficient | None]]()
     made: dict[str, Any] = {"kind": (Literal[name_of(of)], ...)}  # pyright: ignore[reportInvalidTypeForm]
