@@ -169,6 +169,20 @@ def test_joints_that_break_away_together_move_the_way_they_were_let_go() -> None
         assert (a * mode.direction >= -1e-9 * np.abs(a).max()).all(), k
 
 
+@pytest.mark.parametrize("n", [1, 2, 7])
+def test_a_joint_at_its_limit_is_let_go_whatever_the_rounding_of_its_load(n: int) -> None:
+    """Loaded to f_s but for some units in the last place, and known to break away: it is not held again."""
+    rng = np.random.default_rng([8, n])
+    for _ in range(60):
+        U = rng.normal(size=(n, n))
+        fs, i = rng.uniform(0.1, 5, n), int(rng.integers(n))
+        load = np.zeros(n)
+        load[i] = fs[i] * (1 + float(rng.integers(-8, 9)) * np.finfo(float).eps)
+        _, mode = settled([rd.DryFriction(fs)], U @ U.T + np.eye(n), load, np.zeros(n), np.zeros(n), {i: 1})
+        assert mode.held.tolist() == [k != i for k in range(n)]
+        assert mode.direction[i] == 1
+
+
 def driven_panda(integrator: rd.Integrator | rd.Adaptive | str, **options) -> rd.Trajectory:
     """Panda, driven about its weight against dry and viscous friction, some 55 switches in 2 s."""
     panda = rd.load("panda")

@@ -19,7 +19,7 @@ from robot_dyn.arithmetic import Array
 from robot_dyn.convex import minimum
 from robot_dyn.effects.effect import Dissipative
 
-_ROUNDING = 1e-12  # of the largest acceleration
+_ROUNDING = 1e-12  # of the accelerations that add up
 
 
 class Interval(NamedTuple):
@@ -102,13 +102,16 @@ def settled(
     friction = np.where(rests, np.where(np.isfinite(most), most, -least), 0.0)
     lower, upper = np.where(rests & (most == np.inf), 0.0, -np.inf), np.where(rests & (least == -np.inf), 0.0, np.inf)
     slides = sum((each.sliding(zero) for each in effects), start=zero)
+    size = np.abs(np.linalg.inv(M)) @ (np.abs(load) + friction)  # of what cancels in a joint that just breaks away
     held_on = set[int]()  # that broke away, and would move the other way now that another one slides
     while True:  # each joint breaks away once, and is taken back once, at most
         p, f = load.copy(), friction.copy()
         for i, direction in forced.items():
             p[i], f[i] = load[i] - slides[i] * direction, 0.0
         a = minimum(M, p, f, lower, upper)
-        if back := [i for i, direction in forced.items() if a[i] * direction < -_ROUNDING * np.abs(a).max()]:
+        if back := [
+            i for i, direction in forced.items() if a[i] * direction < -_ROUNDING * (np.abs(a).max() + size[i])
+        ]:
             held_on |= set(back)
             forced = {i: direction for i, direction in forced.items() if i not in held_on}
             continue
