@@ -51,6 +51,8 @@ if TYPE_CHECKING:
     from robot_dyn.control.reference import quintic as quintic
     from robot_dyn.control.reference import via_points as via_points
     from robot_dyn.control.samples import Samples as Samples
+    from robot_dyn.doctor.check import Checkup as Checkup
+    from robot_dyn.doctor.check import check as check
     from robot_dyn.effects.actuator import ActuatorLag as ActuatorLag
     from robot_dyn.effects.actuator import EffortLimit as EffortLimit
     from robot_dyn.effects.carried_payload import CarriedPayload as CarriedPayload
@@ -120,6 +122,7 @@ _HOME = {
     "Bound": "effects.effect",
     "CarriedPayload": "effects.carried_payload",
     "Certificate": "accuracy.certificate",
+    "Checkup": "doctor.check",
     "Comparison": "accuracy.compare",
     "Compiled": "compiled.plant",
     "ComputedTorque": "control.computed_torque",
@@ -176,6 +179,7 @@ _HOME = {
     "WorkPrecision": "accuracy.work_precision",
     "advise": "accuracy.advisor",
     "certify": "accuracy.certify",
+    "check": "doctor.check",
     "circle": "control.cartesian",
     "coefficient": "coefficients",
     "compare": "accuracy.compare",

@@ -71,18 +71,26 @@ def read(path: str | Path) -> Description:
         DescriptionError: If the file cannot be read safely or does not describe one tree of rigid bodies.
     """
     path = Path(path)
+    return check(content(path), source=str(path))
+
+
+def content(path: Path) -> bytes:
+    """The bytes of a file, one more than `MAX_BYTES` at most.
+
+    Raises:
+        DescriptionError: If it is not a regular file, or cannot be read.
+    """
     try:
         mode = path.stat().st_mode
         if not S_ISREG(mode):
             kind = "a folder" if S_ISDIR(mode) else "not a regular file"
             raise DescriptionError(f"{path}: is {kind}; give the path of a URDF file")
         with path.open("rb") as stream:
-            text = stream.read(MAX_BYTES + 1)
+            return stream.read(MAX_BYTES + 1)
     except OSError as error:
         raise DescriptionError(
             f"{path}: cannot be read ({error.strerror}); check the path and its permissions"
         ) from None
-    return check(text, source=str(path))
 
 
 def check(text: bytes | str, source: str, findings: Iterable[str] = ()) -> Description:

@@ -20,8 +20,8 @@ _VERSION = re.compile(rb"(\sversion\s*=\s*[\"'])([0-9.]{1,16})(?=[\"'])")
 _PREFIX = re.compile(r"Namespace prefix (\S+) ")
 
 
-def parse(text: bytes, source: str) -> tuple[etree._Element, tuple[str, ...]]:
-    """The root of an XML text, and what was assumed to read it.
+def parse(text: bytes, source: str, comments: bool = False) -> tuple[etree._Element, tuple[str, ...]]:
+    """The root of an XML text, with its comments if they are asked for, and what was assumed to read it.
 
     Raises:
         DescriptionError: If it is not XML, or uses what is not read; `source` names it.
@@ -29,10 +29,10 @@ def parse(text: bytes, source: str) -> tuple[etree._Element, tuple[str, ...]]:
     if not text.strip():
         raise DescriptionError(f"{source}: is empty; give a URDF file")
     text, findings = _declared_first(text)
-    root, errors = _fed(text, source, recover=False)
+    root, errors = _fed(text, source, False, comments)
     if root is not None:
         return root, findings
-    root, _ = _fed(text, source, recover=True)  # which passes over these errors alone: there are no others
+    root, _ = _fed(text, source, True, comments)  # which passes over these errors alone: there are no others
     prefixes = dict.fromkeys(match[1] for error in errors if (match := _PREFIX.search(error.message)))
     prefixes.pop("xacro", None)  # of which the read of the robot speaks
     if not prefixes:
@@ -60,7 +60,9 @@ def _declared_first(text: bytes) -> tuple[bytes, tuple[str, ...]]:
     return mark + declaration + before + text[match.end() :], tuple(findings)
 
 
-def _fed(text: bytes, source: str, recover: bool) -> tuple[etree._Element | None, list[etree._LogEntry]]:
+def _fed(
+    text: bytes, source: str, recover: bool, comments: bool
+) -> tuple[etree._Element | None, list[etree._LogEntry]]:
     """The root; or None with the errors of the parser, if all of them are prefixes that are not declared."""
     parser = etree.XMLPullParser(
         events=("start", "end"),
@@ -69,7 +71,7 @@ def _fed(text: bytes, source: str, recover: bool) -> tuple[etree._Element | None
         no_network=True,
         recover=recover,
         huge_tree=False,
-        remove_comments=True,
+        remove_comments=not comments,
         remove_pis=True,
     )
     depth = 0

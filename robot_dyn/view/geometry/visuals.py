@@ -92,6 +92,18 @@ def drawing(robot: Robot, package_dirs: Iterable[str | Path] = (), *, inertia: b
     return Drawing(tuple(pieces), tuple(dict.fromkeys(artist.notes)), tuple(artist.remarks))
 
 
+def solids(
+    robot: Robot, package_dirs: Iterable[str | Path] = ()
+) -> tuple[dict[str, tuple[Piece, ...]], tuple[str, ...]]:
+    """The collision shapes of each link, or its visuals where it has none that can be read; and what cannot."""
+    artist, found = _Artist(robot, package_dirs), {}
+    for link in artist.element.iterfind("link"):
+        name = (link.get("name") or "").strip()
+        for kind in ("collision", "visual"):
+            found[name] = found.get(name) or tuple(artist.readable(name, link, kind))
+    return found, tuple(dict.fromkeys(artist.notes))
+
+
 class _Artist:
     """Draws one robot; remembers its meshes, its named materials and its notes."""
 
@@ -167,6 +179,14 @@ class _Artist:
         mesh, axes = inertia_ellipsoid(mass, inertia)
         pose = self.pose(inertial, f"inertia of link {name!r}") @ homogeneous(axes, np.zeros(3))
         return [Piece(name, pose, mesh, _STAND_IN)], "the ellipsoid of its inertia is"
+
+    def readable(self, name: str, link: Any, kind: str) -> Iterator[Piece]:
+        """The pieces of all shapes of a kind that can be read; what cannot is noted."""
+        for each in link.iterfind(kind):
+            try:
+                yield from self.shape(name, each, f"link {name!r}")
+            except MeshError as error:
+                self.notes.append(f"link {name!r}: <{kind}>: {error}")
 
     def shape(self, name: str, element: Any, where: str, color: Rgba | None = None) -> list[Piece]:
         """The pieces of a <visual> or <collision>."""

@@ -1,0 +1,95 @@
+"""The command that checks URDF files: check."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+import robot_dyn as rd
+from robot_dyn.cli import arguments, completion
+from robot_dyn.cli.app import Force, Json, PackageDir, app, progress
+from robot_dyn.cli.terminal import say, say_json, tell
+from robot_dyn.errors import QueryError, RobotDynError
+from robot_dyn.files import Kind, save
+
+if TYPE_CHECKING:
+    from robot_dyn.doctor.check import Checkup
+
+_URDF = Kind("a URDF", ".urdf", b"<?xml")
+
+
+class RepairError(RobotDynError):
+    """A repaired file that cannot be written."""
+
+
+@app.command()
+def check(
+    files: Annotated[
+        list[str],
+        typer.Argument(metavar="FILE...", help="URDF files, or names of robots.", autocompletion=completion.robots),
+    ],
+    fix: Annotated[
+        bool, typer.Option("--fix", help="Write NAME.fixed.urdf here, with every change in a comment.")
+    ] = False,
+    density: Annotated[
+        float | None,
+        typer.Option(metavar="KG/M³", help="With --fix: inertias of this density for links without any, from shapes."),
+    ] = None,
+    force: Force = False,
+    package_dir: PackageDir = None,
+    as_json: Json = False,
+) -> None:
+    """Check URDF files: inertias, units, limits, names, shapes; exit code 1 if there are errors in one."""
+    if density is not None and not fix:
+        raise QueryError("--density is for --fix, which writes the inertias; add it, or leave --density out")
+    targets = {file: _target(file, force) for file in files} if fix else {}
+    made = [rd.check(file, package_dirs=package_dir or (), density=density) for file in progress(files, "checking")]
+    written = {}
+    for file, each in zip(files, made, strict=True):
+        if fix and each.repaired is not None:
+            text, to = each.repaired, targets[file]
+            written[file] = str(save(to, lambda stream, text=text: stream.write(text), RepairError))
+    documents = [_document(file, each, written.get(file)) for file, each in zip(files, made, strict=True)]
+    say_json({"files": documents}) if as_json else say(*(line for each in documents for line in _lines(each)))
+    if fix and not as_json:
+        tell("".join(f"{file}: nothing that can be repaired\n" for file in files if file not in written).rstrip())
+    if not all(each.ok for each in made):
+        raise typer.Exit(1)
+
+
+def _target(file: str, force: bool) -> Path:
+    stem = Path(file).name.removesuffix(".urdf")
+    return arguments.output(f"{stem}.fixed.urdf", _URDF, RepairError, [file] if Path(file).is_file() else [], force)
+
+
+def _document(file: str, made: Checkup, written: str | None) -> dict[str, Any]:
+    findings = [
+        {
+            "severity": each.severity.value,
+            "kind": each.kind,
+            "where": each.where,
+            "what": each.what,
+            "remedy": each.remedy,
+            "line": each.line,
+            "changes": [change.text for change in each.changes],
+        }
+        for each in made.findings
+    ]
+    return {"file": file, "loads": made.loads, "ok": made.ok, "findings": findings, "written": written}
+
+
+def _lines(document: dict[str, Any]) -> Iterator[str]:
+    """A file, its findings, and what was written."""
+    findings = document["findings"]
+    counts = {word: sum(each["severity"] == word for each in findings) for word in ("error", "warning", "note")}
+    said = [f"{count} {word}{'s' * (count > 1)}" for word, count in counts.items() if count]
+    yield f"{document['file']}: {', '.join(said) or 'nothing found'}{'' if document['loads'] else '; it does not load'}"
+    for each in findings:
+        line = f" (line {each['line']})" if each["line"] else ""
+        fixed = " [--fix]" if each["changes"] and document["written"] is None else ""
+        yield f"  {each['severity']}: {each['where']}{line}: {each['what']}; {each['remedy']}{fixed}"
+    if document["written"]:
+        yield f"  written to {document['written']}"

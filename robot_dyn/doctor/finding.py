@@ -1,0 +1,88 @@
+"""Findings of the doctor, and the changes of the file that remove them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any, final
+
+from robot_dyn.errors import shorten
+
+
+class Severity(Enum):
+    """How grave a finding is.
+
+    ERROR: the file is refused, or its numbers cannot be those of the robot. WARNING: they are hardly meant. NOTE: other
+    programs read it in another way, or something is not stated.
+    """
+
+    ERROR = "error"
+    WARNING = "warning"
+    NOTE = "note"
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Change:
+    """A change of one element.
+
+    Attributes:
+        element: The element of the document.
+        key: The attribute that is changed; "" for the name of the element itself.
+        value: What it is then.
+        renames: The attribute that `key` was called before, if it is renamed.
+        text: What it is, in words.
+    """
+
+    element: Any
+    key: str
+    value: str
+    renames: str = ""
+    text: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        tag, before = self.element.tag, self.element.get(self.key or "x", "")
+        text = f'{self.key} of <{tag}> was "{shorten(before)}"'  # told now: once it is made it is not to be seen
+        if not self.key:
+            text = f"<{tag}> is now <{self.value}>"
+        elif self.renames:
+            text = f"{self.renames} of <{tag}> is now called {self.key}"
+        object.__setattr__(self, "text", text)
+
+    def apply(self) -> None:
+        """Make it."""
+        if not self.key:
+            self.element.tag = self.value
+        elif self.renames:
+            attributes = {self.key if key == self.renames else key: x for key, x in self.element.items()}
+            self.element.attrib.clear()
+            self.element.attrib.update(attributes)
+        else:
+            self.element.set(self.key, self.value)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Finding:
+    """What is wrong, or doubtful.
+
+    Attributes:
+        severity: How grave it is.
+        kind: What it is about, a fixed word for programs.
+        where: Link, joint or line.
+        what: What is found there, with its value.
+        remedy: What to do.
+        line: Line of the file, where it is known.
+        changes: What `--fix` changes; nothing where the file does not say what is meant.
+    """
+
+    severity: Severity
+    kind: str
+    where: str
+    what: str
+    remedy: str
+    line: int | None = None
+    changes: tuple[Change, ...] = ()
+
+    def __str__(self) -> str:
+        return f"{self.where}: {self.what}; {self.remedy}"
