@@ -55,7 +55,7 @@ def test_an_inertial_is_estimated_at_a_density() -> None:
     """A box of the density that its stated mass is: the moments of the closed form, and M of the sound file."""
     mass, _, edges = LINKS["hand"]
     text = BROKEN["no inertial"].change(SOUND).encode()
-    made = checked(text, "rig.urdf", density=mass / np.prod(edges))
+    made = checked(text, "rig.urdf", density=float(mass / np.prod(edges)))
     assert made.repaired is not None
     x, y = rd.Robot.from_text(SOUND).M(Q), rd.Robot.from_text(made.repaired).M(Q)
     assert np.abs(x - y).max() <= 1e-6 * np.abs(x).max()  # shapes are drawn in float32

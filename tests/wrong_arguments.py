@@ -31,6 +31,7 @@ NOT_OBJECTS = (None, 3, NAN, True, "no such", object(), np.ones(2), MASKED, {"a"
 RESULTS = {
     "Advice",
     "Certificate",
+    "Checkup",
     "Comparison",
     "Cost",
     "Rollouts",
@@ -215,7 +216,7 @@ def examples(folder: Path) -> dict[str, Example]:
         "save_certificate": (
             rd.save_certificate, {"result": certified, "path": folder / "digits.csv", "theme": "dark"},
         ),
-        "check": (rd.check, {"name_or_path": "planar_2r", "package_dirs": [], "density": 1000.0}),
+        "check": (rd.check, {"name_or_path": "planar_2r", "package_dirs": [folder], "density": 1000.0}),
         "circle": (
             rd.circle,
             {"centre": [0.1, 0.2, 0.3], "radius": 0.1, "normal": [0.0, 0.1, 1.0], "period_s": 1.0, "turns": 1.0,
