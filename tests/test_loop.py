@@ -9,12 +9,14 @@ import pytest
 from scipy.signal import butter, lfilter, lfilter_zi
 
 import robot_dyn as rd
+from robot_dyn.accuracy.step_cost import parts
 from robot_dyn.errors import ControlError, QueryError
 from robot_dyn.simulation.error import Verdict
 from robot_dyn.simulation.machine.making import machine
+from robot_dyn.simulation.remarks import Kind
 from robot_dyn.simulation.schedule import cuts
 from robot_dyn.simulation.state_equation import StateEquation
-from tests.loops import Q0, V0, Exact, exact, plant
+from tests.loops import Q0, V0, Exact, exact, matrices, plant
 
 T, PERIODS = 0.03, 40
 KP, KD, TARGET = np.array([60.0, 45.0]), np.array([5.0, 4.0]), np.array([0.5, 0.2])
@@ -219,6 +221,12 @@ def test_a_loop_of_nothing_adds_no_instruction() -> None:
     assert counts[0]["tick"] < counts[2]["tick"]
 
 
+def test_what_a_loop_costs_is_told_apart_from_its_controller() -> None:
+    setup = rd.Setup(PLANT, Q0, V0, 1.0, rd.Loop(PD, actuation_delay=0.5))
+    assert dict(parts(setup))["loop"].controller is PD
+    assert "loop" not in dict(parts(replace(setup, controller=PD)))
+
+
 def test_states_that_wait_do_not_loosen_the_tolerance() -> None:
     """They do not change between ticks: the mean of squares of the local error is that of the others."""
     arm, free = rd.load("planar_2r"), rd.PD(rd.hold(Q0), 0.0, 0.0, 1.0)
@@ -236,6 +244,19 @@ def test_the_last_torque_is_that_of_the_last_tick() -> None:
         made = run(controller, periods=PERIODS - 0.5)  # type: ignore[arg-type]
         longer = run(controller)
         np.testing.assert_allclose(made.u[-1], longer.u[len(made.t) - 1], atol=1e-12)
+
+
+@pytest.mark.parametrize("late", [0.0, 0.05])
+def test_chatter_is_seen_where_a_torque_acts_late(late: float) -> None:
+    """Damping of 2.24/T reverses at each tick, whether there are one or two instants in a period."""
+    M = np.linalg.inv(matrices()[1][2:])
+    kd = 2.24 / T / np.abs(np.linalg.eigvals(np.linalg.inv(M))).max()
+    loop = rd.Loop(rd.PD(rd.hold(TARGET), 0.0, kd, T), actuation_delay=late)
+    for integrator in ("rk4", "DOP853"):
+        for engine in ("interpreted", "compiled"):
+            options = {"integrator": integrator, "engine": engine, "estimate_error": False, "duration_s": 50 * T}
+            made = rd.simulate(PLANT, Q0, V0, controller=loop, record_period_s=T, **options)  # type: ignore[arg-type]
+            assert Kind.CHATTER in {remark.kind for remark in made.remarks}
 
 
 def test_ticks_of_two_instants_a_period() -> None:

@@ -18,6 +18,7 @@ import numpy as np
 from robot_dyn.accuracy.alternative import Pair, Way
 from robot_dyn.coefficients import with_values
 from robot_dyn.compiled.parameters import names_of
+from robot_dyn.control.loop import Loop
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import RobotDynError
 from robot_dyn.integrate.methods import method
@@ -41,7 +42,7 @@ _STEP_S, _STEPS, _STEPS_OF_MANY = 1e-7, 4000, 25
 
 
 def parts(setup: Setup) -> Iterator[tuple[str, Setup]]:
-    """Each part that acts, by name, with the setup without it: gravity, other edits, effects and control.
+    """Each part that acts, by name, with the setup without it: gravity, other edits, effects, loop and control.
 
     Models of the controller are without what the plant is without: what both compute alike is computed once.
     """
@@ -55,6 +56,8 @@ def parts(setup: Setup) -> Iterator[tuple[str, Setup]]:
     for name in dict.fromkeys(names):
         left = [each for each, own in zip(plant.effects, names, strict=True) if own != name]
         yield name, replace(setup, plant=Plant(plant.dynamics, left))
+    if isinstance(controller, Loop):
+        yield "loop", replace(setup, controller=controller.controller)
     if setup.controller is not None:
         yield "control", replace(setup, controller=None)
 

@@ -168,6 +168,11 @@ class Controller(Value, ABC):
         return (0.0,)
 
     @property
+    def acting_instant(self) -> int:
+        """Number of the instant at which its torque changes."""
+        return 0
+
+    @property
     def cycle(self) -> int:
         """Number of periods after which it does the same again."""
         return 1

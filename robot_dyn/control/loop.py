@@ -142,6 +142,10 @@ class Loop(Controller):
         return tuple(each.part for each in self._instants)
 
     @property
+    def acting_instant(self) -> int:
+        return next(i for i, each in enumerate(self._instants) if each.acts)
+
+    @property
     def deviates(self) -> int:
         return self.n * sum(block.random for _, _, block in self._all)
 

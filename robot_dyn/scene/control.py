@@ -274,7 +274,10 @@ class Control(Part):
         if not self.loops:
             return made
         lines: Any = {line: [each.build(robot) for each in getattr(self, line)] for line in LINES}
-        late = {"measurement_delay": self.measurement_delay_periods, "actuation_delay": self.actuation_delay_periods}
+        late: Any = {
+            "measurement_delay": self.measurement_delay_periods,
+            "actuation_delay": self.actuation_delay_periods,
+        }
         return Loop(made, **lines, **late, seed=self.noise_seed)
 
     def _controller(self, described: Robot, robot: Robot, q0: np.ndarray, reference: Any) -> Controller:

@@ -20,7 +20,7 @@ from robot_dyn.integrate.bernstein import NONE
 from robot_dyn.integrate.primitives import between, copy, evaluate
 from robot_dyn.integrate.step_control import At, chosen_step, finite, first_step
 from robot_dyn.simulation.crossings import Switches, approaches, correction, first_event, nears, remember, settle_sides
-from robot_dyn.simulation.time_loop import Ended, Functions, Now, Plan, Rules, Runs, act, conserve
+from robot_dyn.simulation.time_loop import Ended, Functions, Now, Plan, Rules, Runs, act, acts, conserve
 
 FASTEST = 1e6  # [rad/s] or [m/s]: such a method would follow an exploding state without end
 _EARLY = 1e-9  # of a period: a sample at the end of a segment belongs to the next one
@@ -171,7 +171,7 @@ def event_loop(
                     keep(f, runs, kept, now, t1, y, p)
                 now[Now.STEPS] += 1
                 now[Now.BUDGET] -= 1
-                walk(runs, kept, rules, now, t1, work.last, plan.ticks[s] > 0 and t == start)
+                walk(runs, kept, rules, now, t1, work.last, t == start and acts(rules, plan.ticks[s]))
                 if event >= 0:
                     now[Now.EVENT] = event
                     now[Now.STEP] = 1

@@ -25,7 +25,7 @@ from robot_dyn.simulation.schedule import paced
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.state_functions import interpreted, sample, system
-from robot_dyn.simulation.time_loop import WATCHED, Ended, Functions, Now, Records, Rules, Runs, time_loop
+from robot_dyn.simulation.time_loop import WATCHED, Ended, Functions, Now, Records, Rules, Runs, acts, time_loop
 from robot_dyn.simulation.trajectory import Ending, Outcome
 from robot_dyn.simulation.transfers import Transfers
 from robot_dyn.simulation.watch import DivergedError, Watch, one_step
@@ -161,7 +161,7 @@ class FixedStep(Followed):
             right_side = system(functions, self.equation, p, self.runs.own, seen)
             self.runs.y[:, 0] = y = one_step(method, right_side, t, y, h, self.watch)
         if observer is not None:
-            ticked = self.now[Now.STEP] == 0 and self.segments[s].tick
+            ticked = self.now[Now.STEP] == 0 and acts(self.rules, int(self.plan.ticks[s]))
             observer.step(t + h, y, ticked or not self.equation.sampled)
         self.now[Now.STEP] += 1
         self.now[Now.STEPS] += 1
@@ -214,9 +214,9 @@ def rules_of(
 ) -> Rules:
     """The rules of a loop over a state equation."""
     n, controller = equation.plant.dynamics.n, equation.controller
-    deviates, instants = (0, 1) if controller is None else (controller.deviates, len(controller.instants))
+    of = (1, 0, 0) if controller is None else (len(controller.instants), controller.acting_instant, controller.deviates)
     return Rules(
-        n, len(equation.sources), equation.state_size, n if equation.sampled else 0, instants, deviates,
+        n, len(equation.sources), equation.state_size, n if equation.sampled else 0, *of,
         equation.canonical, alone, largest, every, thin, base,
     )  # fmt: skip
 

@@ -167,7 +167,7 @@ class Rules(NamedTuple):
         n, works: Number of joints, and of works at the end of y.
         states: Number of states of the controller, behind q and v.
         held: Number of torques in the zero-order hold of a sampled controller; 0 for any other.
-        instants: Ticks of the controller in each of its periods.
+        instants, acting: Ticks of the controller in each of its periods, and which of them changes its torque.
         deviates: Number of its last states that are drawn anew before each tick.
         canonical: Whether y has momenta in place of velocities.
         alone: Whether what may end a run is looked at by its driver.
@@ -181,6 +181,7 @@ class Rules(NamedTuple):
     states: int
     held: int
     instants: int
+    acting: int
     deviates: int
     canonical: bool
     alone: bool
@@ -226,7 +227,7 @@ def time_loop(step: Callable[..., int]) -> Callable[..., int]:
                 now[Now.STEP] += 1
                 now[Now.STEPS] += 1
                 now[Now.BUDGET] -= 1
-                show(runs, records, rules, work.K, now, t + h, rules.held == 0 or (k == 0 and plan.ticks[s] > 0))
+                show(runs, records, rules, work.K, now, t + h, rules.held == 0 or (k == 0 and acts(rules, tick)))
                 if now[Now.STEPS] % WATCHED == 0 and not conserve(functions, runs, rules, t + h, p):
                     return Ended.GAINS
                 if now[Now.BUDGET] <= 0 or stop[0] != 0:
@@ -250,6 +251,11 @@ def act(functions: Functions, runs: Runs, rules: Rules, t: float, p: Array, numb
     copy(runs.own[:held], runs.command[:held])
     copy(runs.y[2 * n : 2 * n + z], runs.command[held:])
     return True
+
+
+def acts(rules: Rules, tick: int) -> bool:
+    """Whether the torque of a sampled controller changes at the tick of a number; 0 is none."""
+    return tick > 0 and (tick - 1) % rules.instants == rules.acting
 
 
 def share(runs: Runs, records: Records, rules: Rules, now: Array, last: bool) -> None:
