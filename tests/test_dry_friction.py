@@ -119,6 +119,23 @@ def test_stribecks_curve_is_followed_while_sliding() -> None:
     assert run.q[-1, 0] == pytest.approx(of.y[0, -1], rel=1e-11)
 
 
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_step_up_to_an_event_has_an_error_within_the_tolerance_too(engine: str) -> None:
+    """A reversal in 2e-5 s through Stribeck's curve, which a long step leaps over: t = ∫ dv / (F + f(v)).
+
+    By quadrature, to 1e-11 s; without the curve it is off by (f_s − f_k) v_s √π / 2 F² = 2e-8.
+    """
+    from scipy.integrate import quad
+
+    F, fk, fs, vs = 600.0, 1.0, 1.4, 0.02
+    plant = rd.Plant(level(RAIL, F), [rd.DryFriction(fk, fs, vs)])
+    run = rd.simulate(plant, [0.0], [30.0], duration_s=0.1, engine=engine, **OPTIONS)
+    parts = [quad(lambda v: 1 / (F + fk + (fs - fk) * np.exp(-((v / vs) ** 2))), a, b, epsabs=1e-15, epsrel=1e-13)[0]
+             for a, b in ((0.0, 0.05), (0.05, 0.2), (0.2, 30.0))]  # fmt: skip
+    assert run.events[0].name.endswith("reverses")
+    assert run.events[0].t == pytest.approx(sum(parts), abs=1e-11)
+
+
 def test_an_arm_obeys_the_law_of_friction_at_every_sample() -> None:
     """Where a joint slides M a + C v + N = u − f sign(v); where it rests the torque that is missing is at most f."""
     f = np.array([3.0, 1.0])

@@ -123,6 +123,12 @@ def finite(x: Array) -> bool:
     return total < np.inf
 
 
+def shortened(h: float, e: float, control: Array) -> float:
+    """The length of the step that is tried after one of length h that is refused, with the error e."""
+    control[At.REJECTED] += 1
+    return abs(h) * (max(_LEAST, _SAFETY * e ** -control[At.EXPONENT]) if e < np.inf else _CUT)
+
+
 def chosen_step(step: Callable[..., int], error: Callable[..., float]) -> Callable[..., tuple[int, int]]:
     """The choice of a step, for a method's `step` and `error`.
 
@@ -153,8 +159,7 @@ def chosen_step(step: Callable[..., int], error: Callable[..., float]) -> Callab
             if e <= 1.0:
                 break
             rejected = True
-            control[At.REJECTED] += 1
-            wanted = h * (max(_LEAST, _SAFETY * e ** -control[At.EXPONENT]) if e < np.inf else _CUT)
+            wanted = shortened(h, e, control)
             if wanted < least:
                 return evaluations, Choice.TOO_SMALL
         alpha = control[At.EXPONENT]

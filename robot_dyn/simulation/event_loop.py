@@ -18,7 +18,7 @@ import numpy as np
 from robot_dyn.arithmetic import Array
 from robot_dyn.integrate.bernstein import NONE
 from robot_dyn.integrate.primitives import between, copy, evaluate
-from robot_dyn.integrate.step_control import At, chosen_step, finite, first_step
+from robot_dyn.integrate.step_control import At, chosen_step, finite, first_step, shortened
 from robot_dyn.simulation.crossings import Switches, approaches, correction, first_event, nears, remember, settle_sides
 from robot_dyn.simulation.time_loop import Ended, Functions, Now, Plan, Rules, Runs, act, acts, conserve
 
@@ -82,27 +82,30 @@ def event_loop(
 
     def cut(
         f: Functions, c: Any, t: float, whole: float, theta: float, p: Array, runs: Runs, work: Any,
-        switches: Switches, event: int,
-    ) -> tuple[int, float, float]:  # fmt: skip
+        switches: Switches, event: int, control: Array,
+    ) -> tuple[int, float, float, float]:  # fmt: skip
         """The step made anew, up to where a switching function vanishes after it, but for the last bit of its length.
 
-        Its evaluations, its length, and that bit, over which y is a straight line.
+        Its evaluations, its length, that bit, over which y is a straight line, and its error as of `error`: it may pass
+        slowly through what the whole step leapt over, as friction near v = 0.
         """
-        h, evaluations, y, after = theta * whole, 0, runs.y, runs.after
+        h, evaluations, y, after, e = theta * whole, 0, runs.y, runs.after, 0.0
         for k in range(_ROOTS):
             if abs(h) <= np.spacing(abs(t)):  # at once, as right behind another event
                 copy(after, y)
                 copy(work.last, work.K[0])
-                return evaluations, 0.0, 0.0
+                return evaluations, 0.0, 0.0, 0.0
             evaluations += step(f, c, t, h, y, p, runs.own, after, work, runs.lost)
+            if control[At.RTOL] + control[At.ATOL] > 0.0:  # 0 for steps of a fixed length
+                e = error(c, h, y, after, work, control[At.RTOL], control[At.ATOL])
             evaluations += accept(f, c, t, h, y, p, runs.own, after, work)
             shift = correction(f, t, h, whole, y, p, runs, work, switches, event)
             if not abs(shift) > _SHORT * h:
-                return evaluations, h, shift
+                return evaluations, h, shift, e
             if k == _ROOTS - 1 or (abs(shift) > h and event >= len(switches.exact)):
                 break  # a function that jumps, say: where it is bracketed
             h = max(h + shift, 0.0)
-        return evaluations, h, 0.0
+        return evaluations, h, 0.0, e
 
     def advance(
         f: Functions, plan: Plan, runs: Runs, kept: Kept, times: Times, rules: Rules, c: Any, work: Any,
@@ -149,10 +152,14 @@ def event_loop(
                         event, theta = first_event(f, t, h, y, p, runs, work.F, switches)
                         has_dense = event < 0
                     if event >= 0:
-                        made, h, rest = cut(f, c, t, h, theta, p, runs, work, switches, event)
+                        made, h, rest, e = cut(f, c, t, h, theta, p, runs, work, switches, event, control)
                         now[Now.EVALUATIONS] += made
                         if runs.lost[0] != 0 or not finite(after):
                             return Ended.TOO_SMALL
+                        if e > 1.0:
+                            control[At.NEXT] = shortened(h, e, control)
+                            remember(t, y, p, own, switches)
+                            continue
                         t1 = t + (h + rest)
                         control[At.NEXT] = max(control[At.NEXT], abs(control[At.TAKEN]))  # the cut is no error
                         switches.sides[event] = -switches.sides[event]
