@@ -8,6 +8,7 @@ import numpy as np
 
 from robot_dyn.effects.joint_limit import JointStopSpring
 from robot_dyn.effects.plant import Plant
+from robot_dyn.effects.rigid_stops import RigidStops
 from robot_dyn.effects.wrench import ExternalWrench
 from robot_dyn.model.robot import Robot
 
@@ -47,8 +48,7 @@ def link_of(dynamics: Any, frame: str) -> str:
 
 
 def at_stop(plant: Plant, q: np.ndarray) -> np.ndarray | None:
-    """Whether each joint bears on a stop, (m, n); None without stops."""
-    stops = [effect for effect in plant.effects if isinstance(effect, JointStopSpring)]
-    if not stops:
-        return None
-    return np.any([(q < stop.lower) | (q > stop.upper) for stop in stops], axis=0)
+    """Whether each joint bears on a soft stop, or touches a rigid one, (m, n); None without stops."""
+    soft = [(q < x.lower) | (q > x.upper) for x in plant.effects if isinstance(x, JointStopSpring)]
+    rigid = [x.touched(q) != 0 for x in plant.effects if isinstance(x, RigidStops)]
+    return np.any(soft + rigid, axis=0) if soft or rigid else None

@@ -25,6 +25,7 @@ from robot_dyn.view.geometry.visuals import Drawing, drawing
 from robot_dyn.view.keyframes import Keyframes, keyframes
 from robot_dyn.view.overlays import GHOST, Overlays, overlays
 from robot_dyn.view.price import price
+from robot_dyn.view.rests import rests
 from robot_dyn.view.scenery import gravity_arrow, gravity_label, ground, scenery, turned, upright
 from robot_dyn.view.series import plots
 from robot_dyn.view.stage import Stage
@@ -101,6 +102,7 @@ def document(
         "problems": problems,
         "gravity": _labels(shown),
         "events": _events(shown),
+        "rests": _rests(shown),
         "notes": [*notes, *scale, *turned(gravity), f"the squares on the floor are {seen.square:g} m wide"],
         "scene": seen.as_json(),
         "plots": plots([each.run for each in shown], [each.stage for each in shown]),
@@ -121,6 +123,18 @@ def _events(shown: list[Shown]) -> list[dict[str, Any]]:
         for each in shown
         for event in each.run.events[:_MOST_EVENTS]
     ]
+
+
+def _rests(shown: list[Shown]) -> list[dict[str, Any]]:
+    """A line for each joint that is held for a time, or meets a rigid stop: its rests, and its events."""
+    made = []
+    for each in shown:
+        for name, spans in zip(each.run.joint_names, rests(each.run), strict=True):
+            if spans:
+                who = name if len(shown) == 1 else f"{each.name}: {name}"
+                met = [(event.t, event.name) for event in each.run.events if event.joint == name]
+                made.append({"joint": who, "spans": [list(span) for span in spans], "events": met[:_MOST_EVENTS]})
+    return made
 
 
 def _outcome(shown: Shown, count: int) -> str:
@@ -147,7 +161,9 @@ def _shown(number: int, run: Trajectory, count: int, package_dirs: tuple[Path, .
     )
     mark = "" if not number else " (ghost)" if count == 2 else f" (ghost {number})"
     look = drawing(robot, package_dirs, inertia=inertia)
-    return Shown(robot.name + mark, run, stage, keys, look, tuple(problems), (thinning,))
+    some = f"the first {_MOST_EVENTS} of {len(run.events)} events are marked on the plots"
+    notes = (thinning, some) if len(run.events) > _MOST_EVENTS else (thinning,)
+    return Shown(robot.name + mark, run, stage, keys, look, tuple(problems), notes)
 
 
 def _drawable(run: Trajectory) -> Trajectory:

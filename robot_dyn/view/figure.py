@@ -14,6 +14,7 @@ import numpy as np
 
 from robot_dyn.simulation.remarks import lines
 from robot_dyn.simulation.trajectory import Ending, Trajectory
+from robot_dyn.view.rests import Rest
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -31,6 +32,7 @@ THEMES: dict[str, dict[str, Any]] = {  # colours of Okabe and Ito, told apart by
     | {"lines": ("#56b4e9", "#e69f00", "#00b886", "#cc79a7", "#ffffff", "#f0e442", "#ff7f2a")},
 }
 _DASHES = ("-", (0, (4, 2)), (0, (1, 1.2)), (0, (6, 2, 1, 2)))
+_STOP = 1  # colour of a rest at a stop
 DESIRED, _LIMIT = (1, 1), (1, 1)  # colour and dashes of what is asked for, and of what is allowed
 
 
@@ -50,6 +52,8 @@ class Curve:
 class Cell:
     """One pair of axes; `limit` is drawn at ±limit, `marks` as dotted lines, what lies after `until` is veiled.
 
+    `rests` are shaded, those at a stop in colour.
+
     Without `x` it is that of the row below.
     """
 
@@ -62,6 +66,7 @@ class Cell:
     until: float = np.inf
     note: str = ""
     marks: tuple[float, ...] = ()
+    rests: tuple[Rest, ...] = ()
 
 
 @final
@@ -163,6 +168,9 @@ def _fill(axes: Any, cell: Cell, theme: Mapping[str, Any], diverged: bool) -> No
         cell.marks[:_MOST_MARKS], 0, 1, transform=axes.get_xaxis_transform(), color=theme["ink"], linewidth=0.6,
         linestyle=":", label="_events",
     )  # fmt: skip
+    for each in cell.rests:
+        shade = {"color": colours[_STOP], "alpha": 0.25} if each.at_stop else {"color": theme["grid"]}
+        axes.axvspan(each.start, each.end, linewidth=0, zorder=0.5, label="_rest", **shade)
     if np.isfinite(cell.until):
         axes.axvspan(cell.until, cell.curves[0].x[-1], color=theme["veil"], zorder=0.5, label="_not resolved")
     _scale(axes, "y", np.concatenate([curve.y for curve in cell.curves]), cell.limit, diverged, log)

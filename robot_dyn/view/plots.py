@@ -21,6 +21,7 @@ from robot_dyn.model.units import unit
 from robot_dyn.simulation.trajectory import Trajectory
 from robot_dyn.validate import choice, instance, number, shaped
 from robot_dyn.view.figure import DESIRED, NEAR, THEMES, Cell, Curve, Panel, draw
+from robot_dyn.view.rests import rests
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -55,18 +56,21 @@ class View:
 
 
 def joints(view: View) -> Panel:
-    """Position and velocity of each joint, with the desired position where there is a reference."""
-    run, cells = view.run, []
+    """Position and velocity of each joint, with the desired position where there is a reference, and its rests."""
+    run, cells, held = view.run, [], rests(view.run)
     for i, name in zip(view.joints, view.names, strict=True):
         q = [Curve("actual", run.t, run.q[:, i])]
         if run.desired is not None:
             q.append(Curve("desired", run.t, run.desired[:, i], DESIRED))
         marks = tuple(each.t for each in run.events if each.joint in ("", name))
-        cells.append(Cell(name, "", f"q [{view.units[i]}]", tuple(q), marks=marks))
+        cells.append(Cell(name, "", f"q [{view.units[i]}]", tuple(q), marks=marks, rests=held[i]))
         v = (Curve("actual", run.t, run.v[:, i]),)
-        cells.append(Cell("", "t [s]", f"v [{_rate(view.units[i])}]", v, marks=marks))
+        cells.append(Cell("", "t [s]", f"v [{_rate(view.units[i])}]", v, marks=marks, rests=held[i]))
     pairs = zip(_grid(cells[::2]), _grid(cells[1::2]), strict=True)
-    marked = "; events are dotted" if run.events else ""
+    shown = [each for i in view.joints for each in held[i]]
+    said = [("events are dotted", run.events), ("where a joint is held is shaded", shown)]
+    said.append(("at a stop in colour", [each for each in shown if each.at_stop]))
+    marked = "".join(f"; {words}" for words, some in said if some)
     return Panel(f"Joint positions and velocities{marked}", tuple(row for pair in pairs for row in pair))
 
 

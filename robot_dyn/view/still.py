@@ -50,6 +50,7 @@ def still(robot: Robot, q: Array | None, package_dirs: Iterable[str | Path], ine
         "problems": list(look.notes),
         "gravity": gravity_label(robot),
         "events": [],
+        "rests": [],
         "notes": [
             "q: " + ", ".join(f"{name} = {value:.4g} {unit}" for name, value, unit in values),
             *look.remarks,

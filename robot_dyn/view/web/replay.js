@@ -71,6 +71,35 @@ function makePlot(plot, events, seek) {
   };
 }
 
+function makeRests(rests, duration, seek) {
+  const make = (className, textContent = "") => Object.assign(document.createElement("div"), { className, textContent });
+  const box = Object.assign(document.createElement("section"), { className: "rests" });
+  box.append(Object.assign(document.createElement("h2"), { textContent: "held: by dry friction grey, at a stop in colour; events dotted" }));
+  const marks = [], part = (t) => `${100 * t / (duration || 1)}%`;
+  for (const each of rests) {
+    const line = make("lane"), time = make("time"), mark = make("mark");
+    for (const [start, end, stop] of each.spans) {
+      const span = make(stop ? "rest stop" : "rest");
+      Object.assign(span.style, { left: part(start), width: part(end - start) });
+      span.title = `${each.joint} ${stop ? "rests at a stop" : "sticks"}, ${start.toFixed(3)} to ${end.toFixed(3)} s`;
+      time.append(span);
+    }
+    for (const [t, name] of each.events) {
+      const tick = make("event");
+      tick.style.left = part(t);
+      tick.title = `${t.toFixed(3)} s: ${name}`;
+      time.append(tick);
+    }
+    time.append(mark);
+    time.addEventListener("click", (click) => seek((click.clientX - time.getBoundingClientRect().left) / time.clientWidth * duration));
+    line.append(make("joint", each.joint), time);
+    box.append(line);
+    marks.push(mark);
+  }
+  element("plots").append(box);
+  return (t) => marks.forEach((mark) => { mark.style.left = part(t); });
+}
+
 function makePrice(price) {
   const make = (tag, text) => Object.assign(document.createElement(tag), { textContent: text });
   const box = Object.assign(document.createElement("section"), { className: "price" }), table = document.createElement("table");
@@ -176,6 +205,7 @@ async function main() {
   };
   const clock = window.replay = makeClock(data.duration, show);
   marks.push(...data.plots.map((plot) => makePlot(plot, data.events, (t) => { clock.play(false); clock.seek(t); })));
+  if (data.rests.length) marks.push(makeRests(data.rests, data.duration, (t) => { clock.play(false); clock.seek(t); }));
   if (data.price.rows.length) makePrice(data.price);
   clock.seek(0);
   const follow = () => {  // over a socket the animation comes when it comes

@@ -1,0 +1,51 @@
+"""Rests: the times in which dry friction or a rigid stop holds a joint, from the samples and the events of a run.
+
+A joint that is held has v = 0 and the same q at two successive times, to the last bit.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from robot_dyn.simulation.trajectory import Trajectory
+
+_HOLD = {"dry_friction", "rigid_stops"}  # among the names of what acts
+_MOST = 200  # of a joint
+
+
+class Rest(NamedTuple):
+    """A time in which a joint is held.
+
+    Attributes:
+        start, end: In [s].
+        at_stop: Whether it rests at a stop.
+    """
+
+    start: float
+    end: float
+    at_stop: bool
+
+
+def rests(run: Trajectory) -> tuple[tuple[Rest, ...], ...]:
+    """The rests of each joint, the first ones, in the order of time; none in a run in which nothing holds joints."""
+    names = run.joint_names
+    if not _HOLD & set(run.acting or ()):
+        return ((),) * len(names)
+    events = [each for each in run.events if len(each.q) == len(names)]
+    t = np.concatenate([run.t, [each.t for each in events]])
+    order = np.argsort(t, kind="stable")
+    q, v = (
+        np.concatenate([x, np.array([getattr(each, name) for each in events]).reshape(-1, len(names))])[order]
+        for name, x in (("q", run.q), ("v", run.v))
+    )
+    return tuple(_of_joint(run, i, t[order], q[:, i], v[:, i]) for i in range(len(names)))
+
+
+def _of_joint(run: Trajectory, i: int, t: np.ndarray, q: np.ndarray, v: np.ndarray) -> tuple[Rest, ...]:
+    held = (v[1:] == 0) & (v[:-1] == 0) & (q[1:] == q[:-1])
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], held, [False]]).astype(int)))
+    stops = set() if run.at_stop is None else set(run.q[run.at_stop[:, i], i].tolist())
+    found = (Rest(float(t[a]), float(t[b]), float(q[a]) in stops) for a, b in edges.reshape(-1, 2) if t[b] > t[a])
+    return tuple(found)[:_MOST]
