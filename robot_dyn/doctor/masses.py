@@ -17,6 +17,7 @@ from robot_dyn.model.robot import Robot
 from robot_dyn.model.structure import Structure, structure
 
 _SENTENCE = re.compile(r"((?:link|joint)s? '[^:;]*?')(?:: | )(.*?); (.*)", re.DOTALL)
+_NOTHING = 1e-9  # of the largest moment
 _RATIO = 1e4  # of the masses of two bodies of an arm: of a base of 100 kg to a finger of 10 g
 _KINDS = (
     (Severity.ERROR, "inertia_impossible", doctor.impossible_inertias),
@@ -37,6 +38,7 @@ def masses(robot: Robot) -> Iterator[Finding]:
     for severity, kind, find in _KINDS:
         for text in find(stated):
             yield _of_words(severity, kind, text)
+    yield from _lopsided(stated)
     yield from _merged(robot, stated)
     yield from _proportions(robot, stated)
 
@@ -46,6 +48,25 @@ def _of_words(severity: Severity, kind: str, text: str) -> Finding:
     said = _SENTENCE.fullmatch(text)
     assert said is not None, "each begins with its link, joint or joints"
     return Finding(severity, kind, said[1], said[2], said[3])
+
+
+def _lopsided(stated: Structure) -> Iterator[Finding]:
+    """Links with moments and no mass, or with mass and a moment of 0, of which other programs make something else."""
+    for name, link in stated.links.items():
+        Ixx, Ixy, Ixz, Iyy, Iyz, Izz = link.moments
+        least, _, most = np.linalg.eigvalsh(np.array([[Ixx, Ixy, Ixz], [Ixy, Iyy, Iyz], [Ixz, Iyz, Izz]]))
+        if link.mass == 0 and most > 0:
+            yield Finding(
+                Severity.WARNING, "inertia_without_mass", f"link {name!r}",
+                f"has moments of inertia up to {most:.3g} kg m² and no mass; they count here, and MuJoCo drops them",
+                "give it a mass, or remove its <inertial>",
+            )  # fmt: skip
+        elif link.mass > 0 and abs(least) <= _NOTHING * most and name not in stated.base:
+            yield Finding(
+                Severity.NOTE, "inertia_zero", f"link {name!r}",
+                f"its least principal moment is 0, as of a rod or a point of {link.mass:g} kg; MuJoCo refuses that",
+                "give it the moments of a body with some width",
+            )  # fmt: skip
 
 
 def _merged(robot: Robot, stated: Structure) -> Iterator[Finding]:

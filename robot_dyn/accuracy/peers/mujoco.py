@@ -22,8 +22,9 @@ _METHODS = {  # name of the option, order, evaluations of the equation of motion
 
 
 def mujoco_model(
-    mujoco: Any, arm: Robot, gains: tuple[float, float] | None = None, damping: float = 0.0, bare: bool = False
-) -> Any:
+    mujoco: Any, arm: Robot, gains: tuple[float, float] | None = None, damping: float = 0.0, bare: bool = False,
+    ordered: bool = True,
+) -> Any:  # fmt: skip
     """The arm under RK4 at 1 ms: locked joints fixed, no limits, no contacts; PD with `gains` (kp, kd) on every joint.
 
     Args:
@@ -32,6 +33,7 @@ def mujoco_model(
         gains: Of a position servo u = kp (ctrl − q) − kd v on each joint.
         damping: Viscous friction of each joint, in [N m s/rad].
         bare: Whether the constraint solver is switched off with all it would look for.
+        ordered: Whether its joints must stand in the order of the robot's.
 
     Raises:
         PeerError: If it has other joints.
@@ -58,7 +60,7 @@ def mujoco_model(
     if bare:
         for bit in (off.mjDSBL_CONSTRAINT, off.mjDSBL_LIMIT, off.mjDSBL_EQUALITY, off.mjDSBL_FRICTIONLOSS):
             model.opt.disableflags |= int(bit)
-    if tuple(model.joint(i).name for i in range(model.njnt)) != arm.joint_names:
+    if ordered and tuple(model.joint(i).name for i in range(model.njnt)) != arm.joint_names:
         raise PeerError("it has the joints of the file in another order")
     return model
 
