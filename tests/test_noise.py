@@ -95,6 +95,16 @@ def test_each_tick_has_its_noise_whatever_the_steps_and_the_delay() -> None:
     assert run.error.final < 1e-12
 
 
+def test_noise_makes_no_velocity_at_the_first_tick() -> None:
+    """Before the start the arm was measured where it starts, with the noise of the first tick."""
+    noise = {"position": rd.Noise(1e-3), "velocity": rd.Differences()}
+    loop = rd.Loop(rd.PD(rd.hold([0.0, 0.0]), 0.0, WEAK, PERIOD), **noise)  # type: ignore[arg-type]
+    run = rd.simulate(ARM, [0.3, 0.2], controller=loop, duration_s=0.1, record_period_s=PERIOD, estimate_error=False)
+    assert not run.u[0].any()
+    expected = -WEAK * np.diff(0.2 + 1e-3 * deviates(0, 0, 11, 2)[:, 1]) / PERIOD
+    np.testing.assert_allclose(run.u[1:, 1], expected, rtol=1e-9)
+
+
 def test_deviates_are_normal_white_and_independent() -> None:
     """Each bound is passed by chance once in 1e6 or less: five standard deviations; 2 exp(−2 c²) of Kolmogorov's."""
     N = 40_000

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import ceil
-from typing import Any, ClassVar, NamedTuple, final
+from typing import Any, ClassVar, final
 
 import numpy as np
 
@@ -21,23 +21,13 @@ from robot_dyn.arithmetic import Array
 from robot_dyn.coefficients import declared, with_values
 from robot_dyn.control.block import Block
 from robot_dyn.control.controller import Controller, Nested
+from robot_dyn.control.delay import Instant, delay, instants, shifted
 from robot_dyn.control.differences import Differences
 from robot_dyn.control.nested import check_sampled, nested
 from robot_dyn.errors import ControlError, shown
-from robot_dyn.validate import integer, number
+from robot_dyn.validate import integer
 
 LINES = ("position", "velocity", "actuation")
-_LEAST = 1e-6  # of a period, between two instants
-_MOST = 1000  # periods of a delay: each is a state of every joint
-
-
-class Instant(NamedTuple):
-    """A part of each period, and what happens there: measuring, computing, or a torque that begins to act."""
-
-    part: float
-    measures: bool
-    computes: bool
-    acts: bool
 
 
 @final
@@ -82,15 +72,9 @@ class Loop(Controller):
         for line in LINES:
             object.__setattr__(self, line, _blocks(line, getattr(self, line)))
         for name in ("measurement_delay", "actuation_delay"):
-            object.__setattr__(self, name, _delay(name, getattr(self, name)))
+            object.__setattr__(self, name, delay(name, getattr(self, name)))
         for name in ("seed", "run"):
             object.__setattr__(self, name, integer(name, getattr(self, name), most=2**63 - 1, error=ControlError))
-        parts = [each.part for each in self._instants]
-        if (np.diff([*parts, 1.0]) < _LEAST).any():
-            raise ControlError(
-                f"measurement_delay = {self.measurement_delay!r} and actuation_delay = {self.actuation_delay!r} make"
-                f" instants that lie closer together than {_LEAST:g} of a period; make them one, or move them apart"
-            )
         super().__post_init__()
         self._check_blocks(self.period_s)
         self._places  # noqa: B018  # while the controller in it has numbers: a trace puts symbols in their place
@@ -163,9 +147,7 @@ class Loop(Controller):
     @cached_property
     def _instants(self) -> tuple[Instant, ...]:
         """In each period, the first at its start."""
-        measured, acted = -self.measurement_delay % 1.0, self.actuation_delay % 1.0
-        parts = sorted({0.0, measured, acted})
-        return tuple(Instant(part, part == measured, part == 0.0, part == acted) for part in parts)
+        return instants(self.measurement_delay, self.actuation_delay)
 
     @property
     def _differs(self) -> bool:
@@ -202,10 +184,7 @@ class Loop(Controller):
 
     def _tick(self, t: float, q: Array, v: Array, z: Array) -> tuple[Array, Array]:
         """The torque that acts from a tick on, and z⁺."""
-        i, begun = 0, z[self._places["begun"]]
-        for count in z[self._places["instant"]]:
-            while i < len(self._instants) - 1 and count > i + 0.5:
-                i += 1
+        i, begun = self._coming(z), z[self._places["begun"]]
         if len(begun) and begun[0] < 0.5:
             z = self._at_rest(q, v, z)
         at, fresh = self._instants[i], q if self._differs else np.concatenate([q, v])
@@ -224,16 +203,23 @@ class Loop(Controller):
             made["acting"], made["instant"] = u, np.array([(i + 1.0) % len(self._instants)])
         return u, np.concatenate([*made.values()])
 
+    def _coming(self, z: Array) -> int:
+        """Number of the instant of this tick, which z counts where there are several."""
+        i = 0
+        while i < len(self._instants) - 1 and z[self._places["instant"]][0] > i + 0.5:
+            i += 1
+        return i
+
     def _computed(self, t: float, fresh: Array, made: dict[str, Array]) -> Array:
         """What the torque is to be that the whole periods of its delay let through; the states in `made` go on."""
         newest = made["sample"] if len(made["sample"]) else fresh
-        measured, made["past"] = _shifted(newest, made["past"])
+        measured, made["past"] = shifted(newest, made["past"])
         q = self._through("position", measured[: self.n], made)
         v = self._through("velocity", q if self._differs else measured[self.n :], made)
         z = made["controller"]
         u = self._through("actuation", self.controller.torque(t, q, v, z), made)
         made["controller"] = self.controller.next_state(t, q, v, z)
-        u, made["coming"] = _shifted(u, made["coming"])
+        u, made["coming"] = shifted(u, made["coming"])
         return u
 
     def _through(self, line: str, x: Array, made: dict[str, Array]) -> Array:
@@ -255,10 +241,12 @@ class Loop(Controller):
         for line, i, block in self._all:
             if line == "velocity" and i == 0 and self._differs:
                 signals[line] = signals["position"]
+            x, name = signals[line], f"{line}.{i}"
             if not block.random:
-                x = signals[line]
-                made[f"{line}.{i}"] = s = block.start(x, self.period_s)
-                signals[line] = block.output(x, s, self.period_s)
+                made[name] = block.start(x, self.period_s)
+            elif line == "actuation":
+                continue  # no torque, no noise
+            signals[line] = block.output(x, made[name], self.period_s)
         return np.concatenate([*made.values()])
 
     def at_period(self, period_s: float) -> Controller:
@@ -283,24 +271,9 @@ class Loop(Controller):
         return z
 
 
-def _shifted(x: Array, past: Array) -> tuple[Array, Array]:
-    """What leaves a delay of whole periods, and what is in it then, the newest first."""
-    if not len(past):
-        return x, past
-    return past[-len(x) :], np.concatenate([x, past[: -len(x)]])
-
-
 def _blocks(line: str, given: Any) -> tuple[Block, ...]:
     """The blocks that are meant: several, or one."""
     made = (given,) if isinstance(given, Block) else given
     if not isinstance(made, tuple | list) or not all(isinstance(each, Block) for each in made):
         raise ControlError(f"{line} must be blocks, such as [rd.Quantisation(1e-4)], got {shown(given)}")
     return tuple(made)
-
-
-def _delay(name: str, given: Any) -> float:
-    """A delay in periods; within rounding of a whole number of them it is that."""
-    delay = number(name, given, error=ControlError)
-    if not 0 <= delay <= _MOST:
-        raise ControlError(f"{name} must be from 0 to {_MOST} periods, got {delay:g}; take another period")
-    return float(round(delay)) if abs(delay - round(delay)) < 1e-9 else delay
