@@ -74,6 +74,7 @@ if TYPE_CHECKING:
     from robot_dyn.effects.line_spring_damper import LineSpringDamper as LineSpringDamper
     from robot_dyn.effects.lugre import LuGreFriction as LuGreFriction
     from robot_dyn.effects.plant import Plant as Plant
+    from robot_dyn.effects.rigid_backlash import RigidBacklash as RigidBacklash
     from robot_dyn.effects.rigid_stops import RigidStops as RigidStops
     from robot_dyn.effects.series_elastic import SeriesElastic as SeriesElastic
     from robot_dyn.effects.spring import Spring as Spring
@@ -162,6 +163,7 @@ _HOME = {
     "Quantisation": "control.quantisation",
     "RateLimit": "control.rate_limit",
     "RegularisedCoulombFriction": "effects.friction",
+    "RigidBacklash": "effects.rigid_backlash",
     "RigidStops": "effects.rigid_stops",
     "Robot": "model.robot",
     "RobotDynError": "errors",

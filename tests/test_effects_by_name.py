@@ -73,6 +73,7 @@ def test_an_effect_has_one_name_in_python_scene_ledger_and_rollouts() -> None:
         "external_wrench": [rd.ExternalWrench("tip", [1.0, 0, 0, 0, 0, 0])],
         "carried_payload": [rd.CarriedPayload(rd.Payload("tip", 0.5), 0.004)],
         "series_elastic": [rd.SeriesElastic({"joint_2": 90.0}, 0.1, 3.0, backlash=1e-3)],
+        "rigid_backlash": [rd.RigidBacklash({"joint_1": 0.01}, 0.1, 3.0)],
         "effort_limit": [rd.EffortLimit(5.0)],
         "actuator_lag": [rd.ActuatorLag(0.05)],
     }
@@ -85,7 +86,7 @@ def test_an_effect_has_one_name_in_python_scene_ledger_and_rollouts() -> None:
     assert list(run.power) == [
         "control", "viscous_friction", "regularised_coulomb_friction", "dry_friction", "lugre_friction",
         "dahl_friction", "joint_stops", "rigid_stops", "line_spring_damper", "external_wrench", "series_elastic",
-        "carried_payload", "pick_up",
+        "rigid_backlash", "carried_payload", "pick_up",
     ]  # fmt: skip
 
 

@@ -98,6 +98,7 @@ EFFECTS = {
     "series_elastic": (
         "stiffness_N_m_per_rad = {joint_2 = 80.0}\ninertia_kg_m2 = 0.02\nratio = 5.0\nbacklash_rad = 0.01"
     ),
+    "rigid_backlash": "gap_rad = {joint_2 = 0.01}\ninertia_kg_m2 = 0.02\nratio = 5.0\nrestitution = 0.4",
     "payload": 'frame = "tip"\nmass_kg = 0.5',
     "armature": "inertia_kg_m2 = {joint_1 = 0.002, joint_2 = 0.001}\ngear_ratio = {joint_1 = 9.0}",
     "lock": "joints = {joint_1 = 0.2}",
@@ -132,6 +133,7 @@ def test_effect_of_a_scene_is_that_of_python(write, kind: str) -> None:
             robot, [rd.CarriedPayload(rd.Payload("tip", 0.5), end_s=0.07, at_rest=False)]
         ),
         "series_elastic": lambda: rd.Plant(robot, [rd.SeriesElastic([0.0, 80.0], 0.02, 5.0, backlash=0.01)]),
+        "rigid_backlash": lambda: rd.Plant(robot, [rd.RigidBacklash([0.0, 0.01], 0.02, 5.0, 0.4)]),
         "dry_friction": lambda: rd.Plant(robot, [rd.DryFriction([0.4, 0.2], 0.6)]),
         "rigid_stops": lambda: rd.Plant(robot, [rd.RigidStops(-1.0, [1.0, np.inf], 0.3)]),
         "payload": lambda: rd.Plant(robot.with_(payload=rd.Payload("tip", 0.5))),

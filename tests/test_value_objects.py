@@ -48,6 +48,7 @@ def values() -> dict[str, Any]:
         rd.DryFriction([1.0, 2.0], 2.0, 0.1), rd.RigidStops(-1.0, [1.0, 2.0], 0.5),
         rd.ActuatorLag([0.1, 0.2]), rd.LuGreFriction(9.0, 1.0, 1.0, [1.0, 2.0], 2.0, 0.1),
         rd.DahlFriction(9.0, [1.0, 2.0], 1.5), rd.CarriedPayload(rd.Payload("tip", 1.0)),
+        rd.RigidBacklash([0.1, 0.0], 0.1, 3.0, 0.5, 0.2),
         rd.SeriesElastic([9.0, 0.0], 0.1, 3.0, 0.1, 0.2, 0.01),
         rd.Samples([0.0, 1.0, 2.0], np.ones((3, 2))), LINE,
         loop, loop.controller, *loop.position, *loop.velocity, *loop.actuation,

@@ -47,6 +47,7 @@ FOR_LOOPS = {
 }
 FOR_LOOPS |= {
     "task_acceleration", "in_mode", "at_rest", "sliding", "touched", "snapped", "beyond_by", "friction", "bounds",
+    "of", "reflected", "drag",
 }  # fmt: skip
 LAX = {  # arguments that may be infinite or unknown, or of any shape
     "ExternalWrench.acts": {"t"},
@@ -250,6 +251,9 @@ def examples(folder: Path) -> dict[str, Example]:
         "SeriesElastic": (
             rd.SeriesElastic,
             {"stiffness": [90.0, 1.0], "inertia": 0.1, "ratio": 3.0, "damping": 0.1, "friction": 0.2, "backlash": 0.01},
+        ),
+        "RigidBacklash": (
+            rd.RigidBacklash, {"gap": [0.1, 0.0], "inertia": 0.1, "ratio": 3.0, "restitution": 0.5, "viscous": 0.2}
         ),
         "RigidStops": (rd.RigidStops, stops | {"restitution": 0.5}),
         "LineDamper": (rd.LineDamper, strut | {"damping": 0.1}),

@@ -92,10 +92,10 @@ def _traced(effect: Effect, values: Mapping[str, Array]) -> Effect:
             raise TraceError(f"effect {effect.name} comes and goes: ask plant.at(t), t in [s], or simulate the plant")
         return effect
     own: Any = with_values(effect, values)
+    if isinstance(effect, Drive):
+        return _TracedSetValuedDrive(own) if isinstance(effect, SetValued) else _TracedDrive(own)
     if isinstance(effect, SetValued):
         return _TracedSetValued(own)
-    if isinstance(effect, Drive):
-        return _TracedDrive(own)
     if isinstance(effect, Stateful):
         return _StatefulBound(own) if isinstance(effect, Bound) else _StatefulForce(own)
     if isinstance(effect, Bound):
@@ -187,8 +187,8 @@ class _States(_Part, Stateful):
     def start(self, dynamics: Any, q: Array, v: Array) -> Array:
         return self.inner.start(dynamics, q, v)
 
-    def state_rate(self, dynamics: Any, t: Any, q: Array, v: Array, u: Array, z: Array) -> Array:
-        return self.traced(lambda: self.inner.state_rate(dynamics, t, q, v, u, z), len(z))
+    def state_rate(self, dynamics: Any, t: Any, q: Array, v: Array, u: Array, z: Array, *a: Array) -> Array:
+        return self.traced(lambda: self.inner.state_rate(dynamics, t, q, v, u, z, *a), len(z))
 
 
 class _StatefulForce(_States, _TracedForce):
@@ -201,8 +201,26 @@ class _TracedDrive(_StatefulForce, Drive):
     def driven(self, n: int) -> Sequence[int]:
         return self.inner.driven(n)
 
+    @property
+    def coupled(self) -> bool:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """Whether its motors may move with their joints."""
+        return self.inner.coupled
+
     def speeds(self, z: Array) -> Array:
         return self.inner.speeds(z)
+
+    def reaching(self, u: Array) -> Array:
+        return self.inner.reaching(u)
+
+    def added_inertia(self, n: int) -> Array:
+        return self.inner.added_inertia(n)
+
+    def power(self, v: Array, u: Array, torque: Array, z: Array, a: Array) -> Array:
+        return self.inner.power(v, u, torque, z, a)
+
+
+class _TracedSetValuedDrive(_TracedDrive, _TracedSetValued):
+    """A drive with a mode."""
 
 
 class _StatefulBound(_States, _TracedBound):

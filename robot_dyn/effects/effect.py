@@ -166,9 +166,23 @@ class Drive(Stateful, Force, ABC):
     def driven(self, n: int) -> Sequence[int]:
         """Indices of the joints whose actuation it takes, on an arm of n joints."""
 
+    coupled: ClassVar[bool] = False  # whether its motors may move with their joints: its state_rate takes a, too
+
     @abstractmethod
     def speeds(self, z: Array) -> Array:
         """Velocities at which the actuation of these joints works, in the order of `driven`."""
+
+    def reaching(self, u: Array) -> Array:
+        """What of the actuation u, (..., n), acts on these joints; 0 unless it says otherwise."""
+        return 0 * u[..., list(self.driven(u.shape[-1]))]
+
+    def added_inertia(self, n: int) -> Array:
+        """Inertia of motors that move with these joints; 0 unless it says otherwise."""
+        return np.zeros(len(self.driven(n)))
+
+    def power(self, v: Array, u: Array, torque: Array, z: Array, a: Array) -> Array:
+        """Its power, at the velocity and acceleration of one state, the actuation, its torque and its states."""
+        return torque @ v - u[list(self.driven(len(v)))] @ self.speeds(z)
 
 
 class Bound(Effect, ABC):

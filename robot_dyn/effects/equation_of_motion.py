@@ -83,10 +83,10 @@ class EquationOfMotion:
         """What of the actuation u, (..., n), acts on joints: 0 where it acts on the motor of a drive."""
         if not self.drives:
             return u
-        direct = np.ones(self.dynamics.n)
+        made = u.copy()
         for drive in self.drives.values():
-            direct[list(drive.driven(self.dynamics.n))] = 0.0
-        return u * direct
+            made[..., list(drive.driven(self.dynamics.n))] = drive.reaching(u)
+        return made
 
     def torques(
         self, t: float, q: Array, v: Array, shape: tuple[int, ...] | None = None, z: Array | None = None
@@ -173,14 +173,19 @@ class EquationOfMotion:
             raise EffectError(f"{bound.name} does not fit an actuation of shape {np.shape(u)}: {error}") from None
 
     def state_rates(
-        self, t: float, q: Array, v: Array, u: Array, reached: Mapping[int, Array], z: Array
+        self, t: float, q: Array, v: Array, u: Array, reached: Mapping[int, Array], z: Array, a: Array | None = None
     ) -> list[tuple[slice, Array]]:
-        """ż of each effect with states, with its place, at the actuation u and what reaches each bound of it."""
-        return [
-            (place, call(effect.state_rate, self.dynamics, t, q, v, reached.get(k, u), z[place]))
-            for k, place in self.states.items()
-            if isinstance(effect := self.effects[k], Stateful)
-        ]
+        """ż of each effect with states, with its place, at the actuation u and what reaches each bound of it.
+
+        Motors that may move with their joints take the acceleration, 0 unless given.
+        """
+        a = 0 * v if a is None else a
+        made = []
+        for k, place in self.states.items():
+            effect: Any = self.effects[k]
+            more = (a,) if isinstance(effect, Drive) and effect.coupled else ()
+            made.append((place, call(effect.state_rate, self.dynamics, t, q, v, reached.get(k, u), z[place], *more)))
+        return made
 
     def N(self, q: Array, torque: Array) -> Array:
         """Every force but actuation, with the torque Σ τ_effect."""
@@ -214,9 +219,20 @@ class EquationOfMotion:
             held = (a == 0).astype(float)
         else:
             free = 1 - held
+            if any(drive.coupled for drive in self.drives.values()):
+                M = M + self._added_inertia()
             alone = M * (free[:, None] * free[None, :]) + held * np.eye(len(load))
             a = acceleration(alone, free * load, self.dynamics.joint_names)
         return a, held * (M @ a - load)
+
+    def _added_inertia(self) -> Array:
+        """The inertia of motors that move with their joints, (n, n)."""
+        n = self.dynamics.n
+        added = 0 * self.set_valued[0].held
+        for drive in self.drives.values():
+            if drive.coupled:
+                added[list(drive.driven(n))] = drive.added_inertia(n)
+        return added * np.eye(n)
 
     def in_a_step(self, q: Array, v: Array) -> tuple[Array, Array, Array, list[Array]]:
         """For a step of time stepping with the middle q: friction at most, bounds of v⁺, and the shares of effects.
@@ -269,12 +285,24 @@ class EquationOfMotion:
                 potential = potential + call(force.potential, self.dynamics, t, q)
         return self.dynamics.kinetic_energy(q, v), potential
 
-    def powers(self, v: Array, u: Array, torques: list[Array], z: Array) -> list[Array]:
-        """Power of the actuation, and of each force without a potential, at one state and states z of the effects."""
-        each = zip(self.forces, torques, strict=True)
-        powers = {force: torque @ v for force, torque in each if not isinstance(force, Conservative)}
-        control = self.on_joints(u) @ v
-        for k, drive in self.drives.items():
-            on_motors = u[list(drive.driven(self.dynamics.n))] @ drive.speeds(z[self.states[k]])
-            control, powers[drive] = control + on_motors, powers[drive] - on_motors
-        return [control, *powers.values()]
+    def powers(self, v: Array, u: Array, torques: list[Array], z: Array, a: Array) -> list[Array]:
+        """Power of the actuation, and of each force without a potential, at one state.
+
+        Args:
+            v: Velocity, (n,).
+            u: Actuation, (n,).
+            torques: Of each force, (n,).
+            z: States of the effects.
+            a: Acceleration, (n,), of which the motors of some drives have their share.
+        """
+        powers, speeds = [], v
+        places = {drive: self.states[k] for k, drive in self.drives.items()}
+        for force, torque in zip(self.forces, torques, strict=True):
+            if isinstance(force, Drive):
+                own = z[places[force]]
+                speeds = speeds.copy()
+                speeds[list(force.driven(len(v)))] = force.speeds(own)
+                powers.append(force.power(v, u, torque, own, a))
+            elif not isinstance(force, Conservative):
+                powers.append(torque @ v)
+        return [u @ speeds, *powers]

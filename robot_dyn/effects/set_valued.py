@@ -35,10 +35,12 @@ class Mode(NamedTuple):
     Attributes:
         held: 1 for each joint that is held, 0 for the others.
         direction: 1 or −1 for each joint that slides or is about to; 0 for those held, and those that nothing can hold.
+        contact: 1 or −1 where the motor of a joint rests at an end of its backlash, else 0; None for 0 everywhere.
     """
 
     held: np.ndarray
     direction: np.ndarray
+    contact: np.ndarray | None = None
 
 
 class SetValued(Dissipative):

@@ -16,6 +16,7 @@ from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFricti
 from robot_dyn.effects.joint_limit import JointStopDamper, JointStopSpring, joint_stops
 from robot_dyn.effects.line_spring_damper import LineSpringDamper
 from robot_dyn.effects.lugre import LuGreFriction
+from robot_dyn.effects.rigid_backlash import RigidBacklash
 from robot_dyn.effects.rigid_stops import RigidStops
 from robot_dyn.effects.series_elastic import SeriesElastic
 from robot_dyn.effects.spring import Spring
@@ -183,6 +184,7 @@ ACTING = (
     Wrench,
     Carried,
     declared_part("series_elastic", SeriesElastic),
+    declared_part("rigid_backlash", RigidBacklash),
     declared_part("effort_limit", EffortLimit),
     declared_part("actuator_lag", ActuatorLag),
 )  # fmt: skip

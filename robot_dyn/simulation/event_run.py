@@ -310,7 +310,7 @@ class EventRun(Followed):
         self.events = sorted([*self.events, *happened], key=lambda each: each.t)
         self._changes.append(t)
         if len(self._changes) == _ACCUMULATED and t - self._changes[0] <= _BRIEF * self.setup.duration_s:
-            self._accumulated(t, y, self.equation.plant.dynamics.joint_names[guard.joint])
+            self._accumulated(t, y, self.equation.plant.dynamics.joint_names[modes.joint(guard.joint)])
         self._watch_anew(t, held)
         if self.setup.integrator.needs_jacobian:
             self.control[At.NEXT] = 0.0

@@ -20,6 +20,7 @@ from robot_dyn.effects.effect import Conservative
 from robot_dyn.effects.rigid_stops import RigidStops
 from robot_dyn.effects.set_valued import Mode, settled
 from robot_dyn.simulation.event import Occurrence
+from robot_dyn.simulation.gaps import Coordinates, end_of_gap
 from robot_dyn.simulation.state_equation import StateEquation
 
 _ACCUMULATED = 1e-6  # [s] for all impacts that are still to come: what ends there has no effect beyond its square
@@ -32,7 +33,7 @@ class Guard(NamedTuple):
     """A quantity that ends a mode where it passes a level.
 
     Attributes:
-        joint: Its index.
+        joint: Its index among the coordinates: joints, then motors in a backlash.
         row: Entry of y, the rate of which it is if `rate`.
         level: The level, in the unit of q, v or λ.
         side: 1 where it must stay above, −1 where it must stay below.
@@ -54,54 +55,70 @@ class Modes:
         equation: Its state equation, of effects without a mode.
 
     Attributes:
-        mode: What is held now, and which way the others slide.
+        whole: What is held now, and which way the others slide, of all coordinates.
     """
 
     def __init__(self, equation: StateEquation) -> None:
         self.equation, self.effects = equation, equation.equation_of_motion.set_valued
         self.stops = tuple(each for each in self.effects if isinstance(each, RigidStops))
         self._n = n = equation.plant.dynamics.n
-        self.impulses = np.arange(2 * n + equation.states - n, 2 * n + equation.states)
-        self.mode = Mode(np.zeros(n), np.zeros(n))
+        self.of = Coordinates(equation)
+        self.laws, self.impulses = self.of.widened(self.effects), self.of.impulses
+        self.whole = Mode(np.zeros(len(self.of.joints)), np.zeros(len(self.of.joints)))
         self._impacts: list[float] = []  # times of the latest
         rubs = (each.at_rest(np.zeros(n)).most > 0 for each in self.effects if not isinstance(each, RigidStops))
-        self._rubs = sum(rubs, start=np.zeros(n, bool))  # what may stick where its velocity is 0
+        self._rubs = self.of.wide(sum(rubs, start=np.zeros(n, bool)), False)  # what may stick where its velocity is 0
 
     def start(self, y: np.ndarray) -> None:
         """The mode at the start: all that may be held is, until the reactions are known."""
-        q, v = y[: self._n], y[self._n : 2 * self._n]
-        least, most = self._intervals(q)
+        x, v = y[self.of.rows], y[self.of.speeds]
+        least, most = self._intervals(x)
         held = (v == 0) & ((least < 0) | (most > 0))
-        self.mode = Mode(held.astype(float), np.sign(v))
+        self.whole = Mode(held.astype(float), np.sign(v), self.of.contact(held, y.copy()))
+
+    @property
+    def mode(self) -> Mode:
+        """The mode of the joints."""
+        n, whole = self._n, self.whole
+        return Mode(whole.held[:n], whole.direction[:n], whole.contact)
+
+    def follow(self, before: Modes) -> None:
+        """Go on from the mode of the same effects on other bodies."""
+        self.whole, self._impacts = before.whole, before._impacts
 
     @property
     def key(self) -> bytes:
         """The mode in bytes."""
-        return self.mode.held.tobytes() + self.mode.direction.tobytes()
+        contact = b"" if self.whole.contact is None else self.whole.contact.tobytes()
+        return self.whole.held.tobytes() + self.whole.direction.tobytes() + contact
 
-    def _intervals(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        known = [each.at_rest(q) for each in self.effects]
+    def joint(self, coordinate: int) -> int:
+        """The joint of a coordinate."""
+        return int(self.of.joints[coordinate])
+
+    def _intervals(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        known = [each.at_rest(x) for each in self.laws]
         return sum(each.least for each in known), sum(each.most for each in known)  # pyright: ignore[reportReturnType]
 
     def guards(self, y: np.ndarray) -> list[Guard]:
         """What ends the mode at a state y."""
-        n, made = self._n, []
-        q, v = y[:n], y[n : 2 * n]
-        least, most = self._intervals(q)
-        for i in range(n):
-            if self.mode.held[i]:
-                row = int(self.impulses[i])
+        n, of, made = self._n, self.of, []
+        x, v, whole = y[of.rows], y[of.speeds], self.whole
+        least, most = self._intervals(x)
+        for i, (row, speed) in enumerate(zip(of.rows.tolist(), of.speeds.tolist(), strict=True)):
+            if whole.held[i]:
                 levels = ((float(least[i]), 1), (float(most[i]), -1))
-                made += [Guard(i, row, level, side, True) for level, side in levels if np.isfinite(level)]
+                made += [Guard(i, int(of.impulses[i]), at, side, True) for at, side in levels if np.isfinite(at)]
                 continue
-            if self.mode.direction[i] and (self._rubs[i] or v[i] == 0):
-                made.append(Guard(i, n + i, 0.0, int(self.mode.direction[i]), False))
-            for stops in self.stops:
-                for level, side in ((stops.lower, 1), (stops.upper, -1)):
-                    position = float(np.broadcast_to(level, n)[i])
-                    leaves = q[i] == position and v[i] == 0  # then its velocity is watched until it turns
+            if whole.direction[i] and (self._rubs[i] or v[i] == 0):
+                made.append(Guard(i, speed, 0.0, int(whole.direction[i]), False))
+            ends = [(stops.lower, stops.upper) for stops in self.stops] if i < n else [(-of.level, of.level)]
+            for both in ends:
+                for level, side in zip(both, (1, -1), strict=True):
+                    position = float(np.broadcast_to(level, n)[i] if i < n else level[i - n])
+                    leaves = x[i] == position and v[i] == 0  # then its velocity is watched until it turns
                     if np.isfinite(position) and not leaves:
-                        made.append(Guard(i, i, position, side, False))
+                        made.append(Guard(i, row, position, side, False))
         return made
 
     def after(
@@ -115,39 +132,43 @@ class Modes:
             held: The actuation in zero-order hold.
             guard: What passed its level; None at the start of a run.
         """
-        y, n, happened = y.copy(), self._n, []
+        y, n, of, happened = y.copy(), self._n, self.of, []
         q, v = y[:n], y[n : 2 * n]
         for stops in self.stops:
             q[:] = stops.snapped(q)
-        v[(np.abs(v) <= _STILL) & self._rubs] = 0.0
+        v[(np.abs(v) <= _STILL) & self._rubs[:n]] = 0.0
         forced: dict[int, int] = {}
         if guard is not None and guard.rate:
             forced[guard.joint] = guard.side
         elif guard is not None:
             y[guard.row] = guard.level
+        of.snap(y)
         y[self.impulses] = 0.0
-        before, M = self.mode, self.equation.plant.M(q)
-        for k, stops in enumerate(self.stops):
-            side = stops.touched(q)
-            if (side * v > 0).any():
-                happened += self._struck(t, y, held, M, k, side)
-        forced = {i: way for i, way in forced.items() if v[i] == 0}  # the impact may have thrown it the other way
-        self.mode = settled(self.effects, M, self._load(t, y, held), q, v, forced)[1]
+        before, M = self.whole, self.equation.plant.M(q)
+        for stops in self.stops or (None,) * bool(of.gaps):
+            side = of.wide(np.zeros(n, int) if stops is None else stops.touched(q), of.ends(y[of.rows]))
+            if (side * y[of.speeds] > 0).any():
+                happened += self._struck(t, y, held, M, stops, side)
+        forced = {i: way for i, way in forced.items() if y[of.speeds[i]] == 0}  # the impact may have thrown it back
+        found = settled(self.laws, *self._bodies(t, y, held, M), y[of.rows], y[of.speeds], forced)[1]
+        self.whole = found._replace(contact=of.contact(found.held, y))
         struck = {each.joint for each in happened}
-        others = [i for i, name in enumerate(self.equation.plant.dynamics.joint_names) if name not in struck]
+        names = self.equation.plant.dynamics.joint_names
+        others = [i for i, joint in enumerate(of.joints) if names[joint] not in struck]
         return y, happened + [each for i in others if (each := self._changed(i, before, t, y))]
 
     def _struck(
-        self, t: float, y: np.ndarray, held: Array | None, M: np.ndarray, k: int, side: np.ndarray
+        self, t: float, y: np.ndarray, held: Array | None, M: np.ndarray, stops: RigidStops | None, side: np.ndarray
     ) -> list[Occurrence]:
         """The impact, or the last of ever faster ones, its work in y."""
-        n, stops = self._n, self.stops[k]
-        before = y[n : 2 * n].copy()
-        strike = np.flatnonzero(side * before > 0)
-        e = np.broadcast_to(stops.restitution, n).astype(float)
-        y[n : 2 * n] = _impact(M, before, side, e, np.zeros(n, bool))
-        a = settled(self.effects, M, self._load(t, y, held), y[:n], y[n : 2 * n])[0]
-        v = y[n : 2 * n]
+        n, of = self._n, self.of
+        start, speeds = y.copy(), y[of.speeds]
+        strike = np.flatnonzero(side * speeds > 0)
+        e = of.wide(np.broadcast_to(0.0 if stops is None else stops.restitution, n).astype(float), of.restitution)
+        whole = self._bodies(t, y, held, M)[0]
+        of.take(y, _impact(whole, speeds, side, e, np.zeros(len(e), bool)))
+        a = settled(self.laws, *self._bodies(t, y, held, M), y[of.rows], y[of.speeds])[0]
+        v = y[of.speeds]
         returns = (side * a > 0) & (side * v < 0) & (e < 1)
         with np.errstate(divide="ignore", invalid="ignore"):
             left = np.where(returns, 2 * np.abs(v) / (np.abs(a) * (1 - e)), np.inf)
@@ -156,17 +177,23 @@ class Modes:
         if len(self._impacts) == _CROWDED and t - self._impacts[0] < _ACCUMULATED:  # as several stops in turn
             still |= (side != 0) & (2 * np.abs(v) <= np.abs(a) * _ACCUMULATED)
         last = [i for i in strike if still[i]]
-        if still.any():
-            y[n : 2 * n] = _impact(M, before, side, e, still)
-        v = y[n : 2 * n]
-        y[self._work(stops)] += (v + before) @ M @ (v - before) / 2
+        after = _impact(whole, speeds, side, e, still) if still.any() else v
+        y[:] = start
+        of_gaps = of.take(y, after)
+        if stops is not None:
+            v, before = y[n : 2 * n], start[n : 2 * n]
+            y[self._work(stops)] += (v + before) @ M @ (v - before) / 2 - of_gaps
         return [
             self._occurrence(
-                i, f"{'comes to rest at' if i in last else 'strikes'} its {_STOP[int(side[i])]}",
+                i, f"{'comes to rest at' if i in last else 'strikes'} {self._place(i, int(side[i]))}",
                 t + (float(left[i]) if left[i] < _ACCUMULATED else 0.0), y, int(side[i]),
             )
             for i in strike.tolist()
         ]  # fmt: skip
+
+    def _place(self, i: int, side: int) -> str:
+        """What a coordinate touches, in words."""
+        return f"its {_STOP[side]}" if i < self._n else end_of_gap(side)
 
     def _work(self, stops: RigidStops) -> int:
         """The entry of y that is the work of stops."""
@@ -174,30 +201,33 @@ class Modes:
         first = self.equation.size - len(self.equation.sources) + 1
         return first + next(i for i, each in enumerate(works) if each is stops)
 
-    def _load(self, t: float, y: np.ndarray, held: Array | None) -> np.ndarray:
-        """All torques but the reactions, less C v and ∂V/∂q."""
+    def _bodies(self, t: float, y: np.ndarray, held: Array | None, M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The mass matrix of all coordinates, and all torques but the reactions, less C v and ∂V/∂q."""
         equation, motion = self.equation, self.equation.equation_of_motion
         q, v, z, _ = equation.state(y)
         u = equation.actuation(t, q, v, z, held)
         total = sum(motion.torques(t, q, v, z=z[equation.state_size :]), start=motion.on_joints(u))
-        return total - equation.plant.dynamics.inverse_dynamics(q, v, 0 * v)
+        return self.of.bodies(M, total - equation.plant.dynamics.inverse_dynamics(q, v, 0 * v), u, y)
 
     def _changed(self, i: int, before: Mode, t: float, y: np.ndarray) -> Occurrence | None:
-        """What the change of the mode is for a joint, in words."""
-        touched = next((int(side) for each in self.stops if (side := each.touched(y[: self._n])[i])), 0)
-        was, held = before.held[i], self.mode.held[i]
-        way, direction = before.direction[i], self.mode.direction[i]
+        """What the change of the mode is for a coordinate, in words."""
+        if i < self._n:
+            touched = next((int(side) for each in self.stops if (side := each.touched(y[: self._n])[i])), 0)
+        else:
+            touched = int(self.of.ends(y[self.of.rows])[i - self._n])
+        was, held = before.held[i], self.whole.held[i]
+        way, direction = before.direction[i], self.whole.direction[i]
         if held and not was:
-            return self._occurrence(i, f"rests at its {_STOP[touched]}" if touched else "sticks", t, y, 0)
+            return self._occurrence(i, f"rests at {self._place(i, touched)}" if touched else "sticks", t, y, 0)
         if was and not held:
-            word = f"leaves its {_STOP[touched]}" if touched == -direction and touched else "slides"
+            word = f"leaves {self._place(i, touched)}" if touched == -direction and touched else "slides"
             return self._occurrence(i, word, t, y, int(direction))
-        if way * direction < 0 and y[self._n + i] == 0 and self._rubs[i]:
+        if way * direction < 0 and y[self.of.speeds[i]] == 0 and self._rubs[i]:
             return self._occurrence(i, "reverses", t, y, int(direction))
         return None
 
     def _occurrence(self, i: int, what: str, t: float, y: np.ndarray, direction: int) -> Occurrence:
-        n, joint = self._n, self.equation.plant.dynamics.joint_names[i]
+        n, joint = self._n, self.equation.plant.dynamics.joint_names[self.joint(i)]
         return Occurrence(t, f"{joint} {what}", direction, tuple(y[:n].tolist()), tuple(y[n : 2 * n].tolist()), joint)
 
 

@@ -230,14 +230,15 @@ class StateEquation:
         remembers = held is None and controller is not None and self.state_size > 0
         result[2 * n : end] = call(controller.state_rate, t, q, v, of_controller) if remembers and controller else 0.0
         rates = result[end : end + equation.state_size]
-        for place, rate in equation.state_rates(t, q, v, u, reached, of_effects):
+        a = result[n : 2 * n]
+        for place, rate in equation.state_rates(t, q, v, u, reached, of_effects, a):
             rates[place] = rate
-        result[W:] = self._powers(v, u, torques, of_effects)
+        result[W:] = self._powers(v, u, torques, of_effects, a)
         return result, u
 
-    def _powers(self, v: Array, u: Array, torques: list[Array], z: Array) -> list[Array]:
+    def _powers(self, v: Array, u: Array, torques: list[Array], z: Array, a: Array) -> list[Array]:
         """Of each source; those that work at once have none."""
-        powers = self.equation_of_motion.powers(v, u, torques, z)
+        powers = self.equation_of_motion.powers(v, u, torques, z, a)
         return powers + [0.0] * (len(self.sources) - len(powers))
 
     @cached_property
@@ -284,7 +285,7 @@ class StateEquation:
         """Power of the control and of the effects that work, in the order of `sources`."""
         equation = self.equation_of_motion
         own = z[self.state_size :]
-        return self._powers(v, u, equation.torques(t, q, v, z=own), own)
+        return self._powers(v, u, equation.torques(t, q, v, z=own), own, 0 * v)
 
 
 def numbered(*names: str) -> tuple[str, ...]:

@@ -61,7 +61,7 @@ class Switching:
         """The same of the equation with other bodies, in the mode that is known."""
         modes = None if self.modes is None else Modes(equation)
         if modes is not None and self.modes is not None:
-            modes.mode = self.modes.mode
+            modes.follow(self.modes)
         return Switching(equation, self.dropped, modes)
 
     @property

@@ -1,0 +1,144 @@
+"""Rigid backlash: a motor moves freely within a gap of its gear, and strikes and pushes its joint at both ends.
+
+    |δ| ≤ β,  δ = θ − q:   n² J θ̈ = u − b θ̇ within the gap;   δ̇⁺ = −e δ̇⁻ where an end is struck;   θ̈ = q̈ where it rests
+
+θ is the motor's angle behind the gear. An impact is that of the whole arm and its motors, by one convex problem.
+[Nordin, Gutman 2002; Brogliato, Nonsmooth Mechanics, 2016]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, final
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.coefficients import coefficient, with_values
+from robot_dyn.effects.effect import Drive
+from robot_dyn.effects.set_valued import Interval, Mode, SetValued
+from robot_dyn.errors import EffectError
+from robot_dyn.model.dynamics import Dynamics
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class RigidBacklash(Drive, SetValued):
+    """Joints that a motor drives through a rigid gear with a gap: |δ| ≤ β, δ = θ − q, and δ̇⁺ = −e δ̇⁻ at its ends.
+
+    A run starts in the middle of the gap, δ = 0, with motors that move with their joints. The actuation u of such a
+    joint is the torque of its motor behind the gear, n times that at the rotor. Steps end where an end of the gap is
+    struck or left. States are δ of each of these joints, then δ̇, θ̇ and the impulse of the contact in the latest step.
+
+    In the energy ledger the work of the control is done on the motors, which store ½ n² J θ̇². The rotors turn about
+    the axes of their joints alone: that they move with the arm is left out.
+
+    Attributes:
+        gap: β, to each side, a scalar or (n,), in [rad] or [m], not negative; joints of gap 0 are driven directly.
+        inertia: J of the rotor, in [kg m²], or [kg] for a prismatic joint, positive.
+        ratio: n of the gear; 1 unless given.
+        restitution: e, a scalar or (n,), 0 to 1; 0 unless given.
+        viscous: b of the motor behind the gear, in [N m s/rad] or [N s/m], not negative; 0 unless given.
+    """
+
+    gap: Any = field(metadata=coefficient("rad", symbol="β", least=0))
+    inertia: Any = field(metadata=coefficient("kg m²", symbol="J", above=0, elsewhere=1.0))
+    ratio: Any = field(default=None, metadata=coefficient(symbol="n", above=0, elsewhere=1.0))
+    restitution: Any = field(default=0.0, metadata=coefficient(symbol="e", least=0))
+    viscous: Any = field(default=None, metadata=coefficient("N m s/rad", symbol="b", least=0))
+
+    joints: tuple[int, ...] | None = field(default=None, init=False, repr=False)
+    held: Any = field(default=None, init=False, repr=False, metadata=coefficient(swept=False))
+    _contact: Any = field(default=None, init=False, repr=False, metadata=coefficient(swept=False))
+
+    coupled: ClassVar[bool] = True
+    term = "|δ| ≤ β, δ = θ − q, δ̇⁺ = −e δ̇⁻, n² J θ̈ = u − b θ̇ within"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if isinstance(self.restitution, float | np.ndarray) and np.any(np.greater(self.restitution, 1)):
+            raise EffectError(f"restitution must not be greater than 1, got {self.restitution}")
+
+    def on(self, dynamics: Any) -> RigidBacklash:
+        made: Any = super().on(dynamics)
+        driven = np.flatnonzero(np.broadcast_to(made.gap, dynamics.n) > 0)
+        if not len(driven):
+            raise EffectError("rigid_backlash: gap is 0 for all joints; give a positive one, or leave it out")
+        return with_values(made, {"joints": tuple(driven.tolist())})
+
+    @property
+    def _driven(self) -> list[int]:
+        if self.joints is None:
+            raise EffectError("rigid_backlash: its joints are known in a plant; ask that")
+        return list(self.joints)
+
+    def driven(self, n: int) -> Sequence[int]:
+        return self._driven
+
+    def speeds(self, z: Array) -> Array:
+        k = len(self._driven)
+        return z[2 * k : 3 * k]
+
+    def in_mode(self, mode: Mode) -> RigidBacklash:
+        contact = np.zeros_like(mode.held) if mode.contact is None else mode.contact
+        return with_values(self, {"held": mode.held, "_contact": contact})
+
+    def at_rest(self, q: np.ndarray) -> Interval:
+        return Interval(np.zeros_like(q), np.zeros_like(q))
+
+    def state_size(self, n: int) -> int:
+        return 4 * len(self._driven)
+
+    def start(self, dynamics: Dynamics, q: Array, v: Array) -> Array:
+        v = v[..., self._driven]
+        return np.concatenate([0 * v, 0 * v, v, 0 * v], axis=-1)
+
+    def of(self, name: str, n: int) -> Array:
+        """A coefficient of its joints, (k,)."""
+        return np.broadcast_to(getattr(self, name), (n,), subok=True)[self._driven]
+
+    def reflected(self, n: int) -> Array:
+        """The inertia of the motors behind the gear, n² J, (k,)."""
+        J = self.of("inertia", n)
+        return J if self.ratio is None else self.of("ratio", n) ** 2 * J
+
+    def drag(self, n: int, z: Array) -> Array:
+        """The friction b θ̇ of the motors, (k,)."""
+        return 0 * self.speeds(z) if self.viscous is None else self.of("viscous", n) * self.speeds(z)
+
+    def _touching(self, n: int) -> Array:
+        """1 for each of its joints whose motor rests at an end of the gap, else 0."""
+        return np.zeros(len(self._driven)) if self._contact is None else self.of("_contact", n) ** 2
+
+    def reaching(self, u: Array) -> Array:
+        return self._touching(u.shape[-1]) * u[..., self._driven]
+
+    def added_inertia(self, n: int) -> Array:
+        return self._touching(n) * self.reflected(n)
+
+    def state_rate(  # pyright: ignore[reportIncompatibleMethodOverride]  with the acceleration
+        self, dynamics: Dynamics, t: float, q: Array, v: Array, u: Array, z: Array, a: Array
+    ) -> Array:
+        n, k, touching = dynamics.n, len(self._driven), self._touching(dynamics.n)
+        inertia, a = self.reflected(n), a[self._driven]
+        torque = u[self._driven] - self.drag(n, z)
+        free = (1 - touching) * (torque / inertia)
+        relative = free - (1 - touching) * a
+        return np.concatenate([z[k : 2 * k], relative, free + touching * a, touching * (inertia * a - torque)])
+
+    def torque(  # pyright: ignore[reportIncompatibleMethodOverride]  with its states
+        self, dynamics: Dynamics, t: float, q: Array, v: Array, z: Array
+    ) -> Array:
+        made = 0 * v
+        if self.viscous is not None and self._contact is not None:
+            made[self._driven] = -self._touching(dynamics.n) * self.drag(dynamics.n, z)
+        return made
+
+    def power(self, v: Array, u: Array, torque: Array, z: Array, a: Array) -> Array:
+        n, d = len(v), self._driven
+        pushed = self._touching(n) * (u[d] - self.reflected(n) * a[d])
+        return torque @ v + pushed @ v[d] - u[d] @ self.speeds(z)
+
+    def stored_energy(self, dynamics: Dynamics, t: float, q: Array, z: Array) -> Array:
+        return (self.reflected(dynamics.n) * self.speeds(z) ** 2 / 2).sum(axis=-1)
