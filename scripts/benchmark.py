@@ -3,6 +3,7 @@
 Subjects: queries (Robot over bare Pinocchio), compiled (against Pinocchio's C++), rollouts (against MuJoCo),
 parameters (numbers as inputs of machine code over constants), growth (cost against the number of joints), iftomm
 (problems A01 and A05 of the IFToMM library of multibody benchmarks), stiff (joints with stiff dampers and springs),
+sticking (time stepping of dry friction and stops against the event-driven limit, beside MuJoCo),
 precision (time against error, all methods beside SciPy, MuJoCo, Drake and heyoka), energy (of a long run), estimates
 (of errors, beside true ones). What accuracy costs in other scenes: work_precision.py.
 """
@@ -12,14 +13,27 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from benchmarks import energy, estimates, growth, iftomm, kernels, parameters, precision, queries, rollouts, stiff
+from benchmarks import (
+    energy,
+    estimates,
+    growth,
+    iftomm,
+    kernels,
+    parameters,
+    precision,
+    queries,
+    rollouts,
+    sticking,
+    stiff,
+)
 from benchmarks.measure import Effort
 
 from robot_dyn.accuracy.environment import environment
 
 PICTURES = Path(__file__).parents[1] / "docs" / "pictures"
 SUBJECTS = (
-    "queries", "compiled", "rollouts", "parameters", "growth", "iftomm", "stiff", "precision", "energy", "estimates",
+    "queries", "compiled", "rollouts", "parameters", "growth", "iftomm", "stiff", "sticking", "precision", "energy",
+    "estimates",
 )  # fmt: skip
 
 
@@ -46,7 +60,6 @@ def main() -> None:
         rollouts.one_step(effort)
         rollouts.thousands(effort)
         rollouts.sticking(effort)
-        rollouts.sticking(effort)
     if "parameters" in what:
         parameters.parameters(effort)
     if "growth" in what:
@@ -56,6 +69,8 @@ def main() -> None:
         iftomm.iftomm(effort)
     if "stiff" in what:
         stiff.stiff(effort)
+    if "sticking" in what:
+        sticking.sticking(effort)
     if "precision" in what:
         precision.precision(effort, None if options.quick else PICTURES / "precision.png")
     if "energy" in what:
