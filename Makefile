@@ -11,8 +11,9 @@ demo: .venv/installed
 test: .venv/installed
 	$(BIN)/python -m pytest -n auto
 
-# what takes long: error estimates on 600 random scenes of a fixed seed, and of the seed of the day
+# what takes long: the long forms of hard cases; error estimates on 600 random scenes of a fixed seed, and of the seed of the day
 stress: .venv/installed
+	$(BIN)/python -m pytest -n auto -m stress
 	$(BIN)/python -m tests.estimates --scenes 600 --seed 1
 	$(BIN)/python -m tests.estimates --scenes 600 --seed $$(date +%Y%m%d)
 
