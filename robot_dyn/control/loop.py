@@ -21,9 +21,10 @@ from robot_dyn.arithmetic import Array
 from robot_dyn.coefficients import declared, with_values
 from robot_dyn.control.block import Block
 from robot_dyn.control.controller import Controller, Nested
-from robot_dyn.control.delay import Instant, delay, instants, shifted
+from robot_dyn.control.delay import Instant, delay, instants
 from robot_dyn.control.differences import Differences
 from robot_dyn.control.nested import check_sampled, nested
+from robot_dyn.control.tick import tick
 from robot_dyn.errors import ControlError, shown
 from robot_dyn.validate import integer
 
@@ -77,10 +78,10 @@ class Loop(Controller):
             object.__setattr__(self, name, integer(name, getattr(self, name), most=2**63 - 1, error=ControlError))
         super().__post_init__()
         self._check_blocks(self.period_s)
-        self._places  # noqa: B018  # while the controller in it has numbers: a trace puts symbols in their place
+        self.places  # noqa: B018  # while the controller in it has numbers: a trace puts symbols in their place
 
     def _check_blocks(self, period_s: float) -> None:
-        for line, i, block in self._all:
+        for line, i, block in self.blocks:
             if isinstance(block, Differences) and (line, i) != ("velocity", 0):
                 raise ControlError(f"{line}: Differences may only be the first block of velocity; move it there")
             for name, each in declared(type(block)).items():
@@ -90,7 +91,7 @@ class Loop(Controller):
             block.check(period_s)
 
     @property
-    def _all(self) -> Iterator[tuple[str, int, Block]]:
+    def blocks(self) -> Iterator[tuple[str, int, Block]]:
         """Line, number and block of each."""
         return ((line, i, block) for line in LINES for i, block in enumerate(getattr(self, line)))
 
@@ -123,15 +124,15 @@ class Loop(Controller):
 
     @property
     def instants(self) -> tuple[float, ...]:
-        return tuple(each.part for each in self._instants)
+        return tuple(each.part for each in self.ticks)
 
     @property
     def acting_instant(self) -> int:
-        return next(i for i, each in enumerate(self._instants) if each.acts)
+        return next(i for i, each in enumerate(self.ticks) if each.acts)
 
     @property
     def deviates(self) -> int:
-        return self.n * sum(block.random for _, _, block in self._all)
+        return sum(block.state_size(self.n) for _, _, block in self.blocks if block.random)
 
     @property
     def noise_key(self) -> tuple[int, int]:
@@ -142,112 +143,45 @@ class Loop(Controller):
 
     @property
     def state_size(self) -> int:
-        return max((each.stop for each in self._places.values()), default=0)
+        return max((each.stop for each in self.places.values()), default=0)
 
     @cached_property
-    def _instants(self) -> tuple[Instant, ...]:
+    def ticks(self) -> tuple[Instant, ...]:
         """In each period, the first at its start."""
         return instants(self.measurement_delay, self.actuation_delay)
 
     @property
-    def _differs(self) -> bool:
+    def differs(self) -> bool:
         """Whether the velocity is that of differences."""
         return bool(self.velocity) and isinstance(self.velocity[0], Differences)
 
     @cached_property
-    def _places(self) -> dict[str, slice]:
+    def places(self) -> dict[str, slice]:
         """Where z has what."""
-        n, several = self.n, len(self._instants) > 1
-        measured = n if self._differs else 2 * n
+        n, several = self.n, len(self.ticks) > 1
+        measured = n if self.differs else 2 * n
         whole = int(self.measurement_delay), int(self.actuation_delay)
-        blocks = {f"{line}.{i}": block for line, i, block in self._all}
+        named = {f"{line}.{i}": block for line, i, block in self.blocks}
         sizes = {"controller": self.controller.state_size, "instant": several, "begun": 0}
         sizes["sample"] = measured * (self.measurement_delay % 1.0 > 0)
         sizes["past"] = measured * whole[0]
-        sizes |= {name: block.state_size(n) for name, block in blocks.items() if not block.random}
+        sizes |= {name: block.state_size(n) for name, block in named.items() if not block.random}
         sizes["begun"] = any(sizes[name] for name in sizes if name not in ("controller", "instant"))
         sizes["coming"] = n * whole[1]
         sizes["computed"] = n * (self.actuation_delay % 1.0 > 0)
         sizes["acting"] = n * several
-        sizes |= {name: block.state_size(n) for name, block in blocks.items() if block.random}
+        sizes |= {name: block.state_size(n) for name, block in named.items() if block.random}
         ends = np.cumsum([0, *sizes.values()]).tolist()
         return {name: slice(a, b) for name, a, b in zip(sizes, ends, ends[1:], strict=False)}
 
     def torque(self, t: float, q: Array, v: Array, z: Array) -> Array:
-        return self._tick(t, q, v, z)[0]
+        return tick(self, t, q, v, z)[0]
 
     def state_rate(self, t: float, q: Array, v: Array, z: Array) -> Array:
         return 0 * z
 
     def next_state(self, t: float, q: Array, v: Array, z: Array) -> Array:
-        return self._tick(t, q, v, z)[1]
-
-    def _tick(self, t: float, q: Array, v: Array, z: Array) -> tuple[Array, Array]:
-        """The torque that acts from a tick on, and z⁺."""
-        i, begun = self._coming(z), z[self._places["begun"]]
-        if len(begun) and begun[0] < 0.5:
-            z = self._at_rest(q, v, z)
-        at, fresh = self._instants[i], q if self._differs else np.concatenate([q, v])
-        made = {name: z[place] for name, place in self._places.items()}
-        made["begun"] = np.ones(len(begun))
-        u = made["acting"]
-        if at.computes:
-            u = self._computed(t, fresh, made)
-            if self.actuation_delay % 1.0:
-                u, made["computed"] = made["acting"], u
-        elif at.acts:
-            u = made["computed"]
-        if at.measures and not at.computes:
-            made["sample"] = fresh
-        if len(self._instants) > 1:
-            made["acting"], made["instant"] = u, np.array([(i + 1.0) % len(self._instants)])
-        return u, np.concatenate([*made.values()])
-
-    def _coming(self, z: Array) -> int:
-        """Number of the instant of this tick, which z counts where there are several."""
-        i = 0
-        while i < len(self._instants) - 1 and z[self._places["instant"]][0] > i + 0.5:
-            i += 1
-        return i
-
-    def _computed(self, t: float, fresh: Array, made: dict[str, Array]) -> Array:
-        """What the torque is to be that the whole periods of its delay let through; the states in `made` go on."""
-        newest = made["sample"] if len(made["sample"]) else fresh
-        measured, made["past"] = shifted(newest, made["past"])
-        q = self._through("position", measured[: self.n], made)
-        v = self._through("velocity", q if self._differs else measured[self.n :], made)
-        z = made["controller"]
-        u = self._through("actuation", self.controller.torque(t, q, v, z), made)
-        made["controller"] = self.controller.next_state(t, q, v, z)
-        u, made["coming"] = shifted(u, made["coming"])
-        return u
-
-    def _through(self, line: str, x: Array, made: dict[str, Array]) -> Array:
-        """The signal behind the blocks of a line, whose states go on."""
-        for i, block in enumerate(getattr(self, line)):
-            s, name = made[f"{line}.{i}"], f"{line}.{i}"
-            if not block.random:
-                made[name] = block.next_state(x, s, self.period_s)
-            x = block.output(x, s, self.period_s)
-        return x
-
-    def _at_rest(self, q: Array, v: Array, z: Array) -> Array:
-        """The states of a loop in which q and v have been measured at all times, and no torque was asked for."""
-        made = {name: z[place] for name, place in self._places.items()}
-        fresh = q if self._differs else np.concatenate([q, v])
-        for name in ("sample", "past"):
-            made[name] = np.concatenate([fresh] * (len(made[name]) // len(fresh)) or [fresh[:0]])
-        signals = {"position": q, "velocity": v, "actuation": 0 * q}
-        for line, i, block in self._all:
-            if line == "velocity" and i == 0 and self._differs:
-                signals[line] = signals["position"]
-            x, name = signals[line], f"{line}.{i}"
-            if not block.random:
-                made[name] = block.start(x, self.period_s)
-            elif line == "actuation":
-                continue  # no torque, no noise
-            signals[line] = block.output(x, made[name], self.period_s)
-        return np.concatenate([*made.values()])
+        return tick(self, t, q, v, z)[1]
 
     def at_period(self, period_s: float) -> Controller:
         inside = self.controller.at_period(period_s)
