@@ -13,6 +13,7 @@ import robot_dyn as rd
 from robot_dyn.errors import QueryError, RobotDynError, SceneError
 from robot_dyn.simulation.accuracy import AccuracyError
 from tests.estimates.asked import FAMILIES, asked_scene
+from tests.estimates.held import meet
 from tests.estimates.truth import truth
 
 ARM = rd.load("planar_2r")
@@ -29,6 +30,14 @@ def test_the_error_is_at_most_what_is_asked(index: int) -> None:
     assert run.accuracy.asked == asked
     assert run.accuracy.estimated <= asked
     assert np.abs(run.q - truth(setup, run.t)).max() <= asked
+
+
+@pytest.mark.parametrize("index", [0, 1, 6, 9])
+def test_the_error_is_at_most_what_is_asked_where_joints_stick_and_strike(index: int) -> None:
+    """Of random dry friction and rigid stops; more of them by `python -m tests.estimates --held`."""
+    found = meet(1, index)
+    assert found.met, str(found)
+    assert found.estimated <= found.asked
 
 
 def test_a_tolerance_is_not_the_error() -> None:

@@ -1,4 +1,7 @@
-"""`python -m tests.estimates --scenes 600 --seed 1`: judge error estimates; exit code 1 if one misleads."""
+"""`python -m tests.estimates --scenes 600 --seed 1`: judge error estimates; exit code 1 if one misleads.
+
+With `--held`: scenes of dry friction and rigid stops with an accuracy that is asked for; exit code 1 if one is missed.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,8 @@ import sys
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
 
+from robot_dyn.simulation.accuracy import AccuracyError
+from tests.estimates.held import FAMILIES, meet
 from tests.estimates.judge import LEAST, MOST, judge
 
 
@@ -26,7 +31,10 @@ def main() -> int:
     parser.add_argument("--scenes", type=int, default=600)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--show", action="store_true", help="print every scene")
+    parser.add_argument("--held", action="store_true", help="scenes of dry friction and rigid stops")
     options = parser.parse_args()
+    if options.held:
+        return _held(options.scenes, options.seed, options.show)
     with ProcessPoolExecutor(2) as pool:
         found = list(pool.map(one, [(options.seed, i) for i in range(options.scenes)], chunksize=4))
     for each in found:
@@ -41,6 +49,28 @@ def main() -> int:
     misleading = sum(each["misleads"] for each in found)
     print(f"seed {options.seed}: {misleading} of {len(found)} mislead")
     return int(misleading > 0)
+
+
+def ask(task: tuple[int, int]) -> tuple[str, bool | None, str]:
+    """The family of a scene with an accuracy that is asked for, whether it was met, None if refused, and the words."""
+    family = FAMILIES[task[1] % 2]
+    try:
+        found = meet(*task)
+    except AccuracyError as error:
+        return family, None, f"{task[0]}/{task[1]} {family}: refused, {error}"
+    return family, found.met, str(found)
+
+
+def _held(scenes: int, seed: int, show: bool) -> int:
+    with ProcessPoolExecutor(2) as pool:
+        found = list(pool.map(ask, [(seed, i) for i in range(scenes)], chunksize=2))
+    for _, met, text in found:
+        if show or not met:
+            print("MISSED  " if met is False else "        ", text)
+    for family in FAMILIES:
+        those = [met for of, met, _ in found if of == family]
+        print(f"{family:9s} met {those.count(True)}, missed {those.count(False)}, refused {those.count(None)}")
+    return int(any(met is False for _, met, _ in found))
 
 
 if __name__ == "__main__":

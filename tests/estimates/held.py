@@ -1,0 +1,81 @@
+"""Random scenes with dry friction and rigid stops, and an accuracy that is asked for; how it is met."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+import robot_dyn as rd
+from tests.estimates.scenes import Scene, arms
+
+FAMILIES = ("rigid", "dry")
+_FINEST = rd.Adaptive("DOP853", 3e-14, 1e-15)
+
+
+@dataclass(frozen=True)
+class Met:
+    """What came of a scene: the error that was asked for, estimated and true, and how far two truths are apart."""
+
+    label: str
+    asked: float
+    estimated: float
+    true: float
+    unsure: float
+
+    @property
+    def met(self) -> bool:
+        return self.true - self.unsure <= self.asked
+
+    def __str__(self) -> str:
+        numbers = (f"{name} {getattr(self, name):.1e}" for name in ("asked", "estimated", "true", "unsure"))
+        return f"{self.label}: {', '.join(numbers)}"
+
+
+def held_scene(seed: int, index: int) -> tuple[Scene, float]:
+    """Scene number `index` of a seed, its method to be chosen, and what is asked: 1e-10 to 1e-3."""
+    rng, family = np.random.default_rng([seed, index, 14]), FAMILIES[index % 2]
+    name = str(rng.choice(["rail", "pendulum", "planar_2r", "cart_pole"]))
+    arm = arms()[name]
+    n, q, v = arm.n, *rng.uniform(-1, 1, (2, arm.n))
+    scale, duration = np.diag(arm.M(q)), float(np.round(rng.uniform(0.3, 1.2), 3))
+    effects: list[rd.Effect] = [rd.ViscousFriction(scale * rng.uniform(0.1, 1, n))]
+    if rng.random() < 0.5:
+        effects.append(rd.Spring(scale * rng.uniform(1, 30, n), rng.uniform(-1, 1, n)))
+    if family == "dry" or rng.random() < 0.4:
+        effects.append(_friction(rng, scale * rng.uniform(0.3, 8, n)))
+    if family == "rigid":
+        lower, upper = q - rng.uniform(0.05, 0.6, n), q + rng.uniform(0.05, 0.6, n)
+        effects.append(rd.RigidStops(lower, upper, rng.uniform(0, 0.9, n) * (rng.random(n) < 0.7)))
+    drive = None
+    if rng.random() < 0.5:
+        gains = scale * rng.uniform(5, 60, n), scale * rng.uniform(0.3, 3, n)
+        drive = rd.PD(rd.hold(q + rng.uniform(-0.5, 0.5, n)), *gains)
+    setup = rd.Setup(rd.Plant(arm, effects), q, v, duration, drive, record_period_s=duration / 20)
+    return Scene(family, setup, f"{seed}/{index} {family} {name} T={duration:g}"), float(10 ** rng.uniform(-10, -3))
+
+
+def _friction(rng: np.random.Generator, level: np.ndarray) -> rd.Effect:
+    """Of one level, of two, or by Stribeck's curve."""
+    kind = rng.random()
+    if kind < 0.5:
+        return rd.DryFriction(level)
+    if kind < 0.8:
+        return rd.DryFriction(level, level * rng.uniform(1, 1.5, len(level)))
+    return rd.DryFriction(level, level * 1.3, 0.2)
+
+
+def meet(seed: int, index: int) -> Met:
+    """Ask for the accuracy of a scene; AccuracyError if it is refused.
+
+    The truth is DOP853 near rounding, and its witness order 8 at steps of a fixed length: both cut at the same events,
+    which closed forms in test_dry_friction and test_rigid_stops hold to.
+    """
+    scene, asked = held_scene(seed, index)
+    run = rd.simulate(scene.setup, accuracy=asked)
+    assert run.accuracy is not None
+    own = replace(scene.setup, estimate_error=False)
+    exact = rd.simulate(replace(own, integrator=_FINEST))
+    other = rd.simulate(replace(own, integrator="order_8", step_s=own.duration_s / 400))
+    true, unsure = (float(np.abs(x.q - exact.q).max()) for x in (run, other))
+    return Met(scene.label, asked, run.accuracy.estimated, true, unsure)
