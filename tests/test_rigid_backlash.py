@@ -172,6 +172,21 @@ def test_a_motor_that_rests_at_an_end_is_an_armature(engine: str) -> None:
     np.testing.assert_allclose(run.a[-1], rest.a[-1], atol=1e-8)
 
 
+@BOTH
+def test_a_payload_that_a_pushed_joint_picks_up_is_an_impact_of_its_motor_too(engine: str) -> None:
+    """With the motor at an end, e = 0: (m + B + M) v⁺ = (m + B) v⁻; the slider, its motor and the ledger, 1e-12."""
+    force, M, at = 1.3, 0.9, 0.5
+    body = rd.CarriedPayload(rd.Payload("cart", M), at)
+    run = slide(0.0, engine, force, (body,))
+    whole = MASS + REFLECTED
+    speed = force * at / whole
+    after = whole * speed / (whole + M) + force * (run.t[-1] - at) / (whole + M)
+    assert run.v[-1, 0] == pytest.approx(after, abs=1e-12)
+    np.testing.assert_allclose(run.effect_states["rigid_backlash"][-1, :3], [GAP, 0.0, run.v[-1, 0]], atol=1e-13)
+    assert np.abs(run.ledger.residual).max() < 1e-12
+    assert next(each.name for each in run.events if each.t >= at) == "payload on cart picked up at rest"
+
+
 def test_what_is_not_supported_is_refused_by_name() -> None:
     plant = rd.Plant(ARM, [rd.RigidBacklash(0.01, 0.1)])
     for method in ("gauss_4", "time_stepping"):
@@ -179,6 +194,8 @@ def test_what_is_not_supported_is_refused_by_name() -> None:
             rd.Setup(plant, Q, integrator=method)
     with pytest.raises(QueryError, match="rollouts: rigid_backlash holds joints"):
         rd.rollouts(plant, q0=[Q, Q], duration_s=0.1, integrator="rk4")
+    with pytest.raises(QueryError, match="advise: rigid_backlash frees and couples motors by turns"):
+        rd.advise(plant, Q)
     with pytest.raises(EffectError, match="rigid_backlash: gap is 0 for all joints"):
         rd.Plant(ARM, [rd.RigidBacklash(0.0, 0.1)])
     with pytest.raises(EffectError, match="restitution must not be greater than 1"):

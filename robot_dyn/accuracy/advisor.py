@@ -123,6 +123,8 @@ def advise(what: Setup | Plant | Dynamics, q0: Any = None, v0: Any = None, **opt
     plant, controller, duration = setup.plant, setup.controller, setup.duration_s
     if plant.equation_of_motion.payloads:
         raise QueryError("advise: carried_payload changes the bodies in the run; ask of plant.at(t), t in [s]")
+    if coupled := [x.name for x in plant.equation_of_motion.drives.values() if x.coupled]:
+        raise QueryError(f"advise: {coupled[0]} frees and couples motors by turns, and no one linearisation holds")
     period = 0.0 if controller is None else controller.period_s
     loop = StateEquation(plant, None if controller is None else controller.at_period(0.0)).in_a_mode
     states = _along(setup, loop)

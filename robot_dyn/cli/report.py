@@ -111,7 +111,7 @@ def why(plant: Plant, answer: Document, joint: str) -> Document:
 
 def _holding(plant: Plant) -> list[str]:
     """Names of the effects that may hold joints."""
-    return [each.name for each in plant.equation_of_motion.set_valued]
+    return [each.name for each in plant.equation_of_motion.set_valued if each.rubs or each.stops]
 
 
 def _names(plant: Plant) -> tuple[str, ...]:

@@ -323,6 +323,7 @@ class EventRun(Followed):
         self.equation = self.watch.equation = self.transfers.equation
         self.switching = self.switching.of(self.equation)
         if (modes := self.switching.modes) is not None:
+            modes.of.part(y)
             y, more = modes.after(t, y, held, None)
             happened += more
         self.runs.y[:, 0] = y

@@ -105,6 +105,10 @@ class Coordinates:
         np.add.at(y, self._works, works)
         return float(works.sum())
 
+    def part(self, y: np.ndarray) -> None:
+        """Let motors keep their speeds where the velocities of their joints have jumped, in y."""
+        y[self.speeds[self._n :]] = y[self._motors] - y[self.speeds[: self._n]][self._own]
+
     def contact(self, held: np.ndarray, y: np.ndarray) -> np.ndarray | None:
         """The ends at which motors rest, by joint; None without gaps. Motors there move with their joints in y."""
         if not self.gaps:
