@@ -80,7 +80,7 @@ def test_several_faults_are_told_together() -> None:
 def test_what_is_no_urdf_is_a_finding(text: bytes) -> None:
     made = checked(text, "x.urdf")
     assert not made.loads
-    assert [each.kind for each in made.findings] == ["refused"]
+    assert [(each.kind, each.where) for each in made.findings] == [("refused", "file")]
 
 
 def test_known_files_of_the_catalog() -> None:

@@ -121,8 +121,8 @@ def _loaded(document: Document, found: list[Finding]) -> Robot | None:
 
 def _of_refusal(source: str, message: str) -> Finding:
     where, _, rest = message.removeprefix(f"{source}: ").partition(": ")
-    if not rest:
-        where, rest = "file", where
+    if not rest or not where.startswith(("link ", "joint ", "line ", "<")):
+        where, rest = "file", message.removeprefix(f"{source}: ")
     what, _, remedy = rest.rpartition("; ")
     return Finding(Severity.ERROR, "refused", where, what or remedy, remedy if what else "correct the file")
 

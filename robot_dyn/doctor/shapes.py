@@ -134,7 +134,8 @@ def _inertia(name: str, link: StatedLink, shape: Shape, inertial: Any) -> Findin
         if factor / _WITHIN < ratio < factor * _WITHIN:
             suspected, inertia = f": {unit} is suspected", inertial.find("inertia")
             power = -round(np.log10(factor))
-            changes = tuple(Change(inertia, key, _scaled(inertia.get(key), power)) for key in _MOMENTS)
+            moments = {key: inertia.get(key) for key in _MOMENTS}
+            changes = tuple(Change(inertia, key, _scaled(x, power)) for key, x in moments.items() if float(x))
     return Finding(
         Severity.ERROR, "inertia_shape", f"link {name!r}",
         f"its inertia is that of {link.mass:g} kg at {np.sqrt(half / link.mass):.3g} m and more from the centre of"
