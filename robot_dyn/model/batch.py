@@ -6,6 +6,7 @@ A batch is asked for as a whole. Only if it is refused is it halved until the st
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 
 import numpy as np
 
@@ -70,7 +71,23 @@ def answered(
         rows = [np.broadcast_to(x, (*batch, x.shape[-1])).reshape(-1, x.shape[-1]) for x in arrays.values()]
         result = np.full((len(rows[0]), *shape), arithmetic.number("nan"), dtype=arithmetic.dtype)
         _halved(attempt, rows, result, 0, len(result), batch, errors)
+        _at_once(attempt, rows, result, arithmetic)
     return result.reshape(*batch, *shape)
+
+
+def _at_once(attempt: Callable[..., Array], rows: list[Array], result: Array, arithmetic: Arithmetic) -> None:
+    """Answer the states that have an answer in one batch, another state in place of those that have none.
+
+    So they are what they would be beside any other states, to the last bit: a kernel may round a part of a batch, or
+    one state, in another way.
+    """
+    answers = arithmetic.finite(result).reshape(len(result), -1).all(axis=1)
+    if not answers.any():
+        return
+    some = int(np.argmax(answers))
+    with suppress(*_REFUSALS, DoubtError):  # a doubt about the batch as a whole
+        whole = attempt(*(np.where(answers[:, None], x, x[some]) for x in rows))
+        result[answers] = whole[answers]
 
 
 def _halved(
