@@ -81,7 +81,7 @@ def _at_once(attempt: Callable[..., Array], rows: list[Array], result: Array, ar
     So they are what they would be beside any other states, to the last bit: a kernel may round a part of a batch, or
     one state, in another way.
     """
-    answers = arithmetic.finite(result).reshape(len(result), -1).all(axis=1)
+    answers: np.ndarray = np.all(arithmetic.finite(result).reshape(len(result), -1), axis=1)
     if not answers.any():
         return
     some = int(np.argmax(answers))
