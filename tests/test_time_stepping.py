@@ -166,20 +166,19 @@ def test_a_step_solves_problems_that_newtons_method_does_not() -> None:
     rng, n, runs = np.random.default_rng(10), 3, 300
     given = [each for k in range(4000) if len((each := problem(rng, k % 2 == 1))[1]) == n][:runs]
     rows, stepper = problem_rows(n), TimeStepping().stepper(None, 2 * n + 1, n, 3 * n + 1, runs)
-    y, after, lost = np.zeros((2 * n + 1, runs)), np.zeros((2 * n + 1, runs)), np.zeros(runs, np.int64)
+    m, lost = 2 * n + 1, np.zeros(runs, np.int64)
+    y, after = np.zeros((m, runs)), np.zeros((m, runs))
 
-    def stated(t, x, p, own, out):
+    def gave_up(t, x, p, own, out):
+        out[m + rows.changed] = 1.0
         for b, (M, *vectors) in enumerate(given):
-            out[: rows.p - rows.M, b] = M[np.triu_indices(n)]
-            out[rows.p - rows.M : rows.u - rows.M, b] = np.concatenate(vectors)
-
-    def gave_up(t, known, p, place, out):
-        out[:], out[2 * n] = np.nan, 1.0
+            out[m + rows.M : m + rows.p, b] = M[np.triu_indices(n)]
+            out[m + rows.p : m + rows.u, b] = np.concatenate(vectors)
 
     def told(t, x, p, found, out):
         copy(out[:n], found[:n])
 
-    functions = RightSide(None, 0, stated, gave_up, told)
+    functions = RightSide(None, 0, gave_up, told)
     stepper.step(functions, rows, 0.0, 1e-3, y, np.zeros(0), np.zeros((0, runs)), after, stepper.work, lost)
     assert (lost == 0).all()
     for b, each in enumerate(given):

@@ -57,16 +57,16 @@ class Work(NamedTuple):
 
     Attributes:
         K: v and u of the latest step, where a rate has them, (1, r, W).
-        y: The state and, in its last row, the step, (m + 1, W).
-        problem: Rows as of `Problem`, (R, W).
-        solved: Those of v⁺ and its places, (2n + 1, W).
+        y: The state, the step, and the places of v⁺ after the step before, (m + 1 + n, W).
+        made: y⁺, then rows as of `Problem`, (m + R, W).
+        again: y⁺ of runs that are solved alone, (m, W).
         M, one, room: For the problem of one run, (n, n), (6, n) and (n + 1, n).
     """
 
     K: Array
     y: Array
-    problem: Array
-    solved: Array
+    made: Array
+    again: Array
     M: Array
     one: Array
     room: Array
@@ -76,35 +76,42 @@ def time_step(
     f: RightSide, rows: Problem, t: Any, h: Any, y: Array, p: Array, own: Array, after: Array, work: Work, lost: Array
 ) -> int:  # fmt: skip
     """A step; arguments as of `Stepper`. The places of the step before are where the solution starts."""
-    n, m = len(work.M), len(y)
+    n, m, made = len(work.M), len(y), work.made
     copy(work.y[:m], y)
     for b in range(y.shape[1]):
         work.y[m, b], lost[b] = h, 0
-    evaluate(f.problem, t + h / 2, work.y, p, own, work.problem[rows.M :])
-    evaluate(f.newton, t, work.problem[rows.M :], p, work.problem[n : 2 * n], work.solved)
-    copy(work.problem[: rows.M], work.solved)
+    evaluate(f.step, t + h / 2, work.y, p, own, made)
+    copy(after, made[:m])
+    alone = False
     for b in range(y.shape[1]):
-        if work.problem[rows.changed, b] > 0.0 and not solved_alone(rows, work, b):
-            lost[b] = 1
-    evaluate(f.behind, t, work.y, p, work.problem, after)
+        if made[m + rows.changed, b] > 0.0:
+            alone = True
+            lost[b] = 0 if solved_alone(rows, work, made[m:], b) else 1
+    if alone:
+        evaluate(f.behind, t, work.y[: m + 1], p, made[m:], work.again)
+        for b in range(y.shape[1]):
+            if made[m + rows.changed, b] > 0.0:
+                for e in range(m):
+                    after[e, b] = work.again[e, b]
+    copy(work.y[m + 1 :], made[m + n : m + 2 * n])
     copy(work.K[0, :n], y[n : 2 * n])
-    copy(work.K[0, m : m + n], work.problem[rows.u : rows.u + n])
+    copy(work.K[0, m : m + n], made[m + rows.u : m + rows.u + n])
     return 1
 
 
-def solved_alone(rows: Problem, work: Work, b: int) -> bool:
+def solved_alone(rows: Problem, work: Work, known: Array, b: int) -> bool:
     """The problem of run b by the active set, where Newton's method cycles."""
     n, k, one = len(work.M), rows.M, work.one
     for i in range(n):
         for j in range(i, n):
-            work.M[i, j] = work.M[j, i] = work.problem[k, b]
+            work.M[i, j] = work.M[j, i] = known[k, b]
             k += 1
     for i in range(n):
         for row in range(4):
-            one[row, i] = work.problem[rows.p + row * n + i, b]
+            one[row, i] = known[rows.p + row * n + i, b]
     found = active_set(work.M, one[0], one[1], one[2], one[3], one[4], one[5], work.room)
     for i in range(n):
-        work.problem[i, b], work.problem[n + i, b] = one[4, i], one[5, i]
+        known[i, b], known[n + i, b] = one[4, i], one[5, i]
     return found
 
 
@@ -127,7 +134,7 @@ class TimeStepping(PlainMethod):
         self, kind: Arithmetic, m: int, n: int, rows: int, runs: int = 1, widths: Array | None = None
     ) -> Stepper:
         of, most = problem_rows(n), (m - 2 * n) * (n + 1)
-        made = (np.zeros((size, runs)) for size in (m + 1, of.rest + most, 2 * n + 1))
+        made = (np.zeros((size, runs)) for size in (m + 1 + n, m + of.rest + most, m))
         room = (np.empty(shape) for shape in ((n, n), (6, n), (n + 1, n)))
         return Stepper(time_step, of, Work(np.zeros((1, rows, runs)), *made, *room))
 

@@ -66,8 +66,23 @@ def solution(n: int, known: Array, place: Array) -> Array:
     return np.concatenate([x, after, np.abs(after - place) @ np.ones((n, 1))])
 
 
-def solved(n: int, known: Array, place: Array) -> Array:
-    """The same after as many Newton steps as it takes, but for PASSES at most; in floats."""
+def stepped(equation: StateEquation, t: float, x: Array, held: Array | None) -> Array:
+    """y⁺, v⁺ and its places, how many have changed, and the numbers of `problem`; in floats.
+
+    Args:
+        equation: The state equation.
+        t: Time in the middle of the step, in [s].
+        x: The state, the step, and the places to start from.
+        held: As of `problem`.
+    """
+    n = equation.plant.dynamics.n
+    known = problem(equation, t, x[:-n], held)
+    found = np.concatenate([_solved(n, known, x[-n:]), known])
+    return np.concatenate([behind(equation, x[:-n], found), found])
+
+
+def _solved(n: int, known: Array, place: Array) -> Array:
+    """The solution after as many Newton steps as it takes, but for PASSES at most."""
     made = solution(n, known, place)
     for _ in range(PASSES - 1):
         if made[2 * n] > 0:

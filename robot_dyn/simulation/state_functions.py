@@ -14,7 +14,7 @@ from robot_dyn.arithmetic import Array
 from robot_dyn.errors import RobotDynError
 from robot_dyn.integrate.integrator import System
 from robot_dyn.integrate.primitives import evaluate
-from robot_dyn.simulation.moreau_jean import behind, problem, solved
+from robot_dyn.simulation.moreau_jean import behind, stepped
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.time_loop import Functions
 from robot_dyn.simulation.watch import Watch
@@ -48,17 +48,15 @@ def interpreted(equation: StateEquation, watch: Watch) -> Functions:
         end = p[1] if t - p[0] < p[1] - t else p[0]
         out[:, :, 0] = system(functions, equation, p, own, exact=False).derivatives(t, y[:, 0], end)
 
-    def of_problem(t: float, x: Array, p: Array, own: Array, out: Array) -> None:
-        made = problem(equation, min(max(t, p[0]), p[1]), _state(x), own[:n, 0].copy() if equation.sampled else None)
+    def step(t: float, x: Array, p: Array, own: Array, out: Array) -> None:
+        held = own[:n, 0].copy() if equation.sampled else None
+        made = stepped(equation, min(max(t, p[0]), p[1]), _state(x), held)
         out[: len(made), 0] = made
-
-    def of_solution(t: float, known: Array, p: Array, place: Array, out: Array) -> None:
-        out[:, 0] = solved(n, known[:, 0], place[:, 0])
 
     def of_behind(t: float, x: Array, p: Array, found: Array, out: Array) -> None:
         out[:, 0] = behind(equation, x[:, 0], found[:, 0])
 
-    functions = Functions(rate, tick, energy, sampled, jacobian, 0, of_problem, of_solution, of_behind)
+    functions = Functions(rate, tick, energy, sampled, jacobian, 0, step, of_behind)
     return functions
 
 

@@ -76,7 +76,7 @@ class Functions(NamedTuple):
         sample: What a sample holds.
         jacobian: As of `RightSide`.
         events: Values of the events.
-        problem, newton, behind: As of `RightSide`.
+        step, behind: As of `RightSide`.
     """
 
     rate: Any
@@ -85,8 +85,7 @@ class Functions(NamedTuple):
     sample: Any
     jacobian: Any = 0
     events: Any = 0
-    problem: Any = 0
-    newton: Any = 0
+    step: Any = 0
     behind: Any = 0
 
 

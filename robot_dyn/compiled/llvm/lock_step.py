@@ -7,15 +7,15 @@ run depends on the others.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 from llvmlite import ir
 
 from robot_dyn.compiled.llvm.lanes import F64, wide
 from robot_dyn.compiled.llvm.vectors import I1, I64, Vectors
-from robot_dyn.compiled.llvm.writer import Writer, Written
+from robot_dyn.compiled.llvm.writer import Writer
 from robot_dyn.compiled.program import Program
 
 SIDE = 8  # runs in a vector: a 512-bit register, or two or four smaller ones
@@ -24,9 +24,26 @@ _NOTHING: Mapping[int, int] = MappingProxyType({})
 _ARGUMENTS = [F64, *[F64.as_pointer()] * 4]
 
 
-def write_function(
-    module: Any, name: str, program: Program, runs: int, shared: Mapping[int, int] = _NOTHING, passes: int = 1
-) -> None:
+class Computed(NamedTuple):
+    """What a function computes of a vector of runs.
+
+    Attributes:
+        results: A vector of each.
+        beyond: As of `Written`.
+        seldom: Numbers of the results that are stored only where `doubt` holds for some run.
+        doubt: The mask of these runs; None if all are stored.
+    """
+
+    results: list[Any]
+    beyond: Any
+    seldom: range = range(0)
+    doubt: Any = None
+
+
+Body = Callable[[Writer, list[list[Any]]], Computed]  # (writer, the vectors of each input) → …
+
+
+def write_function(module: Any, name: str, program: Program, runs: int, shared: Mapping[int, int] = _NOTHING) -> None:
     """A function of a program with the inputs t (1,), y, p and own.
 
     Args:
@@ -36,55 +53,103 @@ def write_function(
         runs: 1 or a multiple of SIDE.
         shared: Of those numbers of `own` that are the same for all runs, where in it each stands once; the others come
             row by row in their order.
-        passes: How often it is computed at most, for the runs of each vector until the last output is 0 for all of
-            them: the outputs before that one are then `own` of the next pass.
     """
-    rows = [k for k in range(program.inputs[-1]) if k not in shared]
+
+    def body(writer: Writer, given: list[list[Any]]) -> Computed:
+        written = writer.write(program, given)
+        return Computed(written.results, written.beyond)
+
+    _write(module, name, program.inputs, body, runs, shared)
+
+
+def write_step(
+    module: Any,
+    name: str,
+    programs: tuple[Program, Program, Program],
+    runs: int,
+    shared: Mapping[int, int],
+    passes: int,
+) -> None:
+    """A step as three programs in one, so that what one hands to the next stays near.
+
+        known = first(t, x, p, own),   found = second(t, known, own = places) until nothing changes,
+        after = third(t, x, own = found and known)
+
+    y is x and the places, where the second one starts; it is repeated for the runs of a vector until its last result is
+    0 for all of them, `passes` times at most, the results before that one being its places then. What comes out is
+    after, found and known; the last only of vectors in which a run has not settled.
+    """
+    first, second, third = programs
+    n = second.inputs[-1]
+    m = first.inputs[1]
+
+    def body(writer: Writer, given: list[list[Any]]) -> Computed:
+        t, y, p, own = given
+        known = writer.write(first, [t, y[:m], p, own])
+        found = _repeated(writer, second, [t, known.results, [], y[m:]], passes)
+        after = writer.write(third, [t, y[:m], [], [*found, *known.results]])
+        doubt = writer.builder.fcmp_ordered(">", found[-1], writer.vectors.constant(0.0))
+        before = len(after.results) + len(found)
+        results = [*after.results, *found, *known.results]
+        return Computed(results, known.beyond, range(before, len(results)), doubt)
+
+    _write(module, name, (1, m + n, *first.inputs[2:]), body, runs, shared)
+
+
+def _write(
+    module: Any, name: str, inputs: tuple[int, ...], body: Body, runs: int, shared: Mapping[int, int]
+) -> None:  # fmt: skip
+    rows = [k for k in range(inputs[-1]) if k not in shared]
     own = {k: (row, False) for row, k in enumerate(rows)} | {k: (at, True) for k, at in shared.items()}
-    any_angle = _any_angle(module, f"{name}_any_angle", program, runs, own)
+    any_angle = _any_angle(module, f"{name}_any_angle", inputs, body, runs, own)
     function = ir.Function(module, ir.FunctionType(ir.VoidType(), _ARGUMENTS), name)
     builder = ir.IRBuilder(function.append_basic_block())
-    before, body, end = builder.block, function.append_basic_block(), function.append_basic_block()
-    builder.branch(body)
-    builder.position_at_end(body)
+    before, loop, end = builder.block, function.append_basic_block(), function.append_basic_block()
+    builder.branch(loop)
+    builder.position_at_end(loop)
     at = builder.phi(I64)
     at.add_incoming(ir.Constant(I64, 0), before)
     writer = Writer(builder, F64, min(SIDE, runs))
-    given = _inputs(writer.vectors, function.args, program, runs, at, own)
-    written = writer.write(program, given) if passes == 1 else _repeated(writer, program, given, passes)
-    for k, value in enumerate(written.results):
-        builder.store(value, _place(writer.vectors, function.args[-1], k, runs, at), align=8)
-    with builder.if_then(writer.vectors.any(written.beyond), likely=False):
-        builder.call(any_angle, [*function.args, at, builder.bitcast(written.beyond, ir.IntType(writer.count))])
+    made = body(writer, _inputs(writer.vectors, function.args, inputs, runs, at, own))
+
+    def store(which: Iterable[int]) -> None:
+        for k in which:
+            builder.store(made.results[k], _place(writer.vectors, function.args[-1], k, runs, at), align=8)
+
+    store(k for k in range(len(made.results)) if k not in made.seldom)
+    if made.doubt is not None:
+        with builder.if_then(writer.vectors.any(made.doubt), likely=False):
+            store(made.seldom)
+    with builder.if_then(writer.vectors.any(made.beyond), likely=False):
+        builder.call(any_angle, [*function.args, at, builder.bitcast(made.beyond, ir.IntType(writer.count))])
     following = builder.add(at, ir.Constant(I64, writer.count))
     at.add_incoming(following, builder.block)
-    builder.cbranch(builder.icmp_signed("<", following, ir.Constant(I64, runs)), body, end)
+    builder.cbranch(builder.icmp_signed("<", following, ir.Constant(I64, runs)), loop, end)
     builder.position_at_end(end)
     builder.ret_void()
 
 
-def _repeated(writer: Writer, program: Program, given: list[list[Any]], passes: int) -> Written:
-    """The program of one vector of runs, pass after pass."""
+def _repeated(writer: Writer, program: Program, given: list[list[Any]], passes: int) -> list[Any]:
+    """The results of a program of one vector of runs, pass after pass."""
     builder, vectors = writer.builder, writer.vectors
     before, again, done = builder.block, builder.append_basic_block(), builder.append_basic_block()
     builder.branch(again)
     builder.position_at_end(again)
     count, own = builder.phi(I64), [builder.phi(vectors.type) for _ in given[-1]]
-    written = writer.write(program, [*given[:-1], own])
-    *_, changed = written.results
+    results = writer.write(program, [*given[:-1], own]).results
     after = builder.add(count, ir.Constant(I64, 1))
-    first, following = [ir.Constant(I64, 0), *given[-1]], [after, *written.results[-1 - len(own) : -1]]
+    first, following = [ir.Constant(I64, 0), *given[-1]], [after, *results[-1 - len(own) : -1]]
     for phi, start, value in zip([count, *own], first, following, strict=True):
         phi.add_incoming(start, before)
         phi.add_incoming(value, builder.block)
-    goes_on = vectors.any(builder.fcmp_ordered(">", changed, vectors.constant(0.0)))
+    goes_on = vectors.any(builder.fcmp_ordered(">", results[-1], vectors.constant(0.0)))
     less = builder.icmp_signed("<", after, ir.Constant(I64, passes))
     builder.cbranch(builder.and_(goes_on, less), again, done)
     builder.position_at_end(done)
-    return written
+    return results
 
 
-def _any_angle(module: Any, name: str, program: Program, runs: int, own: Own) -> Any:
+def _any_angle(module: Any, name: str, inputs: tuple[int, ...], body: Body, runs: int, own: Own) -> Any:
     """The same for the runs from a number on that share a vector, and stored of those alone whose bit is set."""
     side = min(SIDE, runs)
     shape = ir.FunctionType(ir.VoidType(), [*_ARGUMENTS, I64, ir.IntType(side)])
@@ -96,18 +161,18 @@ def _any_angle(module: Any, name: str, program: Program, runs: int, own: Own) ->
     *arguments, at, bits = function.args
     writer = Writer(builder, F64, side, any_angle=True)
     mask = builder.bitcast(bits, wide(I1, side))
-    given = _inputs(writer.vectors, arguments, program, runs, at, own)
-    for k, value in enumerate(writer.write(program, given).results):
+    made = body(writer, _inputs(writer.vectors, arguments, inputs, runs, at, own))
+    for k, value in enumerate(made.results):
         place = _place(writer.vectors, arguments[-1], k, runs, at)
         builder.store(builder.select(mask, value, builder.load(place, align=8)), place, align=8)
     builder.ret_void()
     return function
 
 
-def _inputs(vectors: Vectors, arguments: Any, program: Program, runs: int, at: Any, own: Own) -> list[list[Any]]:
+def _inputs(vectors: Vectors, arguments: Any, inputs: tuple[int, ...], runs: int, at: Any, own: Own) -> list[list[Any]]:
     """The vectors of t, y, p and own, of the runs from `at` on."""
     t, y, p, numbers, _ = arguments
-    _, m, shared, each = program.inputs
+    _, m, shared, each = inputs
     builder = vectors.builder
 
     def one(array: Any, k: int) -> Any:

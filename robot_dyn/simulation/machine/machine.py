@@ -9,7 +9,7 @@ import ctypes
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NamedTuple, final
+from typing import Any, final
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from robot_dyn.coefficients import value_at
 from robot_dyn.compiled.cache import default_store
 from robot_dyn.compiled.identity import digest
 from robot_dyn.compiled.llvm import machine_code
-from robot_dyn.compiled.llvm.lock_step import write_function
+from robot_dyn.compiled.llvm.lock_step import write_function, write_step
 from robot_dyn.compiled.parameters import CONTROLLER, ROBOT, Parameter, Part, joined, parameters
 from robot_dyn.compiled.program import Program
 from robot_dyn.control.controller import Controller
@@ -25,7 +25,7 @@ from robot_dyn.convex import PASSES
 from robot_dyn.effects.effect import Effect
 from robot_dyn.errors import RobotDynError
 from robot_dyn.simulation.machine.jacobian_check import DIFFERENCES, by_differences
-from robot_dyn.simulation.moreau_jean import behind, problem, solved
+from robot_dyn.simulation.moreau_jean import stepped
 from robot_dyn.simulation.plan import plan_of
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.smoothness import foreign
@@ -36,21 +36,12 @@ from robot_dyn.simulation.time_loop import Functions
 _STATES = 4
 _AGREES = 1e-13
 _LENGTH = 1e-3  # [s], of a step that is compared
-_OF_STEP = "newton", "behind"  # their own numbers are what the step has found so far
+STEP = "problem", "newton", "behind"  # programs of one function; the last is one by itself, too
 _FUNCTION = ctypes.CFUNCTYPE(None, ctypes.c_double, *[ctypes.c_void_p] * 4)
 
 
 class MachineError(RobotDynError):
     """Machine code that does not agree with the interpreted equations; nothing of it is used."""
-
-
-class Step(NamedTuple):
-    """State and step, the numbers of the problem, its solution, and the state behind a step, of W runs each."""
-
-    x: np.ndarray
-    problem: np.ndarray
-    newton: np.ndarray
-    behind: np.ndarray
 
 
 @final
@@ -87,13 +78,18 @@ class Equations:
 
         def write(module: Any, prefix: str) -> None:
             for name, program in self.programs.items():
-                shared, passes = {} if name in _OF_STEP else self.shared, PASSES if name == "newton" else 1
-                write_function(module, f"{prefix}{name}", program, self.runs, shared, passes)
+                if name == "problem":
+                    three: Any = tuple(self.programs[each] for each in STEP)
+                    write_step(module, f"{prefix}step", three, self.runs, self.shared, PASSES)
+                elif name != "newton":
+                    shared = {} if name == "behind" else self.shared
+                    write_function(module, f"{prefix}{name}", program, self.runs, shared)
 
         def address(name: str) -> int:
             return machine_code.address(name, self._key, write, default_store(), f"the state equation of {self.name}")
 
-        return Functions(*(address(name) if name in self.programs else 0 for name in Functions._fields))
+        known = {*self.programs, *(["step"] if "problem" in self.programs else [])}
+        return Functions(*(address(name) if name in known else 0 for name in Functions._fields))
 
 
 @final
@@ -188,15 +184,14 @@ class Machine:
             own = self.own(swept)
             own[:held] = rng.normal(size=(held, W))
             for name, out in made.items():
-                if name not in Step._fields:
+                if name not in STEP:
                     getattr(self.in_python, name)(t, y, plan.parameters[s], own, out)
-            step = self._step(t, y, plan.parameters[s], own) if "problem" in made else None
             for lane in range(min(W, _STATES)):
                 ours = {name: out[:, lane] for name, out in made.items()}
                 held_here = own[:n, lane] if held else None
                 pairs = [*self._pairs(t, y[:, lane], held_here, ours)]
-                if step is not None:
-                    pairs += self._of_step(t, held_here, [x[:, lane] for x in step])
+                if "problem" in made and not lane:
+                    pairs += self._of_step(t, y, plan.parameters[s], own, min(W, _STATES))
                 allowed = _AGREES * max(1.0, float(np.linalg.cond(self.equation.plant.M(y[:n, lane]))))
                 worst = max(_difference(mine, theirs, y[:, lane]) for mine, theirs in pairs)
                 if not worst <= allowed:
@@ -209,28 +204,18 @@ class Machine:
                     raise self._differs("Jacobian", worst * DIFFERENCES, DIFFERENCES, i)
         self.equations.checked.add(True)
 
-    def _step(self, t: float, y: np.ndarray, p: np.ndarray, own: np.ndarray) -> Step:
-        """What the functions of a step of time stepping give, one after the other."""
-        n, W, rows = self.equation.plant.dynamics.n, y.shape[1], self.equations.programs
-        x, place = np.vstack([y, np.full((1, W), _LENGTH)]), np.zeros((n, W))
-        known, newton = (np.empty((len(rows[name].outputs), W)) for name in ("problem", "newton"))
-        call = self.in_python
-        call.problem(t, x, p, own, known)
-        call.newton(t, known, p, place, newton)
-        found, after = np.vstack([newton, known]), np.empty_like(y)
-        call.behind(t, x, p, found, after)
-        return Step(x, known, newton, after)
-
     def _of_step(
-        self, t: float, held: np.ndarray | None, made: list[np.ndarray]
-    ) -> list[tuple[np.ndarray, np.ndarray]]:
-        """The same of one run, beside what the equation gives."""
-        x, known, newton, after = made
-        n = self.equation.plant.dynamics.n
-        bounded = np.isfinite(known)
-        theirs = problem(self.equation, t, x, held), solved(n, known, np.zeros(n))
-        pairs = zip((known[bounded], newton), (theirs[0][bounded], theirs[1]), strict=True)
-        return [*pairs, (after, behind(self.equation, x, np.concatenate([newton, known])))]
+        self, t: float, y: np.ndarray, p: np.ndarray, own: np.ndarray, lanes: int
+    ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """y⁺, v⁺ and its places by a step of time stepping, run by run, beside what the equation gives."""
+        n, m, W = self.equation.plant.dynamics.n, self.equation.size, y.shape[1]
+        x = np.vstack([y, np.full((1, W), _LENGTH), np.zeros((n, W))])
+        out = np.empty((m + 2 * n + 1 + len(self.equations.programs["problem"].outputs), W))
+        self.in_python.step(t, x, p, own, out)
+        for lane in range(lanes):
+            theirs = stepped(self.equation, t, x[:, lane], own[:n, lane] if self.equation.sampled else None)
+            yield out[:m, lane], theirs[:m]
+            yield out[m : m + 2 * n, lane], theirs[m : m + 2 * n]
 
     def _differs(self, what: str, worst: float, allowed: float, state: int) -> MachineError:
         return MachineError(
