@@ -14,6 +14,7 @@ from robot_dyn.integrate.explicit import ExplicitRungeKutta
 from robot_dyn.integrate.gauss import Gauss
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.integrate.tableau import Coefficient, Surd
+from robot_dyn.integrate.time_stepping import TimeStepping
 from tests.test_integrate import ANY_ARITHMETIC, OSCILLATOR, PENDULUM, name_of
 
 
@@ -46,6 +47,9 @@ def stability_matrix(integrator: Integrator, z: list[list[Fraction]]) -> list[li
         (a, b), (c, d) = polynomial([(-1) ** k * each for k, each in enumerate(p)])
         inverse = [[d / (a * d - b * c), -b / (a * d - b * c)], [-c / (a * d - b * c), a / (a * d - b * c)]]
         return times(inverse, polynomial(p))
+    if isinstance(integrator, TimeStepping):  # Störmer and Verlet: q_m = q + h/2 v, v⁺ = v − h q_m, q⁺ = q_m + h/2 v⁺
+        h = z[0][1]
+        return [[1 - h * h / 2, h - h**3 / 4], [-h, 1 - h * h / 2]]
     if not isinstance(integrator, ExplicitRungeKutta):  # semi-implicit Euler: v⁺ = v − h q, q⁺ = q + h v⁺
         h = z[0][1]
         return [[1 - h * h, h], [-h, Fraction(1)]]
