@@ -5,6 +5,7 @@ ratio = t(MuJoCo) / t(robot_dyn), both in µs per step
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib import import_module
 from time import perf_counter
 from typing import Any
@@ -22,6 +23,14 @@ READY = np.array([0.3, 0.6, -0.4, -1.2, 0.5, 1.1, 0.2])
 GAINS, DAMPING, THREADS = (100.0, 10.0), 0.5, 2
 LEVEL = np.array([3.0, 6.0, 2.0, 4.0, 1.0, 0.8, 0.3])
 LOWER, UPPER = READY - 0.15, READY + 0.25
+
+
+def _second(call: Callable[[], object]) -> float:
+    """Time in [s] of the second of two calls: the first one after other work may pay for pages of memory."""
+    call()
+    began = perf_counter()
+    call()
+    return perf_counter() - began
 
 
 def one_step(effort: Effort) -> None:
@@ -95,13 +104,10 @@ def _side_by_side(effort: Effort, model: Any, held: list[Any], method: str, what
     with mujoco_rollout.Rollout(nthread=THREADS) as pool:
         made = rd.rollouts(setup, starts, threads=THREADS)
         for _ in range(min(effort.repeats, 5)):
-            began = perf_counter()
-            pool.rollout(model, datas, first, command, state=state)
-            theirs.append((perf_counter() - began) / (runs * steps))
+            theirs.append(_second(lambda: pool.rollout(model, datas, first, command, state=state)) / (runs * steps))
             for threads, times in ((THREADS, ours), (1, alone)):
-                began = perf_counter()
-                rd.rollouts(setup, starts, threads=threads)
-                times.append((perf_counter() - began) / (runs * steps))
+                spent = _second(lambda threads=threads: rd.rollouts(setup, starts, threads=threads))
+                times.append(spent / (runs * steps))
     a, b, c = (1e6 * np.median(times) for times in (theirs, ours, alone))
     table("what", "MuJoCo, µs", "robot_dyn, µs", "ratio", "robot_dyn, 1 thread, µs", "2 threads over 1")
     what = f"{runs} runs of {steps} {what}, {THREADS} threads, per step"
