@@ -40,7 +40,7 @@ def test_each_fault_is_named(name: str) -> None:
 @pytest.mark.parametrize("name", [name for name, each in BROKEN.items() if each.restored])
 def test_what_the_file_still_says_is_restored(name: str) -> None:
     """M and N are those of the sound file to 1e-12 of their largest entries; each change is in a comment."""
-    repaired = checked(BROKEN[name].change(SOUND).encode(), "rig.urdf").repaired
+    repaired = checked(BROKEN[name].change(SOUND).encode(), "rig.urdf", units=True).repaired
     assert repaired is not None
     sound, mended = rd.Robot.from_text(SOUND), rd.Robot.from_text(repaired)
     for quantity in ("M", "N"):
@@ -49,6 +49,16 @@ def test_what_the_file_still_says_is_restored(name: str) -> None:
     assert name == "late declaration" or repaired.count(b"<!-- robot-dyn check: ") >= 1
     again = checked(repaired, "rig.urdf")
     assert again.findings == ()
+
+
+@pytest.mark.parametrize("name", ["kg mm²", "g m²", "mass in grams"])
+def test_a_unit_that_is_only_suspected_is_converted_on_request_alone(name: str) -> None:
+    """Numbers that nobody measured, as of sensors in the files of the world, look like numbers of other units."""
+    made = checked(BROKEN[name].change(SOUND).encode(), "rig.urdf")
+    (finding,) = made.findings
+    assert finding.supposed
+    assert finding.changes
+    assert made.repaired is None
 
 
 def test_an_inertial_is_estimated_at_a_density() -> None:
@@ -68,7 +78,7 @@ def test_several_faults_are_told_together() -> None:
     text = SOUND
     for name in ("decimal comma", "g mm²", "1.57", "crossed limits"):
         text = BROKEN[name].change(text)
-    made = checked(text.encode(), "rig.urdf")
+    made = checked(text.encode(), "rig.urdf", units=True)
     kinds = {each.kind for each in made.findings}
     assert kinds == {"decimal_comma", "inertia_shape", "near_right_angle", "limits_crossed"}
     assert not made.loads
@@ -107,4 +117,5 @@ def test_the_command_tells_fixes_and_exits(tmp_path: Path, monkeypatch: pytest.M
     assert again.returncode == 2
     assert "add --force" in again.stderr
     assert run("check", "arm.urdf", "--density", "1000").returncode == 2
+    assert run("check", "arm.urdf", "--units").returncode == 2
     assert run("check", "no_such.urdf").returncode == 2

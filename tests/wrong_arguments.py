@@ -217,7 +217,7 @@ def examples(folder: Path) -> dict[str, Example]:
         "save_certificate": (
             rd.save_certificate, {"result": certified, "path": folder / "digits.csv", "theme": "dark"},
         ),
-        "check": (rd.check, {"name_or_path": "planar_2r", "package_dirs": [folder], "density": 1000.0}),
+        "check": (rd.check, {"name_or_path": "planar_2r", "package_dirs": [folder], "density": 1000.0, "units": True}),
         "circle": (
             rd.circle,
             {"centre": [0.1, 0.2, 0.3], "radius": 0.1, "normal": [0.0, 0.1, 1.0], "period_s": 1.0, "turns": 1.0,

@@ -38,15 +38,22 @@ def check(
         float | None,
         typer.Option(metavar="KG/M³", help="With --fix: inertias of this density for links without any, from shapes."),
     ] = None,
+    units: Annotated[
+        bool, typer.Option("--units", help="With --fix: convert what seems to be in another unit, such as kg mm².")
+    ] = False,
     force: Force = False,
     package_dir: PackageDir = None,
     as_json: Json = False,
 ) -> None:
     """Check URDF files: inertias, units, limits, names, shapes; exit code 1 if there are errors in one."""
-    if density is not None and not fix:
-        raise QueryError("--density is for --fix, which writes the inertias; add it, or leave --density out")
+    for option, given in (("--density", density is not None), ("--units", units)):
+        if given and not fix:
+            raise QueryError(f"{option} is for --fix, which writes the changes; add it, or leave {option} out")
     targets = {file: _target(file, force) for file in files} if fix else {}
-    made = [rd.check(file, package_dirs=package_dir or (), density=density) for file in progress(files, "checking")]
+    made = [
+        rd.check(file, package_dirs=package_dir or (), density=density, units=units)
+        for file in progress(files, "checking")
+    ]
     written = {}
     for file, each in zip(files, made, strict=True):
         if fix and each.repaired is not None:
@@ -75,6 +82,7 @@ def _document(file: str, made: Checkup, written: str | None) -> dict[str, Any]:
             "remedy": each.remedy,
             "line": each.line,
             "changes": [change.text for change in each.changes],
+            "supposed": each.supposed,
         }
         for each in made.findings
     ]
@@ -89,7 +97,8 @@ def _lines(document: dict[str, Any]) -> Iterator[str]:
     yield f"{document['file']}: {', '.join(said) or 'nothing found'}{'' if document['loads'] else '; it does not load'}"
     for each in findings:
         line = f" (line {each['line']})" if each["line"] else ""
-        fixed = " [--fix]" if each["changes"] and document["written"] is None else ""
+        by = "[--fix --units]" if each["supposed"] else "[--fix]"
+        fixed = f" {by}" if each["changes"] and (each["supposed"] or document["written"] is None) else ""
         yield f"  {each['severity']}: {each['where']}{line}: {each['what']}; {each['remedy']}{fixed}"
     if document["written"]:
         yield f"  written to {document['written']}"

@@ -17,6 +17,7 @@ from robot_dyn.errors import DescriptionError
 from robot_dyn.model import catalog, description
 from robot_dyn.model.packages import searched
 from robot_dyn.model.robot import Robot
+from robot_dyn.validate import truth
 
 _OF_TEXT = (
     spelling.misspelt, literals.decimal_commas, literals.line_breaks, literals.angles_in_degrees,
@@ -50,14 +51,17 @@ class Checkup:
 
 
 def check(
-    name_or_path: str | Path, *, package_dirs: Iterable[str | Path] = (), density: float | None = None
-) -> Checkup:
+    name_or_path: str | Path, *, package_dirs: Iterable[str | Path] = (), density: float | None = None,
+    units: bool = False,
+) -> Checkup:  # fmt: skip
     """Check a URDF file: its numbers, names, limits and units, and its inertias against the shapes of its links.
 
     Args:
         name_or_path: As of `load`.
         package_dirs: Folders in which packages of meshes are searched first.
         density: In [kg/m³]: links with a shape and no inertial get the inertia of that shape among the repairs.
+        units: Whether masses, inertias and shapes in units that are suspected are converted among the repairs. Numbers
+            that nobody measured look like these as well.
 
     Raises:
         CatalogError: If there is no such file, or an entry of `package_dirs` is not a folder.
@@ -66,10 +70,12 @@ def check(
     """
     package_dirs = searched(package_dirs)
     path = catalog.find(name_or_path, package_dirs)
-    return checked(description.content(path), str(path), package_dirs, density)
+    return checked(description.content(path), str(path), package_dirs, density, truth("units", units))
 
 
-def checked(text: bytes, source: str, package_dirs: tuple[Path, ...] = (), density: float | None = None) -> Checkup:
+def checked(
+    text: bytes, source: str, package_dirs: tuple[Path, ...] = (), density: float | None = None, units: bool = False
+) -> Checkup:
     """The same of the text of a file."""
     refusal = _refusal(text, source)
     try:
@@ -94,9 +100,9 @@ def checked(text: bytes, source: str, package_dirs: tuple[Path, ...] = (), densi
         found += [_of_mesh(each) for each in unread]
         later = [*shapes.misfits(document, robot, of), *shapes.outside(robot, of), *estimates(document, of, density)]
         found += later
-        if any(each.changes for each in later):
-            repairs += later
-            document = _rewritten(document, later)
+        if made := [each for each in later if each.changes and (units or not each.supposed)]:
+            repairs += made
+            document = _rewritten(document, made)
     found.sort(key=lambda each: _ORDER.index(each.severity))
     loads = refusal is None and not any(each.kind == "refused" for each in found)
     return Checkup(source, loads, tuple(found), document.text if repairs or declared else None)

@@ -74,6 +74,7 @@ class Finding:
         remedy: What to do.
         line: Line of the file, where it is known.
         changes: What `--fix` changes; nothing where the file does not say what is meant.
+        supposed: Whether the changes rest on a unit that is only suspected, and are made on request alone.
     """
 
     severity: Severity
@@ -83,6 +84,7 @@ class Finding:
     remedy: str
     line: int | None = None
     changes: tuple[Change, ...] = ()
+    supposed: bool = False
 
     def __str__(self) -> str:
         return f"{self.where}: {self.what}; {self.remedy}"

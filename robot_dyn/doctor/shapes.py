@@ -24,7 +24,7 @@ from robot_dyn.view.geometry.visuals import Piece, solids
 _SLACK = 1.1  # of a shape's extent: collision shapes leave out screws
 _LIGHT, _HEAVY = 2.0, 3e4  # [kg/m³] of a link and its convex hull: below foam, above tungsten
 _UNITS = {1e3: "g m²", 1e4: "kg cm²", 1e6: "kg mm²", 1e7: "g cm²", 1e9: "g mm²"}
-_WITHIN = 12.0  # a factor on either side, by which a link's own inertia is off that of a uniform body
+_WITHIN = 4.0  # a factor on either side, by which the inertia of a link is off that of a uniform body
 _LONG = 100.0  # times the length of the arm that a shape is: millimetres
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
@@ -102,7 +102,7 @@ def _oversized(document: Document, name: str, element: Any, size: float, reach: 
     return Finding(
         Severity.WARNING, "shape_in_mm", f"link {name!r}",
         f"its shape is {size:.3g} m long, on a robot of {reach:.3g} m: millimetres are suspected",
-        'scale its mesh, scale="0.001 0.001 0.001"', element.sourceline, changes,
+        'scale its mesh, scale="0.001 0.001 0.001"', element.sourceline, changes, True,
     )  # fmt: skip
 
 
@@ -118,7 +118,7 @@ def _mass(name: str, link: StatedLink, shape: Shape, inertial: Any) -> Finding |
     return Finding(
         Severity.WARNING, "mass_density", f"link {name!r}",
         f"its mass of {link.mass:g} kg in its shape is a density of {density:.3g} kg/m³{suspected}",
-        "correct the mass, or its unit", inertial.sourceline, changes,
+        "correct the mass, or its unit", inertial.sourceline, changes, True,
     )  # fmt: skip
 
 
@@ -140,7 +140,7 @@ def _inertia(name: str, link: StatedLink, shape: Shape, inertial: Any) -> Findin
         Severity.ERROR, "inertia_shape", f"link {name!r}",
         f"its inertia is that of {link.mass:g} kg at {np.sqrt(half / link.mass):.3g} m and more from the centre of"
         f" mass, and its shape ends at {far:.3g} m{suspected}",
-        "correct the inertia, or its unit", inertial.sourceline, changes,
+        "correct the inertia, or its unit", inertial.sourceline, changes, True,
     )  # fmt: skip
 
 
