@@ -74,6 +74,12 @@ def test_an_inertial_is_estimated_at_a_density() -> None:
         checked(text, "rig.urdf", density=-1.0)
 
 
+@pytest.mark.parametrize("name", ["ns:ha;nd", "o'hand", "ha: nd; x"])
+def test_names_may_hold_what_separates_the_parts_of_a_sentence(name: str) -> None:
+    made = checked(BROKEN["no inertial"].change(SOUND).replace('"hand"', f'"{name}"').encode(), "rig.urdf")
+    assert ("mass_missing", f"link {name!r}") in {(each.kind, each.where) for each in made.findings}
+
+
 def test_several_faults_are_told_together() -> None:
     text = SOUND
     for name in ("decimal comma", "g mm²", "1.57", "crossed limits"):
@@ -119,3 +125,8 @@ def test_the_command_tells_fixes_and_exits(tmp_path: Path, monkeypatch: pytest.M
     assert run("check", "arm.urdf", "--density", "1000").returncode == 2
     assert run("check", "arm.urdf", "--units").returncode == 2
     assert run("check", "no_such.urdf").returncode == 2
+    (tmp_path / "other").mkdir()
+    Path("other/arm.urdf").write_text(SOUND, encoding="utf-8")
+    both = run("check", "arm.urdf", "other/arm.urdf", "--fix", "--force")
+    assert both.returncode == 2
+    assert "under one name" in both.stderr

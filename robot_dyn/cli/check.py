@@ -50,6 +50,8 @@ def check(
         if given and not fix:
             raise QueryError(f"{option} is for --fix, which writes the changes; add it, or leave {option} out")
     targets = {file: _target(file, force) for file in files} if fix else {}
+    if len({*targets.values()}) < len(targets):
+        raise QueryError("--fix: two of the files would be written under one name; repair them one by one")
     made = [
         rd.check(file, package_dirs=package_dir or (), density=density, units=units)
         for file in progress(files, "checking")

@@ -17,7 +17,7 @@ NUMBERS = {
     "mesh": ("scale",),
 }  # fmt: skip
 _COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
-_BREAK = re.compile(rb"<\s*([A-Za-z_]+)((?:[^<>\"']|\"[^\"]*\"|'[^']*')*)>")
+_BREAK = re.compile(rb"<\s*([A-Za-z_]+)((?:[^<>\"']|\"[^\"<]*\"|'[^'<]*')*)>")
 _QUOTED = re.compile(rb"([A-Za-z_]+)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
 _TURN = 2 * pi
 _LEAST_DECIMALS = 2

@@ -16,7 +16,8 @@ from robot_dyn.model.inertia import implausibility
 from robot_dyn.model.robot import Robot
 from robot_dyn.model.structure import Structure, structure
 
-_SENTENCE = re.compile(r"((?:link|joint)s? '[^:;]*?')(?:: | )(.*?); (.*)", re.DOTALL)
+_QUOTED = r"""(?:'[^']*'|"[^"]*")"""  # a name, which may hold colons and semicolons
+_SENTENCE = re.compile(rf"((?:link|joint)s? {_QUOTED}(?:, {_QUOTED})*)(?:: | )(.*?); (.*)", re.DOTALL)
 _NOTHING = 1e-9  # of the largest moment
 _RATIO = 1e4  # of the masses of two bodies of an arm: of a base of 100 kg to a finger of 10 g
 _KINDS = (
@@ -45,9 +46,10 @@ def masses(robot: Robot) -> Iterator[Finding]:
 
 def _of_words(severity: Severity, kind: str, text: str) -> Finding:
     """A finding of `model.doctor`: where, what and remedy in one sentence."""
-    said = _SENTENCE.fullmatch(text)
-    assert said is not None, "each begins with its link, joint or joints"
-    return Finding(severity, kind, said[1], said[2], said[3])
+    if said := _SENTENCE.fullmatch(text):
+        return Finding(severity, kind, said[1], said[2], said[3])
+    what, _, remedy = text.rpartition("; ")  # of a name with quotes of both kinds, or of more joints than are listed
+    return Finding(severity, kind, "robot", what, remedy)
 
 
 def _lopsided(stated: Structure) -> Iterator[Finding]:

@@ -82,7 +82,7 @@ def _at_once(attempt: Callable[..., Array], rows: list[Array], result: Array, ar
     one state, in another way.
     """
     answers: np.ndarray = np.all(arithmetic.finite(result).reshape(len(result), -1), axis=1)
-    if not answers.any():
+    if answers.all() or not answers.any():
         return
     some = int(np.argmax(answers))
     with suppress(*_REFUSALS, DoubtError):  # a doubt about the batch as a whole
