@@ -339,10 +339,10 @@ class EventRun(Followed):
         first = self._changes[0]
         what = f"{_ACCUMULATED} changes of what holds joints in {t - first:.1e} s, the last of joint {joint!r}"
         motion = self.equation.equation_of_motion
-        if not self._chooses or motion.payloads or motion.drives:  # which time stepping does not take
-            raise DivergedError(
-                t, f"events accumulate at t = {t}: {what}; take integrator='time_stepping' and a step_s"
-            )
+        alone = motion.payloads or motion.drives  # which time stepping does not take
+        if alone or not self._chooses:
+            remedy = "soft stops and regularised friction" if alone else "integrator='time_stepping' and a step_s"
+            raise DivergedError(t, f"events accumulate at t = {t}: {what}; take {remedy}")
         velocity = float(np.abs(y[self.rules.n : 2 * self.rules.n]).max())
         remedy = f"made by time stepping with steps of {Setup.step_s} s, without an estimate of its error"
         raise AccumulationError(
