@@ -101,7 +101,7 @@ CHAINS: dict[str, str] = {
     "from 1 km to 1 µm": text("tapered", tapered(1e3, 1e-6, 1)),
     "from 1 km to 1 µm, of one density": text("tapered", tapered(1e3, 1e-6, 3)),
     "turning and sliding": text("alternating", alternating(8)),
-    **{f"base {x:g} m away": text("far", spatial(6), (x, -x / 2, x / 3)) for x in (1e2, 1e4)},
+    **{f"base {x:.0f} m away": text("far", spatial(6), (x, -x / 2, x / 3)) for x in (1e2, 1e4, 5e6)},
 }
 
 LONG: dict[str, str] = {

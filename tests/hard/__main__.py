@@ -1,0 +1,74 @@
+"""`python -m tests.hard --seed 20261122`: run all hard cases, and write docs/hard_cases.md and docs/hard_cases.json.
+
+Exit code 1 if a figure is wrong without a word. With --family, only those are run; without --full, the short ones.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import traceback
+import warnings
+from collections import Counter
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from time import perf_counter
+
+from robot_dyn.errors import ModelWarning
+from tests.hard.case import Row
+from tests.hard.families import FAMILIES
+from tests.hard.report import Result, write
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+def run(task: tuple[str, int, int]) -> Result:
+    """One case of a family; an exception that escapes is a row that does not hold."""
+    name, index, seed = task
+    case = FAMILIES[name].CASES[index]
+    start = perf_counter()
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ModelWarning)
+            rows = list(case.rows(seed))
+    except Exception:  # a case that breaks is a result too
+        rows = [Row(case.name, "crash: " + traceback.format_exc(limit=-3), float("nan"), 0.0)]
+    return Result(name, case.name, tuple(rows), perf_counter() - start)
+
+
+def main() -> int:
+    """Run, print and write."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--family", action="append", choices=list(FAMILIES))
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--full", action="store_true", help="the long cases too")
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--write", type=Path, nargs="?", const=DOCS, help="folder of the report")
+    options = parser.parse_args()
+    print(f"seed {options.seed}", flush=True)
+    tasks = [
+        (name, index, options.seed)
+        for name in options.family or FAMILIES
+        for index, case in enumerate(FAMILIES[name].CASES)
+        if options.full or not case.full
+    ]
+    results = []
+    with ProcessPoolExecutor(options.workers) as pool:
+        for result in pool.map(run, tasks):
+            results.append(result)
+            for row in result.rows:
+                print(
+                    f"{row.verdict:6s} {result.family}: {row.case}: {row.found:.3g} of {row.allowed:.3g}"
+                    f" {row.measure}; {row.program} {row.said}",
+                    flush=True,
+                )
+            print(f"       {result.family}: {result.case}: {result.seconds:.1f} s", flush=True)
+    if options.write:
+        write(results, options.seed, options.write)
+    count = Counter(row.verdict for result in results for row in result.rows)
+    print(f"seed {options.seed}: {dict(count)}")
+    return int(count["SILENT"] > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
