@@ -109,11 +109,11 @@ class PrecisionWarning(RobotDynWarning):
 
 
 def announce(robot: str, findings: Sequence[str]) -> None:
-    """One ModelWarning of findings about a robot, if there are any, at the line that called the caller."""
+    """One ModelWarning of findings about a robot, if there are any, at the line that loads it: the caller of the caller's caller."""
     if findings:
         more = f" (the first of {len(findings)} findings; all of them: Robot.findings, robot-dyn info)"
         text = f"{robot}: {findings[0]}{more if len(findings) > 1 else ''}"
-        warnings.warn(text, ModelWarning, stacklevel=3)
+        warnings.warn(text, ModelWarning, stacklevel=4)
 
 
 _COMPARED = 48  # characters of a name: likeness costs the square of it

@@ -24,6 +24,8 @@ from robot_dyn.validate import choice, shaped
 
 QUANTITIES = by_name(M, C, N, INVERSE_DYNAMICS, FORWARD_DYNAMICS)
 
+_COUNTED = 64  # joints; balls of more take many seconds
+
 _exact = lru_cache(maxsize=8)(Exact)
 _own = lru_cache(maxsize=8)(Lagrangian)
 
@@ -58,7 +60,7 @@ def digits(robot: Robot, quantity: str, state: tuple[Any, ...]) -> float:
 def doubt(robot: Robot, quantity: str, arrays: Mapping[str, np.ndarray], answers: np.ndarray, least: float) -> str:
     """What is said of answers (..., *shape) with fewer digits than asked for; "" if they have them.
 
-    Only where the estimate is below that are digits counted, at the worst state.
+    Only where the estimate is below that are digits counted, at the worst state; of more than 64 joints it is told itself.
     """
     asked, quiet = QUANTITIES.get(quantity), _quiet(robot)
     if asked is None:
@@ -72,12 +74,14 @@ def doubt(robot: Robot, quantity: str, arrays: Mapping[str, np.ndarray], answers
     if not bounds or digits_of(max(bounds)) >= least:
         return ""
     worst = int(np.argmax(bounds))
-    held = _counted(quiet, asked, rows[worst][0])
+    counts = robot.n <= _COUNTED
+    held = _counted(quiet, asked, rows[worst][0]) if counts else digits_of(bounds[worst])
     if held >= least:
         return ""
     where = f" in row {worst} of the batch" if batch else ""
+    has = "has" if counts else "is only certain to have"
     return (
-        f"{quantity} of {robot.name} has {held:.1f} digits{where}, fewer than {least:g}; ask"
+        f"{quantity} of {robot.name} {has} {held:.1f} digits{where}, fewer than {least:g}; ask"
         " rd.Lagrangian(robot, np.longdouble), or rd.Ball(bits) for digits that are proven"
     )
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.errors import shorten
+from robot_dyn.model.conditioning import LEAST_DIGITS, NearlySingular
 from robot_dyn.model.couplings import resolve
 from robot_dyn.model.inertia import implausibility
 from robot_dyn.model.mobile_base import stands_on
@@ -24,19 +25,22 @@ LIGHTEST = 1e-12  # [kg]
 _LISTED = 6  # names in a finding
 
 
-def findings(structure: Structure, joint_without_inertia: str | None = None) -> tuple[str, ...]:
+def findings(
+    structure: Structure, joint_without_inertia: str | None = None, near: NearlySingular | None = None
+) -> tuple[str, ...]:
     """What is doubtful in a description with its edits, in words: where, what and the remedy; the gravest first.
 
     Args:
         structure: The description with its edits.
         joint_without_inertia: The joint at which M is singular at every configuration, if there is one.
+        near: What M leaves of the digits of forward dynamics, if it is few.
     """
     kinds = (
         massless_bodies, impossible_inertias, tiny_masses, long_lengths, large_ratios, welded_base, zero_limits,
         equal_limits, impossible_inertias_of_the_base,
     )  # fmt: skip
     found = (finding for kind in kinds for finding in kind(structure))
-    return (*no_inertia_about_axis(structure, joint_without_inertia), *found)
+    return (*no_inertia_about_axis(structure, joint_without_inertia), *found, *hardly_any_inertia(near))
 
 
 def impossible_inertias(robot: Structure) -> Iterator[str]:
@@ -73,6 +77,16 @@ def no_inertia_about_axis(robot: Structure, joint: str | None) -> Iterator[str]:
         yield (
             f"joint {joint!r}: what it moves has mass but no inertia about its axis, so M is singular; give its link"
             " moments of inertia, or give the joint armature"
+        )
+
+
+def hardly_any_inertia(near: NearlySingular | None) -> Iterator[str]:
+    """A matrix M so near to a singular one that rounding takes most digits of forward dynamics."""
+    if near is not None:
+        yield (
+            f"joint {near.joint!r}: M is nearly singular, κ = {near.condition:.1e}, so that forward dynamics may keep only"
+            f" {near.digits:.0f} digits; correct the inertia of what it moves, or give it armature (queries warn below"
+            f" {LEAST_DIGITS} digits; Robot.warn_below(None) for none of these warnings)"
         )
 
 

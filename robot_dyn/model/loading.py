@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from robot_dyn.errors import announce
 from robot_dyn.model import catalog
 from robot_dyn.model.description import check, read
 from robot_dyn.model.packages import searched
@@ -43,6 +42,4 @@ def load(
 
         text, said = expand(path, xacro, package_dirs)
         description = check(text, source=str(path), findings=said)
-    robot = Robot(description)
-    announce(robot.name, robot.findings)
-    return robot
+    return Robot(description).announced()

@@ -30,6 +30,7 @@ from robot_dyn.errors import (
 )
 from robot_dyn.model import doctor, kernels, pinocchio_model
 from robot_dyn.model.batch import answered
+from robot_dyn.model.conditioning import LEAST_DIGITS, NearlySingular, nearly_singular
 from robot_dyn.model.coriolis import Bodies
 from robot_dyn.model.couplings import Couplings
 from robot_dyn.model.description import Description, check
@@ -85,9 +86,7 @@ class Robot(Dynamics, Parametrised):
         Raises:
             DescriptionError: If the text is refused.
         """
-        robot = Robot(check(urdf, source))
-        announce(robot.name, robot.findings)
-        return robot
+        return Robot(check(urdf, source)).announced()
 
     @staticmethod
     def from_pinocchio(model: Any) -> Robot:
@@ -102,9 +101,13 @@ class Robot(Dynamics, Parametrised):
         """
         from robot_dyn.model.from_pinocchio import robot_of
 
-        robot = robot_of(model)
-        announce(robot.name, robot.findings)
-        return robot
+        return robot_of(model).announced()
+
+    def announced(self) -> Robot:
+        """The robot as it is loaded: warns of its findings; its queries warn below 8 digits if M is nearly singular."""
+        announce(self.name, self.findings)
+        answers = self._nearly_singular is not None and self._singular is None
+        return self.warn_below(LEAST_DIGITS) if answers else self
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Robot, (self.description, self.edits, self.least_digits)
@@ -156,7 +159,7 @@ class Robot(Dynamics, Parametrised):
         """A robot whose queries warn where their answers have fewer digits, as `digits` counts them.
 
         Of M, C, N, inverse and forward dynamics. An estimate, 8 n u κ of the terms, is made first; digits are counted
-        only where it is below. Takes milliseconds a state, and does not reach machine code made of the robot.
+        only where it is below, and of up to 64 joints. Takes milliseconds a state, and does not reach machine code made of the robot.
 
         Args:
             digits: From above 0 to 20; None for no warnings, and no cost.
@@ -267,7 +270,11 @@ class Robot(Dynamics, Parametrised):
     @cached_property
     def findings(self) -> tuple[str, ...]:
         """What is doubtful in the description and its edits, in words, each with its remedy; see docs/findings.md."""
-        of_body = doctor.findings(structure(self.description, self.edits), self.joint_without_inertia)
+        of_body = doctor.findings(
+            structure(self.description, self.edits),
+            None if self._nearly_singular else self.joint_without_inertia,
+            self._nearly_singular,
+        )
         return (*self.description.findings, *of_body)
 
     def random_configuration(self, rng: np.random.Generator) -> ndarray:
@@ -416,11 +423,22 @@ class Robot(Dynamics, Parametrised):
         return None if self._singular is None else self._singular().joint
 
     @cached_property
+    def _general_inertia(self) -> ndarray:
+        """M at a configuration without symmetries."""
+        return self._equation(pin.crba, self.couplings.matrix)(np.linspace(0.3, 0.9, self.n))
+
+    @cached_property
+    def _nearly_singular(self) -> NearlySingular | None:
+        if self._singular is not None and not isinstance(self._singular(), UndecidedError):
+            return None
+        return nearly_singular(self._general_inertia, self.joint_names)
+
+    @cached_property
     def _singular(self) -> Callable[[], SingularError] | None:
         """Makes the error of a robot without forward dynamics."""
-        q = np.linspace(0.3, 0.9, self.n)  # a configuration without symmetries
+        M = self._general_inertia
         try:
-            acceleration(self._equation(pin.crba, self.couplings.matrix)(q), q, self.joint_names)
+            acceleration(M, np.ones(self.n), self.joint_names)
         except UndecidedError as error:
             return partial(UndecidedError, error.joint, "at any q", "float64")
         except SingularError as error:

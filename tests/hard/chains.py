@@ -63,11 +63,16 @@ def light_tip(mass: float) -> list[Body]:
     return [*spatial(5), Body((0.0, 0.0, 1.0), (1e-3, 0.0, 0.0), mass, 1e-3)]
 
 
-def coincident(angle: float) -> list[Body]:
-    """Four axes through one point, a small angle apart, with thin links between."""
+def coincident(angle: float, thin: float) -> list[Body]:
+    """Four axes through one point, a small angle apart; links between them of so many kilograms and metres."""
     turned = [(float(np.sin(k * angle)), 0.0, float(np.cos(k * angle))) for k in range(4)]
-    near = [Body(axis, (0.0, 0.0, 1e-3), 0.1, 0.05) for axis in turned[:3]]
+    near = [Body(axis, (0.0, 0.0, thin), thin, thin) for axis in turned[:3]]
     return [*near, Body(turned[3], (0.5, 0.0, 0.0), 2.0)]
+
+
+def carousel(length: float) -> list[Body]:
+    """Six links on a beam that turns about the base, so many metres away."""
+    return [Body((0.0, 0.0, 1.0), (length, 0.0, 0.0), 10.0), *spatial(6)]
 
 
 def sized(scale: float) -> list[Body]:
@@ -95,11 +100,15 @@ CHAINS: dict[str, str] = {
     **{f"planar, {n} joints": text("planar", planar(n)) for n in (2, 7, 16)},
     **{f"spatial, {n} joints": text("spatial", spatial(n)) for n in (3, 7, 16)},
     **{f"mass ratio {10.0**k:g}": text("ratio", ratio(10.0 ** (k / 5))) for k in (-8, -4, 4, 8)},
-    **{f"tip of {10.0**k:g} kg": text("tip", light_tip(10.0**k)) for k in (-3, -6)},
-    **{f"axes {10.0**-k:g} rad apart": text("axes", coincident(10.0**-k)) for k in (3, 5, 7, 9)},
+    **{f"tip of {10.0**k:g} kg": text("tip", light_tip(10.0**k)) for k in (-3, -6, -10)},
+    **{
+        f"axes {angle:g} rad apart, {thin:g} kg between": text("axes", coincident(angle, thin))
+        for angle, thin in ((1e-3, 0.1), (1e-5, 1e-2), (1e-7, 1e-3), (1e-9, 1e-3), (1e-9, 1e-5))
+    },
     **{f"links of {s:g} m": text("sized", sized(s)) for s in (1e-6, 1e3)},
     "from 1 km to 1 µm": text("tapered", tapered(1e3, 1e-6, 1)),
     "from 1 km to 1 µm, of one density": text("tapered", tapered(1e3, 1e-6, 3)),
+    **{f"at the end of a beam of {x:.0f} m": text("carousel", carousel(x)) for x in (1e2, 1e4, 5e6)},
     "turning and sliding": text("alternating", alternating(8)),
     **{f"base {x:.0f} m away": text("far", spatial(6), (x, -x / 2, x / 3)) for x in (1e2, 1e4, 5e6)},
 }
