@@ -109,7 +109,7 @@ class PrecisionWarning(RobotDynWarning):
 
 
 def announce(robot: str, findings: Sequence[str]) -> None:
-    """One ModelWarning of findings about a robot, if there are any, at the line that loads it: the caller of the caller's caller."""
+    """One ModelWarning of findings about a robot, if there are any, at the line that loads it, three calls above."""
     if findings:
         more = f" (the first of {len(findings)} findings; all of them: Robot.findings, robot-dyn info)"
         text = f"{robot}: {findings[0]}{more if len(findings) > 1 else ''}"

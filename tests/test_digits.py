@@ -18,6 +18,7 @@ from robot_dyn.accuracy.exact import RESOLUTION, Exact
 from robot_dyn.model.quantity import FORWARD_DYNAMICS, INVERSE_DYNAMICS, C, M, N
 from robot_dyn.recursive.articulated_body import articulated_body
 from robot_dyn.recursive.newton_euler import newton_euler
+from tests.hard.chains import coincident, text
 
 FAR = """<robot name="far"><link name="base"/><link name="bar"><inertial><origin xyz="1e6 0 0"/><mass value="1.3"/>
 <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.03" iyz="0" izz="0.03"/></inertial></link>
@@ -109,6 +110,28 @@ def test_digits_that_a_lever_of_1000_km_costs_are_seen() -> None:
     assert robot.digits("M", x["q"]) > 14
     with pytest.warns(rd.PrecisionWarning, match=r"^forward_dynamics of far has 10\.\d digits, fewer than 13; ask rd"):
         robot.warn_below(13).forward_dynamics(x["q"], x["v"], x["tau"])
+
+
+@pytest.mark.parametrize(("thin", "warns"), [(0.1, False), (1e-4, True)])
+def test_a_nearly_singular_robot_says_so_and_its_answers_say_how_many_digits_they_have(
+    thin: float, warns: bool
+) -> None:
+    """Four axes through one point, nearly parallel: of thin links between them few digits are kept."""
+    written = text("axes", coincident(1e-7, thin))
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        robot = rd.Robot.from_text(written)
+    assert [("nearly singular" in str(each.message), each.filename) for each in said] == [(True, __file__)] * warns
+    assert robot.least_digits == (8 if warns else None)
+    assert any("M is nearly singular, κ = 4.7e+12" in each for each in robot.findings) == warns
+    assert robot.warn_below(None).least_digits is None
+    q = np.array([0.2, -0.9, 0.4, 0.7])
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        a = robot.forward_dynamics(q, 2 * q, 0.3 * q)
+    held = robot.digits("forward_dynamics", q, 2 * q, 0.3 * q)
+    assert [f"has {held:.1f} digits" in str(each.message) for each in said] == [True] * (held < 8)
+    assert np.isfinite(a).all() and (held >= 8) != warns
 
 
 def test_queries_warn_below_the_digits_that_are_set_and_answer_the_same() -> None:

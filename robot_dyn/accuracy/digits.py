@@ -60,7 +60,8 @@ def digits(robot: Robot, quantity: str, state: tuple[Any, ...]) -> float:
 def doubt(robot: Robot, quantity: str, arrays: Mapping[str, np.ndarray], answers: np.ndarray, least: float) -> str:
     """What is said of answers (..., *shape) with fewer digits than asked for; "" if they have them.
 
-    Only where the estimate is below that are digits counted, at the worst state; of more than 64 joints it is told itself.
+    Only where the estimate is below that are digits counted, at the worst state; of more than 64 joints the estimate is
+    told.
     """
     asked, quiet = QUANTITIES.get(quantity), _quiet(robot)
     if asked is None:

@@ -84,9 +84,9 @@ def hardly_any_inertia(near: NearlySingular | None) -> Iterator[str]:
     """A matrix M so near to a singular one that rounding takes most digits of forward dynamics."""
     if near is not None:
         yield (
-            f"joint {near.joint!r}: M is nearly singular, κ = {near.condition:.1e}, so that forward dynamics may keep only"
-            f" {near.digits:.0f} digits; correct the inertia of what it moves, or give it armature (queries warn below"
-            f" {LEAST_DIGITS} digits; Robot.warn_below(None) for none of these warnings)"
+            f"joint {near.joint!r}: M is nearly singular, κ = {near.condition:.1e}, so that forward dynamics may keep"
+            f" only {near.digits:.0f} digits; correct the inertia of what it moves, or give it armature (queries warn"
+            f" below {LEAST_DIGITS} digits; Robot.warn_below(None) for none of these warnings)"
         )
 
 

@@ -159,7 +159,8 @@ class Robot(Dynamics, Parametrised):
         """A robot whose queries warn where their answers have fewer digits, as `digits` counts them.
 
         Of M, C, N, inverse and forward dynamics. An estimate, 8 n u κ of the terms, is made first; digits are counted
-        only where it is below, and of up to 64 joints. Takes milliseconds a state, and does not reach machine code made of the robot.
+        only where it is below, and of up to 64 joints. Takes milliseconds a state, and does not reach machine code made
+        of the robot. A robot is loaded with 8 digits if M is nearly singular at a configuration without symmetries.
 
         Args:
             digits: From above 0 to 20; None for no warnings, and no cost.

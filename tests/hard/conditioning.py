@@ -4,8 +4,8 @@
 
 u = 2⁻⁵³; the terms are those of `compare`. n links add n terms to an entry, each after products of n rotations of 3
 terms and more: 32 n u is what such sums may lose. κ is that of M scaled to a unit diagonal, of which Cholesky's
-solution loses n u κ. Where that leaves fewer than eight digits the answer says how many hold, or the robot that is loaded
-says that few may; where rounding hides whether M is singular it is refused, by name.
+solution loses n u κ. Where that leaves fewer than eight digits the answer says how many hold, or the robot that is
+loaded says that few may; where rounding hides whether M is singular it is refused, by name.
 [Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., 2002, sec. 3.1 and thm. 10.3]
 """
 
@@ -39,8 +39,9 @@ U = 2.0**-53
 BITS = 256
 SUMS, SOLVED = 32, 8
 COMPILED = {  # machine code takes seconds to make: one of each kind
-    "planar, 2 joints", "spatial, 7 joints", "mass ratio 1e+08", "tip of 1e-06 kg", "axes 1e-07 rad apart, 0.001 kg between",
-    "links of 1e-06 m", "from 1 km to 1 µm", "turning and sliding", "base 10000 m away", "base 5000000 m away",
+    "planar, 2 joints", "spatial, 7 joints", "mass ratio 1e+08", "tip of 1e-06 kg",
+    "axes 1e-07 rad apart, 0.001 kg between", "links of 1e-06 m", "from 1 km to 1 µm", "turning and sliding",
+    "base 10000 m away", "base 5000000 m away",
 }  # fmt: skip
 QUERIES = (M, C, N, CORIOLIS_TORQUE, INVERSE_DYNAMICS)
 FEW = 1e-8  # of forward dynamics: with a larger error it has fewer than eight digits

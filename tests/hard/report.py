@@ -56,9 +56,10 @@ def _page(results: Sequence[Result], seed: int) -> Iterator[str]:
     yield "# Hard cases"
     yield ""
     yield (
-        "Written by `python -m tests.hard --full --write`, which `make stress` runs; the same rows are in `hard_cases.json`."
-        " Each figure is held to what is allowed, with the reason of it above its table. A figure that does not hold and"
-        " was said to be so (a refusal, a finding, the verdict of a run) counts as *said*; one without a word as *SILENT*."
+        "Written by `python -m tests.hard --full --write`, which `make stress` runs; the same rows are in"
+        " `hard_cases.json`. Each figure is held to what is allowed, with the reason of it above its table. A figure"
+        " that does not hold and was said to be so (a refusal, a finding, the verdict of a run) counts as *said*; one"
+        " without a word as *SILENT*."
     )
     yield ""
     yield (

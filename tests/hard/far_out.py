@@ -1,0 +1,132 @@
+"""Angles of 1e16 rad, velocities whose squares nearly overflow, denormals, NaN and infinity beside numbers.
+
+A float of 1e16 rad is one angle, whose sine is known; terms grow as v². What has a finite answer gets it, to 32 n u of
+the terms added, as under Conditioning; what overflows is refused by name. In a batch with errors="nan" the rows
+beside one without an answer have the bits of the batch with a finite row in its place; else the row is named, and
+`out` is as it was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import robot_dyn as rd
+from robot_dyn.arithmetic import midpoint
+from robot_dyn.compiled.right_angles import completed
+from robot_dyn.errors import NotFiniteError, RobotDynError
+from robot_dyn.lagrange.magnitude import magnitudes
+from robot_dyn.lagrange.scale import diagonal_scale, floored, scaled
+from robot_dyn.model.quantity import INVERSE_DYNAMICS, M, N, Quantity
+from tests.hard.case import Case, Row
+from tests.hard.conditioning import SUMS, U
+
+TITLE = "Range"
+BITS = 1400  # 1e160² beside 1e-160
+BATCH, SPOILT = 19, 7
+
+
+class Roads(NamedTuple):
+    """A robot with its right angles written out in full, its engines and its balls."""
+
+    robot: rd.Robot
+    engines: dict[str, Any]
+    truth: rd.Lagrangian
+
+
+def roads(name: str) -> Roads:
+    """Of a robot of the catalog."""
+    robot, _ = completed(rd.load(name))
+    engines = {"Pinocchio": robot, "Lagrangian": rd.Lagrangian(robot), "machine code": rd.Compiled(robot)}
+    return Roads(robot, engines, rd.Lagrangian(robot, rd.Ball(BITS)))
+
+
+def error(of: Roads, road: str, quantity: Quantity, state: dict[str, np.ndarray]) -> float:
+    """In units of n u of the terms added."""
+    size = magnitudes(rd.Lagrangian(of.robot).linkage, state["q"])
+    x = midpoint(quantity.ask(of.truth, state))
+    absolute = {key: np.abs(value) for key, value in state.items()}
+    with np.errstate(over="ignore"):  # of the terms where v² overflows, and every road refuses
+        scale = diagonal_scale(x) if quantity.definite else quantity.terms(size, absolute)
+    difference = quantity.ask(of.engines[road], state) - x
+    return float(scaled(difference, floored(np.asarray(scale))).max() / (of.robot.n * U))
+
+
+def general(n: int, seed: int) -> np.ndarray:
+    """q, v and a, from 0.5 to 1 in size, (3, n)."""
+    rng = np.random.default_rng((23, seed))
+    return rng.uniform(0.5, 1.0, (3, n)) * rng.choice([-1, 1], (3, n))
+
+
+def far_angles(name: str, far: float, seed: int) -> Iterator[Row]:
+    """M and N at angles of any size, which are reduced exactly."""
+    of = roads(name)
+    q = far * general(of.robot.n, seed)[0]
+    for road in of.engines:
+        found = max(error(of, road, quantity, {"q": q}) for quantity in (M, N))
+        yield Row(f"{name}: q of {far:g} rad", f"{road}: M, N, in n u", found, SUMS)
+
+
+def fast(name: str, speed: float, seed: int) -> Iterator[Row]:
+    """Inverse dynamics at velocities of any size whose squares are finite."""
+    of = roads(name)
+    q, v, a = general(of.robot.n, seed)
+    for road in of.engines:
+        found, said = float("nan"), ""
+        try:
+            found = error(of, road, INVERSE_DYNAMICS, {"q": q, "v": speed * v, "a": a})
+        except RobotDynError as refusal:
+            said = str(refusal)
+        finite = speed * speed < 1e307
+        if finite or said:
+            yield Row(f"{name}: v of {speed:g} rad/s", f"{road}: ID, in n u", found, SUMS, "" if finite else said)
+        else:
+            yield Row(f"{name}: v of {speed:g} rad/s", f"{road}: answers where v² overflows", float("nan"), SUMS)
+
+
+def spoilt(name: str, bad: float, seed: int) -> Iterator[Row]:
+    """A row without an answer leaves the others as they are."""
+    of, rng = roads(name), np.random.default_rng((29, seed))
+    n = of.robot.n
+    q, (v, tau) = rng.uniform(-1, 1, (BATCH, n)), rng.normal(size=(2, BATCH, n))
+    marred = q.copy()
+    marred[SPOILT, n // 2] = bad
+    others = np.arange(BATCH) != SPOILT
+    for road, engine in of.engines.items():
+        changed, named = 0, 0
+        for query, rest in (("M", ()), ("inverse_dynamics", (v, tau)), ("forward_dynamics", (v, 10 * tau))):
+            ask = getattr(engine, query)
+            whole, made = ask(q, *rest), ask(marred, *rest, errors="nan")
+            changed += int(np.sum(made[others] != whole[others])) + int(np.sum(~np.isnan(made[SPOILT])))
+            named += _is_named(partial(ask, marred, *rest))
+        case = f"{name}: a row with {bad}"
+        yield Row(case, f"{road}: entries of other rows with other bits", changed, 0)
+        yield Row(case, f"{road}: queries that do not name the row", 3 - named, 0)
+    yield Row(case, "machine code: entries of out that were touched", _touched(of.engines["machine code"], marred), 0)
+
+
+def _is_named(ask: Callable[[], Any]) -> bool:
+    try:
+        ask()
+    except NotFiniteError as refusal:
+        return f"in row {SPOILT} of the batch" in str(refusal)
+    return False
+
+
+def _touched(compiled: Any, q: np.ndarray) -> int:
+    out = np.full((*q.shape, q.shape[1]), 7.0)
+    try:
+        compiled.M(q, out=out)
+    except NotFiniteError:
+        return int(np.sum(out != 7.0))
+    return out.size
+
+
+CASES = [
+    *(Case(f"q of {far:g} rad", partial(far_angles, "ur5", far)) for far in (1e3, 1e5, 1e9, 1e16)),
+    *(Case(f"v of {v:g} rad/s", partial(fast, "ur5", v)) for v in (5e-324, 1e-200, 1e-10, 1e75, 1e150, 1e160)),
+    *(Case(f"{bad} in a row", partial(spoilt, "ur5", bad)) for bad in (np.nan, np.inf, -np.inf)),
+]
