@@ -49,6 +49,10 @@ class ControlError(RobotDynError):
     """A controller or reference with values that are not allowed, or of the wrong shape."""
 
 
+class ProofError(RobotDynError):
+    """A run of which no theorem can be proven: a part of it switches, or is not known to be analytic."""
+
+
 class EffectError(RobotDynError):
     """An effect with coefficients that have no physical meaning, or of the wrong shape."""
 

@@ -1,0 +1,165 @@
+"""One proven step: polynomial, defect, tube, and the error set carried on; shorter until all bounds hold."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import final
+
+import numpy as np
+
+from robot_dyn.proof.balls import Ball, NotProvenError, between, exact, horner, upper
+from robot_dyn.proof.defect import defect
+from robot_dyn.proof.linearised import jacobian
+from robot_dyn.proof.mass import Inverse
+from robot_dyn.proof.lohner import ErrorSet, carried, fundamental
+from robot_dyn.proof.polynomial import Polynomial, taylor
+from robot_dyn.proof.tape import Tape
+from robot_dyn.proof.tube import Tube, logarithmic_norm, tube
+
+_GRID = 2**40  # steps are multiples of 1/grid, so that times are short sums
+_SHORTER, _TRIES = Fraction(3, 4), 24
+_LONGER = 1.2  # than the step before
+_GROWTH = 0.6  # h L that is tried
+_SWEEPS = 30  # of power iteration
+
+
+@final
+@dataclass(frozen=True)
+class Effort:
+    """What a proof puts into its steps.
+
+    Attributes:
+        order: Of the accelerations of a polynomial.
+        tolerance: Of the last term of a step's velocity.
+    """
+
+    order: int
+    tolerance: float
+
+
+def effort(bits: int) -> Effort:
+    """Order and tolerance for a precision: 10 and 1e-12 at 53 bits, 14 and 1e-16 at 100."""
+    more = (bits - 53) / 47
+    return Effort(max(round(10 + 4 * more), 4), max(10.0 ** -(12 + 4 * more), 1e-300))
+
+
+@final
+@dataclass(frozen=True)
+class State:
+    """Where a step starts: the centre of a set, and the set about it.
+
+    Attributes:
+        t: Time in [s].
+        q, v: The centre, exact.
+        error: What the true state may be off it.
+    """
+
+    t: Fraction
+    q: tuple[Ball, ...]
+    v: tuple[Ball, ...]
+    error: ErrorSet
+
+
+@final
+@dataclass(frozen=True)
+class Step:
+    """A step that is proven.
+
+    Attributes:
+        start: Its start.
+        h: In [s].
+        p: Its polynomial.
+        tube: Around it.
+        end: Its end.
+    """
+
+    start: State
+    h: Fraction
+    p: Polynomial
+    tube: Tube
+    end: State
+
+
+def proven_step(tape: Tape, start: State, most: Fraction, how: Effort, before: Fraction | None = None) -> Step:
+    """The longest step within `most` that is found to be proven; after one of `before` hardly longer than that.
+
+    Raises:
+        NotProvenError: If none is; says why.
+    """
+    time = exact(start.t)
+    try:
+        inverse = Inverse.of(tape.mass(start.q))
+        p = taylor(tape, time, start.q, start.v, inverse, how.order)
+        weights, rate = _weights(tape, time, p, inverse)
+        h = _first(p, rate, most, how, before)
+    except ValueError:
+        raise NotProvenError("M may be singular") from None
+    for attempt in range(_TRIES):
+        try:
+            return _step(tape, time, start, p, inverse, weights, rate, h, how.order)
+        except NotProvenError as error:
+            why = error
+        except ValueError:  # a power series is divided by one that may begin with 0
+            why = NotProvenError("a pivot of M may be 0 within a step")
+        shorter = _on_grid(h * _SHORTER)
+        if shorter <= 0 or attempt == _TRIES - 1:
+            raise why
+        h = shorter
+    raise AssertionError
+
+
+def _step(
+    tape: Tape, time: Ball, start: State, p: Polynomial, inverse: Inverse, weights: Sequence[Ball], rate: float,
+    step: Fraction, order: int,
+) -> Step:  # fmt: skip
+    h = exact(step)
+    T = between(0 * h, h)
+    d = defect(tape, time, p, inverse, h, T, order)
+    around = tube(tape, time, p, inverse, h, d, start.error.bounds, weights, rate)
+    Y, delta = fundamental(tape, time, p, inverse, h, T, around)
+    ends = [horner(each, h) for each in (*p.q, *p.v)]
+    centre = tuple(each.mid() for each in ends)
+    error = carried(start.error, Y, delta, around, [upper(each - c) for each, c in zip(ends, centre, strict=True)])
+    end = State(start.t + step, centre[: tape.n], centre[tape.n :], error)
+    return Step(start, step, p, around, end)
+
+
+def _weights(tape: Tape, time: Ball, p: Polynomial, inverse: Inverse) -> tuple[list[Ball], float]:
+    """Exact weights in which the logarithmic norm at the start is about the least, and it: Perron's vector of |J|."""
+    from flint import arb
+
+    n = tape.n
+    (J,) = jacobian(tape, inverse, (time, *p.at(arb(0))))
+    A = np.zeros((2 * n, 2 * n))
+    A[:n, n:] = np.eye(n)
+    A[n:] = [[abs(float(J[i, j].mid())) for j in range(2 * n)] for i in range(n)]
+    x = np.ones(2 * n)
+    shift = max(float(np.sqrt(np.abs(A[n:, :n]).max())), float(A[n:, n:].max()), 1e-3)
+    for _ in range(_SWEEPS):
+        x = A @ x + shift * x
+        x = np.maximum(x / x.max(), 1e-9)
+    if not np.isfinite(x).all():
+        raise NotProvenError("the Jacobian is not finite")
+    w = [arb(float(each)) for each in x]
+    return w, float(logarithmic_norm(J, w))
+
+
+def _first(p: Polynomial, rate: float, most: Fraction, how: Effort, before: Fraction | None) -> Fraction:
+    """The step that is tried first: by the last coefficients, and by the growth of errors."""
+    found = [float(most)]
+    for k in (how.order, how.order + 1):
+        size = max(float(abs(each[k])) for each in p.v)
+        if size > 0:
+            found.append(0.9 * (how.tolerance / size) ** (1 / k))
+    if rate > 0:
+        found.append(_GROWTH / rate)
+    if before is not None:
+        found.append(_LONGER * float(before))
+    h = min(found)
+    return most if h >= float(most) else max(_on_grid(Fraction(h)), Fraction(1, _GRID))
+
+
+def _on_grid(h: Fraction) -> Fraction:
+    return Fraction(int(h * _GRID), _GRID)
