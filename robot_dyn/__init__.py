@@ -92,6 +92,8 @@ if TYPE_CHECKING:
     from robot_dyn.model.edits import Payload as Payload
     from robot_dyn.model.loading import load as load
     from robot_dyn.model.robot import Robot as Robot
+    from robot_dyn.proof.prove import prove as prove
+    from robot_dyn.proof.theorem import Proof as Proof
     from robot_dyn.scene.scene import read_scene as read_scene
     from robot_dyn.simulation.event import Event as Event
     from robot_dyn.simulation.linearise import linearise as linearise
@@ -160,6 +162,7 @@ _HOME = {
     "PiecewisePolynomial": "control.reference",
     "Plant": "effects.plant",
     "PrecisionWarning": "errors",
+    "Proof": "proof.theorem",
     "Quantisation": "control.quantisation",
     "RateLimit": "control.rate_limit",
     "RegularisedCoulombFriction": "effects.friction",
@@ -199,6 +202,7 @@ _HOME = {
     "method": "integrate.methods",
     "midpoint": "arithmetic",
     "plot": "view.plots",
+    "prove": "proof.prove",
     "quintic": "control.reference",
     "radius": "arithmetic",
     "read_scene": "scene.scene",

@@ -55,7 +55,7 @@ def values() -> dict[str, Any]:
         setup, run, runs, run.ledger, run.error, run.statistics, run.outcome, ARM.couplings, ARM.edits,
         rd.task_dynamics(ARM, Q, Q, "tip", rows=(0, 2)), rd.method("rk4"), rd.method("gauss_4"), rd.method("sdirk_3"),
         rd.WorkPrecision("arm", (), "rad", 1.0, Reference(Q, Q, 1e-12, ("a", "b"), 1.0), (), (), {}, 1.0, 1.0),
-        rd.advise(setup), rd.Cost("arm", (), (), (), {}, 1.0, 1.0),
+        rd.prove(rd.Setup(plant, Q), 0.01), rd.advise(setup), rd.Cost("arm", (), (), (), {}, 1.0, 1.0),
         rd.certify(rd.load("pendulum"), samples=100, repeats=1), rd.check("pendulum"),
     ]  # fmt: skip
     named: dict[str, Any] = {type(each).__name__: each for each in made}

@@ -34,6 +34,7 @@ RESULTS = {
     "Checkup",
     "Comparison",
     "Cost",
+    "Proof",
     "Rollouts",
     "Trajectory",
     "WorkPrecision",
@@ -92,6 +93,7 @@ def examples(folder: Path) -> dict[str, Example]:
     plant, own = rd.Plant(robot, [friction]), rd.Lagrangian(robot)
     setup = rd.Setup(plant, q, duration_s=0.01, integrator="rk4")
     run, several = rd.simulate(setup), rd.rollouts(setup, np.tile(q, (2, 1)))
+    proven = rd.prove(setup, bits=53)
     measured = rd.work_precision(replace(setup, engine="interpreted"), methods=["rk4"], repeats=1)
     priced = rd.cost(setup, budget_s=1e-9, repeats=1)
     saved, scene, urdf = rd.save_run(run, folder / "run"), folder / "scene.toml", folder / "arm.urdf"
@@ -147,6 +149,15 @@ def examples(folder: Path) -> dict[str, Example]:
              "actuation": [rd.RateLimit(9.0)], "measurement_delay": 1.5, "actuation_delay": 0.5, "seed": 3, "run": 1},
         ),
         "LowPass": (rd.LowPass, {"cutoff": [9.0, 8.0], "order": 1}),
+        "Proof.at": (proven.at, {"t": 0.01}),
+        "Proof.contains": (proven.contains, {"t": 0.01, "q": q, "v": v}),
+        "Proof.digits_of": (proven.digits_of, {"t": run.t, "q": run.q}),
+        "Trajectory.proven_digits": (run.proven_digits, {"proof": proven}),
+        "prove": (
+            rd.prove,
+            {"setup": setup, "until_s": 0.001, "bits": 53, "q0": q, "v0": v, "width_q": 1e-9,
+             "width_v": 1e-9, "budget_s": 1.0, "on_progress": print},
+        ),
         "Multirate": (rd.Multirate, {"fast": sampled, "slow": rd.PD(hold, 1.0, 1.0, 0.02)}),
         "Noise": (rd.Noise, {"deviation": [0.1, 0.2]}),
         "Quantisation": (rd.Quantisation, {"resolution": [0.1, 0.2]}),

@@ -31,7 +31,7 @@ def _run() -> Any:
     """The exit code of the command."""
     import warnings
 
-    from robot_dyn.cli import ask, check, demo, keep, price, run, show  # noqa: F401  each adds its commands
+    from robot_dyn.cli import ask, check, demo, keep, price, prove, run, show  # noqa: F401  each adds its commands
     from robot_dyn.cli.app import app
     from robot_dyn.cli.terminal import failed, finish, open_streams, tell
     from robot_dyn.errors import RobotDynError, RobotDynWarning

@@ -17,7 +17,7 @@ class NotProvenError(Exception):
 def upper(x: Ball) -> Ball:
     """An exact number that |x| does not exceed."""
     if not x.is_finite():
-        raise NotProvenError("a ball is not finite: a pivot of M may be 0, or a bound overflows")
+        raise NotProvenError("a ball is not finite: a divisor may be 0")
     return x.abs_upper()
 
 

@@ -58,7 +58,9 @@ def on_a_set(
         NotProvenError: If C does not hold a − p'' everywhere, or M may be singular.
     """
     n = tape.n
-    q, v, a = ([x + b for x, b in zip(known, wide, strict=True)] for known, wide in zip(p, (B[:n], B[n:], C), strict=True))
+    q, v, a = (
+        [x + b for x, b in zip(known, wide, strict=True)] for known, wide in zip(p, (B[:n], B[n:], C), strict=True)
+    )
     ((right, M),) = _parts(tape, (t, q, v, a), 1)
     more = inverse.contraction(M)
     J = -inverse.solve(more, right)

@@ -53,11 +53,11 @@ class Inverse:
             NotProvenError: If ε is not less than 1: then one of them may be singular.
         """
         n, u, product = M.nrows(), self.units, self.A * M
-        epsilon = largest(
-            dot([upper(int(i == j) - product[i, j]) for j in range(n)], u) / u[i] for i in range(n)
-        )
+        epsilon = largest(dot([upper(int(i == j) - product[i, j]) for j in range(n)], u) / u[i] for i in range(n))
         if not epsilon < 1:
-            raise NotProvenError("M may be singular within a step")
+            raise NotProvenError(
+                "within a step M is not certainly regular: the set of states is too wide, or M nearly singular"
+            )
         return upper(epsilon / (1 - epsilon))
 
     def bound(self, more: Ball, r: Sequence[Ball]) -> list[Ball]:

@@ -12,13 +12,14 @@ import numpy as np
 from robot_dyn.proof.balls import Ball, NotProvenError, between, exact, horner, upper
 from robot_dyn.proof.defect import defect
 from robot_dyn.proof.linearised import jacobian
-from robot_dyn.proof.mass import Inverse
 from robot_dyn.proof.lohner import ErrorSet, carried, fundamental
+from robot_dyn.proof.mass import Inverse
 from robot_dyn.proof.polynomial import Polynomial, taylor
 from robot_dyn.proof.tape import Tape
 from robot_dyn.proof.tube import Tube, logarithmic_norm, tube
 
-_GRID = 2**40  # steps are multiples of 1/grid, so that times are short sums
+_GRID = 2**40  # steps end at multiples of 1/grid, so that times are floats
+_LONGEST_S = 1.0
 _SHORTER, _TRIES = Fraction(3, 4), 24
 _LONGER = 1.2  # than the step before
 _GROWTH = 0.6  # h L that is tried
@@ -40,9 +41,9 @@ class Effort:
 
 
 def effort(bits: int) -> Effort:
-    """Order and tolerance for a precision: 10 and 1e-12 at 53 bits, 14 and 1e-16 at 100."""
-    more = (bits - 53) / 47
-    return Effort(max(round(10 + 4 * more), 4), max(10.0 ** -(12 + 4 * more), 1e-300))
+    """Order and tolerance for a precision: 14 and 1e-16 at 53 bits, 20 and 1e-22 at 100."""
+    more = 6 * (bits - 53) / 47
+    return Effort(round(14 + more), max(10.0 ** -(16 + more), 1e-300))
 
 
 @final
@@ -82,8 +83,8 @@ class Step:
     end: State
 
 
-def proven_step(tape: Tape, start: State, most: Fraction, how: Effort, before: Fraction | None = None) -> Step:
-    """The longest step within `most` that is found to be proven; after one of `before` hardly longer than that.
+def proven_step(tape: Tape, start: State, end: Fraction, how: Effort, before: Fraction | None = None) -> Step:
+    """The longest step up to `end` that is found to be proven; after one of `before` hardly longer than that.
 
     Raises:
         NotProvenError: If none is; says why.
@@ -93,7 +94,7 @@ def proven_step(tape: Tape, start: State, most: Fraction, how: Effort, before: F
         inverse = Inverse.of(tape.mass(start.q))
         p = taylor(tape, time, start.q, start.v, inverse, how.order)
         weights, rate = _weights(tape, time, p, inverse)
-        h = _first(p, rate, most, how, before)
+        h = _to_grid(start.t, end, _first(p, rate, how, before))
     except ValueError:
         raise NotProvenError("M may be singular") from None
     for attempt in range(_TRIES):
@@ -102,11 +103,10 @@ def proven_step(tape: Tape, start: State, most: Fraction, how: Effort, before: F
         except NotProvenError as error:
             why = error
         except ValueError:  # a power series is divided by one that may begin with 0
-            why = NotProvenError("a pivot of M may be 0 within a step")
-        shorter = _on_grid(h * _SHORTER)
-        if shorter <= 0 or attempt == _TRIES - 1:
+            why = NotProvenError("a divisor may be 0 within a step")
+        h = _to_grid(start.t, end, h * _SHORTER)
+        if attempt == _TRIES - 1:
             raise why
-        h = shorter
     raise AssertionError
 
 
@@ -146,20 +146,23 @@ def _weights(tape: Tape, time: Ball, p: Polynomial, inverse: Inverse) -> tuple[l
     return w, float(logarithmic_norm(J, w))
 
 
-def _first(p: Polynomial, rate: float, most: Fraction, how: Effort, before: Fraction | None) -> Fraction:
-    """The step that is tried first: by the last coefficients, and by the growth of errors."""
-    found = [float(most)]
+def _first(p: Polynomial, rate: float, how: Effort, before: Fraction | None) -> Fraction:
+    """The step that is tried first: by the last coefficients, by the growth of errors, and by the step before."""
+    found = [_LONGEST_S] if before is None else [_LONGER * float(before)]
     for k in (how.order, how.order + 1):
         size = max(float(abs(each[k])) for each in p.v)
         if size > 0:
             found.append(0.9 * (how.tolerance / size) ** (1 / k))
     if rate > 0:
         found.append(_GROWTH / rate)
-    if before is not None:
-        found.append(_LONGER * float(before))
-    h = min(found)
-    return most if h >= float(most) else max(_on_grid(Fraction(h)), Fraction(1, _GRID))
+    return Fraction(min(found))
 
 
-def _on_grid(h: Fraction) -> Fraction:
-    return Fraction(int(h * _GRID), _GRID)
+def _to_grid(t: Fraction, end: Fraction, h: Fraction) -> Fraction:
+    """A step of about h that ends on the grid, or at the end."""
+    if t + h >= end:
+        return end - t
+    after = Fraction(int((t + h) * _GRID), _GRID)
+    if not after > t:
+        raise NotProvenError("steps become too short")
+    return after - t

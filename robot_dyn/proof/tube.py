@@ -97,6 +97,6 @@ def logarithmic_norm(J: Matrix, w: Sequence[Ball]) -> Ball:
         row = sum((upper(J[i, j]) * w[j] for j in range(2 * n) if j != n + i), start=0 * w[0])
         bound = J[i, n + i] + row / w[n + i]
         if not bound.is_finite():
-            raise NotProvenError("a ball is not finite: a pivot of M may be 0, or a bound overflows")
+            raise NotProvenError("a ball is not finite: a divisor may be 0")
         most = bound.upper() if bound.upper() > most else most
     return most

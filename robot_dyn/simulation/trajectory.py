@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import final
+from typing import Any, Protocol, final, runtime_checkable
 
 import numpy as np
 
 from robot_dyn import former
+from robot_dyn.errors import QueryError, shown
 from robot_dyn.model.units import units
 from robot_dyn.simulation.error import ErrorEstimate
 from robot_dyn.simulation.event import Occurrence
@@ -31,6 +32,21 @@ class Ending(StrEnum):
     FINISHED = "finished"
     DIVERGED = "diverged"
     STOPPED = "stopped"
+
+
+@runtime_checkable
+class Theorem(Protocol):
+    """What is proven of a motion, as `rd.Proof`."""
+
+    joint_names: tuple[str, ...]
+
+    def contains(self, t: float, q: Any, v: Any = None) -> bool:
+        """Whether a state may be that of the motion at t."""
+        ...
+
+    def digits_of(self, t: np.ndarray, q: np.ndarray) -> float:
+        """Decimal digits of positions (m, n) at times (m,) that are confirmed."""
+        ...
 
 
 @final
@@ -188,6 +204,23 @@ class Trajectory(Value):
         if span > 0 and self.ledger.closure > _CONTRADICTS * max(self.error.final / span, _ROUNDING):
             return "it does not close as the estimated error of q says: do not trust the estimate, take a smaller step"
         return ""
+
+    def proven_digits(self, proof: Theorem) -> float:
+        """Decimal digits of q that a theorem confirms: −log₁₀ of the largest possible error, in [rad] or [m].
+
+        Args:
+            proof: Of the same motion, as `rd.prove` makes it; samples beyond its end are left out.
+
+        Raises:
+            QueryError: If it is of other joints, or its motion starts elsewhere.
+        """
+        if not isinstance(proof, Theorem):
+            raise QueryError(f"proof: give one, as rd.prove(setup), got {shown(proof)}")
+        if proof.joint_names != self.joint_names:
+            raise QueryError(f"proof is of the joints {', '.join(proof.joint_names)}; give one of this motion")
+        if self.t[0] == 0 and not proof.contains(0.0, self.q[0], self.v[0]):
+            raise QueryError("the motion of the proof starts elsewhere; give one of this motion")
+        return proof.digits_of(self.t, self.q)
 
     @property
     def summary(self) -> str:
