@@ -1,7 +1,7 @@
 """Motions to many digits by another road than that of proofs: the closed form in balls, extrapolated midpoint steps.
 
-Gragg, Bulirsch and Stoer: y(h; n) by the modified midpoint rule has an error in powers of (h/n)², which Neville's scheme
-takes away, order by order. [Hairer, Nørsett, Wanner 1993, II.9]
+Gragg, Bulirsch and Stoer: y(h; n) by the modified midpoint rule has an error in powers of (h/n)², which Neville's
+scheme takes away, order by order. [Hairer, Nørsett, Wanner 1993, II.9]
 """
 
 from __future__ import annotations

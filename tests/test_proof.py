@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from fractions import Fraction
 from math import nextafter
@@ -149,8 +150,10 @@ def test_derivatives_of_the_tape_hold_differences_of_the_closed_form(name: str) 
 
 
 def test_a_theorem_says_which_numbers_it_is_about() -> None:
-    """The decimal 0.31 and the float nearest to it, gravity and its neighbour, literal and completed right angles:
-    at 100 bits each of the two has its own balls, and they do not overlap."""
+    """The decimal 0.31 and the float nearest to it, gravity and its neighbour, literal and completed right angles.
+
+    At 100 bits each of two has its own balls, and they do not overlap.
+    """
     robot = arm("ur5")
     decimals = proof(robot, 0.01, 100)
     floats = proof(robot, 0.01, 100, q0=[float(x) for x in GENERAL_Q[:6]], v0=[float(x) for x in GENERAL_V[:6]])
@@ -188,7 +191,7 @@ def test_a_polynomial_need_not_be_right() -> None:
             for x, y, bound in zip([*q, *v], [*end.q, *end.v], bounds, strict=True):
                 assert upper(x - y) < bound
             sizes.append(float(largest(bounds)))
-    assert sizes[0] < 1e-14 and all(low < high for low, high in zip(sizes, sizes[1:], strict=False))
+    assert sizes[0] < 1e-14 and all(low < high for low, high in itertools.pairwise(sizes))
 
 
 def test_nothing_that_is_not_finite_passes_as_a_bound() -> None:
@@ -295,7 +298,7 @@ def test_few_bits_are_enough_for_a_theorem_of_few_digits() -> None:
 def test_steps_end_at_floats_and_cover_the_time() -> None:
     made = proof(arm("planar_2r"), 0.1)
     t = [node.t for node in made.nodes]
-    assert t[0] == 0 and t[-1] == 0.1 and all(a < b for a, b in zip(t, t[1:], strict=False))
+    assert t[0] == 0 and t[-1] == 0.1 and all(a < b for a, b in itertools.pairwise(t))
     assert all(d & (d - 1) == 0 for d in (Fraction(x).denominator for x in t))
 
 
@@ -357,8 +360,9 @@ def test_what_switches_is_refused_by_name(name: str, parts: dict[str, Any]) -> N
 @pytest.mark.parametrize(
     "wrong",
     [
-        {"q0": ["0.1", "nan"]}, {"q0": ["0.1"]}, {"q0": "0.1"}, {"v0": [1j, 0]}, {"q0": [True, 0]}, {"q0": ["1e999", "0"]},
-        {"q0": [[0.1], [0.2]]}, {"width_q": -1.0}, {"budget_s": 0.0}, {"bits": 20}, {"until_s": 1e9},
+        {"q0": ["0.1", "nan"]}, {"q0": ["0.1"]}, {"q0": "0.1"}, {"v0": [1j, 0]}, {"q0": [True, 0]},
+        {"q0": ["1e999", "0"]}, {"q0": [[0.1], [0.2]]}, {"width_q": -1.0}, {"budget_s": 0.0},
+        {"bits": 20}, {"until_s": 1e9},
     ],
 )  # fmt: skip
 def test_starts_that_are_no_numbers_are_refused(wrong: dict[str, Any]) -> None:
