@@ -5,7 +5,7 @@ With e(h) = q_h − q the error of a run of step h:
     order seen   |e(h)| ≈ |q_h − q_2h| / (2ᵖ − 1), where |q_h − q_3h| / |q_h − q_2h| is near (3ᵖ − 1) / (2ᵖ − 1)
     bounded      |e(h)| ≤ about max |q_h − q_mh| / (m − 1) over m = 2, 3, 5: undivided but for the order 1 that every
                  method keeps; steps of incommensurate lengths do not meet a switch at the same node
-    none         where the companions differ as much as the motion itself
+    none         where the companions differ by more than a tenth of the motion, or 0.1 rad or m
 
 [Richardson 1911; Hairer, Nørsett, Wanner 1993, II.4]
 """
@@ -22,7 +22,7 @@ import numpy as np
 from robot_dyn.simulation.error import ErrorEstimate, Verdict, no_estimate
 from robot_dyn.simulation.record import Path
 
-ROUNDED = "what rounding leaves of q, as the motion magnifies it, is as large as the motion itself"
+ROUNDED = "what rounding leaves of q, as the motion magnifies it, is more than"
 ROUNDING = 4500  # units of rounding of q, or as many as steps if there are more: differences below are not an error
 COARSE = (Fraction(2), Fraction(3), Fraction(5))
 FINE = (Fraction(1, 2), Fraction(1, 3))
@@ -61,13 +61,15 @@ class Estimated:
         seen = (ratio > nominal / _BAND) & (ratio < nominal * _BAND) | (self.floor >= A)
         return self._judged(np.where(self._smooth(seen), A / (2.0**order - 1), bound), bound, seen)
 
-    def from_shorter_steps(self, companions: Mapping[Fraction, Path]) -> ErrorEstimate:
-        """The estimate from companions of `FINE`: |q_h − q_{h/m}| = |e(h)| (1 − m⁻ᵖ) needs no division."""
+    def from_shorter_steps(self, companions: Mapping[Fraction, Path], order: int) -> ErrorEstimate:
+        """The estimate from companions of `FINE`: |q_h − q_{h/m}| = |e(h)| (1 − m⁻ᵖ), of order 1 where none shows."""
         half, third = (companions[pace] for pace in FINE)
         between = differences(third, half, self.n)[np.searchsorted(third.key[:-1], self.path.key)]
         gaps = [differences(self.path, each, self.n) for each in (half, third)]
-        error = np.maximum(np.maximum(*gaps), between)
-        return self._judged(error, error, (between < error / 2) | (error <= self.floor))
+        largest = np.maximum(np.maximum(*gaps), between)
+        seen = (between < largest / 2) | (largest <= self.floor)
+        error = np.maximum(largest, gaps[1] / (1 - 3.0 ** -np.where(self._smooth(seen), order, 1)))
+        return self._judged(error, error, seen)
 
     def from_refinement(self, finer: Path, loose: Path | None) -> ErrorEstimate:
         """The estimate of a method that chooses its steps.
@@ -83,10 +85,16 @@ class Estimated:
         return self._judged(np.where(self._smooth(seen), near, bound), bound, seen)
 
     def lost_at(self, companion: Path) -> float:
-        """Time in [s] at which a companion differs from the run as much as the motion itself; inf if it does not."""
+        """Time in [s] at which a companion tells nothing more of the run; inf if it does not."""
         gap = differences(self.path, companion, self.n)
         lost = np.flatnonzero(np.isnan(gap) | (gap > self.meaningless))
         return float(self.path.t[lost[0]]) if len(lost) else np.inf
+
+    @property
+    def _limit(self) -> str:
+        """What `meaningless` is, in words."""
+        most = "rad or m" if self.meaningless >= _LOST else "[rad] or [m], a tenth of the motion"
+        return f"{self.meaningless:.2g} {most}"
 
     def _smooth(self, seen: np.ndarray) -> np.ndarray:
         return seen & (self.path.t < self.kink)
@@ -96,11 +104,8 @@ class Estimated:
         t, error = self.path.t, np.maximum(error, self.floor)
         bad = np.flatnonzero(np.isnan(bound) | (np.maximum(bound, self.floor) > self.meaningless))
         last = int(bad[0]) - 1 if len(bad) else len(t) - 1
-        why = (
-            ROUNDED
-            if len(bad) and self.floor[bad[0]] > self.meaningless
-            else "runs with other steps differ as much as the motion itself"
-        )
+        rounded = len(bad) and self.floor[bad[0]] > self.meaningless
+        why = f"{ROUNDED if rounded else 'runs with other steps differ by more than'} {self._limit}"
         if last < 1 < len(t):
             return no_estimate(why)
         rows = np.unique(np.linspace(0, last, min(last + 1, _ROWS)).astype(int))

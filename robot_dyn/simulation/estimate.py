@@ -25,7 +25,7 @@ from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.smoothness import first_kink
 from robot_dyn.simulation.state_equation import StateEquation
 
-_GAIN = 1.3  # in the time resolved, that a shorter step must bring
+_GAIN = 1.1  # in the time resolved, that a shorter step must bring
 _MORE_STEPS = 1.05  # of a companion with tighter tolerances, so that it tells something
 _FAR_TURN = 1.0  # [rad] in a step: beyond, longer steps may meet the same angles
 _BLIND_TURN = np.pi  # [rad] in a step: beyond, shorter ones may, too
@@ -84,7 +84,7 @@ def _by_steps(
         return made  # chaos: no step of practical length resolves it
     pushed = differences(estimated.path, companion(Fraction(1), _pushed(setup)).shared, estimated.n)
     estimated = replace(estimated, floor=np.fmax(estimated.floor, pushed))
-    return estimated.from_shorter_steps({FINE[0]: half, FINE[1]: companion(FINE[1], setup).shared})
+    return estimated.from_shorter_steps({FINE[0]: half, FINE[1]: companion(FINE[1], setup).shared}, method.order)
 
 
 def _until_brief(setup: Setup, run: Record, made: ErrorEstimate) -> ErrorEstimate:
@@ -159,7 +159,7 @@ def _advised(setup: Setup, made: ErrorEstimate, why: str) -> ErrorEstimate:
         made = replace(made, reason=why or "the order of the method does not show")
     if not made.note:
         return made
-    if made.note == ROUNDED:
+    if made.note.startswith(ROUNDED):
         return replace(made, note=f"{made.note}; take a shorter run")
     method: Any = setup.integrator
     finer = f"rtol = {method.rtol / 100:.0e}" if method.controls_error else f"step_s = {setup.taken_step_s / 4:.0e}"

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from typing import cast
 
-from tests.hard import conditioning, far_out, tools
+from tests.hard import chaos, conditioning, far_out, tools
 from tests.hard.case import Family
 
-FAMILIES: dict[str, Family] = {
-    each.__name__.rpartition(".")[2]: cast("Family", each) for each in (conditioning, far_out, tools)
-}
+_ALL = (
+    conditioning,
+    far_out,
+    chaos,
+    tools,
+)
+FAMILIES: dict[str, Family] = {each.__name__.rpartition(".")[2]: cast("Family", each) for each in _ALL}
