@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.accuracy.sampled_loop import longest_period
-from robot_dyn.accuracy.stability import longest_step
+from robot_dyn.simulation.sampled_loop import longest_period
+from robot_dyn.simulation.stability import longest_step
 from tests.command import run
 from tests.estimates.advised import blow_up, limited
 from tests.estimates.scenes import RAIL

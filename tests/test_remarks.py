@@ -284,3 +284,53 @@ def test_regularised_friction_that_creeps_is_named_with_its_speed(joint) -> None
     assert rd.simulate(rd.Plant(joint, [rd.DryFriction(f)]), [0.1], **load).remarks == ()
     load["controller"] = lambda t, q, v: np.array([3.0])
     assert rd.simulate(rd.Plant(joint, [rd.RegularisedCoulombFriction(f, scale)]), [0.1], **load).remarks == ()
+
+
+@pytest.mark.parametrize("engine", ["interpreted", "compiled"])
+@pytest.mark.parametrize(("part", "grows"), [(0.97, False), (1.03, True)])
+def test_a_sampled_loop_that_grows_says_so_though_nothing_chatters(
+    joint, engine: str, part: float, grows: bool
+) -> None:
+    """M v̇ = −kp q a period late: z² (z − 1) … has |z| = 1 at the period of its Jury criterion, found by bisection."""
+    kp, kd = 40.0, 4.0
+
+    def radius(T: float) -> float:  # of (q, v, the torque on its way)
+        b = np.array([T**2 / 2, T, 0.0]) / INERTIA
+        made = np.array([[1, T, 0], [0, 1, 0], [-kp, -kd, 0]]) + np.outer(b, [0, 0, 1.0])
+        return float(np.abs(np.linalg.eigvals(made)).max())
+
+    low, high = 1e-3, 1e-1
+    while high / low > 1 + 1e-6:
+        middle = np.sqrt(low * high)
+        low, high = (middle, high) if radius(middle) < 1 else (low, middle)
+    period = part * low
+    loop = rd.Loop(rd.PD(rd.hold([0.0]), kp, kd, period), actuation_delay=1.0)
+    run = rd.simulate(
+        joint, [1e-6], duration_s=1000 * period, controller=loop, integrator="rk4", step_s=period, engine=engine,
+        estimate_error=False,
+    )  # fmt: skip
+    assert Kind.CHATTER not in kinds(run)
+    assert (Kind.UNSTABLE in kinds(run)) == grows
+    if grows:
+        (said,) = (each for each in run.remarks if each.kind is Kind.UNSTABLE)
+        assert said.value == pytest.approx(radius(period), rel=1e-6)
+        assert "sampled loop unstable, deviations grow: pivot by 1." in run.summary
+        assert float(said.remedy.split("take period_s=")[1].split(",")[0]) < low
+
+
+@pytest.mark.parametrize("steps", [{"integrator": "DOP853"}, {"integrator": "rk4", "step_s": 2e-3}])
+def test_a_task_that_is_damped_says_so_between_samples_too(steps) -> None:
+    """A planar arm held stretched but for 1e-3: the smallest eigenvalue of J M⁻¹ Jᵀ by inv(M). Bent, it is silent."""
+    arm, frame = rd.load("planar_2r").with_(gravity=(0, 0, 0)), "tip"
+    for bend, says in ((1e-3, True), (1.0, False)):
+        q = np.array([0.4, bend])
+        at = arm.placement(q, frame)[:3, 3]
+        law = rd.OperationalSpace(arm, frame, rd.line(at, at, 1.0), 50.0, 10.0, rows=(0, 2))
+        run = rd.simulate(arm, q, duration_s=0.3, controller=law, estimate_error=False, **steps)
+        assert (Kind.DAMPED in kinds(run)) == says
+        if says:
+            (said,) = (each for each in run.remarks if each.kind is Kind.DAMPED)
+            J = arm.jacobian(q, frame)[[0, 2]]
+            assert said.value == pytest.approx(np.linalg.eigvalsh(J @ np.linalg.inv(arm.M(q)) @ J.T)[0], rel=1e-6)
+            assert said.duration == pytest.approx(0.3)
+            assert "task damped near a singularity: tip for 0.3 s from 0 s" in run.summary

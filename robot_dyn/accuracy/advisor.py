@@ -14,16 +14,16 @@ from typing import Any, Unpack, final
 
 import numpy as np
 
-from robot_dyn.accuracy.sampled_loop import longest_period
-from robot_dyn.accuracy.stability import longest_step
 from robot_dyn.arithmetic import Array
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import QueryError, RobotDynError
 from robot_dyn.integrate.methods import FIXED_STEP, method
 from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.simulation.options import Options, setup_of, starts, takes_options
+from robot_dyn.simulation.sampled_loop import longest_period
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.simulate import simulate
+from robot_dyn.simulation.stability import below, longest_step
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.stiffness import Fastest, fastest, jacobian
 from robot_dyn.simulation.trajectory import Ending, Trajectory
@@ -81,7 +81,7 @@ class Advice:
         other = f", or integrator={others[0]!r}" if others else ""
         return (
             f"step {self.step_s:.3g} s: unstable; {self.method} is stable up to {limit:.3g} s: take"
-            f" step_s={_below(limit)}{other}"
+            f" step_s={below(limit)}{other}"
         )
 
     def _of_period(self) -> Iterator[str]:
@@ -94,7 +94,7 @@ class Advice:
         elif self.period_s:
             yield (
                 f"control period {self.period_s:.3g} s: unstable; the loop is stable up to {limit:.3g} s: take"
-                f" period_s={_below(limit)}, or lower gains"
+                f" period_s={below(limit)}, or lower gains"
             )
 
     def _of_error(self) -> str:
@@ -183,8 +183,3 @@ def _fastest(
         raise QueryError("the motion cannot be linearised at any state of a run; take a shorter one")
     found.sort(key=lambda each: -abs(each[0].eigenvalue))
     return *found[0][:2], [each[1:] for each in found[:_FAST]]
-
-
-def _below(limit: float) -> str:
-    """A length safely below a limit, in one digit."""
-    return f"{float(f'{limit / 2:.0e}'):g}"

@@ -1,7 +1,8 @@
 """Remarks on a run: what its samples need not show, seen at the end of every step.
 
 chatter · an effort limit or a stop reached · beyond a limit that the file states · a record coarser than the motion ·
-an effect declared dissipative that does positive work · friction that creeps · steps that stability bounds
+an effect declared dissipative that does positive work · friction that creeps · steps that stability bounds ·
+a sampled loop that is unstable · a task that is damped
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ class Kind(StrEnum):
     CREEPS = "regularised_friction_creeps"
     ACCUMULATE = "events_accumulate"
     STIFF = "steps_bounded_by_stability"
+    UNSTABLE = "sampled_loop_unstable"
+    DAMPED = "task_damped"
 
 
 _HEADINGS = {
@@ -38,6 +41,8 @@ _HEADINGS = {
     Kind.CREEPS: "regularised friction creeps",
     Kind.ACCUMULATE: "events accumulate",
     Kind.STIFF: "steps bounded by stability",
+    Kind.UNSTABLE: "sampled loop unstable, deviations grow",
+    Kind.DAMPED: "task damped near a singularity",
 }
 
 
@@ -48,7 +53,7 @@ class Remark:
 
     Attributes:
         kind: What it is about.
-        joint: Name of the joint; of the effect, if it is about one.
+        joint: Name of the joint; of the effect or the frame, if it is about one.
         quantity: "q", "v", "u" or "power", of which value and limit are.
         start: When it began, in [s].
         duration: How long it lasted in all, in [s].

@@ -23,6 +23,7 @@ from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.simulation.accuracy import run_to
 from robot_dyn.simulation.acting import acting
 from robot_dyn.simulation.choice import choose, most_interpreted
+from robot_dyn.simulation.damped_task import damped
 from robot_dyn.simulation.error import ErrorEstimate, no_estimate
 from robot_dyn.simulation.estimate import estimate
 from robot_dyn.simulation.event_run import AccumulationError, TooLongError
@@ -41,6 +42,7 @@ from robot_dyn.simulation.size import check_record
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.stiffness import StiffError, bounded_by_stability
 from robot_dyn.simulation.trajectory import Ending, Outcome, Statistics, Trajectory
+from robot_dyn.simulation.unstable_loop import unstable
 from robot_dyn.validate import function
 
 if TYPE_CHECKING:
@@ -180,7 +182,8 @@ def _trajectory(
         wrenches(plant, t, q), at_stop(plant, q),
         (
             *remarks(setup, observer, t, np.hstack([q, v, u]), power), *ran.said,
-            *bounded_by_stability(setup, equation, record),
+            *bounded_by_stability(setup, equation, record), *unstable(setup, equation, t, record.y),
+            *damped(setup, record),
         ),
         observer.extremes, acting(setup),
         equation.controller_states(record.y), record.events, equation.effect_states(record.y),

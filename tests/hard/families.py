@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import cast
 
-from tests.hard import chaos, conditioning, far_out, tools
+from tests.hard import chaos, conditioning, far_out, sampled_control, singularity, tools
 from tests.hard.case import Family
 
 _ALL = (
     conditioning,
     far_out,
+    singularity,
+    sampled_control,
     chaos,
     tools,
 )

@@ -1,4 +1,4 @@
-"""The longest stable period of a sampled control loop, linearised at a state.
+"""Whether a sampled control loop is stable, and its longest stable period, linearised at a state.
 
     from one tick to the next:  δx⁺ = e^{Aδ} δx + (∫₀^δ e^{As} ds) B δu,   δz⁺ = δz,   δu⁺ = δu
     at a tick:                  δu = K δx + K_z δz,   δz⁺ = L δx + L_z δz
@@ -15,12 +15,12 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.accuracy.stability import longest
 from robot_dyn.arithmetic import Array
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foreign import call
 from robot_dyn.integrate.differences import by_state
+from robot_dyn.simulation.stability import longest
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.stiffness import jacobian
 
@@ -34,6 +34,19 @@ def longest_period(plant: Plant, controller: Controller, t: float, y: Array, dur
         t: Time, in [s].
         y: State (q, v, z), z of the continuous controller and then of the effects.
         duration_s: Of the run.
+    """
+    cycle, loop = linearised(plant, controller, t, y)
+    return longest(cycle, loop, duration_s, controller.cycle)
+
+
+def linearised(plant: Plant, controller: Controller, t: float, y: Array) -> tuple[Callable[[float], Array], Array]:
+    """The map of (x, u, z) over a cycle of ticks, of their period in [s]; and J of the loop at all times, of x.
+
+    Args:
+        plant: As of `longest_period`, like the others.
+        controller: What controls it.
+        t: Time, in [s].
+        y: State.
     """
     from scipy.linalg import expm
 
@@ -63,7 +76,7 @@ def longest_period(plant: Plant, controller: Controller, t: float, y: Array, dur
 
     loop = A.copy()
     loop[:, : 2 * n] += B @ K
-    return longest(cycle, loop, duration_s, controller.cycle)
+    return cycle, loop
 
 
 def _between(flow: Array, size: int) -> Array:

@@ -44,21 +44,32 @@ def longest_step(method: Any, J: Array, n: int, duration_s: float) -> float:
     return longest(lambda h: np.asarray(method.step(system, 0.0, np.eye(len(J)), h)).T, J, duration_s)
 
 
+def blows_up(made: Array, J: Array, h: float, duration_s: float, steps: int = 1) -> bool:
+    """Whether the powers of a matrix, of so many steps h, grow by 1e3 more than the motion with J does over a run."""
+    with np.errstate(all="ignore"):
+        rate = np.log(np.abs(np.linalg.eigvals(made)).max()) / (steps * h)
+    growth = max(0.0, float(np.linalg.eigvals(J).real.max()))
+    return not rate - growth <= log(_GROWTH) / duration_s
+
+
+def below(limit: float) -> str:
+    """A length safely below a limit, in one digit."""
+    return f"{float(f'{limit / 2:.0e}'):g}"
+
+
 def longest(matrix: Callable[[float], Array], J: Array, duration_s: float, steps: int = 1) -> float:
     """The longest h for which the powers of a matrix, of so many steps h, grow no more than the motion with J does.
 
     It is inf if each is, and 0 if none is. It is looked for from short to long, so that what is stable again beyond
     does not count.
     """
-    rates = np.linalg.eigvals(J)
-    size, growth = float(np.abs(rates).max()), max(0.0, float(rates.real.max()))
+    size = float(np.abs(np.linalg.eigvals(J)).max())
 
     def stable(h: float) -> bool:
         try:
-            radius = float(np.abs(np.linalg.eigvals(matrix(h))).max())
+            return not blows_up(matrix(h), J, h, duration_s, steps)
         except (RobotDynError, np.linalg.LinAlgError):
             return False
-        return bool(np.log(radius) / steps - h * growth <= log(_GROWTH) * h / duration_s)
 
     if not size > 0:
         return inf
