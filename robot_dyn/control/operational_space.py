@@ -93,8 +93,11 @@ def _task_dynamics(
     dynamics: Dynamics, q: Array, v: Array, frame: str, rows: tuple[int, ...], epsilon: float
 ) -> TaskDynamics:
     """The same of arguments that were checked."""
-    J, J_over_M, s, U = _felt(dynamics, q, frame, rows)
+    J = dynamics.jacobian(q, frame)[..., rows, :]
     drift = apply(dynamics.jacobian_rate(q, v, frame)[..., rows, :], np.asarray(v))
+    # rows of J M⁻¹, one solve each: M is symmetric
+    J_over_M = acceleration(dynamics.M(q)[..., None, :, :], J, dynamics.joint_names)
+    s, U = eigh(symmetric(J_over_M @ transpose(J)))
     with np.errstate(over="ignore", under="ignore"):
         weight = s / np.maximum(s, epsilon) ** 2
     Lambda = (U * weight[..., None, :]) @ transpose(U)
@@ -103,14 +106,6 @@ def _task_dynamics(
     return TaskDynamics(
         J, Lambda, J_bar, mu, apply(transpose(J_bar), dynamics.N(q)), drift, np.minimum.reduce(s, axis=-1)
     )
-
-
-def _felt(dynamics: Dynamics, q: Array, frame: str, rows: tuple[int, ...]) -> tuple[Array, Array, Array, Array]:
-    """J, J M⁻¹, and eigenvalues and eigenvectors of J M⁻¹ Jᵀ."""
-    J = dynamics.jacobian(q, frame)[..., rows, :]
-    # rows of J M⁻¹, one solve each: M is symmetric
-    J_over_M = acceleration(dynamics.M(q)[..., None, :, :], J, dynamics.joint_names)
-    return J, J_over_M, *eigh(symmetric(J_over_M @ transpose(J)))
 
 
 @final
@@ -185,14 +180,6 @@ class OperationalSpace(Stateless):
         F = apply(task.Lambda, self.task_acceleration(t, q, v)) + task.mu + task.p
         free = model.inverse_dynamics(q, v, self.posture_kp * (self.posture - q) - self.posture_kd * v)
         return apply(transpose(task.J), F) + apply(task.projector, free)
-
-    def smallest(self, q: Array) -> Array:
-        """Smallest eigenvalue of J M⁻¹ Jᵀ, shape (...): below the threshold the task is damped.
-
-        Args:
-            q: Shape (n,) or (..., n), in [rad] or [m].
-        """
-        return np.minimum.reduce(_felt(self.model, q, self.frame, self.rows)[2], axis=-1)
 
     def task_acceleration(self, t: float, q: Array, v: Array) -> Array:
         """Desired acceleration ẍ_d + kd ė + kp e of the task, shape (m,), in [m/s²] and [rad/s²]."""

@@ -9,13 +9,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from robot_dyn.control.operational_space import OperationalSpace
+from robot_dyn.control.operational_space import OperationalSpace, task_dynamics
 from robot_dyn.errors import RobotDynError
 from robot_dyn.simulation.record import Record
 from robot_dyn.simulation.remarks import Kind, Remark
 from robot_dyn.simulation.setup import Setup
 
-_MOST = 4000  # states that are looked at
+_MOST = 2000  # states that are looked at
 
 
 def damped(setup: Setup, record: Record) -> Iterator[Remark]:
@@ -37,9 +37,10 @@ def damped(setup: Setup, record: Record) -> Iterator[Remark]:
 
 def _of(task: OperationalSpace, t: np.ndarray, q: np.ndarray) -> Iterator[Remark]:
     try:
-        smallest = np.asarray(task.smallest(q), float)
+        made = task_dynamics(task.model, q, 0 * q, task.frame, rows=task.rows, threshold=task.threshold)
     except RobotDynError:  # of its model: the outcome of a run
         return
+    smallest = np.asarray(made.smallest, float)
     below = smallest < task.threshold
     if not below.any():
         return
