@@ -4,12 +4,23 @@ from __future__ import annotations
 
 from typing import cast
 
-from tests.hard import chaos, conditioning, far_out, sampled_control, singularity, tools
+from tests.hard import (
+    chaos,
+    conditioning,
+    far_out,
+    long_runs,
+    sampled_control,
+    singularity,
+    stiffness,
+    tools,
+)
 from tests.hard.case import Family
 
 _ALL = (
     conditioning,
     far_out,
+    long_runs,
+    stiffness,
     singularity,
     sampled_control,
     chaos,
