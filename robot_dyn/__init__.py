@@ -106,6 +106,9 @@ if TYPE_CHECKING:
     from robot_dyn.simulation.setup import Setup as Setup
     from robot_dyn.simulation.simulate import simulate as simulate
     from robot_dyn.simulation.trajectory import Trajectory as Trajectory
+    from robot_dyn.stress_test.page import save_stress as save_stress
+    from robot_dyn.stress_test.result import Stress as Stress
+    from robot_dyn.stress_test.stress import stress as stress
     from robot_dyn.threshold import Threshold as Threshold
     from robot_dyn.view.plots import plot as plot
     from robot_dyn.view.plots import save_plot as save_plot
@@ -178,6 +181,7 @@ _HOME = {
     "Spring": "effects.spring",
     "Stateful": "effects.effect",
     "Stateless": "control.controller",
+    "Stress": "stress_test.result",
     "Threshold": "threshold",
     "Trajectory": "simulation.trajectory",
     "ViscousFriction": "effects.friction",
@@ -215,9 +219,11 @@ _HOME = {
     "save_rollouts": "simulation.rollouts_file",
     "save_run": "simulation.run_file",
     "save_show": "view.replay",
+    "save_stress": "stress_test.page",
     "save_work_precision": "accuracy.diagram",
     "show": "view.replay",
     "simulate": "simulation.simulate",
+    "stress": "stress_test.stress",
     "task_dynamics": "control.operational_space",
     "via_points": "control.reference",
     "work_precision": "accuracy.work_precision",

@@ -57,6 +57,8 @@ def values() -> dict[str, Any]:
         rd.WorkPrecision("arm", (), "rad", 1.0, Reference(Q, Q, 1e-12, ("a", "b"), 1.0), (), (), {}, 1.0, 1.0),
         rd.prove(rd.Setup(plant, Q), 0.01), rd.advise(setup), rd.Cost("arm", (), (), (), {}, 1.0, 1.0),
         rd.certify(rd.load("pendulum"), samples=100, repeats=1), rd.check("pendulum"),
+        (stressed := rd.stress(rd.load("pendulum"), samples=100, runs=0, budget_s=1e-3)), stressed.worst[0],
+        stressed.loading,
     ]  # fmt: skip
     named: dict[str, Any] = {type(each).__name__: each for each in made}
     return named | {"Compiled": rd.Compiled(ARM), "CompiledPlant": rd.Compiled(plant)}

@@ -36,6 +36,7 @@ RESULTS = {
     "Cost",
     "Proof",
     "Rollouts",
+    "Stress",
     "Trajectory",
     "WorkPrecision",
 }  # made by the library: their constructors take what it computed
@@ -90,6 +91,7 @@ def examples(folder: Path) -> dict[str, Example]:
     q, v, u = np.array([0.3, -0.4]), np.array([0.7, 1.1]), np.array([1.3, 0.9])
     friction, hold = rd.ViscousFriction(0.1), rd.hold(q)
     certified = rd.certify(robot, samples=100, repeats=1)
+    stressed = rd.stress(robot, samples=100, runs=0, budget_s=1e-3)
     plant, own = rd.Plant(robot, [friction]), rd.Lagrangian(robot)
     setup = rd.Setup(plant, q, duration_s=0.01, integrator="rk4")
     run, several = rd.simulate(setup), rd.rollouts(setup, np.tile(q, (2, 1)))
@@ -228,6 +230,13 @@ def examples(folder: Path) -> dict[str, Example]:
         "save_certificate": (
             rd.save_certificate, {"result": certified, "path": folder / "digits.csv", "theme": "dark"},
         ),
+        "stress": (
+            rd.stress,
+            {"robot": robot, "samples": 100, "runs": 0, "seed": 3, "budget_s": 1e-3,
+             "on_progress": lambda spent, what: None},
+        ),
+        "Stress.python": (stressed.python, {"finding": stressed.worst[0]}),
+        "save_stress": (rd.save_stress, {"result": stressed, "path": folder / "stress.html"}),
         "check": (rd.check, {"name_or_path": "planar_2r", "package_dirs": [folder], "density": 1000.0, "units": True}),
         "circle": (
             rd.circle,

@@ -64,9 +64,9 @@ class Counting:
         known = self._errors(road, quantity, states)
         at = row(states, int(np.nanargmax(known)))
         worst, _ = search.worst(lambda young: self._errors(road, quantity, young), known, quantity.arguments)
-        judged = [(self._judged(road, quantity, state), state) for state in (at, row(worst, 0))]
+        judged = [(self.judged(road, quantity, state), state) for state in (at, row(worst, 0))]
         searched, state = max(judged, key=lambda each: each[0])
-        given = None if self.given is None else digits_of(self._judged(road, quantity, self.given))
+        given = None if self.given is None else digits_of(self.judged(road, quantity, self.given))
         typical = digits_of(float(np.nanmedian(known)))
         self._of_file(road, quantity, state)
         return Found(given, typical, digits_of(judged[0][0]), digits_of(searched), len(known), state)
@@ -78,7 +78,7 @@ class Counting:
         self.bits = max(self.bits, truth.bits)
         return truth
 
-    def _judged(self, road: Road, quantity: Quantity, state: dict[str, np.ndarray]) -> float:
+    def judged(self, road: Road, quantity: Quantity, state: dict[str, np.ndarray]) -> float:
         """The error at a state, by balls."""
         several = {name: np.tile(x, (_SIDE_BY_SIDE, 1)) for name, x in state.items()}
         return self.truth(road.robot, quantity, state).error(road.ask(quantity, several)[0])

@@ -30,9 +30,13 @@ def load(
     with warnings.catch_warnings():
         if quiet:
             warnings.simplefilter("ignore", ModelWarning)
-        expansion = None if xacro is None else dict(_name_and_value("--xacro", text) for text in xacro if text)
-        robot = rd.load(name, package_dirs=package_dirs or (), xacro=expansion)
+        robot = rd.load(name, package_dirs=package_dirs or (), xacro=None if xacro is None else expansion(xacro))
     return robot.with_(lock=assignments("--lock", lock)) if lock else robot
+
+
+def expansion(xacro: list[str]) -> dict[str, str]:
+    """The arguments of xacro by name."""
+    return dict(_name_and_value("--xacro", text) for text in xacro if text)
 
 
 def scene(what: str, given: Mapping[str, object]) -> Setup | None:

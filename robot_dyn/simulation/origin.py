@@ -45,7 +45,7 @@ def edits_of_machine_code(setup: Setup) -> dict[str, str]:
 
 def packed(about: dict[str, str], folder: Path) -> dict[str, str]:
     """The texts of a run as a file in `folder` keeps them."""
-    return about | {"source": _portable(about["source"], folder)} if "source" in about else about
+    return about | {"source": portable(about["source"], folder)} if "source" in about else about
 
 
 def unpacked(about: dict[str, str], folder: Path) -> dict[str, str]:
@@ -58,7 +58,7 @@ def unpacked(about: dict[str, str], folder: Path) -> dict[str, str]:
     return about | {"source": os.path.normpath(folder.absolute() / path)}
 
 
-def _portable(source: str, folder: Path) -> str:
+def portable(source: str, folder: Path) -> str:
     """The path of a URDF from the folder of a run, or from the user's own folder (~); else its name alone.
 
     A robot of the catalog needs no more than its name: its meshes are found in the installed package.

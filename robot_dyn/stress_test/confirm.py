@@ -1,0 +1,89 @@
+"""Runs that confirm a limit of stability: from near an equilibrium, 0.98 of it stays and 1.02 of it goes.
+
+growth = max ‖√M_ii δq_i‖ in the second half of the run / ‖√M_ii δq_i‖ at its start
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import final
+
+import numpy as np
+
+from robot_dyn.simulation.setup import Setup
+from robot_dyn.simulation.simulate import simulate
+from robot_dyn.simulation.trajectory import Ending, Trajectory
+
+WITHIN, BEYOND = 0.98, 1.02  # of a limit
+MOST = 1e3  # by which a push may grow within a limit, as the advisor counts it
+LEFT = 30.0  # a run whose push grows by more, of itself and of what it does within the limit, has left
+PUSH = 1e-6  # of the start, in [rad] or [m] of the joint of median inertia
+LEAST = 0.3  # of the true error: an estimate below misleads
+
+
+def pushed(setup: Setup, seed: int) -> Setup:
+    """The setup with its start moved off the equilibrium, each joint by as much in its unit 1/√M_ii."""
+    units = np.sqrt(np.diagonal(setup.plant.dynamics.M(setup.q0)))
+    push = np.random.default_rng(seed).normal(size=len(units)) * PUSH * np.median(units) / units
+    return replace(setup, q0=setup.q0 + push)
+
+
+@final
+@dataclass(frozen=True)
+class Told:
+    """What a run did, and what it said of itself.
+
+    Attributes:
+        growth: As above; inf if the run ended before its time.
+        misleads: Whether it has left an equilibrium that the motion does not leave, and nothing of it says so.
+        words: Both in words.
+    """
+
+    growth: float
+    misleads: bool
+    words: str
+
+    @property
+    def stays(self) -> bool:
+        """Whether it stays near the equilibrium."""
+        return self.growth < MOST
+
+    def leaves(self, within: Told) -> bool:
+        """Whether it leaves the equilibrium, and a run within the limit does not."""
+        return self.growth > LEFT * max(within.growth, 1.0)
+
+
+def told(setup: Setup, at: np.ndarray, numerical: bool = False) -> Told:
+    """Run a setup and look how far it goes from an equilibrium.
+
+    Args:
+        setup: From near the equilibrium.
+        at: The equilibrium, (n,).
+        numerical: Whether only errors of the method can make it go, so that its error estimate is looked at.
+    """
+    run = simulate(replace(setup, estimate_error=numerical))
+    units = np.sqrt(np.diagonal(setup.plant.dynamics.M(at)))
+    off = np.linalg.norm((run.q - at) * units, axis=1)
+    late = off[run.t >= run.t[-1] / 2]
+    finished = run.outcome.ending is Ending.FINISHED and bool(np.isfinite(late).all())
+    growth = float(late.max() / np.linalg.norm((setup.q0 - at) * units)) if finished else float("inf")
+    how = f"{run.outcome.ending} at {run.outcome.t:.3g} s" if not finished else f"the push grew {growth:.2g}-fold"
+    said = says(run)
+    silent = numerical and finished and growth > LEFT and not said and not _estimates(run, at)
+    return Told(growth, silent, f"{how}{f' ({said})' if said else ''}")
+
+
+def says(run: Trajectory) -> str:
+    """What a run says against itself, or of what it met; empty if its summary is clean."""
+    words = [str(kind).replace("_", " ") for kind in dict.fromkeys(each.kind for each in run.remarks)]
+    if run.error is not None and run.error.note:
+        until = run.error.resolved_until
+        words.append(f"error told up to {until:.3g} s only" if until else "no error told")
+    if "does not close" in run.summary:
+        words.append("the ledger does not close")
+    return ", ".join(words)
+
+
+def _estimates(run: Trajectory, at: np.ndarray) -> bool:
+    """Whether the error estimate admits that the run is off by as much as it is."""
+    return run.error is not None and run.error.final >= LEAST * float(np.abs(run.q - at).max())

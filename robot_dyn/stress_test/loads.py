@@ -1,0 +1,164 @@
+"""The speed at which Coriolis torque, and the payload at which gravity torque, passes an effort limit.
+
+    s² |C(q, u) u|_i = τ_max,i,   |N_i(q) + m n_i(q)| = τ_max,i
+
+u is a velocity whose largest entry is the velocity limit of its joint, and n the gravity torque of 1 kg at the tip.
+Both are searched for over all configurations, and judged at 0.98 and 1.02 by the own road, and by runs under a PD.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from robot_dyn.accuracy.road import asked
+from robot_dyn.accuracy.worst_state import Batch
+from robot_dyn.control.computed_torque import PDGravity
+from robot_dyn.control.reference import hold
+from robot_dyn.effects.actuator import EffortLimit
+from robot_dyn.effects.plant import Plant
+from robot_dyn.errors import RobotDynError
+from robot_dyn.lagrange.manipulator import Lagrangian
+from robot_dyn.model.edits import Payload
+from robot_dyn.model.quantity import CORIOLIS_TORQUE, N
+from robot_dyn.model.robot import Robot
+from robot_dyn.simulation.remarks import Kind
+from robot_dyn.simulation.simulate import simulate
+from robot_dyn.stress_test.confirm import BEYOND, WITHIN
+from robot_dyn.stress_test.finding import Limit
+from robot_dyn.stress_test.lines import assigned, expression
+from robot_dyn.stress_test.worst import worst
+
+_LOOKS = 50  # states at which the tip is looked for
+_HOLD_S = 0.05  # of a run that holds a payload
+_SPEED = 1.0  # [rad/s] or [m/s], of joints without a velocity limit
+
+
+def efforts(robot: Robot) -> np.ndarray:
+    """Effort limits, inf where none is stated or it is 0, (n,)."""
+    return np.where(robot.effort_limit > 0, robot.effort_limit, np.inf)
+
+
+def speed_limit(robot: Robot, states: Batch, rng: np.random.Generator, tell: Callable[[str], object]) -> Limit:
+    """The least multiple of the velocity limits at which Coriolis torque alone passes an effort limit."""
+    tell("speed")
+    effort, most = efforts(robot), robot.velocity_limit
+    most = np.where((most > 0) & np.isfinite(most), most, _SPEED)
+    what = "Coriolis torque passes an effort limit, at a multiple of the velocity limits"
+    of_joints = np.abs(states["v"]).max()
+    states = states | {"v": states["v"] / of_joints * most}
+
+    def direction(v: np.ndarray) -> np.ndarray:
+        largest = np.abs(v / most).max(axis=-1, keepdims=True)
+        return np.divide(v, largest, out=np.zeros_like(v), where=largest > 0)
+
+    def measure(batch: Batch) -> np.ndarray:
+        at = {"q": batch["q"], "v": direction(batch["v"])}
+        return (np.abs(asked(robot, CORIOLIS_TORQUE, at)) / effort).max(axis=1)
+
+    sizes, state = worst(states, rng, ("q", "v"), measure)
+    if not sizes["minimal"] > 1e-12:
+        return Limit("speed", what, "", np.inf, "times", "it has no torque on any joint with a limit", "", None, "")
+    q, v, limit = state["q"], direction(state["v"]), float(sizes["minimal"]) ** -0.5
+    own = Lagrangian(robot)
+    joint = int(np.argmax(np.abs(robot.coriolis_torque(q, v)) / effort))
+    parts = [float((np.abs(own.coriolis_torque(q, part * limit * v)) / effort).max()) for part in (WITHIN, BEYOND)]
+    python = (
+        f"{assigned({'q': q, 'v': v})}for part in ({WITHIN}, {BEYOND}):\n"
+        f"    torque = rd.Lagrangian(robot).coriolis_torque(q, part * {limit!r} * np.array(v))\n"
+        f"    print(abs(torque[{joint}]) / robot.effort_limit[{joint}])\n"
+    )
+    within, beyond = (f"{part:.3f} of the effort limit" for part in parts)
+    confirmed = bool(parts[0] < 1 < parts[1])
+    return Limit("speed", what, robot.joint_names[joint], limit, "times", within, beyond, confirmed, python)
+
+
+def payload_limit(
+    robot: Robot, states: Batch, rng: np.random.Generator, gains: tuple[np.ndarray, np.ndarray] | None,
+    tell: Callable[[str], object],
+) -> Limit:  # fmt: skip
+    """The least mass at the tip at which gravity torque passes an effort limit.
+
+    Args:
+        robot: The robot.
+        states: Random ones.
+        rng: Of the search.
+        gains: Of the PD that holds it; None where M is singular, so that nothing can be run.
+        tell: Called with what is being done.
+    """
+    tell("payload")
+    effort = efforts(robot)
+    frame = _tip(robot, states)
+    what, loaded = f"gravity torque of a payload at {frame}", robot.with_(payload=Payload(frame, 1.0))
+
+    def inverse_masses(batch: Batch) -> np.ndarray:
+        """1/m of each joint, (S, n)."""
+        own = asked(robot, N, batch)
+        per_kg = asked(loaded, N, batch) - own
+        spare = effort - np.sign(per_kg) * own
+        made = np.abs(per_kg) / np.where(spare > 0, spare, 1e-300)
+        return np.where(np.isfinite(effort), made, 0.0)
+
+    sizes, state = worst(states, rng, ("q",), lambda batch: inverse_masses(batch).max(axis=1))
+    q, largest = state["q"], float(sizes["minimal"])
+    if not largest > 1e-12:
+        return Limit("payload", what, "", np.inf, "kg", "it has no torque on any joint with a limit", "", None, "")
+    joint = robot.joint_names[int(np.argmax(inverse_masses({"q": q[None]})[0]))]
+    if largest > 1e250:
+        return Limit(
+            "payload", what, joint, 0.0, "kg", "gravity alone passes its effort limit", "", None, assigned(state)
+        )
+    said = [_held(robot, q, Payload(frame, part / largest), effort, gains) for part in (WITHIN, BEYOND)]
+    confirmed = said[0][0] and not said[1][0]
+    python = (
+        f"{assigned(state)}for mass in ({WITHIN / largest!r}, {BEYOND / largest!r}):\n"
+        f"    loaded = robot.with_(payload=rd.Payload({frame!r}, mass))\n"
+        "    print(mass, max(abs(rd.Lagrangian(loaded).N(q)) / robot.effort_limit))\n"
+    )
+    if gains is not None:
+        python += (
+            f"    law = rd.PDGravity(loaded, rd.hold(q), {expression(gains[0])}, {expression(gains[1])})\n"
+            "    plant = rd.Plant(loaded, [rd.EffortLimit(robot.effort_limit)])\n"
+            f"    run = rd.simulate(plant, q, controller=law, duration_s={_HOLD_S})\n"
+            "    print([str(each.kind) for each in run.remarks], abs(run.q[-1] - q).max())\n"
+        )
+    return Limit("payload", what, joint, 1 / largest, "kg", said[0][1], said[1][1], confirmed, python)
+
+
+def _tip(robot: Robot, states: Batch) -> str:
+    """The frame at which a mass has the largest gravity torques."""
+    few = {name: x[:_LOOKS] for name, x in states.items()}
+    own, effort = asked(robot, N, few), efforts(robot)
+    effort = np.where(np.isfinite(effort), effort, np.nanmin(effort[np.isfinite(effort)], initial=1.0))
+
+    def torque(frame: str) -> float:
+        return float(
+            (np.abs(asked(robot.with_(payload=Payload(frame, 1.0)), N, few) - own) / effort).max(axis=1).mean()
+        )
+
+    return max(robot.frame_names, key=torque)
+
+
+def _held(
+    robot: Robot, q: np.ndarray, payload: Payload, effort: np.ndarray, gains: tuple[np.ndarray, np.ndarray] | None
+) -> tuple[bool, str]:
+    """Whether the arm can hold a payload, by the own road and by a run; and in words."""
+    loaded = robot.with_(payload=payload)
+    part = float((np.abs(Lagrangian(loaded).N(q)) / effort).max())
+    said = f"{part:.3f} of the effort limit"
+    if gains is None:
+        return part < 1, said
+    plant = Plant(loaded, [EffortLimit(effort)])
+    try:
+        run = simulate(
+            plant, q, controller=PDGravity(loaded, hold(q), *gains), duration_s=_HOLD_S, estimate_error=False,
+            engine="interpreted",
+        )  # fmt: skip
+    except RobotDynError as error:
+        return part < 1, f"{said}; not run: {error}"
+    reached = any(each.kind is Kind.EFFORT_REACHED for each in run.remarks)
+    off = float(np.abs(run.q[-1] - q).max())
+    holds = part < 1 and not reached
+    sags = part > 1 and reached
+    return holds if holds or sags else not part < 1, f"{said}; a PD sags by {off:.1e} in {_HOLD_S:g} s"

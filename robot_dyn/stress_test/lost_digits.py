@@ -1,0 +1,68 @@
+"""The states at which each road loses most digits of inverse and forward dynamics, judged by balls.
+
+lost = −log₁₀(2⁻⁵³) − digits
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from math import log10
+
+import numpy as np
+
+from robot_dyn.accuracy.counting import Counting
+from robot_dyn.accuracy.digits import digits_of
+from robot_dyn.accuracy.road import Road, roads
+from robot_dyn.accuracy.worst_state import Batch
+from robot_dyn.model.quantity import FORWARD_DYNAMICS, INVERSE_DYNAMICS, Quantity
+from robot_dyn.model.robot import Robot
+from robot_dyn.stress_test.finding import Worst
+from robot_dyn.stress_test.lines import assigned
+from robot_dyn.stress_test.worst import KEPT, listed, shrunk_state
+
+_OF_FLOAT64 = -log10(2.0**-53)
+_ROUNDS, _MOST_TRIES = 3, 60
+_OTHER_NUMBERS = ("Lagrangian, float32", "Lagrangian, longdouble")
+
+
+def lost_digits(
+    robot: Robot, states: Batch, rng: np.random.Generator, words: str, tell: Callable[[str], object]
+) -> Iterator[Worst | str]:
+    """The roads in float64, one after the other; what is left out in words."""
+    tell("machine code")
+    found, left_out = roads(robot)
+    counting = Counting(robot, states, None, rng)
+    yield from left_out
+    for quantity in (INVERSE_DYNAMICS, FORWARD_DYNAMICS):
+        for road in found:
+            if quantity in road.quantities and road.name not in _OTHER_NUMBERS:
+                tell(f"digits of {quantity.name} by {road.name}")
+                yield _of(counting, road, quantity, words)
+
+
+def _of(counting: Counting, road: Road, quantity: Quantity, words: str) -> Worst:
+    made = counting.count(road, quantity)
+    for _ in range(_ROUNDS - 1):
+        if made.searched < made.random:
+            break
+        again = counting.count(road, quantity)
+        made = again if again.searched < made.searched else made
+    lost = _OF_FLOAT64 - made.searched
+
+    def losses(batch: Batch) -> np.ndarray:
+        state = {name: batch[name][0] for name in quantity.arguments}
+        return np.array([_OF_FLOAT64 - digits_of(counting.judged(road, quantity, state))])
+
+    at = {name: made.state[name] for name in quantity.arguments}
+    state, minimal = shrunk_state(at, counting.states, losses, KEPT * lost if lost > 0 else -np.inf, _MOST_TRIES)
+    arguments = ", ".join(f"{name}={name}" for name in state)
+    python = (
+        f"{assigned(state)}made = rd.certify(robot, {arguments}, samples=100, repeats=1)\n"
+        f"print(made.of({quantity.name!r}, {road.name!r}).given)\n"
+    )
+    options = " ".join(f"--{name}={','.join(map(repr, x.tolist()))}" for name, x in state.items())
+    command = f"certify {words} {options} --samples=100 --repeats=1" if words and "--xacro" not in words else ""
+    typical, random = _OF_FLOAT64 - made.typical, _OF_FLOAT64 - made.random
+    note = f"{road.name}: {made.searched:.1f} digits hold, {made.typical:.1f} typically"
+    what = f"digits lost in {quantity.name}"
+    return Worst(what, "", "digits", typical, random, lost, minimal, listed(state), note, python, command)

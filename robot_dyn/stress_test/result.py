@@ -1,0 +1,90 @@
+"""The result of a stress test."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import isfinite
+from typing import final
+
+from robot_dyn.stress_test.finding import Judged, Limit, Worst
+from robot_dyn.stress_test.lines import Loading
+from robot_dyn.validate import instance
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Stress:
+    """What an arm does at its worst, what breaks first, and what of that the library fails to tell.
+
+    Attributes:
+        robot: Its name.
+        joints: Their names.
+        worst: Worst configurations.
+        limits: Of step, gain, speed and payload, each confirmed at 0.98 and 1.02 of it.
+        runs: Random runs whose error estimates were judged.
+        left_out: What was left out, and why.
+        loading: How the robot is loaded.
+        environment: Versions and processor.
+        samples, seed: Number of random states; of the random generator.
+        spent_s: Time that it took, in [s].
+        interrupted: Whether it was ended by the user.
+    """
+
+    robot: str
+    joints: tuple[str, ...]
+    worst: tuple[Worst, ...]
+    limits: tuple[Limit, ...]
+    runs: tuple[Judged, ...]
+    left_out: tuple[str, ...]
+    loading: Loading
+    environment: dict[str, str] = field(repr=False)
+    samples: int
+    seed: int
+    spent_s: float
+    interrupted: bool = False
+
+    @property
+    def failures(self) -> tuple[str, ...]:
+        """What the library fails at: limits that runs refute, and runs that mislead; in words."""
+        return (
+            *(
+                f"{each.of} {each.what}: {_number(each.value)} {each.unit} is refuted: {each.within}; {each.beyond}"
+                for each in self.limits
+                if each.confirmed is False
+            ),
+            *(
+                f"run, {each.what}: estimated {each.estimated:.1e}, true {each.true:.1e}, and nothing says so"
+                for each in self.runs
+                if each.misleads
+            ),
+        )
+
+    @property
+    def ok(self) -> bool:
+        """Whether there are no failures."""
+        return not self.failures
+
+    @property
+    def sentence(self) -> str:
+        """The worst of each kind, in a sentence."""
+        parts = []
+        for what in dict.fromkeys(each.what for each in self.worst):
+            top = max((each for each in self.worst if each.what == what), key=lambda each: each.searched)
+            joint = f" ({top.joint})" if top.joint else ""
+            parts.append(f"{what} up to {top.searched:.3g}{f' {top.unit}' if top.unit else ''}{joint}")
+        checked = sum(each.confirmed is not None for each in self.limits) + len(self.runs)
+        failed = len(self.failures)
+        return f"{self.robot}: {failed or 'no'} failure{'s' * (failed != 1)} in {checked} checks; {'; '.join(parts)}"
+
+    def python(self, finding: Worst | Limit | Judged) -> str:
+        """Lines that repeat a finding, from the imports on; empty if it has none.
+
+        Raises:
+            QueryError: If it is not one of `worst`, `limits` and `runs`.
+        """
+        finding = instance("finding", finding, Worst | Limit | Judged, "give one of worst, limits or runs")
+        return self.loading.python + finding.python if finding.python else ""
+
+
+def _number(x: float) -> str:
+    return f"{x:.4g}" if isfinite(x) else "none"

@@ -1,0 +1,114 @@
+"""Random runs, each error estimate held against two better runs: one that is too small and says nothing misleads.
+
+The better runs share the equations with the run, and neither its method nor its steps: DOP853 and an implicit method
+near rounding. What both miss is found by `compare` and by energy alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from robot_dyn.accuracy.budget import Limit as TimeLimit
+from robot_dyn.accuracy.budget import OvertimeError
+from robot_dyn.accuracy.worst_state import Batch
+from robot_dyn.errors import RobotDynError
+from robot_dyn.integrate.adaptive import Adaptive
+from robot_dyn.model.robot import Robot
+from robot_dyn.simulation.setup import Setup
+from robot_dyn.simulation.simulate import simulate
+from robot_dyn.simulation.trajectory import Ending, Trajectory
+from robot_dyn.stress_test.confirm import LEAST, says
+from robot_dyn.stress_test.finding import Judged
+from robot_dyn.stress_test.lines import expression
+from robot_dyn.stress_test.scenes import scenes
+from robot_dyn.stress_test.shrink import shrunk
+
+_BETTER = (Adaptive("DOP853", 3e-14, 1e-15), Adaptive("Rosenbrock", 1e-11, 1e-13))
+_ROUNDING = 1e-12  # of 1 + |q|: below it neither can tell
+_ONE_TIME = 1e-12  # [s]
+_LONGEST_S = 8.0  # of one run
+_MOST_TRIES = 25  # of the start of a run that misleads
+
+
+def judged_runs(
+    robot: Robot, states: Batch, count: int, rng: np.random.Generator, tell: Callable[[str], object]
+) -> Iterator[Judged | str]:
+    """So many random runs; what cannot be judged in words."""
+    for scene in scenes(robot, states, count, rng):
+        tell(f"run, {scene.what}")
+        try:
+            found = judged(scene.setup, scene.what)
+            if found.misleads:
+                tell(f"shrinking, {scene.what}")
+                found = shrunk_run(scene.setup, scene.what, found)
+            yield found
+        except OvertimeError:
+            yield f"run, {scene.what}: takes more than {_LONGEST_S:g} s"
+        except RobotDynError as error:
+            yield f"run, {scene.what}: {error}"
+
+
+def judged(setup: Setup, what: str) -> Judged:
+    """A run beside two better ones.
+
+    Raises:
+        RobotDynError: If one of these cannot be made.
+        OvertimeError: If one takes too long.
+    """
+    run = _simulated(setup)
+    said = says(run) if run.outcome.ending is Ending.FINISHED else f"{run.outcome.ending} at {run.outcome.t:.3g} s"
+    error = run.error
+    if error is None or run.outcome.ending is not Ending.FINISHED or not error.resolved_until:
+        return Judged(what, setup.duration_s, np.nan, np.nan, np.nan, said, False, _lines(setup))
+    better = [
+        _simulated(replace(setup, integrator=each, step_s=Setup.step_s, estimate_error=False)) for each in _BETTER
+    ]
+    known = run.t <= error.resolved_until
+    if any(each.outcome.ending is not Ending.FINISHED for each in better):
+        raise RobotDynError("a better run did not finish")
+    if any(each.t.shape != run.t.shape or np.abs(each.t - run.t).max() > _ONE_TIME for each in better):
+        raise RobotDynError("the better runs have other samples")
+    true = float(np.abs(run.q - better[0].q)[known].max())
+    unsure = float(np.abs(better[1].q - better[0].q)[known].max())
+    floor = _ROUNDING * (1 + float(np.abs(run.q).max())) + unsure
+    misleads = not says_more(run) and max(error.final, floor) < LEAST * max(true, floor)
+    return Judged(what, setup.duration_s, error.final, true, unsure, said or str(error), misleads, _lines(setup))
+
+
+def says_more(run: Trajectory) -> bool:
+    """Whether something but the estimate warns."""
+    return bool(run.error is not None and run.error.note) or "does not close" in run.summary
+
+
+def _simulated(setup: Setup) -> Trajectory:
+    return simulate(setup, on_progress=TimeLimit(_LONGEST_S))
+
+
+def _lines(setup: Setup) -> str:
+    return (
+        f"setup = {expression(setup)}\nrun = rd.simulate(setup)\nbetter = rd.simulate(setup, integrator="
+        f"{expression(_BETTER[0])}, estimate_error=False)\nprint(run.error)\n"
+        "print(abs(run.q - better.q).max())\n"
+    )
+
+
+def shrunk_run(setup: Setup, what: str, found: Judged) -> Judged:
+    """The same from a start of few digits that misleads too."""
+
+    def at(x: np.ndarray) -> Setup:
+        q0, v0 = np.split(x, 2)
+        return replace(setup, q0=q0, v0=v0)
+
+    def fails(x: np.ndarray) -> bool:
+        try:
+            return judged(at(x), what).misleads
+        except (RobotDynError, OvertimeError):
+            return False
+
+    start: Any = np.concatenate([setup.q0, setup.v0])
+    small = shrunk(start, fails, _MOST_TRIES)
+    return found if np.array_equal(small, start) else judged(at(small), what)

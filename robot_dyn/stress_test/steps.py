@@ -1,0 +1,96 @@
+"""The longest stable step of each method of fixed step, by the advisor, and runs that confirm it.
+
+The arm is held at a configuration by a PD with its gravity balanced, an equilibrium, and the viscous friction of its
+file; a push that grows is the method's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from math import isfinite
+
+import numpy as np
+
+from robot_dyn.accuracy.advisor import advise
+from robot_dyn.control.computed_torque import PDGravity
+from robot_dyn.control.reference import hold
+from robot_dyn.effects.friction import ViscousFriction
+from robot_dyn.effects.plant import Plant
+from robot_dyn.errors import RobotDynError
+from robot_dyn.integrate.gauss import Gauss
+from robot_dyn.integrate.implicit import SinglyDiagonallyImplicit
+from robot_dyn.integrate.methods import FIXED_STEP, method
+from robot_dyn.model.robot import Robot
+from robot_dyn.simulation.setup import Setup
+from robot_dyn.stress_test.confirm import BEYOND, WITHIN, pushed, told
+from robot_dyn.stress_test.finding import Limit
+from robot_dyn.stress_test.lines import expression
+
+_TIMES = 400.0  # of the run, 1/|λ| of the fastest motion
+_STEPS = 10  # of a method whose stages are iterated
+_PARTS = 20  # of the run: the longest step that is judged
+
+
+def held(robot: Robot, q: np.ndarray, gains: tuple[np.ndarray, np.ndarray], rate: float) -> Setup:
+    """The arm at rest at q, held there; the run lasts so many times its fastest motion."""
+    effects = [ViscousFriction(robot.damping)] if np.any(robot.damping) else []
+    return Setup(
+        Plant(robot, effects), q, duration_s=_TIMES / rate, controller=PDGravity(robot, hold(q), *gains),
+        engine="interpreted",
+    )  # fmt: skip
+
+
+def step_limits(setup: Setup, seed: int, tell: Callable[[str], object]) -> Iterator[Limit]:
+    """Each method of fixed step: its limit, and runs at 0.98 and 1.02 of it.
+
+    Args:
+        setup: As of `held`.
+        seed: Of the push.
+        tell: Called with what is being done.
+    """
+    tell("steps: linearisation")
+    advice = advise(setup, estimate_error=False)
+    duration = min(setup.duration_s, _TIMES / abs(advice.fastest.eigenvalue))
+    for name in FIXED_STEP:
+        tell(f"steps: {name}")
+        limit = advice.limits[name]
+        pushed_off = pushed(replace(setup, duration_s=duration, integrator=name), seed)
+        try:
+            yield _confirmed(pushed_off, setup.q0, name, limit, advice.fastest.joint)
+        except RobotDynError as error:
+            yield Limit("step", name, advice.fastest.joint, limit, "s", f"not run: {error}", "", None, "")
+
+
+def _confirmed(setup: Setup, at: np.ndarray, name: str, limit: float, joint: str) -> Limit:
+    """The limit of a method, with runs at both sides of it, or with steps as long as are judged if it has none."""
+    if not isfinite(limit):
+        longest = setup.duration_s / _PARTS
+        run = told(replace(setup, step_s=longest), at, True)
+        told_of = f"step {longest:.3g} s: {run.words}"
+        lines = _lines(setup, at, (longest,))
+        holds = run.stays or (_iterates(name) and not isfinite(run.growth))
+        return Limit("step", name, "", limit, "s", told_of, "", holds and not run.misleads, lines)
+    steps, what, iterates = (WITHIN * limit, BEYOND * limit), name, _iterates(name)
+    if iterates:  # every step is stable, and where its stages are not found, about there, the run says so
+        setup, what = replace(setup, duration_s=_STEPS * limit), f"{name}, stages by fixed-point iteration"
+    within = told(replace(setup, step_s=steps[0]), at)
+    beyond = told(replace(setup, step_s=steps[1]), at, not iterates)
+    confirmed = within.stays and beyond.leaves(within) and not beyond.misleads
+    if iterates:
+        confirmed = all(each.stays or not isfinite(each.growth) for each in (within, beyond))
+    said = beyond.words + " AND DOES NOT SAY SO" * beyond.misleads
+    return Limit("step", what, joint, limit, "s", within.words, said, confirmed, _lines(setup, at, steps))
+
+
+def _iterates(name: str) -> bool:
+    """Whether the stages of a method are iterated, so that a run ends, and says so, where they are not found."""
+    return isinstance(method(name), Gauss | SinglyDiagonallyImplicit)
+
+
+def _lines(setup: Setup, at: np.ndarray, steps: tuple[float, ...]) -> str:
+    return (
+        f"q = {expression(at)}\nsetup = {expression(setup)}\nfor step_s in {expression(list(steps))}:\n"
+        "    run = rd.simulate(setup, step_s=step_s)\n    print(run.summary)\n"
+        "    print(f'{step_s:.4g} s: {run.outcome.ending}, off by {abs(run.q[-1] - q).max():.1e}')\n"
+    )

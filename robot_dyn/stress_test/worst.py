@@ -1,0 +1,155 @@
+"""The configurations at which an arm is hardest: κ of M, the fastest motion, gravity torque over effort limit.
+
+Each is searched for from the worst of random states on (`accuracy.worst_state`), and shrunk to a state of few digits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from robot_dyn.accuracy.road import asked
+from robot_dyn.accuracy.worst_state import Batch, Search
+from robot_dyn.control.independent_joint import gains_from
+from robot_dyn.effects.plant import Plant
+from robot_dyn.lagrange.scale import unit_diagonal_conditions
+from robot_dyn.model.quantity import M, N
+from robot_dyn.model.robot import Robot
+from robot_dyn.stress_test.finding import Worst
+from robot_dyn.stress_test.lines import assigned, expression
+from robot_dyn.stress_test.shrink import shrunk
+
+FASTEST = "fastest motion"
+KEPT = 0.9  # of what was found, that a shrunk state keeps
+_ROUNDS = 3  # of a search that finds nothing worse
+_NOTHING = 1e-12  # of an effort limit: rounding of zero
+_FREQUENCY = 20.0  # [rad/s], of the gains of a PD
+
+Measure = Callable[[Batch], np.ndarray]  # at each of S states, (S,); nan where there is none
+
+
+def worst(
+    states: Batch, rng: np.random.Generator, arguments: tuple[str, ...], measure: Measure
+) -> tuple[dict[str, float], dict[str, np.ndarray]]:
+    """Typical, random, searched and minimal size of a measure, and the shrunk state, (n,) each.
+
+    Args:
+        states: Random ones.
+        rng: Of the search.
+        arguments: Names of those coordinates that the measure depends on.
+        measure: What is made large.
+    """
+    known = measure(states)
+    random, found, best = float(np.nanmax(known)), -np.inf, states
+    for _ in range(_ROUNDS):
+        at, size = Search(states, rng).worst(measure, known, arguments)
+        if size > found:
+            best, found = at, size
+        if found > random:
+            break
+    state, minimal = shrunk_state({name: best[name][0] for name in arguments}, states, measure, KEPT * found)
+    found = max(found, minimal)  # where the largest value lies at few digits
+    return {"typical": float(np.nanmedian(known)), "random": random, "searched": found, "minimal": minimal}, state
+
+
+def shrunk_state(
+    state: dict[str, np.ndarray], states: Batch, measure: Measure, least: float, most: int = 400
+) -> tuple[dict[str, np.ndarray], float]:
+    """A state of few digits, within the range of random ones, at which a measure is at least so much; and how much."""
+    names, n = tuple(state), len(next(iter(state.values())))
+    low = np.concatenate([states[name].min(axis=0) for name in names])
+    high = np.concatenate([states[name].max(axis=0) for name in names])
+
+    def at(x: np.ndarray) -> float:
+        rows = dict(zip(names, x.reshape(len(names), 1, n), strict=True))
+        return float(measure({name: rows.get(name, each[:1]) for name, each in states.items()})[0])
+
+    def fails(x: np.ndarray) -> bool:
+        return bool((low <= x).all() and (x <= high).all() and at(x) >= least)
+
+    made = shrunk(np.concatenate([state[name] for name in names]), fails, most)
+    return dict(zip(names, made.reshape(len(names), n), strict=True)), at(made)
+
+
+def worst_configurations(
+    robot: Robot, states: Batch, rng: np.random.Generator, words: str, tell: Callable[[str], object]
+) -> Iterator[Worst]:
+    """κ, the fastest motion, and gravity torque of each joint with an effort limit."""
+    for what, joint, unit, measure, note, python in _asked(robot, states):
+        tell(f"worst {what} {joint}".rstrip())
+        sizes, state = worst(states, rng, ("q",), measure)
+        if not sizes["searched"] > _NOTHING:
+            continue  # gravity has no torque on the joint
+        q = ",".join(map(repr, state["q"].tolist()))
+        python = assigned(state) + python
+        command = f"query {words} --q={q}" if words and "robot.N" in python else ""
+        yield Worst(what, joint, unit, **sizes, state=listed(state), note=note, python=python, command=command)
+
+
+def listed(state: dict[str, np.ndarray]) -> dict[str, list[float]]:
+    """The state in plain numbers."""
+    return {name: x.tolist() for name, x in state.items()}
+
+
+def _asked(robot: Robot, states: Batch) -> Iterator[tuple[str, str, str, Measure, str, str]]:
+    """What is looked for: quantity, joint, unit, measure, note and lines."""
+    if robot.joint_without_inertia is None:
+        lines = "M = robot.M(q)\nd = np.sqrt(np.diagonal(M))\nprint(np.linalg.cond(M / np.outer(d, d)))\n"
+        yield "κ of M", "", "", lambda batch: unit_diagonal_conditions(asked(robot, M, batch)), "", lines
+        yield from _fastest(robot, states)
+    for i, joint in enumerate(robot.joint_names):
+        limit = robot.effort_limit[i]
+        if 0 < limit < np.inf:
+            lines = f"print(abs(robot.N(q)[{i}]) / robot.effort_limit[{i}])\n"
+            note = f"effort limit {limit:g}"
+
+            def loaded(batch: Batch, i: int = i, limit: float = limit) -> np.ndarray:
+                return np.abs(asked(robot, N, batch)[:, i]) / limit
+
+            yield "gravity torque / effort limit", joint, "", loaded, note, lines
+
+
+def _fastest(robot: Robot, states: Batch) -> Iterator[tuple[str, str, str, Measure, str, str]]:
+    """The fastest decay by the friction of the file, and by a PD of stated gains, both where gravity is balanced."""
+    if damping := _slopes(robot):
+        lines = (
+            "balance = rd.PDGravity(robot, rd.hold(q), 0.0, 0.0)\nsetup = rd.Setup(rd.Plant(robot, 'urdf'), q,"
+            " controller=balance, duration_s=1e-4)\nprint(rd.advise(setup).fastest)\n"
+        )
+        note = "friction of the file, at rest"
+        yield FASTEST, "", "1/s", lambda batch: _rates(robot, batch, np.array(damping)), note, lines
+    kp, kd = pd_gains(robot, states)
+
+    def by_pd(batch: Batch) -> np.ndarray:
+        mu = _rates(robot, batch, kd) / (2 * _FREQUENCY)
+        return _FREQUENCY * np.where(mu > 1, mu + np.sqrt(np.maximum(mu * mu - mu, 0)), np.sqrt(mu))
+
+    lines = (
+        f"kp = {expression(kp)}\nkd = {expression(kd)}\nhold = rd.PDGravity(robot, rd.hold(q), kp, kd)\n"
+        "setup = rd.Setup(rd.Plant(robot), q, controller=hold, duration_s=1e-3)\nprint(rd.advise(setup).fastest)\n"
+    )
+    note = f"PD of ω = {_FREQUENCY:g} rad/s, ζ = 1 for the median of M_ii, gravity balanced"
+    yield FASTEST, "", "1/s", by_pd, note, lines
+
+
+def _slopes(robot: Robot) -> list[float]:
+    """−∂τ/∂v of the friction of the file at rest, (n,); nothing without any."""
+    plant, n = Plant(robot, "urdf"), robot.n
+    if not plant.effects:
+        return []
+    h = 1e-9  # far below the velocities over which friction is regularised
+    zeros = np.zeros(n)
+    return [float(-plant.torque(0.0, zeros, h * unit)[i] / h) for i, unit in enumerate(np.eye(n))]
+
+
+def _rates(robot: Robot, batch: Batch, damping: np.ndarray) -> np.ndarray:
+    """The largest eigenvalue of M⁻¹ diag(b) at each state, that of b^½ M⁻¹ b^½."""
+    inertia, root = asked(robot, M, batch), np.sqrt(damping)
+    return np.linalg.eigvalsh(root[:, None] * np.linalg.solve(inertia, np.diag(root)[None]))[:, -1]
+
+
+def pd_gains(robot: Robot, states: Batch, frequency: float = _FREQUENCY) -> tuple[np.ndarray, np.ndarray]:
+    """Stiffness and damping of a critically damped PD for the median of M_ii at random states."""
+    few = {name: x[:1000] for name, x in states.items()}
+    return gains_from(np.median(np.diagonal(asked(robot, M, few), axis1=-2, axis2=-1), axis=0), frequency)

@@ -1,0 +1,263 @@
+"""The stress test of an arm: what it finds is worse than random, limits hold in runs, and its lines repeat it."""
+
+from __future__ import annotations
+
+import contextlib
+import html
+import io
+import json
+import re
+import shlex
+from dataclasses import replace
+from functools import cache
+from math import isfinite
+
+import numpy as np
+import pytest
+
+import robot_dyn as rd
+from robot_dyn.accuracy.worst_state import random_states
+from robot_dyn.stress_test import confirm, runs, steps
+from robot_dyn.stress_test.lines import Loading, expression
+from robot_dyn.stress_test.loads import payload_limit
+from robot_dyn.stress_test.scenes import FAMILIES, scenes
+from robot_dyn.stress_test.worst import worst_configurations
+from tests.browser import FLAGS, chromium
+from tests.command import refusal, run
+from tests.test_command_documents import promised
+
+ARMS = ["planar_2r", *(pytest.param(each, marks=pytest.mark.stress) for each in ("cart_pole", "mimic_chain", "ur5"))]
+
+
+@cache
+def made(name: str) -> rd.Stress:
+    return rd.stress(rd.load(name), samples=300, runs=1, seed=2)
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_searched_states_are_no_better_than_random_ones_and_shrunk_ones_keep_nine_tenths(name: str) -> None:
+    found = made(name).worst
+    assert {"κ of M", "fastest motion"} <= {each.what for each in found}
+    for each in found:
+        assert each.searched >= each.random >= each.typical
+        assert each.minimal >= 0.9 * each.searched or each.searched < 0
+
+
+def test_condition_of_a_double_pendulum_is_worst_where_it_is_straight() -> None:
+    """M₁₁ is largest at q₂ = 0, and κ of M scaled to a unit diagonal with the correlation M₁₂/√(M₁₁ M₂₂)."""
+    robot, (first, *_) = rd.load("planar_2r"), made("planar_2r").worst
+    q = np.linspace(-np.pi, np.pi, 721)
+    M = robot.M(np.stack([0 * q, q], axis=1))
+    r = np.abs(M[:, 0, 1]) / np.sqrt(M[:, 0, 0] * M[:, 1, 1])
+    assert first.what == "κ of M"
+    assert first.searched == pytest.approx(((1 + r) / (1 - r)).max(), rel=1e-9)
+
+
+def test_largest_payload_of_a_pole_is_that_of_statics() -> None:
+    """A level bar of 2 kg and 0.8 m on an effort limit of 30 N m bears m at its end: (2 · 0.4 + m · 0.8) g = 30."""
+    text = """<robot name="bar"><link name="base"/><link name="bar"><inertial><origin xyz="0.4 0 0"/><mass value="2"/>
+    <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial></link><link name="end"/>
+    <joint name="hinge" type="revolute"><parent link="base"/><child link="bar"/><axis xyz="0 1 0"/>
+    <limit lower="-3" upper="3" effort="30" velocity="2"/></joint>
+    <joint name="tip" type="fixed"><parent link="bar"/><child link="end"/><origin xyz="0.8 0 0"/></joint></robot>"""
+    robot, rng = rd.Robot.from_text(text), np.random.default_rng(0)
+    payload = payload_limit(robot, random_states(robot, 300, rng), rng, (np.ones(1), np.ones(1)), lambda what: None)
+    assert payload.value == pytest.approx((30 / 9.80665 - 0.8) / 0.8, rel=1e-6)
+    assert payload.confirmed and payload.joint == "hinge" and payload.what.endswith("end")
+    assert Loading.of(robot).python.endswith("# robot: the one that was given to rd.stress\n")
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_each_limit_is_confirmed_or_said(name: str) -> None:
+    result = made(name)
+    assert {each.of for each in result.limits} == {"step", "gain", "speed", "payload"}
+    assert result.failures == () and result.ok
+    assert all(each.confirmed for each in result.limits if each.of == "step")
+
+
+def test_a_limit_that_is_too_long_is_refuted(monkeypatch) -> None:
+    """Steps 1.1 times as long as the advisor allows leave the equilibrium within the limit already."""
+    advise = steps.advise
+
+    def wrong(*arguments, **options):
+        advice = advise(*arguments, **options)
+        return replace(advice, limits={name: 1.1 * x for name, x in advice.limits.items()})
+
+    monkeypatch.setattr(steps, "advise", wrong)
+    result = rd.stress(rd.load("pendulum"), samples=200, runs=0)
+    refuted = {each.what for each in result.limits if each.confirmed is False}
+    assert {"explicit_euler", "midpoint", "rk4", "order_8"} <= refuted
+    assert not result.ok and len(result.failures) == len(refuted) and "is refuted" in result.failures[0]
+
+
+def test_an_estimate_that_is_too_small_misleads_and_shrinks_to_a_start_of_few_digits(monkeypatch) -> None:
+    """An estimate divided by 100."""
+    simulate = runs.simulate
+
+    def boastful(*arguments, **options):
+        run = simulate(*arguments, **options)
+        if run.error is None:
+            return run
+        return replace(run, error=replace(run.error, error=run.error.error / 100))
+
+    monkeypatch.setattr(runs, "simulate", boastful)
+    robot = rd.load("planar_2r")
+    setup = rd.Setup(
+        rd.Plant(robot), [0.7312, -0.4321], [0.5111, 0.7222], 0.2, integrator="midpoint", step_s=2e-3,
+        record_period_s=0.02,
+    )  # fmt: skip
+    found = runs.judged(setup, "swing")
+    assert found.misleads and found.estimated < 0.3 * found.true
+    assert runs.judged(replace(setup, integrator="order_8"), "swing").misleads is False  # rounding
+    small = runs.shrunk_run(setup, "swing", found)
+    numbers = re.findall(r"[qv]0=\[(.*?)\]", small.python)
+    assert small.misleads and numbers
+    assert sum(len(x) for x in ", ".join(numbers).split(", ")) < len("0.7312-0.43210.51110.7222")
+
+
+def test_runs_of_all_families_are_judged_and_say_what_is_true() -> None:
+    robot, rng = rd.load("cart_pole"), np.random.default_rng(1)
+    states = {"q": np.array([robot.random_configuration(rng) for _ in range(200)])}
+    found = list(runs.judged_runs(robot, states, len(FAMILIES), rng, lambda what: None))
+    assert len(found) == len(FAMILIES)
+    judged = [each for each in found if not isinstance(each, str)]
+    assert len(judged) >= len(FAMILIES) - 1 and not any(each.misleads for each in judged)
+    assert sum(isfinite(each.true) for each in judged) >= len(FAMILIES) - 2
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_lines_to_paste_repeat_what_was_found(name: str) -> None:
+    """The last line that each prints has the figure, in the digits that are shown."""
+    result = made(name)
+    by_quantity = {(each.what, each.joint): each for each in result.worst}  # one road of each
+    for each in (*by_quantity.values(), *result.limits, *result.runs):
+        python = result.python(each)
+        if not python or (each in result.limits and each.of == "step" and each.what != "rk4"):
+            continue
+        said = io.StringIO()
+        with contextlib.redirect_stdout(said):
+            exec(compile(python, each.what, "exec"), {})
+        if each in result.worst:
+            figures = [float(x) for x in re.findall(r"-?\d+\.?\d*(?:e[+-]?\d+)?", said.getvalue())]
+            expected = each.minimal if "digits lost" not in each.what else -np.log10(2.0**-53) - each.minimal
+            rough = 0.06 if each.what == "fastest motion" else 1e-9  # printed in two digits
+            if "digits lost in inverse" in each.what:
+                rough = 0.1  # on the root mean square of 100 states
+            assert any(x == pytest.approx(expected, rel=rough) for x in figures), (python, said.getvalue())
+
+
+def test_a_joint_without_inertia_is_named_and_the_rest_is_told() -> None:
+    with pytest.warns(rd.ModelWarning, match="has no mass"):
+        robot = rd.load("massless_tip")
+    result = rd.stress(robot, samples=100, runs=1)
+    assert "runs: joint 'pointer_joint' carries no inertia" in result.left_out
+    assert {each.of for each in result.limits} == {"speed", "payload"} and not result.runs
+    assert {each.what for each in result.worst} == {"gravity torque / effort limit", "digits lost in inverse_dynamics"}
+
+
+def test_joints_without_limits_are_named() -> None:
+    said = made("planar_2r").left_out
+    assert "joints without an effort limit: joint_1, joint_2" in said
+    assert any(each.startswith("joints without a velocity limit: joint_1, joint_2") for each in said)
+
+
+def test_what_is_found_depends_on_the_seed_alone() -> None:
+    robot = rd.load("cart_pole")
+
+    def found(seed: int) -> list[object]:
+        rng = np.random.default_rng(seed)
+        states = random_states(robot, 200, rng)
+        worst = list(worst_configurations(robot, states, rng, "cart_pole", lambda what: None))
+        return [*worst, *(expression(each.setup) for each in scenes(robot, states, 7, rng))]
+
+    assert found(3) == found(3) != found(4)
+
+
+def test_the_budget_ends_it_and_what_is_left_out_is_said() -> None:
+    result = rd.stress(rd.load("planar_2r"), samples=100, runs=1, budget_s=1e-3)
+    assert "runs: the rest, as the budget of 0.001 s ended" in " ".join(result.left_out) or not result.runs
+    assert any("the budget of 0.001 s ended" in each for each in result.left_out)
+
+
+def test_a_run_that_leaves_an_equilibrium_is_seen_to_say_so() -> None:
+    """Steps beyond their limit: the run leaves the equilibrium, and admits that."""
+    robot = rd.load("pendulum")
+    law = rd.PDGravity(robot, rd.hold([0.4]), 133.0, 13.3)
+    setup = rd.Setup(rd.Plant(robot), [0.4 + 1e-6], duration_s=2.0, controller=law, integrator="midpoint", step_s=0.11)
+    told = confirm.told(setup, np.array([0.4]), True)
+    assert told.growth > 30 and not told.misleads  # it says so
+
+
+# --- the command ------------------------------------------------------------------------------------------------
+
+
+def test_document_has_the_keys_that_are_promised_and_no_infinity(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr("robot_dyn.stress_test.stress.stressed", lambda *arguments: made("planar_2r"))
+    done = run("stress", "planar_2r", "--json", "-o", tmp_path / "page")
+    assert done.returncode == 0, done.stderr
+    document = json.loads(done.stdout, parse_constant=lambda word: pytest.fail(f"{word} is not JSON"))
+    parts = ("worst", "limits", "runs")
+    assert promised("stress").keys() | {"python"} == {
+        *document, *(key for part in parts for each in document[part] for key in each)
+    }  # fmt: skip
+    assert all(document[part] for part in parts)
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert page.startswith("<!DOCTYPE html>") and "http://" not in page and "https://" not in page
+    assert str(tmp_path) not in page and "<script" not in page
+    for each in (finding for part in parts for finding in document[part] if finding["python"]):
+        assert html.escape(each["python"]) in page
+    shown = run("stress", "planar_2r")
+    assert shown.returncode == 0 and shown.stdout.startswith("planar_2r: no failures in ")
+
+
+def test_failures_are_told_loudly(monkeypatch, tmp_path) -> None:
+    whole = made("planar_2r")
+    wrong = replace(whole, limits=tuple(replace(each, confirmed=False) for each in whole.limits[-1:]))
+    monkeypatch.setattr("robot_dyn.stress_test.stress.stressed", lambda *arguments: wrong)
+    done = run("stress", "planar_2r", "-o", tmp_path / "page.html")
+    assert done.returncode == 1 and "\nFAILURE: gain PD" in done.stdout
+    assert 'class="fails">failure: gain PD' in (tmp_path / "page.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_the_page_opens_without_a_word_of_the_browser_and_asks_for_nothing(tmp_path, dark: bool) -> None:
+    sync_api = pytest.importorskip("playwright.sync_api")
+    page = rd.save_stress(made("planar_2r"), tmp_path / "page")
+    with sync_api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium(), args=FLAGS)
+        tab = browser.new_page(color_scheme="dark" if dark else "light", viewport={"width": 1100, "height": 900})
+        said, asked = [], []
+        tab.on("console", lambda message: said.append(message.text))
+        tab.on("request", lambda request: asked.append(request.url))
+        tab.goto(page.as_uri())
+        assert tab.title() == "planar_2r: what breaks first"
+        assert tab.evaluate("getComputedStyle(document.body).backgroundColor") == (
+            "rgb(22, 24, 28)" if dark else "rgb(255, 255, 255)"
+        )
+        assert said == [] and asked == [page.as_uri()]
+        assert tab.evaluate("document.documentElement.scrollWidth <= innerWidth")
+        browser.close()
+
+
+def test_commands_to_paste_answer() -> None:
+    commands = [each.command for each in made("planar_2r").worst if each.command]
+    assert {each.split()[0] for each in commands} == {"certify"}
+    done = run(*shlex.split(commands[0]))
+    assert done.returncode == 0, done.stderr
+    assert "given" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (["--samples", "10"], "samples must be .*100.*, got 10"),
+        (["--runs", "-1"], "runs must be .*, got -1"),
+        (["--budget", "0"], "budget_s must be positive, got 0.*"),
+        (["-o", "page.txt"], r"page\.txt: '\.txt' is not the suffix of a page; .*"),
+        (["-o", "old.html"], r"old\.html: exists; add --force to replace it.*"),
+    ],
+)
+def test_mistakes_are_told_in_one_line_before_the_work(tmp_path, monkeypatch, given, message: str) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "old.html").write_text("<!DOCTYPE html>")
+    assert re.fullmatch(message, refusal(["stress", "pendulum", *given]))
