@@ -195,6 +195,7 @@ def examples(folder: Path) -> dict[str, Example]:
         "Plant.torque": (plant.torque, {"t": 0.1, "q": q, "v": v}),
         "RegularisedCoulombFriction": (rd.RegularisedCoulombFriction, {"friction": 0.1, "velocity_scale": [0.1, 0.2]}),
         "Robot": (rd.Robot, {"description": robot.description, "edits": robot.edits}),
+        "Robot.announced": (robot.announced, {}),
         "Robot.from_pinocchio": (rd.Robot.from_pinocchio, {"model": robot.model}),
         "Robot.from_text": (rd.Robot.from_text, {"urdf": robot.description.xml.decode(), "source": "arm"}),
         "Robot.random_configuration": (getattr(robot, "random_configuration", None), {"rng": np.random.default_rng(0)}),
