@@ -32,10 +32,13 @@ class Met:
         return f"{self.label}: {', '.join(numbers)}"
 
 
-def held_scene(seed: int, index: int) -> tuple[Scene, float]:
-    """Scene number `index` of a seed, its method to be chosen, and what is asked: 1e-10 to 1e-3."""
+def held_scene(seed: int, index: int, of: str = "") -> tuple[Scene, float]:
+    """Scene number `index` of a seed, of one of four arms or of that one, its method to be chosen, and what is asked.
+
+    That is 1e-10 to 1e-3.
+    """
     rng, family = np.random.default_rng([seed, index, 14]), FAMILIES[index % 2]
-    name = str(rng.choice(["rail", "pendulum", "planar_2r", "cart_pole"]))
+    name = of or str(rng.choice(["rail", "pendulum", "planar_2r", "cart_pole"]))
     arm = arms()[name]
     n, q, v = arm.n, *rng.uniform(-1, 1, (2, arm.n))
     scale, duration = np.diag(arm.M(q)), float(np.round(rng.uniform(0.3, 1.2), 3))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +13,8 @@ from tests.estimates.truth import truth
 
 LEAST = 0.3  # an estimate below this part of the true error misleads
 MOST = 3.0  # an estimate beyond this multiple of it is of little use
+
+Truth = Callable[[rd.Setup, np.ndarray], np.ndarray]  # positions of a setup at times
 
 
 @dataclass(frozen=True)
@@ -64,12 +67,15 @@ class Judgement:
 
 def judge(seed: int, index: int) -> Judgement:
     """Run a scene and its truth."""
-    made = scene(seed, index)
+    return judged(scene(seed, index), truth, lambda setup, t: truth(setup, t, 2e-13, 7e-4))
+
+
+def judged(made: Scene, exact: Truth, witness: Truth) -> Judgement:
+    """Run a scene, its truth, and another whose distance from that one tells how sure it is."""
     run = rd.simulate(made.setup)
-    exact = truth(made.setup, run.t)
-    other = truth(made.setup, run.t, 2e-13, 7e-4)
-    errors = np.maximum.accumulate(np.abs(run.q - exact).max(axis=1))
+    q = exact(made.setup, run.t)
+    errors = np.maximum.accumulate(np.abs(run.q - q).max(axis=1))
     known = run.t <= run.error.resolved_until
     true = float(errors[known][-1]) if known.any() else 0.0
-    unsure = float(np.abs(exact - other)[known].max()) if known.any() else 0.0
+    unsure = float(np.abs(q - witness(made.setup, run.t))[known].max()) if known.any() else 0.0
     return Judgement(made, run, true, float(errors[-1]), unsure)

@@ -38,15 +38,22 @@ def arms() -> dict[str, rd.Robot]:
         "planar_2r": rd.load("planar_2r"),
         "cart_pole": rd.load("cart_pole"),
         "ur5": rd.load("ur5"),
+        "panda": _panda(),
     }
 
 
-def scene(seed: int, index: int) -> Scene:
-    """Scene number `index` of a seed."""
+def _panda() -> rd.Robot:
+    """Without its fingers."""
+    whole = rd.load("panda")
+    return whole.with_(lock=dict.fromkeys(whole.joint_names[7:], 0.0))
+
+
+def scene(seed: int, index: int, of: str = "") -> Scene:
+    """Scene number `index` of a seed, of one of the arms or of that one."""
     rng = np.random.default_rng([seed, index])
     family = FAMILIES[index % len(FAMILIES)]
     names = ["pendulum", "planar_2r", "cart_pole"] + (["rail"] if family in ("impact", "window") else ["ur5"])
-    name = str(rng.choice(names))
+    name = of or str(rng.choice(names))
     arm = arms()[name]
     n, duration = arm.n, float(np.round(rng.uniform(0.2, 1.2), 3))
     q, v = rng.uniform(-1, 1, n), rng.uniform(-1, 1, n)
@@ -67,7 +74,7 @@ def scene(seed: int, index: int) -> Scene:
         method = rd.Adaptive(rtol=10 ** rng.uniform(-11, -5), atol=10 ** rng.uniform(-13, -8))
         text = f"DOP853 {method.rtol:.0e}"
     else:
-        method = rd.method("rk4" if name == "ur5" else str(rng.choice(METHODS)))
+        method = rd.method("rk4" if arm.n > 2 else str(rng.choice(METHODS)))
         text = method.name
     step = float(np.round(10 ** rng.uniform(-3.4, -1.9), 6))
     fixed = {} if isinstance(method, rd.Adaptive) else {"step_s": step}

@@ -7,6 +7,7 @@ from typing import cast
 from tests.hard import (
     chaos,
     conditioning,
+    contact,
     far_out,
     long_runs,
     sampled_control,
@@ -21,6 +22,7 @@ _ALL = (
     far_out,
     long_runs,
     stiffness,
+    contact,
     singularity,
     sampled_control,
     chaos,
