@@ -65,4 +65,4 @@ def _of(counting: Counting, road: Road, quantity: Quantity, words: str) -> Worst
     typical, random = _OF_FLOAT64 - made.typical, _OF_FLOAT64 - made.random
     note = f"{road.name}: {made.searched:.1f} digits hold, {made.typical:.1f} typically"
     what = f"digits lost in {quantity.name}"
-    return Worst(what, "", "digits", typical, random, lost, minimal, listed(state), note, python, command)
+    return Worst(what, "", "digits", typical, random, max(lost, minimal), minimal, listed(state), note, python, command)

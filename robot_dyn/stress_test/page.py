@@ -108,7 +108,7 @@ def named(each: Worst | Limit | Judged) -> str:
     if isinstance(each, Worst):
         return f"{each.what}{f' of {each.joint}' if each.joint else ''}: {figure(each.minimal)} {each.unit}".rstrip()
     if isinstance(each, Limit):
-        return f"{each.of}, {each.what}: {figure(each.value)} {each.unit}"
+        return f"{each.of}, {each.what}: {_limit(each)}"
     return each.what
 
 
@@ -121,9 +121,13 @@ def cells(each: Worst | Limit | Judged) -> tuple[str, ...]:
         return (each.what, each.joint, *sizes, each.note)
     if isinstance(each, Limit):
         verdict = {True: "confirmed", False: "REFUTED", None: ""}[each.confirmed]
-        return (each.of, each.what, each.joint, f"{figure(each.value)} {each.unit}", each.within, each.beyond, verdict)
+        return (each.of, each.what, each.joint, _limit(each), each.within, each.beyond, verdict)
     errors = (figure(each.estimated, "–"), figure(each.true, "–"), figure(each.unsure, "–"))
     return (each.what, f"{each.duration_s:g} s", *errors, each.said, "MISLEADS" if each.misleads else "")
+
+
+def _limit(each: Limit) -> str:
+    return f"{each.value:.4g} {each.unit}" if isfinite(each.value) else "none"
 
 
 def figure(x: float, none: str = "none") -> str:

@@ -48,7 +48,7 @@ class Stress:
         """What the library fails at: limits that runs refute, and runs that mislead; in words."""
         return (
             *(
-                f"{each.of} {each.what}: {_number(each.value)} {each.unit} is refuted: {each.within}; {each.beyond}"
+                f"{each.of} {each.what}: {_number(each.value)} [{each.unit}] is refuted: {each.within}; {each.beyond}"
                 for each in self.limits
                 if each.confirmed is False
             ),
