@@ -25,10 +25,12 @@ class Defect:
     Attributes:
         rho: Of |ρ|, (n,).
         d: Of |d|, (n,).
+        rounding: What |d| would be without the remainder, (n,): no shorter step makes it less.
     """
 
     rho: list[Ball]
     d: list[Ball]
+    rounding: list[Ball]
 
 
 def defect(tape: Tape, time: Ball, p: Polynomial, inverse: Inverse, h: Ball, T: Ball, order: int) -> Defect:
@@ -46,13 +48,14 @@ def defect(tape: Tape, time: Ball, p: Polynomial, inverse: Inverse, h: Ball, T: 
     n, shifted = tape.n, p.about(T)
     start, whole = _residual(tape, time, p, order + 1), _residual(tape, time + T, shifted, order + 2)
     powers = [h**k for k in range(order + 2)]
-    rho = []
+    rounding, rho = [], []
     for at_start, anywhere in zip(start, whole, strict=True):
         known = [upper(coefficient(at_start, k)) for k in range(order + 1)]
-        rho.append(upper(dot([*known, upper(coefficient(anywhere, order + 1))], powers)))
+        rounding.append(upper(dot(known, powers[:-1])))
+        rho.append(upper(rounding[-1] + upper(coefficient(anywhere, order + 1)) * powers[-1]))
     M = tape.mass([each[0] for each in shifted.q])
     more = inverse.contraction(matrix([M[i * n : (i + 1) * n] for i in range(n)]))
-    return Defect(rho, inverse.bound(more, rho))
+    return Defect(rho, inverse.bound(more, rho), inverse.bound(more, rounding))
 
 
 def _residual(tape: Tape, time: Ball, p: Polynomial, length: int) -> list[Ball]:

@@ -9,7 +9,7 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.proof.balls import Ball, NotProvenError, between, exact, horner, upper
+from robot_dyn.proof.balls import Ball, NotProvenError, between, exact, horner, largest, upper
 from robot_dyn.proof.defect import defect
 from robot_dyn.proof.linearised import jacobian
 from robot_dyn.proof.lohner import ErrorSet, carried, fundamental
@@ -20,6 +20,7 @@ from robot_dyn.proof.tube import Tube, logarithmic_norm, tube
 
 _GRID = 2**40  # steps end at multiples of 1/grid, so that times are floats
 _LONGEST_S = 1.0
+_OFF, _SHARE = 30.0, 1e-4  # h |d| at most: of the tolerance, and of the errors at the start
 _SHORTER, _TRIES = Fraction(3, 4), 24
 _LONGER = 1.2  # than the step before
 _GROWTH = 0.6  # h L that is tried
@@ -99,7 +100,7 @@ def proven_step(tape: Tape, start: State, end: Fraction, how: Effort, before: Fr
         raise NotProvenError("M may be singular") from None
     for attempt in range(_TRIES):
         try:
-            return _step(tape, time, start, p, inverse, weights, rate, h, how.order)
+            return _step(tape, time, start, p, inverse, weights, rate, h, how)
         except NotProvenError as error:
             why = error
         except ValueError:  # a power series is divided by one that may begin with 0
@@ -112,12 +113,16 @@ def proven_step(tape: Tape, start: State, end: Fraction, how: Effort, before: Fr
 
 def _step(
     tape: Tape, time: Ball, start: State, p: Polynomial, inverse: Inverse, weights: Sequence[Ball], rate: float,
-    step: Fraction, order: int,
+    step: Fraction, how: Effort,
 ) -> Step:  # fmt: skip
     h = exact(step)
     T = between(0 * h, h)
-    d = defect(tape, time, p, inverse, h, T, order)
-    around = tube(tape, time, p, inverse, h, d, start.error.bounds, weights, rate)
+    d = defect(tape, time, p, inverse, h, T, how.order)
+    errors = start.error.bounds
+    most = _OFF * how.tolerance + _SHARE * largest(errors) + 2 * h * largest(d.rounding)
+    if not h * largest(d.d) < most:
+        raise NotProvenError("a step is too long for its polynomial")
+    around = tube(tape, time, p, inverse, h, d, errors, weights, rate)
     Y, delta = fundamental(tape, time, p, inverse, h, T, around)
     ends = [horner(each, h) for each in (*p.q, *p.v)]
     centre = tuple(each.mid() for each in ends)
