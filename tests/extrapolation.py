@@ -18,7 +18,7 @@ BITS = 240
 
 def motion(
     plant: rd.Plant, q: Any, v: Any, until_s: float, steps: int, columns: int = 20,
-    control: Callable[[float, Any, Any], Any] | None = None,
+    control: Callable[[Any, Any, Any], Any] | None = None,
 ) -> tuple[np.ndarray, np.ndarray, float]:  # fmt: skip
     """Midpoints of q and v at the end, and how far the last two columns are apart, the sum over the steps.
 
@@ -29,23 +29,23 @@ def motion(
         until_s: End, in [s].
         steps: So many of equal length.
         columns: Of the extrapolation.
-        control: The torque (t, q, v) → (n,).
+        control: The torque (t, q, v) → (n,), t a ball.
     """
     from flint import arb
 
     n, doubt = plant.dynamics.n, 0.0
     with rd.Ball(BITS).scope():
 
-        def rate(t: float, y: np.ndarray) -> np.ndarray:
+        def rate(t: Any, y: np.ndarray) -> np.ndarray:
             u = np.zeros(n) if control is None else control(t, y[:n], y[n:])
-            return middle(np.concatenate([y[n:], plant.forward_dynamics(t, y[:n], y[n:], u)]))
+            return middle(np.concatenate([y[n:], plant.forward_dynamics(float(t), y[:n], y[n:], u)]))
 
         y, h = middle(np.array([arb(x) for x in (*q, *v)], dtype=object)), arb(until_s) / steps
         for k in range(steps):
             table: list[list[np.ndarray]] = []
             for i in range(columns):
                 parts = 2 * (i + 1)
-                row = [_midpoint_rule(rate, float(h) * k, y, h, parts)]
+                row = [_midpoint_rule(rate, h * k, y, h, parts)]
                 for j in range(i):
                     ratio = arb(parts) ** 2 / arb(2 * (i - j)) ** 2
                     row.append(middle(row[j] + (row[j] - table[i - 1][j]) / (ratio - 1)))
@@ -60,9 +60,9 @@ def middle(x: np.ndarray) -> np.ndarray:
     return np.array([each.mid() for each in x], dtype=object)
 
 
-def _midpoint_rule(rate: Any, t: float, y: np.ndarray, h: Any, parts: int) -> np.ndarray:
+def _midpoint_rule(rate: Any, t: Any, y: np.ndarray, h: Any, parts: int) -> np.ndarray:
     step = (h / parts).mid()
     before, now = y, middle(y + step * rate(t, y))
     for i in range(1, parts):
-        before, now = now, middle(before + 2 * step * rate(t + i * float(step), now))
-    return middle((before + now + step * rate(t + float(h), now)) / 2)
+        before, now = now, middle(before + 2 * step * rate(t + i * step, now))
+    return middle((before + now + step * rate(t + h, now)) / 2)
