@@ -5,7 +5,8 @@ parameters (numbers as inputs of machine code over constants), growth (cost agai
 (problems A01 and A05 of the IFToMM library of multibody benchmarks), stiff (joints with stiff dampers and springs),
 sticking (time stepping of dry friction and stops against the event-driven limit, beside MuJoCo),
 precision (time against error, all methods beside SciPy, MuJoCo, Drake and heyoka), energy (of a long run), estimates
-(of errors, beside true ones). What accuracy costs in other scenes: work_precision.py.
+(of errors, beside true ones), proofs (radius and time of proven runs). What accuracy costs in other scenes:
+work_precision.py.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from benchmarks import (
     kernels,
     parameters,
     precision,
+    proofs,
     queries,
     rollouts,
     sticking,
@@ -33,7 +35,7 @@ from robot_dyn.accuracy.environment import environment
 PICTURES = Path(__file__).parents[1] / "docs" / "pictures"
 SUBJECTS = (
     "queries", "compiled", "rollouts", "parameters", "growth", "iftomm", "stiff", "sticking", "precision", "energy",
-    "estimates",
+    "estimates", "proofs",
 )  # fmt: skip
 
 
@@ -77,6 +79,8 @@ def main() -> None:
         energy.energy(effort)
     if "estimates" in what:
         estimates.estimates(effort)
+    if "proofs" in what:
+        proofs.proofs(effort, None if options.quick else PICTURES / "proofs.png")
 
 
 if __name__ == "__main__":

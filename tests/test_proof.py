@@ -228,7 +228,8 @@ def test_the_defect_bounds_the_residual_anywhere_on_a_step() -> None:
         q, v = ([arb(x).mid() for x in known[:6]] for known in (GENERAL_Q, GENERAL_V))
         inverse, h = Inverse.of(tape.mass(q)), arb(2) ** -7
         p = taylor(tape, arb(0), q, v, inverse, 8)
-        of = defect(tape, arb(0), p, inverse, h, between(arb(0), h), 8)
+        T = between(arb(0), h)
+        of = defect(tape, arb(0), p, p.about(T), inverse, h, T, 8)
         for part in np.linspace(0, 1, 23).tolist():
             rho = tape.residual(h * part, *p.at(h * part))
             assert all(upper(x) < bound for x, bound in zip(rho, of.rho, strict=True))

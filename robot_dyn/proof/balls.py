@@ -6,6 +6,8 @@ from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from typing import Any
 
+from flint import arb, arb_mat, ctx, fmpq
+
 Ball = Any  # flint.arb
 Matrix = Any  # flint.arb_mat
 
@@ -48,8 +50,6 @@ def horner(coefficients: Sequence[Ball], x: Ball) -> Ball:
 
 def exact(x: Fraction) -> Ball:
     """A fraction with a power of two below it, as a number without radius."""
-    from flint import arb, ctx, fmpq
-
     with ctx.workprec(x.numerator.bit_length() + 2):
         made = arb(fmpq(x.numerator, x.denominator))
     assert made.is_exact()
@@ -63,6 +63,4 @@ def between(low: Ball, high: Ball) -> Ball:
 
 def matrix(rows: Sequence[Sequence[Ball]]) -> Matrix:
     """The matrix of its rows."""
-    from flint import arb_mat
-
     return arb_mat([list(row) for row in rows])

@@ -11,6 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import final
 
+from flint import arb, ctx
+
 from robot_dyn.proof.balls import Ball, dot, matrix, upper
 from robot_dyn.proof.mass import Inverse
 from robot_dyn.proof.polynomial import Polynomial, coefficient, series
@@ -33,35 +35,36 @@ class Defect:
     rounding: list[Ball]
 
 
-def defect(tape: Tape, time: Ball, p: Polynomial, inverse: Inverse, h: Ball, T: Ball, order: int) -> Defect:
+def defect(
+    tape: Tape, time: Ball, p: Polynomial, everywhere: Polynomial, inverse: Inverse, h: Ball, T: Ball, order: int
+) -> Defect:  # fmt: skip
     """The defect on a step.
 
     Args:
         tape: Of the motion.
         time: At the start of the step, exact.
         p: The polynomial from there.
+        everywhere: The same about T.
         inverse: Close to M⁻¹.
         h: The step, exact.
         T: A ball that holds [0, h].
         order: Of the accelerations of the polynomial.
     """
-    n, shifted = tape.n, p.about(T)
-    start, whole = _residual(tape, time, p, order + 1), _residual(tape, time + T, shifted, order + 2)
+    n = tape.n
+    start, whole = _residual(tape, time, p, order + 1), _residual(tape, time + T, everywhere, order + 2)
     powers = [h**k for k in range(order + 2)]
     rounding, rho = [], []
     for at_start, anywhere in zip(start, whole, strict=True):
         known = [upper(coefficient(at_start, k)) for k in range(order + 1)]
         rounding.append(upper(dot(known, powers[:-1])))
         rho.append(upper(rounding[-1] + upper(coefficient(anywhere, order + 1)) * powers[-1]))
-    M = tape.mass([each[0] for each in shifted.q])
+    M = tape.mass([each[0] for each in everywhere.q])
     more = inverse.contraction(matrix([M[i * n : (i + 1) * n] for i in range(n)]))
     return Defect(rho, inverse.bound(more, rho), inverse.bound(more, rounding))
 
 
 def _residual(tape: Tape, time: Ball, p: Polynomial, length: int) -> list[Ball]:
     """R along a polynomial, as series of a length."""
-    from flint import arb, ctx
-
     ctx.cap = length
     given = ([series(each, length) for each in known] for known in (p.q, p.v, p.a))
     return list(tape.residual(series([time, arb(1)], length), *given))

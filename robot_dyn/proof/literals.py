@@ -14,6 +14,7 @@ from typing import Any, final
 
 import casadi as ca
 import numpy as np
+from flint import arb
 
 from robot_dyn.arithmetic import Arithmetic, Array, Ball
 from robot_dyn.compiled.condition import Node
@@ -92,8 +93,6 @@ _ball = Ball(BITS)
 
 
 def _zero() -> Any:
-    from flint import arb
-
     return arb(0)
 
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import final
 
 import numpy as np
+from flint import arb, arb_mat, ctx
 
 from robot_dyn.proof.balls import Ball, Matrix, NotProvenError, dot, largest, matrix, upper
 from robot_dyn.proof.linearised import jacobian
@@ -21,7 +22,8 @@ from robot_dyn.proof.polynomial import Polynomial, series
 from robot_dyn.proof.tape import Tape
 from robot_dyn.proof.tube import Tube
 
-_ORDER = 6  # of Y: an error of a thousandth is enough
+_ORDERS = 3, 6  # of Y: the second where the first does not know it to a thousandth
+_ENOUGH = 1e-3
 _DOUBT = 0.05  # δ at most
 
 
@@ -51,45 +53,59 @@ def box(r: Sequence[Ball]) -> ErrorSet:
 
 
 def fundamental(
-    tape: Tape, time: Ball, p: Polynomial, inverse: Inverse, h: Ball, T: Ball, within: Tube
-) -> tuple[Matrix, Ball]:
-    """Y(h), and δ, on a tube.
+    tape: Tape, time: Ball, p: Polynomial, everywhere: Polynomial, inverse: Inverse, h: Ball, T: Ball, within: Tube
+) -> tuple[Matrix, Ball]:  # fmt: skip
+    """Y(h), and δ, on a tube; `everywhere` is p about T.
 
     Raises:
         NotProvenError: If δ is too large.
     """
-    from flint import arb, arb_mat, ctx
+    delta = None
+    for order in _ORDERS:
+        J = [
+            *_coefficients(tape, time, p, inverse, within, order)[:order],
+            _coefficients(tape, time + T, everywhere, inverse, within, order)[order],
+        ]
+        Y, delta = _expansion(J, h, within)
+        if delta < _ENOUGH:
+            break
+    if delta is None or not delta < _DOUBT:
+        raise NotProvenError("the fundamental matrix is not well known: the start is too wide, or a step too long")
+    at_end = Y[-1]
+    for each in Y[-2::-1]:
+        at_end = at_end * h + each
+    return at_end, delta
 
-    n, m = tape.n, _ORDER
-    ctx.cap = m + 1
 
-    def coefficients(t: Ball, p: Polynomial) -> list[Matrix]:
-        sets = within.B[:n], within.B[n:], within.C
-        x = (
-            [series([each[0] + b, *each[1:]], m + 1) for each, b in zip(known, wide, strict=True)]
-            for known, wide in zip((p.q, p.v, p.a), sets, strict=True)
-        )
-        made = jacobian(tape, inverse, (series([t, arb(1)], m + 1), *x), m + 1)
-        return [_whole(each, k == 0) for k, each in enumerate(made)]
+def _coefficients(
+    tape: Tape, time: Ball, p: Polynomial, inverse: Inverse, within: Tube, order: int
+) -> list[Matrix]:  # fmt: skip
+    """Those of J(p + b) for all b in a tube, to the order."""
+    n, length = tape.n, order + 1
+    ctx.cap = length
+    sets = within.B[:n], within.B[n:], within.C
+    x = (
+        [series([each[0] + b, *each[1:]], length) for each, b in zip(known, wide, strict=True)]
+        for known, wide in zip((p.q, p.v, p.a), sets, strict=True)
+    )
+    made = jacobian(tape, inverse, (series([time, arb(1)], length), *x), length)
+    return [_whole(each, k == 0) for k, each in enumerate(made)]
 
-    J = [*coefficients(time, p)[:m], coefficients(time + T, p.about(T))[m]]
-    Y = [_identity(2 * n)]
+
+def _expansion(J: Sequence[Matrix], h: Ball, within: Tube) -> tuple[list[Matrix], Ball]:
+    """Y of order m by the m + 1 coefficients of J, and δ."""
+    m, size = len(J) - 1, J[0].nrows()
+    Y = [_identity(size)]
     for k in range(m):
         total = sum((J[i] * Y[k - i] for i in range(1, k + 1)), start=J[0] * Y[k])
         Y.append((total * (arb(1) / (k + 1))).mid())
     delta, power = arb(0), arb(1)
     for k in range(2 * m + 1):
-        defect = Y[k + 1] * arb(k + 1) if k < m else arb_mat(2 * n, 2 * n)
+        defect = Y[k + 1] * arb(k + 1) if k < m else arb_mat(size, size)
         for i in range(max(0, k - m), min(k, m) + 1):
             defect = defect - J[i] * Y[k - i]
         delta, power = delta + _norm(defect, within.weights) * power, power * h
-    delta = upper(h * within.growth * delta)
-    if not delta < _DOUBT:
-        raise NotProvenError("the fundamental matrix is not well known: the start is too wide, or a step too long")
-    at_end = Y[m]
-    for each in Y[-2::-1]:
-        at_end = at_end * h + each
-    return at_end, delta
+    return Y, upper(h * within.growth * delta)
 
 
 def carried(before: ErrorSet, Y: Matrix, delta: Ball, within: Tube, rounding: Sequence[Ball]) -> ErrorSet:
@@ -113,8 +129,6 @@ def carried(before: ErrorSet, Y: Matrix, delta: Ball, within: Tube, rounding: Se
 
 def _turned(YQ: Matrix, r: Sequence[Ball], w: Sequence[Ball]) -> Matrix:
     """Q', exact: any matrix is right, this one keeps the set narrow."""
-    from flint import arb
-
     m, most = len(r), largest(r)
     units = np.array([float(x) for x in w])
     sizes = np.array([float(x / most) if most > 0 else 0.0 for x in r])
@@ -128,8 +142,6 @@ def _turned(YQ: Matrix, r: Sequence[Ball], w: Sequence[Ball]) -> Matrix:
 
 def _whole(J: Matrix, constant: bool) -> Matrix:
     """[0 1; J], of a coefficient of a power series: the identity is constant."""
-    from flint import arb
-
     n = J.nrows()
     top = [[arb(int(constant and j == n + i)) for j in range(2 * n)] for i in range(n)]
     return matrix([*top, *([J[i, j] for j in range(2 * n)] for i in range(n))])
@@ -142,6 +154,4 @@ def _norm(A: Matrix, w: Sequence[Ball]) -> Ball:
 
 
 def _identity(m: int) -> Matrix:
-    from flint import arb
-
     return matrix([[arb(int(i == j)) for j in range(m)] for i in range(m)])

@@ -13,6 +13,8 @@ from functools import cached_property
 from math import sqrt
 from typing import final
 
+from flint import arb
+
 from robot_dyn.proof.balls import Ball, Matrix, NotProvenError, dot, largest, matrix, upper
 
 
@@ -39,8 +41,6 @@ class Inverse:
     @cached_property
     def units(self) -> list[Ball]:
         """u, exact and positive."""
-        from flint import arb
-
         made = [float(self.A[i, i]) for i in range(self.A.nrows())]
         if not all(x > 0 for x in made):
             raise NotProvenError("M may be singular")
@@ -69,8 +69,6 @@ class Inverse:
 
     def solve(self, more: Ball, right: Matrix) -> Matrix:
         """M⁻¹ G for all matrices where ε/(1−ε) ≤ `more`, (n, k)."""
-        from flint import arb
-
         product, u = self.A * right, self.units
         n, columns = product.nrows(), product.ncols()
         sizes = [more * largest(product[i, j] / u[i] for i in range(n)) for j in range(columns)]

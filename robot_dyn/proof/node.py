@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, final
 
+from flint import arb
+
 from robot_dyn.proof.balls import horner
 from robot_dyn.proof.packed import Packed, of_joints, unpacked
 from robot_dyn.proof.polynomial import derivatives
@@ -34,8 +36,6 @@ class Node:
 
 def node_of(state: State, step: Step | None = None) -> Node:
     """What is kept of a state, and of the step before it."""
-    from flint import arb
-
     n = len(state.q)
     wide = [arb(0, bound) for bound in state.error.bounds]
     q, v = (
@@ -51,8 +51,6 @@ def node_of(state: State, step: Step | None = None) -> Node:
 
 def on_the_way(start: float, node: Node) -> Callable[[float], tuple[list[Any], list[Any]]]:
     """Balls that hold q and v at a time of the step from `start` to the node; in the precision of the calls."""
-    from flint import arb
-
     q = tuple(tuple(map(unpacked, each)) for each in node.polynomial)
     v, wide_q, wide_v = derivatives(q), [*map(unpacked, node.tube_q)], [*map(unpacked, node.tube_v)]
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from flint import arb, ctx
+
 from robot_dyn.proof.balls import Ball
 
 Packed = tuple[int, int, int, int]
@@ -17,8 +19,6 @@ def packed(x: Ball) -> Packed:
 
 def unpacked(x: Packed) -> Ball:
     """The ball of these numbers; its midpoint exactly, its radius rounded up."""
-    from flint import arb, ctx
-
     m, e, r, s = x
     with ctx.workprec(max(m.bit_length(), r.bit_length(), 2)):
         return arb(arb(m) * arb(2) ** e, arb(r) * arb(2) ** s)

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, final
 
+from flint import arb, arb_series, ctx
+
 from robot_dyn.proof.balls import Ball, horner, matrix
 from robot_dyn.proof.mass import Inverse
 from robot_dyn.proof.tape import Tape
@@ -64,15 +66,11 @@ def derivatives(known: Coefficients) -> Coefficients:
 
 def series(coefficients: Sequence[Ball], length: int) -> Any:
     """A power series that is known to the coefficient before `length`."""
-    from flint import arb_series
-
     return arb_series(list(coefficients[:length]), length)
 
 
 def coefficient(x: Any, k: int) -> Ball:
     """A coefficient of a power series, or of a number."""
-    from flint import arb
-
     if isinstance(x, arb):
         return x if k == 0 else arb(0)
     return x[k]
@@ -80,8 +78,6 @@ def coefficient(x: Any, k: int) -> Ball:
 
 def taylor(tape: Tape, time: Ball, q: Sequence[Ball], v: Sequence[Ball], inverse: Inverse, order: int) -> Polynomial:
     """The polynomial from an exact state, with accelerations of the order."""
-    from flint import arb, ctx
-
     qs, vs, as_ = [[x, y] for x, y in zip(q, v, strict=True)], [[x] for x in v], [[] for _ in q]
     for k in range(order + 1):
         ctx.cap = k + 1

@@ -8,6 +8,8 @@ from fractions import Fraction
 from time import perf_counter
 from typing import Any
 
+from flint import arb, ctx
+
 from robot_dyn.arithmetic import Ball
 from robot_dyn.errors import QueryError
 from robot_dyn.proof.balls import NotProvenError, upper
@@ -90,8 +92,6 @@ def prove(
 
 def _start(names: tuple[str, ...], given: tuple[Any, Any], widths: tuple[float, float]) -> State:
     """The set of starts: its centre has the precision in force, and what that rounds belongs to the set."""
-    from flint import arb
-
     balls = [numbers_of(what, x, names) for what, x in zip(("q0", "v0"), given, strict=True)]
     q, v = (tuple((+x).mid() for x in known) for known in balls)
     r = [
@@ -123,8 +123,6 @@ def _nodes(about: Motion, state: State, until_s: float, bits: int) -> Iterator[N
 @contextmanager
 def _precision(bits: int) -> Iterator[None]:
     """The precision of balls, with the length of power series as it was before."""
-    from flint import ctx
-
     with Ball(bits).scope():
         cap = ctx.cap
         try:

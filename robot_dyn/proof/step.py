@@ -8,6 +8,7 @@ from fractions import Fraction
 from typing import final
 
 import numpy as np
+from flint import arb
 
 from robot_dyn.proof.balls import Ball, NotProvenError, between, exact, horner, largest, upper
 from robot_dyn.proof.defect import defect
@@ -42,9 +43,9 @@ class Effort:
 
 
 def effort(bits: int) -> Effort:
-    """Order and tolerance for a precision: 14 and 1e-16 at 53 bits, 20 and 1e-22 at 100."""
+    """Order and tolerance for a precision: 16 and 1e-16 at 53 bits, 22 and 1e-22 at 100."""
     more = 6 * (bits - 53) / 47
-    return Effort(round(14 + more), max(10.0 ** -(16 + more), 1e-300))
+    return Effort(round(16 + more), max(10.0 ** -(16 + more), 1e-300))
 
 
 @final
@@ -117,13 +118,14 @@ def _step(
 ) -> Step:  # fmt: skip
     h = exact(step)
     T = between(0 * h, h)
-    d = defect(tape, time, p, inverse, h, T, how.order)
+    everywhere = p.about(T)
+    d = defect(tape, time, p, everywhere, inverse, h, T, how.order)
     errors = start.error.bounds
     most = _OFF * how.tolerance + _SHARE * largest(errors) + 2 * h * largest(d.rounding)
     if not h * largest(d.d) < most:
         raise NotProvenError("a step is too long for its polynomial")
     around = tube(tape, time, p, inverse, h, d, errors, weights, rate)
-    Y, delta = fundamental(tape, time, p, inverse, h, T, around)
+    Y, delta = fundamental(tape, time, p, everywhere, inverse, h, T, around)
     ends = [horner(each, h) for each in (*p.q, *p.v)]
     centre = tuple(each.mid() for each in ends)
     error = carried(start.error, Y, delta, around, [upper(each - c) for each, c in zip(ends, centre, strict=True)])
@@ -133,8 +135,6 @@ def _step(
 
 def _weights(tape: Tape, time: Ball, p: Polynomial, inverse: Inverse) -> tuple[list[Ball], float]:
     """Exact weights in which the logarithmic norm at the start is about the least, and it: Perron's vector of |J|."""
-    from flint import arb
-
     n = tape.n
     (J,) = jacobian(tape, inverse, (time, *p.at(arb(0))))
     A = np.zeros((2 * n, 2 * n))

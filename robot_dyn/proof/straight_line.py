@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from flint import arb
+
 from robot_dyn.compiled.program import Kind, Program
 from robot_dyn.errors import ProofError
 
@@ -55,8 +57,6 @@ def straight_line(program: Program) -> Function:
     function = scope["function"]
 
     def of_inputs(x: Sequence[Any]) -> Sequence[Any]:
-        from flint import arb
-
         return function(x, _tanh, [arb(each) for each in program.constants])
 
     return of_inputs

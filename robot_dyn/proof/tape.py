@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from typing import Any, final
 
 import casadi as ca
+from flint import ctx
 
 from robot_dyn.compiled.from_casadi import program_of
 from robot_dyn.compiled.program import Program
@@ -57,8 +58,6 @@ class Tape:
         return self._of("derivatives", [*q, *v, *a, t])
 
     def _of(self, name: str, x: Sequence[Any]) -> Sequence[Any]:
-        from flint import ctx
-
         if ctx.prec != self._bits:  # balls of fewer bits that hold the constants
             self._bits, self._rounded = ctx.prec, [+each for each in self._constants]
         return self._functions[name]([*x, *self._rounded])

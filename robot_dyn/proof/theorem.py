@@ -66,6 +66,11 @@ class Proof(Value):
         return _radii(self.nodes[-1].v)
 
     @property
+    def radii(self) -> tuple[np.ndarray, np.ndarray]:
+        """Times of the nodes, (k,), and upper bounds of the largest radius of q there, (k,)."""
+        return np.array([node.t for node in self.nodes]), np.array([_radii(node.q).max() for node in self.nodes])
+
+    @property
     def digits(self) -> float:
         """−log₁₀ of the largest radius of q at the end; inf if that is a point."""
         return _digits(float(self.radius_q.max()))

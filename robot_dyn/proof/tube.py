@@ -12,6 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import final
 
+from flint import arb, ctx
+
 from robot_dyn.proof.balls import Ball, Matrix, NotProvenError, between, largest, upper
 from robot_dyn.proof.defect import Defect
 from robot_dyn.proof.linearised import on_a_set
@@ -67,8 +69,6 @@ def tube(
     Raises:
         NotProvenError: If the motion may leave it.
     """
-    from flint import arb, ctx
-
     n = tape.n
     first = largest(e / w for e, w in zip(start, weights, strict=True))
     defect = largest(x / w for x, w in zip(of.d, weights[n:], strict=True))
