@@ -60,7 +60,7 @@ def fundamental(
     Raises:
         NotProvenError: If δ is too large.
     """
-    delta = None
+    Y, delta = [_identity(2 * tape.n)], arb("inf")
     for order in _ORDERS:
         J = [
             *_coefficients(tape, time, p, inverse, within, order)[:order],
@@ -69,7 +69,7 @@ def fundamental(
         Y, delta = _expansion(J, h, within)
         if delta < _ENOUGH:
             break
-    if delta is None or not delta < _DOUBT:
+    if not delta < _DOUBT:
         raise NotProvenError("the fundamental matrix is not well known: the start is too wide, or a step too long")
     at_end = Y[-1]
     for each in Y[-2::-1]:
