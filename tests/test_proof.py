@@ -9,17 +9,20 @@ from math import nextafter
 from threading import Thread
 from typing import Any
 
+import casadi as ca
 import numpy as np
 import pytest
-from flint import arb, ctx
+from flint import arb, arb_series, ctx
 
 import robot_dyn as rd
 from robot_dyn.accuracy.exact import RoundedLiterals
 from robot_dyn.coefficients import with_values
+from robot_dyn.compiled.from_casadi import program_of
 from robot_dyn.compiled.right_angles import completed
 from robot_dyn.control.reference import polynomial
 from robot_dyn.errors import ProofError, QueryError
 from robot_dyn.proof import step as steps
+from robot_dyn.proof import tube as tubes
 from robot_dyn.proof.balls import NotProvenError, between, exact, largest, matrix, upper
 from robot_dyn.proof.defect import defect
 from robot_dyn.proof.linearised import on_a_set
@@ -29,6 +32,7 @@ from robot_dyn.proof.motion import Motion
 from robot_dyn.proof.packed import packed, unpacked
 from robot_dyn.proof.polynomial import Polynomial, taylor
 from robot_dyn.proof.prove import _precision
+from robot_dyn.proof.straight_line import straight_line
 from robot_dyn.proof.tape import Tape
 from tests.extrapolation import BITS, motion
 
@@ -208,6 +212,44 @@ def test_nothing_that_is_not_finite_passes_as_a_bound() -> None:
             inverse.contraction(matrix(M))
     with pytest.raises(NotProvenError, match="singular"):
         Inverse.of([arb(1), arb(2), arb(2), arb(4)])
+
+
+def test_solutions_of_all_matrices_of_balls_are_bounded() -> None:
+    """M⁻¹ x and M⁻¹ G of random matrices in the balls, with right sides of both signs."""
+    rng, n, width = np.random.default_rng(3), 4, 0.01
+    F = rng.normal(size=(n, n))
+    middle = F @ F.T + np.eye(n)
+    with rd.Ball(100).scope():
+        M = matrix([[arb(x, width) for x in row] for row in middle.tolist()])
+        inverse = Inverse.of([M[i, j] for i in range(n) for j in range(n)])
+        more, r = inverse.contraction(M), [arb(x) for x in (1.0, 2.0, 0.5, 3.0)]
+        bounds, wide = inverse.bound(more, r), inverse.solve(more, matrix([[x] for x in r]))
+        reached = 0.0
+        for _ in range(200):
+            one = matrix([[arb(x) for x in row] for row in (middle + rng.uniform(-width, width, (n, n))).tolist()])
+            signs = rng.choice([-1.0, 1.0], n).tolist()
+            x = one.solve(matrix([[s * b] for s, b in zip(signs, r, strict=True)]))
+            assert all(upper(x[i, 0]) < bounds[i] for i in range(n))
+            reached = max(reached, *(float(upper(x[i, 0]) / bounds[i]) for i in range(n)))
+            assert all(wide[i, 0].overlaps(y) for i, y in enumerate(one.solve(matrix([[b] for b in r])).entries()))
+    assert reached > 0.8
+
+
+def test_a_tube_that_the_motion_may_leave_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that is no wider than the error at its start: e^{hL} > 1."""
+    monkeypatch.setattr(tubes, "_WIDER", 1)
+    made = proof(arm("planar_2r"), 0.1)
+    assert made.until_s == 0 and made.why_not == "the motion may leave the tube around its polynomial"
+
+
+def test_a_constant_that_was_rounded_is_refused() -> None:
+    x = ca.SX.sym("x")
+    for function in (0.1 * x, x**0.5 + x**3.5, ca.fmax(x, 0), ca.fabs(x)):
+        with pytest.raises(ProofError):
+            straight_line(program_of(ca.Function("f", [x], [function])))
+    with rd.Ball(60).scope():
+        (y,) = straight_line(program_of(ca.Function("f", [x], [ca.tanh(x)])))([arb_series([0.5, 1], 3)])
+        assert y[0].overlaps(arb(0.5).tanh()) and y[1].overlaps(1 - arb(0.5).tanh() ** 2)
 
 
 def test_a_guess_of_the_accelerations_that_is_too_small_is_found_out() -> None:

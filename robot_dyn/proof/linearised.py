@@ -67,7 +67,7 @@ def on_a_set(
     sizes = [upper(b) for b in B]
     for i, (c, d) in enumerate(zip(C, inverse.bound(more, rho), strict=True)):
         if not d + dot([upper(J[i, j]) for j in range(2 * n)], sizes) < c.upper():
-            raise NotProvenError("accelerations within the tube are not bounded")
+            raise NotProvenError("accelerations within the tube are not bounded: the set of states is too wide")
     return J
 
 
