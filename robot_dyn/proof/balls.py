@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from fractions import Fraction
 from typing import Any
 
@@ -11,9 +12,18 @@ from flint import arb, arb_mat, ctx, fmpq
 Ball = Any  # flint.arb
 Matrix = Any  # flint.arb_mat
 
+_GUARD = 32
+
 
 class NotProvenError(Exception):
     """Internal: a bound does not hold, or a step is too long for it; says why."""
+
+
+@contextmanager
+def finer() -> Iterator[None]:
+    """More bits, where numbers cancel: of a residual those of its terms would be left otherwise."""
+    with ctx.workprec(ctx.prec + _GUARD):
+        yield
 
 
 def upper(x: Ball) -> Ball:

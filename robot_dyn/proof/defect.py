@@ -13,7 +13,7 @@ from typing import final
 
 from flint import arb, ctx
 
-from robot_dyn.proof.balls import Ball, dot, matrix, upper
+from robot_dyn.proof.balls import Ball, dot, finer, matrix, upper
 from robot_dyn.proof.mass import Inverse
 from robot_dyn.proof.polynomial import Polynomial, coefficient, series
 from robot_dyn.proof.tape import Tape
@@ -67,4 +67,5 @@ def _residual(tape: Tape, time: Ball, p: Polynomial, length: int) -> list[Ball]:
     """R along a polynomial, as series of a length."""
     ctx.cap = length
     given = ([series(each, length) for each in known] for known in (p.q, p.v, p.a))
-    return list(tape.residual(series([time, arb(1)], length), *given))
+    with finer():
+        return list(tape.residual(series([time, arb(1)], length), *given))

@@ -14,7 +14,7 @@ from typing import Any, final
 
 from flint import arb, arb_series, ctx
 
-from robot_dyn.proof.balls import Ball, horner, matrix
+from robot_dyn.proof.balls import Ball, finer, horner, matrix
 from robot_dyn.proof.mass import Inverse
 from robot_dyn.proof.tape import Tape
 
@@ -61,7 +61,8 @@ class Polynomial:
 
 def derivatives(known: Coefficients) -> Coefficients:
     """Coefficients of the derivatives."""
-    return tuple(tuple(k * c for k, c in enumerate(each) if k) for each in known)
+    with finer():  # of exact coefficients exact
+        return tuple(tuple(k * c for k, c in enumerate(each) if k) for each in known)
 
 
 def series(coefficients: Sequence[Ball], length: int) -> Any:
@@ -82,7 +83,9 @@ def taylor(tape: Tape, time: Ball, q: Sequence[Ball], v: Sequence[Ball], inverse
     for k in range(order + 1):
         ctx.cap = k + 1
         t = series([time, arb(1)], k + 1)
-        rho = tape.residual(t, *([series(c, k + 1) for c in each] for each in (qs, vs, [[*a, arb(0)] for a in as_])))
+        given = (qs, vs, [[*a, arb(0)] for a in as_])
+        with finer():
+            rho = tape.residual(t, *([series(c, k + 1) for c in each] for each in given))
         a = inverse.A * matrix([[coefficient(x, k).mid()] for x in rho])
         for i in range(len(q)):
             as_[i].append(-a[i, 0].mid())

@@ -10,7 +10,7 @@ from typing import final
 import numpy as np
 from flint import arb
 
-from robot_dyn.proof.balls import Ball, NotProvenError, between, exact, horner, largest, upper
+from robot_dyn.proof.balls import Ball, NotProvenError, between, exact, finer, horner, largest, upper
 from robot_dyn.proof.defect import defect
 from robot_dyn.proof.linearised import jacobian
 from robot_dyn.proof.lohner import ErrorSet, carried, fundamental
@@ -126,8 +126,9 @@ def _step(
         raise NotProvenError("a step is too long for its polynomial")
     around = tube(tape, time, p, inverse, h, d, errors, weights, rate)
     Y, delta = fundamental(tape, time, p, everywhere, inverse, h, T, around)
-    ends = [horner(each, h) for each in (*p.q, *p.v)]
-    centre = tuple(each.mid() for each in ends)
+    with finer():
+        ends = [horner(each, h) for each in (*p.q, *p.v)]
+    centre = tuple((+each).mid() for each in ends)
     error = carried(start.error, Y, delta, around, [upper(each - c) for each, c in zip(ends, centre, strict=True)])
     end = State(start.t + step, centre[: tape.n], centre[tape.n :], error)
     return Step(start, step, p, around, end)

@@ -43,7 +43,7 @@ class Tape:
                 for name, (given, result) in made.items()
             }
         self._functions = {name: straight_line(program) for name, program in self.programs.items()}
-        self._bits, self._rounded = 0, []
+        self._rounded: dict[int, list[Any]] = {}
 
     def residual(self, t: Any, q: Sequence[Any], v: Sequence[Any], a: Sequence[Any]) -> Sequence[Any]:
         """R(t, q, v, a), n numbers, 0 for the true motion."""
@@ -58,9 +58,9 @@ class Tape:
         return self._of("derivatives", [*q, *v, *a, t])
 
     def _of(self, name: str, x: Sequence[Any]) -> Sequence[Any]:
-        if ctx.prec != self._bits:  # balls of fewer bits that hold the constants
-            self._bits, self._rounded = ctx.prec, [+each for each in self._constants]
-        return self._functions[name]([*x, *self._rounded])
+        if ctx.prec not in self._rounded:  # balls of fewer bits that hold the constants
+            self._rounded[ctx.prec] = [+each for each in self._constants]
+        return self._functions[name]([*x, *self._rounded[ctx.prec]])
 
 
 def _traced(motion: Motion, arithmetic: Literals, piece: float) -> dict[str, tuple[list[Any], Any]]:
