@@ -8,17 +8,18 @@ from fractions import Fraction
 from time import perf_counter
 from typing import Any
 
-from flint import arb, ctx
+from flint import ctx
 
 from robot_dyn.arithmetic import Ball
 from robot_dyn.errors import QueryError
-from robot_dyn.proof.balls import NotProvenError, upper
-from robot_dyn.proof.lohner import box
-from robot_dyn.proof.motion import Motion, assumed, motion
+from robot_dyn.proof.assumed import assumed
+from robot_dyn.proof.balls import NotProvenError
+from robot_dyn.proof.motion import Motion, motion
 from robot_dyn.proof.node import Node, node_of
+from robot_dyn.proof.start import start
 from robot_dyn.proof.step import State, effort, proven_step
 from robot_dyn.proof.tape import Tape
-from robot_dyn.proof.theorem import Proof, numbers_of
+from robot_dyn.proof.theorem import Proof
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.validate import duration, function, instance, integer, number
 
@@ -73,12 +74,10 @@ def prove(
     function("on_progress", on_progress, "the time reached in [s]")
     about = motion(setup, until_s)
     with _precision(bits):
-        start = _start(
-            about.robot.joint_names, (setup.q0 if q0 is None else q0, setup.v0 if v0 is None else v0), widths
-        )
-        nodes, why = [node_of(start)], ""
+        state = start(about.robot.joint_names, (setup.q0 if q0 is None else q0, setup.v0 if v0 is None else v0), widths)
+        nodes, why = [node_of(state)], ""
     try:
-        for node in _nodes(about, start, until_s, bits):
+        for node in _nodes(about, state, until_s, bits):
             nodes.append(node)
             if on_progress is not None:
                 on_progress(node.t)
@@ -88,18 +87,6 @@ def prove(
         why = str(error)
     meant = assumed(about, setup, q0 is not None, v0 is not None, widths)
     return Proof(about.robot.name, about.robot.joint_names, until_s, nodes[-1].t, why, bits, meant, tuple(nodes))
-
-
-def _start(names: tuple[str, ...], given: tuple[Any, Any], widths: tuple[float, float]) -> State:
-    """The set of starts: its centre has the precision in force, and what that rounds belongs to the set."""
-    balls = [numbers_of(what, x, names) for what, x in zip(("q0", "v0"), given, strict=True)]
-    q, v = (tuple((+x).mid() for x in known) for known in balls)
-    r = [
-        upper((x - c).abs_upper() + arb(width))
-        for known, centre, width in zip(balls, (q, v), widths, strict=True)
-        for x, c in zip(known, centre, strict=True)
-    ]
-    return State(Fraction(0), q, v, box(r))
 
 
 def _nodes(about: Motion, state: State, until_s: float, bits: int) -> Iterator[Node]:

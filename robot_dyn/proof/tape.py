@@ -14,9 +14,10 @@ from flint import ctx
 
 from robot_dyn.compiled.from_casadi import program_of
 from robot_dyn.compiled.program import Program
-from robot_dyn.proof.literals import Literals, expressions
+from robot_dyn.proof.literals import Literals
 from robot_dyn.proof.motion import Bodies, Motion
 from robot_dyn.proof.straight_line import straight_line
+from robot_dyn.proof.term import expressions
 from robot_dyn.recursive.composite_body import composite_body
 
 

@@ -6,15 +6,16 @@ from bisect import bisect_right
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from math import inf, isfinite, log10, nextafter
+from math import inf, log10, nextafter
 from typing import Any, final
 
 import numpy as np
 
 from robot_dyn.arithmetic import Array, Ball
-from robot_dyn.errors import QueryError, shown
+from robot_dyn.errors import QueryError
 from robot_dyn.proof.node import Node, on_the_way
 from robot_dyn.proof.packed import Packed, unpacked
+from robot_dyn.proof.start import numbers_of
 from robot_dyn.validate import number, numbers
 from robot_dyn.values import Value
 
@@ -173,30 +174,6 @@ class Proof(Value):
     def _precision(self) -> Iterator[None]:
         with Ball(self.bits).scope():
             yield
-
-
-def numbers_of(what: str, values: Any, joint_names: tuple[str, ...]) -> list[Any]:
-    """One ball for each joint, of decimals as text, of numbers, which are taken exactly, or of balls.
-
-    Raises:
-        QueryError: If they are anything else.
-    """
-    made, wanted = [], f"{what} must be {len(joint_names)} finite numbers, or decimals as text, got {shown(values)}"
-    try:
-        array = np.asarray(values, dtype=object)
-        if isinstance(values, np.ma.MaskedArray):
-            raise ValueError
-        if array.shape != (len(joint_names),):
-            raise ValueError
-        for x in array:
-            if isinstance(x, bool | np.bool_ | bytes | complex) or (isinstance(x, str) and not isfinite(float(x))):
-                raise ValueError
-            made.append(Ball().number(x))
-            if not made[-1].is_finite():
-                raise ValueError
-    except (TypeError, ValueError, OverflowError):
-        raise QueryError(wanted) from None
-    return made
 
 
 def _far(ball: Any, x: float) -> float:
