@@ -12,7 +12,7 @@ from flint import arb, arb_mat, ctx, fmpq
 Ball = Any  # flint.arb
 Matrix = Any  # flint.arb_mat
 
-_GUARD = 32
+_GUARD = 24  # with 100 bits no more than two words
 
 
 class NotProvenError(Exception):
