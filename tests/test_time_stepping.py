@@ -216,3 +216,14 @@ def test_it_takes_over_where_events_accumulate(monkeypatch: pytest.MonkeyPatch) 
     named = rd.simulate(plant, [0.4], duration_s=2.0, integrator="DOP853")
     assert named.outcome.ending == "diverged"
     assert "take integrator='time_stepping'" in named.outcome.advice
+
+
+def test_a_run_far_beyond_its_stable_step_ends_as_diverged() -> None:
+    """Positions of 1e16 rad and more, where M by Pinocchio is rounding and no longer positive definite."""
+    robot, q = rd.load("panda"), np.full(8, 0.3)
+    law = rd.PDGravity(robot, rd.hold(q), 1e3, 50.0)
+    run = rd.simulate(
+        robot, q + 1e-3, controller=law, duration_s=0.5, integrator="time_stepping", step_s=0.01, engine="interpreted",
+        estimate_error=False,
+    )  # fmt: skip
+    assert run.outcome.ending == "diverged" and run.outcome.t < 0.5

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
+from robot_dyn.arithmetic import Array, NotPositiveDefiniteError
 from robot_dyn.convex import PASSES, newton
 from robot_dyn.effects.effect import Conservative
 from robot_dyn.effects.set_valued import SetValued
@@ -82,11 +82,14 @@ def stepped(equation: StateEquation, t: float, x: Array, held: Array | None) -> 
 
 
 def _solved(n: int, known: Array, place: Array) -> Array:
-    """The solution after as many Newton steps as it takes, but for PASSES at most."""
-    made = solution(n, known, place)
-    for _ in range(PASSES - 1):
-        if made[2 * n] > 0:
-            made = solution(n, known, made[n : 2 * n])
+    """The solution after as many Newton steps as it takes, but for PASSES at most; nan where M is not definite."""
+    try:
+        made = solution(n, known, place)
+        for _ in range(PASSES - 1):
+            if made[2 * n] > 0:
+                made = solution(n, known, made[n : 2 * n])
+    except NotPositiveDefiniteError:  # of a state far beyond all bounds: the run ends there, as in machine code
+        return np.full(2 * n + 1, np.nan)
     return made
 
 

@@ -6,7 +6,7 @@ growth = max ‖√M_ii δq_i‖ in the second half of the run / ‖√M_ii δq_
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import final
+from typing import Any, final
 
 import numpy as np
 
@@ -16,16 +16,24 @@ from robot_dyn.simulation.trajectory import Ending, Trajectory
 
 WITHIN, BEYOND = 0.98, 1.02  # of a limit
 MOST = 1e3  # by which a push may grow within a limit, as the advisor counts it
-LEFT = 30.0  # a run whose push grows by more, of itself and of what it does within the limit, has left
+LEFT = 10.0  # a run whose push grows by more, of itself and of what it does within the limit, has left
 PUSH = 1e-6  # of the start, in [rad] or [m] of the joint of median inertia
 LEAST = 0.3  # of the true error: an estimate below misleads
 
 
 def pushed(setup: Setup, seed: int) -> Setup:
-    """The setup with its start moved off the equilibrium, each joint by as much in its unit 1/√M_ii."""
-    units = np.sqrt(np.diagonal(setup.plant.dynamics.M(setup.q0)))
-    push = np.random.default_rng(seed).normal(size=len(units)) * PUSH * np.median(units) / units
-    return replace(setup, q0=setup.q0 + push)
+    """The setup with its start moved off the equilibrium: along the fastest motion, and a little along all.
+
+    That is the mode of M⁻¹ diag(k_d) of the PD with the largest rate; sizes are in the units 1/√M_ii of the joints.
+    """
+    controller: Any = setup.controller
+    M = setup.plant.dynamics.M(setup.q0)
+    units = np.sqrt(np.diagonal(M))
+    rates, modes = np.linalg.eig(np.linalg.solve(M, np.diag(controller.kd)))
+    fast = modes[:, np.argmax(rates.real)].real * units
+    others = np.random.default_rng(seed).normal(size=len(units))
+    push = fast / np.linalg.norm(fast) + 0.1 * others / np.linalg.norm(others)
+    return replace(setup, q0=setup.q0 + push * PUSH * np.median(units) / units)
 
 
 @final
