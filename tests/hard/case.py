@@ -36,9 +36,14 @@ class Row:
         return self.found <= self.allowed
 
     @property
+    def ours(self) -> bool:
+        """Whether it is a figure of this library."""
+        return self.program.startswith(OURS)
+
+    @property
     def silent(self) -> bool:
         """Whether a figure of ours is wrong without a word."""
-        return self.program == OURS and not self.holds and not self.said
+        return self.ours and not self.holds and not self.said
 
     @property
     def verdict(self) -> str:

@@ -10,10 +10,13 @@ from tests.hard import (
     contact,
     far_out,
     long_runs,
+    peer_runs,
+    peers,
     sampled_control,
     singularity,
     stiffness,
     tools,
+    world,
 )
 from tests.hard.case import Family
 
@@ -27,5 +30,8 @@ _ALL = (
     sampled_control,
     chaos,
     tools,
+    world,
+    peers,
+    peer_runs,
 )
 FAMILIES: dict[str, Family] = {each.__name__.rpartition(".")[2]: cast("Family", each) for each in _ALL}

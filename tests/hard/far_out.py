@@ -37,9 +37,13 @@ class Roads(NamedTuple):
     truth: rd.Lagrangian
 
 
-def roads(name: str) -> Roads:
-    """Of a robot of the catalog."""
-    robot, _ = completed(rd.load(name))
+def loaded(name: str) -> rd.Robot:
+    """A robot of the catalog, its right angles written out in full."""
+    return completed(rd.load(name))[0]
+
+
+def roads(robot: rd.Robot) -> Roads:
+    """Of a robot whose right angles are written out in full."""
     engines = {"Pinocchio": robot, "Lagrangian": rd.Lagrangian(robot), "machine code": rd.Compiled(robot)}
     return Roads(robot, engines, rd.Lagrangian(robot, rd.Ball(BITS)))
 
@@ -63,7 +67,7 @@ def general(n: int, seed: int) -> np.ndarray:
 
 def far_angles(name: str, far: float, seed: int) -> Iterator[Row]:
     """M and N at angles of any size, which are reduced exactly."""
-    of = roads(name)
+    of = roads(loaded(name))
     q = far * general(of.robot.n, seed)[0]
     for road in of.engines:
         found = max(error(of, road, quantity, {"q": q}) for quantity in (M, N))
@@ -72,7 +76,7 @@ def far_angles(name: str, far: float, seed: int) -> Iterator[Row]:
 
 def fast(name: str, speed: float, seed: int) -> Iterator[Row]:
     """Inverse dynamics at velocities of any size whose squares are finite."""
-    of = roads(name)
+    of = roads(loaded(name))
     q, v, a = general(of.robot.n, seed)
     for road in of.engines:
         found, said = float("nan"), ""
@@ -89,22 +93,30 @@ def fast(name: str, speed: float, seed: int) -> Iterator[Row]:
 
 def spoilt(name: str, bad: float, seed: int) -> Iterator[Row]:
     """A row without an answer leaves the others as they are."""
-    of, rng = roads(name), np.random.default_rng((29, seed))
+    yield from beside(name, roads(loaded(name)), bad, seed)
+
+
+def beside(name: str, of: Roads, bad: float, seed: int) -> Iterator[Row]:
+    """The same of a robot."""
+    rng = np.random.default_rng((29, seed))
     n = of.robot.n
     q, (v, tau) = rng.uniform(-1, 1, (BATCH, n)), rng.normal(size=(2, BATCH, n))
     marred = q.copy()
     marred[SPOILT, n // 2] = bad
     others = np.arange(BATCH) != SPOILT
+    asked = [("M", ()), ("inverse_dynamics", (v, tau)), ("forward_dynamics", (v, 10 * tau))]
+    if of.robot.joint_without_inertia is not None:
+        asked.pop()
     for road, engine in of.engines.items():
         changed, named = 0, 0
-        for query, rest in (("M", ()), ("inverse_dynamics", (v, tau)), ("forward_dynamics", (v, 10 * tau))):
+        for query, rest in asked:
             ask = getattr(engine, query)
             whole, made = ask(q, *rest), ask(marred, *rest, errors="nan")
             changed += int(np.sum(made[others] != whole[others])) + int(np.sum(~np.isnan(made[SPOILT])))
             named += _is_named(partial(ask, marred, *rest))
         case = f"{name}: a row with {bad}"
         yield Row(case, f"{road}: entries of other rows with other bits", changed, 0)
-        yield Row(case, f"{road}: queries that do not name the row", 3 - named, 0)
+        yield Row(case, f"{road}: queries that do not name the row", len(asked) - named, 0)
     yield Row(case, "machine code: entries of out that were touched", _touched(of.engines["machine code"], marred), 0)
 
 

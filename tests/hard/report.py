@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import final
 
 from robot_dyn.accuracy.environment import environment
-from tests.hard.case import OURS, Row
+from tests.hard.case import Row
 from tests.hard.families import FAMILIES
 
 
@@ -51,7 +51,7 @@ def write(results: Sequence[Result], seed: int, folder: Path) -> None:
 
 def _page(results: Sequence[Result], seed: int) -> Iterator[str]:
     rows = [row for result in results for row in result.rows]
-    ours = [row for row in rows if row.program == OURS]
+    ours = [row for row in rows if row.ours]
     count = Counter(row.verdict for row in ours)
     yield "# Hard cases"
     yield ""
@@ -75,7 +75,10 @@ def _page(results: Sequence[Result], seed: int) -> Iterator[str]:
         yield ""
         yield from (line.strip() for line in (family.__doc__ or "").strip().splitlines())
         yield ""
-        several = any(row.program != OURS for result in those for row in result.rows)
+        if getattr(family, "MATRIX", False):
+            yield from _matrix([row for result in those for row in result.rows])
+            continue
+        several = any(not row.ours for result in those for row in result.rows)
         heads = ["case", *(["program"] if several else []), "figure", "found", "allowed", "verdict"]
         yield "| " + " | ".join(heads) + " |"
         yield "|" + " --- |" * len(heads)
@@ -85,6 +88,24 @@ def _page(results: Sequence[Result], seed: int) -> Iterator[str]:
                 said = f"{row.verdict}: {row.said}" if row.said and not row.holds else row.verdict
                 cells = [row.case, *program, row.measure, _number(row.found), _number(row.allowed), said]
                 yield "| " + " | ".join(" ".join(each.replace("|", "\\|").split()) for each in cells) + " |"
+
+
+def _matrix(rows: Sequence[Row]) -> Iterator[str]:
+    """A row for each case, a column for each figure."""
+    measures = dict.fromkeys(row.measure for row in rows)
+    most = {measure: max(row.allowed for row in rows if row.measure == measure) for measure in measures}
+    yield "| case | " + " | ".join(f"{measure} (≤ {_number(most[measure])})" for measure in measures) + " |"
+    yield "|" + " --- |" * (len(measures) + 1)
+    for case in dict.fromkeys(row.case for row in rows):
+        own = {row.measure: row for row in rows if row.case == case}
+        cells = [_cell(own[measure]) if measure in own else "" for measure in measures]
+        yield f"| {case} | " + " | ".join(cells) + " |"
+
+
+def _cell(row: Row) -> str:
+    if row.holds:
+        return _number(row.found)
+    return f"{_number(row.found)}, {row.verdict}: {row.said}".replace("|", "\\|") if row.said else "**SILENT**"
 
 
 def _number(x: float) -> str:
