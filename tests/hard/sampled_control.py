@@ -81,7 +81,7 @@ def words(run: rd.Trajectory) -> str:
     return "; ".join([run.outcome.advice] * bool(run.outcome.advice) + lines(of))
 
 
-def _limit(name: str, kind: str, seed: int) -> Iterator[Row]:
+def limit_of(name: str, kind: str, seed: int) -> Iterator[Row]:
     arm, q, gains = at_rest(name, seed)
     case, law = f"{name}, {kind}", controller(arm, q, gains, kind)
     z = arm.N(q) if kind not in LATE else np.zeros(0)
@@ -122,7 +122,7 @@ def _wound_up(name: str, seed: int) -> Iterator[Row]:
 
 CASES = [
     *(
-        Case(f"{name}, {kind}", partial(_limit, name, kind), name not in SHORT)
+        Case(f"{name}, {kind}", partial(limit_of, name, kind), name not in SHORT)
         for name in ARMS
         for kind in (*LATE, "PID in saturation")
     ),

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -20,7 +21,7 @@ from robot_dyn.compiled.right_angles import completed
 from robot_dyn.errors import RobotDynError
 from robot_dyn.model.quantity import FORWARD_DYNAMICS, M, N
 from tests.estimates.truth import truth
-from tests.hard import conditioning, far_out, tools
+from tests.hard import conditioning, far_out, sampled_control, tools
 from tests.hard.case import Case, Row
 
 TITLE = "The world"
@@ -146,7 +147,14 @@ def held(name: str, robot: rd.Robot, seed: int) -> Iterator[Row]:
     yield Row(name, "held by friction: moved", float(np.abs(run.q - q).max()), 0.0, run.outcome.advice)
 
 
-COLUMNS: tuple[Column, ...] = (roads, far, rows_of_a_batch, swing, held)
+def sampled(name: str, robot: rd.Robot, seed: int) -> Iterator[Row]:
+    """A PD at 0.98 and 1.02 of the longest stable period."""
+    for row in sampled_control.limit_of(name, "PD", seed):
+        if "exact map" not in row.measure:
+            yield replace(row, case=name, measure=f"PD: {row.measure}")
+
+
+COLUMNS: tuple[Column, ...] = (roads, far, rows_of_a_batch, swing, held, sampled)
 
 
 def arm(name: str, seed: int) -> Iterator[Row]:
