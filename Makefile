@@ -11,9 +11,11 @@ demo: .venv/installed
 test: .venv/installed
 	$(BIN)/python -m pytest -n auto
 
-# what takes long: the long forms of hard cases; error estimates on 600 random scenes of a fixed seed, and of the seed of the day
+# what takes long: all hard cases and their report, docs/hard_cases.md; what tests mark as stress; error estimates on 600
+# random scenes. With a fixed seed and with that of the day, which each prints.
 stress: .venv/installed
-	$(BIN)/python -m pytest -n auto -m stress
+	$(BIN)/python -m tests.hard --full --write --seed $$(date +%Y%m%d)
+	$(BIN)/python -m pytest -n auto -m stress --ignore tests/hard
 	$(BIN)/python -m tests.estimates --scenes 600 --seed 1
 	$(BIN)/python -m tests.estimates --scenes 600 --seed $$(date +%Y%m%d)
 

@@ -1,10 +1,13 @@
 """Chains that cost digits: long, stretched, of masses and lengths far apart, of axes that coincide, far from the base.
 
-Each is the text of a URDF whose decimals are exact, so that balls of them are the truth.
+Each is the text of a URDF whose decimals are exact, so that balls of them are the truth. `python -m tests.hard.chains`
+writes them into urdf/hard.
 """
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -118,3 +121,17 @@ LONG: dict[str, str] = {
     for name, of in (("planar", planar), ("spatial", spatial))
     for n in (32, 64)
 }
+
+FOLDER = Path(__file__).parents[2] / "urdf" / "hard"
+
+
+def file_of(name: str) -> Path:
+    """Where a chain is kept."""
+    plain = re.sub(r"[^a-z0-9.+-]+", "_", name.replace("µ", "u").lower()).strip("_")
+    return FOLDER / f"{plain}.urdf"
+
+
+if __name__ == "__main__":
+    FOLDER.mkdir(exist_ok=True)
+    for each, written in (CHAINS | LONG).items():
+        file_of(each).write_text(written.replace("><", ">\n<") + "\n")

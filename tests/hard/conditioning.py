@@ -32,7 +32,7 @@ from robot_dyn.lagrange.scale import (
 )
 from robot_dyn.model.quantity import CORIOLIS_TORQUE, FORWARD_DYNAMICS, INVERSE_DYNAMICS, C, M, N, Quantity
 from tests.hard.case import Case, Row
-from tests.hard.chains import CHAINS, LONG
+from tests.hard.chains import CHAINS, LONG, file_of
 
 TITLE = "Conditioning"
 U = 2.0**-53
@@ -124,7 +124,7 @@ def rows(case: str, robot: rd.Robot, engines: dict[str, Any], at: list[dict[str,
 
 def _chain(name: str, seed: int) -> Iterator[Row]:
     try:
-        robot = rd.Robot.from_text((CHAINS | LONG)[name])
+        robot = rd.load(file_of(name))
     except DescriptionError as refusal:
         yield Row(name, "refused", float("nan"), 0.0, str(refusal))
         return

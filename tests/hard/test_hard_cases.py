@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tests.hard.case import Case
+from tests.hard.chains import CHAINS, FOLDER, LONG, file_of
 from tests.hard.families import FAMILIES
 
 SEED = 1
@@ -21,3 +22,10 @@ def test_no_figure_is_wrong_without_a_word(case: Case) -> None:
     rows = list(case.rows(SEED))
     assert rows
     assert not [each for each in rows if each.silent]
+
+
+def test_the_files_are_those_that_the_script_makes() -> None:
+    """`python -m tests.hard.chains` writes urdf/hard."""
+    for name, written in (CHAINS | LONG).items():
+        assert file_of(name).read_text().replace("\n", "") == written, "run python -m tests.hard.chains"
+    assert len(list(FOLDER.iterdir())) == len(CHAINS | LONG)
