@@ -1,6 +1,7 @@
 """`python -m tests.hard --seed 20261122`: run all hard cases, and write docs/hard_cases.md and docs/hard_cases.json.
 
-Exit code 1 if a figure is wrong without a word. With --family, only those are run; without --full, the short ones.
+Exit code 1 if a figure is wrong without a word. With --family, only those are run, and the report keeps the others as
+they were; without --full, the short cases.
 """
 
 from __future__ import annotations

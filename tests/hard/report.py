@@ -7,6 +7,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
+from inspect import cleandoc
 from pathlib import Path
 from typing import final
 
@@ -34,24 +35,25 @@ class Result:
 
 
 def write(results: Sequence[Result], seed: int, folder: Path) -> None:
-    """Write hard_cases.md and hard_cases.json."""
-    document = {
-        "seed": seed,
-        "environment": environment(),
-        "rows": [
-            {"family": result.family, **_finite(asdict(row)), "verdict": row.verdict}
-            for result in results
-            for row in result.rows
-        ],
-        "seconds": {f"{each.family}: {each.case}": round(each.seconds, 1) for each in results},
-    }
-    (folder / "hard_cases.json").write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n")
-    (folder / "hard_cases.md").write_text("\n".join(_page(results, seed)) + "\n")
+    """Write hard_cases.md and hard_cases.json; families that were not run are kept as they were."""
+    path = folder / "hard_cases.json"
+    known = json.loads(path.read_text()) if path.exists() else {}
+    for name in dict.fromkeys(result.family for result in results):
+        those = [result for result in results if result.family == name]
+        known[name] = {
+            "seed": seed,
+            "environment": environment(),
+            "seconds": {each.case: round(each.seconds, 1) for each in those},
+            "rows": [_finite(asdict(row)) | {"verdict": row.verdict} for each in those for row in each.rows],
+        }
+    known = {name: known[name] for name in FAMILIES if name in known}
+    path.write_text(json.dumps(known, indent=1, ensure_ascii=False) + "\n")
+    (folder / "hard_cases.md").write_text("\n".join(_page(known)) + "\n")
 
 
-def _page(results: Sequence[Result], seed: int) -> Iterator[str]:
-    rows = [row for result in results for row in result.rows]
-    ours = [row for row in rows if row.ours]
+def _page(known: dict) -> Iterator[str]:
+    rows = {name: [_row(each) for each in family["rows"]] for name, family in known.items()}
+    ours = [row for those in rows.values() for row in those if row.ours]
     count = Counter(row.verdict for row in ours)
     yield "# Hard cases"
     yield ""
@@ -63,31 +65,34 @@ def _page(results: Sequence[Result], seed: int) -> Iterator[str]:
     )
     yield ""
     yield (
-        f"Seed {seed}: {len(ours)} figures of robot_dyn, {count['holds']} hold, {count['said']} said,"
-        f" **{count['SILENT']} silent**. {', '.join(f'{name} {value}' for name, value in environment().items())}."
+        f"{len(ours)} figures of robot_dyn: {count['holds']} hold, {count['said']} said, **{count['SILENT']} silent**."
+        f" {'; '.join(sorted({_environment(family) for family in known.values()}))}."
     )
-    for name, family in FAMILIES.items():
-        those = [result for result in results if result.family == name]
-        if not those:
-            continue
+    for name, those in rows.items():
         yield ""
-        yield f"## {family.TITLE}"
+        yield f"## {FAMILIES[name].TITLE}"
         yield ""
-        yield from (line.strip() for line in (family.__doc__ or "").strip().splitlines())
+        yield cleandoc(FAMILIES[name].__doc__ or "")
         yield ""
-        if getattr(family, "MATRIX", False):
-            yield from _matrix([row for result in those for row in result.rows])
-            continue
-        several = any(not row.ours for result in those for row in result.rows)
-        heads = ["case", *(["program"] if several else []), "figure", "found", "allowed", "verdict"]
-        yield "| " + " | ".join(heads) + " |"
-        yield "|" + " --- |" * len(heads)
-        for result in those:
-            for row in result.rows:
-                program = [row.program] if several else []
-                said = f"{row.verdict}: {row.said}" if row.said and not row.holds else row.verdict
-                cells = [row.case, *program, row.measure, _number(row.found), _number(row.allowed), said]
-                yield "| " + " | ".join(" ".join(each.replace("|", "\\|").split()) for each in cells) + " |"
+        yield f"Seed {known[name]['seed']}, {sum(known[name]['seconds'].values()):.0f} s."
+        yield ""
+        yield from _matrix(those) if getattr(FAMILIES[name], "MATRIX", False) else _table(those)
+
+
+def _environment(family: dict) -> str:
+    return ", ".join(f"{name} {value}" for name, value in family["environment"].items())
+
+
+def _table(rows: Sequence[Row]) -> Iterator[str]:
+    """A row for each figure."""
+    several = any(not row.ours for row in rows)
+    heads = ["case", *(["program"] if several else []), "figure", "found", "allowed", "verdict"]
+    yield "| " + " | ".join(heads) + " |"
+    yield "|" + " --- |" * len(heads)
+    for row in rows:
+        said = f"{row.verdict}: {row.said}" if row.said and not row.holds else row.verdict
+        cells = [row.case, *([row.program] if several else []), row.measure, _number(row.found)]
+        yield "| " + " | ".join(_plain(each) for each in (*cells, _number(row.allowed), said)) + " |"
 
 
 def _matrix(rows: Sequence[Row]) -> Iterator[str]:
@@ -105,7 +110,12 @@ def _matrix(rows: Sequence[Row]) -> Iterator[str]:
 def _cell(row: Row) -> str:
     if row.holds:
         return _number(row.found)
-    return f"{_number(row.found)}, {row.verdict}: {row.said}".replace("|", "\\|") if row.said else "**SILENT**"
+    return _plain(f"{_number(row.found)}, {row.verdict}: {row.said}") if row.said else "**SILENT**"
+
+
+def _plain(text: str) -> str:
+    """In one line of a table."""
+    return " ".join(text.replace("|", "\\|").split())
 
 
 def _number(x: float) -> str:
@@ -113,4 +123,9 @@ def _number(x: float) -> str:
 
 
 def _finite(row: dict) -> dict:
-    return {key: None if isinstance(x, float) and not math.isfinite(x) else x for key, x in row.items()}
+    return {key: str(x) if isinstance(x, float) and not math.isfinite(x) else x for key, x in row.items()}
+
+
+def _row(stored: dict) -> Row:
+    figures = {key: float(stored[key]) for key in ("found", "allowed")}
+    return Row(**{key: x for key, x in stored.items() if key != "verdict"} | figures)
