@@ -23,6 +23,7 @@ from robot_dyn.simulation.error import ErrorEstimate, Verdict, no_estimate
 from robot_dyn.simulation.record import Path
 
 ROUNDED = "what rounding leaves of q, as the motion magnifies it, is more than"
+PUSH = 4.0  # units of rounding by which a start is moved, to see what the motion makes of rounding
 ROUNDING = 4500  # units of rounding of q, or as many as steps if there are more: differences below are not an error
 COARSE = (Fraction(2), Fraction(3), Fraction(5))
 FINE = (Fraction(1, 2), Fraction(1, 3))
@@ -130,6 +131,17 @@ def rounding(run: Path, n: int) -> np.ndarray:
     """Error that rounding of q in every step may leave, up to each state, where nothing magnifies it."""
     size = np.maximum.accumulate(np.abs(run.y[:, :n]).max(axis=1))
     return np.finfo(float).eps * np.maximum(ROUNDING, run.key) * (1 + size)
+
+
+def carried(run: Path, pushed: np.ndarray, n: int) -> np.ndarray:
+    """Error that rounding of every step leaves where the motion magnifies it: a random walk of steps, each magnified.
+
+    G(t) √Σ_k (u_k / G(t_k))²,    G what the motion has made of a push at the start, over that push
+    """
+    u = np.finfo(float).eps * (1 + np.maximum.accumulate(np.abs(run.y[:, :n]).max(axis=1)))
+    growth = np.fmax(pushed / (PUSH * np.finfo(float).eps), 1.0)
+    walk = np.sqrt(np.cumsum(np.diff(run.key, prepend=run.key[0]) * (u / growth) ** 2))
+    return np.fmax(pushed, growth * walk)
 
 
 def meaningless(walked: Path, n: int) -> float:

@@ -17,7 +17,17 @@ from robot_dyn.coefficients import with_values
 from robot_dyn.integrate.adaptive import LEAST_RTOL, Adaptive
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.simulation.between import stepped_over
-from robot_dyn.simulation.companions import COARSE, FINE, ROUNDED, Estimated, differences, meaningless, rounding
+from robot_dyn.simulation.companions import (
+    COARSE,
+    FINE,
+    PUSH,
+    ROUNDED,
+    Estimated,
+    carried,
+    differences,
+    meaningless,
+    rounding,
+)
 from robot_dyn.simulation.error import ErrorEstimate, Verdict, no_estimate
 from robot_dyn.simulation.record import Path, Record
 from robot_dyn.simulation.schedule import LEAST_STEPS
@@ -29,7 +39,6 @@ _GAIN = 1.1  # in the time resolved, that a shorter step must bring
 _MORE_STEPS = 1.05  # of a companion with tighter tolerances, so that it tells something
 _FAR_TURN = 1.0  # [rad] in a step: beyond, longer steps may meet the same angles
 _BLIND_TURN = np.pi  # [rad] in a step: beyond, shorter ones may, too
-_PUSH = 4.0  # units of rounding by which a start is moved, to see what the motion makes of rounding
 
 Companion = Callable[[Any, Setup], Record]  # of a factor of the steps, or of a mesh
 
@@ -73,9 +82,12 @@ def _by_steps(
     made = no_estimate("fewer than 3 steps between ticks, switches or breaks")
     if turn < _FAR_TURN and min(each.steps for each in setup.segments) >= LEAST_STEPS:
         paths = {pace: companion(pace, setup).shared for pace in COARSE}
-        pushed = differences(paths[COARSE[1]], companion(COARSE[1], _pushed(setup)).shared, estimated.n)
-        rows = np.searchsorted(paths[COARSE[1]].key[:-1], estimated.path.key)
-        estimated = replace(estimated, floor=np.fmax(estimated.floor, np.append(pushed, pushed[-1])[rows]))
+        coarse = paths[COARSE[1]]
+        rounds = carried(
+            coarse, differences(coarse, companion(COARSE[1], _pushed(setup)).shared, estimated.n), estimated.n
+        )
+        rows = np.searchsorted(coarse.key[:-1], estimated.path.key)
+        estimated = replace(estimated, floor=np.fmax(estimated.floor, np.append(rounds, rounds[-1])[rows]))
         made = estimated.from_longer_steps(paths, method.order)
         if made.resolved_until >= estimated.path.t[-1]:
             return made
@@ -83,7 +95,7 @@ def _by_steps(
     if made.resolved_until > 0 and estimated.lost_at(half) < _GAIN * made.resolved_until:
         return made  # chaos: no step of practical length resolves it
     pushed = differences(estimated.path, companion(Fraction(1), _pushed(setup)).shared, estimated.n)
-    estimated = replace(estimated, floor=np.fmax(estimated.floor, pushed))
+    estimated = replace(estimated, floor=np.fmax(estimated.floor, carried(estimated.path, pushed, estimated.n)))
     return estimated.from_shorter_steps({FINE[0]: half, FINE[1]: companion(FINE[1], setup).shared}, method.order)
 
 
@@ -130,7 +142,7 @@ def _tolerant(setup: Setup, method: Adaptive, factor: float) -> Setup:
 def _pushed(setup: Setup) -> Setup:
     """The setup from a start that differs by rounding: its run tells what the motion makes of rounding."""
     sign = np.where(np.arange(len(setup.q0)) % 2, -1.0, 1.0)
-    unit = _PUSH * np.finfo(float).eps
+    unit = PUSH * np.finfo(float).eps
     return replace(
         setup, q0=setup.q0 + sign * unit * (1 + np.abs(setup.q0)), v0=setup.v0 + unit * (1 + np.abs(setup.v0))
     )
