@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import robot_dyn as rd
-from robot_dyn.errors import EditError
+from robot_dyn.errors import EditError, OverflowedError
 from tests.queries import general
 
 FINGERS = np.vstack([np.eye(8), np.eye(8)[-1]]), np.zeros(9)
@@ -67,3 +67,21 @@ def test_couplings_are_read_only():
     for array in (couplings.S, couplings.s0):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 1.0
+
+
+@pytest.mark.parametrize("road", ["Pinocchio", "Lagrangian", "machine code"])
+def test_where_rounding_hides_the_joints_that_follow_the_state_is_refused(road: str) -> None:
+    """Half of 3e6 rad is known to 1e-9 rad, half of 1e15 rad to 0.1 rad, with as few digits of M; balls know both."""
+    robot = rd.load("mimic_chain")
+    engine = {"Pinocchio": robot, "Lagrangian": rd.Lagrangian(robot), "machine code": rd.Compiled(robot)}[road]
+    q = np.full((19, 2), 0.3)
+    q[5], q[7] = 3e6, 1e15
+    truth = rd.Lagrangian(robot, rd.Ball(200))
+    with pytest.raises(OverflowedError, match="rounding hides where the joints that follow .* in row 7 of the batch"):
+        engine.M(q)
+    with pytest.raises(OverflowedError, match="rounding hides"):
+        engine.M(q[7])
+    M = engine.M(q, errors="nan")
+    assert np.isnan(M[7]).all() and np.isfinite(np.delete(M, 7, axis=0)).all()
+    assert_allclose(M[5], rd.midpoint(truth.M(q[5])), rtol=1e-7)
+    assert np.isfinite(rd.midpoint(truth.M(q[7]))).all()

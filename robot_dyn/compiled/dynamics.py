@@ -90,6 +90,7 @@ class CompiledDynamics(Dynamics, Parametrised):
             thread_count(self.threads),
             default_store() if self.cache else None,
             robot.joint_without_inertia is not None,
+            coupled=not robot.couplings.trivial,
         )
 
     @cached_property

@@ -54,6 +54,8 @@ class Engine:
         store: Where compiled code is kept, or None.
         singular: Whether M is singular everywhere: what is solved has no answer, and its errors are for others to word.
         parameters: What all states share, the last argument of each trace; none if it is empty.
+        coupled: Whether joints follow others: then angles that are far are for `otherwise`, which knows what rounding
+            of theirs hides.
     """
 
     traced: Callable[[str], Traced]
@@ -67,6 +69,7 @@ class Engine:
     store: Store | None
     singular: bool = False
     parameters: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    coupled: bool = False
     traces: OnFirstUse = field(init=False, repr=False)
     paying: OnFirstUse = field(init=False, repr=False)
     kernels: OnFirstUse = field(init=False, repr=False)
@@ -190,7 +193,9 @@ class Engine:
 
     def _single(self, quantity: str, *arguments: Any) -> Status:
         status = Status(self.ones[quantity](*arguments))
-        return Status(self.kernels[quantity].any_angle(*arguments)) if status is Status.FAR else status
+        if status is not Status.FAR or self.coupled:
+            return status
+        return Status(self.kernels[quantity].any_angle(*arguments))
 
     def _kernel(self, quantity: str) -> Kernel:
         asked = self.quantities[quantity]
@@ -198,7 +203,8 @@ class Engine:
         program = program_of(self.traces[quantity].function)
         about = f"{self.self_check.dynamics.name}: {quantity}, {self.dtype}"
         return Kernel(
-            program, self.shape(quantity), self.dtype, times, asked.doubtful, self.store, about, self.parameters
+            program, self.shape(quantity), self.dtype, times, asked.doubtful, self.store, about, self.parameters,
+            not self.coupled,
         )  # fmt: skip
 
     def _one(self, quantity: str) -> Any:

@@ -45,6 +45,7 @@ class Kernel:
         store: Where compiled code is kept, or None.
         about: What it is of, for a reader of the store.
         parameters: Numbers that all states share, (P,); two kernels that differ in them alone run the same code.
+        takes_any_angle: Whether `many` answers angles beyond the range of our sine too; else it reports them.
     """
 
     program: Program
@@ -55,6 +56,7 @@ class Kernel:
     store: Store | None = None
     about: str = ""
     parameters: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    takes_any_angle: bool = True
 
     @cached_property
     def call(self) -> Callable[..., int]:
@@ -100,7 +102,7 @@ class Kernel:
 
     def _run(self, inputs: Sequence[np.ndarray], y: np.ndarray, start: int, stop: int) -> Status:
         status = Status(self.batch(*inputs, y, start, stop))
-        if status is not Status.FAR:
+        if status is not Status.FAR or not self.takes_any_angle:
             return status
         first = [[float(t) for t in inputs[0][:, 0]] if self.times else inputs[0], *inputs[1:]]
         shaped = y.reshape(len(y), *self.shape)

@@ -80,6 +80,7 @@ class CompiledPlant:
             default_store() if self.dynamics.cache else None,
             robot.joint_without_inertia is not None,
             joined(self._known),
+            not robot.couplings.trivial,
         )
 
     @property

@@ -10,7 +10,10 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.arithmetic import Arithmetic, Array
+from robot_dyn.errors import OverflowedError
 from robot_dyn.values import Value
+
+LEAST_EXACT = 1e-4  # [rad] or [m], of joints that follow others
 
 
 @final
@@ -58,8 +61,20 @@ class Couplings(Value):
         return n == N and bool(np.all(np.eye(n, dtype=int) == self.S)) and bool(np.all(self.s0 == 0))
 
     def position(self, q: Array) -> Array:
-        """q_full = S q + s₀."""
-        return q if self.trivial else self.velocity(q) + self.s0
+        """q_full = S q + s₀.
+
+        Raises:
+            OverflowedError: If q is so large that rounding hides where the joints that follow are.
+        """
+        if self.trivial:
+            return q
+        full = self.velocity(q) + self.s0
+        if full.dtype.kind == "f" and np.finfo(full.dtype).eps * np.abs(full).max(initial=0.0) > LEAST_EXACT:
+            raise OverflowedError(
+                "q is so large that rounding hides where the joints that follow others are, to"
+                f" {LEAST_EXACT:g} rad or m; take a smaller q, or rd.Lagrangian(robot, rd.Ball(bits))"
+            )
+        return full
 
     def velocity(self, v: Array) -> Array:
         """v_full = S v, and accelerations alike: S is constant."""

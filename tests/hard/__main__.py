@@ -64,8 +64,8 @@ def main() -> int:
                     flush=True,
                 )
             print(f"       {result.family}: {result.case}: {result.seconds:.1f} s", flush=True)
-    if options.write:
-        write(results, options.seed, options.write)
+            if options.write:  # after each case, so that one that is stopped leaves those before it
+                write(results, options.seed, options.write)
     count = Counter(row.verdict for result in results for row in result.rows)
     print(f"seed {options.seed}: {dict(count)}")
     return int(count["SILENT"] > 0)

@@ -74,9 +74,15 @@ def _page(known: dict) -> Iterator[str]:
         yield ""
         yield cleandoc(FAMILIES[name].__doc__ or "")
         yield ""
-        yield f"Seed {known[name]['seed']}, {sum(known[name]['seconds'].values()):.0f} s."
+        yield f"Seed {known[name]['seed']}, {sum(known[name]['seconds'].values()):.0f} s.{_not_run(name, known[name])}"
         yield ""
         yield from _matrix(those) if getattr(FAMILIES[name], "MATRIX", False) else _table(those)
+
+
+def _not_run(name: str, family: dict) -> str:
+    """The cases of a family that were not run."""
+    missing = [case.name for case in FAMILIES[name].CASES if case.name not in family["seconds"]]
+    return f" Not run: {'; '.join(missing)}." if missing else ""
 
 
 def _environment(family: dict) -> str:
