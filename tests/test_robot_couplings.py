@@ -77,7 +77,7 @@ def test_where_rounding_hides_the_joints_that_follow_the_state_is_refused(road: 
     q = np.full((19, 2), 0.3)
     q[5], q[7] = 3e6, 1e15
     truth = rd.Lagrangian(robot, rd.Ball(200))
-    with pytest.raises(OverflowedError, match="rounding hides where the joints that follow .* in row 7 of the batch"):
+    with pytest.raises(OverflowedError, match=r"rounding hides where the joints that follow .* in row 7 of the batch"):
         engine.M(q)
     with pytest.raises(OverflowedError, match="rounding hides"):
         engine.M(q[7])
