@@ -193,6 +193,43 @@ def test_impacts_that_another_joint_feeds_come_to_an_end() -> None:
     assert run.ledger.closure <= 1e-8
 
 
+@pytest.mark.parametrize("speed", [1e-2, 1e-7])  # [rad/s]: bounces that are followed, and bounces that are ended
+def test_a_joint_that_an_impact_kicks_off_its_stop_gives_its_momentum_back(speed: float) -> None:
+    """Joint 1 strikes at speed v, and joint 2, pressed on its stop, is kicked off it and comes to rest.
+
+        v₁⁺ = −e v,  v₂⁺ = (1 + e) v M₁₂/M₂₂;   behind the bounces of joint 2, v₁ = −e v + (1 + e) v M₁₂²/(M₁₁ M₂₂)
+
+    The stop of joint 2 pushes joint 2 alone, so that M₁₁ v₁ + M₁₂ v₂ stays after the impact, and no load acts on it.
+    What C v adds in the time of bounces is of the order of v², 1e-14 here.
+    """
+    e, q = 0.7, np.array([0.3, 1.5])
+    M = ARM.M(q)
+    stops = rd.RigidStops([-9.0, q[1]], [q[0], 9.0], [e, 0.5])
+    run = rd.simulate(
+        rd.Plant(ARM.with_(gravity=(0, 0, 0)), [stops]), [q[0] - speed / 100, q[1]], [speed, 0.0], duration_s=0.05,
+        controller=lambda t, q, v: np.array([0.0, -5.0]), **OPTIONS,
+    )  # fmt: skip
+    after = speed * ((1 + e) * M[0, 1] ** 2 / (M[0, 0] * M[1, 1]) - e)
+    assert run.v[-1] == pytest.approx([after, 0.0], rel=1e-9, abs=1e-14)
+    assert run.q[-1, 1] == q[1]
+
+
+def test_joints_that_impacts_kick_off_their_stops_strike_again_when_they_must() -> None:
+    """As above, but joint 1 is thrown back by joint 2 in flight: at every speed v₁ ends at the same part of v.
+
+    Speeds differ by 1e3; the flights of the slower one last from 1e-5 s to 1e-6 s, and 1e-5 of them is rounding of q.
+    """
+    parts = []
+    for speed in (1e-2, 1e-5):
+        stops = rd.RigidStops([-9.0, 0.4], [0.3, 9.0], [0.7, 0.5])
+        run = rd.simulate(
+            rd.Plant(ARM.with_(gravity=(0, 0, 0)), [stops]), [0.3 - speed / 100, 0.4], [speed, 0.0], duration_s=0.05,
+            controller=lambda t, q, v: np.array([0.0, -5.0]), **OPTIONS,
+        )  # fmt: skip
+        parts.append(run.v[-1, 0] / speed)
+    assert parts[1] == pytest.approx(parts[0], rel=1e-4)
+
+
 def test_an_impact_may_throw_a_joint_against_the_load_that_just_let_it_go() -> None:
     """Joint 2 breaks away downwards at t = 0, as joint 1 strikes its stop, whose impact throws joint 2 upwards.
 

@@ -14,7 +14,7 @@ from robot_dyn.effects.set_valued import Interval, Mode, SetValued
 from robot_dyn.errors import EffectError
 from robot_dyn.model.dynamics import Dynamics
 
-_NEAR = 1e-13  # of a stop, or in its unit: as close as rounding leaves an event
+_NEAR = 4e-15  # of a stop, or in its unit: as close as rounding leaves an event
 
 
 @final

@@ -16,7 +16,7 @@ from robot_dyn.effects.rigid_backlash import RigidBacklash
 from robot_dyn.effects.set_valued import Interval
 from robot_dyn.simulation.state_equation import StateEquation
 
-_NEAR = 1e-13  # of an end of a gap, or in its unit
+_NEAR = 4e-15  # of an end of a gap, or in its unit
 _END = {-1: "backward end", 1: "forward end"}
 
 

@@ -4,7 +4,8 @@
     acceleration  that of least constraint, of the joints at rest; one that broke away moves the way it was let go
 
 A joint that slides stops where v = 0, one that is held breaks away where the reaction λ leaves its interval. Impacts
-that follow each other ever faster end where the sum of their intervals says, in an impact without restitution.
+that follow each other ever faster end where the sum of their intervals says, in one impulse that takes what velocity
+their joint has left; what other joints do in that time is followed.
 [Moreau 1988; Glocker 2001; Acary, Brogliato, Numerical Methods for Nonsmooth Dynamical Systems, 2008, ch. 8]
 """
 
@@ -160,36 +161,60 @@ class Modes:
     def _struck(
         self, t: float, y: np.ndarray, held: Array | None, M: np.ndarray, stops: RigidStops | None, side: np.ndarray
     ) -> list[Occurrence]:
-        """The impact, or the last of ever faster ones, its work in y."""
+        """The impact, with those that end behind it, its work in y."""
         n, of = self._n, self.of
         start, speeds = y.copy(), y[of.speeds]
         strike = np.flatnonzero(side * speeds > 0)
         e = of.wide(np.broadcast_to(0.0 if stops is None else stops.restitution, n).astype(float), of.restitution)
         whole = self._bodies(t, y, held, M)[0]
-        of.take(y, _impact(whole, speeds, side, e, np.zeros(len(e), bool)))
-        a = settled(self.laws, *self._bodies(t, y, held, M), y[of.rows], y[of.speeds])[0]
-        v = y[of.speeds]
-        returns = (side * a > 0) & (side * v < 0) & (e < 1)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            left = np.where(returns, 2 * np.abs(v) / (np.abs(a) * (1 - e)), np.inf)
-        still = left < _ACCUMULATED  # those that are kicked off their stops by others, too
         self._impacts = [*self._impacts[1 - _CROWDED :], t]
-        if len(self._impacts) == _CROWDED and t - self._impacts[0] < _ACCUMULATED:  # as several stops in turn
-            still |= (side != 0) & (2 * np.abs(v) <= np.abs(a) * _ACCUMULATED)
-        last = [i for i in strike if still[i]]
-        after = _impact(whole, speeds, side, e, still) if still.any() else v
-        y[:] = start
+        v = _impact(whole, speeds, side, e, np.zeros(len(e), bool))
+        after, ended = self._ended(t, y, held, M, v, side, e)
         of_gaps = of.take(y, after)
         if stops is not None:
             v, before = y[n : 2 * n], start[n : 2 * n]
             y[self._work(stops)] += (v + before) @ M @ (v - before) / 2 - of_gaps
+        rests = ended < np.inf
         return [
             self._occurrence(
-                i, f"{'comes to rest at' if i in last else 'strikes'} {self._place(i, int(side[i]))}",
-                t + (float(left[i]) if left[i] < _ACCUMULATED else 0.0), y, int(side[i]),
+                i, f"{'comes to rest at' if rests[i] else 'strikes'} {self._place(i, int(side[i]))}",
+                t + (float(ended[i]) if rests[i] else 0.0), y, int(side[i]),
             )
             for i in strike.tolist()
         ]  # fmt: skip
+
+    def _ended(
+        self, t: float, y: np.ndarray, held: Array | None, M: np.ndarray, v: np.ndarray, side: np.ndarray, e: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The velocity (N,) behind the bounces that follow an impact, and in how long each of their joints rests, (N,).
+
+        inf for joints that go on. The stop of a joint pushes that joint alone: its bounces together are one impulse
+        that takes the velocity it has behind the impact. It is not known where another joint strikes in their time.
+        """
+        of, y, after, ended = self.of, y.copy(), v, np.full(len(e), np.inf)
+        crowded = len(self._impacts) == _CROWDED and t - self._impacts[0] < _ACCUMULATED  # as several stops in turn
+        while True:  # each joint once, since those at rest do not return
+            of.take(y, after)
+            whole, load = self._bodies(t, y, held, M)
+            a = settled(self.laws, whole, load, y[of.rows], y[of.speeds])[0]
+            left, meets = _lasts(after, a, side, 0 * e if crowded else e), self._meets(y, a)
+            first = int(np.argmin(left))  # the others are kicked by its bounces, and then loaded with it at rest
+            meets[first] = np.inf
+            if not left[first] < _ACCUMULATED or (left[first] > meets.min() and not crowded):
+                return after, ended
+            ended[first] = left[first]
+            after = _impact(whole, v, side, e, ended < np.inf)
+
+    def _meets(self, y: np.ndarray, a: np.ndarray) -> np.ndarray:
+        """In how long each coordinate meets a stop or an end of its gap, at accelerations that stay, (N,)."""
+        n, of = self._n, self.of
+        x, v, meets = y[of.rows], y[of.speeds], np.full(len(a), np.inf)
+        known = [(each.lower, each.upper) for each in self.stops] or [(-np.inf, np.inf)]
+        for each in known:
+            lower, upper = (np.broadcast_to(level, n).astype(float) for level in each)
+            meets = np.fmin(meets, _falls(x - of.wide(lower, -of.level), v, a))
+            meets = np.fmin(meets, _falls(of.wide(upper, of.level) - x, -v, -a))
+        return meets
 
     def _place(self, i: int, side: int) -> str:
         """What a coordinate touches, in words."""
@@ -229,6 +254,20 @@ class Modes:
     def _occurrence(self, i: int, what: str, t: float, y: np.ndarray, direction: int) -> Occurrence:
         n, joint = self._n, self.equation.plant.dynamics.joint_names[self.joint(i)]
         return Occurrence(t, f"{joint} {what}", direction, tuple(y[:n].tolist()), tuple(y[n : 2 * n].tolist()), joint)
+
+
+def _lasts(v: np.ndarray, a: np.ndarray, side: np.ndarray, e: np.ndarray) -> np.ndarray:
+    """How long the bounces of each joint that leaves its stop at v still take, Σ 2 eᵏ |v| / |a|; inf for the others."""
+    returns = (side * a > 0) & (side * v < 0) & (e < 1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(returns, 2 * np.abs(v) / (np.abs(a) * (1 - e)), np.inf)
+
+
+def _falls(d: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+    """The time t > 0 at which d + v t + a t²/2 first vanishes, d ≥ 0, for each; nan where it never does, or rests."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        root = np.sqrt(v * v - 2 * a * d)
+        return np.where(v > 0, np.where(a < 0, (v + root) / -a, np.nan), 2 * d / (root - v))
 
 
 def _impact(M: np.ndarray, v: np.ndarray, side: np.ndarray, e: np.ndarray, still: np.ndarray) -> np.ndarray:

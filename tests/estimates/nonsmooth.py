@@ -4,10 +4,10 @@ Behind an event the mode is the one, of all combinations of stuck and sliding jo
 
     stuck: a = 0 and −f ≤ λ ≤ f, without the bound on the side of a stop that is touched;   sliding: a in its direction
 
-M is positive definite, so that there is one. A joint whose bounces still to come take less than 1e-7 s is at rest, and
-those that its impact kicks off their stops are: what such bounces add in that time is not resolved. Impacts obey
-v⁺ = −e v where impulses push, v⁺ ≥ −e v elsewhere. It shares the numbers of a scene with the library, and the torques
-of `truth`; no convex problem, mode, event or step.
+M is positive definite, so that there is one. A joint that strikes and whose bounces still to come take less than 1e-7 s
+is at rest; what its impact kicks off other stops goes on. Impacts obey v⁺ = −e v where impulses push, v⁺ ≥ −e v
+elsewhere. It shares the numbers of a scene with the library, and the torques of `truth`; no convex problem, mode, event
+or step.
 """
 
 from __future__ import annotations
@@ -273,7 +273,7 @@ def _behind(bodies: Bodies, t: float, y: np.ndarray, way, stuck, forced):
         a = a if a_rest is None else a_rest
         back = (side * a > 0) & (side * v < 0) & (bodies.e < 1)
         with np.errstate(divide="ignore", invalid="ignore"):
-            still = back & (2 * np.abs(v) < _RESTS * np.abs(a) * (1 - bodies.e))
+            still = back & (side * v0 > 0) & (2 * np.abs(v) < _RESTS * np.abs(a) * (1 - bodies.e))
         if still.any():
             v[:] = bodies.impact(q, v0, still)
             v[still] = 0.0
