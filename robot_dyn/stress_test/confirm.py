@@ -30,7 +30,7 @@ def pushed(setup: Setup, seed: int) -> Setup:
     M = setup.plant.dynamics.M(setup.q0)
     units = np.sqrt(np.diagonal(M))
     rates, modes = np.linalg.eig(np.linalg.solve(M, np.diag(controller.kd)))
-    fast = modes[:, np.argmax(rates.real)].real * units
+    fast = np.real(modes[:, np.argmax(np.real(rates))]) * units
     others = np.random.default_rng(seed).normal(size=len(units))
     push = fast / np.linalg.norm(fast) + 0.1 * others / np.linalg.norm(others)
     return replace(setup, q0=setup.q0 + push * PUSH * np.median(units) / units)
