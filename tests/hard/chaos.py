@@ -132,7 +132,7 @@ def _of_arm(name: str, method: str, starts: int, seed: int) -> Iterator[Row]:
     robot, runs, unsure = arm(name), [], 0.0
     for k in range(seed, seed + starts):
         q, apart = of_bodies(name, k)
-        engine = "interpreted" if starts == 1 else "auto"  # machine code takes longer to make than a few runs
+        engine = "interpreted" if starts == 1 else "compiled"  # machine code takes longer to make than a few runs
         run = _run(robot, METHODS[name][method], k, DURATION[name], engine)
         runs.append((run, q))
         unsure = max(unsure, float(apart[np.searchsorted(run.t, passed(run, q))]))

@@ -30,7 +30,7 @@ U, STARTS, SAMPLES = 2.0**-53, 16, 200
 ERRORS, EXPONENT, WALK, FAST = 3.0, 0.3, 10.0, 10.0
 ORDER = {"gauss_2": 2, "gauss_4": 4, "gauss_6": 6, "rk4": 4, "order_8": 8}
 STEPS = {"gauss_2": 0.01, "gauss_4": 0.02, "gauss_6": 0.04, "rk4": 0.02, "order_8": 0.05}  # [s]
-PACE = {"planar_2r": 1.0, "ur5": 1.0, "panda": 0.25, "body": 4.0}  # of these steps: how slowly it moves
+PACE = {"planar_2r": 1.0, "ur5": 1.0, "panda": 0.125, "body": 4.0}  # of these steps: how slowly it moves
 NAMES = {"planar_2r": "double pendulum", "ur5": "UR5", "panda": "Panda", "body": "torque-free body"}
 _JOINT = (
     '<joint name="{0}" type="continuous"><parent link="{1}"/><child link="{2}"/><axis xyz="{3}"/></joint>'
