@@ -13,7 +13,7 @@ from robot_dyn.arithmetic import Arithmetic, Array
 from robot_dyn.errors import OverflowedError
 from robot_dyn.values import Value
 
-LEAST_EXACT = 1e-4  # [rad] or [m], of joints that follow others
+LEAST_EXACT = 1e-3  # [rad] or [m], of joints that follow others
 
 
 @final

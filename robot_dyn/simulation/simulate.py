@@ -182,12 +182,18 @@ def _trajectory(
         wrenches(plant, t, q), at_stop(plant, q),
         (
             *remarks(setup, observer, t, np.hstack([q, v, u]), power), *ran.said,
-            *bounded_by_stability(setup, equation, record), *unstable(setup, equation, t, record.y),
-            *damped(setup, record),
+            *bounded_by_stability(setup, equation, record), *_of_control(setup, equation, record),
         ),
         observer.extremes, acting(setup),
         equation.controller_states(record.y), record.events, equation.effect_states(record.y),
     )  # fmt: skip
+
+
+def _of_control(setup: Setup, equation: StateEquation, record: Record) -> tuple[Remark, ...]:
+    """What is said of the controller; one that was interrupted is not asked again."""
+    if record.outcome.ending is Ending.STOPPED:
+        return ()
+    return (*unstable(setup, equation, record.t, record.y), *damped(setup, record))
 
 
 def deviation_of(setup: Setup, t: np.ndarray, q: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:
