@@ -22,7 +22,6 @@ from robot_dyn.stress_test.lines import Loading, expression
 from robot_dyn.stress_test.loads import payload_limit
 from robot_dyn.stress_test.scenes import FAMILIES, scenes
 from robot_dyn.stress_test.worst import worst_configurations
-from tests.browser import FLAGS, chromium
 from tests.command import refusal, run
 from tests.test_command_documents import promised
 
@@ -220,12 +219,10 @@ def test_failures_are_told_loudly(monkeypatch, tmp_path) -> None:
 
 
 @pytest.mark.parametrize("dark", [False, True])
-def test_the_page_opens_without_a_word_of_the_browser_and_asks_for_nothing(tmp_path, dark: bool) -> None:
-    sync_api = pytest.importorskip("playwright.sync_api")
+def test_the_page_opens_without_a_word_of_the_browser_and_asks_for_nothing(tmp_path, browser, dark: bool) -> None:
     page = rd.save_stress(made("planar_2r"), tmp_path / "page")
-    with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium(), args=FLAGS)
-        tab = browser.new_page(color_scheme="dark" if dark else "light", viewport={"width": 1100, "height": 900})
+    tab = browser.new_page(color_scheme="dark" if dark else "light", viewport={"width": 1100, "height": 900})
+    try:
         said, asked = [], []
         tab.on("console", lambda message: said.append(message.text))
         tab.on("request", lambda request: asked.append(request.url))
@@ -236,7 +233,8 @@ def test_the_page_opens_without_a_word_of_the_browser_and_asks_for_nothing(tmp_p
         )
         assert said == [] and asked == [page.as_uri()]
         assert tab.evaluate("document.documentElement.scrollWidth <= innerWidth")
-        browser.close()
+    finally:
+        tab.close()
 
 
 def test_commands_to_paste_answer() -> None:
