@@ -32,7 +32,7 @@ from robot_dyn.lagrange.scale import (
 )
 from robot_dyn.model.quantity import CORIOLIS_TORQUE, FORWARD_DYNAMICS, INVERSE_DYNAMICS, C, M, N, Quantity
 from tests.hard.case import Case, Row
-from tests.hard.chains import CHAINS, LONG, file_of
+from tests.hard.chains import CHAINS, FOLDER, LONG, file_of
 
 TITLE = "Conditioning"
 U = 2.0**-53
@@ -126,7 +126,7 @@ def _chain(name: str, seed: int) -> Iterator[Row]:
     try:
         robot = rd.load(file_of(name))
     except DescriptionError as refusal:
-        yield Row(name, "refused", float("nan"), 0.0, str(refusal))
+        yield Row(name, "refused", float("nan"), 0.0, str(refusal).replace(f"{FOLDER}/", "urdf/hard/"))
         return
     yield from rows(name, robot, roads(robot, name in COMPILED), states(robot.n, seed))
 
