@@ -56,8 +56,6 @@ def of_estimates(case: str, found: list[Judgement]) -> Iterator[Row]:
         yield Row(case, "true error over its estimate", max(quiet), 1 / LEAST)
     loud = max(found, key=lambda each: each.run.ledger.closure)
     yield Row(case, "energy unaccounted for, of that exchanged", loud.run.ledger.closure, OPEN, words(loud.run))
-    told = sum(bool(words(each.run)) for each in found)
-    yield Row(case, "scenes with a word of warning", float(told), float(len(found)))
 
 
 def _smooth(name: str, block: range, case: str, seed: int) -> Iterator[Row]:
