@@ -13,7 +13,7 @@ or step.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from itertools import combinations, product
+from itertools import combinations, islice, product
 
 import numpy as np
 import pinocchio as pin
@@ -44,8 +44,7 @@ class Bodies:
         self.forces = [_force(model, self.data, each)(0.0) for each in others]
 
     def M(self, q: np.ndarray) -> np.ndarray:
-        made = np.triu(pin.crba(self.model, self.data, q))
-        return made + np.triu(made, 1).T
+        return pin.crba(self.model, self.data, q).copy()
 
     def level(self, v: np.ndarray) -> np.ndarray:
         """Friction of sliding, all in all."""
@@ -62,18 +61,25 @@ class Bodies:
         levels = (x.level if x.static is None else x.static for x in self.friction)
         return sum((np.broadcast_to(each, self.n) for each in levels), np.zeros(self.n))
 
+    def applied(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Torques of effects without friction and stops, and of the controller."""
+        made = np.zeros(self.n)
+        for force in self.forces:
+            made = made + force(q, v)
+        return made if self.law is None else made + _control(self.law, self.model, self.data, t, q, v, t)
+
     def load(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """All torques but those of friction and stops."""
-        made = -pin.nonLinearEffects(self.model, self.data, q, v)
-        made = made + sum(force(q, v) for force in self.forces)
-        return made if self.law is None else made + _control(self.law, self.model, self.data, t, q, v, t)
+        return self.applied(t, q, v) - pin.nonLinearEffects(self.model, self.data, q, v)
 
     def motion(self, t: float, y: np.ndarray, way: np.ndarray, stuck: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """A and the reactions of stuck joints."""
         q, v = y[: self.n], y[self.n :]
+        if not stuck.any():
+            return pin.aba(self.model, self.data, q, v, self.applied(t, q, v) - self.level(v) * way), np.zeros(self.n)
         M, left, a = self.M(q), self.load(t, q, v) - self.level(v) * way, np.zeros(self.n)
         free = ~stuck
-        a[free] = np.linalg.solve(M[np.ix_(free, free)], left[free])
+        a[free] = np.linalg.solve(M[free][:, free], left[free])
         return a, np.where(stuck, M @ a - left, 0.0)
 
     def touched(self, q: np.ndarray) -> np.ndarray:
@@ -144,15 +150,29 @@ def _nearest(usual: list[int], choices: list[list[int]]) -> Iterator[tuple[int, 
 
 def nonsmooth_truth(setup: rd.Setup, times: np.ndarray, tolerance: float = 1e-13, longest: float = 5e-3) -> np.ndarray:
     """Positions at ascending times, (k, n)."""
-    bodies, n, t = Bodies(setup), len(setup.q0), 0.0
-    y, result = np.concatenate([setup.q0, setup.v0]).astype(float), np.empty((len(times), len(setup.q0)))
+    result = np.empty((len(times), len(setup.q0)))
     result[times <= 0] = setup.q0
+    for _ in _modes(setup, times, result, tolerance, longest):
+        pass
+    return result
+
+
+def time_of_event(setup: rd.Setup, count: int) -> float:
+    """When event number `count` happens; the duration if there are fewer."""
+    none = np.empty(0), np.empty((0, len(setup.q0)))
+    return next(islice(_modes(setup, *none, 1e-10, 1e-2), count - 1, None), setup.duration_s)
+
+
+def _modes(setup: rd.Setup, times, result, tolerance: float, longest: float) -> Iterator[float]:
+    """The times at which modes end; positions are written to the result."""
+    bodies, n, t = Bodies(setup), len(setup.q0), 0.0
+    y = np.concatenate([setup.q0, setup.v0]).astype(float)
     ends = [each for each in (setup.controller.knots if setup.controller else ()) if 0 < each < setup.duration_s]
     y, way, stuck = _behind(bodies, t, y, np.zeros(n), np.zeros(n, bool), {})
     for end in [*sorted(ends), setup.duration_s]:
         while t < end:
             t, y, way, stuck = _until_event(bodies, t, end, y, way, stuck, times, result, tolerance, longest)
-    return result
+            yield t
 
 
 def _until_event(bodies, t, end, y, way, stuck, times, result, tolerance, longest):

@@ -17,7 +17,7 @@ import robot_dyn as rd
 
 def truth(setup: rd.Setup, times: np.ndarray, tolerance: float = 3e-14, longest: float = 1e-3) -> np.ndarray:
     """Positions at ascending times, (k, n)."""
-    n, model = len(setup.q0), setup.plant.dynamics.model
+    n, none, model = len(setup.q0), np.zeros(len(setup.q0)), setup.plant.dynamics.model
     data, law = model.createData(), setup.controller
     forces = [_force(model, data, effect) for effect in setup.plant.effects]
     period = law.period_s if law else 0.0
@@ -38,17 +38,19 @@ def truth(setup: rd.Setup, times: np.ndarray, tolerance: float = 3e-14, longest:
 
         def rate(t, y, acting=acting, held=held, middle=middle):
             q, v = y[:n], y[n:]
-            u = np.zeros(n) if law is None else held if period else _control(law, model, data, t, q, v, middle)
-            return np.concatenate([v, pin.aba(model, data, q, v, u + sum(f(q, v) for f in acting))])
+            u = none if law is None else held if period else _control(law, model, data, t, q, v, middle)
+            for force in acting:
+                u = u + force(q, v)
+            return np.concatenate([v, pin.aba(model, data, q, v, u)])
 
         inside = (times > start) & (times <= end)
+        at = np.union1d(times[inside], [end])
         solved = solve_ivp(
-            rate, (start, end), y, "DOP853", dense_output=bool(inside.any()), rtol=tolerance,
-            atol=tolerance / 10, max_step=longest if stops else np.inf,
+            rate, (start, end), y, "DOP853", at, rtol=tolerance, atol=tolerance / 10,
+            max_step=longest if stops else np.inf,
         )  # fmt: skip
         assert solved.success, solved.message
-        if inside.any():
-            result[inside] = solved.sol(times[inside])[:n].T
+        result[inside] = solved.y[:n, np.isin(at, times[inside])].T
         y = solved.y[:, -1]
     return result
 
@@ -62,8 +64,9 @@ def _force(model, data, effect) -> Callable[[float], Callable]:
     if isinstance(effect, rd.RegularisedCoulombFriction):
         return lambda t: lambda q, v: -effect.friction * np.tanh(v / effect.velocity_scale)
     if isinstance(effect, rd.JointStopSpring):
-        depths = lambda q: (np.maximum(effect.lower - q, 0), np.maximum(q - effect.upper, 0))  # noqa: E731
-        return lambda t: lambda q, v: effect.stiffness * (depths(q)[0] - depths(q)[1])
+        return lambda t: (
+            lambda q, v: effect.stiffness * (np.maximum(effect.lower - q, 0) - np.maximum(q - effect.upper, 0))
+        )
     if isinstance(effect, rd.JointStopDamper):
         return lambda t: (
             lambda q, v: -effect.damping * (np.maximum(effect.lower - q, 0) + np.maximum(q - effect.upper, 0)) * v

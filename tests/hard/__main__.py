@@ -1,7 +1,7 @@
 """`python -m tests.hard --seed 20261122`: run all hard cases, and write docs/hard_cases.md and docs/hard_cases.json.
 
-Exit code 1 if a figure is wrong without a word. With --family, only those are run, and the report keeps the others as
-they were; without --full, the short cases.
+Exit code 1 if a figure is wrong without a word. With --family and --case, only those are run, and the report keeps the
+others as they were; without --full, the short cases.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import warnings
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
-from time import perf_counter
+from time import process_time
 
 from robot_dyn.errors import ModelWarning
 from tests.hard.case import Row
@@ -27,20 +27,21 @@ def run(task: tuple[str, int, int]) -> Result:
     """One case of a family; an exception that escapes is a row that does not hold."""
     name, index, seed = task
     case = FAMILIES[name].CASES[index]
-    start = perf_counter()
+    start = process_time()
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ModelWarning)
             rows = list(case.rows(seed))
     except Exception:  # a case that breaks is a result too
         rows = [Row(case.name, "crash: " + traceback.format_exc(limit=-3), float("nan"), 0.0)]
-    return Result(name, case.name, tuple(rows), perf_counter() - start)
+    return Result(name, case.name, seed, tuple(rows), process_time() - start)
 
 
 def main() -> int:
     """Run, print and write."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--family", action="append", choices=list(FAMILIES))
+    parser.add_argument("--case", default="", help="only cases whose name holds this text")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--full", action="store_true", help="the long cases too")
     parser.add_argument("--workers", type=int, default=2)
@@ -51,7 +52,7 @@ def main() -> int:
         (name, index, options.seed)
         for name in options.family or FAMILIES
         for index, case in enumerate(FAMILIES[name].CASES)
-        if options.full or not case.full
+        if (options.full or not case.full) and options.case in case.name
     ]
     results = []
     with ProcessPoolExecutor(options.workers) as pool:
@@ -65,7 +66,7 @@ def main() -> int:
                 )
             print(f"       {result.family}: {result.case}: {result.seconds:.1f} s", flush=True)
             if options.write:  # after each case, so that one that is stopped leaves those before it
-                write(results, options.seed, options.write)
+                write(result, options.write)
     count = Counter(row.verdict for result in results for row in result.rows)
     print(f"seed {options.seed}: {dict(count)}")
     return int(count["SILENT"] > 0)

@@ -24,35 +24,39 @@ class Result:
     Attributes:
         family: Its family.
         case: Its name.
+        seed: Of its random numbers.
         rows: Its figures.
-        seconds: How long it took.
+        seconds: How long it took, of one process.
     """
 
     family: str
     case: str
+    seed: int
     rows: tuple[Row, ...]
     seconds: float
 
 
-def write(results: Sequence[Result], seed: int, folder: Path) -> None:
-    """Write hard_cases.md and hard_cases.json; families that were not run are kept as they were."""
+def write(result: Result, folder: Path) -> None:
+    """Write a result into hard_cases.json and hard_cases.md; cases that were run before are kept as they were."""
     path = folder / "hard_cases.json"
     known = json.loads(path.read_text()) if path.exists() else {}
-    for name in dict.fromkeys(result.family for result in results):
-        those = [result for result in results if result.family == name]
-        known[name] = {
-            "seed": seed,
-            "environment": environment(),
-            "seconds": {each.case: round(each.seconds, 1) for each in those},
-            "rows": [_finite(asdict(row)) | {"verdict": row.verdict} for each in those for row in each.rows],
-        }
-    known = {name: known[name] for name in FAMILIES if name in known}
+    known.setdefault(result.family, {})[result.case] = {
+        "seed": result.seed,
+        "seconds": round(result.seconds, 1),
+        "environment": environment(),
+        "rows": [_finite(asdict(row)) | {"verdict": row.verdict} for row in result.rows],
+    }
+    known = {
+        name: {case.name: known[name][case.name] for case in family.CASES if case.name in known[name]}
+        for name, family in FAMILIES.items()
+        if name in known
+    }
     path.write_text(json.dumps(known, indent=1, ensure_ascii=False) + "\n")
     (folder / "hard_cases.md").write_text("\n".join(_page(known)) + "\n")
 
 
 def _page(known: dict) -> Iterator[str]:
-    rows = {name: [_row(each) for each in family["rows"]] for name, family in known.items()}
+    rows = {name: [_row(each) for case in of.values() for each in case["rows"]] for name, of in known.items()}
     ours = [row for those in rows.values() for row in those if row.ours]
     count = Counter(row.verdict for row in ours)
     yield "# Hard cases"
@@ -66,7 +70,7 @@ def _page(known: dict) -> Iterator[str]:
     yield ""
     yield (
         f"{len(ours)} figures of robot_dyn: {count['holds']} hold, {count['said']} said, **{count['SILENT']} silent**."
-        f" {'; '.join(sorted({_environment(family) for family in known.values()}))}."
+        f" {'; '.join(sorted({_environment(case) for of in known.values() for case in of.values()}))}."
     )
     for name, those in rows.items():
         yield ""
@@ -74,19 +78,21 @@ def _page(known: dict) -> Iterator[str]:
         yield ""
         yield cleandoc(FAMILIES[name].__doc__ or "")
         yield ""
-        yield f"Seed {known[name]['seed']}, {sum(known[name]['seconds'].values()):.0f} s.{_not_run(name, known[name])}"
+        seeds = ", ".join(str(seed) for seed in sorted({case["seed"] for case in known[name].values()}))
+        seconds = sum(case["seconds"] for case in known[name].values())
+        yield f"Seed {seeds}; {seconds:.0f} s of one core.{_not_run(name, known[name])}"
         yield ""
         yield from _matrix(those) if getattr(FAMILIES[name], "MATRIX", False) else _table(those)
 
 
 def _not_run(name: str, family: dict) -> str:
     """The cases of a family that were not run."""
-    missing = [case.name for case in FAMILIES[name].CASES if case.name not in family["seconds"]]
+    missing = [case.name for case in FAMILIES[name].CASES if case.name not in family]
     return f" Not run: {'; '.join(missing)}." if missing else ""
 
 
-def _environment(family: dict) -> str:
-    return ", ".join(f"{name} {value}" for name, value in family["environment"].items())
+def _environment(case: dict) -> str:
+    return ", ".join(f"{name} {value}" for name, value in case["environment"].items())
 
 
 def _table(rows: Sequence[Row]) -> Iterator[str]:
