@@ -19,6 +19,11 @@ settings.register_profile(
 )
 settings.load_profile("robot_dyn")
 
+# Before NumPy is loaded; workers and commands inherit it. Matrices of arms are small, and threads of BLAS wait for each
+# other in loops that take the cores from other workers: with two of them a comparison of 101 joints took eight times as
+# much CPU time.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 if "ROBOT_DYN_CACHE" not in os.environ:  # kernels of a test run are its own; workers inherit the folder
     os.environ["ROBOT_DYN_CACHE"] = tempfile.mkdtemp(prefix="robot_dyn-kernels-")
     atexit.register(shutil.rmtree, os.environ["ROBOT_DYN_CACHE"], ignore_errors=True)
