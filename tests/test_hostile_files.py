@@ -6,6 +6,7 @@ import json
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,57 +18,33 @@ from tests.hostile.kinds import SECRET, Kind
 
 TOPICS = (paths, xml, entities, limits, structure, names, numbers, mimics, oddities)
 TABLE = [kind for topic in TOPICS for kind in topic.KINDS]
-SECONDS = 20
 LONGEST_MESSAGE = 1500  # characters besides the path: what still fits a terminal
 REMEDY = re.compile(
     r"\b(give|needs|write|correct|remove|rename|keep|add|make|join|expand|exchange|check|split"
     r"|known|nearest|looked for|only)\b"
 )
 
-CHILD = """
-import json, math, resource, sys, warnings
-resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
-resource.setrlimit(resource.RLIMIT_CPU, (18, 18))
-resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-import robot_dyn
 
-def forward_dynamics(robot):
-    still = [0.0] * robot.n
-    try:
-        a = robot.forward_dynamics([0.5] * robot.n, still, still)
-    except robot_dyn.RobotDynError as error:
-        return f"{type(error).__name__}: {error}"
-    return "ok" if all(map(math.isfinite, a)) else f"not finite: {a}"
-
-with warnings.catch_warnings(record=True) as caught:
-    warnings.simplefilter("always")
-    try:
-        robot = robot_dyn.load(json.loads(sys.argv[1]))
-    except robot_dyn.RobotDynError as error:
-        report = {"outcome": "refused", "kind": type(error).__name__, "message": str(error)}
-    else:
-        report = {"outcome": "loaded", "forward_dynamics": forward_dynamics(robot), "upper": list(robot.upper)}
-        few = 1 < robot.n < 10
-        report["held"] = robot.with_(lock={robot.joint_names[0]: 0.5}).n if few else None
-report["warnings"] = [f"{type(w.message).__name__}: {w.message}" for w in caught]
-print(json.dumps(report))
-"""
+@pytest.fixture(scope="module")
+def server() -> Iterator[subprocess.Popen[str]]:
+    """The process whose forks load files."""
+    command = [sys.executable, "-m", "tests.hostile.loading"]
+    with subprocess.Popen(
+        command, cwd=Path(__file__).parents[1], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
+        yield process
+        process.stdin.close()  # pyright: ignore[reportOptionalMemberAccess]
 
 
-def load_in_child(path: Path) -> dict[str, Any]:
-    """What became of a file, loaded under limits of memory and time."""
-    child = subprocess.run(
-        [sys.executable, "-c", CHILD, json.dumps(str(path))],
-        cwd=Path(__file__).parents[1],
-        capture_output=True,
-        text=True,
-        timeout=SECONDS,
-        check=False,
-    )
-    assert (child.returncode, child.stderr) == (0, ""), f"exit {child.returncode}: {child.stderr[-2000:]}"
-    assert SECRET not in child.stdout
-    assert child.stdout.count("\n") == 1, child.stdout[:2000]
-    return json.loads(child.stdout)
+def load_in_child(server: Any, path: Path) -> dict[str, Any]:
+    """What became of a file, loaded in a process of its own under limits of memory and time."""
+    server.stdin.write(json.dumps(str(path)) + "\n")
+    server.stdin.flush()
+    child = json.loads(server.stdout.readline())
+    assert (child["returncode"], child["stderr"]) == (0, ""), f"exit {child['returncode']}: {child['stderr'][-2000:]}"
+    assert SECRET not in child["stdout"]
+    assert child["stdout"].count("\n") == 1, child["stdout"][:2000]
+    return json.loads(child["stdout"])
 
 
 def check_says(message: str, fragments: tuple[str, ...]) -> None:
@@ -106,9 +83,9 @@ def test_table_is_wide() -> None:
 
 
 @pytest.mark.parametrize("kind", TABLE, ids=[kind.id for kind in TABLE])
-def test_hostile_file_is_refused_by_name_in_bounded_time(kind: Kind, tmp_path: Path) -> None:
+def test_hostile_file_is_refused_by_name_in_bounded_time(kind: Kind, server: Any, tmp_path: Path) -> None:
     path = kind.make(tmp_path / "robot.urdf")
-    report = load_in_child(path)
+    report = load_in_child(server, path)
     if kind.refused:
         check_refusal(kind, path, report)
     else:
