@@ -7,7 +7,7 @@ from inspect import Parameter, getdoc, signature
 from math import isinf
 from typing import Any, ClassVar, Literal
 
-from pydantic import Field, create_model
+from pydantic import ConfigDict, Field, create_model
 
 from robot_dyn.coefficients import URDF, Coefficient, declared
 from robot_dyn.effects.effect import Effect
@@ -30,6 +30,8 @@ class Acting(Part):
 
 class Declared(Acting):
     """An effect made of the coefficients that its classes declare."""
+
+    model_config = ConfigDict(use_attribute_docstrings=False)  # to look for texts in a source that is not there is slow
 
     make: ClassVar[Callable[..., Any]]
     keys: ClassVar[Mapping[str, tuple[str, Coefficient]]] = {}

@@ -7,7 +7,7 @@ from dataclasses import MISSING, fields
 from inspect import getdoc
 from typing import Annotated, Any, ClassVar, Literal, Union
 
-from pydantic import Field, create_model
+from pydantic import ConfigDict, Field, create_model
 
 from robot_dyn.coefficients import Coefficient, declared
 from robot_dyn.control.block import SIGNAL, Block, name_of
@@ -26,6 +26,8 @@ _UNITS: dict[str, str] = dict(zip(LINES, ("rad", "rad/s", "N m"), strict=True))
 
 class BlockPart(Part):
     """A block of a line of a loop."""
+
+    model_config = ConfigDict(use_attribute_docstrings=False)  # to look for texts in a source that is not there is slow
 
     make: ClassVar[type[Block]]
     keys: ClassVar[Mapping[str, tuple[str, Coefficient | None]]] = {}
