@@ -25,8 +25,14 @@ def rotation(axis: Array, angle: Array) -> Array:
 
     Source: Murray, Li, Sastry 1994, eq. 2.14 (Rodrigues' formula).
     """
-    A, theta = hat(axis), np.asarray(angle)[..., None, None]
-    return np.eye(3, dtype=axis.dtype) + sin(theta) * A + (1 - cos(theta)) * (A @ A)
+    A = hat(axis)
+    return turned_about(A, A @ A, angle)
+
+
+def turned_about(A: Array, square: Array, angle: Array) -> Array:
+    """As `rotation`, of the skew matrix â of the axis and of its square, (3, 3)."""
+    theta = np.asarray(angle)[..., None, None]
+    return np.eye(3, dtype=A.dtype) + sin(theta) * A + (1 - cos(theta)) * square
 
 
 def rotation_rpy(rpy: Array) -> Array:

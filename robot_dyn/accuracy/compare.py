@@ -105,14 +105,13 @@ def _frame_pairs(
     robot: Robot, own: Lagrangian, q: np.ndarray, v: np.ndarray, frame: str, size: Magnitudes, tolerance: float
 ) -> Iterator[Pair]:
     """Placement and Jacobians of one link. A lever is a difference of positions, so its scale is their size."""
-    g, reach = robot.placement(q, frame), size.reach[frame]
+    g, own_g, reach = robot.placement(q, frame), own.placement(q, frame), size.reach[frame]
     arm = size.lever[frame] + reach
     turn, swing = np.abs(v).sum(), arm @ np.abs(v)
     rows = ("x", "y", "z", "rx", "ry", "rz")
     unit = np.ones((3, 3))
-    yield Pair("placement", g[:3, :3], own.placement(q, frame)[:3, :3], unit, tolerance, (rows[3:], rows[:3]), frame)
-    position = own.placement(q, frame)[:3, 3]
-    yield Pair("placement", g[:3, 3], position, np.full(3, reach), tolerance, (rows[:3],), frame)
+    yield Pair("placement", g[:3, :3], own_g[:3, :3], unit, tolerance, (rows[3:], rows[:3]), frame)
+    yield Pair("placement", g[:3, 3], own_g[:3, 3], np.full(3, reach), tolerance, (rows[:3],), frame)
     for axes in Axes:
         J = np.vstack([np.tile(arm, (3, 1)), np.ones((3, robot.n))])
         rate = np.vstack([np.tile(arm * turn + swing, (3, 1)), np.full((3, robot.n), turn)])

@@ -161,14 +161,14 @@ class Lagrangian(Dynamics, Parametrised):
     def placement(self, q: Array, frame: str, *, errors: str = "raise") -> Array:
         frame = self._link(frame)
         return self._answer(
-            "placement", errors, lambda q: homogeneous(*self._placement(self.linkage.at(q), frame)), q=q
+            "placement", errors, lambda q: homogeneous(*self._placement(self.linkage.at_link(q, frame), frame)), q=q
         )
 
     def jacobian(self, q: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, errors: str = "raise") -> Array:
         frame, axes = self._link(frame), Axes.of(expressed_in)
 
         def equation(q: Array) -> Array:
-            at = self.linkage.at(q)
+            at = self.linkage.at_link(q, frame)
             return self.linkage.couplings.columns(self._change(at, frame, axes) @ self._body_jacobian(at, frame))
 
         return self._answer("jacobian", errors, equation, q=q)
@@ -179,7 +179,7 @@ class Lagrangian(Dynamics, Parametrised):
         frame, axes = self._link(frame), Axes.of(expressed_in)
 
         def equation(q: Array, v: Array) -> Array:
-            at, v = self.linkage.at(q), self.linkage.couplings.velocity(v)
+            at, v = self.linkage.at_link(q, frame), self.linkage.couplings.velocity(v)
             J, rate = self._body_jacobian(at, frame), self._body_jacobian(at, frame, v)
             V = apply(J, v)
             if axes is Axes.WORLD_ALIGNED:  # d/dt diag(R, R) = diag(R, R) diag(ω̂, ω̂)
@@ -203,7 +203,7 @@ class Lagrangian(Dynamics, Parametrised):
 
     def _V(self, at: Configuration) -> Array:
         V, g = 0, self.linkage.gravity
-        for inertia, (R, p) in zip(self.linkage.inertias, at.in_base, strict=True):
+        for inertia, (R, p) in zip(self.linkage.inertias, at.in_base.values(), strict=True):
             V = V - (inertia[0, 0] * p + R @ first_moment(inertia)) @ g
         return V
 

@@ -57,7 +57,7 @@ class Summand:
 
 def of_bodies(at: Configuration) -> Iterator[Summand]:
     """The summands of the bodies that move, each with all its links."""
-    bodies = zip(at.linkage.bodies, at.linkage.inertias, at.jacobians, at.in_base, strict=True)
+    bodies = zip(at.linkage.bodies, at.linkage.inertias, at.jacobians.values(), at.in_base.values(), strict=True)
     return (Summand(body.path, inertia, J, R) for body, inertia, J, (R, _) in bodies)
 
 

@@ -6,6 +6,7 @@ frame of the joint that carries it. [Murray, Li, Sastry 1994, ch. 3 and 4]
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, final
@@ -16,7 +17,7 @@ from robot_dyn.arithmetic import Arithmetic, Array, apply, sqrt, symmetric, tran
 from robot_dyn.model.couplings import Couplings, resolve
 from robot_dyn.model.inertial_parameters import ordered
 from robot_dyn.model.tree import Joint, Link, Tree
-from robot_dyn.spatial import adjoint_inverse, rotation, rotation_rpy, spatial_inertia
+from robot_dyn.spatial import adjoint_inverse, hat, rotation_rpy, spatial_inertia, turned_about
 
 BASE = -1  # the body that does not move
 
@@ -59,18 +60,24 @@ class Body:
         """ξ, the body twist at unit rate, (6,)."""
         return np.concatenate((np.zeros_like(self.axis), self.axis)[:: 1 if self.revolute else -1])
 
+    @cached_property
+    def generators(self) -> tuple[Array, Array]:
+        """â and â² of the axis, as `turned_about` takes them."""
+        A = hat(self.axis)
+        return A, A @ A
+
     def step(self, q: Array) -> Step:
         """The change of frame from the parent at the joint's coordinate q (...,)."""
         zero, one = np.zeros_like(self.axis), np.broadcast_to(np.eye(3, dtype=self.axis.dtype), (*q.shape, 3, 3))
         slide = q[..., None] * self.axis
-        motion = (rotation(self.axis, q), zero) if self.revolute else (one, slide)
+        motion = (turned_about(*self.generators, q), zero) if self.revolute else (one, slide)
         origin = self.pose.p if self.revolute else self.pose.p + apply(self.pose.R, slide)
         return Step(adjoint_inverse(self.pose.R, self.pose.p), adjoint_inverse(*motion), origin)
 
     def moved(self, q: Array) -> tuple[Array, Array]:
         """(R, p) in the parent's frame at the joint's coordinate q (...,)."""
         if self.revolute:
-            return self.pose.R @ rotation(self.axis, q), np.broadcast_to(self.pose.p, (*q.shape, 3))
+            return self.pose.R @ turned_about(*self.generators, q), np.broadcast_to(self.pose.p, (*q.shape, 3))
         slide = self.pose.R @ self.axis
         return np.broadcast_to(self.pose.R, (*q.shape, 3, 3)), self.pose.p + q[..., None] * slide
 
@@ -146,48 +153,56 @@ class Linkage:
 
     def at(self, q: Array) -> Configuration:
         """The linkage at coordinates q (..., n)."""
+        return self._at(q, range(len(self.bodies)))
+
+    def at_link(self, q: Array, link: str) -> Configuration:
+        """What a link hangs on, at coordinates q (..., n): the bodies of its path alone."""
+        body, *_ = self.links[link]
+        return self._at(q, () if body == BASE else self.bodies[body].path)
+
+    def _at(self, q: Array, which: Iterable[int]) -> Configuration:
         q = self.couplings.position(q)
-        in_parent = [body.moved(q[..., i]) for i, body in enumerate(self.bodies)]
-        return Configuration(self, q.shape[:-1], in_parent)
+        return Configuration(self, q.shape[:-1], {i: self.bodies[i].moved(q[..., i]) for i in which})
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Configuration:
-    """The linkage at one configuration, or a batch.
+    """The linkage, or those of its bodies that are asked for, at one configuration or a batch.
 
     Attributes:
         batch: Shape of the batch axes.
-        in_parent: (R, p) of each body in its parent's frame.
+        in_parent: (R, p) of each body in its parent's frame, by its index; parents first.
     """
 
     linkage: Linkage
     batch: tuple[int, ...]
-    in_parent: list[tuple[Array, Array]]
+    in_parent: dict[int, tuple[Array, Array]]
 
     @cached_property
-    def in_base(self) -> list[tuple[Array, Array]]:
+    def in_base(self) -> dict[int, tuple[Array, Array]]:
         """(R, p) of each body in the base."""
-        result: list[tuple[Array, Array]] = []
-        for body, (R, p) in zip(self.linkage.bodies, self.in_parent, strict=True):
-            if body.parent != BASE:
-                R0, p0 = result[body.parent]
+        result: dict[int, tuple[Array, Array]] = {}
+        for i, (R, p) in self.in_parent.items():
+            parent = self.linkage.bodies[i].parent
+            if parent != BASE:
+                R0, p0 = result[parent]
                 R, p = R0 @ R, apply(R0, p) + p0
-            result.append((R, p))
+            result[i] = R, p
         return result
 
     @cached_property
-    def jacobians(self) -> list[Array]:
+    def jacobians(self) -> dict[int, Array]:
         """Body Jacobian of each body, (..., 6, len(path)): its columns are the joints of its path.
 
         Jᵢ = [Ad⁻¹ J_parent, ξᵢ].  [Murray, Li, Sastry 1994, eq. 3.56]
         """
-        J: list[Array] = []
-        for body, (R, p) in zip(self.linkage.bodies, self.in_parent, strict=True):
-            own = np.broadcast_to(body.screw[:, None], (*self.batch, 6, 1))
+        J: dict[int, Array] = {}
+        for i, (R, p) in self.in_parent.items():
+            body = self.linkage.bodies[i]
+            J[i] = np.broadcast_to(body.screw[:, None], (*self.batch, 6, 1))
             if body.parent != BASE:
-                own = np.concatenate([adjoint_inverse(R, p) @ J[body.parent], own], axis=-1)
-            J.append(own)
+                J[i] = np.concatenate([adjoint_inverse(R, p) @ J[body.parent], J[i]], axis=-1)
         return J
 
 

@@ -5,7 +5,7 @@ Paths are thinned like joints: a straight line replaces the samples between keyf
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import final
 
@@ -21,7 +21,7 @@ from robot_dyn.view.keyframes import Keyframes, keyframes
 from robot_dyn.view.stage import Stage, placement
 
 Rgba = tuple[float, float, float, float]
-Placements = list[tuple[np.ndarray, np.ndarray]]
+Placements = Mapping[int, tuple[np.ndarray, np.ndarray]]
 
 _COM: Rgba = (0.94, 0.89, 0.26, 1.0)
 _TRACE: Rgba = (0.0, 0.62, 0.45, 1.0)
@@ -105,7 +105,7 @@ def of_link(stage: Stage, q: np.ndarray, link: str) -> np.ndarray:
 def centre_of_mass(stage: Stage, at: Placements) -> np.ndarray:
     """Centre of mass of the bodies that move, (m, 3), where they are placed at (R, p) each."""
     total, mass = np.zeros_like(at[0][1]), 0.0
-    for inertia, (R, p) in zip(stage.linkage.inertias, at, strict=True):
+    for inertia, (R, p) in zip(stage.linkage.inertias, at.values(), strict=True):
         total, mass = total + inertia[0, 0] * p + R @ first_moment(inertia), mass + inertia[0, 0]
     return total / mass if mass > 0 else total
 

@@ -6,6 +6,7 @@ keyframes is the arm at the q between them. [Murray, Li, Sastry 1994, ch. 3 §2]
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -116,7 +117,7 @@ def _tracks(body: Body, t: np.ndarray, q: np.ndarray) -> list[Command]:
     return [still, commands.track("position", "vector", t, slides)]
 
 
-def placement(at: list[tuple[np.ndarray, np.ndarray]], body: int, pose: Pose) -> tuple[np.ndarray, np.ndarray]:
+def placement(at: Mapping[int, tuple[np.ndarray, np.ndarray]], body: int, pose: Pose) -> tuple[np.ndarray, np.ndarray]:
     """(R, p) in the base of a pose in a body, from those of all bodies."""
     if body == BASE:
         return pose.R, pose.p

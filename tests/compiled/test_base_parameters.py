@@ -75,7 +75,7 @@ def test_origins_slide_to_where_distances_vanish() -> None:
     linkage = rd.Lagrangian(completed(rd.load("ur5"))[0]).linkage
     count = [sum(np.count_nonzero(body.pose.p) for body in each.bodies) for each in (linkage, slid(linkage))]
     assert count[1] <= count[0] - 2
-    before, after = (each.at(np.zeros(6)).in_base for each in (linkage, slid(linkage)))
+    before, after = (each.at(np.zeros(6)).in_base.values() for each in (linkage, slid(linkage)))
     for body, (R, p), (S, r) in zip(linkage.bodies, before, after, strict=True):
         assert np.array_equal(R, S)
         assert np.allclose(np.cross(R @ body.axis, r - p), 0, atol=1e-14)  # moved along the axis, if at all
