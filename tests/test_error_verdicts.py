@@ -217,6 +217,19 @@ def test_turns_that_no_step_can_see_have_no_estimate() -> None:
     assert "turns by 6.28 rad in a step" in run.error.note
 
 
+@pytest.mark.parametrize("method", ["rosenbrock_5", "sdirk_3", "linearly_implicit_euler"])
+def test_an_oscillation_that_a_method_damps_has_no_estimate(method: str) -> None:
+    """q = q₀ cos ω t with ω h = 17: each step leaves next to nothing of it, at any length near h."""
+    bar = rd.load("pendulum").with_(gravity=(0.0, 0.0, 0.0))
+    options = {"duration_s": 0.02, "integrator": method, "engine": "interpreted"}
+    run = rd.simulate(rd.Plant(bar, [rd.Spring(1e8)]), [1e-2], step_s=1e-3, **options)
+    assert run.error.verdict is Verdict.NONE
+    assert "joint 'pivot', by 'spring'" in run.error.note
+    slow = rd.simulate(rd.Plant(bar, [rd.Spring(1e4)]), [1e-2], step_s=1e-3, **options)  # ω h = 0.17
+    exact = 1e-2 * np.cos(np.sqrt(3e4) * slow.t[:, None])
+    assert slow.error.final >= LEAST * np.abs(slow.q - exact).max()
+
+
 def test_a_record_that_meets_every_turning_point_accuses_no_run() -> None:
     """Samples at rest alone: the energy exchanged and the motion are those between them."""
     plant = rd.Plant(RAIL, [rd.Spring(1.0)])

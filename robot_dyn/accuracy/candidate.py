@@ -21,9 +21,8 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.choice import choose
-from robot_dyn.simulation.ledger import Ledger
 from robot_dyn.simulation.prepared import prepared
-from robot_dyn.simulation.record import Record
+from robot_dyn.simulation.samples import ledger
 from robot_dyn.simulation.setup import MOST_CUT, Setup
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.trajectory import Ending
@@ -210,13 +209,5 @@ def timed(setup: Setup, limit: Limit, events: bool = True) -> Run:
         met = common(record.t, np.append(0.0, record.ends)) >= 0
     return Run(
         record.t[met], record.y[met, : setup.plant.dynamics.n] if finished else None,
-        _ledger(equation, record).closure if finished else float("nan"), record.steps, record.evaluations, spent,
+        ledger(equation, record).closure if finished else float("nan"), record.steps, record.evaluations, spent,
     )  # fmt: skip
-
-
-def _ledger(equation: StateEquation, record: Record) -> Ledger:
-    """The energy ledger at the samples of a run."""
-    m, works = equation.size, equation.size - len(equation.sources)
-    E = record.made[:, -2:]
-    work = dict(zip(equation.sources, record.y[:, works:m].T, strict=True))
-    return Ledger(E[:, 0], E[:, 1], work, record.kinetic_peak)

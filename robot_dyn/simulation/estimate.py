@@ -34,6 +34,7 @@ from robot_dyn.simulation.schedule import LEAST_STEPS
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.smoothness import first_kink
 from robot_dyn.simulation.state_equation import StateEquation
+from robot_dyn.simulation.stiffness import damped_oscillation
 
 _GAIN = 1.1  # in the time resolved, that a shorter step must bring
 _MORE_STEPS = 1.05  # of a companion with tighter tolerances, so that it tells something
@@ -66,6 +67,11 @@ def estimate(setup: Setup, equation: StateEquation, run: Record, companion: Comp
     if method.controls_error:
         made = _by_refinement(setup, method, run, estimated, companion)
     else:
+        if motion := damped_oscillation(setup, equation, run):
+            return no_estimate(
+                f"the energy ledger does not close: {motion}, which {method.name} damps in steps longer than"
+                f" {1 / abs(motion.eigenvalue):.0e} s, so that runs with other steps do not show it; take shorter ones"
+            )
         made = _by_steps(setup, method, estimated, companion, _turn(equation, run.walked))
         made = _until_brief(setup, run, made)
     return _advised(setup, _looked_between(setup, equation, run, made), why)

@@ -12,6 +12,8 @@ import numpy as np
 
 from robot_dyn.values import Value, read_only
 
+_OPEN = 1e-3  # a residual, as a part of the energy exchanged
+
 
 @final
 @dataclass(frozen=True, eq=False)
@@ -55,6 +57,11 @@ class Ledger(Value):
         """Energy exchanged: max K + Σ ∫ |P_k|, K over steps and samples, the integrals over the samples."""
         moved = sum(float(np.nansum(np.abs(np.diff(work)))) for work in self.work.values())
         return max(largest(self.kinetic), self.kinetic_peak) + moved
+
+    @property
+    def closes(self) -> bool:
+        """Whether at most a thousandth of the energy exchanged is unaccounted for."""
+        return not self.closure > _OPEN
 
     @property
     def closure(self) -> float:

@@ -8,6 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from robot_dyn.errors import RobotDynError
+from robot_dyn.simulation.ledger import Ledger
+from robot_dyn.simulation.record import Record
 from robot_dyn.simulation.state_equation import StateEquation
 
 
@@ -27,6 +29,13 @@ def columns(equation: StateEquation, t: np.ndarray, y: np.ndarray, made: np.ndar
         z = y[:, 2 * n : works]
         a = np.array([_acceleration(equation, *each) for each in zip(t, q, v, z, u, strict=True)]).reshape(q.shape)
     return q, v, a, u, y[:, works:], made[:, works:m], made[:, m + n :]
+
+
+def ledger(equation: StateEquation, record: Record) -> Ledger:
+    """The energy ledger at the samples of a run."""
+    m, works = equation.size, equation.size - len(equation.sources)
+    E, work = record.made[:, -2:], dict(zip(equation.sources, record.y[:, works:m].T, strict=True))
+    return Ledger(E[:, 0], E[:, 1], work, record.kinetic_peak, equation.stored(record.t, record.y))
 
 
 def _acceleration(

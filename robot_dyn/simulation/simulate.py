@@ -27,7 +27,6 @@ from robot_dyn.simulation.damped_task import damped
 from robot_dyn.simulation.error import ErrorEstimate, no_estimate
 from robot_dyn.simulation.estimate import estimate
 from robot_dyn.simulation.event_run import AccumulationError, TooLongError
-from robot_dyn.simulation.ledger import Ledger
 from robot_dyn.simulation.loads import at_stop, link_of, wrenches
 from robot_dyn.simulation.observed import observer_of, remarks
 from robot_dyn.simulation.observer import Observer
@@ -36,7 +35,7 @@ from robot_dyn.simulation.origin import edits_of_machine_code, origin
 from robot_dyn.simulation.prepared import prepared
 from robot_dyn.simulation.record import Record
 from robot_dyn.simulation.remarks import Remark
-from robot_dyn.simulation.samples import columns
+from robot_dyn.simulation.samples import columns, ledger
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import check_record
 from robot_dyn.simulation.state_equation import StateEquation
@@ -163,23 +162,16 @@ def _trajectory(
     setup, observer = ran.setup, ran.observer
     edits = {} if ran.machine is None else edits_of_machine_code(setup)
     t = record.t
-    q, v, a, u, W, P, E = columns(equation, t, record.y, record.made)
+    q, v, a, u, _, P, _ = columns(equation, t, record.y, record.made)
     desired, deviation = deviation_of(setup, t, q)
-    ledger = Ledger(
-        E[:, 0],
-        E[:, 1],
-        dict(zip(equation.sources, W.T, strict=True)),
-        record.kinetic_peak,
-        equation.stored(t, record.y),
-    )
     power = dict(zip(equation.sources, P.T, strict=True))
     plant = setup.plant
     names, about = plant.dynamics.joint_names, origin(plant.dynamics) | edits | setup.about
     if setup.controller is not None and setup.controller.task_frame is not None:
         about = {"frame": link_of(plant.dynamics, setup.controller.task_frame)} | about
     return Trajectory(
-        names, t, q, v, a, u, power, ledger, desired, deviation, record.outcome, statistics, error, about,
-        wrenches(plant, t, q), at_stop(plant, q),
+        names, t, q, v, a, u, power, ledger(equation, record), desired, deviation, record.outcome, statistics, error,
+        about, wrenches(plant, t, q), at_stop(plant, q),
         (
             *remarks(setup, observer, t, np.hstack([q, v, u]), power), *ran.said,
             *bounded_by_stability(setup, equation, record), *_of_control(setup, equation, record),

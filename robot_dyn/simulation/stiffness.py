@@ -19,6 +19,7 @@ from robot_dyn.integrate.adaptive import EXPLICIT, STIFF
 from robot_dyn.integrate.differences import by_state
 from robot_dyn.simulation.record import Record
 from robot_dyn.simulation.remarks import Kind, Remark
+from robot_dyn.simulation.samples import ledger
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.state_equation import CONTROL, StateEquation, numbered
 
@@ -125,6 +126,24 @@ def bounded_by_stability(setup: Setup, equation: StateEquation, record: Record) 
     return (_remark(motion, 0.0, float(t[-1]), float(t[k]), f"take integrator={STIFF!r}"),)
 
 
+def damped_oscillation(setup: Setup, equation: StateEquation, record: Record) -> Fastest | None:
+    """What a stiff method damps with steps of any length near its own: an oscillation of more than a radian a step.
+
+    None if the energy ledger closes, or nothing of the kind is found at some states of the run.
+    """
+    if not setup.integrator.stiff or ledger(equation, record).closes:
+        return None
+    t, y, held = record.walked.t, record.walked.y, np.zeros(equation.plant.dynamics.n) if equation.sampled else None
+    for k in np.unique(np.linspace(0, len(t) - 2, _LOOKS).astype(int)):
+        try:
+            motion = fastest(equation, float(t[k]), y[k], held, oscillation=True)
+        except (RobotDynError, np.linalg.LinAlgError):
+            continue
+        if abs(motion.eigenvalue) * setup.taken_step_s > 1:
+            return motion
+    return None
+
+
 def jacobian(equation: StateEquation, t: float, y: Array, held: Array | None) -> Array:
     """∂y'/∂y without the works, which do not act back, by differences.
 
@@ -143,7 +162,7 @@ def jacobian(equation: StateEquation, t: float, y: Array, held: Array | None) ->
     return np.moveaxis(by_state(f, t, y, equation.widths), 0, -1)[:size, :size]
 
 
-def fastest(equation: StateEquation, t: float, y: Array, held: Array | None) -> Fastest:
+def fastest(equation: StateEquation, t: float, y: Array, held: Array | None, *, oscillation: bool = False) -> Fastest:
     """The fastest motion near a state, by differences of the interpreted equation.
 
     Args:
@@ -151,14 +170,18 @@ def fastest(equation: StateEquation, t: float, y: Array, held: Array | None) -> 
         t: Time, in [s].
         y: State, (m,).
         held: The actuation in zero-order hold, or None.
+        oscillation: Whether to pass over what decays more than it oscillates.
 
     Raises:
         RobotDynError: If the equation has no answer near the state.
-        numpy.linalg.LinAlgError: If its eigenvalues are not found, or the fastest one is defective.
+        numpy.linalg.LinAlgError: If its eigenvalues are not found, the fastest one is defective, or nothing oscillates.
     """
     n, J = equation.plant.dynamics.n, jacobian(equation, t, y, held)
     values, right = np.linalg.eig(J)
-    k = int(np.argmax(np.abs(values)))
+    among = np.abs(values.imag) > np.abs(values.real) if oscillation else np.full(len(values), True)
+    if not among.any():
+        raise np.linalg.LinAlgError("nothing oscillates")
+    k = int(np.argmax(np.where(among, np.abs(values), -1.0)))
     x = right[:, k]
     others, left = np.linalg.eig(J.T)
     w = left[:, np.argmin(np.abs(others - values[k]))]
@@ -168,7 +191,8 @@ def fastest(equation: StateEquation, t: float, y: Array, held: Array | None) -> 
     joint = int(np.argmax(part[:n] + part[n : 2 * n]))
     with np.errstate(all="ignore"):  # w x = 0 where λ is defective: no part is the largest then
         parts = {name: w[n : 2 * n] @ (A @ x) / (w @ x) for name, A in _accelerations(equation, t, y, held).items()}
-        parts[BODIES] = values[k] - sum(parts.values())
+        kinematic = w[:n] @ (J[:n] @ x) / (w @ x)  # q' = v, half of every oscillation
+        parts[BODIES] = values[k] - kinematic - sum(parts.values())
         source = max(reversed(parts), key=lambda name: np.nan_to_num(abs(parts[name]), nan=0.0))
     return Fastest(complex(values[k]), equation.plant.dynamics.joint_names[joint], source)
 

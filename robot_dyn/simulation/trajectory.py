@@ -20,7 +20,7 @@ from robot_dyn.values import Value, read_only
 
 # Residuals, as parts of the energy exchanged. Over 150 random scenes they were at most 10 times the estimated error of
 # q, as a part of the motion; one that is far larger contradicts the estimate.
-_OPEN, _CONTRADICTS, _ROUNDING = 1e-3, 100.0, 1e-12
+_CONTRADICTS, _ROUNDING = 100.0, 1e-12
 _NOT_ESTIMATED = ("not estimated (estimate_error is False)", "not estimated (the run was stopped)")
 _TOLD = 3  # events in a summary
 _NOTICED = 0.01  # [s]: shorter times are not worth a word
@@ -196,7 +196,7 @@ class Trajectory(Value):
     @property
     def leak(self) -> str:
         """Why the energy ledger casts doubt on the run; empty if it does not."""
-        if self.ledger.closure > _OPEN:
+        if not self.ledger.closes:
             return "it does not close: take a smaller step"
         if self.error is None or not self.error.resolved_until > 0:
             return ""
