@@ -168,3 +168,27 @@ def test_the_command_prints_it_and_its_exit_code_tells(tmp_path: Path) -> None:
     assert made["limits"]["sdirk_3"] is None
     assert made["error"] < 1e-6
     assert made["fastest"]["source"] == "viscous_friction"
+
+
+@pytest.mark.parametrize("k", [1e5, 1e9])
+def test_a_stop_that_samples_miss_bounds_the_step(k: float) -> None:
+    """On a stop ω = √(k / I), for half a period only; RK4 is stable up to h ω = √8 there.
+
+    A step is long if it grows by 1e3 over the run of 0.5 s, which moves the limit by 1 % at k = 1e5.
+    """
+    bar = rd.load("pendulum").with_(gravity=(0.0, 0.0, 0.0))
+    plant = rd.Plant(bar, [rd.JointStopSpring(-9.0, 0.0, k)])
+    advice = rd.advise(plant, [-0.3], [1.5], duration_s=0.5, integrator="rk4", step_s=1e-3)
+    omega = np.sqrt(3 * k)
+    assert advice.limits["rk4"] == pytest.approx(np.sqrt(8) / omega, rel=0.02)
+    assert advice.fastest.source == "joint_stops"
+    assert advice.stable == (1e-3 < np.sqrt(8) / omega)
+
+
+def test_free_flight_bounds_no_step() -> None:
+    """J = [[0, 1], [0, 0]]: nothing acts back."""
+    bar = rd.load("pendulum").with_(gravity=(0.0, 0.0, 0.0))
+    advice = rd.advise(bar, [0.1], [1.0], duration_s=0.2, step_s=1e-2, integrator="rk4")
+    assert advice.stable
+    assert "nothing acts back on the motion" in str(advice.fastest)
+    assert all(limit == np.inf for limit in advice.limits.values())

@@ -15,6 +15,7 @@ from typing import Any, Unpack, final
 import numpy as np
 
 from robot_dyn.arithmetic import Array
+from robot_dyn.effects.joint_limit import JointStopSpring
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import QueryError, RobotDynError
 from robot_dyn.integrate.methods import FIXED_STEP, method
@@ -156,7 +157,19 @@ def _along(setup: Setup, loop: StateEquation) -> list[tuple[float, Array]]:
     known = np.hstack([run.q, run.v, *z, *run.effect_states.values()])
     y[:, : known.shape[1]] = known
     good = np.isfinite(y).all(axis=1)
-    return list(zip(run.t[good].tolist(), y[good], strict=True))
+    states = list(zip(run.t[good].tolist(), y[good], strict=True))
+    return [*states, *_pressed(setup.plant, run, states)]
+
+
+def _pressed(plant: Plant, run: Trajectory, states: list[tuple[float, Array]]) -> Iterator[tuple[float, Array]]:
+    """The states with joints as far beyond soft stops as they come, which is between the samples."""
+    least, most = (np.zeros(plant.dynamics.n),) * 2 if run.extremes is None else run.extremes[0]
+    for stop in plant.effects:
+        if isinstance(stop, JointStopSpring):
+            for far, beyond in ((least, least < stop.lower), (most, most > stop.upper)):
+                for i in np.flatnonzero(beyond):
+                    t, y = min(states, key=lambda each, i=i, far=far: abs(each[1][i] - far[i]))
+                    yield t, np.where(np.arange(len(y)) == i, far[i], y)
 
 
 def _own(equation: StateEquation, y: Array) -> Array:

@@ -53,6 +53,8 @@ class Fastest:
         return -self.eigenvalue.real > abs(self.eigenvalue.imag)
 
     def __str__(self) -> str:
+        if self.eigenvalue == 0:
+            return "nothing acts back on the motion"
         how = "decays" if self.decays else "changes"
         by = self.source if self.source == BODIES else repr(self.source)
         return f"the fastest motion {how} with {abs(self.eigenvalue):.1e} per second, of joint {self.joint!r}, by {by}"
@@ -185,6 +187,8 @@ def fastest(equation: StateEquation, t: float, y: Array, held: Array | None, *, 
     x = right[:, k]
     others, left = np.linalg.eig(J.T)
     w = left[:, np.argmin(np.abs(others - values[k]))]
+    if values[k] == 0:  # as of a joint in free flight, whose λ = 0 is defective
+        return Fastest(0j, equation.plant.dynamics.joint_names[int(np.argmax(np.abs(x[:n])))], BODIES)
     if w @ x == 0:
         raise np.linalg.LinAlgError(f"the eigenvalue {values[k]:.3g} is defective")
     part = np.abs(w * x)

@@ -153,19 +153,18 @@ def _stepped(made: Scene, count: int) -> rd.Trajectory:
     return rd.simulate(setup)
 
 
-SHORT = {
-    ("smooth", "planar_2r"): range(6),
-    ("smooth", "panda"): range(4),
-    ("set-valued", "planar_2r"): range(6),
-    ("set-valued", "panda"): range(1, 9, 2),  # of dry friction; with rigid stops in the long form
+SCENES = {  # of the short form, and how many in the long one: 20 and 1000 in all
+    ("smooth", "planar_2r"): (range(6), 400),
+    ("smooth", "panda"): (range(4), 200),
+    ("set-valued", "planar_2r"): (range(6), 300),
+    ("set-valued", "panda"): (range(1, 9, 2), 100),  # of dry friction; with rigid stops in the long form
 }
 
 
 def _cases() -> Iterator[Case]:
-    """20 scenes in the short form, 1000 in all."""
-    for (kind, name), few in SHORT.items():
+    for (kind, name), (few, all_of_them) in SCENES.items():
         rows = _smooth if kind == "smooth" else _set_valued
-        for block in (few, *(range(k, k + 50) for k in range(0, 250, 50))):
+        for block in (few, *(range(k, k + 50) for k in range(0, all_of_them, 50))):
             case = f"{name}, {kind}, scenes {block.start} to {block[-1]}"
             yield Case(case, partial(rows, name, block, case), block != few)
 
