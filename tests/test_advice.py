@@ -182,7 +182,7 @@ def test_a_stop_that_samples_miss_bounds_the_step(k: float) -> None:
     omega = np.sqrt(3 * k)
     assert advice.limits["rk4"] == pytest.approx(np.sqrt(8) / omega, rel=0.02)
     assert advice.fastest.source == "joint_stops"
-    assert advice.stable == (1e-3 < np.sqrt(8) / omega)
+    assert advice.stable == (omega * 1e-3 < np.sqrt(8))
 
 
 def test_free_flight_bounds_no_step() -> None:

@@ -219,7 +219,7 @@ def test_turns_that_no_step_can_see_have_no_estimate() -> None:
 
 @pytest.mark.parametrize("method", ["rosenbrock_5", "sdirk_3", "linearly_implicit_euler"])
 def test_an_oscillation_that_a_method_damps_has_no_estimate(method: str) -> None:
-    """q = q₀ cos ω t with ω h = 17: each step leaves next to nothing of it, at any length near h."""
+    """Of q = q₀ cos ω t with ω h = 17 each step leaves next to nothing of it, at any length near h."""
     bar = rd.load("pendulum").with_(gravity=(0.0, 0.0, 0.0))
     options = {"duration_s": 0.02, "integrator": method, "engine": "interpreted"}
     run = rd.simulate(rd.Plant(bar, [rd.Spring(1e8)]), [1e-2], step_s=1e-3, **options)
