@@ -80,6 +80,18 @@ def test_works_close_the_ledger_where_the_mass_is_constant() -> None:
     assert ledger.work["dry_friction"][-1] == pytest.approx(2 * ledger.work["dry_friction 2"][-1], rel=1e-13)
 
 
+def test_no_stop_adds_energy_whatever_the_restitutions() -> None:
+    """Works r (v + v⁺)/2 ≤ 0 of each joint, where one leaves its stop as another one strikes, but for 10 roundings."""
+    rng = np.random.default_rng(9)
+    q, v = rng.uniform(-0.3, 0.3, (64, 2)), 5 * rng.normal(size=(64, 2))
+    setup = rd.Setup(
+        rd.Plant(ARM, [rd.RigidStops(-0.35, 0.35, [0.25, 0.9])]), q[0], duration_s=2.0, step_s=4e-3, **FIXED
+    )
+    work = rd.rollouts(setup, q, v, record=("work",)).work["rigid_stops"]
+    assert np.diff(work).max() <= 10 * np.finfo(float).eps * np.abs(work).max()
+    assert (work[:, -1] < -1).all()
+
+
 def test_of_two_stops_the_nearer_one_works() -> None:
     plant = rd.Plant(RAIL.with_(gravity=(0, 0, 0)), [rd.RigidStops(-1, 0.8), rd.RigidStops(-1, 0.5)])
     run = rd.simulate(plant, [0.0], [1.0], duration_s=0.7, step_s=1e-3, **FIXED)

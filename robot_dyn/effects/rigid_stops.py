@@ -64,9 +64,10 @@ class RigidStops(SetValued):
         return Interval(np.where(side > 0, -inf, 0.0), np.where(side < 0, inf, 0.0))
 
     def bounds(self, q: Array, v: Array) -> tuple[Array, Array]:
+        # Newton's law where a joint approaches; one that leaves is turned round at most, so that r (v + v⁺) / 2 is 0
         back = -self.restitution * v
-        lower = np.where(q <= self.lower + 0 * q, np.maximum(back, 0 * v), 0 * v - inf)
-        return lower, np.where(q >= self.upper + 0 * q, np.minimum(back, 0 * v), 0 * v + inf)
+        lower = np.where(q <= self.lower + 0 * q, np.minimum(back, -v), 0 * v - inf)
+        return lower, np.where(q >= self.upper + 0 * q, np.maximum(back, -v), 0 * v + inf)
 
     def touched(self, q: np.ndarray) -> np.ndarray:
         """−1 for each joint at its lower stop, to rounding, or beyond it, 1 at the upper one, 0 elsewhere, (n,)."""
