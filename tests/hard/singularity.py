@@ -77,7 +77,7 @@ PATHS = {
     "panda's pose towards its elbow": PANDA,
     "panda's pose 0.2 m beyond": replace(PANDA, beyond=0.2),
 }
-SHORT = {"planar_2r to the edge of its reach", "ur5's elbow 0.1 m beyond", "ur5's pose through its wrist"}
+SHORT = {"ur5's elbow 0.1 m beyond", "ur5's pose through its wrist"}
 
 
 def arm(name: str) -> rd.Robot:
