@@ -220,3 +220,22 @@ def test_articulated_bodies_answer_a_batch_with_joints_that_slide() -> None:
     own = rd.Lagrangian(rd.load("cart_pole"))
     q, v, tau = np.random.default_rng(4).normal(size=(3, 5, 2))
     np.testing.assert_allclose(articulated_body(own.linkage, q, v, tau), own.forward_dynamics(q, v, tau), rtol=1e-12)
+
+
+def test_a_road_whose_numbers_overflow_everywhere_is_left_out_by_name() -> None:
+    """A joint that turns its follower 1e9 times as fast: C of it is beyond float32."""
+    pendulum = """<link name="{0}"><inertial><origin xyz="0 0 0.1"/><mass value="1"/>
+    <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>"""
+    joint = """<joint name="{0}" type="revolute"><parent link="{1}"/><child link="{2}"/><axis xyz="0 1 0"/>
+    <limit lower="-1" upper="1" effort="1" velocity="1"/>{3}</joint>"""
+    text = (
+        '<robot name="gear"><link name="base"/>' + pendulum.format("a") + pendulum.format("b")
+        + joint.format("lead", "base", "a", "")
+        + joint.format("follow", "a", "b", '<mimic joint="lead" multiplier="1e9"/>') + "</robot>"
+    )  # fmt: skip
+    with pytest.warns(rd.ModelWarning, match="1e\\+09 times"):
+        robot = rd.Robot.from_text(text)
+    made = rd.certify(robot, samples=100, repeats=1)
+    assert any(
+        each.endswith("by Lagrangian, float32: no random state has a finite answer") for each in made.left_out
+    ), made.left_out

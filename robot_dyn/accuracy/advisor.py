@@ -6,7 +6,7 @@ times; a motion that leaves them behind may be stable with longer steps, or unst
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import inf, isfinite
@@ -32,6 +32,8 @@ from robot_dyn.simulation.trajectory import Ending, Trajectory
 _LOOKS = 9  # states along the pilot run
 _FAST = 3  # of them, where motion is fastest: limits are looked for there
 _MOST_STEPS = 200_000  # of a run that is made for its error estimate
+
+State = tuple[float, Array]  # t and y
 
 
 @final
@@ -121,6 +123,18 @@ def advise(what: Setup | Plant | Dynamics, q0: Any = None, v0: Any = None, **opt
         QueryError: If the setup is not allowed, or its motion cannot be linearised at any state of the pilot run.
     """
     setup = setup_of("advise", what, {**starts(q0, v0), **options})
+    made = advice_about(setup, _along)
+    makes = made.stable and (setup.integrator.controls_error or setup.steps <= _MOST_STEPS)
+    return replace(made, run=simulate(replace(setup, estimate_error=True))) if makes else made
+
+
+def advice_about(setup: Setup, states_of: Callable[[Setup, StateEquation], list[State]]) -> Advice:
+    """The same without a run.
+
+    Args:
+        setup: As of `simulate`.
+        states_of: Gives times and states y of the setup, by its state equation with control at all times.
+    """
     plant, controller, duration = setup.plant, setup.controller, setup.duration_s
     if plant.equation_of_motion.payloads:
         raise QueryError("advise: carried_payload changes the bodies in the run; ask of plant.at(t), t in [s]")
@@ -128,23 +142,25 @@ def advise(what: Setup | Plant | Dynamics, q0: Any = None, v0: Any = None, **opt
         raise QueryError(f"advise: {coupled[0]} frees and couples motors by turns, and no one linearisation holds")
     period = 0.0 if controller is None else controller.period_s
     loop = StateEquation(plant, None if controller is None else controller.at_period(0.0)).in_a_mode
-    states = _along(setup, loop)
-    motion, at, states = _fastest(loop, states)
+    motion, at, states = _fastest(loop, states_of(setup, loop))
     matrices = [_between_ticks(plant, loop, t, y) if period else jacobian(loop, t, y, None) for t, y in states]
     limits = {
         name: min(longest_step(method(name), J, plant.dynamics.n, duration) for J in matrices) for name in FIXED_STEP
     }
     periods = [longest_period(plant, setup.controller, t, _own(loop, y), duration) for t, y in states if period]
     chooses = setup.integrator.controls_error
-    made = Advice(
+    return Advice(
         setup.integrator.name, 0.0 if chooses else setup.taken_step_s, motion, at, limits, period,
         min(periods, default=inf),
     )  # fmt: skip
-    makes = made.stable and (chooses or setup.steps <= _MOST_STEPS)
-    return replace(made, run=simulate(replace(setup, estimate_error=True))) if makes else made
 
 
-def _along(setup: Setup, loop: StateEquation) -> list[tuple[float, Array]]:
+def at_rest(setup: Setup, loop: StateEquation) -> list[State]:
+    """The start alone: enough where it is an equilibrium."""
+    return [(0.0, loop.start(setup.q0, setup.v0))]
+
+
+def _along(setup: Setup, loop: StateEquation) -> list[State]:
     """Times and states y along a run with control at all times."""
     run = simulate(
         Setup(
@@ -184,9 +200,7 @@ def _between_ticks(plant: Plant, loop: StateEquation, t: float, y: Array) -> Arr
     return jacobian(free, t, bodies, np.zeros(n))
 
 
-def _fastest(
-    equation: StateEquation, states: list[tuple[float, Array]]
-) -> tuple[Fastest, float, list[tuple[float, Array]]]:
+def _fastest(equation: StateEquation, states: list[State]) -> tuple[Fastest, float, list[State]]:
     """The fastest motion at some states, when, and the states where motion is fastest."""
     found: list[tuple[Fastest, float, Array]] = []
     for t, y in states:

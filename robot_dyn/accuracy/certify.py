@@ -81,7 +81,7 @@ def certify(
     try:
         for k, quantity in enumerate(asked_for):
             held += _quantity(
-                counting, quantity, [road for road in found if quantity in road.quantities], repeats,
+                counting, quantity, [road for road in found if quantity in road.quantities], repeats, left_out,
                 lambda part, what, k=k: tell((k + part) / len(asked_for), what),
             )  # fmt: skip
     except KeyboardInterrupt:
@@ -109,17 +109,23 @@ def _given(robot: Robot, q: Any, v: Any, a: Any, tau: Any) -> dict[str, np.ndarr
 
 
 def _quantity(
-    counting: Counting, quantity: Quantity, found: list[Road], repeats: int, tell: Callable[[float, str], object]
-) -> list[Held]:
-    """The digits and times of one quantity by each road, and by balls."""
+    counting: Counting, quantity: Quantity, found: list[Road], repeats: int, left_out: list[str],
+    tell: Callable[[float, str], object],
+) -> list[Held]:  # fmt: skip
+    """The digits and times of one quantity by each road, and by balls; `left_out` takes those without an answer."""
     counted = {}
     for k, road in enumerate(found):
         tell(k / len(found), f"{quantity.name}: {road.name}")
-        counted[road.name] = counting.count(road, quantity)
+        try:
+            counted[road.name] = counting.count(road, quantity)
+        except QueryError as error:
+            left_out.append(str(error))
     state = counting.given or row(counting.states, 0)
     balls = Lagrangian(counting.robot, Ball(counting.truth(counting.robot, quantity, state).bits))
     proven = Road(f"balls, {balls.dtype.bits} bits", counting.robot, balls, (quantity,))
-    calls = {road.name: road.call(quantity, state) for road in (*found, proven)}
+    calls = {
+        road.name: road.call(quantity, state) for road in (*found, proven) if road.name in counted or road is proven
+    }
     tell(1.0, f"{quantity.name}: times")
     times = in_turns(calls, repeats, _AT_LEAST_S)
     held = [

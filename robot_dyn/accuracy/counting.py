@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import final
 
@@ -11,6 +12,7 @@ from robot_dyn.accuracy.digits import digits_of
 from robot_dyn.accuracy.exact import NOTHING, Exact, Scale, Truth, entry_units, in_joint_units
 from robot_dyn.accuracy.road import Road, asked
 from robot_dyn.accuracy.worst_state import Batch, Search, row
+from robot_dyn.errors import QueryError
 from robot_dyn.lagrange.manipulator import Lagrangian
 from robot_dyn.lagrange.scale import diagonal_scale, floored, solved_norm
 from robot_dyn.model.quantity import CORIOLIS_TORQUE, M, N, Quantity
@@ -54,16 +56,33 @@ class Counting:
         self._sizes: dict[Quantity, float] = {}
         self._fine: dict[tuple[Robot, Quantity], np.ndarray] = {}
 
-    def count(self, road: Road, quantity: Quantity) -> Found:
-        """The digits of one road."""
+    def count(self, road: Road, quantity: Quantity, check: Callable[[], object] = lambda: None) -> Found:
+        """The digits of one road.
+
+        Args:
+            road: The road.
+            quantity: Of which they are counted.
+            check: Called before each batch of states; what it raises ends the counting.
+
+        Raises:
+            QueryError: If the road has no finite answer.
+        """
+
+        def errors(states: Batch) -> np.ndarray:
+            check()
+            return self._errors(road, quantity, states)
+
         states = self.states
         search = Search(states, self._rng)
         if road.fine is None:
             states = {name: x[: max(len(x) // FEWER, 8)] for name, x in states.items()}
             search = Search(states, self._rng, parents=4, children=4, generations=3)
-        known = self._errors(road, quantity, states)
+        known = errors(states)
+        if np.isnan(known).all():
+            raise QueryError(f"{quantity.name} by {road.name}: no random state has a finite answer")
         at = row(states, int(np.nanargmax(known)))
-        worst, _ = search.worst(lambda young: self._errors(road, quantity, young), known, quantity.arguments)
+        worst, _ = search.worst(errors, known, quantity.arguments)
+        check()
         judged = [(self.judged(road, quantity, state), state) for state in (at, row(worst, 0))]
         searched, state = max(judged, key=lambda each: each[0])
         given = None if self.given is None else digits_of(self.judged(road, quantity, self.given))

@@ -26,8 +26,8 @@ def stress(
     runs: Annotated[int, typer.Option(help="Number of random runs.")] = 7,
     seed: Annotated[int, typer.Option(help="Of the random states and runs.")] = 0,
     budget: Annotated[
-        float, typer.Option(metavar="SECONDS", help="Time to spend; what is left then is left out.")
-    ] = 100.0,
+        float, typer.Option(metavar="SECONDS", help="Time to spend; what is not looked at by then is named.")
+    ] = 90.0,
     force: Force = False,
     lock: Lock = None,
     package_dir: PackageDir = None,
@@ -77,6 +77,7 @@ def document(made: rd.Stress) -> dict[str, Any]:
         "limits": [plain(each) for each in made.limits],
         "runs": [plain(each) for each in made.runs],
         "left_out": list(made.left_out),
+        "out_of_time": list(made.out_of_time),
         "environment": made.environment,
         "samples": made.samples,
         "seed": made.seed,
@@ -106,5 +107,6 @@ def _tables(made: rd.Stress) -> Iterator[Any]:
                 table.add_row(*cells(each))
             yield table
     yield ""
+    yield from (f"not looked at for lack of time: {each}" for each in made.out_of_time)
     yield from (f"left out: {each}" for each in made.left_out)
     yield "lines that repeat each finding: --out PAGE.html, or --json"

@@ -63,7 +63,8 @@ def simulate(
         what: What to run.
         q0: Position at the start, (n,), in [rad] or [m] by joint; required unless `what` is a setup.
         v0: Velocity at the start, (n,), in [rad/s] or [m/s]; 0, or that of the setup, unless given.
-        on_progress: Called with the time reached, in [s], at each step; in machine code some ten times a second.
+        on_progress: Called with the time reached, in [s], at each step, and with that of the end at the steps of
+            companion runs; in machine code some ten times a second. What it raises ends the call.
         **options: The other attributes of a `Setup`, with its defaults: duration_s, controller, integrator, step_s,
             record_period_s, estimate_error, about, engine, events and accuracy.
 
@@ -83,10 +84,11 @@ def simulate(
     ran = _by_choice(setup, equation, on_progress)
     setup, record, finished = ran.setup, ran.record, perf_counter()
     error, spent = None, 0
+    at_the_end = None if on_progress is None else lambda _: on_progress(record.outcome.t)
 
     def companion(pace: Any, of: Setup) -> Record:
         nonlocal spent
-        made = prepared(of, equation, ran.machine, pace, samples=False).record()
+        made = prepared(of, equation, ran.machine, pace, at_the_end, samples=False).record()
         if made.outcome.ending is Ending.STOPPED:
             raise KeyboardInterrupt
         spent += made.evaluations

@@ -18,7 +18,8 @@ from robot_dyn.errors import RobotDynError
 from robot_dyn.integrate.integrator import System
 
 _GROWTH = 1e3  # over the run, beyond that of the motion itself: a run that grows by more has blown up
-_RANGE = (1e-4, 1e3)  # h |λ| where limits are looked for
+_RANGE = (1e-4, 1e3)  # h |λ| where limits are looked for, of the fastest and of the slowest motion
+_STILL = 1e-9  # of the fastest |λ|: differences do not tell less from zero
 _LEAST_STEPS = 20  # of a run: longer steps are not judged
 _SCAN = 5  # lengths in each factor of ten
 _SHARP = 1e-3  # of a limit
@@ -35,13 +36,18 @@ def longest_step(method: Any, J: Array, n: int, duration_s: float) -> float:
         n: Number of positions, the first entries of x.
         duration_s: Of the run.
     """
+    return longest(step_map(method, J, n), J, duration_s)
+
+
+def step_map(method: Any, J: Array, n: int) -> Callable[[float], Array]:
+    """Φ(h) of a method of fixed step on δx' = J δx, as of `longest_step`."""
     by_entry = np.concatenate([J.T, np.zeros((1, len(J)))])
 
     def exact(t: Any, y: Array) -> Array:
         return np.broadcast_to(by_entry.reshape(-1, *(1,) * (y.ndim - 1), len(J)), (len(J) + 1, *y.shape)).copy()
 
     system = System(lambda t, y: y @ J.T, n, exact=exact)
-    return longest(lambda h: np.asarray(method.step(system, 0.0, np.eye(len(J)), h)).T, J, duration_s)
+    return lambda h: np.asarray(method.step(system, 0.0, np.eye(len(J)), h)).T
 
 
 def blows_up(made: Array, J: Array, h: float, duration_s: float, steps: int = 1) -> bool:
@@ -63,7 +69,8 @@ def longest(matrix: Callable[[float], Array], J: Array, duration_s: float, steps
     It is inf if each is, and 0 if none is. It is looked for from short to long, so that what is stable again beyond
     does not count.
     """
-    size = float(np.abs(np.linalg.eigvals(J)).max())
+    rates = np.abs(np.linalg.eigvals(J))
+    size = float(rates.max())
 
     def stable(h: float) -> bool:
         try:
@@ -73,7 +80,8 @@ def longest(matrix: Callable[[float], Array], J: Array, duration_s: float, steps
 
     if not size > 0:
         return inf
-    low, high = _RANGE[0] / size, min(_RANGE[1] / size, duration_s / _LEAST_STEPS)
+    slowest = float(rates[rates > _STILL * size].min())  # it may be what a long period makes unstable
+    low, high = _RANGE[0] / size, min(_RANGE[1] / slowest, duration_s / _LEAST_STEPS)
     if low >= high:
         return inf
     before, after = 0.0, inf

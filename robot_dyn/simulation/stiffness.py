@@ -176,7 +176,7 @@ def fastest(equation: StateEquation, t: float, y: Array, held: Array | None, *, 
 
     Raises:
         RobotDynError: If the equation has no answer near the state.
-        numpy.linalg.LinAlgError: If its eigenvalues are not found, the fastest one is defective, or nothing oscillates.
+        numpy.linalg.LinAlgError: If its eigenvalues are not found, or nothing oscillates.
     """
     n, J = equation.plant.dynamics.n, jacobian(equation, t, y, held)
     values, right = np.linalg.eig(J)
@@ -187,16 +187,14 @@ def fastest(equation: StateEquation, t: float, y: Array, held: Array | None, *, 
     x = right[:, k]
     others, left = np.linalg.eig(J.T)
     w = left[:, np.argmin(np.abs(others - values[k]))]
-    if values[k] == 0:  # as of a joint in free flight, whose λ = 0 is defective
+    if values[k] == 0:  # as of a joint in free flight
         return Fastest(0j, equation.plant.dynamics.joint_names[int(np.argmax(np.abs(x[:n])))], BODIES)
-    if w @ x == 0:
-        raise np.linalg.LinAlgError(f"the eigenvalue {values[k]:.3g} is defective")
     part = np.abs(w * x)
     joint = int(np.argmax(part[:n] + part[n : 2 * n]))
-    with np.errstate(all="ignore"):  # w x = 0 where λ is defective: no part is the largest then
-        parts = {name: w[n : 2 * n] @ (A @ x) / (w @ x) for name, A in _accelerations(equation, t, y, held).items()}
-        kinematic = w[:n] @ (J[:n] @ x) / (w @ x)  # q' = v, half of every oscillation
-        parts[BODIES] = values[k] - kinematic - sum(parts.values())
+    with np.errstate(all="ignore"):  # times wᴴ x, which is 0 where λ is defective, as of critical damping
+        parts = {name: w[n : 2 * n] @ (A @ x) for name, A in _accelerations(equation, t, y, held).items()}
+        kinematic = w[:n] @ (J[:n] @ x)  # q' = v, half of every oscillation
+        parts[BODIES] = values[k] * (w @ x) - kinematic - sum(parts.values())
         source = max(reversed(parts), key=lambda name: np.nan_to_num(abs(parts[name]), nan=0.0))
     return Fastest(complex(values[k]), equation.plant.dynamics.joint_names[joint], source)
 

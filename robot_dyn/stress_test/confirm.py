@@ -6,10 +6,11 @@ growth = max ‖√M_ii δq_i‖ in the second half of the run / ‖√M_ii δq_
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, final
+from typing import final
 
 import numpy as np
 
+from robot_dyn.accuracy.deadline import Deadline
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.simulate import simulate
 from robot_dyn.simulation.trajectory import Ending, Trajectory
@@ -18,22 +19,27 @@ WITHIN, BEYOND = 0.98, 1.02  # of a limit
 MOST = 1e3  # by which a push may grow within a limit, as the advisor counts it
 LEFT = 10.0  # a run whose push grows by more, of itself and of what it does within the limit, has left
 PUSH = 1e-6  # of the start, in [rad] or [m] of the joint of median inertia
+RATE = 1e3  # [1/s]: that times as much in [rad/s] or [m/s] at most, as motions that are faster move less
 LEAST = 0.3  # of the true error: an estimate below misleads
 
 
-def pushed(setup: Setup, seed: int) -> Setup:
-    """The setup with its start moved off the equilibrium: along the fastest motion, and a little along all.
+def pushed(setup: Setup, matrix: np.ndarray, seed: int) -> Setup:
+    """The setup with its start moved off the equilibrium: along what grows fastest, and a little along all positions.
 
-    That is the mode of M⁻¹ diag(k_d) of the PD with the largest rate; sizes are in the units 1/√M_ii of the joints.
+    Args:
+        setup: At an equilibrium.
+        matrix: Of (q, v, ...) from a step or tick to the next: its largest eigenvalue is of what grows fastest.
+        seed: Of the other positions.
     """
-    controller: Any = setup.controller
-    M = setup.plant.dynamics.M(setup.q0)
-    units = np.sqrt(np.diagonal(M))
-    rates, modes = np.linalg.eig(np.linalg.solve(M, np.diag(controller.kd)))
-    fast = np.real(modes[:, np.argmax(np.real(rates))]) * units
-    others = np.random.default_rng(seed).normal(size=len(units))
-    push = fast / np.linalg.norm(fast) + 0.1 * others / np.linalg.norm(others)
-    return replace(setup, q0=setup.q0 + push * PUSH * np.median(units) / units)
+    n = len(setup.q0)
+    units = np.sqrt(np.diagonal(setup.plant.dynamics.M(setup.q0)))
+    values, modes = np.linalg.eig(matrix)
+    mode = np.real(modes[:, np.argmax(np.abs(values))])
+    q, v = mode[:n] * units, mode[n : 2 * n] * units
+    size = PUSH * np.median(units) / max(np.linalg.norm(q), np.linalg.norm(v) / RATE)
+    others = np.random.default_rng(seed).normal(size=n)
+    q = size * (q + 0.1 * np.linalg.norm(q) * others / np.linalg.norm(others))
+    return replace(setup, q0=setup.q0 + q / units, v0=setup.v0 + size * v / units)
 
 
 @final
@@ -61,15 +67,19 @@ class Told:
         return self.growth > LEFT * max(within.growth, 1.0)
 
 
-def told(setup: Setup, at: np.ndarray, numerical: bool = False) -> Told:
+def told(setup: Setup, at: np.ndarray, deadline: Deadline, numerical: bool = False) -> Told:
     """Run a setup and look how far it goes from an equilibrium.
 
     Args:
         setup: From near the equilibrium.
         at: The equilibrium, (n,).
+        deadline: Of the run.
         numerical: Whether only errors of the method can make it go, so that its error estimate is looked at.
+
+    Raises:
+        OvertimeError: If the deadline passes.
     """
-    run = simulate(replace(setup, estimate_error=numerical))
+    run = simulate(replace(setup, estimate_error=numerical), on_progress=deadline.check)
     units = np.sqrt(np.diagonal(setup.plant.dynamics.M(at)))
     off = np.linalg.norm((run.q - at) * units, axis=1)
     late = off[run.t >= run.t[-1] / 2]

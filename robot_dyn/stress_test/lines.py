@@ -54,7 +54,9 @@ class Loading:
         words += [word for joint, value in edits.lock for word in ("--lock", f"{joint}={value!r}")]
         changes = _changes(edits)
         others = ".with_(" + ", ".join(changes) + ")" if changes else ""
-        python = f"{_HEAD}robot = rd.load({', '.join(arguments)}){others}\n"
+        elsewhere = Path(name).name == name and name not in list_robots() and not Path(name).is_file()
+        place = f"# to be run in the folder of {name}\n" * elsewhere
+        python = f"{_HEAD}{place}robot = rd.load({', '.join(arguments)}){others}\n"
         return Loading(python, "" if len(changes) > bool(edits.lock) else shlex.join(words))
 
 

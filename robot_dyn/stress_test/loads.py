@@ -8,10 +8,9 @@ Both are searched for over all configurations, and judged at 0.98 and 1.02 by th
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
+from robot_dyn.accuracy.deadline import Deadline
 from robot_dyn.accuracy.road import asked
 from robot_dyn.accuracy.worst_state import Batch
 from robot_dyn.control.computed_torque import PDGravity
@@ -28,7 +27,8 @@ from robot_dyn.simulation.simulate import simulate
 from robot_dyn.stress_test.confirm import BEYOND, WITHIN
 from robot_dyn.stress_test.finding import Limit
 from robot_dyn.stress_test.lines import assigned, expression
-from robot_dyn.stress_test.worst import worst
+from robot_dyn.stress_test.work import Work
+from robot_dyn.stress_test.worst import Gains, State, worst
 
 _LOOKS = 50  # states at which the tip is looked for
 _HOLD_S = 0.05  # of a run that holds a payload
@@ -40,9 +40,11 @@ def efforts(robot: Robot) -> np.ndarray:
     return np.where(robot.effort_limit > 0, robot.effort_limit, np.inf)
 
 
-def speed_limit(robot: Robot, states: Batch, rng: np.random.Generator, tell: Callable[[str], object]) -> Limit:
-    """The least multiple of the velocity limits at which Coriolis torque alone passes an effort limit."""
-    tell("speed")
+def speed_limit(robot: Robot, states: Batch, rng: np.random.Generator, work: Work) -> Limit | None:
+    """The least multiple of the velocity limits at which Coriolis torque alone passes an effort limit.
+
+    None for lack of time.
+    """
     effort, most = efforts(robot), robot.velocity_limit
     most = np.where((most > 0) & np.isfinite(most), most, _SPEED)
     what = "Coriolis torque passes an effort limit, at a multiple of the velocity limits"
@@ -57,11 +59,19 @@ def speed_limit(robot: Robot, states: Batch, rng: np.random.Generator, tell: Cal
         at = {"q": batch["q"], "v": direction(batch["v"])}
         return (np.abs(asked(robot, CORIOLIS_TORQUE, at)) / effort).max(axis=1)
 
-    sizes, state = worst(states, rng, ("q", "v"), measure)
+    found = worst(states, rng, ("q", "v"), measure, work, "speed")
+    if found is None:
+        return None
+    (sizes, state), none = found, "it has no torque on any joint with a limit"
     if not sizes["minimal"] > 1e-12:
-        return Limit("speed", what, "", np.inf, "times", "it has no torque on any joint with a limit", "", None, "")
+        return Limit("speed", what, "", np.inf, "times", none, "", None, "")
     q, v, limit = state["q"], direction(state["v"]), float(sizes["minimal"]) ** -0.5
-    own = Lagrangian(robot)
+    return work.do("speed, judged", lambda _: _judged_speed(robot, q, v, limit, what))
+
+
+def _judged_speed(robot: Robot, q: np.ndarray, v: np.ndarray, limit: float, what: str) -> Limit:
+    """The torques at both sides of the limit by the own road."""
+    own, effort = Lagrangian(robot), efforts(robot)
     joint = int(np.argmax(np.abs(robot.coriolis_torque(q, v)) / effort))
     parts = [float((np.abs(own.coriolis_torque(q, part * limit * v)) / effort).max()) for part in (WITHIN, BEYOND)]
     python = (
@@ -75,21 +85,21 @@ def speed_limit(robot: Robot, states: Batch, rng: np.random.Generator, tell: Cal
 
 
 def payload_limit(
-    robot: Robot, states: Batch, rng: np.random.Generator, gains: tuple[np.ndarray, np.ndarray] | None,
-    tell: Callable[[str], object],
-) -> Limit:  # fmt: skip
-    """The least mass at the tip at which gravity torque passes an effort limit.
+    robot: Robot, states: Batch, rng: np.random.Generator, gains: Gains | None, work: Work
+) -> Limit | None:
+    """The least mass at the tip at which gravity torque passes an effort limit; None for lack of time.
 
     Args:
         robot: The robot.
         states: Random ones.
         rng: Of the search.
         gains: Of the PD that holds it; None where M is singular, so that nothing can be run.
-        tell: Called with what is being done.
+        work: Does it.
     """
-    tell("payload")
     effort = efforts(robot)
-    frame = _tip(robot, states)
+    frame = work.do("tip, where a payload is heaviest", lambda _: _tip(robot, states), ("payload",))
+    if frame is None:
+        return None
     what, loaded = f"gravity torque of a payload at {frame}", robot.with_(payload=Payload(frame, 1.0))
 
     def inverse_masses(batch: Batch) -> np.ndarray:
@@ -100,7 +110,10 @@ def payload_limit(
         made = np.abs(per_kg) / np.where(spare > 0, spare, 1e-300)
         return np.where(np.isfinite(effort), made, 0.0)
 
-    sizes, state = worst(states, rng, ("q",), lambda batch: inverse_masses(batch).max(axis=1))
+    found = worst(states, rng, ("q",), lambda batch: inverse_masses(batch).max(axis=1), work, "payload")
+    if found is None:
+        return None
+    sizes, state = found
     q, largest = state["q"], float(sizes["minimal"])
     if not largest > 1e-12:
         return Limit("payload", what, "", np.inf, "kg", "it has no torque on any joint with a limit", "", None, "")
@@ -109,10 +122,21 @@ def payload_limit(
         return Limit(
             "payload", what, joint, 0.0, "kg", "gravity alone passes its effort limit", "", None, assigned(state)
         )
-    said = [_held(robot, q, Payload(frame, part / largest), effort, gains) for part in (WITHIN, BEYOND)]
+    return work.do(
+        "payload, judged", lambda until: _judged_payload(robot, state, Payload(frame, 1 / largest), joint, gains, until)
+    )
+
+
+def _judged_payload(
+    robot: Robot, state: State, payload: Payload, joint: str, gains: Gains | None, deadline: Deadline
+) -> Limit:
+    """Whether the arm holds the payload on both sides of the limit."""
+    q, frame, most, effort = state["q"], payload.frame, payload.mass, efforts(robot)
+    masses = [part * most for part in (WITHIN, BEYOND)]
+    said = [_held(robot, q, Payload(frame, mass), effort, gains, deadline) for mass in masses]
     confirmed = said[0][0] and not said[1][0]
     python = (
-        f"{assigned(state)}for mass in ({WITHIN / largest!r}, {BEYOND / largest!r}):\n"
+        f"{assigned(state)}for mass in {expression(masses)}:\n"
         f"    loaded = robot.with_(payload=rd.Payload({frame!r}, mass))\n"
         "    print(mass, max(abs(rd.Lagrangian(loaded).N(q)) / robot.effort_limit))\n"
     )
@@ -123,25 +147,24 @@ def payload_limit(
             f"    run = rd.simulate(plant, q, controller=law, duration_s={_HOLD_S})\n"
             "    print([str(each.kind) for each in run.remarks], abs(run.q[-1] - q).max())\n"
         )
-    return Limit("payload", what, joint, 1 / largest, "kg", said[0][1], said[1][1], confirmed, python)
+    what = f"gravity torque of a payload at {frame}"
+    return Limit("payload", what, joint, most, "kg", said[0][1], said[1][1], confirmed, python)
 
 
 def _tip(robot: Robot, states: Batch) -> str:
-    """The frame at which a mass has the largest gravity torques."""
-    few = {name: x[:_LOOKS] for name, x in states.items()}
-    own, effort = asked(robot, N, few), efforts(robot)
+    """The frame at which a mass has the largest gravity torques, −Jᵀ g of 1 kg."""
+    q, effort = states["q"][:_LOOKS], efforts(robot)
     effort = np.where(np.isfinite(effort), effort, np.nanmin(effort[np.isfinite(effort)], initial=1.0))
 
     def torque(frame: str) -> float:
-        return float(
-            (np.abs(asked(robot.with_(payload=Payload(frame, 1.0)), N, few) - own) / effort).max(axis=1).mean()
-        )
+        per_kg = np.abs(np.einsum("skj,k->sj", robot.jacobian(q, frame, errors="nan")[:, :3], robot.gravity))
+        return float((per_kg / effort).max(axis=1).mean())
 
     return max(robot.frame_names, key=torque)
 
 
 def _held(
-    robot: Robot, q: np.ndarray, payload: Payload, effort: np.ndarray, gains: tuple[np.ndarray, np.ndarray] | None
+    robot: Robot, q: np.ndarray, payload: Payload, effort: np.ndarray, gains: Gains | None, deadline: Deadline
 ) -> tuple[bool, str]:
     """Whether the arm can hold a payload, by the own road and by a run; and in words."""
     loaded = robot.with_(payload=payload)
@@ -153,7 +176,7 @@ def _held(
     try:
         run = simulate(
             plant, q, controller=PDGravity(loaded, hold(q), *gains), duration_s=_HOLD_S, estimate_error=False,
-            engine="interpreted",
+            engine="interpreted", on_progress=deadline.check,
         )  # fmt: skip
     except RobotDynError as error:
         return part < 1, f"{said}; not run: {error}"

@@ -5,12 +5,13 @@ lost = −log₁₀(2⁻⁵³) − digits
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from math import log10
 
 import numpy as np
 
-from robot_dyn.accuracy.counting import Counting
+from robot_dyn.accuracy.counting import Counting, Found
+from robot_dyn.accuracy.deadline import Deadline
 from robot_dyn.accuracy.digits import digits_of
 from robot_dyn.accuracy.road import Road, roads
 from robot_dyn.accuracy.worst_state import Batch
@@ -18,6 +19,7 @@ from robot_dyn.model.quantity import FORWARD_DYNAMICS, INVERSE_DYNAMICS, Quantit
 from robot_dyn.model.robot import Robot
 from robot_dyn.stress_test.finding import Worst
 from robot_dyn.stress_test.lines import assigned
+from robot_dyn.stress_test.work import Work
 from robot_dyn.stress_test.worst import KEPT, listed, shrunk_state
 
 _OF_FLOAT64 = -log10(2.0**-53)
@@ -25,36 +27,41 @@ _ROUNDS, _MOST_TRIES = 3, 60
 _OTHER_NUMBERS = ("Lagrangian, float32", "Lagrangian, longdouble")
 
 
-def lost_digits(
-    robot: Robot, states: Batch, rng: np.random.Generator, words: str, tell: Callable[[str], object]
-) -> Iterator[Worst | str]:
-    """The roads in float64, one after the other; what is left out in words."""
-    tell("machine code")
-    found, left_out = roads(robot)
+def lost_digits(robot: Robot, states: Batch, rng: np.random.Generator, words: str, work: Work) -> Iterator[Worst]:
+    """The roads in float64, one after the other."""
+    asked = (INVERSE_DYNAMICS, FORWARD_DYNAMICS)
+    names = tuple(f"digits lost in {quantity.name}" for quantity in asked)
+    known = work.do("roads, machine code among them", lambda _: roads(robot), names)
+    if known is None:
+        return
+    found, left_out = known
+    work.left_out += left_out
     counting = Counting(robot, states, None, rng)
-    yield from left_out
-    for quantity in (INVERSE_DYNAMICS, FORWARD_DYNAMICS):
+    for quantity in asked:
         for road in found:
             if quantity in road.quantities and road.name not in _OTHER_NUMBERS:
-                tell(f"digits of {quantity.name} by {road.name}")
-                yield _of(counting, road, quantity, words)
+                made = _lost(counting, road, quantity, words, work)
+                if made is not None:
+                    yield made
 
 
-def _of(counting: Counting, road: Road, quantity: Quantity, words: str) -> Worst:
-    made = counting.count(road, quantity)
-    for _ in range(_ROUNDS - 1):
-        if made.searched < made.random:
-            break
-        again = counting.count(road, quantity)
-        made = again if again.searched < made.searched else made
+def _lost(counting: Counting, road: Road, quantity: Quantity, words: str, work: Work) -> Worst | None:
+    """What one road loses; None for lack of time."""
+    name = f"digits lost in {quantity.name} by {road.name}"
+    made = work.do(name, lambda deadline: _counted(counting, road, quantity, deadline))
+    if made is None:
+        return None
     lost = _OF_FLOAT64 - made.searched
 
     def losses(batch: Batch) -> np.ndarray:
         state = {name: batch[name][0] for name in quantity.arguments}
         return np.array([_OF_FLOAT64 - digits_of(counting.judged(road, quantity, state))])
 
-    at = {name: made.state[name] for name in quantity.arguments}
-    state, minimal = shrunk_state(at, counting.states, losses, KEPT * lost if lost > 0 else -np.inf, _MOST_TRIES)
+    at, least = {name: made.state[name] for name in quantity.arguments}, KEPT * lost if lost > 0 else -np.inf
+    small = work.do(
+        f"shrinking of {name}", lambda until: shrunk_state(at, counting.states, losses, least, until, _MOST_TRIES)
+    )
+    state, minimal = small or (at, lost)
     arguments = ", ".join(f"{name}={name}" for name in state)
     python = (
         f"{assigned(state)}made = rd.certify(robot, {arguments}, samples=100, repeats=1)\n"
@@ -66,3 +73,14 @@ def _of(counting: Counting, road: Road, quantity: Quantity, words: str) -> Worst
     note = f"{road.name}: {made.searched:.1f} digits hold, {made.typical:.1f} typically"
     what = f"digits lost in {quantity.name}"
     return Worst(what, "", "digits", typical, random, max(lost, minimal), minimal, listed(state), note, python, command)
+
+
+def _counted(counting: Counting, road: Road, quantity: Quantity, deadline: Deadline) -> Found:
+    """The fewest digits of some searches."""
+    made = counting.count(road, quantity, deadline.check)
+    for _ in range(_ROUNDS - 1):
+        if made.searched < made.random:
+            break
+        again = counting.count(road, quantity, deadline.check)
+        made = again if again.searched < made.searched else made
+    return made

@@ -69,10 +69,16 @@ def _body(result: Stress) -> Iterator[str]:
     yield from _section(result, LIMITS, result.limits)
     yield "<h2>Random runs</h2>\n<p>estimated errors of q in rad or m, held against better runs</p>\n"
     yield from _section(result, RUNS, result.runs)
+    if result.out_of_time:
+        yield f"<h2>Not looked at for lack of time</h2>\n<ul>{_items(result.out_of_time)}</ul>\n"
     if result.left_out:
-        yield "<h2>Left out</h2>\n<ul>" + "".join(f"<li>{escape(each)}</li>" for each in result.left_out) + "</ul>\n"
+        yield f"<h2>Left out</h2>\n<ul>{_items(result.left_out)}</ul>\n"
     versions = ", ".join(f"{name} {value}" for name, value in result.environment.items())
     yield f"<footer>seed {result.seed}; {result.spent_s:.0f} s; {escape(versions)}</footer>\n"
+
+
+def _items(words: Iterable[str]) -> str:
+    return "".join(f"<li>{escape(each)}</li>" for each in words)
 
 
 def _section(result: Stress, headings: tuple[str, ...], findings: Iterable[Worst | Limit | Judged]) -> Iterator[str]:

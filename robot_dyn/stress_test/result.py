@@ -23,6 +23,7 @@ class Stress:
         limits: Of step, gain, speed and payload, each confirmed at 0.98 and 1.02 of it.
         runs: Random runs whose error estimates were judged.
         left_out: What was left out, and why.
+        out_of_time: Names of what was not looked at, or not to its end, for lack of time.
         loading: How the robot is loaded.
         environment: Versions and processor.
         samples, seed: Number of random states; of the random generator.
@@ -36,6 +37,7 @@ class Stress:
     limits: tuple[Limit, ...]
     runs: tuple[Judged, ...]
     left_out: tuple[str, ...]
+    out_of_time: tuple[str, ...]
     loading: Loading
     environment: dict[str, str] = field(repr=False)
     samples: int
@@ -74,6 +76,8 @@ class Stress:
             parts.append(f"{what} up to {top.searched:.3g}{f' {top.unit}' if top.unit else ''}{joint}")
         checked = sum(each.confirmed is not None for each in self.limits) + len(self.runs)
         failed = len(self.failures)
+        if late := len(self.out_of_time):
+            parts.append(f"{late} not looked at for lack of time")
         return f"{self.robot}: {failed or 'no'} failure{'s' * (failed != 1)} in {checked} checks; {'; '.join(parts)}"
 
     def python(self, finding: Worst | Limit | Judged) -> str:

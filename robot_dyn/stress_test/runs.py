@@ -6,14 +6,12 @@ near rounding. What both miss is found by `compare` and by energy alone.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
-from robot_dyn.accuracy.budget import Limit as TimeLimit
-from robot_dyn.accuracy.budget import OvertimeError
+from robot_dyn.accuracy.deadline import Deadline
 from robot_dyn.accuracy.worst_state import Batch
 from robot_dyn.errors import RobotDynError
 from robot_dyn.integrate.adaptive import Adaptive
@@ -26,47 +24,42 @@ from robot_dyn.stress_test.finding import Judged
 from robot_dyn.stress_test.lines import expression
 from robot_dyn.stress_test.scenes import scenes
 from robot_dyn.stress_test.shrink import shrunk
+from robot_dyn.stress_test.work import Work
 
 _BETTER = (Adaptive("DOP853", 3e-14, 1e-15), Adaptive("Rosenbrock", 1e-11, 1e-13))
 _ROUNDING = 1e-12  # of 1 + |q|: below it neither can tell
 _ONE_TIME = 1e-12  # [s]
-_LONGEST_S = 8.0  # of one run
 _MOST_TRIES = 25  # of the start of a run that misleads
 
 
-def judged_runs(
-    robot: Robot, states: Batch, count: int, rng: np.random.Generator, tell: Callable[[str], object]
-) -> Iterator[Judged | str]:
-    """So many random runs; what cannot be judged in words."""
-    for scene in scenes(robot, states, count, rng):
-        tell(f"run, {scene.what}")
-        try:
-            found = judged(scene.setup, scene.what)
-            if found.misleads:
-                tell(f"shrinking, {scene.what}")
-                found = shrunk_run(scene.setup, scene.what, found)
-            yield found
-        except OvertimeError:
-            yield f"run, {scene.what}: takes more than {_LONGEST_S:g} s"
-        except RobotDynError as error:
-            yield f"run, {scene.what}: {error}"
+def judged_runs(robot: Robot, states: Batch, count: int, rng: np.random.Generator, work: Work) -> Iterator[Judged]:
+    """So many random runs."""
+    for k, make in enumerate(scenes(robot, states, count, rng), 1):
+        if work.over:
+            work.skip(f"runs {k} to {count}" if k < count else f"run {k}")
+            return
+        scene = work.do(f"scene of run {k}", lambda _, make=make: make())
+        if scene is None:
+            continue
+        found = work.do(f"run {k}, {scene.what}", lambda until, of=scene: judged(of.setup, of.what, until))
+        if found is not None:
+            yield shrunk_run(scene.setup, found, f"shrinking of run {k}", work) if found.misleads else found
 
 
-def judged(setup: Setup, what: str) -> Judged:
+def judged(setup: Setup, what: str, deadline: Deadline) -> Judged:
     """A run beside two better ones.
 
     Raises:
         RobotDynError: If one of these cannot be made.
-        OvertimeError: If one takes too long.
+        OvertimeError: If the deadline passes.
     """
-    run = _simulated(setup)
+    run = simulate(setup, on_progress=deadline.check)
     said = says(run) if run.outcome.ending is Ending.FINISHED else f"{run.outcome.ending} at {run.outcome.t:.3g} s"
     error = run.error
     if error is None or run.outcome.ending is not Ending.FINISHED or not error.resolved_until:
         return Judged(what, setup.duration_s, np.nan, np.nan, np.nan, said, False, _lines(setup))
-    better = [
-        _simulated(replace(setup, integrator=each, step_s=Setup.step_s, estimate_error=False)) for each in _BETTER
-    ]
+    sure = replace(setup, step_s=Setup.step_s, estimate_error=False, integrator=_BETTER[0])
+    better = [simulate(replace(sure, integrator=each), on_progress=deadline.check) for each in _BETTER]
     known = run.t <= error.resolved_until
     if any(each.outcome.ending is not Ending.FINISHED for each in better):
         raise RobotDynError("a better run did not finish")
@@ -84,10 +77,6 @@ def says_more(run: Trajectory) -> bool:
     return bool(run.error is not None and run.error.note) or "does not close" in run.summary
 
 
-def _simulated(setup: Setup) -> Trajectory:
-    return simulate(setup, on_progress=TimeLimit(_LONGEST_S))
-
-
 def _lines(setup: Setup) -> str:
     return (
         f"setup = {expression(setup)}\nrun = rd.simulate(setup)\nbetter = rd.simulate(setup, integrator="
@@ -96,19 +85,22 @@ def _lines(setup: Setup) -> str:
     )
 
 
-def shrunk_run(setup: Setup, what: str, found: Judged) -> Judged:
-    """The same from a start of few digits that misleads too."""
+def shrunk_run(setup: Setup, found: Judged, name: str, work: Work) -> Judged:
+    """A run that misleads, from the start of fewest digits that was found; itself if that is none."""
+    least = found
 
-    def at(x: np.ndarray) -> Setup:
-        q0, v0 = np.split(x, 2)
-        return replace(setup, q0=q0, v0=v0)
+    def shrink(deadline: Deadline) -> np.ndarray:
+        def fails(x: np.ndarray) -> bool:
+            nonlocal least
+            q0, v0 = np.split(x, 2)
+            try:
+                young = judged(replace(setup, q0=q0, v0=v0), found.what, deadline)
+            except RobotDynError:
+                return False
+            least = young if young.misleads else least
+            return young.misleads
 
-    def fails(x: np.ndarray) -> bool:
-        try:
-            return judged(at(x), what).misleads
-        except (RobotDynError, OvertimeError):
-            return False
+        return shrunk(np.concatenate([setup.q0, setup.v0]), fails, _MOST_TRIES)
 
-    start: Any = np.concatenate([setup.q0, setup.v0])
-    small = shrunk(start, fails, _MOST_TRIES)
-    return found if np.array_equal(small, start) else judged(at(small), what)
+    work.do(name, shrink)
+    return least

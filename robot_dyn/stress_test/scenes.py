@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, final
 
 import numpy as np
@@ -40,11 +41,12 @@ class Scene:
     what: str
 
 
-def scenes(robot: Robot, states: Batch, count: int, rng: np.random.Generator) -> Iterator[Scene]:
-    """So many scenes; each family comes in its turn."""
+def scenes(robot: Robot, states: Batch, count: int, rng: np.random.Generator) -> Iterator[Callable[[], Scene]]:
+    """So many scenes, each made when it is called; each family comes in its turn."""
     scale = np.median(np.diagonal(asked(robot, M, {"q": states["q"][:200]}), axis1=-2, axis2=-1), axis=0)
     for k in range(count):
-        yield _scene(robot, FAMILIES[k % len(FAMILIES)], scale, np.random.default_rng(rng.integers(2**63)))
+        own = np.random.default_rng(rng.integers(2**63))
+        yield partial(_scene, robot, FAMILIES[k % len(FAMILIES)], scale, own)
 
 
 def _scene(robot: Robot, family: str, scale: np.ndarray, rng: np.random.Generator) -> Scene:

@@ -6,13 +6,14 @@ file; a push that grows is the method's.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from math import isfinite
 
 import numpy as np
 
-from robot_dyn.accuracy.advisor import advise
+from robot_dyn.accuracy.advisor import Advice, advice_about, at_rest
+from robot_dyn.accuracy.deadline import Deadline
 from robot_dyn.control.computed_torque import PDGravity
 from robot_dyn.control.reference import hold
 from robot_dyn.effects.friction import ViscousFriction
@@ -23,9 +24,13 @@ from robot_dyn.integrate.implicit import SinglyDiagonallyImplicit
 from robot_dyn.integrate.methods import FIXED_STEP, method
 from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.setup import Setup
+from robot_dyn.simulation.stability import step_map
+from robot_dyn.simulation.state_equation import StateEquation
+from robot_dyn.simulation.stiffness import jacobian
 from robot_dyn.stress_test.confirm import BEYOND, WITHIN, pushed, told
 from robot_dyn.stress_test.finding import Limit
 from robot_dyn.stress_test.lines import expression
+from robot_dyn.stress_test.work import Work
 
 _TIMES = 400.0  # of the run, 1/|λ| of the fastest motion
 _STEPS = 10  # of a method whose stages are iterated
@@ -41,32 +46,50 @@ def held(robot: Robot, q: np.ndarray, gains: tuple[np.ndarray, np.ndarray], rate
     )  # fmt: skip
 
 
-def step_limits(setup: Setup, seed: int, tell: Callable[[str], object]) -> Iterator[Limit]:
+def step_limits(setup: Setup, seed: int, work: Work) -> Iterator[Limit]:
     """Each method of fixed step: its limit, and runs at 0.98 and 1.02 of it.
 
     Args:
         setup: As of `held`.
         seed: Of the push.
-        tell: Called with what is being done.
+        work: Does it.
     """
-    tell("steps: linearisation")
-    advice = advise(setup, estimate_error=False)
-    duration = min(setup.duration_s, _TIMES / abs(advice.fastest.eigenvalue))
-    for name in FIXED_STEP:
-        tell(f"steps: {name}")
-        limit = advice.limits[name]
-        pushed_off = pushed(replace(setup, duration_s=duration, integrator=name), seed)
-        try:
-            yield _confirmed(pushed_off, setup.q0, name, limit, advice.fastest.joint)
-        except RobotDynError as error:
-            yield Limit("step", name, advice.fastest.joint, limit, "s", f"not run: {error}", "", None, "")
+    names = {name: f"step of {name}" for name in FIXED_STEP}
+    known = work.do("linearisation", lambda _: _linearised(setup), tuple(names.values()))
+    if known is None:
+        return
+    advice, J = known
+    setup = replace(setup, duration_s=min(setup.duration_s, _TIMES / abs(advice.fastest.eigenvalue)))
+    for name, of in names.items():
+        made = work.do(of, lambda until, name=name: _judged(setup, name, advice, J, seed, until))
+        if made is not None:
+            yield made
 
 
-def _confirmed(setup: Setup, at: np.ndarray, name: str, limit: float, joint: str) -> Limit:
+def _linearised(setup: Setup) -> tuple[Advice, np.ndarray]:
+    """The advice at rest, and J there."""
+    loop = StateEquation(setup.plant, setup.controller).in_a_mode
+    ((t, y),) = at_rest(setup, loop)
+    return advice_about(setup, at_rest), jacobian(loop, t, y, None)
+
+
+def _judged(setup: Setup, name: str, advice: Advice, J: np.ndarray, seed: int, deadline: Deadline) -> Limit:
+    """The limit of a method."""
+    limit, joint, n = advice.limits[name], advice.fastest.joint, len(setup.q0)
+    try:
+        unstable = isfinite(limit) and not _iterates(name)
+        matrix = step_map(method(name), J, n)(BEYOND * limit) if unstable else J
+        start = pushed(replace(setup, integrator=name), matrix, seed)
+        return _confirmed(start, setup.q0, name, limit, joint, deadline)
+    except RobotDynError as error:
+        return Limit("step", name, joint, limit, "s", f"not run: {error}", "", None, "")
+
+
+def _confirmed(setup: Setup, at: np.ndarray, name: str, limit: float, joint: str, deadline: Deadline) -> Limit:
     """The limit of a method, with runs at both sides of it, or with steps as long as are judged if it has none."""
     if not isfinite(limit):
         longest = setup.duration_s / _PARTS
-        run = told(replace(setup, step_s=longest), at, True)
+        run = told(replace(setup, step_s=longest), at, deadline, True)
         told_of = f"step {longest:.3g} s: {run.words}"
         lines = _lines(setup, at, (longest,))
         holds = run.stays or (_iterates(name) and not isfinite(run.growth))
@@ -74,8 +97,8 @@ def _confirmed(setup: Setup, at: np.ndarray, name: str, limit: float, joint: str
     steps, what, iterates = (WITHIN * limit, BEYOND * limit), name, _iterates(name)
     if iterates:  # every step is stable, and where its stages are not found, about there, the run says so
         setup, what = replace(setup, duration_s=_STEPS * limit), f"{name}, stages by fixed-point iteration"
-    within = told(replace(setup, step_s=steps[0]), at)
-    beyond = told(replace(setup, step_s=steps[1]), at, not iterates)
+    within = told(replace(setup, step_s=steps[0]), at, deadline)
+    beyond = told(replace(setup, step_s=steps[1]), at, deadline, not iterates)
     confirmed = within.stays and beyond.leaves(within) and not beyond.misleads
     if iterates:
         confirmed = all(each.stays or not isfinite(each.growth) for each in (within, beyond))

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
+from time import perf_counter
 from typing import Any
 
 import numpy as np
 
-from robot_dyn.accuracy.budget import Budget
+from robot_dyn.accuracy.deadline import Deadline
 from robot_dyn.accuracy.environment import environment
 from robot_dyn.accuracy.worst_state import random_states
-from robot_dyn.errors import RobotDynError
 from robot_dyn.model.robot import Robot
 from robot_dyn.stress_test.finding import Judged, Limit, Worst
 from robot_dyn.stress_test.gains import gain_limit
@@ -20,12 +20,15 @@ from robot_dyn.stress_test.lost_digits import lost_digits
 from robot_dyn.stress_test.result import Stress
 from robot_dyn.stress_test.runs import judged_runs
 from robot_dyn.stress_test.steps import held, step_limits
-from robot_dyn.stress_test.worst import FASTEST, pd_gains, worst_configurations
+from robot_dyn.stress_test.work import Work
+from robot_dyn.stress_test.worst import BY_PD, HELD, pd_gains, worst_configurations
 from robot_dyn.validate import function, instance, integer, number
 
 _LEAST_SAMPLES, _MOST_SAMPLES, _MOST_RUNS = 100, 10**6, 10**5
 
-Found = Worst | Limit | Judged | str  # words are of what was left out
+_PIECES = 8  # of the budget; one piece of work may take this part of it
+
+Found = Worst | Limit | Judged
 
 
 def stress(
@@ -34,7 +37,7 @@ def stress(
     samples: int = 10_000,
     runs: int = 7,
     seed: int = 0,
-    budget_s: float = 100.0,
+    budget_s: float = 90.0,
     on_progress: Callable[[float, str], object] | None = None,
 ) -> Stress:
     """The worst configurations of an arm, the step, gain, speed and payload at which it breaks, and runs judged.
@@ -48,7 +51,8 @@ def stress(
         samples: Number of random states.
         runs: Number of random runs.
         seed: Of the random generator.
-        budget_s: Time to spend, in [s]; what is to come when it ends is left out.
+        budget_s: Time to spend, in [s]. What is to come when it ends, or takes more than an eighth of it, is named in
+            `out_of_time`; with time enough for all, what is found depends on the seed alone.
         on_progress: Called with the time spent, in [s], and with what is being done.
 
     Raises:
@@ -60,73 +64,72 @@ def stress(
 
 def stressed(
     robot: Robot, loading: Loading, samples: int, runs: int, seed: int, budget_s: float,
-    on_progress: Callable[[float, str], object] | None,
+    on_progress: Callable[[float, str], object] | None, clock: Callable[[], float] = perf_counter,
 ) -> Stress:  # fmt: skip
-    """The same of a robot that is loaded so."""
+    """The same of a robot that is loaded so, by a clock."""
     samples = integer("samples", samples, least=_LEAST_SAMPLES, most=_MOST_SAMPLES)
     runs, seed = integer("runs", runs, most=_MOST_RUNS), integer("seed", seed, most=2**128 - 1)
     seconds = number("budget_s", budget_s, above=0)
-    budget = Budget(seconds, function("on_progress", on_progress, "(spent, what)"))
-    robot, found, interrupted = robot.warn_below(None), list[Found](_unlimited(robot)), False
+    told = function("on_progress", on_progress, "(spent, what)") or (lambda spent, what: None)
+    deadline = Deadline(clock=clock).within(seconds)
+    work = Work(deadline, seconds / _PIECES, lambda name: told(seconds - max(deadline.left, 0.0), name))
+    robot, found, interrupted = robot.warn_below(None), list[Found](), False
     try:
-        for name, part in _parts(robot, loading, samples, runs, seed, budget.tell):
-            try:
-                for each in part:
-                    found.append(each)
-                    if budget.left <= 0:
-                        found.append(f"{name}: the rest, as the budget of {seconds:g} s ended")
-                        break
-            except RobotDynError as error:
-                found.append(f"{name}: {error}")
-            except np.linalg.LinAlgError as error:
-                found.append(f"{name}: {error}; M is near a singular one")
+        for each in _found(robot, loading, samples, runs, seed, work):
+            found.append(each)
     except KeyboardInterrupt:
         interrupted = True
-        found.append("what was to come when it was interrupted")
+        work.left_out.append("what was to come when it was interrupted")
 
     def of(kind: type) -> tuple[Any, ...]:
         return tuple(each for each in found if isinstance(each, kind))
 
     return Stress(
-        robot.name, robot.joint_names, of(Worst), of(Limit), of(Judged), of(str), loading, environment(), samples,
-        seed, budget.spent, interrupted,
+        robot.name, robot.joint_names, of(Worst), of(Limit), of(Judged), (*_unlimited(robot), *work.left_out),
+        tuple(work.out_of_time), loading, environment(), samples, seed, seconds - deadline.left, interrupted,
     )  # fmt: skip
 
 
-def _parts(
-    robot: Robot, loading: Loading, samples: int, runs: int, seed: int, tell: Callable[[str], object]
-) -> Iterator[tuple[str, Iterable[Found]]]:
-    """The parts of the test; each begins when it is asked for, with a generator of its own."""
+def _found(robot: Robot, loading: Loading, samples: int, runs: int, seed: int, work: Work) -> Iterator[Found]:
+    """The findings of all parts, each with a random generator of its own."""
     streams = [np.random.default_rng(each) for each in np.random.SeedSequence(seed).spawn(6)]
-    tell("random states")
-    states = random_states(robot, samples, streams[0])
-    found: list[Worst] = []
-    yield "worst configurations", _kept(found, worst_configurations(robot, states, streams[1], loading.words, tell))
-    moves = robot.joint_without_inertia is None
-    gains = pd_gains(robot, states) if moves else None
-    yield "speed", (speed_limit(robot, states, streams[2], tell) for _ in range(1))
-    yield "payload", (payload_limit(robot, states, streams[3], gains, tell) for _ in range(1))
-    fastest = [each for each in found if each.what == FASTEST]
-    if gains is not None and fastest:
-        setup = held(robot, np.array(fastest[-1].state["q"]), gains, fastest[-1].minimal)
-        yield "steps", step_limits(setup, seed, tell)
-        yield "gains", (gain_limit(setup, seed, tell) for _ in range(1))
-    yield "digits", lost_digits(robot, states, streams[4], loading.words, tell)
+    states = work.do("random states", lambda _: random_states(robot, samples, streams[0]), ("all at these",))
+    if states is None:
+        return
+    moves, fastest = robot.joint_without_inertia is None, None
+    needed_for = ("worst fastest motion under it", *HELD)
+    gains = work.do("gains of a PD", lambda _: pd_gains(robot, states), needed_for) if moves else None
+    for each in worst_configurations(robot, states, streams[1], gains, loading.words, work):
+        fastest = each if each.note == BY_PD else fastest
+        yield each
+    yield from _kept(speed_limit(robot, states, streams[2], work))
+    yield from _kept(payload_limit(robot, states, streams[3], gains, work))
     if moves:
-        yield "runs", judged_runs(robot, states, runs, streams[5], tell)
+        yield from _of_motion(robot, gains, fastest, seed, work)
+    yield from lost_digits(robot, states, streams[4], loading.words, work)
+    if moves:
+        yield from judged_runs(robot, states, runs, streams[5], work)
     else:
         why = f"joint {robot.joint_without_inertia!r} carries no inertia"
-        yield (
-            "without forward dynamics",
-            (f"{what}: {why}" for what in ("κ of M", "fastest motion, steps and gains", "runs")),
-        )
+        work.left_out += [f"{what}: {why}" for what in ("κ of M", "fastest motion, steps and gains", "runs")]
 
 
-def _kept(into: list[Worst], those: Iterable[Worst]) -> Iterator[Worst]:
-    """The same, kept as they come."""
-    for each in those:
-        into.append(each)
-        yield each
+def _of_motion(robot: Robot, gains: Any, fastest: Worst | None, seed: int, work: Work) -> Iterator[Limit]:
+    """The limits of step and gain, where motion is fastest."""
+    if gains is None or fastest is None:
+        return
+    at = np.array(fastest.state["q"])
+    setup = work.do("start of steps and gain", lambda _: held(robot, at, gains, fastest.minimal), HELD)
+    if setup is None:
+        return
+    yield from step_limits(setup, seed, work)
+    yield from _kept(gain_limit(setup, seed, work))
+
+
+def _kept(limit: Limit | None) -> Iterator[Limit]:
+    """A limit, if there was time for it."""
+    if limit is not None:
+        yield limit
 
 
 def _unlimited(robot: Robot) -> Iterator[str]:

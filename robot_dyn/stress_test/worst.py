@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from robot_dyn.accuracy.deadline import Deadline
 from robot_dyn.accuracy.road import asked
 from robot_dyn.accuracy.worst_state import Batch, Search
 from robot_dyn.control.independent_joint import gains_from
@@ -19,44 +20,86 @@ from robot_dyn.model.robot import Robot
 from robot_dyn.stress_test.finding import Worst
 from robot_dyn.stress_test.lines import assigned, expression
 from robot_dyn.stress_test.shrink import shrunk
+from robot_dyn.stress_test.work import Work
 
 FASTEST = "fastest motion"
+HELD = ("steps", "gain")  # limits that are looked for where the motion is fastest under a PD
 KEPT = 0.9  # of what was found, that a shrunk state keeps
 _ROUNDS = 3  # of a search that finds nothing worse
 _NOTHING = 1e-12  # of an effort limit: rounding of zero
 _FREQUENCY = 20.0  # [rad/s], of the gains of a PD
+BY_PD = f"PD of ω = {_FREQUENCY:g} rad/s, ζ = 1 for the median of M_ii, gravity balanced"
 
 Measure = Callable[[Batch], np.ndarray]  # at each of S states, (S,); nan where there is none
 
 
+Gains = tuple[np.ndarray, np.ndarray]  # stiffness and damping of a PD
+Sizes = dict[str, float]
+State = dict[str, np.ndarray]  # (n,) each
+
+
 def worst(
-    states: Batch, rng: np.random.Generator, arguments: tuple[str, ...], measure: Measure
-) -> tuple[dict[str, float], dict[str, np.ndarray]]:
-    """Typical, random, searched and minimal size of a measure, and the shrunk state, (n,) each.
+    states: Batch,
+    rng: np.random.Generator,
+    arguments: tuple[str, ...],
+    measure: Measure,
+    work: Work,
+    name: str,
+    needed_for: tuple[str, ...] = (),
+) -> tuple[Sizes, State] | None:
+    """Typical, random, searched and minimal size of a measure, and the shrunk state; None for lack of time.
 
     Args:
         states: Random ones.
         rng: Of the search.
         arguments: Names of those coordinates that the measure depends on.
         measure: What is made large.
+        work: Does it.
+        name: Of the measure.
+        needed_for: As of `Work.do`.
     """
+    found = work.do(name, lambda deadline: searched(states, rng, arguments, measure, deadline), needed_for)
+    if found is None:
+        return None
+    sizes, state = found
+    least = KEPT * sizes["searched"]
+    small = work.do(f"shrinking of {name}", lambda until: shrunk_state(state, states, measure, least, until))
+    state, minimal = small or (state, sizes["searched"])
+    largest = max(sizes["searched"], minimal)  # where the largest value lies at few digits
+    return sizes | {"searched": largest, "minimal": minimal}, state
+
+
+def searched(
+    states: Batch, rng: np.random.Generator, arguments: tuple[str, ...], measure: Measure, deadline: Deadline
+) -> tuple[Sizes, State]:
+    """Typical, random and searched size of a measure, and the state."""
     known = measure(states)
     random, found, best = float(np.nanmax(known)), -np.inf, states
     for _ in range(_ROUNDS):
-        at, size = Search(states, rng).worst(measure, known, arguments)
+        at, size = Search(states, rng).worst(_timed(measure, deadline), known, arguments)
         if size > found:
             best, found = at, size
         if found > random:
             break
-    state, minimal = shrunk_state({name: best[name][0] for name in arguments}, states, measure, KEPT * found)
-    found = max(found, minimal)  # where the largest value lies at few digits
-    return {"typical": float(np.nanmedian(known)), "random": random, "searched": found, "minimal": minimal}, state
+    sizes = {"typical": float(np.nanmedian(known)), "random": random, "searched": found}
+    return sizes, {name: best[name][0] for name in arguments}
+
+
+def _timed(measure: Measure, deadline: Deadline) -> Measure:
+    """A measure that asks first whether there is time."""
+
+    def made(batch: Batch) -> np.ndarray:
+        deadline.check()
+        return measure(batch)
+
+    return made
 
 
 def shrunk_state(
-    state: dict[str, np.ndarray], states: Batch, measure: Measure, least: float, most: int = 400
-) -> tuple[dict[str, np.ndarray], float]:
+    state: State, states: Batch, measure: Measure, least: float, deadline: Deadline, most: int = 400
+) -> tuple[State, float]:
     """A state of few digits, within the range of random ones, at which a measure is at least so much; and how much."""
+    measure = _timed(measure, deadline)
     names, n = tuple(state), len(next(iter(state.values())))
     low = np.concatenate([states[name].min(axis=0) for name in names])
     high = np.concatenate([states[name].max(axis=0) for name in names])
@@ -73,14 +116,16 @@ def shrunk_state(
 
 
 def worst_configurations(
-    robot: Robot, states: Batch, rng: np.random.Generator, words: str, tell: Callable[[str], object]
+    robot: Robot, states: Batch, rng: np.random.Generator, gains: Gains | None, words: str, work: Work
 ) -> Iterator[Worst]:
     """κ, the fastest motion, and gravity torque of each joint with an effort limit."""
-    for what, joint, unit, measure, note, python in _asked(robot, states):
-        tell(f"worst {what} {joint}".rstrip())
-        sizes, state = worst(states, rng, ("q",), measure)
-        if not sizes["searched"] > _NOTHING:
+    for what, joint, unit, measure, note, python in _asked(robot, gains, work):
+        of = note if what == FASTEST else joint
+        name, needed_for = f"worst {what}{f', {of}' if of else ''}", HELD if note == BY_PD else ()
+        found = worst(states, rng, ("q",), measure, work, name, needed_for)
+        if found is None or not found[0]["searched"] > _NOTHING:
             continue  # gravity has no torque on the joint
+        sizes, state = found
         q = ",".join(map(repr, state["q"].tolist()))
         python = assigned(state) + python
         command = f"query {words} --q={q}" if words and "robot.N" in python else ""
@@ -92,12 +137,12 @@ def listed(state: dict[str, np.ndarray]) -> dict[str, list[float]]:
     return {name: x.tolist() for name, x in state.items()}
 
 
-def _asked(robot: Robot, states: Batch) -> Iterator[tuple[str, str, str, Measure, str, str]]:
+def _asked(robot: Robot, gains: Gains | None, work: Work) -> Iterator[tuple[str, str, str, Measure, str, str]]:
     """What is looked for: quantity, joint, unit, measure, note and lines."""
     if robot.joint_without_inertia is None:
         lines = "M = robot.M(q)\nd = np.sqrt(np.diagonal(M))\nprint(np.linalg.cond(M / np.outer(d, d)))\n"
         yield "κ of M", "", "", lambda batch: unit_diagonal_conditions(asked(robot, M, batch)), "", lines
-        yield from _fastest(robot, states)
+        yield from _fastest(robot, gains, work)
     for i, joint in enumerate(robot.joint_names):
         limit = robot.effort_limit[i]
         if 0 < limit < np.inf:
@@ -110,16 +155,18 @@ def _asked(robot: Robot, states: Batch) -> Iterator[tuple[str, str, str, Measure
             yield "gravity torque / effort limit", joint, "", loaded, note, lines
 
 
-def _fastest(robot: Robot, states: Batch) -> Iterator[tuple[str, str, str, Measure, str, str]]:
+def _fastest(robot: Robot, gains: Gains | None, work: Work) -> Iterator[tuple[str, str, str, Measure, str, str]]:
     """The fastest decay by the friction of the file, and by a PD of stated gains, both where gravity is balanced."""
-    if damping := _slopes(robot):
+    if damping := work.do("friction at rest", lambda _: _slopes(robot)):
         lines = (
             "balance = rd.PDGravity(robot, rd.hold(q), 0.0, 0.0)\nsetup = rd.Setup(rd.Plant(robot, 'urdf'), q,"
             " controller=balance, duration_s=1e-4)\nprint(rd.advise(setup).fastest)\n"
         )
         note = "friction of the file, at rest"
         yield FASTEST, "", "1/s", lambda batch: _rates(robot, batch, np.array(damping)), note, lines
-    kp, kd = pd_gains(robot, states)
+    if gains is None:
+        return
+    kp, kd = gains
 
     def by_pd(batch: Batch) -> np.ndarray:
         mu = _rates(robot, batch, kd) / (2 * _FREQUENCY)
@@ -129,8 +176,7 @@ def _fastest(robot: Robot, states: Batch) -> Iterator[tuple[str, str, str, Measu
         f"kp = {expression(kp)}\nkd = {expression(kd)}\nhold = rd.PDGravity(robot, rd.hold(q), kp, kd)\n"
         "setup = rd.Setup(rd.Plant(robot), q, controller=hold, duration_s=1e-3)\nprint(rd.advise(setup).fastest)\n"
     )
-    note = f"PD of ω = {_FREQUENCY:g} rad/s, ζ = 1 for the median of M_ii, gravity balanced"
-    yield FASTEST, "", "1/s", by_pd, note, lines
+    yield FASTEST, "", "1/s", by_pd, BY_PD, lines
 
 
 def _slopes(robot: Robot) -> list[float]:
