@@ -131,7 +131,7 @@ def test_blocks_and_rates_of_a_loop_bound_its_period() -> None:
 
 
 def test_friction_a_thousand_times_faster_than_the_period_does_not_hide_its_limit() -> None:
-    """M v̇ = u − b v with m/b ≪ T gives q⁺ = (1 − kp T/b) q: |·| = 1 at T = 2 b/kp, but for m/b and growth."""
+    """Of m v̇ = u − b v with m/b ≪ T gives q⁺ = (1 − kp T/b) q: |·| = 1 at T = 2 b/kp, but for m/b and growth."""
     b, kp = 1e6, 5e8
     law, plant = rd.PD(rd.hold([0.0]), kp, 0.0, 1e-3), rd.Plant(BLOCK, [rd.ViscousFriction(b)])
     assert longest_period(plant, law, 0.0, np.zeros(2), 20.0) == pytest.approx(2 * b / kp, rel=0.01)
@@ -202,7 +202,7 @@ def test_free_flight_bounds_no_step() -> None:
 
 
 def test_a_loop_that_is_damped_critically_has_a_fastest_motion() -> None:
-    """x'' = −ω² x − 2 ω x': both eigenvalues are −ω, with one eigenvector."""
+    """Of x'' = −ω² x − 2 ω x': both eigenvalues are −ω, with one eigenvector."""
     advice = rd.advise(BLOCK, [0.0], duration_s=0.1, controller=rd.PD(rd.hold([0.0]), 400.0, 40.0))
     assert abs(advice.fastest.eigenvalue) == pytest.approx(20.0, rel=1e-3)  # of a double root, of the root of rounding
     assert advice.fastest.source == "control"
