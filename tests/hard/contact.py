@@ -154,8 +154,8 @@ def _stepped(made: Scene, count: int) -> rd.Trajectory:
 
 
 SCENES = {  # of the short form, and how many in the long one: 20 and 1000 in all
-    ("smooth", "planar_2r"): (range(6), 400),
-    ("smooth", "panda"): (range(4), 200),
+    ("smooth", "planar_2r"): (range(6), 500),
+    ("smooth", "panda"): (range(4), 100),
     ("set-valued", "planar_2r"): (range(6), 300),
     ("set-valued", "panda"): (range(1, 9, 2), 100),  # of dry friction; with rigid stops in the long form
 }
