@@ -14,7 +14,7 @@ test: .venv/installed
 # what takes long: all hard cases and their report, docs/hard_cases.md; what tests mark as stress; error estimates on 600
 # random scenes. With a fixed seed and with that of the day, which each prints.
 stress: .venv/installed
-	$(BIN)/python -m tests.hard --full --write --seed $$(date +%Y%m%d)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.hard --full --write --seed $$(date +%Y%m%d)
 	$(BIN)/python -m pytest -n auto --dist worksteal -m stress --ignore tests/hard
 	$(BIN)/python -m tests.estimates --scenes 600 --seed 1
 	$(BIN)/python -m tests.estimates --scenes 600 --seed $$(date +%Y%m%d)
