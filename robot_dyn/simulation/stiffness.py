@@ -180,7 +180,7 @@ def fastest(equation: StateEquation, t: float, y: Array, held: Array | None, *, 
     """
     n, J = equation.plant.dynamics.n, jacobian(equation, t, y, held)
     values, right = np.linalg.eig(J)
-    among = np.abs(values.imag) > np.abs(values.real) if oscillation else np.full(len(values), True)
+    among = np.abs(np.imag(values)) > np.abs(np.real(values)) if oscillation else np.full(len(values), True)
     if not among.any():
         raise np.linalg.LinAlgError("nothing oscillates")
     k = int(np.argmax(np.where(among, np.abs(values), -1.0)))
