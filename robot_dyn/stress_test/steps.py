@@ -96,12 +96,13 @@ def _confirmed(setup: Setup, at: np.ndarray, name: str, limit: float, joint: str
         return Limit("step", name, "", limit, "s", told_of, "", holds and not run.misleads, lines)
     steps, what, iterates = (WITHIN * limit, BEYOND * limit), name, _iterates(name)
     if iterates:  # every step is stable, and where its stages are not found, about there, the run says so
-        setup, what = replace(setup, duration_s=_STEPS * limit), f"{name}, stages by fixed-point iteration"
+        setup, what = replace(setup, duration_s=_STEPS * limit), f"{name}: its stages are not found beyond about"
     within = told(replace(setup, step_s=steps[0]), at, deadline)
     beyond = told(replace(setup, step_s=steps[1]), at, deadline, not iterates)
     confirmed = within.stays and beyond.leaves(within) and not beyond.misleads
     if iterates:
-        confirmed = all(each.stays or not isfinite(each.growth) for each in (within, beyond))
+        grew = any(not each.stays and isfinite(each.growth) for each in (within, beyond))
+        confirmed = False if grew else None  # a limit that is not sharp is neither reached nor kept
     said = beyond.words + " AND DOES NOT SAY SO" * beyond.misleads
     return Limit("step", what, joint, limit, "s", within.words, said, confirmed, _lines(setup, at, steps))
 
