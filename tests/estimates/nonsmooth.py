@@ -4,10 +4,11 @@ Behind an event the mode is the one, of all combinations of stuck and sliding jo
 
     stuck: a = 0 and −f ≤ λ ≤ f, without the bound on the side of a stop that is touched;   sliding: a in its direction
 
-M is positive definite, so that there is one. A joint that strikes and whose bounces still to come take less than 1e-7 s
-is at rest; what its impact kicks off other stops goes on. Impacts obey v⁺ = −e v where impulses push, v⁺ ≥ −e v
-elsewhere. It shares the numbers of a scene with the library, and the torques of `truth`; no convex problem, mode, event
-or step.
+M is positive definite, so that there is one, unless friction of rest is above that of sliding: then either of two
+joints may go on and hold the other, and no truth is known from there on. A joint that strikes and whose bounces still
+to come take less than 1e-7 s is at rest; what its impact kicks off other stops goes on. Impacts obey v⁺ = −e v where
+impulses push, v⁺ ≥ −e v elsewhere. It shares the numbers of a scene with the library, and the torques of `truth`; no
+convex problem, mode, event or step.
 """
 
 from __future__ import annotations
@@ -41,6 +42,7 @@ class Bodies:
         self.lower, self.upper, e = known
         self.e, self.stops = np.broadcast_to(np.asarray(e, float), self.n), bool(stops)
         others = [each for each in effects if not isinstance(each, rd.DryFriction | rd.RigidStops)]
+        self.several = False  # whether more than one mode was possible behind an event
         self.forces = [_force(model, self.data, each)(0.0) for each in others]
 
     def M(self, q: np.ndarray) -> np.ndarray:
@@ -92,7 +94,8 @@ class Bodies:
         rests = np.flatnonzero((v == 0) & ((rough > 0) | (side != 0)))
         free = np.where(rough > 0, np.sign(v), 0.0)
         usual = [0 if stuck[i] and i not in forced else int(forced.get(i, 2)) for i in rests]
-        best, least = None, np.inf
+        best, least, motion = None, np.inf, np.zeros(self.n)
+        two_levels = len(rests) > 1 and bool((rough > self.level(0 * v))[rests].any())
         for made in _nearest(usual, [[forced[i]] if i in forced else [0, -1, 1] for i in rests]):
             trial, held = free.copy(), np.zeros(self.n, bool)
             held[rests] = [each == 0 for each in made]
@@ -106,9 +109,11 @@ class Bodies:
             off[rests] = np.where(held[rests], off[rests], -a[rests] * trial[rests] * diagonal[rests])
             off[rests] = np.where(~held[rests] & (side[rests] * trial[rests] > 0), np.inf, off[rests])
             worst = float((off / (size + 1e-300)).max(initial=0.0))
-            if worst < least:
-                best, least = (np.where(rough > 0, trial, 0.0), held), worst
-            if worst <= _SLACK:
+            if worst <= _SLACK and least <= _SLACK:
+                self.several = self.several or np.abs(a - motion).max() > 1e-6 * (1 + np.abs(motion).max())
+            elif worst < least:
+                best, least, motion = (np.where(rough > 0, trial, 0.0), held), worst, a
+            if least <= _SLACK and not two_levels:
                 break
         assert best is not None
         assert least < 1e-6, f"no mode at t = {t}: {least}"
@@ -158,13 +163,14 @@ def nonsmooth_truth(setup: rd.Setup, times: np.ndarray, tolerance: float = 1e-13
 
 
 def time_of_event(setup: rd.Setup, count: int) -> float:
-    """When event number `count` happens; the duration if there are fewer."""
+    """When event number `count` happens, or one with several modes behind it; the duration if there is none."""
     none = np.empty(0), np.empty((0, len(setup.q0)))
-    return next(islice(_modes(setup, *none, 1e-10, 1e-2), count - 1, None), setup.duration_s)
+    ends = islice(_modes(setup, *none, 1e-10, 1e-2), count)
+    return next((t for k, (t, several) in enumerate(ends, 1) if several or k == count), setup.duration_s)
 
 
-def _modes(setup: rd.Setup, times, result, tolerance: float, longest: float) -> Iterator[float]:
-    """The times at which modes end; positions are written to the result."""
+def _modes(setup: rd.Setup, times, result, tolerance: float, longest: float) -> Iterator[tuple[float, bool]]:
+    """The times at which modes end, and whether several were possible then; positions are written to the result."""
     bodies, n, t = Bodies(setup), len(setup.q0), 0.0
     y = np.concatenate([setup.q0, setup.v0]).astype(float)
     ends = [each for each in (setup.controller.knots if setup.controller else ()) if 0 < each < setup.duration_s]
@@ -172,7 +178,7 @@ def _modes(setup: rd.Setup, times, result, tolerance: float, longest: float) -> 
     for end in [*sorted(ends), setup.duration_s]:
         while t < end:
             t, y, way, stuck = _until_event(bodies, t, end, y, way, stuck, times, result, tolerance, longest)
-            yield t
+            yield t, bodies.several
 
 
 def _until_event(bodies, t, end, y, way, stuck, times, result, tolerance, longest):
@@ -303,8 +309,11 @@ def _behind(bodies: Bodies, t: float, y: np.ndarray, way, stuck, forced):
 
 
 def _resting_acceleration(bodies: Bodies, t: float, y: np.ndarray) -> np.ndarray | None:
+    several = bodies.several
     try:
         way, stuck = bodies.mode(t, y, np.zeros(bodies.n), np.zeros(bodies.n, bool), {})
     except AssertionError:
         return None
+    finally:
+        bodies.several = several  # that was a question, no mode of the motion
     return bodies.motion(t, y, way, stuck)[0]
