@@ -296,7 +296,8 @@ def test_a_run_that_leaves_an_equilibrium_is_seen_to_say_so() -> None:
 
 
 def test_document_has_the_keys_that_are_promised_and_no_infinity(tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr("robot_dyn.stress_test.stress.stressed", lambda *arguments: made("pendulum"))
+    whole = made("pendulum")
+    monkeypatch.setattr("robot_dyn.stress_test.stress.stressed", lambda *arguments: whole)
     done = run("stress", "pendulum", "--json", "-o", tmp_path / "page")
     assert done.returncode == 0, done.stderr
     document = json.loads(done.stdout, parse_constant=lambda word: pytest.fail(f"{word} is not JSON"))

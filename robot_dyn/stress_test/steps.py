@@ -96,7 +96,7 @@ def _confirmed(setup: Setup, at: np.ndarray, name: str, limit: float, joint: str
         return Limit("step", name, "", limit, "s", told_of, "", holds and not run.misleads, lines)
     steps, what, iterates = (WITHIN * limit, BEYOND * limit), name, _iterates(name)
     if iterates:  # every step is stable, and where its stages are not found, about there, the run says so
-        setup, what = replace(setup, duration_s=_STEPS * limit), f"{name}: its stages are not found beyond about"
+        setup, what = replace(setup, duration_s=_STEPS * limit), f"{name}, about where its stages are not found"
     within = told(replace(setup, step_s=steps[0]), at, deadline)
     beyond = told(replace(setup, step_s=steps[1]), at, deadline, not iterates)
     confirmed = within.stays and beyond.leaves(within) and not beyond.misleads
