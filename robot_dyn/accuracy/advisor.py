@@ -177,7 +177,7 @@ def _along(setup: Setup, loop: StateEquation) -> list[State]:
     return [*states, *_pressed(setup.plant, run, states)]
 
 
-def _pressed(plant: Plant, run: Trajectory, states: list[tuple[float, Array]]) -> Iterator[tuple[float, Array]]:
+def _pressed(plant: Plant, run: Trajectory, states: list[State]) -> Iterator[State]:
     """The states with joints as far beyond soft stops as they come, which is between the samples."""
     least, most = (np.zeros(plant.dynamics.n),) * 2 if run.extremes is None else run.extremes[0]
     for stop in plant.effects:
