@@ -72,16 +72,15 @@ class Estimated:
         error = np.maximum(largest, gaps[1] / (1 - 3.0 ** -np.where(self._smooth(seen), order, 1)))
         return self._judged(error, error, seen)
 
-    def from_refinement(self, finer: Path, loose: Path | None) -> ErrorEstimate:
+    def from_refinement(self, halved: Path, tight: Path | None) -> ErrorEstimate:
         """The estimate of a method that chooses its steps.
 
         Args:
-            finer: The companion of a tenth of the tolerance, which errs some eight times less, or of halved steps.
-            loose: That of ten times the tolerance where something may switch unseen: a quarter of its difference bounds
-                the error with that of the finer one.
+            halved: The companion of half as long steps: |q_h − q_{h/2}| = |e(h)| (1 − 2⁻ᵖ).
+            tight: That of a tenth of the tolerance, where something may switch unseen.
         """
-        near = differences(self.path, finer, self.n)
-        bound = near if loose is None else np.fmax(near, differences(self.path, loose, self.n) / 4)
+        near = differences(self.path, halved, self.n)
+        bound = near if tight is None else np.fmax(near, differences(self.path, tight, self.n))
         seen = np.ones(len(near), bool)
         return self._judged(np.where(self._smooth(seen), near, bound), bound, seen)
 

@@ -37,7 +37,6 @@ from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.stiffness import damped_oscillation
 
 _GAIN = 1.1  # in the time resolved, that a shorter step must bring
-_MORE_STEPS = 1.05  # of a companion with tighter tolerances, so that it tells something
 _FAR_TURN = 1.0  # [rad] in a step: beyond, longer steps may meet the same angles
 _BLIND_TURN = np.pi  # [rad] in a step: beyond, shorter ones may, too
 
@@ -123,21 +122,18 @@ def _until_brief(setup: Setup, run: Record, made: ErrorEstimate) -> ErrorEstimat
 def _by_refinement(
     setup: Setup, method: Adaptive, run: Record, estimated: Estimated, companion: Companion
 ) -> ErrorEstimate:
-    """From a tenth of the tolerance; from half as long steps where that changes none of them, as between ticks.
+    """From half as long steps; where something may switch unseen, from a tenth of the tolerance as well.
 
-    Where something may switch unseen, from ten times the tolerance as well.
+    Steps of a tenth of the tolerance may err alike where stability bounds them, half as long ones where both step over
+    a kink at the same place.
     """
     assert run.ends is not None
+    ends = np.append(0.0, run.ends)
+    halves = np.setdiff1d(np.concatenate([ends[1:], (ends[1:] + ends[:-1]) / 2]), [each.t for each in run.events])
     tight = None
-    if method.rtol / 10 > LEAST_RTOL:
-        made = companion(Fraction(1), _tolerant(setup, method, 0.1))
-        tight = made.shared if made.steps > _MORE_STEPS * run.steps else None
-    if tight is None:
-        ends = np.append(0.0, run.ends)
-        halves = np.setdiff1d(np.concatenate([ends[1:], (ends[1:] + ends[:-1]) / 2]), [each.t for each in run.events])
-        tight = companion(halves, setup).shared
-    loose = companion(Fraction(1), _tolerant(setup, method, 10)).shared if estimated.kink < np.inf else None
-    return estimated.from_refinement(tight, loose)
+    if estimated.kink < np.inf and method.rtol / 10 > LEAST_RTOL:
+        tight = companion(Fraction(1), _tolerant(setup, method, 0.1)).shared
+    return estimated.from_refinement(companion(halves, setup).shared, tight)
 
 
 def _tolerant(setup: Setup, method: Adaptive, factor: float) -> Setup:
