@@ -71,7 +71,7 @@ def test_stick_slip_has_the_period_of_its_closed_form(engine: str) -> None:
     slip = 2 / omega * (np.pi - np.arctan(omega * r / V))
     drawn = lambda t, q, v: k * (V * t - q)  # noqa: E731
     plant = rd.Plant(level(RAIL), [rd.DryFriction(fk, fs)])
-    run = rd.simulate(plant, [0.0], duration_s=60.0, controller=drawn, engine=engine, **OPTIONS)
+    run = rd.simulate(plant, [0.0], duration_s=30.0, controller=drawn, engine=engine, **OPTIONS)
     starts = np.array([each.t for each in run.events if each.name.endswith("slides")])
     stops = np.array([each.t for each in run.events if each.name.endswith("sticks")])
     places = np.array([each.q[0] for each in run.events if each.name.endswith("sticks")])

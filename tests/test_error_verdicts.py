@@ -21,7 +21,7 @@ from tests.estimates.truth import truth
 RAIL = arms()["rail"].with_(gravity=(0.0, 0.0, 0.0))
 TOSS = arms()["rail"]
 PANDA = rd.load("panda").with_(lock={"panda_finger_joint1": 0.0})
-SEED, SCENES = 20261121, 36
+SEED, SCENES = 20261121, 24
 READY = np.array([0.3, 0.6, -0.4, -1.2, 0.5, 1.1, 0.2])
 
 
@@ -40,7 +40,7 @@ def test_estimates_of_smooth_runs_are_within_a_factor_of_three() -> None:
     judged = [judge(SEED, index) for index in SMOOTH]
     assert not [str(each) for each in judged if each.misleads]
     usable = [each for each in judged if each.usable]
-    assert len(usable) > 8
+    assert len(usable) > 5
     outside = [str(each) for each in usable if each.run.error.note or not LEAST <= each.ratio <= MOST]
     assert len(outside) <= 1, outside
 

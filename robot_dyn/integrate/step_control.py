@@ -133,16 +133,17 @@ def chosen_step(step: Callable[..., int], error: Callable[..., float]) -> Callab
     """The choice of a step, for a method's `step` and `error`.
 
     choose(f, c, t, end, y, p, own, after, work, lost, control, mesh) → evaluations, Choice. Steps end at the times of
-    the mesh (k,), whatever their error, if there are any.
+    the mesh (k,), if there are any, and before them where the error asks for it: not where both tolerances are 0.
     """
 
     def choose(
         f: Any, c: Any, t: float, end: float, y: Array, p: Array, own: Array, after: Array, work: Any, lost: Array,
         control: Array, mesh: Array,
     ) -> tuple[int, int]:  # fmt: skip
-        if len(mesh) > 0:
-            control[At.END] = target = following(mesh, control, t, end)
-            control[At.TAKEN] = h = target - t
+        end = following(mesh, control, t, end)
+        if control[At.RTOL] + control[At.ATOL] == 0.0:
+            control[At.END], control[At.TAKEN] = end, end - t
+            h = end - t
             made = step(f, c, t, h, y, p, own, after, work, lost)
             return made, Choice.TAKEN if lost[0] == 0 and finite(after) else Choice.TOO_SMALL
         left, evaluations, rejected = abs(end - t), 0, False

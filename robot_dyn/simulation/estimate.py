@@ -37,7 +37,6 @@ from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.stiffness import damped_oscillation
 
 _GAIN = 1.1  # in the time resolved, that a shorter step must bring
-_BEYOND = 4  # steps of a mesh beyond the end of the run
 _FAR_TURN = 1.0  # [rad] in a step: beyond, longer steps may meet the same angles
 _BLIND_TURN = np.pi  # [rad] in a step: beyond, shorter ones may, too
 
@@ -128,18 +127,13 @@ def _by_refinement(
     Steps of a tenth of the tolerance may err alike where stability bounds them, half as long ones where both step over
     a kink at the same place.
     """
+    assert run.ends is not None
+    ends = np.append(0.0, run.ends)
+    halves = np.setdiff1d(np.append(ends[1:], (ends[1:] + ends[:-1]) / 2), [each.t for each in run.events])
     tight = None
     if estimated.kink < np.inf and method.rtol / 10 > LEAST_RTOL:
         tight = companion(Fraction(1), _tolerant(setup, method, 0.1)).shared
-    return estimated.from_refinement(companion(_halved(run), setup).shared, tight)
-
-
-def _halved(run: Record) -> np.ndarray:
-    """Ends of half as long steps; some beyond the end of the run, since a companion may meet later what ended it."""
-    assert run.ends is not None
-    ends = np.append(0.0, run.ends)
-    ends = np.append(ends, ends[-1] + np.diff(ends)[-2:].max() * np.arange(1, _BEYOND + 1))
-    return np.setdiff1d(np.append(ends[1:], (ends[1:] + ends[:-1]) / 2), [each.t for each in run.events])
+    return estimated.from_refinement(companion(halves, setup).shared, tight)
 
 
 def _tolerant(setup: Setup, method: Adaptive, factor: float) -> Setup:

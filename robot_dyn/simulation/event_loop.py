@@ -57,7 +57,7 @@ class Times(NamedTuple):
         period, compared: Periods of samples and of shared states, in [s]; inf for none.
         nodes, every: Whether there is a sample at the start of every segment, and at the end of every step, too.
         end: Of the run.
-        mesh: Where steps end, (k,), in place of error control; none for that.
+        mesh: Where steps end, (k,), if they are to do so at given times; error control makes more of them.
     """
 
     reached: Array
@@ -133,7 +133,7 @@ def event_loop(
                 if not finite(work.K[0]):
                     return Ended.NOT_FINITE
                 remember(times.reached[0], y, p, own, switches)
-                if control[At.NEXT] == 0.0 and len(times.mesh) == 0:
+                if control[At.NEXT] == 0.0 and control[At.RTOL] + control[At.ATOL] > 0.0:
                     now[Now.EVALUATIONS] += first_step(f, times.reached[0], end, y, p, own, after, work, control)
                 now[Now.STEP] = 2
             while times.reached[0] < end:

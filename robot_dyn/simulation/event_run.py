@@ -95,7 +95,7 @@ class EventRun(Followed):
         watch: Of the setup, and its state equation.
         transfers: What it carries.
         made: Gives the functions of a state equation, for the loop, and their parameters (P,).
-        mesh: Where steps end, (k,); None for error control.
+        mesh: Where steps end, (k,), before error control ends them; None for error control alone.
         samples: Whether samples are kept.
         machine_code: The loop of the method as machine code; then the functions are, too.
         on_progress: Called with the time reached, at each step or some ten times a second.

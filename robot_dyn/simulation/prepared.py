@@ -45,7 +45,7 @@ def prepared(
         setup: What to run.
         equation: Its state equation.
         machine: That equation as machine code; None for the interpreted engine.
-        pace: Length of steps, in steps of the setup; or the ends of all steps, in [s].
+        pace: Length of steps, in steps of the setup; or times at which steps end, in [s].
         on_progress: Called with the time reached.
         observer: Sees each step.
         samples: Whether samples are kept.

@@ -154,11 +154,11 @@ def _stepped(made: Scene, count: int) -> rd.Trajectory:
     return rd.simulate(setup)
 
 
-SCENES = {  # of the short form, and how many in the long one: 20 and 1000 in all
-    ("smooth", "planar_2r"): (range(6), 500),
-    ("smooth", "panda"): (range(4), 100),
-    ("set-valued", "planar_2r"): (range(6), 300),
-    ("set-valued", "panda"): (range(1, 9, 2), 100),  # of dry friction; with rigid stops in the long form
+SCENES = {  # of the short form, and how many in the long one: 10 and 1000 in all
+    ("smooth", "planar_2r"): (range(3), 500),
+    ("smooth", "panda"): (range(2), 100),
+    ("set-valued", "planar_2r"): (range(3), 300),
+    ("set-valued", "panda"): (range(1, 5, 2), 100),  # of dry friction; with rigid stops in the long form
 }
 
 
