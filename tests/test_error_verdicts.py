@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import flint
 import numpy as np
@@ -17,6 +17,7 @@ from robot_dyn.simulation.error import Verdict
 from tests.estimates.judge import LEAST, MOST, judge
 from tests.estimates.scenes import FAMILIES, arms
 from tests.estimates.truth import truth
+from tests.hard.stiff_motion import stop
 
 RAIL = arms()["rail"].with_(gravity=(0.0, 0.0, 0.0))
 TOSS = arms()["rail"]
@@ -51,6 +52,15 @@ def test_steps_that_err_alike_at_a_tenth_of_the_tolerance_are_halved(seed: int, 
     judged = judge(seed, index)
     assert not judged.misleads, str(judged)
     assert judged.ratio == pytest.approx(1.0, rel=0.05)  # 1 − 2⁻⁸, where rounding is no part of it
+
+
+def test_halved_steps_are_shortened_where_they_are_still_in_a_stop_that_the_run_has_left() -> None:
+    """A stop of 1e9 N m/rad for 57 µs, and steps of 3 ms behind it: a companion leaves it a little later."""
+    motion = stop(1e9)
+    setup = replace(motion.setup, duration_s=0.25, engine="interpreted")
+    run = rd.simulate(setup, integrator=rd.Adaptive("Rosenbrock", 1e-6, 1e-8))
+    assert run.statistics.companion_evaluations < 3 * run.statistics.evaluations
+    assert run.error.final == pytest.approx(np.abs(run.q - motion.exact(run.t)).max(), rel=0.1)  # 1 − 2⁻⁴
 
 
 def toss(gap: float, stiffness: float, speed: float = 10.0, **options) -> rd.Trajectory:

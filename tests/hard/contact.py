@@ -41,6 +41,7 @@ TITLE = "Friction, stops, impacts"
 U = 2.0**-53
 KKT, OPEN, ADDED = 1e-13, 1e-3, 1e-12
 STEPS, EVENTS = 100, 150  # of time stepping; at most
+MANY = 50  # scenes in a block of the long form, for which compiling the time loops of all methods pays
 SMOOTH = (2, 3)  # places of regularised friction and of stops as springs among the families of `scene`
 
 
@@ -61,7 +62,11 @@ def of_estimates(case: str, found: list[Judgement]) -> Iterator[Row]:
 
 
 def _smooth(name: str, block: range, case: str, seed: int) -> Iterator[Row]:
-    made = [scene(seed, 6 * (i // 2) + SMOOTH[i % 2], name) for i in block]
+    engine = "compiled" if len(block) >= MANY else "interpreted"
+    made = [
+        replace(each, setup=replace(each.setup, engine=engine))
+        for each in (scene(seed, 6 * (i // 2) + SMOOTH[i % 2], name) for i in block)
+    ]
     yield from of_estimates(case, [judged(each, truth, lambda s, t: truth(s, t, 2e-13, 7e-4)) for each in made])
 
 
@@ -136,7 +141,7 @@ def _set_valued(name: str, block: range, case: str, seed: int) -> Iterator[Row]:
     yield Row(case, "energy added by impacts, of the rounding allowed", energy, 1.0)
     yield Row(case, "time stepping: energy added by stops, of that exchanged", max(gained), ADDED)
     yield Row(case, "time stepping that leaks without a word", float(len(broken)), 0.0)
-    if len(ratios) >= 50:
+    if len(ratios) >= MANY:
         yield Row(case, "time stepping: error at a quarter of the step, median", float(np.median(ratios)), 0.4)
 
 
@@ -165,7 +170,7 @@ SCENES = {  # of the short form, and how many in the long one: 10 and 1000 in al
 def _cases() -> Iterator[Case]:
     for (kind, name), (few, all_of_them) in SCENES.items():
         rows = _smooth if kind == "smooth" else _set_valued
-        for block in (few, *(range(k, k + 50) for k in range(0, all_of_them, 50))):
+        for block in (few, *(range(k, k + MANY) for k in range(0, all_of_them, MANY))):
             case = f"{name}, {kind}, scenes {block.start} to {block[-1]}"
             yield Case(case, partial(rows, name, block, case), block != few)
 
