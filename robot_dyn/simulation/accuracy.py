@@ -17,6 +17,7 @@ import numpy as np
 from robot_dyn.errors import RobotDynError
 from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, LEAST_RTOL, STIFF, Adaptive
 from robot_dyn.integrate.explicit import RK4
+from robot_dyn.simulation.remarks import Kind
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.stiffness import fastest
@@ -29,7 +30,7 @@ _LOOSEST = 1e-3
 _ATOL = 0.01  # over rtol
 _TRIES = 4  # runs of a tolerance, at most
 _TOO_MUCH = 1.7  # times the cost of a run with the error that is asked
-_DECIDES = 1.5  # runs that the estimate takes, at most, where the tolerance decides on the steps
+_FEW = 1.5  # steps between ticks, switches and events, where these decide on them
 _MANY = 20  # segments of sampled control, in each of which one step of RK4 may do
 _LONG = 500.0  # |λ| T: explicit steps, of |λ| h = 6 at most, are then as many as those of a run that is not stiff
 _ORDER = {EXPLICIT: 8, STIFF: 5, RK4.name: 4}
@@ -59,7 +60,7 @@ def run_to(setup: Setup, asked: float, run: Callable[[Setup], Trajectory]) -> Tr
     rtol = max(least, min(_LOOSEST, asked ** _LOOSE[STIFF if stiff else EXPLICIT]))
     for k in range(_TRIES):
         made = run(replace(setup, integrator=Adaptive(method, rtol, _ATOL * rtol)))
-        if method == AUTO and not _decides(made) and not _sampled(setup):
+        if method == AUTO and made.statistics.method == EXPLICIT and _stable_at_most(made) and not _sampled(setup):
             other = run(replace(setup, integrator=Adaptive(STIFF, rtol, _ATOL * rtol)))
             made, less = sorted((made, other), key=lambda each: _predicted(each, asked))
             spent += _in_all(less)
@@ -68,7 +69,7 @@ def run_to(setup: Setup, asked: float, run: Callable[[Setup], Trajectory]) -> Tr
         error, method = _resolved(made), made.statistics.method
         least_cost = made.statistics.evaluations * _WEIGHT.get(method, 1) / _TOO_MUCH
         if error <= _TRUSTED * asked and (
-            k > 0 or rtol == _LOOSEST or not _decides(made) or _predicted(made, asked) > least_cost
+            k > 0 or rtol == _LOOSEST or not _decides(setup, made) or _predicted(made, asked) > least_cost
         ):
             return _achieved(made, asked, rtol, spent)
         best = min(best, error)
@@ -104,9 +105,14 @@ def _sampled(setup: Setup) -> bool:
     return setup.controller is not None and setup.controller.period_s > 0
 
 
-def _decides(made: Trajectory) -> bool:
-    """Whether the tolerance decides on the steps: else stability, ticks or events do, and the estimate halves them."""
-    return made.statistics.companion_evaluations <= _DECIDES * made.statistics.evaluations
+def _stable_at_most(made: Trajectory) -> bool:
+    """Whether stability bounds the steps."""
+    return any(each.kind is Kind.STIFF for each in made.remarks)
+
+
+def _decides(setup: Setup, made: Trajectory) -> bool:
+    """Whether the tolerance decides on the steps, and not stability, ticks, switches or events."""
+    return not _stable_at_most(made) and made.statistics.steps > _FEW * (len(setup.segments) + len(made.events))
 
 
 def _in_all(made: Trajectory) -> int:
