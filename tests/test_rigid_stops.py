@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import robot_dyn as rd
 from robot_dyn.errors import EffectError, QueryError
+from tests.estimates.held import held_scene
 from tests.estimates.scenes import arms
 
 ENGINES = ["interpreted", "compiled"]
@@ -151,6 +154,22 @@ def test_stops_that_are_struck_in_turn_come_to_rest_together() -> None:
     assert run.outcome.ending == "finished"
     assert len(run.events) < 300
     assert (np.diff(run.ledger.work["rigid_stops"]) <= 1e-12).all()
+
+
+def test_joints_that_stops_throw_at_each_other_end_at_rest_all_of_them() -> None:
+    """Three joints of a Panda at their stops, each impact of one a kick to the others: v = 0 of all three behind it.
+
+    Impulses of three stops leave the other momenta as they are, and joint 3, which its load pulls off, starts from 0.
+    """
+    setup = held_scene(25158787, 74, "panda")[0].setup
+    run = rd.simulate(replace(setup, duration_s=0.128, estimate_error=False, engine="interpreted"))
+    last = [each for each in run.events if 0.1271 < each.t < 0.1272][-1]
+    np.testing.assert_array_equal(np.array(last.v)[[0, 2, 6]], 0.0)
+    M = setup.plant.dynamics.M(np.array(last.q))
+    first = next(each for each in run.events if each.t > 0.12713)
+    others = [1, 3, 4, 5]
+    change = M @ (np.array(last.v) - first.v)
+    assert np.abs(change[others]).max() < 1e-2 * np.abs(change).max()  # what loads do in 4 µs
 
 
 def test_a_start_beyond_a_stop_is_refused_by_name() -> None:

@@ -66,7 +66,7 @@ class Modes:
         self.of = Coordinates(equation)
         self.laws, self.impulses = self.of.widened(self.effects), self.of.impulses
         self.whole = Mode(np.zeros(len(self.of.joints)), np.zeros(len(self.of.joints)))
-        self._impacts: list[float] = []  # times of the latest
+        self._impacts: list[tuple[float, Array]] = []  # times of the latest, and the coordinates that struck
         rubs = (each.at_rest(np.zeros(n)).most > 0 for each in self.effects if not isinstance(each, RigidStops))
         self._rubs = self.of.wide(sum(rubs, start=np.zeros(n, bool)), False)  # what may stick where its velocity is 0
 
@@ -167,7 +167,7 @@ class Modes:
         strike = np.flatnonzero(side * speeds > 0)
         e = of.wide(np.broadcast_to(0.0 if stops is None else stops.restitution, n).astype(float), of.restitution)
         whole = self._bodies(t, y, held, M)[0]
-        self._impacts = [*self._impacts[1 - _CROWDED :], t]
+        self._impacts = [each for each in self._impacts if t - each[0] < _ACCUMULATED] + [(t, strike)]
         v = _impact(whole, speeds, side, e, np.zeros(len(e), bool))
         after, ended = self._ended(t, y, held, M, v, side, e)
         of_gaps = of.take(y, after)
@@ -192,11 +192,15 @@ class Modes:
         that takes the velocity it has behind the impact. It is not known where another joint strikes in their time.
         """
         of, y, after, ended = self.of, y.copy(), v, np.full(len(e), np.inf)
-        crowded = len(self._impacts) == _CROWDED and t - self._impacts[0] < _ACCUMULATED  # as several stops in turn
+        crowded = len(self._impacts) >= _CROWDED  # as several stops in turn
         while True:  # each joint once, since those at rest do not return
             of.take(y, after)
             whole, load = self._bodies(t, y, held, M)
             a = settled(self.laws, whole, load, y[of.rows], y[of.speeds])[0]
+            if crowded and (turns := self._in_turn(after, a, side) & (ended == np.inf)).any():
+                ended[turns] = 0.0
+                after = _impact(whole, v, side, e, ended < np.inf)
+                continue
             left, meets = _lasts(after, a, side, 0 * e if crowded else e), self._meets(y, a)
             first = int(np.argmin(left))  # the others are kicked by its bounces, and then loaded with it at rest
             meets[first] = np.inf
@@ -204,6 +208,11 @@ class Modes:
                 return after, ended
             ended[first] = left[first]
             after = _impact(whole, v, side, e, ended < np.inf)
+
+    def _in_turn(self, v: np.ndarray, a: np.ndarray, side: np.ndarray) -> np.ndarray:
+        """Which coordinates throw each other at their stops, faster and faster, (N,): all of them end with v = 0."""
+        strikes = np.bincount(np.concatenate([each for _, each in self._impacts]), minlength=len(v))
+        return (strikes > 1) & (side != 0) & (np.abs(v) < _ACCUMULATED * np.abs(a).max())
 
     def _meets(self, y: np.ndarray, a: np.ndarray) -> np.ndarray:
         """In how long each coordinate meets a stop or an end of its gap, at accelerations that stay, (N,)."""
