@@ -30,7 +30,7 @@ def choose(setup: Setup, equation: StateEquation, seen: float = 0) -> tuple[Mach
     Args:
         setup: What to run.
         equation: Its state equation.
-        seen: Evaluations that it is known to take at least.
+        seen: Evaluations that it is known to take at least, without its companions.
 
     Raises:
         TraceError: If engine is "compiled" and a part cannot be; names it.
@@ -42,7 +42,7 @@ def choose(setup: Setup, equation: StateEquation, seen: float = 0) -> tuple[Mach
         return _machine(setup, equation), _label(setup)
     if parts := foreign(setup):  # they may have effects of their own, which a trace would lose
         return None, _interpreted(setup, f"{named(parts[0])} is not the library's own")
-    if max(seen * _with_jacobians(setup, equation.size), _evaluations(setup, equation.size)) < _COMPILED:
+    if max(seen * _in_all(setup, equation.size), _evaluations(setup, equation.size)) < _COMPILED:
         return None, _interpreted(setup, "short: compiling does not pay")
     try:
         return _machine(setup, equation), _label(setup)
@@ -53,7 +53,7 @@ def choose(setup: Setup, equation: StateEquation, seen: float = 0) -> tuple[Mach
 def most_interpreted(setup: Setup, equation: StateEquation, machine: Machine | None) -> float:
     """Evaluations after which a run is begun again in machine code: a count that was guessed too low."""
     guessed = setup.engine == "auto" and machine is None and setup.integrator.controls_error and not foreign(setup)
-    return _COMPILED / _with_jacobians(setup, equation.size) if guessed else inf
+    return _COMPILED / _in_all(setup, equation.size) if guessed else inf
 
 
 def _machine(setup: Setup, equation: StateEquation) -> Machine:
@@ -84,11 +84,17 @@ def _label(setup: Setup) -> str:
 def _evaluations(setup: Setup, size: int) -> float:
     """About how many evaluations of an equation of motion of that size a run takes, with its companions."""
     method: Any = setup.integrator
-    each = _with_jacobians(setup, size)
     if method.controls_error:
-        least = _PER_SEGMENT * segments(setup)
-        return max(_PER_SECOND * setup.duration_s, least) * (3 if setup.estimate_error else 1) * each
-    return setup.steps * (2 if setup.estimate_error else 1) * (method.evaluations_per_step or _GUESSED) * each
+        own = max(_PER_SECOND * setup.duration_s, _PER_SEGMENT * segments(setup))
+    else:
+        own = setup.steps * (method.evaluations_per_step or _GUESSED)
+    return own * _in_all(setup, size)
+
+
+def _in_all(setup: Setup, size: int) -> float:
+    """Evaluations for each one of a run: those of its Jacobians, and of its companions by halved and by other steps."""
+    companions = (2 if setup.integrator.controls_error else 1) if setup.estimate_error else 0
+    return (1 + companions) * _with_jacobians(setup, size)
 
 
 def _with_jacobians(setup: Setup, size: int) -> float:

@@ -27,6 +27,7 @@ PUSH = 4.0  # units of rounding by which a start is moved, to see what the motio
 ROUNDING = 4500  # units of rounding of q, or as many as steps if there are more: differences below are not an error
 COARSE = (Fraction(2), Fraction(3), Fraction(5))
 FINE = (Fraction(1, 2), Fraction(1, 3))
+_UNITS = 100.0  # of rounding, that ten steps may leave in q
 _BAND = 2.0  # a ratio of differences may be this factor off the one of the method's order
 _ROWS = 2000  # of an estimate, at most
 _FAR_OFF = 8.0  # times the bound of the others: beyond, the longest step is no longer in the range of the method
@@ -83,6 +84,13 @@ class Estimated:
         bound = near if tight is None else np.fmax(near, differences(self.path, tight, self.n))
         seen = np.ones(len(near), bool)
         return self._judged(np.where(self._smooth(seen), near, bound), bound, seen)
+
+    def begins_as_rounding(self, companion: Path, until: float) -> bool:
+        """Whether a companion of other steps is apart by rounding alone up to a time, in [s], and by more later."""
+        gap = differences(self.path, companion, self.n)
+        last = min(int(np.searchsorted(self.path.t, until)), len(gap) - 1)
+        size = 1 + float(np.abs(self.path.y[: last + 1, : self.n]).max())
+        return bool(gap[last] < _UNITS * np.finfo(float).eps * size and np.any(gap > self.floor))
 
     def lost_at(self, companion: Path) -> float:
         """Time in [s] at which a companion tells nothing more of the run; inf if it does not."""

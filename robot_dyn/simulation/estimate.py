@@ -36,6 +36,7 @@ from robot_dyn.simulation.smoothness import first_kink
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.stiffness import damped_oscillation
 
+_EARLY = 10  # steps of a method that chooses them, whose error is no longer rounding if it ever is not
 _GAIN = 1.1  # in the time resolved, that a shorter step must bring
 _FAR_TURN = 1.0  # [rad] in a step: beyond, longer steps may meet the same angles
 _BLIND_TURN = np.pi  # [rad] in a step: beyond, shorter ones may, too
@@ -87,20 +88,14 @@ def _by_steps(
     made = no_estimate("fewer than 3 steps between ticks, switches or breaks")
     if turn < _FAR_TURN and min(each.steps for each in setup.segments) >= LEAST_STEPS:
         paths = {pace: companion(pace, setup).shared for pace in COARSE}
-        coarse = paths[COARSE[1]]
-        rounds = carried(
-            coarse, differences(coarse, companion(COARSE[1], _pushed(setup)).shared, estimated.n), estimated.n
-        )
-        rows = np.searchsorted(coarse.key[:-1], estimated.path.key)
-        estimated = replace(estimated, floor=np.fmax(estimated.floor, np.append(rounds, rounds[-1])[rows]))
+        estimated = _with_rounding(estimated, companion(COARSE[1], _pushed(setup)).shared, paths[COARSE[1]])
         made = estimated.from_longer_steps(paths, method.order)
         if made.resolved_until >= estimated.path.t[-1]:
             return made
     half = companion(FINE[0], setup).shared
     if made.resolved_until > 0 and estimated.lost_at(half) < _GAIN * made.resolved_until:
         return made  # chaos: no step of practical length resolves it
-    pushed = differences(estimated.path, companion(Fraction(1), _pushed(setup)).shared, estimated.n)
-    estimated = replace(estimated, floor=np.fmax(estimated.floor, carried(estimated.path, pushed, estimated.n)))
+    estimated = _with_rounding(estimated, companion(Fraction(1), _pushed(setup)).shared, estimated.path)
     return estimated.from_shorter_steps({FINE[0]: half, FINE[1]: companion(FINE[1], setup).shared}, method.order)
 
 
@@ -124,6 +119,7 @@ def _by_refinement(
 ) -> ErrorEstimate:
     """From half as long steps; where something may switch unseen, from a tenth of the tolerance as well.
 
+    Two runs whose errors are rounding alone, magnified, differ by anything: then a push tells how much is magnified.
     Steps of a tenth of the tolerance may err alike where stability bounds them, half as long ones where both step over
     a kink at the same place.
     """
@@ -133,7 +129,17 @@ def _by_refinement(
     tight = None
     if estimated.kink < np.inf and method.rtol / 10 > LEAST_RTOL:
         tight = companion(Fraction(1), _tolerant(setup, method, 0.1)).shared
-    return estimated.from_refinement(companion(halves, setup).shared, tight)
+    halved = companion(halves, setup).shared
+    if estimated.begins_as_rounding(halved, ends[min(_EARLY, len(ends) - 1)]):
+        estimated = _with_rounding(estimated, companion(halves, _pushed(setup)).shared, halved)
+    return estimated.from_refinement(halved, tight)
+
+
+def _with_rounding(estimated: Estimated, pushed: Path, of: Path) -> Estimated:
+    """With what the motion makes of rounding as the floor, seen on a companion and another one that was pushed."""
+    rounds = carried(of, differences(of, pushed, estimated.n), estimated.n)
+    rows = np.searchsorted(of.key[:-1], estimated.path.key)
+    return replace(estimated, floor=np.fmax(estimated.floor, np.append(rounds, rounds[-1])[rows]))
 
 
 def _tolerant(setup: Setup, method: Adaptive, factor: float) -> Setup:

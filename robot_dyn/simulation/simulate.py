@@ -122,7 +122,7 @@ class _Ran(NamedTuple):
         machine, engine: As of `choose`.
         observer: What saw it.
         record: What it left behind.
-        ready: When it began, on the clock.
+        ready: When it began, on the clock, put later by what it compiled.
         said: Remarks on a run before it.
     """
 
@@ -147,7 +147,9 @@ def _by_choice(setup: Setup, equation: StateEquation, on_progress: Callable[[flo
             run = prepared(
                 setup, equation, machine, on_progress=on_progress, observer=observer, most=most, chooses=chooses
             )
-            return _Ran(setup, machine, engine, observer, run.record(), ready, said)
+            before = _spent_on_loops(machine)
+            record = run.record()
+            return _Ran(setup, machine, engine, observer, record, ready + _spent_on_loops(machine) - before, said)
         except TooLongError as found:
             seen = found.evaluations
         except StiffError as found:
@@ -155,6 +157,15 @@ def _by_choice(setup: Setup, equation: StateEquation, on_progress: Callable[[flo
             setup, chooses, said = replace(setup, integrator=stiff), False, (found.remark,)
         except AccumulationError as found:
             setup, chooses, said = replace(setup, integrator=TimeStepping()), False, (*said, found.remark)
+
+
+def _spent_on_loops(machine: Machine | None) -> float:
+    """On the clock of what is compiled in the first call of a loop, which is no time of the run."""
+    if machine is None:
+        return 0.0
+    from robot_dyn.simulation.machine.loop import spent_on_loops
+
+    return spent_on_loops()
 
 
 def _trajectory(

@@ -10,6 +10,7 @@ import threading
 from collections.abc import Callable
 from functools import cache
 from inspect import getsource
+from time import perf_counter
 from typing import Any
 
 from robot_dyn.compiled import elimination as elimination  # a step of a stiff method calls it
@@ -18,6 +19,12 @@ from robot_dyn.compiled.overload import compiled
 from robot_dyn.compiled.primitives import machine_code, reached
 
 Loop = Callable[..., int]
+_clock = [0.0]  # what this process has spent on loading and compiling loops, in [s]
+
+
+def spent_on_loops() -> float:
+    """Time that this process has spent on loading and compiling loops, in [s]; a run's first call does so."""
+    return _clock[0]
 
 
 @cache
@@ -28,8 +35,10 @@ def loop(make: Callable[..., Loop], *functions: Callable[..., Any]) -> Loop:
 
     def advance(*arguments: Any) -> int:
         if not made:
+            began = perf_counter()
             with lock:
                 made[:] = made or [_compiled(make(*functions), arguments, functions[0])]
+            _clock[0] += perf_counter() - began
         return made[0](*arguments)
 
     return advance
