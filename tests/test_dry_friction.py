@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -230,10 +232,15 @@ def test_an_arm_of_seven_joints_sticks_and_slides_to_eleven_digits() -> None:
         assert np.abs(other.q - exact.q).max() <= 10 * tolerance
 
 
+@cache
+def exactly_driven_panda() -> rd.Trajectory:
+    return driven_panda(rd.Adaptive(rtol=1e-13, atol=1e-13), record_period_s=2.0)
+
+
 @pytest.mark.parametrize(("method", "coarsest", "order"), [("order_8", 32, 5.0), ("rk4", 64, 3.5)])
 def test_fixed_steps_keep_their_order_on_an_arm_of_seven_joints(method: str, coarsest: int, order: float) -> None:
     """Mean slope over four halvings from 1/16 s or 1/32 s, where the events are already those of the exact motion."""
-    exact = driven_panda(rd.Adaptive(rtol=1e-13, atol=1e-13), record_period_s=2.0)
+    exact = exactly_driven_panda()
     errors = []
     for k in range(5):
         run = driven_panda(method, step_s=2.0 / (coarsest * 2**k), record_period_s=2.0)

@@ -97,7 +97,7 @@ def examples(folder: Path) -> dict[str, Example]:
     setup = rd.Setup(plant, q, duration_s=0.01, integrator="rk4")
     run, several = rd.simulate(setup), rd.rollouts(setup, np.tile(q, (2, 1)))
     proven = rd.prove(setup, bits=53)
-    measured = rd.work_precision(replace(setup, engine="interpreted"), methods=["rk4"], repeats=1)
+    measured = rd.work_precision(replace(setup, engine="interpreted"), methods=["rk4"], budget_s=2.0, repeats=1)
     priced = rd.cost(setup, budget_s=1e-9, repeats=1)
     saved, scene, urdf = rd.save_run(run, folder / "run"), folder / "scene.toml", folder / "arm.urdf"
     scene.write_text('robot = "cart_pole"\nduration_s = 0.01\n', encoding="utf-8")
@@ -340,8 +340,8 @@ def examples(folder: Path) -> dict[str, Example]:
         "WorkPrecision.sentence": (measured.sentence, {"digits": 6}),
         "work_precision": (
             rd.work_precision,
-            {"what": setup, "q0": q, "v0": v, "duration_s": 0.01, "methods": ["rk4"], "peers": False, "budget_s": 30.0,
-             "repeats": 1, "on_progress": print_nothing},
+            {"what": replace(setup, engine="interpreted"), "q0": q, "v0": v, "duration_s": 0.01, "methods": ["rk4"],
+             "peers": False, "budget_s": 2.0, "repeats": 1, "on_progress": print_nothing},
         ),
         "via_points": (rd.via_points, {"times_s": [0.0, 0.5, 1.0], "points": points, "kind": "cubic"}),
     }  # fmt: skip

@@ -182,7 +182,8 @@ def work_precision(
     made, unable = _able(setup, made)
     variants = [(engines[0], True)] + [(engines[0], False)] * switches(setup) + [(each, True) for each in engines[1:]]
     candidates = [own(setup, each, engine, events) for engine, events in variants for each in made]
-    others, refused = found(setup) if peers else ([], [])
+    with budget.apart():  # other programs are loaded, and build their models
+        others, refused = found(setup) if peers else ([], [])
     place = len(made)  # programs in machine code come before what is interpreted, which takes longest
     candidates[place:place] = others
     walked, interrupted = measured(candidates, exact, budget, repeats)
