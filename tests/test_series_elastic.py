@@ -31,8 +31,9 @@ def slide(effect: rd.SeriesElastic, engine: str = "interpreted", **options) -> r
 def test_two_masses_and_a_spring_move_by_the_matrix_exponential(method, engine: str) -> None:
     """q, q̇, δ, θ̇ under a constant force on the motor; dense output of Rosenbrock, of order 4, leaves 1e-10."""
     F = 1.7
-    fixed = {"step_s": 2e-3} if isinstance(method, str) else {}
-    run = slide(rd.SeriesElastic(K, J, RATIO, D, B), engine, controller=Ramp(F), integrator=method, duration_s=1.0, **fixed)
+    options = {"step_s": 2e-3} if isinstance(method, str) else {}
+    options |= {"controller": Ramp(F), "integrator": method, "duration_s": 1.0}
+    run = slide(rd.SeriesElastic(K, J, RATIO, D, B), engine, **options)
     A = np.array(
         [
             [0, 1, 0, 0, 0],
