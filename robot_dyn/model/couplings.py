@@ -69,12 +69,20 @@ class Couplings(Value):
         if self.trivial:
             return q
         full = self.velocity(q) + self.s0
-        if full.dtype.kind == "f" and np.finfo(full.dtype).eps * np.abs(full).max(initial=0.0) > LEAST_EXACT:
+        if full.dtype.kind == "f" and self._hidden(full[..., self._rounded]):
             raise OverflowedError(
                 "q is so large that rounding hides where the joints that follow others are, to"
                 f" {LEAST_EXACT:g} rad or m; take a smaller q, or rd.Lagrangian(robot, rd.Ball(bits))"
             )
         return full
+
+    @cached_property
+    def _rounded(self) -> Array:
+        """Which of the joints have a position that rounding changes: those that do not just repeat another one's."""
+        return np.any((self.S != 0) & (np.abs(self.S) != 1), axis=1) | (self.s0 != 0)
+
+    def _hidden(self, position: Array) -> bool:
+        return bool(np.finfo(position.dtype).eps * np.abs(position).max(initial=0.0) > LEAST_EXACT)
 
     def velocity(self, v: Array) -> Array:
         """v_full = S v, and accelerations alike: S is constant."""
