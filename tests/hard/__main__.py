@@ -18,7 +18,7 @@ from time import process_time
 from robot_dyn.errors import ModelWarning
 from tests.hard.case import Row
 from tests.hard.families import FAMILIES
-from tests.hard.report import Result, write
+from tests.hard.report import Result, illustrate, write
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -67,6 +67,8 @@ def main() -> int:
             print(f"       {result.family}: {result.case}: {result.seconds:.1f} s", flush=True)
             if options.write:  # after each case, so that one that is stopped leaves those before it
                 write(result, options.write)
+    if options.write:
+        illustrate(options.write)
     count = Counter(row.verdict for result in results for row in result.rows)
     print(f"seed {options.seed}: {dict(count)}")
     return int(count["SILENT"] > 0)

@@ -14,6 +14,9 @@ from typing import final
 from robot_dyn.accuracy.environment import environment
 from tests.hard.case import Row
 from tests.hard.families import FAMILIES
+from tests.hard.figure import save
+
+PICTURE = "pictures/hard_cases.png"
 
 
 @final
@@ -55,8 +58,19 @@ def write(result: Result, folder: Path) -> None:
     (folder / "hard_cases.md").write_text("\n".join(_page(known)) + "\n")
 
 
+def illustrate(folder: Path) -> None:
+    """Draw the figure of the report that is there."""
+    known = json.loads((folder / "hard_cases.json").read_text())
+    save({FAMILIES[name].TITLE: rows for name, rows in _rows(known).items()}, folder / PICTURE)
+
+
+def _rows(known: dict) -> dict[str, list[Row]]:
+    """All figures of each family."""
+    return {name: [_row(each) for case in of.values() for each in case["rows"]] for name, of in known.items()}
+
+
 def _page(known: dict) -> Iterator[str]:
-    rows = {name: [_row(each) for case in of.values() for each in case["rows"]] for name, of in known.items()}
+    rows = _rows(known)
     ours = [row for those in rows.values() for row in those if row.ours]
     count = Counter(row.verdict for row in ours)
     yield "# Hard cases"
@@ -72,6 +86,8 @@ def _page(known: dict) -> Iterator[str]:
         f"{len(ours)} figures of robot_dyn: {count['holds']} hold, {count['said']} said, **{count['SILENT']} silent**."
         f" {'; '.join(sorted({_environment(case) for of in known.values() for case in of.values()}))}."
     )
+    yield ""
+    yield f"![Found over allowed, for each figure of each family]({PICTURE})"
     for name, those in rows.items():
         yield ""
         yield f"## {FAMILIES[name].TITLE}"
