@@ -47,13 +47,17 @@ def main() -> int:
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--write", type=Path, nargs="?", const=DOCS, help="folder of the report")
     options = parser.parse_args()
-    print(f"seed {options.seed}", flush=True)
     tasks = [
         (name, index, options.seed)
         for name in options.family or FAMILIES
         for index, case in enumerate(FAMILIES[name].CASES)
         if (options.full or not case.full) and options.case in case.name
     ]
+    if not tasks:
+        parser.error(f"no case that is asked for holds {options.case!r}; the long ones need --full")
+    if options.write:
+        options.write.mkdir(parents=True, exist_ok=True)
+    print(f"seed {options.seed}", flush=True)
     results = []
     with ProcessPoolExecutor(options.workers) as pool:
         for result in pool.map(run, tasks):
