@@ -36,7 +36,7 @@ from robot_dyn.simulation.smoothness import first_kink
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.stiffness import damped_oscillation
 
-_EARLY = 10  # steps of a method that chooses them, whose error is no longer rounding if it ever is not
+_EARLY = 10  # steps of a method that chooses them: by then an error that is not rounding is more than that
 _GAIN = 1.1  # in the time resolved, that a shorter step must bring
 _FAR_TURN = 1.0  # [rad] in a step: beyond, longer steps may meet the same angles
 _BLIND_TURN = np.pi  # [rad] in a step: beyond, shorter ones may, too
