@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.special import ellipj, ellipk
@@ -184,6 +186,8 @@ def test_a_frame_that_follows_a_circle_has_a_deviation_in_metres() -> None:
     np.testing.assert_allclose(run.deviation, p - desired, atol=1e-15)
     assert run.tracking_error == pytest.approx(np.sqrt(np.mean((p - desired) ** 2)))
     assert "tracking error of the frame [m]: " in run.summary
+    far = replace(run, deviation=np.full_like(run.deviation, 3e200))  # of a run that diverged: its square overflows
+    assert far.tracking_error == 3e200
 
 
 def test_a_run_from_python_carries_its_origin() -> None:

@@ -191,7 +191,10 @@ class Trajectory(Value):
     @property
     def tracking_error(self) -> float | None:
         """Root mean square of the deviation over samples and joints or axes; None without a reference."""
-        return None if self.deviation is None else float(np.sqrt(np.mean(self.deviation**2)))
+        if self.deviation is None:
+            return None
+        scale = np.ldexp(1.0, np.frexp(np.abs(self.deviation).max(initial=0.0))[1] - 1)  # that squares do not overflow
+        return float(scale * np.sqrt(np.mean((self.deviation / scale) ** 2)))
 
     @property
     def leak(self) -> str:

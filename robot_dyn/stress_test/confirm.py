@@ -81,7 +81,8 @@ def told(setup: Setup, at: np.ndarray, deadline: Deadline, numerical: bool = Fal
     """
     run = simulate(replace(setup, estimate_error=numerical), on_progress=deadline.check)
     units = np.sqrt(np.diagonal(setup.plant.dynamics.M(at)))
-    off = np.linalg.norm((run.q - at) * units, axis=1)
+    with np.errstate(over="ignore"):  # a run that diverged may be off by inf
+        off = np.linalg.norm((run.q - at) * units, axis=1)
     late = off[run.t >= run.t[-1] / 2]
     finished = run.outcome.ending is Ending.FINISHED and bool(np.isfinite(late).all())
     growth = float(late.max() / np.linalg.norm((setup.q0 - at) * units)) if finished else float("inf")
