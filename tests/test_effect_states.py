@@ -22,7 +22,9 @@ ARM = rd.load("planar_2r")
 Q = np.array([0.1, 0.2])
 FRICTION = rd.LuGreFriction(120.0, [1.0, 0.8], 0.8, [1.0, 0.5], 1.5, 0.1)
 BOTH = pytest.mark.parametrize("engine", ["interpreted", "compiled"])
-COMPILED = pytest.mark.parametrize("engine", [pytest.param("interpreted", marks=pytest.mark.stress), "compiled"])
+SLOW_INTERPRETED = pytest.mark.parametrize(
+    "engine", [pytest.param("interpreted", marks=pytest.mark.stress), "compiled"]
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +88,7 @@ def test_a_limit_before_a_lag_cuts_the_command_and_one_after_it_the_torque(effec
         assert run.u.max() == pytest.approx(peak, abs=1e-9)
 
 
-@COMPILED
+@SLOW_INTERPRETED
 def test_lugre_friction_slides_steadily_at_its_level(engine: str) -> None:
     """Pushed by F beyond breakaway the speed goes to the root of F = g(v) + σ₂ v, and z to g / σ₀."""
     s0, s1, s2, fc, fs, vs, F = 400.0, 3.0, 2.0, 1.0, 1.4, 0.2, 2.5
@@ -100,7 +102,7 @@ def test_lugre_friction_slides_steadily_at_its_level(engine: str) -> None:
     assert run.ledger.stored["lugre_friction"][-1] == pytest.approx(level**2 / (2 * s0), rel=1e-9)
 
 
-@COMPILED
+@SLOW_INTERPRETED
 def test_lugre_friction_at_rest_is_a_spring(engine: str) -> None:
     """Pushed slowly by F < f, with g = f: dz/dx = 1 − σ₀ z / f, so it rests at x = −(f/σ₀) ln(1 − F/f), σ₀ z = F."""
     s0, f, F = 50.0, 1.2, 0.7

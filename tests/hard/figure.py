@@ -27,7 +27,7 @@ def draw(families: Mapping[str, Sequence[Row]]) -> Figure:
     figure = Figure((9.0, 0.42 * len(families) + 1.3), facecolor=COLOURS["paper"], layout="constrained")
     axes = figure.add_subplot()
     scatter = np.random.default_rng(0)  # marks beside each other, that they may be told apart
-    for verdict, (colour, marker, label) in LOOK.items():
+    for verdict, (number, marker, label) in LOOK.items():
         marks = [
             (_ratio(row), line + scatter.uniform(-0.28, 0.28))
             for line, rows in enumerate(families.values())
@@ -36,18 +36,15 @@ def draw(families: Mapping[str, Sequence[Row]]) -> Figure:
         ]
         if marks:
             x, y = zip(*marks, strict=True)
-            axes.scatter(x, y, 14, COLOURS["lines"][colour], marker, label=label, alpha=0.6, linewidths=0)
+            colour = COLOURS["lines"][number]
+            axes.scatter(x, y, s=14, c=colour, marker=marker, label=label, alpha=0.6, linewidths=0)
     axes.axvline(1.0, color=COLOURS["ink"], linewidth=1.0)
     axes.set_xscale("log")
     axes.set_xlim(LEAST / 2, MOST * 2)
     axes.set_yticks(range(len(families)), list(families))
     axes.invert_yaxis()
-    styled(
-        axes,
-        COLOURS,
-        "found / allowed; at the left edge 1e-6 and less, at the right one 1e3 and more, or no answer",
-        "",
-    )
+    edges = "at the left edge 1e-6 and less, at the right one 1e3 and more, or no answer"
+    styled(axes, COLOURS, f"found / allowed; {edges}", "")
     axes.grid(visible=False, axis="y")
     figure.legend(loc="outside upper left", ncols=3, fontsize=8, frameon=False, labelcolor=COLOURS["ink"])
     return figure

@@ -55,23 +55,28 @@ def write(result: Result, folder: Path) -> None:
         if name in known
     }
     path.write_text(json.dumps(known, indent=1, ensure_ascii=False) + "\n")
-    (folder / "hard_cases.md").write_text("\n".join(_page(known)) + "\n")
+    (folder / "hard_cases.md").write_text(page(known))
 
 
 def illustrate(folder: Path) -> None:
     """Draw the figure of the report that is there."""
     known = json.loads((folder / "hard_cases.json").read_text())
-    save({FAMILIES[name].TITLE: rows for name, rows in _rows(known).items()}, folder / PICTURE)
+    save({FAMILIES[name].TITLE: each for name, each in rows(known).items()}, folder / PICTURE)
 
 
-def _rows(known: dict) -> dict[str, list[Row]]:
+def rows(known: dict) -> dict[str, list[Row]]:
     """All figures of each family."""
     return {name: [_row(each) for case in of.values() for each in case["rows"]] for name, of in known.items()}
 
 
-def _page(known: dict) -> Iterator[str]:
-    rows = _rows(known)
-    ours = [row for those in rows.values() for row in those if row.ours]
+def page(known: dict) -> str:
+    """The page of what hard_cases.json holds."""
+    return "\n".join(_lines(known)) + "\n"
+
+
+def _lines(known: dict) -> Iterator[str]:
+    figures = rows(known)
+    ours = [row for those in figures.values() for row in those if row.ours]
     count = Counter(row.verdict for row in ours)
     yield "# Hard cases"
     yield ""
@@ -88,7 +93,7 @@ def _page(known: dict) -> Iterator[str]:
     )
     yield ""
     yield f"![Found over allowed, for each figure of each family]({PICTURE})"
-    for name, those in rows.items():
+    for name, those in figures.items():
         yield ""
         yield f"## {FAMILIES[name].TITLE}"
         yield ""

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 
+from tests.hard.__main__ import DOCS
 from tests.hard.case import Case
 from tests.hard.chains import CHAINS, FOLDER, LONG, file_of
 from tests.hard.families import FAMILIES
+from tests.hard.figure import draw
+from tests.hard.report import page, rows
 
 SEED = 1
 ALL = [
@@ -22,6 +27,15 @@ def test_no_figure_is_wrong_without_a_word(case: Case) -> None:
     rows = list(case.rows(SEED))
     assert rows
     assert not [each for each in rows if each.silent]
+
+
+def test_the_page_says_what_its_figures_say_and_its_picture_has_a_mark_for_each() -> None:
+    """docs/hard_cases.md follows from hard_cases.json and from the words of the families, as they are."""
+    known = json.loads((DOCS / "hard_cases.json").read_text())
+    assert (DOCS / "hard_cases.md").read_text() == page(known)
+    figures = rows(known)
+    drawn = sum(len(marks.get_offsets()) for marks in draw(figures).axes[0].collections)
+    assert drawn == sum(row.ours for those in figures.values() for row in those)
 
 
 def test_the_files_are_those_that_the_script_makes() -> None:

@@ -3,7 +3,7 @@
 Bit-equal where the same instructions run: threads, code from the cache, another process, runs beside one that diverges.
 Elsewhere sums are ordered otherwise, and answers differ by 4 κ u of the scales of `compare` at most, κ that of M scaled
 to a unit diagonal (1 where M is singular): what is solved has it as a factor, and entries of M, which is its own scale,
-are that much smaller than their terms where links fold back (7 u between batch and single in z1, κ 10 and more). Right
+are that much smaller than their terms where links fold back (5 to 8 u of a batch of z1, κ 13 to 32). Right
 angles written out in full change an rpy by a known angle δ: an entry is made of products of rotations, so that it
 changes by 2 n δ of its terms at most, and forward dynamics by κ times as much. A run of RK4 by either engine adds up N
 steps: 4 κ u √N of |q| + |v|, where the motion is not chaotic.

@@ -19,12 +19,20 @@ from robot_dyn.compiled.overload import compiled
 from robot_dyn.compiled.primitives import machine_code, reached
 
 Loop = Callable[..., int]
-_clock = [0.0]  # what this process has spent on loading and compiling loops, in [s]
+
+
+class _Spent(threading.local):
+    """Of each thread on its own: what another one compiles is no time of this one's run."""
+
+    seconds = 0.0
+
+
+_spent = _Spent()
 
 
 def spent_on_loops() -> float:
-    """Time that this process has spent on loading and compiling loops, in [s]; a run's first call does so."""
-    return _clock[0]
+    """Time that this thread has spent on loading and compiling loops, in [s]; a run's first call does so."""
+    return _spent.seconds
 
 
 @cache
@@ -38,7 +46,7 @@ def loop(make: Callable[..., Loop], *functions: Callable[..., Any]) -> Loop:
             began = perf_counter()
             with lock:
                 made[:] = made or [_compiled(make(*functions), arguments, functions[0])]
-            _clock[0] += perf_counter() - began
+            _spent.seconds += perf_counter() - began
         return made[0](*arguments)
 
     return advance
