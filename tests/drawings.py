@@ -102,7 +102,7 @@ def collada_points(path: Path) -> np.ndarray:
                 case "rotate":
                     *axis, degrees = values.astype(float)
                     a = np.array(axis) / max(np.linalg.norm(axis), 1e-300)
-                    K = np.cross(np.eye(3), -a)
+                    K = np.cross(np.eye(3), a)  # a × x = K x
                     R = np.eye(4)
                     angle = np.deg2rad(degrees)
                     R[:3, :3] += np.sin(angle) * K + (1 - np.cos(angle)) * K @ K

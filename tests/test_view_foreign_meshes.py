@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from robot_dyn.view.geometry import meshes
-from tests.drawings import box, boxes, drawn, mesh_visual, stl, urdf
+from tests.drawings import box, boxes, collada_points, drawn, mesh_visual, stl, urdf
 
 pytestmark = pytest.mark.filterwarnings("ignore::robot_dyn.errors.ModelWarning")
 
@@ -129,7 +129,94 @@ def test_gltf_is_read_with_its_buffers(uri: str | None, file: str | None, tmp_pa
     assert here.notes == ()
     (piece,) = here.pieces
     assert piece.rgba == (1, 0, 0, 1)
-    assert np.array_equal(box(piece.mesh.vertices), box(CORNERS))
+    assert np.array_equal(box(piece.mesh.vertices), box(z_up(CORNERS)))
+
+
+def z_up(points: np.ndarray) -> np.ndarray:
+    """Of coordinates in which y is up, as Drake turns glTF: x ↦ x, y ↦ z, z ↦ −y."""
+    x, y, z = points.T
+    return np.column_stack([x, -z, y])
+
+
+def binary(description: dict) -> bytes:
+    """A glTF as .glb, its buffer in the second chunk."""
+    data = base64.b64decode(description["buffers"][0].pop("uri").partition(",")[2])
+    text = json.dumps(description).encode()
+    chunks = ((b"JSON", text + b" " * (-len(text) % 4)), (b"BIN\0", data + b"\0" * (-len(data) % 4)))
+    body = b"".join(struct.pack("<I", len(part)) + kind + part for kind, part in chunks)
+    return b"glTF" + struct.pack("<II", 2, 12 + len(body)) + body
+
+
+@pytest.mark.parametrize("scale", [(1.0, 1.0, 1.0), (2.0, 0.5, 3.0), (-1.5, 1.0, 2.0)])
+@pytest.mark.parametrize("name", ["a.gltf", "a.glb"])
+def test_gltf_stands_where_its_specification_and_drake_put_it(name: str, scale: tuple, tmp_path: Path) -> None:
+    """Nodes T R S, then y up turned to z up, then the scale of the URDF along the axes of the shape, then its origin.
+
+    Two instances of one mesh, one of them mirrored below a node with a matrix; float32 leaves 1e-6 m. The outside is
+    outside: the volume by the divergence theorem is positive, and that of the tetrahedra.
+    """
+    a = 0.7
+    axis = np.array([2.0, -1.0, 2.0]) / 3
+    quaternion = [*(np.sin(a / 2) * axis), np.cos(a / 2)]
+    K = np.cross(np.eye(3), axis)  # axis × x = K x
+    R, S, t = np.eye(3) + np.sin(a) * K + (1 - np.cos(a)) * K @ K, np.diag([1.0, -2.0, 0.5]), np.array([0.1, 0.2, 0.3])
+    above = np.array([[0.0, -1, 0, 0.4], [1, 0, 0, -0.5], [0, 0, 1, 0.6], [0, 0, 0, 1]])
+    nodes = [
+        {"children": [1], "matrix": above.T.ravel().tolist()},
+        {"mesh": 0, "translation": t.tolist(), "rotation": quaternion, "scale": np.diag(S).tolist()},
+        {"mesh": 0, "translation": [-1.0, 0.0, 2.0]},
+    ]
+    description = gltf() | {"nodes": nodes, "scenes": [{"nodes": [0, 2]}]}
+    (tmp_path / name).write_bytes(binary(description) if name == "a.glb" else json.dumps(description).encode())
+    origin, mesh = '<origin xyz="0.3 -0.2 0.1" rpy="0 0 1.5707963267948966"/>', f'scale="{" ".join(map(str, scale))}"'
+    here = drawn(urdf(mesh_visual(name, mesh, origin)), tmp_path)
+    assert (here.notes, here.remarks) == ((), ())
+    (piece,) = here.pieces
+
+    low, high = (CORNERS @ (R @ S).T + t) @ above[:3, :3].T + above[:3, 3], CORNERS + [-1.0, 0.0, 2.0]
+    x, y, z = (z_up(np.concatenate([low, high])) * scale).T
+    expected = np.column_stack([-y, x, z]) + [0.3, -0.2, 0.1]
+    found = piece.mesh.vertices @ piece.pose[:3, :3].T + piece.pose[:3, 3]
+    distance = np.linalg.norm(found[:, None] - expected[None], axis=2)
+    assert distance.min(axis=0).max() < 1e-6
+    assert distance.min(axis=1).max() < 1e-6
+    volume = np.linalg.det(piece.mesh.vertices[piece.mesh.faces].astype(float)).sum() / 6
+    assert volume == pytest.approx(0.3 * 0.2 * 0.1 / 6 * (1 + 1.0) * abs(np.prod(scale)), rel=1e-5)
+
+
+@pytest.mark.parametrize(("up", "told"), [("y", False), ("z", True)])
+def test_gltf_written_with_z_up_is_known_by_the_masses_and_told(up: str, told: bool, tmp_path: Path) -> None:
+    """The link's centre of mass is 0.2 m along z, and the shape a needle of 0.4 m that a writer took for upright."""
+    corners = np.array([[0.01, 0, 0], [0, 0.01, 0], [0, 0, 0.4], [0, 0, 0]], dtype="f4")
+    description, data = gltf(), np.roll(corners, -1, axis=1) if up == "y" else corners
+    inside = "data:application/octet-stream;base64," + base64.b64encode(data.tobytes() + FACES.tobytes()).decode()
+    description["buffers"][0]["uri"] = inside
+    (tmp_path / "a.gltf").write_text(json.dumps(description))
+    here = drawn(urdf(mesh_visual("a.gltf")), tmp_path)
+    assert [("glTF" in each, "y up" in each) for each in here.remarks] == [(True, True)] * told
+    low, high = boxes(here)["arm"]
+    assert high[2] - low[2] == pytest.approx(0.4, abs=1e-6)
+    assert high[2] == pytest.approx(0.4, abs=1e-6)
+
+
+UNREAD = {
+    "instances by EXT_mesh_gpu_instancing": {"extensionsUsed": ["EXT_mesh_gpu_instancing"]},
+    "buffers compressed by EXT_meshopt_compression": {"extensionsUsed": ["EXT_meshopt_compression"]},
+    "sparse accessors": {"accessors": [{"count": 1, "sparse": {}}]},
+    "skins": {"nodes": [{"mesh": 0, "skin": 0}]},
+    "weights of morph targets": {"nodes": [{"mesh": 0, "weights": [0.5]}]},
+    "triangle fans": {"meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "mode": 6}]}]},
+    "normalized positions": {
+        "accessors": [{"bufferView": 0, "componentType": 5122, "count": 4, "type": "VEC3", "normalized": True}]
+    },
+}
+
+
+@pytest.mark.parametrize("what", UNREAD)
+def test_gltf_that_would_be_drawn_wrong_is_replaced_and_told(what: str, tmp_path: Path) -> None:
+    (tmp_path / "a.gltf").write_text(json.dumps(gltf() | UNREAD[what]))
+    here = drawn(urdf(mesh_visual("a.gltf")), tmp_path)
+    assert f"has {what}, which are not read; export it without them" in here.notes[0]
 
 
 @pytest.mark.parametrize(
@@ -204,6 +291,16 @@ def test_collada_keeps_its_shape_and_colour_beside_what_is_not_drawn(remains: st
     assert piece.rgba == (1, 0, 0, 1)
     assert len(piece.mesh.faces) == 4
     assert np.array_equal(box(piece.mesh.vertices), box(CORNERS))
+
+
+def test_nodes_of_collada_turn_by_the_right_hand(tmp_path: Path) -> None:
+    """x ↦ t + R S x with a quarter turn about z: (x, y, z) ↦ (1 − 2 y, x, z)."""
+    nodes = "<node><translate>1 0 0</translate><rotate>0 0 1 90</rotate><scale>1 2 1</scale>"
+    (tmp_path / "a.dae").write_text(COLLADA.format(**SOUND).replace("<node>", nodes))
+    x, y, z = CORNERS.T
+    expected = box(np.column_stack([1 - 2 * y, x, z]))
+    for found in (boxes(drawn(urdf(mesh_visual("a.dae")), tmp_path))["arm"], box(collada_points(tmp_path / "a.dae"))):
+        assert np.abs(found - expected).max() < 1e-6
 
 
 # --- packages

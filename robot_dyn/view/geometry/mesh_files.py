@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path, PureWindowsPath
 from stat import S_ISREG
@@ -15,6 +16,12 @@ from robot_dyn.errors import RobotDynError, shorten
 
 MAX_BYTES = 64 * 2**20  # of one mesh or texture; the largest of example-robot-data has 28 MiB
 MAX_NODES = 20_000  # of a scene when every instance is counted
+_SHAPING = {
+    "EXT_mesh_gpu_instancing": "instances by EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression": "buffers compressed by EXT_meshopt_compression",
+    "KHR_meshopt_compression": "buffers compressed by KHR_meshopt_compression",
+}
+_FAN = 6  # mode of a primitive of glTF
 _UNSEEN = ("library_lights", "library_cameras", "library_animations", "instance_light", "instance_camera")
 
 
@@ -99,7 +106,10 @@ def checked_collada(data: bytes) -> etree._Element:
 
 
 def check_gltf(data: bytes, named: Any) -> None:
-    """Refuse accessors that claim more than there is: the reader would make arrays of zeros of that size."""
+    """Refuse what the reader would draw wrong without a word, and accessors that claim more than there is.
+
+    Of the latter it would make arrays of zeros of that size.
+    """
     binary = data[:4] == b"glTF"
     head = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")] if binary else data)
     addresses = [each.get("uri", "") for each in head.get("buffers", ())]
@@ -108,3 +118,22 @@ def check_gltf(data: bytes, named: Any) -> None:
         raise MeshError("claims more vertices than it has bytes; export it anew")
     if len(head.get("nodes", ())) > MAX_NODES:
         raise MeshError(f"has more than {MAX_NODES} nodes; simplify it")
+    if unread := next(_unread(head), None):
+        raise MeshError(f"has {unread}, which are not read; export it without them")
+
+
+def _unread(head: Any) -> Iterator[str]:
+    """What shapes the triangles of a glTF and is passed over by its reader."""
+    yield from (what for name, what in _SHAPING.items() if name in head.get("extensionsUsed", ()))
+    accessors, meshes, nodes = (head.get(key, ()) for key in ("accessors", "meshes", "nodes"))
+    if any("sparse" in each for each in accessors):
+        yield "sparse accessors"
+    if any("skin" in each for each in nodes):
+        yield "skins"
+    if any(any(each.get("weights", ())) for each in (*meshes, *nodes)):
+        yield "weights of morph targets"
+    for primitive in (each for mesh in meshes for each in mesh["primitives"]):
+        if primitive.get("mode") == _FAN:
+            yield "triangle fans"
+        if accessors[primitive["attributes"]["POSITION"]].get("normalized"):
+            yield "normalized positions"

@@ -1,7 +1,8 @@
 """Mesh files as plain triangles: one mesh for each material, creased normals, equal corners merged.
 
-Coordinates are read as rviz and coal read them: the nodes of a scene are applied, a Collada `<unit>` is applied, and
-`<up_axis>` (like the y-up of glTF) is not, but told: Gazebo applies it. [rviz, mesh_loader.cpp]
+The nodes of a scene are applied, and a Collada `<unit>`. In glTF y is up, by its specification; it is turned to z up,
+before the scale of the URDF, as in Drake and rviz. A Collada `<up_axis>` is not followed, as in rviz, but told: Gazebo
+follows it. STL, OBJ and PLY say nothing of an axis. [rviz, mesh_loader.cpp; drake, internal_render_engine_vtk.cc]
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ from robot_dyn.view.geometry.triangles import Mesh, welded
 
 MAX_PIXELS = 1024  # of a texture's longer side in the page
 FORMATS = ("stl", "dae", "obj", "ply", "glb", "gltf")
+COLLADA, GLTF = "Collada", "glTF"  # the formats with files in which y is up
+Z_UP = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # from y up: a quarter turn about x
 
 Rgba = tuple[float, float, float, float]
 WHITE: Rgba = (1.0, 1.0, 1.0, 1.0)
@@ -37,20 +40,27 @@ class Part:
     """The triangles of a file that share one material.
 
     Attributes:
-        mesh: The triangles, scaled, in the frame of the file.
+        mesh: The triangles, scaled, in the frame of the file or turned to z up.
         rgba: Their colour, or None if the file gives them none.
         image: Their texture as PNG, or None.
-        y_up: Whether the file says that y is up; its coordinates are not turned.
+        y_up: The format of a file that says that y is up, else None.
     """
 
     mesh: Mesh
     rgba: Rgba | None = None
     image: bytes | None = None
-    y_up: bool = False
+    y_up: str | None = None
 
 
-def read(path: Path, scale: Any = (1.0, 1.0, 1.0)) -> tuple[tuple[Part, ...], tuple[str, ...]]:
+def read(
+    path: Path, scale: Any = (1.0, 1.0, 1.0), turned: frozenset[str] = frozenset({GLTF})
+) -> tuple[tuple[Part, ...], tuple[str, ...]]:
     """The triangles of a mesh file, each coordinate times its scale (3,); in a mirror image the outside stays outside.
+
+    Args:
+        path: The file.
+        scale: Factors along the axes of the shape, after a turn.
+        turned: The formats whose files, where they say that y is up, are turned to z up.
 
     Returns:
         The parts, and what of their materials and textures cannot be read.
@@ -70,7 +80,8 @@ def read(path: Path, scale: Any = (1.0, 1.0, 1.0)) -> tuple[tuple[Part, ...], tu
                 parts = _uncoloured(corners, factors)
             else:
                 scene, unit, y_up = _scene(data, kind, path.parent, missing)
-                parts = tuple(_parts(scene, unit * factors, missing, y_up))
+                A = unit * factors[:, None] * (Z_UP if y_up in turned else np.eye(3))
+                parts = tuple(_parts(scene, A, missing, y_up))
     except MeshError:
         raise
     except Exception as error:  # a damaged file makes the readers raise anything
@@ -121,16 +132,17 @@ def png(picture: Any) -> bytes:
         raise MeshError(f"is damaged ({type(error).__name__}: {shorten(error, 80)})") from None
 
 
-def _scene(data: bytes, kind: str, folder: Path, missing: list[str]) -> tuple[Any, float, bool]:
-    """What trimesh reads, nothing merged; the unit of its lengths in [m]; and whether it says that y is up."""
+def _scene(data: bytes, kind: str, folder: Path, missing: list[str]) -> tuple[Any, float, str | None]:
+    """What trimesh reads, nothing merged; the unit of its lengths in [m]; and its format if it says that y is up."""
     import trimesh
 
     named = beside(folder, missing, anywhere=kind not in ("glb", "gltf"))  # textures often stand in ../textures
     choices = {"file_type": kind, "resolver": named, "process": False}
     if kind in ("glb", "gltf"):
         check_gltf(data, named)
+        return trimesh.load_scene(io.BytesIO(data), **choices), 1.0, GLTF
     if kind != "dae":
-        return trimesh.load_scene(io.BytesIO(data), **choices), 1.0, False
+        return trimesh.load_scene(io.BytesIO(data), **choices), 1.0, None
     root = checked_collada(data)
     unit = root.find("{*}asset/{*}unit")
     try:
@@ -144,11 +156,12 @@ def _scene(data: bytes, kind: str, folder: Path, missing: list[str]) -> tuple[An
         for each in (*root.iterfind(".//{*}bind_material"), *root.iterfind("{*}library_effects")):
             each.getparent().remove(each)
         scene = trimesh.load_scene(io.BytesIO(etree.tostring(root)), **choices)
-    return scene, metres if 0 < metres < np.inf else 1.0, root.findtext("{*}asset/{*}up_axis", "").strip() == "Y_UP"
+    y_up = root.findtext("{*}asset/{*}up_axis", "").strip() == "Y_UP"
+    return scene, metres if 0 < metres < np.inf else 1.0, COLLADA if y_up else None
 
 
-def _parts(scene: Any, scale: ndarray, missing: list[str], y_up: bool) -> Iterator[Part]:
-    """One part for each material, from all nodes of the scene that wear it."""
+def _parts(scene: Any, A: ndarray, missing: list[str], y_up: str | None) -> Iterator[Part]:
+    """One part for each material, from all nodes of the scene that wear it, after x ↦ A x with A (3, 3)."""
     groups: dict[tuple[Any, ...], list[tuple[Any, ...]]] = {}
     images: dict[int, bytes | None] = {}
     for node in scene.graph.nodes_geometry:
@@ -156,7 +169,7 @@ def _parts(scene: Any, scale: ndarray, missing: list[str], y_up: bool) -> Iterat
         geometry = scene.geometry[name]
         if not len(getattr(geometry, "faces", ())):
             continue  # lines and points
-        corners, normals = _placed(geometry, scale[:, None] * transform[:3])
+        corners, normals = _placed(geometry, A @ transform[:3])
         rgba, picture, *columns = _look(geometry)
         if picture is not None and id(picture) not in images:
             try:

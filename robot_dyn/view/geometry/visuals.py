@@ -6,12 +6,12 @@ link's collision shape, or else the ellipsoid of its inertia.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
-from typing import Any, final
+from typing import Any, TypeVar, final
 
 import numpy as np
 from numpy import ndarray
@@ -32,6 +32,13 @@ GREY: Rgba = (0.7, 0.7, 0.7, 1.0)  # of what has no material; rviz takes red
 _STAND_IN: Rgba = (0.9, 0.6, 0.3, 1.0)  # of what is drawn in place of a visual
 _INERTIA: Rgba = (0.2, 0.4, 1.0, 0.35)
 _LARGEST = 1e6  # [m], of a length or a position
+_Y_UP_REMARKS = {  # of files that are read the other way than usual
+    meshes.COLLADA: "its Collada meshes with <up_axis> Y_UP are turned to z up, as in Gazebo: raw, as in rviz, they"
+    " stand away from the masses of their links",
+    meshes.GLTF: "its glTF meshes are not turned to z up: in glTF y is up, but turned they stand away from the masses of"
+    " their links; export them with y up",
+}
+T = TypeVar("T")
 
 
 @final
@@ -81,9 +88,7 @@ def drawing(robot: Robot, package_dirs: Iterable[str | Path] = (), *, inertia: b
         Pieces and notes; a mesh that is missing or damaged is noted and replaced, not raised.
     """
     artist = _Artist(robot, package_dirs)
-    pieces = artist.robot_pieces()
-    if artist.turn_up():
-        pieces = artist.robot_pieces()
+    pieces = artist.upright(artist.robot_pieces)
     if inertia:
         for link, pose, mesh, bent in inertia_boxes(robot):
             pieces.append(Piece(link, pose, mesh, _INERTIA))
@@ -96,11 +101,8 @@ def solids(
     robot: Robot, package_dirs: Iterable[str | Path] = ()
 ) -> tuple[dict[str, tuple[Piece, ...]], tuple[str, ...]]:
     """The collision shapes of each link, or its visuals where it has none that can be read; and what cannot."""
-    artist, found = _Artist(robot, package_dirs), {}
-    for link in artist.element.iterfind("link"):
-        name = (link.get("name") or "").strip()
-        for kind in ("collision", "visual"):
-            found[name] = found.get(name) or tuple(artist.readable(name, link, kind))
+    artist = _Artist(robot, package_dirs)
+    found = artist.upright(artist.link_solids)
     return found, tuple(dict.fromkeys(artist.notes))
 
 
@@ -113,7 +115,8 @@ class _Artist:
         self.checked = {link.get("name"): link for link in robot.description.element.iterfind("link")}
         self.notes, self.remarks = list[str](), list[str]()
         self.file = partial(find_file, source=self.source, package_dirs=tuple(package_dirs), remarks=self.remarks)
-        self._turn, self._y_up = np.eye(4), []  # of what says that y is up: link, pose and mesh
+        self._turned = frozenset({meshes.GLTF})  # the formats of which files with y up are turned to z up
+        self._y_up: list[tuple[str, str, ndarray, Mesh]] = []  # of these files: format, link, pose and mesh
         self._read = cache(meshes.read)  # so that pieces of one file share their meshes
         self._primitive = cache(lambda tag, lengths: PRIMITIVES[tag][0](*lengths))
         self._texture = cache(lambda path: meshes.png(mesh_files.bounded(path)))
@@ -132,21 +135,34 @@ class _Artist:
         self.remarks.append(f"{self.name}: no link has a <visual>; {what}")
         return pieces
 
-    def turn_up(self) -> bool:
-        """Turn the meshes that say "y is up", as Gazebo does and rviz does not, if they then stand nearer to masses."""
-        turn = homogeneous(np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]), np.zeros(3))
-        raw = turned = 0.0
-        for name, pose, mesh in self._y_up:
-            for origin in self.checked[name].iterfind("inertial/origin"):
+    def upright(self, draw: Callable[[], T]) -> T:
+        """What is drawn; drawn again if files with y up, turned or not, stand nearer to masses the other way."""
+        drawn = draw()
+        wrong = frozenset(each for each in _Y_UP_REMARKS if self._nearer_the_other_way(each))
+        if not wrong:
+            return drawn
+        self._turned ^= wrong
+        self.remarks += [f"{self.name}: {_Y_UP_REMARKS[each]}" for each in sorted(wrong)]
+        return draw()
+
+    def _nearer_the_other_way(self, kind: str) -> bool:
+        R = meshes.Z_UP.T if kind in self._turned else meshes.Z_UP
+        turn, here, there = homogeneous(R, np.zeros(3)), 0.0, 0.0
+        for each, name, pose, mesh in self._y_up:
+            for origin in self.checked[name].iterfind("inertial/origin") if each == kind else ():
                 com = np.array(origin.get("xyz").split(), dtype=float)  # checked by the hardened read
-                raw += off_centre(mesh, pose, com)
-                turned += off_centre(mesh, pose @ turn, com)
-        if not turned < 0.6 * raw:
-            return False
-        self._turn = turn
-        why = "turned to z up, as in Gazebo: raw, as in rviz, they stand away from the masses of their links"
-        self.remarks.append(f"{self.name}: its Collada meshes with <up_axis> Y_UP are {why}")
-        return True
+                here += off_centre(mesh, pose, com)
+                there += off_centre(mesh, pose @ turn, com)
+        return there < 0.6 * here
+
+    def link_solids(self) -> dict[str, tuple[Piece, ...]]:
+        """The collision shapes of each link, or its visuals where it has none that can be read."""
+        found: dict[str, tuple[Piece, ...]] = {}
+        for link in self.element.iterfind("link"):
+            name = (link.get("name") or "").strip()
+            for kind in ("collision", "visual"):
+                found[name] = found.get(name) or tuple(self.readable(name, link, kind))
+        return found
 
     def visuals(self, name: str, link: Any) -> Iterator[Piece]:
         failed = []
@@ -195,9 +211,7 @@ class _Artist:
         if geometry is None or not len(geometry):
             raise MeshError("<geometry> is empty; name a box, cylinder, sphere or mesh")
         parts = self.parts(geometry[0])
-        if any(part.y_up for part in parts):
-            self._y_up += [(name, pose, part.mesh) for part in parts]
-            pose = pose @ self._turn
+        self._y_up += [(part.y_up, name, pose, part.mesh) for part in parts if part.y_up]
         # As in rviz: a material of the mesh file wins over that of the URDF. [robot_link.cpp]
         return [
             Piece(name, pose, part.mesh, color or own or GREY, texture if part.mesh.uv is not None else None)
@@ -220,7 +234,7 @@ class _Artist:
         address = element.get("filename")
         path, scale = self.file(address), _numbers(element, "scale", 3, "1 1 1")
         try:
-            parts, complaints = self._read(path, scale)
+            parts, complaints = self._read(path, scale, self._turned)
         except MeshError as error:
             raise MeshError(f"mesh {shown(address)}: {error}") from None
         self.notes += [f"mesh {shown(address)}: {complaint}; drawn without it" for complaint in complaints]
