@@ -341,6 +341,17 @@ def _verified_solves(M: Array, b: Array) -> Array | None:
     return x
 
 
+def _not_positive_definite(M: Array, row: int, pivot: Array) -> NotPositiveDefiniteError:
+    """The error of a pivot that may not be positive; of floats only an M_ii ≤ 0, of whatever row, makes it certain.
+
+    The rounding of M itself may turn the sign of a pivot.
+    """
+    n = M.shape[-1]
+    if len(rows := np.flatnonzero(np.any(np.diagonal(M, axis1=-2, axis2=-1).reshape(-1, n) <= 0, axis=0))):
+        return NotPositiveDefiniteError(int(rows[0]), decided=True)
+    return NotPositiveDefiniteError(row, decided=M.dtype.kind != "f" and bool(np.any(pivot <= 0)))
+
+
 def _eliminate(M: Array, b: Array) -> Array:
     """Solve M x = b by L D Lᵀ, in any arithmetic."""
     n = M.shape[-1]
@@ -351,8 +362,7 @@ def _eliminate(M: Array, b: Array) -> Array:
         L[..., j, j] = L[..., j, j] - (L[..., j, :j] * LD).sum(axis=-1)
         pivot, whole = L[..., j, j], M[..., j, j]
         if not _is_regular(pivot, least * whole, whole):
-            # of floats the rounding of M itself may turn a pivot's sign; only a diagonal without inertia is certain
-            raise NotPositiveDefiniteError(j, decided=bool(np.any(whole <= 0) or (not least and np.any(pivot <= 0))))
+            raise _not_positive_definite(M, j, pivot)
         below = L[..., j + 1 :, j] - (L[..., j + 1 :, :j] * LD[..., None, :]).sum(axis=-1)
         L[..., j + 1 :, j] = below / L[..., j, j, None]
         x[..., j] = x[..., j] - (L[..., j, :j] * x[..., :j]).sum(axis=-1)

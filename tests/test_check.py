@@ -92,6 +92,32 @@ def test_several_faults_are_told_together() -> None:
     assert np.allclose(rd.Robot.from_text(made.repaired).M(Q), rd.Robot.from_text(SOUND).M(Q), rtol=1e-12)
 
 
+@pytest.mark.parametrize("word", ["a", "0x10", "", "nan"])
+def test_a_refused_number_is_a_finding_at_its_line(word: str) -> None:
+    """Also beside a right angle, of which the rest is judged; a finding for the other numbers is one on its own."""
+    text = SOUND.replace('xyz="0.3 0 0" rpy="0 0 0.3"', f'xyz="0.3 0 0" rpy="{word} 1.5708 0"')
+    line = 1 + text[: text.index("1.5708")].count("\n")
+    made = checked(text.encode(), "rig.urdf")
+    assert not made.loads
+    assert [(each.kind, each.where, each.line) for each in made.findings] == [
+        ("refused", "joint 'elbow'", line),
+        ("near_right_angle", "joint 'elbow'", line),
+    ]
+
+
+def test_the_line_of_a_refusal_is_that_of_the_inertial_not_of_a_visual() -> None:
+    text = SOUND.replace('<link name="hand">', '<link name="hand"><visual><origin xyz="0 0 1"/></visual>')
+    text = text.replace('<origin xyz="0.0 0.0 0.06" rpy', '<origin xyz="0.0 0.0 a" rpy')
+    (finding,) = checked(text.encode(), "rig.urdf").findings
+    assert finding.line == 1 + text[: text.index("0.0 a")].count("\n")
+
+
+def test_shapes_without_volume_have_no_density() -> None:
+    """A box of 1e-9 m, whose volume vanishes beside its area; said by no warning of another library."""
+    text = SOUND.replace('box size="0.05 0.07 0.12"', 'box size="1e-9 1e-9 1e-9"')
+    assert {each.kind for each in checked(text.encode(), "rig.urdf").findings} <= {"inertia_shape", "mass_density"}
+
+
 @pytest.mark.parametrize("text", [b"", b"<robot", b"\xff\xfe", b"<html></html>", b"<robot name='x'></robot>"])
 def test_what_is_no_urdf_is_a_finding(text: bytes) -> None:
     made = checked(text, "x.urdf")

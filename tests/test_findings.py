@@ -74,6 +74,7 @@ def test_a_sound_arm_has_no_findings(catalog, name: str) -> None:
 WELDED = '<link name="hand"><inertial><mass value="{}"/><inertia {}/></inertial></link>' + joint(
     "wrist", "fore", "hand", kind="fixed"
 )
+ROUND = 'ixx="0.015" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.01"'
 FLAT = 'ixx="0.001" ixy="0" ixz="0" iyy="0.001" iyz="0" izz="0.01"'
 
 
@@ -106,6 +107,11 @@ FLAT = 'ixx="0.001" ixy="0" ixz="0" iyy="0.001" iyz="0" izz="0.01"'
             ),
             "joint 'second': moves -10100 times as far as 'elbow', beyond 10000, which costs digits; correct the"
             " multiplier of its <mimic>",
+        ),
+        (
+            inside(WELDED.format(0, ROUND)),
+            "link 'hand': has moments of inertia up to 0.02 kg m² and no mass: they count here, and MuJoCo drops them;"
+            " give it a mass, or remove its <inertial>",
         ),
         (
             altered((LIMIT, LIMIT.replace('effort="9"', 'effort="0"'))),
@@ -146,6 +152,19 @@ def test_moments_that_rounding_left_behind_are_those_of_a_point(tmp_path: Path) 
     assert "indefinite" in findings(altered((MOMENTS, rounding.replace("e-20", "e-5"))), tmp_path)[0]
 
 
+def test_moments_without_mass_count_and_are_told_of_links_that_move(tmp_path: Path) -> None:
+    """M of the arm grows by Jᵀ I J, J the angular Jacobian of the link; at the base they have no effect."""
+    text = inside(WELDED.format(0, ROUND))
+    with pytest.warns(ModelWarning, match="'hand': has moments of inertia"):
+        robot = rd.Robot.from_text(text)
+    q = np.array([0.3, -0.4])
+    grown = robot.M(q) - rd.Robot.from_text(inside("")).M(q)
+    J = robot.jacobian(q, "hand", expressed_in="body")[3:]
+    np.testing.assert_allclose(grown, J.T @ np.diag([0.015, 0.02, 0.01]) @ J, rtol=0, atol=1e-15)  # of M of 1 kg m²
+    fixed = WELDED.format(0, ROUND).replace('parent link="fore"', 'parent link="base"')
+    assert findings(inside(fixed), tmp_path) == ()
+
+
 def test_edits_cure_what_they_can(tmp_path: Path) -> None:
     tip = inside(f'<link name="tip">{POINT}</link>' + joint("wrist", "fore", "tip"))
     massless = inside('<link name="tip"/>' + joint("wrist", "fore", "tip"))
@@ -154,6 +173,10 @@ def test_edits_cure_what_they_can(tmp_path: Path) -> None:
         assert len(findings(text, tmp_path)) == 1
         for changes in ({"lock": {"wrist": 0.2}}, {"payload": ball}, {"armature": {"wrist": 0.01}}):
             assert findings(text, tmp_path, **changes) == (), changes
+    for inertial in (WELDED.format(0, ROUND), WELDED.format(1, FLAT), WELDED.format(9e-13, ROUND)):
+        assert len(findings(inside(inertial), tmp_path)) == 1
+        stated = {"masses": {"hand": 0.5}, "inertias": {"hand": np.diag([0.015, 0.02, 0.01])}}
+        assert findings(inside(inertial), tmp_path, **stated) == ()
     idle = altered((LIMIT, LIMIT.replace('effort="9"', 'effort="0"')))
     assert findings(idle, tmp_path, lock={"shoulder": 0.1}) == ()
 

@@ -36,6 +36,23 @@ def point_mass(xyz: str) -> str:
 # --- where M is singular
 
 
+@pytest.mark.filterwarnings("ignore::robot_dyn.errors.ModelWarning")
+def test_a_zero_on_the_diagonal_of_M_decides_that_it_is_singular(tmp_path: Path) -> None:
+    """Three parallel axes and a point mass on the last: M = m (l₁₂ᵀ l₁₂ …) with M₃₃ = 0, of rank 1.
+
+    Which of the first two pivots is positive is lost in rounding; the third joint carries no inertia at any q.
+    """
+    links = {"base": "", "l0": "", "l1": "", "l2": point_mass("0 0 0")}
+    offset = '<origin xyz="0 0.1 0"/>'
+    joints = {"j0": ("base", "l0", ""), "j1": ("l0", "l1", ""), "j2": ("l1", "l2", offset)}
+    robot = rd.load(urdf(tmp_path, links, joints))
+    assert robot.joint_without_inertia == "j2"
+    assert robot.findings[0].startswith("link 'l0' moves but has no mass")
+    assert_allclose(robot.M(np.array([0.3, 0.9, -0.4])), np.pad(np.full((2, 2), 0.01), (0, 1)), rtol=0, atol=1e-17)
+    with pytest.raises(SingularError, match="'j2' carries no inertia"):
+        robot.forward_dynamics(np.zeros(3), np.zeros(3), np.zeros(3))
+
+
 def test_massless_tip_has_no_forward_dynamics_until_it_is_held_or_loaded():
     with pytest.warns(ModelWarning, match="link 'pointer'"):
         robot = rd.load("massless_tip")

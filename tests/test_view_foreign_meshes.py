@@ -173,9 +173,9 @@ def test_gltf_stands_where_its_specification_and_drake_put_it(name: str, scale: 
     assert (here.notes, here.remarks) == ((), ())
     (piece,) = here.pieces
 
-    low, high = (CORNERS @ (R @ S).T + t) @ above[:3, :3].T + above[:3, 3], CORNERS + [-1.0, 0.0, 2.0]
+    low, high = (CORNERS @ (R @ S).T + t) @ above[:3, :3].T + above[:3, 3], CORNERS - np.array([1.0, 0.0, -2.0])
     x, y, z = (z_up(np.concatenate([low, high])) * scale).T
-    expected = np.column_stack([-y, x, z]) + [0.3, -0.2, 0.1]
+    expected = np.column_stack([0.3 - y, x - 0.2, z + 0.1])
     found = piece.mesh.vertices @ piece.pose[:3, :3].T + piece.pose[:3, 3]
     distance = np.linalg.norm(found[:, None] - expected[None], axis=2)
     assert distance.min(axis=0).max() < 1e-6
@@ -294,7 +294,7 @@ def test_collada_keeps_its_shape_and_colour_beside_what_is_not_drawn(remains: st
 
 
 def test_nodes_of_collada_turn_by_the_right_hand(tmp_path: Path) -> None:
-    """x ↦ t + R S x with a quarter turn about z: (x, y, z) ↦ (1 − 2 y, x, z)."""
+    """The point x at t + R S x, with a quarter turn about z: (x, y, z) ↦ (1 − 2 y, x, z)."""
     nodes = "<node><translate>1 0 0</translate><rotate>0 0 1 90</rotate><scale>1 2 1</scale>"
     (tmp_path / "a.dae").write_text(COLLADA.format(**SOUND).replace("<node>", nodes))
     x, y, z = CORNERS.T

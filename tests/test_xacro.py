@@ -54,8 +54,21 @@ def test_expanded_file_has_the_dynamics_of_the_file_written_out(arm: Path) -> No
 
 
 def test_nothing_is_expanded_unless_it_is_asked_for(arm: Path) -> None:
-    with pytest.raises(DescriptionError, match=r"holds xacro macros; expand the file: xacro=\{\} of load, --xacro"):
+    with pytest.raises(DescriptionError, match=r"is a xacro file; expand the file: xacro=\{\} of load, --xacro"):
         rd.load(arm)
+
+
+@pytest.mark.parametrize("name", ["arm.xacro", "arm.urdf.XACRO"])
+def test_a_xacro_file_without_expressions_is_refused_too(name: str, tmp_path: Path) -> None:
+    """What its macros add would be missing without a word: here, the mass of the forearm."""
+    body = '<xacro:macro name="heavy"><mass value="9"/></xacro:macro><link name="base"/>'
+    macros = ARM.replace("<robot ", f"<robot {NAMESPACE} ").replace('<link name="base"/>', body)
+    (file := tmp_path / name).write_text(macros.replace('<mass value="1.5"/>', "<xacro:heavy/>"))
+    with pytest.raises(DescriptionError, match="is a xacro file; expand the file"):
+        rd.load(file)
+    (finding,) = rd.check(file).findings
+    assert (finding.kind, finding.what) == ("refused", "is a xacro file")
+    assert rd.load(file, xacro={}).total_mass == rd.Robot.from_text(ARM).total_mass + 7.5
 
 
 def test_an_argument_that_the_file_does_not_have_is_refused_with_the_nearest(arm: Path) -> None:
@@ -140,4 +153,4 @@ def test_command_line_expands_on_request(arm: Path) -> None:
     ]
     assert masses == [10.0, 4.0, 10.0]
     assert "must be NAME=VALUE" in refusal((*names, "heavy"))
-    assert "holds xacro macros" in refusal(names[:2])
+    assert "is a xacro file" in refusal(names[:2])

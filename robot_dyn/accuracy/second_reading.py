@@ -50,6 +50,7 @@ def second_reading(description: Description, tolerance: float) -> tuple[list[Pai
     return pairs, ()
 
 
+@np.errstate(all="ignore")  # of infinities in visuals, which are not compared
 def _by_yourdfpy(text: bytes) -> Any:
     from yourdfpy import URDF  # heavy: it takes trimesh along
 

@@ -70,6 +70,10 @@ def check(
     """
     package_dirs = searched(package_dirs)
     path = catalog.find(name_or_path, package_dirs)
+    try:
+        description.refuse_xacro(path)
+    except DescriptionError as error:
+        return Checkup(str(path), False, (_of_refusal(str(path), str(error)),), None)
     return checked(description.content(path), str(path), package_dirs, density, truth("units", units))
 
 
@@ -79,7 +83,7 @@ def checked(
     """The same of the text of a file."""
     refusal = _refusal(text, source)
     try:
-        document = Document(text, source)
+        document = written = Document(text, source)
     except DescriptionError as error:
         return Checkup(source, False, (_of_refusal(source, str(error)),), None)
     found = [_assumed(each) for each in document.assumed]
@@ -91,7 +95,7 @@ def checked(
         document = _rewritten(document, repairs)
     still = _refusal(document.text, source)
     if refusal is not None and (still is not None or not explained):
-        found.append(_of_refusal(source, str(refusal if still is None else still)))
+        found.append(_of_refusal(source, str(refusal if still is None else still), written))
     robot = None if still is not None else _loaded(document, found)
     if robot is not None:
         found += [_assumed(each) for each in robot.description.findings if not _told(each, found)]
@@ -125,12 +129,14 @@ def _loaded(document: Document, found: list[Finding]) -> Robot | None:
         return None
 
 
-def _of_refusal(source: str, message: str) -> Finding:
+def _of_refusal(source: str, message: str, written: Document | None = None) -> Finding:
+    """The finding of a message of the read; with its line, if it names an element of a document."""
     where, _, rest = message.removeprefix(f"{source}: ").partition(": ")
     if not rest or not where.startswith(("link ", "joint ", "line ", "<")):
         where, rest = "file", message.removeprefix(f"{source}: ")
     what, _, remedy = rest.rpartition("; ")
-    return Finding(Severity.ERROR, "refused", where, what or remedy, remedy if what else "correct the file")
+    what, remedy = (what, remedy) if what else (remedy, "correct the file")
+    return Finding(Severity.ERROR, "refused", where, what, remedy, written and written.line(where, what))
 
 
 def _assumed(text: str) -> Finding:

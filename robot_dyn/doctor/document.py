@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from typing import Any, final
 
@@ -37,6 +38,15 @@ class Document:
         """A link or joint by its name, or None."""
         found = (each for each in self.root.iterfind(kind) if (each.get("name") or "").strip() == name)
         return next(found, None)
+
+    def line(self, where: str, what: str) -> int | None:
+        """The line of a link or joint, or of its element, or that of its inertial, of which a refusal speaks."""
+        for part in self.root.iter("link", "joint"):
+            if self.where(part) == where:
+                tag = re.match(r"<(\w+)>", what)
+                inner = () if tag is None else (*part.iterfind(tag[1]), *part.iterfind(f"inertial/{tag[1]}"))
+                return next(iter(inner), part).sourceline
+        return None
 
     @staticmethod
     def where(element: Any) -> str:

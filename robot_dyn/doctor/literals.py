@@ -75,7 +75,7 @@ def near_right_angles(document: Document) -> Iterator[Finding]:
             continue
         full = [_right_angle(word) or word for word in words]
         if full != words:
-            off = max(abs(float(a) - float(b)) for a, b in zip(full, words, strict=True))
+            off = max(abs(float(a) - float(b)) for a, b in zip(full, words, strict=True) if a != b)
             drawn = element.getparent().tag in ("visual", "collision")
             severity = Severity.WARNING if off > 1e-6 and not drawn else Severity.NOTE
             yield Finding(

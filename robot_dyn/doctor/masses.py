@@ -23,6 +23,7 @@ _RATIO = 1e4  # of the masses of two bodies of an arm: of a base of 100 kg to a 
 _KINDS = (
     (Severity.ERROR, "inertia_impossible", doctor.impossible_inertias),
     (Severity.ERROR, "mass_missing", doctor.massless_bodies),
+    (Severity.WARNING, "inertia_without_mass", doctor.moments_without_mass),
     (Severity.WARNING, "mass_tiny", doctor.tiny_masses),
     (Severity.WARNING, "length_long", doctor.long_lengths),
     (Severity.WARNING, "mimic_ratio", doctor.large_ratios),
@@ -39,7 +40,7 @@ def masses(robot: Robot) -> Iterator[Finding]:
     for severity, kind, find in _KINDS:
         for text in find(stated):
             yield _of_words(severity, kind, text)
-    yield from _lopsided(stated)
+    yield from _rods_and_points(stated)
     yield from _merged(robot, stated)
     yield from _proportions(robot, stated)
 
@@ -52,18 +53,11 @@ def _of_words(severity: Severity, kind: str, text: str) -> Finding:
     return Finding(severity, kind, "robot", what, remedy)
 
 
-def _lopsided(stated: Structure) -> Iterator[Finding]:
-    """Links with moments and no mass, or with mass and a moment of 0, of which other programs make something else."""
+def _rods_and_points(stated: Structure) -> Iterator[Finding]:
+    """Links that move with mass and a principal moment of 0, which other programs refuse."""
     for name, link in stated.links.items():
-        Ixx, Ixy, Ixz, Iyy, Iyz, Izz = link.moments
-        least, _, most = np.linalg.eigvalsh(np.array([[Ixx, Ixy, Ixz], [Ixy, Iyy, Iyz], [Ixz, Iyz, Izz]]))
-        if link.mass == 0 and most > 0:
-            yield Finding(
-                Severity.WARNING, "inertia_without_mass", f"link {name!r}",
-                f"has moments of inertia up to {most:.3g} kg m² and no mass; they count here, and MuJoCo drops them",
-                "give it a mass, or remove its <inertial>",
-            )  # fmt: skip
-        elif link.mass > 0 and abs(least) <= _NOTHING * most and name not in stated.base:
+        least, _, most = np.linalg.eigvalsh(link.inertia)
+        if link.mass > 0 and abs(least) <= _NOTHING * most and name not in stated.base:
             yield Finding(
                 Severity.NOTE, "inertia_zero", f"link {name!r}",
                 f"its least principal moment is 0, as of a rod or a point of {link.mass:g} kg; MuJoCo refuses that",

@@ -55,6 +55,7 @@ def _shape(pieces: tuple[Piece, ...]) -> Shape:
     return Shape(points, combined(bodies) if bodies else None)
 
 
+@np.errstate(all="ignore")  # a surface without volume, which MassProperties refuses
 def _of_piece(piece: Piece) -> MassProperties | None:
     """A closed surface as it is, any other by its convex hull."""
     import trimesh

@@ -29,7 +29,7 @@ class NearlySingular(NamedTuple):
 
 
 def nearly_singular(M: np.ndarray, joint_names: tuple[str, ...]) -> NearlySingular | None:
-    """What M, (n, n) and positive definite, leaves of the digits of forward dynamics, or None if that is enough."""
+    """What M, (n, n) with M_ii > 0, leaves of the digits of forward dynamics, or None if that is enough."""
     d = np.sqrt(np.diagonal(M))
     eigenvalues, vectors = np.linalg.eigh(M / np.outer(d, d))
     u = np.finfo(float).eps / 2

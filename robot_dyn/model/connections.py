@@ -49,14 +49,17 @@ def mimics(robot: etree._Element, refuse: Refuse) -> None:
         if kinds[source] == "fixed":
             refuse(where, f"mimics {source!r}, which is fixed and never moves; make {follower!r} fixed too")
     for follower in couplings:
-        where, chain, ratio = f"joint {follower!r}", {follower: None}, 1.0  # a dict: ordered, quick to look up
+        where, chain, ratio, offset = f"joint {follower!r}", {follower: None}, 1.0, 0.0  # a dict: quick to look up
         while (name := next(reversed(chain))) in couplings:
+            offset += ratio * float(couplings[name].get("offset"))
             ratio *= float(couplings[name].get("multiplier"))
             source = couplings[name].get("joint")
             if source in chain:
                 refuse(where, f"mimics itself: {_loop([*chain, source])}; remove one <mimic>")
             if abs(ratio) > LARGEST:
                 refuse(where, f"its chain of mimics multiplies by {ratio:g}; correct a multiplier")
+            if abs(offset) > LARGEST:
+                refuse(where, f"its chain of mimics adds up to an offset of {offset:g}; correct an offset")
             chain[source] = None
 
 

@@ -68,10 +68,18 @@ def read(path: str | Path) -> Description:
     """Read and check a URDF file.
 
     Raises:
-        DescriptionError: If the file cannot be read safely or does not describe one tree of rigid bodies.
+        DescriptionError: If the file cannot be read safely, does not describe one tree of rigid bodies, or is a xacro
+            file.
     """
     path = Path(path)
+    refuse_xacro(path)
     return check(content(path), source=str(path))
+
+
+def refuse_xacro(path: Path) -> None:
+    """Refuse a file that is named as one of xacro: without its macros it may describe another robot."""
+    if path.suffix.lower() == ".xacro":
+        raise DescriptionError(f"{path}: is a xacro file; {urdf.EXPAND}")
 
 
 def content(path: Path) -> bytes:

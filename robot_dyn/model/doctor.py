@@ -36,8 +36,8 @@ def findings(
         near: What M leaves of the digits of forward dynamics, if it is few.
     """
     kinds = (
-        massless_bodies, impossible_inertias, tiny_masses, long_lengths, large_ratios, welded_base, zero_limits,
-        equal_limits, impossible_inertias_of_the_base,
+        massless_bodies, moments_without_mass, impossible_inertias, tiny_masses, long_lengths, large_ratios,
+        welded_base, zero_limits, equal_limits, impossible_inertias_of_the_base,
     )  # fmt: skip
     found = (finding for kind in kinds for finding in kind(structure))
     return (*no_inertia_about_axis(structure, joint_without_inertia), *found, *hardly_any_inertia(near))
@@ -67,6 +67,17 @@ def massless_bodies(robot: Structure) -> Iterator[str]:
             yield (
                 f"link {robot.joints[joint].child!r} moves but has no mass; give it an <inertial>, or make its joint"
                 " fixed"
+            )
+
+
+def moments_without_mass(robot: Structure) -> Iterator[str]:
+    """Links that move with moments of inertia and without mass, which no body has; programs differ in what they do."""
+    for name, link in robot.links.items():
+        if name not in robot.base and link.mass == 0 and any(link.moments):
+            most = np.abs(np.linalg.eigvalsh(link.inertia)).max()
+            yield (
+                f"link {name!r}: has moments of inertia up to {most:.3g} kg m² and no mass: they count here, and MuJoCo"
+                " drops them; give it a mass, or remove its <inertial>"
             )
 
 
@@ -144,8 +155,7 @@ def welded_base(robot: Structure) -> Iterator[str]:
 
 
 def _why_impossible(link: StatedLink) -> str | None:
-    Ixx, Ixy, Ixz, Iyy, Iyz, Izz = link.moments
-    return implausibility(link.mass, np.zeros(3), np.array([[Ixx, Ixy, Ixz], [Ixy, Iyy, Iyz], [Ixz, Iyz, Izz]]))
+    return implausibility(link.mass, np.zeros(3), link.inertia)
 
 
 def _has_mass(robot: Structure, joint: str) -> bool:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, final
 
+import numpy as np
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 from robot_dyn.arithmetic import FLOAT64
@@ -21,7 +22,7 @@ Triple = tuple[float, ...]
 @final
 @dataclass(frozen=True)
 class StatedLink:
-    """A link as its file states it, before any others are merged with it; zeros without an <inertial>.
+    """A link as its file or an edit states it, before any others are merged with it; zeros without an <inertial>.
 
     Attributes:
         mass: In [kg].
@@ -32,6 +33,12 @@ class StatedLink:
     mass: float = 0.0
     com: Triple = (0.0, 0.0, 0.0)
     moments: Triple = (0.0,) * 6
+
+    @property
+    def inertia(self) -> np.ndarray:
+        """The moments as a matrix, (3, 3)."""
+        Ixx, Ixy, Ixz, Iyy, Iyz, Izz = self.moments
+        return np.array([[Ixx, Ixy, Ixz], [Ixy, Iyy, Iyz], [Ixz, Iyz, Izz]])
 
 
 @final
@@ -115,6 +122,11 @@ def structure(description: Description, edits: Edits) -> Structure:
     """The structure of a description with its edits."""
     file = description.element
     links = {link.get("name"): _link(link.find("inertial")) for link in file.iterfind("link")}
+    for name in links.keys() & dict(edits.masses):
+        links[name] = replace(links[name], mass=dict(edits.masses)[name])
+    for name in links.keys() & dict(edits.inertias):
+        (Ixx, Ixy, Ixz), (_, Iyy, Iyz), (_, _, Izz) = dict(edits.inertias)[name]
+        links[name] = replace(links[name], moments=(Ixx, Ixy, Ixz, Iyy, Iyz, Izz))
     joints = {joint.get("name"): _joint(joint) for joint in file.iterfind("joint")}
     return Structure(links, joints, stated_mimics(file), edits)
 

@@ -67,6 +67,11 @@ KINDS = [
         following(("1e-12",) * 14 + ("1e12",) * 14, ("1e12",) * 28),
         ("chain of mimics", "correct"),
     ),
+    Kind(
+        "offsets of which a multiplier makes one too large",
+        following(("1e-6", "1e6"), ("1e12", "0")),
+        ("joint 'j2'", "chain of mimics adds up to an offset of 1e+18", "correct an offset"),
+    ),
     Kind("multipliers whose product vanishes", following(("1e-200", "1e-200"))),
     Kind(
         "the largest multiplier and offset",

@@ -21,6 +21,7 @@ from robot_dyn.view.geometry.triangles import Mesh
 
 _THIN = 1e-3  # of the longest edge: what an edge of length 0 is drawn with
 _SMALL = 0.01  # [m], edge drawn for a mass in one point
+_POINT, _LARGEST = 1e-6, 1e6  # [m]: an edge below is that of a point; none is drawn longer than the other
 
 
 def inertia_boxes(robot: Robot) -> Iterator[tuple[str, ndarray, Mesh, str | None]]:
@@ -56,6 +57,7 @@ def _lengths(mass: float, inertia: ndarray, factor: float) -> tuple[ndarray, nda
     """√(factor (I_y + I_z − I_x) / m) along the principal axes, and these axes as the columns of a rotation."""
     moments, axes = np.linalg.eigh(inertia)
     axes = axes * np.sign(np.linalg.det(axes))
-    squares = factor * (moments.sum() - 2 * moments) / mass
-    lengths = np.sqrt(np.maximum(squares, 0.0))
-    return np.maximum(lengths, _THIN * lengths.max() or _SMALL), axes
+    with np.errstate(over="ignore"):  # of a mass of 1e-320 kg
+        squares = factor * (moments.sum() - 2 * moments) / mass
+    lengths = np.clip(np.sqrt(np.maximum(squares, 0.0)), 0.0, _LARGEST)
+    return np.maximum(lengths, _THIN * lengths.max() if lengths.max() > _POINT else _SMALL), axes

@@ -31,12 +31,12 @@ from robot_dyn.view.geometry.triangles import Mesh
 GREY: Rgba = (0.7, 0.7, 0.7, 1.0)  # of what has no material; rviz takes red
 _STAND_IN: Rgba = (0.9, 0.6, 0.3, 1.0)  # of what is drawn in place of a visual
 _INERTIA: Rgba = (0.2, 0.4, 1.0, 0.35)
-_LARGEST = 1e6  # [m], of a length or a position
+_SMALLEST, _LARGEST = 1e-9, 1e6  # [m], of a length; the latter of a position, too
 _Y_UP_REMARKS = {  # of files that are read the other way than usual
     meshes.COLLADA: "its Collada meshes with <up_axis> Y_UP are turned to z up, as in Gazebo: raw, as in rviz, they"
     " stand away from the masses of their links",
-    meshes.GLTF: "its glTF meshes are not turned to z up: in glTF y is up, but turned they stand away from the masses of"
-    " their links; export them with y up",
+    meshes.GLTF: "its glTF meshes are not turned to z up: in glTF y is up, but turned they stand away from the masses"
+    " of their links; export them with y up",
 }
 T = TypeVar("T")
 
@@ -226,8 +226,8 @@ class _Artist:
         if shape.tag not in PRIMITIVES:
             raise MeshError(f"<{shorten(shape.tag)}> is not a shape of URDF; give a box, cylinder, sphere or mesh")
         lengths = tuple(x for key, count in PRIMITIVES[shape.tag][1].items() for x in _numbers(shape, key, count))
-        if min(lengths) <= 0:
-            raise MeshError(f"<{shape.tag}> has a length that is not positive; correct it")
+        if min(lengths) < _SMALLEST:
+            raise MeshError(f"<{shape.tag}> has a length that is not positive, or below {_SMALLEST:g} m; correct it")
         return (Part(self._primitive(shape.tag, lengths)),)
 
     def mesh(self, element: Any) -> tuple[Part, ...]:
