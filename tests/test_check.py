@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import struct
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -112,10 +114,17 @@ def test_the_line_of_a_refusal_is_that_of_the_inertial_not_of_a_visual() -> None
     assert finding.line == 1 + text[: text.index("0.0 a")].count("\n")
 
 
-def test_shapes_without_volume_have_no_density() -> None:
-    """A box of 1e-9 m, whose volume vanishes beside its area; said by no warning of another library."""
-    text = SOUND.replace('box size="0.05 0.07 0.12"', 'box size="1e-9 1e-9 1e-9"')
-    assert {each.kind for each in checked(text.encode(), "rig.urdf").findings} <= {"inertia_shape", "mass_density"}
+def test_a_closed_surface_without_volume_has_no_density(tmp_path: Path) -> None:
+    """A triangle from both sides: nothing is said of the mass of its link, and no warning comes of 0 / 0."""
+    corners = np.array([[0, 0, 0], [0.05, 0, 0], [0, 0.05, 0.1]], dtype="f4")
+    data = b"".join(struct.pack("<12fH", 0, 0, 0, *side.ravel(), 0) for side in (corners, corners[::-1]))
+    (tmp_path / "flat.stl").write_bytes(b" " * 80 + struct.pack("<I", 2) + data)
+    file = tmp_path / "rig.urdf"
+    file.write_text(SOUND.replace('<box size="0.05 0.07 0.12"/>', '<mesh filename="flat.stl"/>'))
+    with warnings.catch_warnings(record=True) as seen:  # as an error it would be caught with those of the hull
+        warnings.simplefilter("always")
+        assert {each.kind for each in rd.check(file).findings} <= {"com_outside"}
+    assert [str(each.message) for each in seen] == []
 
 
 @pytest.mark.parametrize("text", [b"", b"<robot", b"\xff\xfe", b"<html></html>", b"<robot name='x'></robot>"])

@@ -14,6 +14,7 @@ from robot_dyn.model import description, urdf
 from robot_dyn.model.description import check
 from tests.command import ROOT
 from tests.foreign import macros, markup, robots
+from tests.foreign.files import inside
 
 LOADING = [file for topic in (markup, macros, robots) for file in topic.FILES if not file.refused]
 UNREAD = "a capsule and a mesh of the network"  # XML, but yourdfpy knows no capsule
@@ -96,3 +97,14 @@ def test_the_second_reader_sees_the_file_and_not_what_was_written_of_it() -> Non
     other = description.Description(sound.name, "arm", text.replace(b'<mass value="', b'<mass value="9'), sound.xml)
     masses = [pair.worst({}) for pair in second_reading(other, 1e-12)[0] if pair.quantity == "file: mass"]
     assert masses and not any(mass.ok for mass in masses)
+
+
+def test_numbers_of_a_visual_are_not_compared_whatever_they_are() -> None:
+    """Infinite and nan angles, of which yourdfpy takes sines; no warning comes of it."""
+    visual = '<visual><origin rpy="inf 0 nan" xyz="inf 0 0"/><geometry><sphere radius="1"/></geometry></visual>'
+    pairs, notes = second_reading(
+        check(inside("").replace('<link name="base"/>', f'<link name="base">{visual}</link>'), "arm"), 1e-12
+    )
+    assert notes == ()
+    assert pairs
+    assert all(pair.worst({}).ok for pair in pairs)

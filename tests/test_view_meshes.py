@@ -243,6 +243,14 @@ def test_moments_that_no_body_has_are_noted_and_drawn_thin(tmp_path: Path) -> No
     assert here.pieces[-1].rgba[3] < 1
 
 
+@pytest.mark.parametrize(("mass", "moment", "edge"), [("1e-320", "0.03", 1e6), ("2", "1e-300", 0.01)])
+def test_inertias_beyond_what_can_be_drawn_are_drawn_at_the_ends(mass: str, moment: str, edge: float) -> None:
+    """An edge of √(6 I / m) is drawn with 1000 km at most, and one below a micrometre as of a point: 1 cm."""
+    text = re.sub(r'i(xx|yy|zz)="[^"]*"', rf'i\1="{moment}"', urdf("").decode().replace('value="2"', f'value="{mass}"'))
+    ((_, _, mesh, _),) = inertia_boxes(Robot(description.check(text, "r.urdf")))
+    assert np.ptp(mesh.vertices, axis=0) == pytest.approx([edge] * 3, rel=1e-6)
+
+
 def test_a_run_made_on_another_machine_finds_the_installed_meshes() -> None:
     robot = rd.load("ur5")
     moved = Robot(description.check(robot.description.text, "/home/someone/else/ur5.urdf"))
