@@ -29,8 +29,10 @@ from robot_dyn.stress_test.page import page
 from robot_dyn.stress_test.scenes import FAMILIES, scenes
 from robot_dyn.stress_test.stress import stressed
 from robot_dyn.stress_test.work import Work
-from robot_dyn.stress_test.worst import pd_gains, worst_configurations
+from robot_dyn.stress_test.worst import FASTEST, pd_gains, worst, worst_configurations
 from tests.command import refusal, run
+from tests.hostile.kinds import AXIS, LIMIT
+from tests.hostile.kinds import arm as altered
 from tests.short_stress import short_stress
 from tests.test_command_documents import promised
 
@@ -167,6 +169,20 @@ def test_a_joint_without_inertia_is_named_and_the_rest_is_told() -> None:
     assert "runs: joint 'pointer_joint' carries no inertia" in result.left_out
     assert {each.of for each in result.limits} == {"speed", "payload"} and not result.runs
     assert {each.what for each in result.worst} == {"gravity torque / effort limit", "digits lost in inverse_dynamics"}
+
+
+def test_numbers_beyond_a_float64_are_left_out_by_name() -> None:
+    """|N| over a limit of 1e-320 N m, of the joint that gravity turns; and a measure without a value anywhere."""
+    text = altered((LIMIT, LIMIT.replace('effort="9"', 'effort="1e-320"')), (AXIS, '<axis xyz="0 1 0"/>'))
+    robot, rng, work = rd.Robot.from_text(text), np.random.default_rng(3), Work()
+    states = random_states(robot, 100, rng)
+    assert {each.what for each in worst_configurations(robot, states, rng, None, "", work)} == {"κ of M", FASTEST}
+    assert worst(states, rng, ("q",), lambda batch: np.full(len(batch["q"]), np.nan), work, "nothing") is None
+    assert [each.partition(": ")[0] for each in work.left_out] == [
+        "worst gravity torque / effort limit, shoulder",
+        "nothing",
+    ]
+    assert work.left_out[0].endswith("its numbers are beyond those of a float64")
 
 
 def test_joints_without_limits_are_named() -> None:

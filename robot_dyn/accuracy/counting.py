@@ -137,7 +137,9 @@ class Counting:
             return 0.0
         if quantity not in self._sizes:
             answers, inertia = asked(self._own, quantity, self.states), asked(self._own, M, self.states)
-            size = float(np.sqrt(np.nanmean((answers / entry_units(answers, inertia)) ** 2, axis=0)).max())
+            ratios = answers / entry_units(answers, inertia)
+            largest = float(np.nanmax(np.abs(ratios))) or 1.0  # by which they are divided: squares may overflow
+            size = largest * float(np.sqrt(np.nanmean((ratios / largest) ** 2, axis=0)).max())
             self._sizes[quantity] = size if size > NOTHING else 1.0
         return self._sizes[quantity]
 

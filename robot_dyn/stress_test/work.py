@@ -12,6 +12,10 @@ from robot_dyn.accuracy.deadline import NEVER, Deadline
 from robot_dyn.errors import RobotDynError
 
 T = TypeVar("T")
+_REASONS = {
+    np.linalg.LinAlgError: "; M is near a singular one",
+    FloatingPointError: "; its numbers are beyond those of a float64",
+}
 
 
 @final
@@ -48,12 +52,13 @@ class Work:
             return None
         self._tell(name)
         try:
-            return piece(self._deadline.within(self._longest_s))
+            with np.errstate(over="raise", divide="raise", invalid="raise"):
+                return piece(self._deadline.within(self._longest_s))
         except OvertimeError:
             self.skip(name, *needed_for)
-        except (RobotDynError, np.linalg.LinAlgError) as error:
-            near = "; M is near a singular one" * isinstance(error, np.linalg.LinAlgError)
-            self.left_out.append(f"{name}: {error}{near}")
+        except (RobotDynError, np.linalg.LinAlgError, FloatingPointError) as error:
+            why = next((why for kind, why in _REASONS.items() if isinstance(error, kind)), "")
+            self.left_out.append(f"{name}: {error}{why}")
             if needed_for:
                 self.left_out.append(f"{', '.join(needed_for)}: not without {name}")
         return None

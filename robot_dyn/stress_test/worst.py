@@ -14,6 +14,7 @@ from robot_dyn.accuracy.road import asked
 from robot_dyn.accuracy.worst_state import Batch, Search
 from robot_dyn.control.independent_joint import gains_from
 from robot_dyn.effects.plant import Plant
+from robot_dyn.errors import OverflowedError
 from robot_dyn.lagrange.scale import unit_diagonal_conditions
 from robot_dyn.model.quantity import M, N
 from robot_dyn.model.robot import Robot
@@ -74,6 +75,8 @@ def searched(
 ) -> tuple[Sizes, State]:
     """Typical, random and searched size of a measure, and the state."""
     known = measure(states)
+    if np.isnan(known).all():
+        raise OverflowedError("it has a finite value at none of the random states")
     random, found, best = float(np.nanmax(known)), -np.inf, states
     for _ in range(_ROUNDS):
         at, size = Search(states, rng).worst(_timed(measure, deadline), known, arguments)
