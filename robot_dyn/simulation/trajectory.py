@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import StrEnum
+from math import inf
 from typing import Any, Protocol, final, runtime_checkable
 
 import numpy as np
@@ -118,10 +119,16 @@ class Accuracy:
     digit_more: float
     digit_less: float
 
+    @property
+    def margin(self) -> float:
+        """What was asked over what is estimated: at least 2, or 1 where no tolerance brings more; inf for no error."""
+        return self.asked / self.estimated if self.estimated > 0 else inf
+
     def __str__(self) -> str:
         at = f" at rtol {self.rtol:.1e}" if self.rtol else ""
         return (
-            f"asked {self.asked:.1e}, estimated {self.estimated:.1e}{at}; {self.run} evaluations,"
+            f"asked {self.asked:.1e}, estimated {self.estimated:.1e}{at}, a margin of {self.margin:.1f};"
+            f" {self.run} evaluations,"
             f" pilots {self.pilots}, check {self.check}; a digit more about {self.digit_more:.0f}, a digit less"
             f" {self.digit_less:.0f}"
         )
