@@ -16,7 +16,8 @@ from robot_dyn.effects.effect import Force
 from robot_dyn.effects.joint_limit import JointStopSpring
 from robot_dyn.errors import RobotDynError
 from robot_dyn.foreign import call
-from robot_dyn.simulation.record import Path
+from robot_dyn.simulation.record import Path, Record
+from robot_dyn.simulation.schedule import LEAST_STEPS
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.smoothness import LOOKS, extremes, foreign, named
 from robot_dyn.simulation.state_equation import StateEquation
@@ -49,6 +50,17 @@ def stepped_over(setup: Setup, equation: StateEquation, path: Path, error: float
     found = [_stop(equation, effect, path, q, v, error) for effect in effects]
     found += [_code(equation, part, path, q, v, error) for part in foreign(setup)]
     return min((each for each in found if each is not None), key=lambda each: each.t, default=None)
+
+
+def switched_back(setup: Setup, run: Record) -> Missed | None:
+    """The first time at which a joint switches and switches back within a few steps of a fixed length."""
+    h, before = setup.taken_step_s, {}
+    for each in run.events:
+        t = before.get(each.joint, -np.inf) if each.joint else -np.inf
+        if each.t - t < LEAST_STEPS * h:
+            return Missed(t, f"joint {each.joint!r} switches and switches back within {LEAST_STEPS} steps")
+        before[each.joint] = each.t
+    return None
 
 
 def _stop(

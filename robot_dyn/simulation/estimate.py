@@ -16,7 +16,7 @@ import numpy as np
 from robot_dyn.coefficients import with_values
 from robot_dyn.integrate.adaptive import LEAST_RTOL, Adaptive
 from robot_dyn.integrate.integrator import Integrator
-from robot_dyn.simulation.between import stepped_over
+from robot_dyn.simulation.between import stepped_over, switched_back
 from robot_dyn.simulation.companions import (
     COARSE,
     FINE,
@@ -80,7 +80,7 @@ def estimate(setup: Setup, equation: StateEquation, run: Record, companion: Comp
 def _by_steps(
     setup: Setup, method: Integrator, estimated: Estimated, companion: Companion, turn: float
 ) -> ErrorEstimate:
-    """From longer steps, then from shorter ones."""
+    """From longer steps; from shorter ones where those are lost, or show less than the order of the method would."""
     if turn > _BLIND_TURN:
         return no_estimate(
             f"a joint turns by {turn:.3g} rad in a step, so that runs with other steps may meet the same angles"
@@ -88,15 +88,16 @@ def _by_steps(
     made = no_estimate("fewer than 3 steps between ticks, switches or breaks")
     if turn < _FAR_TURN and min(each.steps for each in setup.segments) >= LEAST_STEPS:
         paths = {pace: companion(pace, setup).shared for pace in COARSE}
-        estimated = _with_rounding(estimated, companion(COARSE[1], _pushed(setup)).shared, paths[COARSE[1]])
-        made = estimated.from_longer_steps(paths, method.order)
-        if made.resolved_until >= estimated.path.t[-1]:
+        magnified = _with_rounding(estimated, companion(COARSE[1], _pushed(setup)).shared, paths[COARSE[1]])
+        made = magnified.from_longer_steps(paths, method.order)
+        if made.resolved_until >= estimated.path.t[-1] and not estimated.doubts(made, paths, method.order):
             return made
     half = companion(FINE[0], setup).shared
     if made.resolved_until > 0 and estimated.lost_at(half) < _GAIN * made.resolved_until:
         return made  # chaos: no step of practical length resolves it
-    estimated = _with_rounding(estimated, companion(Fraction(1), _pushed(setup)).shared, estimated.path)
-    return estimated.from_shorter_steps({FINE[0]: half, FINE[1]: companion(FINE[1], setup).shared}, method.order)
+    magnified = _with_rounding(estimated, companion(Fraction(1), _pushed(setup)).shared, estimated.path)
+    shorter = magnified.from_shorter_steps({FINE[0]: half, FINE[1]: companion(FINE[1], setup).shared}, method.order)
+    return shorter if shorter.resolved_until >= made.resolved_until else made
 
 
 def _until_brief(setup: Setup, run: Record, made: ErrorEstimate) -> ErrorEstimate:
@@ -104,14 +105,12 @@ def _until_brief(setup: Setup, run: Record, made: ErrorEstimate) -> ErrorEstimat
 
     Each companion cuts its steps there as well, so that all of them make the same one or two.
     """
-    h, before = setup.taken_step_s, {}
-    for each in run.events:
-        t = before.get(each.joint, -np.inf) if each.joint else -np.inf
-        if each.t - t < LEAST_STEPS * h and t < made.resolved_until:
-            why = f"joint {each.joint!r} switches and switches back within {LEAST_STEPS} steps"
-            return replace(made, resolved_until=t, note=why)
-        before[each.joint] = each.t
-    return made
+    brief = switched_back(setup, run)
+    return (
+        made
+        if brief is None or brief.t >= made.resolved_until
+        else replace(made, resolved_until=brief.t, note=brief.why)
+    )
 
 
 def _by_refinement(

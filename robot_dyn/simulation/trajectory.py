@@ -206,14 +206,16 @@ class Trajectory(Value):
     @property
     def leak(self) -> str:
         """Why the energy ledger casts doubt on the run; empty if it does not."""
-        if not self.ledger.closes:
-            return "it does not close: take a smaller step"
-        if self.error is None or not self.error.resolved_until > 0:
-            return ""
-        span = float(np.ptp(self.q, axis=0).max())
-        if span > 0 and self.ledger.closure > _CONTRADICTS * max(self.error.final / span, _ROUNDING):
-            return "it does not close as the estimated error of q says: do not trust the estimate, take a smaller step"
-        return ""
+        ledger = self.ledger
+        if ledger.closes:
+            if ledger.rounded or self.error is None or not self.error.resolved_until > 0:
+                return ""
+            span = float(np.ptp(self.q, axis=0).max())
+            if not span > 0 or ledger.closure <= _CONTRADICTS * max(self.error.final / span, _ROUNDING):
+                return ""
+            why = ledger.cause or "do not trust the estimate, take a smaller step"
+            return f"it does not close as the estimated error of q says: {why}"
+        return f"it does not close: {ledger.cause or 'simulate the run by itself, which tells why'}"
 
     def proven_digits(self, proof: Theorem) -> float:
         """Decimal digits of q that a theorem confirms: −log₁₀ of the largest possible error, in [rad] or [m].

@@ -27,7 +27,7 @@ def switching_scene(seed: int, index: int) -> Scene:
     name = str(rng.choice(["rail", "pendulum", "planar_2r", "cart_pole"]))
     arm = arms()[name]
     n, q, v = arm.n, *rng.uniform(-1, 1, (2, arm.n))
-    scale, duration = np.diag(arm.M(q)), float(np.round(rng.uniform(0.2, 1.0), 3))
+    scale, duration = np.diag(arm.M(q)), float(np.round(rng.uniform(0.2, 0.6), 3))
     effects: list[rd.Effect] = [rd.ViscousFriction(scale * rng.uniform(0.1, 1, n))] * int(rng.integers(2))
     if rng.random() < 0.5:
         effects.append(rd.Spring(scale * rng.uniform(1, 30, n), rng.uniform(-1, 1, n)))
@@ -42,7 +42,7 @@ def switching_scene(seed: int, index: int) -> Scene:
         plan = rd.quintic(q, q + rng.uniform(-0.5, 0.5, n), duration * rng.uniform(0.4, 1.2))
         drive = rd.PD(plan, *rd.gains_from(scale, rng.uniform(3, 12), 0.7))
     text = str(rng.choice([*METHODS, "order_8", "order_8", "rk4", "gauss_6"]))
-    step = float(np.round(10 ** rng.uniform(-3.7, -2.2), 6))
+    step = float(np.round(10 ** rng.uniform(-3.3, -2.1), 6))
     setup = rd.Setup(rd.Plant(arm, effects), q, v, duration, drive, text, step, engine="interpreted")
     return Scene(family, setup, f"{seed}/{index} {family} {name} {text} h={step:g} T={duration:g}")
 
