@@ -54,8 +54,8 @@ class AccuracyError(RobotDynError):
 def run_to(setup: Setup, asked: float, run: Callable[[Setup], Trajectory]) -> Trajectory:
     """The run of a setup whose estimated error is at most what is asked; one that does not finish is returned as it is.
 
-    The estimate is to be half of it at most; where no tolerance brings that, the run of the least one is returned if
-    it is at most what is asked.
+    The estimate is to be half of it at most. Where no run has that, the best one is returned if its estimate is at
+    most what is asked.
 
     Args:
         setup: What to run.
@@ -73,14 +73,11 @@ def run_to(setup: Setup, asked: float, run: Callable[[Setup], Trajectory]) -> Tr
     rtol = max(least, min(_LOOSEST, asked ** _LOOSE[STIFF if stiff else EXPLICIT]))
     tried: list[_Try] = []
     for k in range(_TRIES):
-        made = run(replace(setup, integrator=Adaptive(method, rtol, _ATOL * rtol)))
-        if method == AUTO and made.statistics.method == EXPLICIT and _stable_at_most(made) and not _sampled(setup):
-            other = run(replace(setup, integrator=Adaptive(STIFF, rtol, _ATOL * rtol)))
-            made, less = sorted((made, other), key=lambda each: _predicted(each, asked))
-            spent += _in_all(less)
+        made, more = _at(setup, method, rtol, asked, run)
+        spent += more
         if made.outcome.ending is not Ending.FINISHED:
             return made
-        error, method, spent = _resolved(made), made.statistics.method, spent + _in_all(made)
+        error, method = _resolved(made), made.statistics.method
         tried.append(_Try(error, rtol, made))
         least_cost = made.statistics.evaluations * _WEIGHT.get(method, 1) / _TOO_MUCH
         if error <= _TRUSTED * asked and (
@@ -91,10 +88,21 @@ def run_to(setup: Setup, asked: float, run: Callable[[Setup], Trajectory]) -> Tr
             break
         factor = _AIM * asked / error if isfinite(error) else 1e-2
         rtol = max(least, min(_LOOSEST, rtol * (min(factor, _LAST) if k == _TRIES - 2 else factor)))
-    best = min(reversed(tried), key=lambda each: each.error)
+    best = min(tried, key=lambda each: each.error)
     if best.error <= asked:
         return _achieved(best, asked, spent)
-    raise AccuracyError(_refusal(best, asked), best.error)
+    raise AccuracyError(_refusal(best, asked, tried[-1].rtol), best.error)
+
+
+def _at(
+    setup: Setup, method: str, rtol: float, asked: float, run: Callable[[Setup], Trajectory]
+) -> tuple[Trajectory, int]:
+    """The run at a tolerance, of the cheaper method where stability bounds explicit steps; what all of it took."""
+    made = run(replace(setup, integrator=Adaptive(method, rtol, _ATOL * rtol)))
+    if method != AUTO or made.statistics.method != EXPLICIT or _sampled(setup) or not _stable_at_most(made):
+        return made, _in_all(made)
+    other = run(replace(setup, integrator=Adaptive(STIFF, rtol, _ATOL * rtol)))
+    return min((made, other), key=lambda each: _predicted(each, asked)), _in_all(made) + _in_all(other)
 
 
 class _Try(NamedTuple):
@@ -172,11 +180,12 @@ def _achieved(chosen: _Try, asked: float, spent: int) -> Trajectory:
     )  # fmt: skip
 
 
-def _refusal(best: _Try, asked: float) -> str:
+def _refusal(best: _Try, asked: float, rtol: float) -> str:
+    """Why the best run does not have what is asked, although tolerances went down to the given one."""
     why = "" if best.made.error is None else best.made.error.note
     if not why:
         method = best.made.statistics.method
-        least = f"{method}'s least tolerance" if best.rtol <= 1.01 * LEAST_RTOL else "the tolerance"
-        why = f"the estimated error is {best.error:.1e} at {least}, {best.rtol:.1e}"
+        least = f"{method}'s least tolerance" if rtol <= 1.01 * LEAST_RTOL else "the tolerance"
+        why = f"the estimated error is {best.error:.1e} at {least}, {rtol:.1e}"
     remedy = f"ask for {1.1 * best.error / _TRUSTED:.1e}" if isfinite(best.error) else "take a shorter run"
     return f"accuracy {asked:.1e} cannot be had: {why}; {remedy}"

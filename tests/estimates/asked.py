@@ -54,6 +54,11 @@ class Answer:
         return self.true - self.unsure <= self.asked
 
     @property
+    def told(self) -> bool:
+        """Whether the truth is sure enough to tell."""
+        return self.unsure <= self.asked / 2
+
+    @property
     def refused_below(self) -> bool:
         """Whether it was refused although a run was estimated to be within what was asked."""
         return bool(self.refusal) and self.estimated <= self.asked

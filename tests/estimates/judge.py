@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,7 +27,7 @@ class Judgement:
         run: Its trajectory.
         true: Largest error of q up to where the estimate holds.
         true_at_end: The same up to the end of the run.
-        unsure: Error of the truth itself.
+        unsure: Error of the truth itself; 0 where the estimate is near the true error whatever it is.
     """
 
     scene: Scene
@@ -72,11 +72,13 @@ def judge(seed: int, index: int, of: Callable[[int, int], Scene] = scene) -> Jud
 
 
 def judged(made: Scene, exact: Truth, witness: Truth) -> Judgement:
-    """Run a scene, its truth, and another whose distance from that one tells how sure it is."""
+    """Run a scene, its truth, and another, whose distance from that one tells how sure it is, where it matters."""
     run = rd.simulate(made.setup)
     q = exact(made.setup, run.t)
     errors = np.maximum.accumulate(np.abs(run.q - q).max(axis=1))
     known = run.t <= run.error.resolved_until
     true = float(errors[known][-1]) if known.any() else 0.0
-    unsure = float(np.abs(q - witness(made.setup, run.t))[known].max()) if known.any() else 0.0
-    return Judgement(made, run, true, float(errors[-1]), unsure)
+    found = Judgement(made, run, true, float(errors[-1]), 0.0)
+    if not known.any() or LEAST <= found.ratio <= MOST:  # a floor moves the ratio towards 1
+        return found
+    return replace(found, unsure=float(np.abs(q - witness(made.setup, run.t))[known].max()))
