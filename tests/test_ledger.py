@@ -141,7 +141,7 @@ def test_effects_of_one_name_keep_their_own_accounts() -> None:
 class Grease(rd.Dissipative):
     """Its name has a space."""
 
-    name = "grease drag"  # pyright: ignore[reportAssignmentType]  of the class, in place of the property
+    name = "grease drag"
     damping: float
 
     def torque(self, dynamics: Any, t: float, q: Any, v: Any) -> Any:

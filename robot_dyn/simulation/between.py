@@ -54,13 +54,14 @@ def stepped_over(setup: Setup, equation: StateEquation, path: Path, error: float
 
 def switched_back(setup: Setup, run: Record) -> Missed | None:
     """The first time at which a joint switches and switches back within a few steps of a fixed length."""
-    h, before = setup.taken_step_s, {}
+    before: dict[str, float] = {}
+    found = []
     for each in run.events:
-        t = before.get(each.joint, -np.inf) if each.joint else -np.inf
-        if each.t - t < LEAST_STEPS * h:
-            return Missed(t, f"joint {each.joint!r} switches and switches back within {LEAST_STEPS} steps")
+        if each.joint and each.t - before.get(each.joint, -np.inf) < LEAST_STEPS * setup.taken_step_s:
+            why = f"joint {each.joint!r} switches and switches back within {LEAST_STEPS} steps"
+            found.append(Missed(before[each.joint], why))
         before[each.joint] = each.t
-    return None
+    return min(found, key=lambda each: each.t, default=None)
 
 
 def _stop(

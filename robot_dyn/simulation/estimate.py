@@ -1,7 +1,7 @@
 """The error estimate of a run: companion runs are made until one of the verdicts of `companions` holds to its end.
 
 Longer steps cost about as much as the run and come first; shorter ones cost five times as much, and are taken where
-longer ones cannot be made or show nothing.
+longer ones cannot be made, or do not show the order of the method throughout.
 """
 
 from __future__ import annotations
@@ -106,11 +106,9 @@ def _until_brief(setup: Setup, run: Record, made: ErrorEstimate) -> ErrorEstimat
     Each companion cuts its steps there as well, so that all of them make the same one or two.
     """
     brief = switched_back(setup, run)
-    return (
-        made
-        if brief is None or brief.t >= made.resolved_until
-        else replace(made, resolved_until=brief.t, note=brief.why)
-    )
+    if brief is None or brief.t >= made.resolved_until:
+        return made
+    return replace(made, resolved_until=brief.t, note=brief.why)
 
 
 def _by_refinement(

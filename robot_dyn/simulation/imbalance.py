@@ -14,8 +14,9 @@ from robot_dyn.effects.effect import Conservative
 from robot_dyn.errors import RobotDynError
 from robot_dyn.foreign import call
 from robot_dyn.simulation.between import stepped_over, switched_back
+from robot_dyn.simulation.ledger import largest
 from robot_dyn.simulation.record import Record
-from robot_dyn.simulation.samples import columns
+from robot_dyn.simulation.samples import columns, ledger
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.trajectory import Ending
@@ -49,25 +50,28 @@ def cause(setup: Setup, equation: StateEquation, run: Record, contradicts: bool)
 
 
 def _unbooked(equation: StateEquation, run: Record) -> str:
-    """What changes the energy by more than the powers, at the sample where it does most; empty if nothing does.
+    """What changes the energy beside the powers, at the sample where it does most; empty if that is not the cause.
 
-    A sample at which dE/dt jumps, as at a stop, tells nothing.
+    A sample at which dE/dt jumps, as at a stop, tells nothing. Payloads that come and go change what the energy is of.
     """
+    if equation.equation_of_motion.payloads:
+        return ""
     rows = np.unique(np.linspace(0, len(run.t) - 1, _LOOKS).astype(int))
     t, y = run.t[rows], run.y[rows]
     q, v, a, _, _, P, _ = columns(equation, t, y, run.made[rows])
-    worst, said = _UNBOOKED, ""
+    worst = largest(np.abs(ledger(equation, run).residual)) / float(run.t[-1]) / 2  # on average, to leave the residual
+    said = ""
     for k in range(len(t)):
         state = float(t[k]), q[k], v[k], a[k]
         try:
             before, after = (_slope(lambda *at: sum(equation.energies(*at)), state, side) for side in (-1, 1))
+            flows = _slope(lambda *at: equation.energies(*at)[0], state, 1)
         except RobotDynError:
             continue
-        rate, booked = (before + after) / 2, float(P[k].sum())
-        size = abs(rate) + float(np.abs(P[k]).sum()) + _power_of_bodies(equation, state)
-        left = rate - booked
-        if np.isfinite(left) and abs(left) > worst * size and abs(after - before) < abs(left) / 2:
-            worst, said = abs(left) / size, _named(equation, state, left)
+        left = (before + after) / 2 - float(P[k].sum())
+        noticed = abs(left) > _UNBOOKED * (abs(flows) + float(np.abs(P[k]).sum()))
+        if noticed and abs(left) > worst and abs(after - before) < abs(left) / 2:
+            worst, said = abs(left), _named(equation, state, left)
     return said
 
 
@@ -76,11 +80,6 @@ def _slope(energy: Any, state: tuple[float, Array, Array, Array], side: float) -
     t, q, v, a = state
     s = side * _WITHIN / (1 + float(max(np.abs(v).max(), np.abs(a).max())))
     return float((energy(t + s, q + s * v, v + s * a) - energy(t, q, v)) / s)
-
-
-def _power_of_bodies(equation: StateEquation, state: tuple[float, Array, Array, Array]) -> float:
-    """What flows between kinetic and potential energy."""
-    return abs(_slope(lambda *at: equation.energies(*at)[0], state, 1))
 
 
 def _named(equation: StateEquation, state: tuple[float, Array, Array, Array], left: float) -> str:

@@ -112,7 +112,7 @@ def simulate(
     )  # fmt: skip
     ran.observer.close()
     made = _trajectory(ran, equation, record, statistics, error)
-    if made.leak:
+    if made.leak and record.outcome.ending is not Ending.STOPPED:  # no more of the user's code is called then
         why = cause(setup, equation, record, made.ledger.closes)
         made = replace(made, ledger=replace(made.ledger, cause=why))
     return replace(made, statistics=replace(statistics, samples_s=perf_counter() - estimated))
