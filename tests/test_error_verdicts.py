@@ -108,6 +108,16 @@ def test_long_steps_that_miss_the_order_speak_of_no_run_that_has_it(gap: float, 
     assert run.error.final == pytest.approx(rebound(run, gap, stiffness), rel=0.1)  # 1 − 2⁻⁸, and rounding
 
 
+def test_a_switch_in_the_last_step_ends_the_estimate() -> None:
+    """Touched 2.6 ms before the end, of which run and companions make one step: ω h = 2.6, and no order."""
+    apex = 10.0**2 / (2 * 9.80665)
+    plant = rd.Plant(TOSS, rd.joint_stops([-50.0], [apex - 0.5], 1e6, 0.0))
+    run = rd.simulate(plant, [0.0], [10.0], duration_s=0.703, integrator="order_8", step_s=0.01, engine="interpreted")
+    exact = rebound(run, 0.5, 1e6)
+    assert run.error.final >= LEAST * exact or "switches in the last step" in run.error.note
+    assert exact > 1e3 * run.error.final
+
+
 @pytest.mark.parametrize(("seed", "index"), [(31, 32), (31, 46), (41, 3)])
 def test_an_order_that_is_seen_is_that_of_the_run(seed: int, index: int) -> None:
     """A swing, bristles and stops whose longer steps show another order for a while, or magnify rounding."""

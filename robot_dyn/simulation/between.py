@@ -52,15 +52,21 @@ def stepped_over(setup: Setup, equation: StateEquation, path: Path, error: float
     return min((each for each in found if each is not None), key=lambda each: each.t, default=None)
 
 
-def switched_back(setup: Setup, run: Record) -> Missed | None:
-    """The first time at which a joint switches and switches back within a few steps of a fixed length."""
-    before: dict[str, float] = {}
+def cut_alike(setup: Setup, run: Record) -> Missed | None:
+    """The first time from which a run of fixed steps and its companions make the same few steps between switches.
+
+    That is where a joint switches and switches back within a few steps, or switches in the last step of the run.
+    """
+    h, before = setup.taken_step_s, dict[str, float]()
     found = []
     for each in run.events:
-        if each.joint and each.t - before.get(each.joint, -np.inf) < LEAST_STEPS * setup.taken_step_s:
+        if each.joint and each.t - before.get(each.joint, -np.inf) < LEAST_STEPS * h:
             why = f"joint {each.joint!r} switches and switches back within {LEAST_STEPS} steps"
             found.append(Missed(before[each.joint], why))
         before[each.joint] = each.t
+    end = float(run.walked.t[-1])
+    late = [(t, joint) for joint, t in before.items() if joint and end - h < t < end]
+    found += [Missed(t, f"joint {joint!r} switches in the last step") for t, joint in late]
     return min(found, key=lambda each: each.t, default=None)
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from robot_dyn.coefficients import with_values
 from robot_dyn.integrate.adaptive import LEAST_RTOL, Adaptive
 from robot_dyn.integrate.integrator import Integrator
-from robot_dyn.simulation.between import stepped_over, switched_back
+from robot_dyn.simulation.between import cut_alike, stepped_over
 from robot_dyn.simulation.companions import (
     COARSE,
     FINE,
@@ -73,7 +73,7 @@ def estimate(setup: Setup, equation: StateEquation, run: Record, companion: Comp
                 f" {1 / abs(motion.eigenvalue):.0e} s, so that runs with other steps do not show it; take shorter ones"
             )
         made = _by_steps(setup, method, estimated, companion, _turn(equation, run.walked))
-        made = _until_brief(setup, run, made)
+        made = _until_alike(setup, run, made)
     return _advised(setup, _looked_between(setup, equation, run, made), why)
 
 
@@ -100,15 +100,12 @@ def _by_steps(
     return shorter if shorter.resolved_until >= made.resolved_until else made
 
 
-def _until_brief(setup: Setup, run: Record, made: ErrorEstimate) -> ErrorEstimate:
-    """The estimate up to where a joint switches and switches back within a few steps.
-
-    Each companion cuts its steps there as well, so that all of them make the same one or two.
-    """
-    brief = switched_back(setup, run)
-    if brief is None or brief.t >= made.resolved_until:
+def _until_alike(setup: Setup, run: Record, made: ErrorEstimate) -> ErrorEstimate:
+    """The estimate up to where each companion cuts its steps as the run does, so that all make the same one or two."""
+    alike = cut_alike(setup, run)
+    if alike is None or alike.t >= made.resolved_until:
         return made
-    return replace(made, resolved_until=brief.t, note=brief.why)
+    return replace(made, resolved_until=alike.t, note=alike.why)
 
 
 def _by_refinement(

@@ -13,7 +13,7 @@ from robot_dyn.arithmetic import Array
 from robot_dyn.effects.effect import Conservative
 from robot_dyn.errors import RobotDynError
 from robot_dyn.foreign import call
-from robot_dyn.simulation.between import stepped_over, switched_back
+from robot_dyn.simulation.between import cut_alike, stepped_over
 from robot_dyn.simulation.ledger import largest
 from robot_dyn.simulation.record import Record
 from robot_dyn.simulation.samples import columns, ledger
@@ -44,7 +44,7 @@ def cause(setup: Setup, equation: StateEquation, run: Record, contradicts: bool)
     doubt = "do not trust the estimate, " if contradicts else ""
     if method.controls_error:
         return f"{doubt}the tolerance is too loose; take rtol = {method.rtol / _TIGHTER:.0e}"
-    missed = stepped_over(setup, equation, run.walked, 0.0) or switched_back(setup, run)
+    missed = stepped_over(setup, equation, run.walked, 0.0) or cut_alike(setup, run)
     why = "the steps are too long for the motion" if missed is None else f"{missed.why}, at t = {missed.t:.4g} s"
     return f"{doubt}{why}; take step_s = {setup.taken_step_s / _FINER:.0e}"
 
