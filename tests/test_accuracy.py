@@ -12,7 +12,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.errors import QueryError, RobotDynError, SceneError
 from robot_dyn.simulation.accuracy import AccuracyError
-from tests.estimates.asked import FAMILIES, asked_scene
+from tests.estimates.asked import FAMILIES, answer, asked_scene
 from tests.estimates.held import meet
 from tests.estimates.truth import truth
 
@@ -38,6 +38,35 @@ def test_the_error_is_at_most_what_is_asked_where_joints_stick_and_strike(index:
     found = meet(1, index)
     assert found.met, str(found)
     assert found.estimated <= found.asked
+
+
+@pytest.mark.parametrize("index", range(4), ids=["pendulum", "planar_2r", "ur5", "panda"])
+def test_a_request_is_met_and_not_refused_at_an_estimate_below_it(index: int) -> None:
+    """The short form of `python -m tests.estimates --requests 400`, against SciPy over `pin.aba`."""
+    found = answer(20261123, index)
+    assert found.met, str(found)
+    assert found.told
+    assert not found.refused_below
+
+
+def test_the_last_run_goes_to_a_tenth_of_the_tolerance() -> None:
+    """In 13 to 21 steps an error falls more slowly than the tolerance: four runs ended at 0.73 of what is asked."""
+    q = [0.71357415, -0.67734523, -0.40458398, 0.29839077, -0.51547014, 0.67809834]
+    v = [0.77390165, -0.52790667, -0.78913078, -0.18638423, -0.08987585, -0.23066578]
+    arm, asked = rd.load("ur5"), 1.059e-4
+    run = rd.simulate(arm, q, v, duration_s=0.99, accuracy=asked, record_period_s=0.09)
+    exact = truth(rd.Setup(rd.Plant(arm), q, v, 0.99), run.t)
+    assert np.abs(run.q - exact).max() <= asked
+    assert run.accuracy.margin >= 2
+
+
+def test_what_is_estimated_below_what_is_asked_is_delivered_with_its_margin() -> None:
+    """At 4.3 rad rounding may leave 4500 u (1 + 4.3) = 5.3e-12 rad whatever the tolerance: more than half of 1e-11."""
+    far = START + np.array([4.0, 0.0])
+    run = rd.simulate(ARM, far, duration_s=0.3, accuracy=1e-11, record_period_s=0.03)
+    assert 1 < run.accuracy.margin < 2
+    assert f"a margin of {run.accuracy.margin:.1f}" in run.summary
+    assert np.abs(run.q - truth(rd.Setup(rd.Plant(ARM), far, duration_s=0.3), run.t)).max() <= 1e-11
 
 
 def test_a_tolerance_is_not_the_error() -> None:

@@ -14,8 +14,9 @@ from robot_dyn.effects.effect import Active
 from robot_dyn.errors import QueryError
 from robot_dyn.simulation import origin
 from robot_dyn.simulation.error import Verdict
-from tests.estimates.judge import LEAST, MOST, judge
+from tests.estimates.judge import FAR, LEAST, MOST, judge
 from tests.estimates.scenes import FAMILIES, arms
+from tests.estimates.switching import scene_of_all
 from tests.estimates.truth import truth
 from tests.hard.stiff_motion import stop
 
@@ -96,6 +97,34 @@ def test_a_graze_of_a_stop_is_not_stepped_over() -> None:
     assert np.diff(run.t).max() <= 0.01
     assert error < 1e-6
     assert LEAST * error < run.error.final
+
+
+@pytest.mark.parametrize(("gap", "stiffness", "step"), [(0.5, 1e3, 0.02), (0.5, 1e4, 0.01), (0.1, 1e3, 0.01)])
+def test_long_steps_that_miss_the_order_speak_of_no_run_that_has_it(gap: float, stiffness: float, step: float) -> None:
+    """In a stop, ω h = 0.3 to 1 of order 8: steps of 2, 3 and 5 h err without order, by up to 8000 times too much."""
+    run = toss(gap, stiffness, integrator="order_8", step_s=step, engine="interpreted")
+    assert run.error.verdict is Verdict.ORDER
+    assert run.error.note == ""
+    assert run.error.final == pytest.approx(rebound(run, gap, stiffness), rel=0.1)  # 1 − 2⁻⁸, and rounding
+
+
+def test_a_switch_in_the_last_step_ends_the_estimate() -> None:
+    """Touched 2.6 ms before the end, of which run and companions make one step: ω h = 2.6, and no order."""
+    apex = 10.0**2 / (2 * 9.80665)
+    plant = rd.Plant(TOSS, rd.joint_stops([-50.0], [apex - 0.5], 1e6, 0.0))
+    run = rd.simulate(plant, [0.0], [10.0], duration_s=0.703, integrator="order_8", step_s=0.01, engine="interpreted")
+    exact = rebound(run, 0.5, 1e6)
+    assert run.error.final >= LEAST * exact or "switches in the last step" in run.error.note
+    assert exact > 1e3 * run.error.final
+
+
+@pytest.mark.parametrize(("seed", "index"), [(31, 32), (31, 46), (41, 3)])
+def test_an_order_that_is_seen_is_that_of_the_run(seed: int, index: int) -> None:
+    """A swing, bristles and stops whose longer steps show another order for a while, or magnify rounding."""
+    judged = judge(seed, index, scene_of_all)
+    assert judged.run.error.verdict is Verdict.ORDER, str(judged)
+    assert judged.run.error.note == ""
+    assert LEAST <= judged.ratio <= FAR, str(judged)
 
 
 @pytest.mark.parametrize(

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Any
+
 import numpy as np
 import pytest
 
 import robot_dyn as rd
+from robot_dyn.simulation.state_equation import numbered
 
 DOUBLE = rd.load("planar_2r")
 SKEW, CART_POLE = rd.load("skew_tree"), rd.load("cart_pole")
@@ -133,6 +137,38 @@ def test_effects_of_one_name_keep_their_own_accounts() -> None:
     np.testing.assert_allclose(first + second, one.work["viscous_friction"], atol=1e-12)
 
 
+@dataclass(frozen=True, eq=False)
+class Grease(rd.Dissipative):
+    """Its name has a space."""
+
+    name = "grease drag"
+    damping: float
+
+    def torque(self, dynamics: Any, t: float, q: Any, v: Any) -> Any:
+        return -self.damping * v
+
+
+def test_effects_of_one_name_with_a_space_keep_their_own_accounts() -> None:
+    """Their powers are −b |v|²; the ledger closes to the tolerance of 1e-10, times some growth."""
+    run = rd.simulate(rd.Plant(DOUBLE, [Grease(0.3), Grease(0.7)]), **START, engine="interpreted")
+    assert list(run.power) == ["control", "grease drag", "grease drag 2"]
+    np.testing.assert_allclose(run.power["grease drag 2"], -0.7 * (run.v**2).sum(axis=1), rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(run.power["grease drag"], run.power["grease drag 2"] * 3 / 7, rtol=1e-12, atol=1e-14)
+    assert run.ledger.closure < 1e-8
+
+
+@pytest.mark.parametrize("names", [("a b",) * 3, ("a 2", "a", "a"), ("a", "a", "a 2", "a 2")])
+def test_numbered_names_differ(names: tuple[str, ...]) -> None:
+    made = numbered(*names)
+    assert len(set(made)) == len(names)
+    assert all(new.startswith(name) for name, new in zip(names, made, strict=True))
+
+
+def test_a_dissipative_effect_that_gains_is_told_whatever_its_name() -> None:
+    run = rd.simulate(rd.Plant(DOUBLE, [Grease(0.3), Grease(-0.2)]), **START, engine="interpreted")
+    assert [each.joint for each in run.remarks if each.kind == "dissipative_effect_gains"] == ["grease drag 2"]
+
+
 def test_a_lift_at_constant_force_does_the_work_of_mechanics() -> None:
     """On a rail, W = F x for a constant force: the wrench pushes, E rises by as much; rounding, 1e-12."""
     cart = CART_POLE.with_(lock={"hinge": 0.4}, gravity=(0.0, 0.0, 0.0))
@@ -156,3 +192,56 @@ def test_gauss_keeps_the_energy_of_a_long_swing_and_euler_does_not() -> None:
     assert np.abs(gauss[1600:]).max() < 2 * np.abs(gauss[:400]).max() < 1e-4
     euler = rd.simulate(rd.Plant(DOUBLE), **start, duration_s=5.0, integrator=rd.method("explicit_euler")).ledger
     assert euler.residual[-1] > 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Lopsided(rd.Conservative):
+    """A spring whose potential is too large by a half, and whose rest may move: d(E − W)/dt is not 0."""
+
+    share: float = 1.0
+    speed: float = 0.0
+
+    def torque(self, dynamics: Any, t: float, q: Any, v: Any) -> Any:
+        return -3.0 * (q - self.speed * t)
+
+    def potential(self, dynamics: Any, t: float, q: Any) -> Any:
+        return (1.5 * self.share * (q - self.speed * t) ** 2).sum(axis=-1)
+
+
+@pytest.mark.parametrize("effect", [Lopsided(1.5), Lopsided(1.0, 2.0)], ids=["not its potential", "depends on time"])
+def test_work_that_nothing_books_is_the_cause_of_a_ledger_that_does_not_close(effect: Lopsided) -> None:
+    """dE/dt = Σ P fails at states, whatever the steps: a smaller step is no remedy, and is not proposed."""
+    run = rd.simulate(rd.Plant(DOUBLE, [effect]), **START, engine="interpreted")
+    assert "does not close: lopsided does" in run.leak
+    assert "that its potential does not give" in run.leak
+    assert "step" not in run.leak
+
+
+def test_long_steps_are_the_cause_of_a_ledger_that_does_not_close() -> None:
+    """Of order 1, at 20 ms, with all work booked: a quarter of the step, or a smaller tolerance, is the remedy."""
+    run = rd.simulate(DOUBLE, [0.4, 0.2], [3.0, 2.0], duration_s=0.6, integrator="explicit_euler", step_s=0.02)
+    assert run.leak == "it does not close: the steps are too long for the motion; take step_s = 5e-03"
+    finer = rd.simulate(DOUBLE, [0.4, 0.2], [3.0, 2.0], duration_s=0.6, integrator="explicit_euler", step_s=0.005)
+    assert finer.ledger.closure < run.ledger.closure / 2
+    loose = rd.Adaptive(rtol=3e-2, atol=1e-1)
+    run = rd.simulate(DOUBLE, [0.4, 0.2], [3.0, 2.0], duration_s=3.0, integrator=loose)
+    assert run.leak == "it does not close: the tolerance is too loose; take rtol = 3e-04"
+
+
+def test_a_stop_passed_within_a_step_is_the_cause_of_a_ledger_that_does_not_close() -> None:
+    """Half an oscillation in the stop takes 36 ms, less than three steps; sdirk_3 damps it."""
+    plant = rd.Plant(DOUBLE, rd.joint_stops(-0.5, 0.6, 1e3, 0.0))
+    run = rd.simulate(
+        plant, [0.4, 0.2], [3.0, 2.0], duration_s=0.4, integrator="sdirk_3", step_s=0.02, estimate_error=False
+    )
+    assert "does not close: joint 'joint_2' switches and switches back within 3 steps, at t = 0.1" in run.leak
+    assert run.leak.endswith("take step_s = 5e-03")
+
+
+def test_rounding_at_rest_is_no_leak() -> None:
+    """Held by gravity compensation, K is 1e-30 J and the residual 1e-14 J of potentials of 10 J: rounding of these."""
+    arm, q = rd.load("ur5"), [0.3, -0.6, 0.4, -1.2, 0.5, 1.1]
+    run = rd.simulate(arm, q, duration_s=0.1, controller=rd.PDGravity(arm, rd.hold(q), 10.0, 1.0))
+    assert run.ledger.closure > 1e-3
+    assert run.leak == ""
+    assert "does not close" not in run.summary

@@ -16,7 +16,8 @@ from robot_dyn.effects.effect import Force
 from robot_dyn.effects.joint_limit import JointStopSpring
 from robot_dyn.errors import RobotDynError
 from robot_dyn.foreign import call
-from robot_dyn.simulation.record import Path
+from robot_dyn.simulation.record import Path, Record
+from robot_dyn.simulation.schedule import LEAST_STEPS
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.smoothness import LOOKS, extremes, foreign, named
 from robot_dyn.simulation.state_equation import StateEquation
@@ -49,6 +50,24 @@ def stepped_over(setup: Setup, equation: StateEquation, path: Path, error: float
     found = [_stop(equation, effect, path, q, v, error) for effect in effects]
     found += [_code(equation, part, path, q, v, error) for part in foreign(setup)]
     return min((each for each in found if each is not None), key=lambda each: each.t, default=None)
+
+
+def cut_alike(setup: Setup, run: Record) -> Missed | None:
+    """The first time from which a run of fixed steps and its companions make the same few steps between switches.
+
+    That is where a joint switches and switches back within a few steps, or switches in the last step of the run.
+    """
+    h, before = setup.taken_step_s, dict[str, float]()
+    found = []
+    for each in run.events:
+        if each.joint and each.t - before.get(each.joint, -np.inf) < LEAST_STEPS * h:
+            why = f"joint {each.joint!r} switches and switches back within {LEAST_STEPS} steps"
+            found.append(Missed(before[each.joint], why))
+        before[each.joint] = each.t
+    end = float(run.walked.t[-1])
+    late = [(t, joint) for joint, t in before.items() if joint and end - h < t < end]
+    found += [Missed(t, f"joint {joint!r} switches in the last step") for t, joint in late]
+    return min(found, key=lambda each: each.t, default=None)
 
 
 def _stop(

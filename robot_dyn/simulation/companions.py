@@ -31,6 +31,7 @@ _UNITS = 100.0  # of rounding, that ten steps may leave in q
 _BAND = 2.0  # a ratio of differences may be this factor off the one of the method's order
 _ROWS = 2000  # of an estimate, at most
 _FAR_OFF = 8.0  # times the bound of the others: beyond, the longest step is no longer in the range of the method
+_DOUBT = 3.0  # times what the order of the method says: beyond, shorter steps are asked
 _LOST = 0.1  # of the motion, at most 0.1 rad or m: companions that differ by more tell nothing
 
 
@@ -62,6 +63,15 @@ class Estimated:
         nominal = (3.0**order - 1) / (2.0**order - 1)
         seen = (ratio > nominal / _BAND) & (ratio < nominal * _BAND) | (self.floor >= A)
         return self._judged(np.where(self._smooth(seen), A / (2.0**order - 1), bound), bound, seen)
+
+    def doubts(self, made: ErrorEstimate, companions: Mapping[Fraction, Path], order: int) -> bool:
+        """Whether an estimate from longer steps is far above what the order of the method would make of them.
+
+        Long steps may be unstable, or show no order for a while, where those of the run are neither. A kink is another
+        matter: shorter steps show no order either.
+        """
+        by_order = differences(self.path, companions[COARSE[0]], self.n)[-1] / (2.0**order - 1)
+        return self.kink > self.path.t[-1] and not made.final <= _DOUBT * max(by_order, float(self.floor[-1]))
 
     def from_shorter_steps(self, companions: Mapping[Fraction, Path], order: int) -> ErrorEstimate:
         """The estimate from companions of `FINE`: |q_h − q_{h/m}| = |e(h)| (1 − m⁻ᵖ), of order 1 where none shows."""

@@ -1,7 +1,7 @@
 """The error estimate of a run: companion runs are made until one of the verdicts of `companions` holds to its end.
 
 Longer steps cost about as much as the run and come first; shorter ones cost five times as much, and are taken where
-longer ones cannot be made or show nothing.
+longer ones cannot be made, or do not show the order of the method throughout.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from robot_dyn.coefficients import with_values
 from robot_dyn.integrate.adaptive import LEAST_RTOL, Adaptive
 from robot_dyn.integrate.integrator import Integrator
-from robot_dyn.simulation.between import stepped_over
+from robot_dyn.simulation.between import cut_alike, stepped_over
 from robot_dyn.simulation.companions import (
     COARSE,
     FINE,
@@ -73,14 +73,14 @@ def estimate(setup: Setup, equation: StateEquation, run: Record, companion: Comp
                 f" {1 / abs(motion.eigenvalue):.0e} s, so that runs with other steps do not show it; take shorter ones"
             )
         made = _by_steps(setup, method, estimated, companion, _turn(equation, run.walked))
-        made = _until_brief(setup, run, made)
+        made = _until_alike(setup, run, made)
     return _advised(setup, _looked_between(setup, equation, run, made), why)
 
 
 def _by_steps(
     setup: Setup, method: Integrator, estimated: Estimated, companion: Companion, turn: float
 ) -> ErrorEstimate:
-    """From longer steps, then from shorter ones."""
+    """From longer steps; from shorter ones where those are lost, or show less than the order of the method would."""
     if turn > _BLIND_TURN:
         return no_estimate(
             f"a joint turns by {turn:.3g} rad in a step, so that runs with other steps may meet the same angles"
@@ -88,30 +88,24 @@ def _by_steps(
     made = no_estimate("fewer than 3 steps between ticks, switches or breaks")
     if turn < _FAR_TURN and min(each.steps for each in setup.segments) >= LEAST_STEPS:
         paths = {pace: companion(pace, setup).shared for pace in COARSE}
-        estimated = _with_rounding(estimated, companion(COARSE[1], _pushed(setup)).shared, paths[COARSE[1]])
-        made = estimated.from_longer_steps(paths, method.order)
-        if made.resolved_until >= estimated.path.t[-1]:
+        magnified = _with_rounding(estimated, companion(COARSE[1], _pushed(setup)).shared, paths[COARSE[1]])
+        made = magnified.from_longer_steps(paths, method.order)
+        if made.resolved_until >= estimated.path.t[-1] and not estimated.doubts(made, paths, method.order):
             return made
     half = companion(FINE[0], setup).shared
     if made.resolved_until > 0 and estimated.lost_at(half) < _GAIN * made.resolved_until:
         return made  # chaos: no step of practical length resolves it
-    estimated = _with_rounding(estimated, companion(Fraction(1), _pushed(setup)).shared, estimated.path)
-    return estimated.from_shorter_steps({FINE[0]: half, FINE[1]: companion(FINE[1], setup).shared}, method.order)
+    magnified = _with_rounding(estimated, companion(Fraction(1), _pushed(setup)).shared, estimated.path)
+    shorter = magnified.from_shorter_steps({FINE[0]: half, FINE[1]: companion(FINE[1], setup).shared}, method.order)
+    return shorter if shorter.resolved_until >= made.resolved_until else made
 
 
-def _until_brief(setup: Setup, run: Record, made: ErrorEstimate) -> ErrorEstimate:
-    """The estimate up to where a joint switches and switches back within a few steps.
-
-    Each companion cuts its steps there as well, so that all of them make the same one or two.
-    """
-    h, before = setup.taken_step_s, {}
-    for each in run.events:
-        t = before.get(each.joint, -np.inf) if each.joint else -np.inf
-        if each.t - t < LEAST_STEPS * h and t < made.resolved_until:
-            why = f"joint {each.joint!r} switches and switches back within {LEAST_STEPS} steps"
-            return replace(made, resolved_until=t, note=why)
-        before[each.joint] = each.t
-    return made
+def _until_alike(setup: Setup, run: Record, made: ErrorEstimate) -> ErrorEstimate:
+    """The estimate up to where each companion cuts its steps as the run does, so that all make the same one or two."""
+    alike = cut_alike(setup, run)
+    if alike is None or alike.t >= made.resolved_until:
+        return made
+    return replace(made, resolved_until=alike.t, note=alike.why)
 
 
 def _by_refinement(

@@ -1,6 +1,7 @@
 """The energy ledger of a run: E(t) − E(0) = Σ W_k(t) + residual, with E = K + Σ potentials.
 
 A residual near zero is necessary for a run to be right, not sufficient: the error estimate is the figure of accuracy.
+Why one is not near zero is found by `imbalance`.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import numpy as np
 from robot_dyn.values import Value, read_only
 
 _OPEN = 1e-3  # a residual, as a part of the energy exchanged
+_ROUNDING = 1e-12  # of the energies, whose differences are the residual
 
 
 @final
@@ -26,6 +28,7 @@ class Ledger(Value):
         work: Done up to each sample by the control and by each other effect, by name.
         kinetic_peak: Largest K between the samples that is known.
         stored: Of effects with states, by name: what these hold of the energy that their work took.
+        cause: Why it does not close, and what to do; empty if it closes, or the cause was not looked for.
     """
 
     kinetic: np.ndarray
@@ -33,6 +36,7 @@ class Ledger(Value):
     work: dict[str, np.ndarray]
     kinetic_peak: float = 0.0
     stored: dict[str, np.ndarray] = field(default_factory=dict)
+    cause: str = ""
 
     def __post_init__(self) -> None:
         read_only(self)
@@ -60,8 +64,15 @@ class Ledger(Value):
 
     @property
     def closes(self) -> bool:
-        """Whether at most a thousandth of the energy exchanged is unaccounted for."""
-        return not self.closure > _OPEN
+        """Whether at most a thousandth of the energy exchanged is unaccounted for, or rounding."""
+        return self.rounded or not self.closure > _OPEN
+
+    @property
+    def rounded(self) -> bool:
+        """Whether the residual is rounding: at most 1e-12 of the energies and the work that are added up."""
+        parts = (self.kinetic, self.potential, *self.work.values())
+        size = sum(largest(np.abs(part)) for part in parts if not np.isnan(part).all())
+        return bool(largest(np.abs(self.residual)) <= _ROUNDING * size)
 
     @property
     def closure(self) -> float:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.effects.effect import Dissipative, Stateful
+from robot_dyn.effects.effect import Conservative, Dissipative, Stateful
 from robot_dyn.errors import RobotDynError
 from robot_dyn.model.robot import Robot
 from robot_dyn.model.units import unit
@@ -58,13 +58,10 @@ def remarks(
 
 def _gaining(setup: Setup, t: np.ndarray, power: dict[str, np.ndarray]) -> Iterator[Remark]:
     """Effects declared dissipative with τᵀv > 0 at a sample, by more than rounding."""
-    declared = {
-        effect.name
-        for effect in setup.plant.effects
-        if isinstance(effect, Dissipative) and not isinstance(effect, Stateful)  # which may give back what they store
-    }
-    for name, P in power.items():
-        if name.partition(" ")[0] not in declared or not (np.nan_to_num(P) > _ROUNDING * np.nanmax(np.abs(P))).any():
+    working = [force for force in setup.plant.forces if not isinstance(force, Conservative)]
+    for force, (name, P) in zip(working, list(power.items())[1:], strict=False):  # behind the control, as of `sources`
+        takes = isinstance(force, Dissipative) and not isinstance(force, Stateful)  # what stores may give back
+        if not takes or not (np.nan_to_num(P) > _ROUNDING * np.nanmax(np.abs(P))).any():
             continue
         at = int(np.nanargmax(P))
         text = f"{name} {P[at]:.4g} W at {t[at]:.4g} s"

@@ -27,6 +27,7 @@ from robot_dyn.simulation.damped_task import damped
 from robot_dyn.simulation.error import ErrorEstimate, no_estimate
 from robot_dyn.simulation.estimate import estimate
 from robot_dyn.simulation.event_run import AccumulationError, TooLongError
+from robot_dyn.simulation.imbalance import cause
 from robot_dyn.simulation.loads import at_stop, link_of, wrenches
 from robot_dyn.simulation.observed import observer_of, remarks
 from robot_dyn.simulation.observer import Observer
@@ -111,6 +112,9 @@ def simulate(
     )  # fmt: skip
     ran.observer.close()
     made = _trajectory(ran, equation, record, statistics, error)
+    if made.leak and record.outcome.ending is not Ending.STOPPED:  # no more of the user's code is called then
+        why = cause(setup, equation, record, made.ledger.closes)
+        made = replace(made, ledger=replace(made.ledger, cause=why))
     return replace(made, statistics=replace(statistics, samples_s=perf_counter() - estimated))
 
 

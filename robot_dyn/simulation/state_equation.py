@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import count
 from typing import Any, final
 
 import numpy as np
@@ -289,9 +290,9 @@ class StateEquation:
 
 
 def numbered(*names: str) -> tuple[str, ...]:
-    """Names, of which a second one of an effect gets a number."""
+    """Names, each of them once: a second part of a name gets a number, "spring" and "spring 2"."""
     made: list[str] = []
     for name in names:
-        count = sum(each.split(" ")[0] == name for each in made)
-        made.append(f"{name} {count + 1}" if count else name)
+        others = (f"{name} {k}" for k in count(2))
+        made.append(name if name not in made else next(each for each in others if each not in {*made, *names}))
     return tuple(made)

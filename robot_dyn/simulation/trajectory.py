@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import StrEnum
+from math import inf
 from typing import Any, Protocol, final, runtime_checkable
 
 import numpy as np
@@ -118,10 +119,16 @@ class Accuracy:
     digit_more: float
     digit_less: float
 
+    @property
+    def margin(self) -> float:
+        """What was asked over what is estimated: at least 2, or 1 where no tolerance brings more; inf for no error."""
+        return self.asked / self.estimated if self.estimated > 0 else inf
+
     def __str__(self) -> str:
         at = f" at rtol {self.rtol:.1e}" if self.rtol else ""
         return (
-            f"asked {self.asked:.1e}, estimated {self.estimated:.1e}{at}; {self.run} evaluations,"
+            f"asked {self.asked:.1e}, estimated {self.estimated:.1e}{at}, a margin of {self.margin:.1f};"
+            f" {self.run} evaluations,"
             f" pilots {self.pilots}, check {self.check}; a digit more about {self.digit_more:.0f}, a digit less"
             f" {self.digit_less:.0f}"
         )
@@ -199,14 +206,16 @@ class Trajectory(Value):
     @property
     def leak(self) -> str:
         """Why the energy ledger casts doubt on the run; empty if it does not."""
-        if not self.ledger.closes:
-            return "it does not close: take a smaller step"
-        if self.error is None or not self.error.resolved_until > 0:
-            return ""
-        span = float(np.ptp(self.q, axis=0).max())
-        if span > 0 and self.ledger.closure > _CONTRADICTS * max(self.error.final / span, _ROUNDING):
-            return "it does not close as the estimated error of q says: do not trust the estimate, take a smaller step"
-        return ""
+        ledger = self.ledger
+        if ledger.closes:
+            if ledger.rounded or self.error is None or not self.error.resolved_until > 0:
+                return ""
+            span = float(np.ptp(self.q, axis=0).max())
+            if not span > 0 or ledger.closure <= _CONTRADICTS * max(self.error.final / span, _ROUNDING):
+                return ""
+            why = ledger.cause or "do not trust the estimate, take a smaller step"
+            return f"it does not close as the estimated error of q says: {why}"
+        return f"it does not close: {ledger.cause or 'simulate the run by itself, which tells why'}"
 
     def proven_digits(self, proof: Theorem) -> float:
         """Decimal digits of q that a theorem confirms: −log₁₀ of the largest possible error, in [rad] or [m].

@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import robot_dyn as rd
+from tests.estimates.nonsmooth import nonsmooth_truth, time_of_event
 from tests.estimates.scenes import Scene, arms
 
 FAMILIES = ("rigid", "dry")
-_FINEST = rd.Adaptive("DOP853", 3e-14, 1e-15)
+EVENTS = 150  # of a scene, at most
 
 
 @dataclass(frozen=True)
@@ -68,17 +69,18 @@ def _friction(rng: np.random.Generator, level: np.ndarray) -> rd.Effect:
     return rd.DryFriction(level, level * 1.3, 0.2)
 
 
-def meet(seed: int, index: int) -> Met:
-    """Ask for the accuracy of a scene; AccuracyError if it is refused.
+def cut(made: Scene) -> Scene:
+    """The scene, of so many events at most, and as long as its motion is the only one."""
+    end = time_of_event(made.setup, EVENTS)
+    return replace(made, setup=replace(made.setup, duration_s=end, record_period_s=end / 20))
 
-    The truth is DOP853 near rounding, and its witness order 8 at steps of a fixed length: both cut at the same events,
-    which closed forms in test_dry_friction and test_rigid_stops hold to.
-    """
-    scene, asked = held_scene(seed, index)
+
+def meet(seed: int, index: int) -> Met:
+    """Ask for the accuracy of a scene; AccuracyError if it is refused. The truth, and its witness, are `nonsmooth`."""
+    whole, asked = held_scene(seed, index)
+    scene = cut(whole)
     run = rd.simulate(scene.setup, accuracy=asked)
     assert run.accuracy is not None
-    own = replace(scene.setup, estimate_error=False)
-    exact = rd.simulate(replace(own, integrator=_FINEST))
-    other = rd.simulate(replace(own, integrator="order_8", step_s=own.duration_s / 400))
-    true, unsure = (float(np.abs(x.q - exact.q).max()) for x in (run, other))
+    exact, other = nonsmooth_truth(scene.setup, run.t), nonsmooth_truth(scene.setup, run.t, 1e-12, 3e-3)
+    true, unsure = (float(np.abs(exact - q).max()) for q in (run.q, other))
     return Met(scene.label, asked, run.accuracy.estimated, true, unsure)

@@ -1,61 +1,184 @@
 """The truth of a scene: SciPy's DOP853 near rounding over `pin.aba` and torques written out here, cut at every switch.
 
-It shares the numbers of a scene with the library, and the reference polynomial; no step, loop, effect or controller.
+Windows, ticks and breaks are known times. Where a stop is touched or left, or a joint with bristles turns, is located
+on SciPy's dense output, and the integration begins again there with the formulas of the other side.
+
+It shares the numbers of a scene with the library, and the reference polynomial; no step, loop, event, effect or
+controller.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from scipy.integrate import solve_ivp
+from scipy.integrate import DOP853, solve_ivp
+from scipy.optimize import brentq
 
 import robot_dyn as rd
 
+STOPS, BRISTLES = (rd.JointStopSpring, rd.JointStopDamper), (rd.LuGreFriction, rd.DahlFriction)
+_LOOKS = np.linspace(0, 1, 9)  # of a step: where guards are looked at
+_DEEP, _SLOW = 1e-15, 1e-12  # [rad], [rad/s]: by which a level is passed
 
-def truth(setup: rd.Setup, times: np.ndarray, tolerance: float = 3e-14, longest: float = 1e-3) -> np.ndarray:
+
+def truth(setup: rd.Setup, times: np.ndarray, tolerance: float = 3e-14, longest: float = 5e-3) -> np.ndarray:
     """Positions at ascending times, (k, n)."""
     n, none, model = len(setup.q0), np.zeros(len(setup.q0)), setup.plant.dynamics.model
-    data, law = model.createData(), setup.controller
-    forces = [_force(model, data, effect) for effect in setup.plant.effects]
+    data, law, effects = model.createData(), setup.controller, setup.plant.effects
+    bristles = [Bristles(effect) for effect in effects if isinstance(effect, BRISTLES)]
+    stops = [effect for effect in effects if isinstance(effect, STOPS)]
+    others = [each for each in effects if not isinstance(each, (*STOPS, *BRISTLES))]
+    forces = [_force(model, data, effect) for effect in others]
     period = law.period_s if law else 0.0
-    ends = {0.0, setup.duration_s} | {t for effect in setup.plant.effects for t in effect.switches}
+    ends = {0.0, setup.duration_s} | {t for effect in effects for t in effect.switches}
     ends |= set(law.knots if law else ())
     if period:
         ends |= {k * period for k in range(int(setup.duration_s / period + 2))}
     ends = sorted(t for t in ends if 0 <= t <= setup.duration_s)
     ends = [t for t, after in zip(ends, [*ends[1:], np.inf], strict=True) if after - t > 1e-12]
-    stops = [effect for effect in setup.plant.effects if isinstance(effect, rd.JointStopSpring)]
-    least = np.full(2 * n, tolerance / 10)
+    least = np.full((2 + len(bristles)) * n, tolerance / 10)
     for each in stops:
-        least[n:] = np.maximum(least[n:], _rounding(model, setup.q0, each.stiffness))
-    y, held, result = np.concatenate([setup.q0, setup.v0]), None, np.empty((len(times), n))
+        if isinstance(each, rd.JointStopSpring):
+            least[n : 2 * n] = np.maximum(least[n : 2 * n], _rounding(model, setup.q0, each.stiffness))
+    y = np.concatenate([setup.q0, setup.v0, *(none for _ in bristles)])
+    held, result = None, np.empty((len(times), n))
     result[times <= 0.0] = setup.q0
+    guards = _guards(stops, bool(bristles), n)
     for start, end in pairwise(ends):
         middle = (start + end) / 2
         acting = [force(middle) for force in forces]
         if period and abs(start / period - round(start / period)) < 1e-6:
-            held = _control(law, model, data, start, y[:n], y[n:], start)
+            held = _control(law, model, data, start, y[:n], y[n : 2 * n], start)
 
-        def rate(t, y, acting=acting, held=held, middle=middle):
-            q, v = y[:n], y[n:]
+        def rate(t, y, sides, acting=acting, held=held, middle=middle):
+            q, v, z = y[:n], y[n : 2 * n], y[2 * n :].reshape(-1, n)
             u = none if law is None else held if period else _control(law, model, data, t, q, v, middle)
             for force in acting:
                 u = u + force(q, v)
-            return np.concatenate([v, pin.aba(model, data, q, v, u)])
+            for stop, (low, high) in zip(stops, guards.beyond(sides), strict=True):
+                u = u + _stop(stop, q, v, low, high)
+            rates = []
+            for bristle, deflection in zip(bristles, z, strict=True):
+                torque, bends = bristle.motion(v, guards.way(sides), deflection)
+                u = u + torque
+                rates.append(bends)
+            return np.concatenate([v, pin.aba(model, data, q, v, u), *rates])
 
-        inside = (times > start) & (times <= end)
-        at = np.union1d(times[inside], [end])
-        solved = solve_ivp(
-            rate, (start, end), y, "DOP853", at, rtol=tolerance, atol=least,
-            max_step=longest if stops else np.inf,
-        )  # fmt: skip
-        assert solved.success, solved.message
-        result[inside] = solved.y[:n, np.isin(at, times[inside])].T
-        y = solved.y[:, -1]
+        y = _across(rate, guards, start, end, y, times, result, tolerance, least, longest)
     return result
+
+
+def _across(rate, guards: Guards, t: float, end: float, y, times, result, tolerance: float, least, longest: float):
+    """The state at the end of a segment, begun again wherever a guard changes its sign; positions are written."""
+    n, sides = result.shape[1], guards.sides(y)
+    while t < end:
+        solver = DOP853(lambda t, y, sides=sides: rate(t, y, sides), t, y, end, rtol=tolerance, atol=least,
+                        max_step=longest if len(sides) else np.inf)  # fmt: skip
+        passed = None
+        while solver.status == "running" and passed is None:
+            solver.step()
+            assert solver.status != "failed", f"at t = {solver.t}"
+            passed = guards.first(solver, sides) if len(sides) else None
+            until = solver.t if passed is None else passed[0]
+            inside = (times > solver.t_old) & (times <= until)
+            if inside.any():
+                result[inside] = solver.dense_output()(times[inside])[:n].T
+        if passed is None:
+            return solver.y
+        root, k = passed
+        before, y = solver.t_old, solver.dense_output()(solver.t_old)
+        if root > before:
+            y = solve_ivp(
+                lambda t, y, sides=sides: rate(t, y, sides), (before, root), y, "DOP853", rtol=tolerance, atol=least
+            ).y[:, -1]
+        t, sides = root, np.where(np.arange(len(sides)) == k, -sides, sides)
+    return y
+
+
+class Guards:
+    """Coordinates of (q, v) that pass a level: q at a stop, v of a joint with bristles."""
+
+    def __init__(self, rows: np.ndarray, levels: np.ndarray, n: int, stops: int) -> None:
+        self.rows, self.levels, self.n, self.stops = rows, levels, n, stops
+        self.slack = np.where(rows < n, _DEEP, _SLOW)
+
+    def sides(self, y: np.ndarray) -> np.ndarray:
+        """On which side of its level each is, 1 or −1."""
+        return np.where(y[self.rows] >= self.levels, 1.0, -1.0)
+
+    def beyond(self, sides: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Of each stop: whether each joint is beyond its lower and its upper one."""
+        n = self.n
+        return [
+            (sides[2 * k * n : (2 * k + 1) * n] < 0, sides[(2 * k + 1) * n : (2 * k + 2) * n] > 0)
+            for k in range(self.stops)
+        ]
+
+    def way(self, sides: np.ndarray) -> np.ndarray:
+        """The sign of each velocity."""
+        return sides[-self.n :]
+
+    def first(self, solver: DOP853, sides: np.ndarray) -> tuple[float, int] | None:
+        """The first that leaves its side in the latest step, and when; q is looked at where it turns, too."""
+        dense, before, h = solver.dense_output(), solver.t_old, solver.t - solver.t_old
+        at = before + h * _LOOKS
+        states = dense(at)
+        v = states[self.n : 2 * self.n]
+        turns = np.argwhere(v[:, :-1] * v[:, 1:] < 0)
+        more = [brentq(lambda s, j=j: dense(s)[self.n + j], at[k], at[k + 1], xtol=1e-15) for j, k in turns]
+        at = np.union1d(at, more)
+        left = sides[:, None] * (dense(at)[self.rows] - self.levels[:, None]) < -self.slack[:, None]
+        if not left.any():
+            return None
+        found = []
+        for k in np.flatnonzero(left.any(axis=1)):
+            i = int(left[k].argmax())
+
+            def gap(s: float, k=k) -> float:
+                return sides[k] * (dense(s)[self.rows[k]] - self.levels[k])
+
+            low = at[i - 1] if i else before
+            found.append((brentq(gap, low, at[i], xtol=1e-16) if gap(low) > 0 else low, int(k)))
+        return min(found)
+
+
+def _guards(stops: list, bristles: bool, n: int) -> Guards:
+    rows = [np.arange(n) for _ in stops for _ in range(2)] + [np.arange(n, 2 * n)] * bristles
+    levels = [np.broadcast_to(x, n) for each in stops for x in (each.lower, each.upper)] + [np.zeros(n)] * bristles
+    empty = np.zeros(0, int), np.zeros(0)
+    return Guards(np.concatenate([empty[0], *rows]), np.concatenate([empty[1], *levels]), n, len(stops))
+
+
+class Bristles:
+    """LuGre's or Dahl's friction as smooth formulas of one sign of v."""
+
+    def __init__(self, effect: Any) -> None:
+        self.effect = effect
+
+    def motion(self, v: np.ndarray, way: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Torque and rate of the deflection."""
+        e = self.effect
+        stiffness = e.bristle_stiffness
+        if isinstance(e, rd.DahlFriction):
+            w = 1 - stiffness * z / e.coulomb * way
+            return -stiffness * z, np.abs(w) ** (1.0 if e.exponent is None else e.exponent) * np.sign(w) * v
+        level = e.coulomb + (e.breakaway - e.coulomb) * np.exp(-((v / e.stribeck_velocity) ** 2))
+        rate = v - stiffness * way * v * z / level
+        return -(stiffness * z + e.bristle_damping * rate + e.viscous * v), rate
+
+
+def _stop(stop, q, v, low, high) -> np.ndarray:
+    """Torque of a stop beyond which each joint is, or is not."""
+    below, above = np.where(low, stop.lower - q, 0.0), np.where(high, q - stop.upper, 0.0)
+    return (
+        stop.stiffness * (below - above)
+        if isinstance(stop, rd.JointStopSpring)
+        else -stop.damping * (below + above) * v
+    )
 
 
 def _rounding(model, q, stiffness) -> float:
@@ -79,14 +202,6 @@ def _force(model, data, effect) -> Callable[[float], Callable]:
         return lambda t: lambda q, v: -effect.stiffness * (q - effect.rest)
     if isinstance(effect, rd.RegularisedCoulombFriction):
         return lambda t: lambda q, v: -effect.friction * np.tanh(v / effect.velocity_scale)
-    if isinstance(effect, rd.JointStopSpring):
-        return lambda t: (
-            lambda q, v: effect.stiffness * (np.maximum(effect.lower - q, 0) - np.maximum(q - effect.upper, 0))
-        )
-    if isinstance(effect, rd.JointStopDamper):
-        return lambda t: (
-            lambda q, v: -effect.damping * (np.maximum(effect.lower - q, 0) + np.maximum(q - effect.upper, 0)) * v
-        )
     assert isinstance(effect, rd.ExternalWrench)
     frame = model.getFrameId(effect.frame)
 

@@ -31,9 +31,9 @@ import robot_dyn as rd
 from robot_dyn.convex import minimum, residual
 from robot_dyn.effects import set_valued
 from robot_dyn.simulation import modes
-from tests.estimates.held import held_scene
+from tests.estimates.held import cut, held_scene
 from tests.estimates.judge import LEAST, Judgement, judged
-from tests.estimates.nonsmooth import Bodies, nonsmooth_truth, time_of_event
+from tests.estimates.nonsmooth import Bodies, nonsmooth_truth
 from tests.estimates.scenes import Scene, scene
 from tests.estimates.truth import truth
 from tests.hard.case import Case, Row
@@ -41,7 +41,7 @@ from tests.hard.case import Case, Row
 TITLE = "Friction, stops, impacts"
 U = 2.0**-53
 KKT, OPEN, ADDED = 1e-13, 1e-3, 1e-12
-STEPS, EVENTS = 100, 150  # of time stepping; at most
+STEPS = 100  # of time stepping
 MANY = 50  # scenes in a block of the long form, for which compiling the time loops of all methods pays
 SMOOTH = (2, 3)  # places of regularised friction and of stops as springs among the families of `scene`
 
@@ -114,7 +114,7 @@ def step_residual(run: rd.Trajectory, bodies: Bodies) -> float:
 def _set_valued(name: str, block: range, case: str, seed: int) -> Iterator[Row]:
     found, kkt, energy, steps, ratios, broken, gained = [], 0.0, 0.0, [], [], [], []
     for i in block:
-        made = _cut(held_scene(seed, i, name)[0])
+        made = cut(held_scene(seed, i, name)[0])
         bodies = Bodies(made.setup)
         ends: list[np.ndarray] = []
 
@@ -144,12 +144,6 @@ def _set_valued(name: str, block: range, case: str, seed: int) -> Iterator[Row]:
     yield Row(case, "time stepping that leaks without a word", float(len(broken)), 0.0)
     if len(ratios) >= MANY:
         yield Row(case, "time stepping: error at a quarter of the step, median", float(np.median(ratios)), 0.4)
-
-
-def _cut(made: Scene) -> Scene:
-    """The scene, of so many events at most, and as long as its motion is the only one."""
-    end = time_of_event(made.setup, EVENTS)
-    return replace(made, setup=replace(made.setup, duration_s=end, record_period_s=end / 20))
 
 
 def _stepped(made: Scene, count: int) -> rd.Trajectory:
