@@ -12,7 +12,7 @@ import robot_dyn as rd
 from robot_dyn.compiled.symbolic import TraceError
 from robot_dyn.effects.effect import Active
 from robot_dyn.errors import QueryError
-from robot_dyn.simulation.machine import batch
+from robot_dyn.simulation.machine import pool
 
 ARM = rd.load("planar_2r")
 Q, V = np.array([0.4, -0.7]), np.array([0.3, 0.5])
@@ -27,15 +27,11 @@ SETUP = rd.Setup(
     integrator="rk4",
     step_s=2e-3,
     record_period_s=0.01,
-    engine="interpreted",
 )
 PID = replace(SETUP, controller=rd.PID(REFERENCE, 40.0, 30.0, 4.0, effort_limit=3.0, period_s=0.004))
 ARM_TIP, INERTIA = "tip", ((0.01, 0.0, 0.0), (0.0, 0.02, 0.001), (0.0, 0.001, 0.03))
 NOMINAL = ARM.with_(payload=rd.Payload(ARM_TIP, 1.0))
 EVERYTHING = ("q", "v", "u", "energy", "work")
-
-
-pytestmark = pytest.mark.usefixtures("uncut")
 
 
 def starts(count: int, spread: float = 0.3) -> np.ndarray:
@@ -227,8 +223,9 @@ def test_runs_are_numbered_as_lists_are() -> None:
 
 @pytest.mark.parametrize("method", ["rk4", "gauss_2"])
 def test_a_diverged_run_names_its_joint_its_time_and_what_to_do(method: str) -> None:
-    """The joint that moved fastest in its last sample; each run its own."""
-    setup = replace(SETUP, integrator=rd.method(method), record_period_s=0.0)
+    """The joint that moved fastest in its last sample; each run its own. Nothing cuts their steps."""
+    plant = rd.Plant(ARM, PLANT.effects[:2])
+    setup = replace(SETUP, plant=plant, integrator=rd.method(method), record_period_s=0.0)
     v0 = np.array([V, [1e5, 3e7], V, [3e7, 1e4]])
     runs = rd.rollouts(setup, starts(4), v0)
     for i in (1, 3):
@@ -349,13 +346,13 @@ def test_an_interrupt_ends_the_batch_and_keeps_what_there_is(monkeypatch) -> Non
 
     setup = replace(SETUP, duration_s=100.0, record_period_s=10.0)
     rd.rollouts(SETUP, starts(1))  # compiled before
-    wait, calls = batch.wait, []
+    wait, calls = pool.wait, []
 
     def once(*args, **options):
         calls.append(1)
         return interrupted() if len(calls) == 1 else wait(*args, **options)
 
-    monkeypatch.setattr(batch, "wait", once)
+    monkeypatch.setattr(pool, "wait", once)
     runs = rd.rollouts(setup, starts(200), threads=2)
     assert runs.stopped.any() and not runs.diverged.any()
     i = int(np.flatnonzero(runs.stopped)[-1])

@@ -260,7 +260,7 @@ class Setup(Value):
         """Whether the controller acts at the end of the run."""
         return self._cuts[-1][1]
 
-    @cached_property
+    @property
     def finds_events(self) -> bool:
         """Whether steps end where effects and the controller switch, and at events asked for."""
         if self.integrator.controls_error or self.integrator.nonsmooth:
