@@ -340,12 +340,16 @@ def test_runs_of_chosen_steps_are_those_of_simulate() -> None:
     assert not runs.diverged.any() and "one after the other" in runs.statistics.engine
 
 
-def test_an_interrupt_ends_the_batch_and_keeps_what_there_is(monkeypatch) -> None:
+@pytest.mark.parametrize("effects", [PLANT.effects[:2], PLANT.effects])
+def test_an_interrupt_ends_the_batch_and_keeps_what_there_is(effects, monkeypatch) -> None:
+    """Also of runs that were to be made again: theirs are kept up to the step in which they may pass a threshold."""
+
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    setup = replace(SETUP, duration_s=100.0, record_period_s=10.0)
-    rd.rollouts(SETUP, starts(1))  # compiled before
+    short = replace(SETUP, plant=rd.Plant(ARM, effects))
+    setup = replace(short, duration_s=100.0, record_period_s=10.0)
+    rd.rollouts(short, starts(1))  # compiled before
     wait, calls = pool.wait, []
 
     def once(*args, **options):
@@ -356,7 +360,9 @@ def test_an_interrupt_ends_the_batch_and_keeps_what_there_is(monkeypatch) -> Non
     runs = rd.rollouts(setup, starts(200), threads=2)
     assert runs.stopped.any() and not runs.diverged.any()
     i = int(np.flatnonzero(runs.stopped)[-1])
-    assert runs.outcome(i).ending == "stopped" and runs.t[-1] < 100.0
+    assert runs.outcome(i).ending == "stopped" and runs.ended[i] < 100.0
+    assert runs.t[-1] < 100.0 or np.isnan(runs.q[i, runs.t > runs.ended[i]]).all()
+    assert len(effects) == 3 or runs.t[-1] < 100.0
 
 
 def test_params_are_held_to_what_their_effect_takes() -> None:

@@ -27,7 +27,7 @@ from robot_dyn.model.edits import Edits
 from robot_dyn.simulation.machine.batch import LANES, Batch
 from robot_dyn.simulation.machine.making import machine
 from robot_dyn.simulation.machine.one_by_one import one_by_one
-from robot_dyn.simulation.machine.thresholds import thresholds
+from robot_dyn.simulation.machine.thresholds import Thresholds, thresholds
 from robot_dyn.simulation.options import Options, setup_of, takes_options
 from robot_dyn.simulation.origin import edits_of_machine_code
 from robot_dyn.simulation.rollout_result import Rollouts
@@ -116,10 +116,14 @@ def rollouts(
     why = _why_one_by_one(setup)
     if why and not truth("cuts", cuts):
         raise QueryError(f"cuts=False: {why}, and so runs are made one after the other; leave it out")
-    if why:
+    passed = None if why else thresholds(setup, sweep, len(q))
+    if why or (cuts and passed is not None and not setup.samples_on_steps):
         runs = one_by_one(setup, q, v, sweep, recorded, most_bytes, threads, on_progress)
     else:
-        runs = _side_by_side(setup, q, v, sweep, recorded, most_bytes, cuts, threads, on_progress)
+        at = passed if cuts else None
+        runs = _side_by_side(setup, q, v, sweep, recorded, most_bytes, at, threads, on_progress)
+        if at is not passed:
+            runs = replace(runs, uncut=passed.names)
     return replace(runs, about=edits_of_machine_code(setup) | runs.about)
 
 
@@ -139,7 +143,7 @@ def _why_one_by_one(setup: Setup) -> str:
 
 def _side_by_side(
     setup: Setup, q: np.ndarray, v: np.ndarray, sweep: dict[str, np.ndarray], recorded: tuple[str, ...], most: int,
-    cuts: bool, threads: int, on_progress: Callable[[float], object] | None,
+    passed: Thresholds | None, threads: int, on_progress: Callable[[float], object] | None,
 ) -> Rollouts:  # fmt: skip
     """The runs in lock step, of which those that pass a threshold are made again."""
     equation = StateEquation(setup.plant, setup.controller, setup.integrator.canonical)
@@ -155,9 +159,7 @@ def _side_by_side(
         nonsmooth=setup.integrator.nonsmooth,
     )
     made.check(setup)
-    passed = thresholds(setup, equation, sweep, len(q))
-    runs = Batch(setup, made, q, v, sweep, recorded, kept, most, passed if cuts else None).run(threads, on_progress)
-    return runs if cuts or passed is None else replace(runs, uncut=passed.names)
+    return Batch(setup, made, q, v, sweep, recorded, kept, most, passed).run(threads, on_progress)
 
 
 def _recorded(record: Any) -> tuple[str, ...]:

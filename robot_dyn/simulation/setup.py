@@ -22,7 +22,7 @@ from robot_dyn.integrate.adaptive import AUTO, Adaptive
 from robot_dyn.integrate.methods import as_method
 from robot_dyn.simulation.asked import asked
 from robot_dyn.simulation.event import Event
-from robot_dyn.simulation.schedule import LEAST_STEPS, Segment, cuts, steps_on
+from robot_dyn.simulation.schedule import LEAST_STEPS, ON_STEP, Segment, cuts, near, nodes, steps_on
 from robot_dyn.simulation.size import check_segments
 from robot_dyn.simulation.smoothness import may_switch
 from robot_dyn.simulation.state_equation import StateEquation
@@ -267,6 +267,14 @@ class Setup(Value):
             return not self.integrator.nonsmooth
         equation = StateEquation(self.plant, self.controller, self.integrator.canonical, self.events)
         return equation.switches and self.steps <= MOST_CUT
+
+    @property
+    def samples_on_steps(self) -> bool:
+        """Whether each sample of a method of fixed step is at the end of a step that is not cut."""
+        if not self.record_period_s:
+            return True
+        ends, due = nodes(self.segments), np.arange(0.0, self.duration_s, self.record_period_s)
+        return bool((np.abs(near(ends, due) - due) <= ON_STEP * self.step_s).all())
 
     @property
     def steps(self) -> int:

@@ -28,6 +28,7 @@ from robot_dyn.simulation.machine.thresholds import Thresholds
 from robot_dyn.simulation.origin import origin
 from robot_dyn.simulation.plan import plan_of
 from robot_dyn.simulation.rollout_result import Rollouts
+from robot_dyn.simulation.schedule import ON_STEP
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import check_batch
 from robot_dyn.simulation.state_equation import StateEquation
@@ -73,7 +74,7 @@ class Batch:
         self.why, self.last = np.zeros(width, np.int64), np.zeros((equation.size, width))
         self.ended, self.until = np.full(width, setup.duration_s), np.full(width, np.inf)
         self.again: dict[int, Single | None] = {}  # runs made again by themselves; None where Ctrl-C came first
-        self.clocks = np.tile([0.0, setup.record_period_s, 1e-9 * setup.step_s], (tiles, 1))
+        self.clocks = np.tile([0.0, setup.record_period_s, ON_STEP * setup.step_s], (tiles, 1))
         self.evaluations, self.stop = np.zeros(tiles, np.int64), np.zeros(1, np.int64)
 
     def run(self, threads: int, on_progress: Callable[[float], object] | None = None) -> Rollouts:
@@ -147,6 +148,8 @@ class Batch:
             np.array(self.columns, np.int64), np.empty((len(self.out_y), 2), np.int64), self.out_y, self.made,
             np.empty((0, equation.size + 2)), np.empty((2 + 3 * n, 0)),
         )  # fmt: skip
+        self.machine.in_python.energy(0.0, runs.y, self.plan.parameters[0], runs.own, runs.energies)
+        runs.energy[:], runs.scale[:] = runs.energies.sum(axis=0), 1.0 + np.abs(runs.energies).sum(axis=0)
         cut = self.thresholds is not None
         rules = rules_of(equation, False, _LARGEST, base=own.start, watched=WATCHED_WHERE_CUT if cut else WATCHED)
         switches = none(LANES) if self.thresholds is None else self.thresholds.lanes(self._numbers(tile), equation.size)

@@ -43,17 +43,17 @@ class Thresholds:
         return made
 
 
-def thresholds(setup: Setup, equation: StateEquation, sweep: Mapping[str, np.ndarray], count: int) -> Thresholds | None:
+def thresholds(setup: Setup, sweep: Mapping[str, np.ndarray], count: int) -> Thresholds | None:
     """Those of so many runs of a setup, where `simulate` cuts steps; None where it does not.
 
     Args:
         setup: Of all runs.
-        equation: Its state equation.
         sweep: Values that differ from run to run, (B, size) by name.
         count: B.
     """
     if setup.steps > MOST_CUT or setup.integrator.nonsmooth:
         return None
+    equation = StateEquation(setup.plant, setup.controller, setup.integrator.canonical)
     of_runs = _of_runs(equation, sweep, count)
     others = np.array([each.equation.limited != equation.limited for each, _ in of_runs])
     known = [(each, runs) for (each, runs), other in zip(of_runs, others, strict=True) if not other]
