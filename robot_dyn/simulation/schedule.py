@@ -74,8 +74,8 @@ def cuts(
         period_s * np.add.outer(np.arange(max(1, count) + 1), instants).ravel(),
         np.array([*inside, duration_s]),
     )
-    near = near(fixed, ticks)
-    ticks = np.where(np.abs(near - ticks) <= _ROUNDED * period_s + ULPS * np.spacing(near), near, ticks)
+    nearest = near(fixed, ticks)
+    ticks = np.where(np.abs(nearest - ticks) <= _ROUNDED * period_s + ULPS * np.spacing(nearest), nearest, ticks)
     acting = set(ticks[ticks <= duration_s].tolist()) if period_s > 0 else {0.0}
     return [(t, t in acting) for t in sorted({*inside, *acting, duration_s})]
 
