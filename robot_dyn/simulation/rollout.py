@@ -16,9 +16,10 @@ import numpy as np
 
 from robot_dyn import former
 from robot_dyn.coefficients import rebuilt
-from robot_dyn.compiled.parameters import CONTROLLER, link_parameters, names_of, parameters
+from robot_dyn.compiled.parameters import CONTROLLER, link_parameters, names_of, parameters, with_parameters
 from robot_dyn.compiled.threads import thread_count
 from robot_dyn.effects.plant import Plant
+from robot_dyn.effects.rigid_stops import RigidStops
 from robot_dyn.errors import QueryError, nearest, shown
 from robot_dyn.integrate.adaptive import AUTO, EXPLICIT
 from robot_dyn.integrate.integrator import Integrator
@@ -31,7 +32,7 @@ from robot_dyn.simulation.machine.thresholds import Thresholds, thresholds
 from robot_dyn.simulation.options import Options, setup_of, takes_options
 from robot_dyn.simulation.origin import edits_of_machine_code
 from robot_dyn.simulation.rollout_result import Rollouts
-from robot_dyn.simulation.setup import Setup
+from robot_dyn.simulation.setup import Setup, check_stops
 from robot_dyn.simulation.size import MOST_BYTES
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.validate import choice, instance, integer, joint_values, numbers, truth
@@ -40,7 +41,6 @@ RECORDS = ("q", "v", "u", "energy", "work")
 _WITHOUT_EFFECT = {
     "estimate_error": "simulate one of the runs for that",
     "accuracy": "simulate one of the runs for that",
-    "engine": "rollouts run in machine code",
 }
 
 
@@ -87,9 +87,9 @@ def rollouts(
         most_bytes: Refuse to record more than this.
         on_progress: Called with the time that the runs have reached, the mean in [s], some ten times a second; with
             a record period of 0 it grows as tiles of 64 runs end.
-        **options: As of `simulate`; all but `estimate_error`, `accuracy` and `engine`, which have no effect here: no
-            error is estimated (`simulate` one of the runs for that), and the engine is machine code. The method "auto"
-            is DOP853 here.
+        **options: As of `simulate`; all but `estimate_error` and `accuracy`, which have no effect here: no error is
+            estimated (`simulate` one of the runs for that). The method "auto" is DOP853 here, and the engine "auto" is
+            machine code; "interpreted" makes the runs one after the other in Python.
 
     Runs are not watched at every step, as those of `simulate` are: they carry no remarks.
 
@@ -114,7 +114,7 @@ def rollouts(
     recorded, threads = _recorded(record), thread_count(threads)
     q, v, sweep = _starts(setup, q0, v0, params or {})
     why = _why_one_by_one(setup)
-    if why and not truth("cuts", cuts):
+    if not truth("cuts", cuts) and why:
         raise QueryError(f"cuts=False: {why}, and so runs are made one after the other; leave it out")
     passed = None if why else thresholds(setup, sweep, len(q))
     if why or (cuts and passed is not None and not setup.samples_on_steps):
@@ -182,7 +182,11 @@ def _setup(what: Setup | Plant | Dynamics, q0: Any, options: Mapping[str, Any]) 
         if q0 is not None:
             q = joint_values("q0", q0, what.dynamics.joint_names)
             start = {"q0": q.reshape(-1, q.shape[-1])[0] if q.size else np.zeros(q.shape[-1])}
-    return setup_of("rollouts", what, {**start, **options})
+    setup = setup_of("rollouts", what, {**start, **options})
+    if setup.accuracy is not None:
+        without = "give the setup without it, as dataclasses.replace(setup, accuracy=None)"
+        raise QueryError(f"rollouts: accuracy has no effect, {_WITHOUT_EFFECT['accuracy']}; {without}")
+    return setup
 
 
 def _starts(
@@ -199,7 +203,12 @@ def _starts(
         shapes = {"q0": q.shape, "v0": v.shape} | {name: x.shape for name, x in sweep.items()}
         raise QueryError(f"starts and params must be of one number of runs, (B, {n}), got {shapes}")
     B = counts.pop()
-    return np.broadcast_to(q, (B, n)), np.broadcast_to(v, (B, n)), sweep
+    q = np.broadcast_to(q, (B, n))
+    if any(isinstance(each, RigidStops) for each in setup.plant.effects):
+        for run in range(B):
+            plant, _ = with_parameters(setup.plant, setup.controller, {name: x[run] for name, x in sweep.items()})
+            check_stops(plant, q[run], f"q0 of run {run}")
+    return q, np.broadcast_to(v, (B, n)), sweep
 
 
 def _values(setup: Setup, name: str, values: Any) -> np.ndarray:
@@ -214,6 +223,11 @@ def _values(setup: Setup, name: str, values: Any) -> np.ndarray:
         if several:
             both = " and ".join(repr(f"{each}.{key}") for each in dict.fromkeys(several))
             raise QueryError(f"params: {name} names a coefficient of several effects of the plant; give {both}")
+        if name.startswith("payload_") and not any(each.name.startswith("payload_") for each in swept):
+            payload = f"rd.Payload({name.partition(':')[2] or 'link'!r}, 1.0)"
+            raise QueryError(
+                f"params: no {name!r}: the arm carries no payload; add one, as robot.with_(payload={payload})"
+            )
         names = dict.fromkeys((*(each.name for each in swept), *link_parameters(plant.dynamics)))
         raise QueryError(f"params: no {name!r}; {nearest(name, names)}")
     n, declared = mine[0].size, mine[0].declared

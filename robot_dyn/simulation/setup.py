@@ -146,11 +146,7 @@ class Setup(Value):
                 )
         if method.nonsmooth and (other := [x for x in effects if not (x.rubs or x.stops)]):
             raise QueryError(f"{other[0].name}: has no law for {method.name}; take integrator='DOP853'")
-        for each in effects:
-            if isinstance(each, RigidStops) and (depth := each.beyond_by(self.q0)).any():
-                i = int(np.argmax(depth))
-                name, which = self.plant.dynamics.joint_names[i], "lower" if each.touched(self.q0)[i] < 0 else "upper"
-                raise QueryError(f"q0: {name!r} is {depth[i]:.3g} beyond its {which} stop; start between the stops")
+        check_stops(self.plant, self.q0)
 
     def _check_payloads(self) -> None:
         """That the state is one of velocities where payloads come and go."""
@@ -294,6 +290,19 @@ class Setup(Value):
         error control does not see what no stage meets. A fixed step is the user's.
         """
         return min(_LONGEST_STEP_S, self.duration_s / _LEAST_STEPS) if may_switch(self) else inf
+
+
+def check_stops(plant: Plant, q0: Array, of: str = "q0") -> None:
+    """That a start is not beyond a rigid stop.
+
+    Raises:
+        QueryError: If it is; names the joint, and by `of` the start.
+    """
+    for each in plant.effects:
+        if isinstance(each, RigidStops) and (depth := each.beyond_by(q0)).any():
+            i = int(np.argmax(depth))
+            name, which = plant.dynamics.joint_names[i], "lower" if each.touched(q0)[i] < 0 else "upper"
+            raise QueryError(f"{of}: {name!r} is {depth[i]:.3g} beyond its {which} stop; start between the stops")
 
 
 def no_step(name: str) -> str:
