@@ -35,9 +35,9 @@ class Thresholds:
     others: np.ndarray
     names: tuple[str, ...]
 
-    def lanes(self, runs: np.ndarray, size: int) -> LockStep:
-        """The switching functions of some of the runs at their start, with states of that size."""
-        made = lock_step(self.rows, self.coordinates, self.levels[:, runs], size, self.functions)
+    def lanes(self, runs: np.ndarray, size: int, positions: int) -> LockStep:
+        """The switching functions of some of the runs at their start; `size` of their states, and `positions`."""
+        made = lock_step(self.rows, self.coordinates, self.levels[:, runs], size, self.functions, positions)
         made.until[self.others[runs]] = 0.0
         made.left[0] -= self.others[runs].sum()
         return made
