@@ -20,9 +20,9 @@ from robot_dyn.integrate.bernstein import NONE
 from robot_dyn.integrate.primitives import between, copy, evaluate
 from robot_dyn.integrate.step_control import At, chosen_step, finite, first_step, shortened
 from robot_dyn.simulation.crossings import Switches, approaches, correction, first_event, nears, remember, settle_sides
+from robot_dyn.simulation.detection import FASTEST
 from robot_dyn.simulation.time_loop import Ended, Functions, Now, Plan, Rules, Runs, act, acts, conserve
 
-FASTEST = 1e6  # [rad/s] or [m/s]: such a method would follow an exploding state without end
 _EARLY = 1e-9  # of a period: a sample at the end of a segment belongs to the next one
 _ROOTS = 6  # steps made anew for an event, at most
 _SHORT = 1e-8  # of a step: over so little of it y is a straight line, to rounding

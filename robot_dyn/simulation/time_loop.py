@@ -202,6 +202,8 @@ def time_loop(step: Callable[..., int]) -> Callable[..., int]:
         now: Array, clock: Array, stop: Array,
     ) -> int:  # fmt: skip
         last = len(plan.counts) - 1
+        if not rules.alone:
+            own_energy(functions, runs, plan.parameters[0])
         while now[Now.SEGMENT] <= last:
             s = now[Now.SEGMENT]
             start, h, p = plan.starts[s], plan.lengths[s], plan.parameters[s]
@@ -328,6 +330,14 @@ def conserve(functions: Functions, runs: Runs, rules: Rules, t: float, p: Array)
     if ended:
         erase_ended(runs)
     return True
+
+
+def own_energy(functions: Functions, runs: Runs, p: Array) -> None:
+    """E(0) of each run in lock step, and its scale."""
+    evaluate(functions.energy, 0.0, runs.y, p, runs.own, runs.energies)
+    for b in range(len(runs.size)):
+        K, V = runs.energies[0, b], runs.energies[1, b]
+        runs.energy[b], runs.scale[b] = K + V, 1.0 + abs(K) + abs(V)
 
 
 def end(runs: Runs, b: int, t: float, why: int) -> None:
