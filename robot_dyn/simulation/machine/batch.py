@@ -16,11 +16,14 @@ import numpy as np
 
 from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.coefficients import with_values
+from robot_dyn.compiled.parameters import over_runs
 from robot_dyn.compiled.right_angles import robot_of
 from robot_dyn.effects.plant import Plant
 from robot_dyn.integrate.integrator import PlainMethod
 from robot_dyn.simulation.fixed_step import rules_of, runs_of, samples_at_most
+from robot_dyn.simulation.levels import Levels, levels
 from robot_dyn.simulation.machine.machine import Machine
+from robot_dyn.simulation.observation import NOTHING, Observation, observation_of, observed
 from robot_dyn.simulation.origin import origin
 from robot_dyn.simulation.plan import plan_of
 from robot_dyn.simulation.rollout_result import Rollouts
@@ -50,7 +53,8 @@ class Batch:
     ) -> None:  # fmt: skip
         equation, n = machine.equation, machine.equation.plant.dynamics.n
         self.setup, self.machine, self.recorded, self.kept, self.values = setup, machine, recorded, kept, sweep
-        self.y = _starts(equation, q0, v0)
+        self.q0, self.v0, self.y = q0, v0, _starts(equation, q0, v0)
+        self.levels = levels(equation.plant.dynamics, *over_runs(equation.plant, equation.controller, sweep), len(q0))
         self.columns = [*range(n)] * ("q" in recorded)
         if "v" in recorded and not equation.canonical:
             self.columns += range(n, 2 * n)
@@ -65,6 +69,7 @@ class Batch:
         self.plan = plan_of(setup)
         most = samples_at_most(setup, self.plan.counts)
         self.out_y, self.made = np.empty((most, len(self.columns), width)), np.empty((most, more, width))
+        self.observations: list[Observation] = [NOTHING] * tiles
         self.place = np.zeros((0, 2), np.int64)  # segment and step of each sample, of the tile that has most
         self.lock = threading.Lock()
         self.unfinished = np.ones(tiles, dtype=bool)
@@ -110,10 +115,26 @@ class Batch:
         end = self.setup.duration_s
         return float(np.where(self.unfinished, np.minimum(self.clocks[:, 0], end), end).mean())
 
+    def _index(self, tile: int) -> np.ndarray:
+        """Numbers of the runs of a tile; one that is not full repeats a run."""
+        return np.minimum(np.arange(tile * LANES, (tile + 1) * LANES), len(self.y) - 1)
+
+    def _observation(self, tile: int, runs: Runs) -> Observation:
+        """What is observed of a tile, before its first step."""
+        index, equation, n = self._index(tile), self.machine.equation, self.machine.equation.plant.dynamics.n
+        u = np.full((n, LANES), np.nan)
+        if not equation.sampled and self.machine.equations.functions.rate:  # of which the actuation is a part
+            rate = np.empty((equation.size + n, LANES))
+            self.machine.in_python.rate(0.0, runs.y, self.plan.parameters[0], runs.own, rate)
+            u = rate[equation.size :]
+        of, limits, bounds = self.levels
+        start = np.vstack([self.q0[index].T, self.v0[index].T, u])
+        return observation_of(start, Levels(of, limits[:, index], bounds[:, index]))
+
     def _runs(self, tile: int) -> Runs:
-        """The runs of a tile at their start; a tile that is not full repeats a run."""
+        """The runs of a tile at their start."""
         equation = self.machine.equation
-        index = np.minimum(np.arange(tile * LANES, (tile + 1) * LANES), len(self.y) - 1)
+        index = self._index(tile)
         own = self.machine.own({name: values[index] for name, values in self.values.items()})
         return runs_of(equation, self.y[index].T, own, self.made.shape[1], index)
 
@@ -122,12 +143,13 @@ class Batch:
         own, runs = slice(tile * LANES, (tile + 1) * LANES), self._runs(tile)
         method = cast(PlainMethod, self.setup.integrator)
         assert self.machine.loop is not None
-        stepper = method.stepper(FLOAT64, equation.size, n, equation.size, LANES)
+        stepper = method.stepper(FLOAT64, equation.size, n, equation.size + n, LANES)
         functions, now = self.machine.equations.functions, np.zeros(len(Now), dtype=np.int64)
         now[Now.BUDGET] = np.iinfo(np.int64).max
+        self.observations[tile] = self._observation(tile, runs)
         records = Records(
             np.array(self.columns, np.int64), np.empty((len(self.out_y), 2), np.int64), self.out_y, self.made,
-            np.empty((0, equation.size + 2)), np.empty((2 + 3 * n, 0)),
+            np.empty((0, equation.size + 2)), np.empty((1 + 3 * n, 0)), self.observations[tile],
         )  # fmt: skip
         rules = rules_of(equation, False, _LARGEST, base=own.start)
         ended = self.machine.loop(
@@ -170,6 +192,7 @@ class Batch:
             ended, why > 0, stopped, self._advice(why), self._steps(ended),
             np.repeat(self.evaluations, LANES)[:B], self._statistics(), tuple(equation.sources),
             origin(self.setup.plant.dynamics) | self.setup.about, dict(self.values), self._compiled(),
+            self.q0, self.v0, observed(self.observations, self.levels)[:B],
         )  # fmt: skip
 
     def _compiled(self) -> Setup:

@@ -10,10 +10,13 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.coefficients import with_values
-from robot_dyn.compiled.parameters import with_parameters
+from robot_dyn.compiled.parameters import over_runs, with_parameters
 from robot_dyn.simulation.event_run import EventRun
+from robot_dyn.simulation.levels import Levels, levels
 from robot_dyn.simulation.machine.machine import Machine
 from robot_dyn.simulation.machine.making import machine
+from robot_dyn.simulation.observation import Observation, Observed, observation_of, observed
+from robot_dyn.simulation.observed import observer_of
 from robot_dyn.simulation.origin import origin
 from robot_dyn.simulation.record import Record
 from robot_dyn.simulation.rollout_result import Rollouts
@@ -51,6 +54,8 @@ class OneByOne:
         if size > most:
             what = f"{samples(setup):.3g} samples of {len(q0)} runs"
             raise too_large(what, size, most, ", fewer runs, or record less")
+        self.levels = levels(setup.plant.dynamics, *over_runs(setup.plant, setup.controller, sweep), len(q0))
+        self.observations: dict[int, Observation] = {}
         self.records: list[Record | None] = [None] * len(q0)
         self.going: set[EventRun] = set()
         self.stopped = False
@@ -101,13 +106,26 @@ class OneByOne:
         def made(of: StateEquation) -> tuple[Any, np.ndarray]:
             return code.equations.functions, code.parameters if of is equation else code.of(of)
 
-        transfers = Transfers(equation)
-        run = EventRun(Watch(setup, transfers.equation), transfers, made, None, code.loop, in_python=code.in_python)
+        transfers, observer = Transfers(equation), observer_of(setup, equation, self._levels(i))
+        self.observations[i] = observer.observation
+        watch = Watch(setup, transfers.equation)
+        run = EventRun(watch, transfers, made, None, code.loop, observer=observer, in_python=code.in_python)
         self.going.add(run)
         try:
             self.records[i] = run.record()
         finally:
             self.going.discard(run)
+
+    def _levels(self, i: int) -> Levels:
+        """Those of one run."""
+        return Levels(self.levels.levels, self.levels.limits[:, i : i + 1], self.levels.bounds[:, i : i + 1])
+
+    def _observed(self) -> Observed:
+        """What was observed; of a run that was not begun, its start."""
+        for i in self.observations.keys() ^ range(len(self.q0)):
+            start = np.concatenate([self.q0[i], self.v0[i], np.full_like(self.q0[i], np.nan)])
+            self.observations[i] = observation_of(start[:, None], self._levels(i))
+        return observed([self.observations[i] for i in range(len(self.q0))], self.levels)
 
     def _result(self, wall_s: float) -> Rollouts:
         B, n, equation = len(self.q0), self.setup.plant.dynamics.n, self.equation
@@ -138,5 +156,5 @@ class OneByOne:
             K, V, work if asked["work"] else None, np.array([each.t for each in outcomes]), ending == Ending.DIVERGED,
             ending == Ending.STOPPED, advice, steps, evaluations, statistics, tuple(equation.sources),
             origin(self.setup.plant.dynamics) | self.setup.about,
-            dict(self.sweep), self.setup,
+            dict(self.sweep), self.setup, self.q0, self.v0, self._observed(),
         )  # fmt: skip
