@@ -15,6 +15,7 @@ from typing import NamedTuple, final
 import numpy as np
 
 from robot_dyn.arithmetic import Array
+from robot_dyn.integrate.primitives import copy
 
 _REVERSALS = 10  # in a row, at least; no motion that is sampled well has so many
 _PART = 0.02  # of the largest actuation of its joint so far: smaller changes are noise
@@ -37,7 +38,8 @@ class Chatter(NamedTuple):
 
     Attributes:
         t: Of the latest tick, (1,), in [s].
-        u, change: The actuation at that tick, and by how much it changed there, (n, W); nan before there is one.
+        ticks: Their number, (1,).
+        u: The actuation at the latest three, tick k in place k mod 3, (3, n, W); nan before there are three.
         count: Reversals in a row so far, (n, W).
         streak: Their start, duration and amplitude, (3, n, W).
         going: In how many runs there are some, (n,).
@@ -45,8 +47,8 @@ class Chatter(NamedTuple):
     """
 
     t: Array
+    ticks: Array
     u: Array
-    change: Array
     count: Array
     streak: Array
     going: Array
@@ -55,51 +57,48 @@ class Chatter(NamedTuple):
 
 def chatter_of(n: int, W: int) -> Chatter:
     """Of W runs before their first tick."""
-    u, change = np.full((2, n, W), np.nan)
-    counts = np.zeros((n, W), np.int64), np.zeros(n, np.int64)
-    return Chatter(np.zeros(1), u, change, counts[0], np.zeros((3, n, W)), counts[1], np.zeros((3, n, W)))
+    u, going, count = np.full((3, n, W), np.nan), np.zeros(n, np.int64), np.zeros((n, W), np.int64)
+    return Chatter(np.zeros(1), np.zeros(1, np.int64), u, count, np.zeros((3, n, W)), going, np.zeros((3, n, W)))
 
 
 def tick(of: Chatter, t: float, u: Array, low: Array, high: Array) -> None:
     """A tick at t with the actuation u (n, W), which lay between low and high (n, W) before."""
+    k = of.ticks[0]
+    before, middle, now = of.u[(k + 1) % 3], of.u[(k + 2) % 3], of.u[k % 3]
+    copy(now, u)
     for j in range(len(u)):
-        if of.going[j] > 0 or reverses(u[j], of.u[j], of.change[j], low[j], high[j]):
+        if of.going[j] > 0 or turns(before[j], middle[j], now[j]):
             for b in range(u.shape[1]):
-                count(of, j, b, t, u[j, b], low[:, b], high[:, b])
-        follow(of.u[j], of.change[j], u[j])
+                change, next_change = middle[j, b] - before[j, b], now[j, b] - middle[j, b]
+                if change * next_change < 0.0 or of.count[j, b] > 0:
+                    count(of, j, b, t, change, next_change, low[:, b], high[:, b])
     of.t[0] = t
+    of.ticks[0] = k + 1
 
 
-def reverses(u: Array, before: Array, change: Array, low: Array, high: Array) -> bool:
-    """Whether the actuation (W,) of a joint reverses by more than noise in any run."""
+def turns(before: Array, middle: Array, now: Array) -> bool:
+    """Whether the actuation (W,) of a joint turns back at the middle one of three ticks in any run."""
     found = False
-    for b in range(len(u)):
-        size = high[b] if high[b] > -low[b] else -low[b]
-        found |= (u[b] - before[b]) * change[b] < -((_PART * size) ** 2)
+    for b in range(len(now)):
+        found |= (middle[b] - before[b]) * (now[b] - middle[b]) < 0.0
     return found
 
 
-def follow(before: Array, change: Array, u: Array) -> None:
-    """Take the actuation (W,) of a joint."""
-    for b in range(len(u)):
-        change[b] = u[b] - before[b]
-        before[b] = u[b]
-
-
-def count(of: Chatter, j: int, b: int, t: float, u: float, low: Array, high: Array) -> None:
-    """Count a reversal of joint j in run b at the tick before t, or the end of a row of them."""
+def count(
+    of: Chatter, j: int, b: int, t: float, change: float, next_change: float, low: Array, high: Array
+) -> None:  # fmt: skip
+    """Count a reversal of joint j in run b at the tick before t, unless it is noise, or the end of a row of them."""
     largest = 0.0
     for i in range(len(low)):
         largest = max(largest, high[i], -low[i])
     least = max(_PART * max(high[j], -low[j]), _LEAST * largest)
-    change = u - of.u[j, b]
-    if change * of.change[j, b] < -(least**2):
+    if change * next_change < -(least**2):
         if of.count[j, b] == 0:
             of.going[j] += 1
             of.streak[0, j, b], of.streak[2, j, b] = of.t[0], 0.0
         of.count[j, b] += 1
         of.streak[1, j, b] = t - of.streak[0, j, b]
-        of.streak[2, j, b] = max(of.streak[2, j, b], abs(change) / 2, abs(of.change[j, b]) / 2)
+        of.streak[2, j, b] = max(of.streak[2, j, b], abs(change) / 2, abs(next_change) / 2)
     elif of.count[j, b] > 0:
         close(of, j, b)
 

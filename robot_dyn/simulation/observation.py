@@ -13,6 +13,7 @@ from typing import NamedTuple, final
 import numpy as np
 
 from robot_dyn.arithmetic import Array
+from robot_dyn.integrate.primitives import enclose
 from robot_dyn.simulation.chatter import Chatter, Episode, chatter_of, close_all, tick
 from robot_dyn.simulation.levels import Level, Levels
 from robot_dyn.values import Value, read_only
@@ -82,20 +83,12 @@ def observe(of: Observation, began: float, t: float, q: Array, v: Array, u: Arra
 
 def look(of: Observation, first: int, x: Array, began: float, t: float, at: float) -> None:
     """Rows x (n, W) from the `first` on, which hold at a time in the step."""
+    enclose(of.low, of.high, first, x)
     for j in range(len(x)):
         row = first + j
-        extend(of.low[row], of.high[row], x[j])
         if beyond(x[j], of.inner[0, row], of.inner[1, row]):
             for k in range(of.first[row], of.first[row + 1]):
                 visit(of.visits[:, k], of.sides[k], of.bounds[k], x[j], began, t, at)
-
-
-def extend(low: Array, high: Array, x: Array) -> None:
-    """Let low and high (W,) enclose x."""
-    for b in range(len(x)):
-        low[b] = x[b] if x[b] < low[b] else low[b]
-    for b in range(len(x)):
-        high[b] = x[b] if x[b] > high[b] else high[b]
 
 
 def beyond(x: Array, low: float, high: float) -> bool:

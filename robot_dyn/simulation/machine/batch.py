@@ -143,7 +143,8 @@ class Batch:
         own, runs = slice(tile * LANES, (tile + 1) * LANES), self._runs(tile)
         method = cast(PlainMethod, self.setup.integrator)
         assert self.machine.loop is not None
-        stepper = method.stepper(FLOAT64, equation.size, n, equation.size + n, LANES)
+        rows = (equation.size + n) | 1  # odd: stages a power of two apart would share the sets of a cache
+        stepper = method.stepper(FLOAT64, equation.size, n, rows, LANES)
         functions, now = self.machine.equations.functions, np.zeros(len(Now), dtype=np.int64)
         now[Now.BUDGET] = np.iinfo(np.int64).max
         self.observations[tile] = self._observation(tile, runs)
