@@ -46,10 +46,9 @@ def observation_of(start: Array, levels: Levels) -> Observation:
     rows, W = start.shape
     of = np.array([each.row for each in levels.levels], np.int64)
     sides, bounds = np.array([float(each.side) for each in levels.levels]), np.ascontiguousarray(levels.bounds)
-    inner = np.repeat([[-np.inf], [np.inf]], rows, axis=1)
-    for level, bound in zip(levels.levels, bounds, strict=True):
-        closer, side = (np.fmin, 1) if level.side > 0 else (np.fmax, 0)
-        inner[side, level.row] = closer(inner[side, level.row], closer.reduce(bound))
+    inner, up = np.repeat([[-np.inf], [np.inf]], rows, axis=1), sides > 0
+    np.fmax.at(inner[0], of[~up], np.fmax.reduce(bounds[~up], axis=1, initial=-np.inf))
+    np.fmin.at(inner[1], of[up], np.fmin.reduce(bounds[up], axis=1, initial=np.inf))
     visits = np.full((4, len(bounds), W), np.nan)
     beyond = sides[:, None] * (start[of] - bounds) > 0
     visits[:3, beyond], visits[3, beyond] = 0.0, start[of][beyond]
