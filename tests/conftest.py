@@ -38,14 +38,6 @@ def obeyed_interrupts() -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-@pytest.fixture
-def uncut(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Single runs of fixed steps are not cut where parts switch, as runs in lock step are not."""
-    from robot_dyn.simulation.setup import Setup
-
-    monkeypatch.setattr(Setup, "finds_events", property(lambda setup: setup.integrator.controls_error))
-
-
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Any]:
     """Chromium, one for each worker."""

@@ -181,8 +181,8 @@ def test_what_is_not_supported_is_refused_by_name() -> None:
     body = rd.CarriedPayload(BODY, 0.1, 0.2)
     with pytest.raises(QueryError, match=r"carried_payload: .* changes momenta, which gauss_4 integrates"):
         rd.Setup(rd.Plant(ARM, [body]), Q, duration_s=0.3, integrator="gauss_4")
-    with pytest.raises(QueryError, match="rollouts: carried_payload changes the state at once"):
-        rd.rollouts(rd.Plant(ARM, [body]), q0=[Q, Q], duration_s=0.3, integrator="rk4")
+    with pytest.raises(QueryError, match="cuts=False: carried_payload comes and goes, where steps must end"):
+        rd.rollouts(rd.Plant(ARM, [body]), q0=[Q, Q], duration_s=0.3, integrator="rk4", cuts=False)
     with pytest.raises(QueryError, match="advise: carried_payload changes the bodies"):
         rd.advise(rd.Plant(ARM, [body]), Q)
     with pytest.raises(EffectError, match=r"carried_payload: .*'tipp'"):

@@ -74,7 +74,6 @@ def test_an_exponent_of_one_that_is_stated_is_the_default() -> None:
     np.testing.assert_allclose(run(1.0, "interpreted").q, run(None, "interpreted").q, atol=1e-10)
 
 
-@pytest.mark.usefixtures("uncut")
 def test_exponents_differ_from_run_to_run_in_rollouts() -> None:
     """Each run is that of the setup with its value, 1e-12."""
     plant = rd.Plant(SLIDER, [rd.DahlFriction(STIFFNESS, LEVEL, 1.5)])

@@ -147,7 +147,6 @@ def test_both_engines_make_the_same_run_of_effects_with_states(method: str, peri
     np.testing.assert_allclose(equation_of_motion, ours.u - torque, atol=1e-9)
 
 
-@pytest.mark.usefixtures("uncut")
 @pytest.mark.parametrize(
     ("name", "values"),
     [

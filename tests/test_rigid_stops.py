@@ -182,14 +182,27 @@ def test_a_start_beyond_a_stop_is_refused_by_name() -> None:
 def test_methods_whose_steps_cannot_end_there_are_refused(method: str, why: str) -> None:
     with pytest.raises(QueryError, match=f"dry_friction: .* {why}.*DOP853"):
         rd.simulate(rd.Plant(ARM, [rd.DryFriction(1.0)]), [0.3, 0.2], integrator=method)
-    with pytest.raises(QueryError, match=r"rollouts: dry_friction .*DOP853"):
-        rd.rollouts(rd.Plant(ARM, [rd.DryFriction(1.0)]), [0.3, 0.2], integrator="rk4")
+    with pytest.raises(QueryError, match=f"dry_friction: .* {why}.*DOP853"):
+        rd.rollouts(rd.Plant(ARM, [rd.DryFriction(1.0)]), [0.3, 0.2], integrator=method)
+    with pytest.raises(QueryError, match="cuts=False: dry_friction holds joints and lets them go, where steps must"):
+        rd.rollouts(rd.Plant(ARM, [rd.DryFriction(1.0)]), [0.3, 0.2], integrator="rk4", cuts=False)
 
 
-def test_rollouts_are_the_runs_of_simulate() -> None:
-    """To the last bit, by DOP853, friction swept."""
+@pytest.mark.parametrize("method", ["time_stepping", "rk4", "DOP853"])
+def test_a_start_of_a_batch_beyond_a_stop_is_refused_by_number(method: str) -> None:
+    plant = rd.Plant(ARM, [rd.RigidStops([-1.0, -1.0], [1.0, 1.0])])
+    with pytest.raises(QueryError, match=r"q0 of run 1: 'joint_2' is 0\.2 beyond its upper stop"):
+        rd.rollouts(plant, [[0.3, 0.2], [0.3, 1.2]], integrator=method)
+    upper = [[1.0, 1.0], [1.0, 0.5]]
+    with pytest.raises(QueryError, match=r"q0 of run 1: 'joint_2' is 0\.1 beyond its upper stop"):
+        rd.rollouts(plant, [0.3, 0.6], params={"rigid_stops.upper": upper}, integrator=method)
+
+
+@pytest.mark.parametrize("method", ["rk4", "DOP853"])
+def test_rollouts_are_the_runs_of_simulate(method: str) -> None:
+    """To the last bit, friction swept."""
     plant = rd.Plant(ARM, [rd.DryFriction([3.0, 1.0]), rd.RigidStops([-1.5, -2.0], [1.0, 2.0], 0.5)])
-    setup = rd.Setup(plant, [0.3, 0.4], duration_s=1.0, record_period_s=0.1, engine="compiled", integrator="DOP853",
+    setup = rd.Setup(plant, [0.3, 0.4], duration_s=1.0, record_period_s=0.1, engine="compiled", integrator=method,
                      estimate_error=False)  # fmt: skip
     levels = np.array([[3.0, 1.0], [0.5, 2.0]])
     runs = rd.rollouts(setup, params={"dry_friction.level": levels})

@@ -12,7 +12,7 @@ import robot_dyn as rd
 from robot_dyn.compiled.symbolic import TraceError
 from robot_dyn.effects.effect import Active
 from robot_dyn.errors import QueryError
-from robot_dyn.simulation.machine import batch
+from robot_dyn.simulation.machine import pool
 
 ARM = rd.load("planar_2r")
 Q, V = np.array([0.4, -0.7]), np.array([0.3, 0.5])
@@ -27,15 +27,11 @@ SETUP = rd.Setup(
     integrator="rk4",
     step_s=2e-3,
     record_period_s=0.01,
-    engine="interpreted",
 )
 PID = replace(SETUP, controller=rd.PID(REFERENCE, 40.0, 30.0, 4.0, effort_limit=3.0, period_s=0.004))
 ARM_TIP, INERTIA = "tip", ((0.01, 0.0, 0.0), (0.0, 0.02, 0.001), (0.0, 0.001, 0.03))
 NOMINAL = ARM.with_(payload=rd.Payload(ARM_TIP, 1.0))
 EVERYTHING = ("q", "v", "u", "energy", "work")
-
-
-pytestmark = pytest.mark.usefixtures("uncut")
 
 
 def starts(count: int, spread: float = 0.3) -> np.ndarray:
@@ -227,8 +223,9 @@ def test_runs_are_numbered_as_lists_are() -> None:
 
 @pytest.mark.parametrize("method", ["rk4", "gauss_2"])
 def test_a_diverged_run_names_its_joint_its_time_and_what_to_do(method: str) -> None:
-    """The joint that moved fastest in its last sample; each run its own."""
-    setup = replace(SETUP, integrator=rd.method(method), record_period_s=0.0)
+    """The joint that moved fastest in its last sample; each run its own. Nothing cuts their steps."""
+    plant = rd.Plant(ARM, PLANT.effects[:2])
+    setup = replace(SETUP, plant=plant, integrator=rd.method(method), record_period_s=0.0)
     v0 = np.array([V, [1e5, 3e7], V, [3e7, 1e4]])
     runs = rd.rollouts(setup, starts(4), v0)
     for i in (1, 3):
@@ -309,7 +306,9 @@ def test_what_has_no_meaning_is_refused() -> None:
             "params": {"viscous_friction.damp": np.ones(3)}
         },
         "params: kp must not be negative": {"params": {"kp": [-1.0]}},
-        "params: no 'payload_mass:elbow'": {"params": {"payload_mass:elbow": np.ones(3)}},
+        r"params: no 'payload_mass:elbow': the arm carries no payload; add one, as robot.with_\(payload=": {
+            "params": {"payload_mass:elbow": np.ones(3)}
+        },
         "no record 'torque'": {"record": ("torque",)},
         "threads .* must be a whole number, from 1": {"threads": 0},
         "takes 0.0 GiB, more than 0.0 GiB: take a longer record_period_s": {"q0": starts(4), "most_bytes": 100},
@@ -343,23 +342,138 @@ def test_runs_of_chosen_steps_are_those_of_simulate() -> None:
     assert not runs.diverged.any() and "one after the other" in runs.statistics.engine
 
 
-def test_an_interrupt_ends_the_batch_and_keeps_what_there_is(monkeypatch) -> None:
+def test_a_batch_of_the_engine_that_is_named_is_that_of_simulate() -> None:
+    """Interpreted, to the last bit; also of a part that cannot be compiled."""
+    for effects in (PLANT.effects, [Table()]):
+        setup = replace(SETUP, plant=rd.Plant(ARM, effects), engine="interpreted", estimate_error=False)
+        runs = rd.rollouts(setup, starts(2), params={"kp": [40.0, 30.0]}, record=("q", "u"))
+        alone = rd.simulate(setup, q0=starts(2)[1], controller=replace(setup.controller, kp=30.0))
+        np.testing.assert_array_equal(runs.q[1], alone.q)
+        np.testing.assert_array_equal(runs.u[1], alone.u)
+        assert runs.statistics.engine.startswith("interpreted")
+
+
+def test_a_joint_strikes_its_stops_in_a_batch_as_it_does_alone() -> None:
+    """Stiff stops, steps as long as the contact: runs without cuts are others. To rounding, and what events make of it.
+
+    The runs that stay between the stops are those of lock step, bit for bit.
+    """
+    plant = rd.Plant(ARM.with_(gravity=(0.0, 0.0, 0.0)), rd.joint_stops(-0.1, 0.5, 1e5, 0.0))
+    setup = rd.Setup(plant, Q, duration_s=1.0, integrator="rk4", step_s=2e-3, estimate_error=False)
+    q0, v0 = np.tile([0.2, 0.15], (70, 1)), np.full((70, 2), [0.05, -0.1])
+    strikes = [2, 65]
+    v0[strikes] = [[2.0, -1.4], [-0.8, 2.4]]
+    runs, uncut = (rd.rollouts(setup, q0, v0, record=EVERYTHING, cuts=cuts) for cuts in (True, False))
+    for i in strikes:
+        alone = rd.simulate(setup, q0=q0[i], v0=v0[i])
+        assert len(alone.events) > 5 and runs.outcome(i) == alone.outcome and runs.steps[i] == alone.statistics.steps
+        np.testing.assert_allclose(runs.q[i], alone.q, rtol=0, atol=1e-11)
+        np.testing.assert_allclose(runs.kinetic[i], alone.ledger.kinetic, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(runs.work["control"][i], alone.ledger.work["control"], rtol=0, atol=1e-11)
+        assert np.abs(uncut.q[i] - alone.q).max() > 1e-3
+    others = np.setdiff1d(np.arange(70), strikes)
+    for x, y in zip(arrays(runs), arrays(uncut), strict=True):
+        np.testing.assert_array_equal(x[others], y[others])
+    assert "2 of them made again with steps cut at thresholds" in runs.statistics.engine
+    assert "cuts=False: no step ends at lower stop, upper stop" in uncut.summary and "cuts" not in runs.summary
+
+
+def test_a_joint_that_starts_from_rest_has_not_reversed() -> None:
+    """Bristles under a steady push, away from v = 0: lock step makes these runs, and they are those of simulate."""
+    plant = rd.Plant(ARM.with_(gravity=(0.0, 0.0, 0.0)), [rd.LuGreFriction(1.0, 1.0, 0.1, 0.2, 0.3, 0.1)])
+    push = rd.PD(rd.hold(Q + 3.0), [20.0, 0.8], 0.0)
+    setup = rd.Setup(plant, Q, duration_s=0.2, controller=push, integrator="rk4", estimate_error=False)
+    runs = rd.rollouts(setup, starts(3, 0.01))
+    assert "made again" not in runs.statistics.engine
+    np.testing.assert_allclose(runs.q[2], rd.simulate(setup, q0=starts(3, 0.01)[2]).q, rtol=0, atol=1e-13)
+
+
+def test_levels_that_differ_from_run_to_run() -> None:
+    """Also where a run has none, and where the setup has none: each run is cut at its own."""
+    arm, stops = ARM.with_(gravity=(0.0, 0.0, 0.0)), rd.joint_stops([-1.0, -1.0], [0.4, 1.0], 0.0, 0.0)
+    setup = rd.Setup(rd.Plant(arm, stops), Q, V, 0.5, integrator="rk4", record_period_s=0.1, estimate_error=False)
+    stiffness, upper = np.array([0.0, 1e4, 1e4]), np.array([[0.5, 1.0], [0.5, 1.0], [0.45, 0.6]])
+    runs = rd.rollouts(setup, params={"joint_stops.stiffness": stiffness, "joint_stops.upper": upper})
+    for i in range(3):
+        plant = rd.Plant(arm, rd.joint_stops([-1.0, -1.0], upper[i], stiffness[i], 0.0))
+        alone = rd.simulate(setup, plant=plant)
+        assert bool(alone.events) is bool(stiffness[i])
+        np.testing.assert_allclose(runs.q[i], alone.q, rtol=0, atol=1e-11)
+
+
+def test_samples_between_the_ends_of_steps_are_those_of_simulate() -> None:
+    """A period that the run does not hold a whole number of times: where steps are cut at its multiples, else not."""
+    for effects in (PLANT.effects, PLANT.effects[:2]):
+        setup = replace(SETUP, plant=rd.Plant(ARM, effects), duration_s=0.123, record_period_s=0.0101)
+        runs, alone = rd.rollouts(setup, starts(2)), rd.simulate(setup, q0=starts(2)[1], estimate_error=False)
+        np.testing.assert_allclose(runs.t, alone.t, rtol=1e-15)
+        np.testing.assert_allclose(runs.q[1], alone.q, rtol=0, atol=1e-12)
+
+
+def test_events_end_the_runs_of_a_batch_as_they_end_single_ones(tmp_path: Path) -> None:
+    """A terminal event: the time to rounding, samples up to it, and the words; also from a file."""
+    down = rd.Event(lambda t, q, v: q[0] - 0.35, name="down", terminal=True)
+    setup = replace(SETUP, controller=None, events=[down], estimate_error=False, duration_s=0.3)
+    q0 = np.array([[0.4, -0.7], [0.5, -0.7], [3.0, 0.2]])
+    for method in ("rk4", "DOP853"):
+        runs = rd.rollouts(setup, q0, 0 * q0, integrator=rd.method(method) if method == "rk4" else method)
+        back = rd.load_rollouts(rd.save_rollouts(runs, tmp_path / method))
+        for i in range(3):
+            alone = rd.simulate(runs.setup, q0=q0[i], v0=[0.0, 0.0])
+            assert runs.outcome(i).ending == alone.outcome.ending == "finished" and back.outcome(i) == runs.outcome(i)
+            assert runs.outcome(i).advice == alone.outcome.advice
+            assert runs.ended[i] == pytest.approx(alone.outcome.t, abs=1e-12)
+            before = runs.t < runs.ended[i] if runs.ended[i] < 0.3 else runs.t <= 0.3
+            np.testing.assert_allclose(runs.q[i, before], alone.q[: before.sum()], rtol=0, atol=1e-11)
+            assert np.isnan(runs.q[i, ~before]).all()
+        assert "'down'" in runs.outcome(0).advice and not runs.outcome(2).advice
+
+
+def test_payloads_come_and_go_in_a_batch_as_they_do_alone() -> None:
+    """By RK4, which ends steps there: to rounding, gravity swept."""
+    body = rd.CarriedPayload(rd.Payload(ARM_TIP, 0.7), 0.05, 0.12)
+    setup = rd.Setup(rd.Plant(ARM, [body]), Q, V, 0.2, integrator="rk4", record_period_s=0.01, estimate_error=False)
+    g = np.array([[0.0, 0.0, -9.8], [1.0, 0.0, -1.6]])
+    runs = rd.rollouts(setup, params={"gravity": g}, record=EVERYTHING)
+    for i in range(2):
+        alone = rd.simulate(setup, plant=rd.Plant(ARM.with_(gravity=tuple(g[i])), [body]))
+        np.testing.assert_allclose(runs.q[i], alone.q, rtol=0, atol=1e-12)
+        for name, work in alone.ledger.work.items():
+            np.testing.assert_allclose(runs.work[name][i], work, rtol=0, atol=1e-10)
+
+
+def test_a_heavy_arm_gains_no_energy_where_it_starts() -> None:
+    """An arm of tons at 6e4 J: its potential at the start is no gain, in lock step as in simulate."""
+    heavy = ARM.with_(mass_scale=2000.0)
+    setup = rd.Setup(rd.Plant(heavy), [1.5, 0.2], duration_s=0.2, integrator="rk4", estimate_error=False)
+    runs = rd.rollouts(setup, record=EVERYTHING)
+    assert runs.potential[0, 0] > 1e4 and not runs.diverged.any()
+    assert runs.outcome(0) == rd.simulate(setup).outcome
+
+
+@pytest.mark.parametrize("effects", [PLANT.effects[:2], PLANT.effects])
+def test_an_interrupt_ends_the_batch_and_keeps_what_there_is(effects, monkeypatch) -> None:
+    """Also of runs that were to be made again: theirs are kept up to the step in which they may pass a threshold."""
+
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    setup = replace(SETUP, duration_s=100.0, record_period_s=10.0)
-    rd.rollouts(SETUP, starts(1))  # compiled before
-    wait, calls = batch.wait, []
+    short = replace(SETUP, plant=rd.Plant(ARM, effects))
+    setup = replace(short, duration_s=100.0, record_period_s=10.0)
+    rd.rollouts(short, starts(1))  # compiled before
+    wait, calls = pool.wait, []
 
     def once(*args, **options):
         calls.append(1)
         return interrupted() if len(calls) == 1 else wait(*args, **options)
 
-    monkeypatch.setattr(batch, "wait", once)
+    monkeypatch.setattr(pool, "wait", once)
     runs = rd.rollouts(setup, starts(200), threads=2)
     assert runs.stopped.any() and not runs.diverged.any()
     i = int(np.flatnonzero(runs.stopped)[-1])
-    assert runs.outcome(i).ending == "stopped" and runs.t[-1] < 100.0
+    assert runs.outcome(i).ending == "stopped" and runs.ended[i] < 100.0
+    assert runs.t[-1] < 100.0 or np.isnan(runs.q[i, runs.t > runs.ended[i]]).all()
+    assert len(effects) == 3 or runs.t[-1] < 100.0
 
 
 def test_params_are_held_to_what_their_effect_takes() -> None:

@@ -165,7 +165,6 @@ def test_beyond_the_gap_of_a_backlash_the_spring_turns_what_moved_freely_within_
     assert np.abs(run.ledger.residual).max() < 1e-11
 
 
-@pytest.mark.usefixtures("uncut")
 @pytest.mark.parametrize("period", [0.0, 0.005])
 def test_both_engines_and_rollouts_make_the_same_run(period: float) -> None:
     """A stiffness of each run, with backlash; beside an actuator lag and an effort limit, the second joint direct."""

@@ -307,7 +307,7 @@ def examples(folder: Path) -> dict[str, Example]:
         "rollouts": (
             rd.rollouts,
             {"what": setup, "q0": [q, u], "v0": [v, u], "params": {"viscous_friction.damping": [0.1, 0.2]},
-             "record": ("q",), "threads": 1, "most_bytes": 10**9},
+             "record": ("q",), "cuts": True, "threads": 1, "most_bytes": 10**9},
         ),
         "save_plot": (rd.save_plot, {"run": run, "path": folder / "plot.png", "dpi": 50.0, "only": ["hinge"]}),
         "save_replay": (

@@ -57,17 +57,22 @@ def most_interpreted(setup: Setup, equation: StateEquation, machine: Machine | N
 
 
 def _machine(setup: Setup, equation: StateEquation) -> Machine:
-    made = _made(setup, equation)
+    made = machine_of(setup, equation)
     made.check(setup)
     return made
 
 
-def _made(setup: Setup, equation: StateEquation) -> Machine:
+def machine_of(setup: Setup, equation: StateEquation, swept: tuple[str, ...] = ()) -> Machine:
+    """The machine code of a run by itself, not checked yet; `swept` as of `machine`.
+
+    Raises:
+        TraceError: If a part cannot be compiled; names it.
+    """
     from robot_dyn.simulation.machine.making import machine
 
     method: Any = setup.integrator
     return machine(
-        equation if method.nonsmooth else equation.in_a_mode, method if method.plain else None,
+        equation if method.nonsmooth else equation.in_a_mode, method if method.plain else None, swept=swept,
         jacobian=method.needs_jacobian, cuts=setup.finds_events, nonsmooth=method.nonsmooth,
     )  # fmt: skip
 

@@ -1,7 +1,7 @@
 """Where switching functions change sign within a step: plain functions of arrays, for the loop of one run.
 
-That a coordinate of y does not pass a level is proven by the coefficients of the dense output in Bernstein's form;
-other functions are looked at eight times in each step. [Shampine, Thompson 2000]
+Where `detection` cannot exclude it, that a coordinate of y does not pass a level is proven by the coefficients of the
+dense output in Bernstein's form; other functions are looked at eight times in the step. [Shampine, Thompson 2000]
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ import numpy as np
 from robot_dyn.arithmetic import Array
 from robot_dyn.integrate.bernstein import NONE, coefficients, first_below, rate_coefficients, value
 from robot_dyn.integrate.primitives import between, evaluate
+from robot_dyn.simulation.detection import coordinate_nears, enclosure, enclosure_of_position, function_nears
 from robot_dyn.simulation.time_loop import Functions, Rules, Runs
 
 ROUNDING = 64 * np.finfo(float).eps  # of the coefficients of a polynomial
-_ROOM = 4.0  # times the change of a limited actuation in a step, or in the one before
 _LOOKS = 8  # at a switching function that is no coordinate, in each step
 _HALVINGS = 50
 _NEAR = 1e-4  # of a step: for the slope of a switching function that is no coordinate
@@ -56,30 +56,18 @@ class Switches(NamedTuple):
 
 
 def approaches(y: Array, after: Array, h: float, before: Array, last: Array, rules: Rules, switches: Switches) -> bool:
-    """Whether a coordinate may pass its level in a step, by Hermite's polynomial through rates at both ends.
-
-    Its coefficients in Bernstein's form, from values and two derivatives of a position and one of a velocity, enclose
-    it; as much room again is left on both sides. Rates are always looked at.
-    """
+    """Whether a coordinate may pass its level in a step. Rates are always looked at."""
     n = 0 if rules.canonical else rules.n  # p' is no acceleration
     for e in range(len(switches.exact)):
         if switches.rates[e]:
             return True
         row = switches.rows[e]
         x0, x1, d0, d1 = y[row, 0], after[row, 0], before[row, 0], last[row, 0]
-        low, high = min(x0, x1), max(x0, x1)
         if row < n:
-            a, b = x0 + h * d0 / 5, x1 - h * d1 / 5
-            c = x0 + 2 * h * d0 / 5 + h * h * before[n + row, 0] / 20
-            d = x1 - 2 * h * d1 / 5 + h * h * last[n + row, 0] / 20
-            low, high = min(low, a, b, c, d), max(high, a, b, c, d)
+            low, high = enclosure_of_position(x0, x1, d0, d1, before[n + row, 0], last[n + row, 0], h)
         else:
-            a, b = x0 + h * d0 / 3, x1 - h * d1 / 3
-            low, high = min(low, a, b), max(high, a, b)
-        room = high - low
-        if switches.sides[e] > 0 and not low - room > switches.levels[e]:
-            return True
-        if switches.sides[e] < 0 and not high + room < switches.levels[e]:
+            low, high = enclosure(x0, x1, d0, d1, h)
+        if coordinate_nears(low, high, switches.levels[e], switches.sides[e]):
             return True
     return False
 
@@ -99,10 +87,9 @@ def nears(t: float, y: Array, p: Array, own: Array, switches: Switches) -> bool:
     E, found = len(switches.exact), switches.asked > 0
     evaluate(switches.functions, t, y, p, own, switches.then)
     for e in range(E, len(switches.rows) - switches.asked):
-        i, level, side = switches.rows[e], switches.levels[e], switches.sides[e]
-        x0, x1 = switches.before[i], switches.then[i, 0]
-        room = _ROOM * max(abs(x1 - x0), switches.change[i])
-        found = found or not min(side * (x0 - level), side * (x1 - level)) > room
+        i = switches.rows[e]
+        x0, x1, change = switches.before[i], switches.then[i, 0], switches.change[i]
+        found = found or function_nears(x0, x1, change, switches.levels[e], switches.sides[e])
     for i in range(len(switches.then)):
         x = switches.then[i, 0]
         switches.before[i], switches.change[i] = x, abs(x - switches.before[i])

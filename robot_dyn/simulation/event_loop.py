@@ -20,14 +20,13 @@ from robot_dyn.integrate.bernstein import NONE
 from robot_dyn.integrate.primitives import between, copy, evaluate
 from robot_dyn.integrate.step_control import At, chosen_step, finite, first_step, shortened
 from robot_dyn.simulation.crossings import Switches, approaches, correction, first_event, nears, remember, settle_sides
+from robot_dyn.simulation.detection import FASTEST
 from robot_dyn.simulation.observation import Observation
 from robot_dyn.simulation.time_loop import Ended, Functions, Now, Plan, Rules, Runs, act, acts, conserve, show
 
-FASTEST = 1e6  # [rad/s] or [m/s]: such a method would follow an exploding state without end
 _EARLY = 1e-9  # of a period: a sample at the end of a segment belongs to the next one
 _ROOTS = 6  # steps made anew for an event, at most
 _SHORT = 1e-8  # of a step: over so little of it y is a straight line, to rounding
-_WATCHED = 8  # steps between looks at the energy
 
 
 class Kept(NamedTuple):
@@ -189,7 +188,7 @@ def event_loop(
                 settle_sides(switches)
                 if not rules.canonical and fast(y, rules.n):
                     return Ended.FAST
-                if now[Now.STEPS] % _WATCHED == 0 and not conserve(f, runs, rules, t1, p):
+                if now[Now.STEPS] % rules.watched == 0 and not conserve(f, runs, rules, t1, p):
                     return Ended.GAINS
                 if now[Now.BUDGET] <= 0 or stop[0] != 0:
                     return Ended.PAUSED

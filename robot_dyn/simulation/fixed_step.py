@@ -17,12 +17,13 @@ from robot_dyn.arithmetic import FLOAT64, Array
 from robot_dyn.errors import RobotDynError
 from robot_dyn.foreign import is_mistake
 from robot_dyn.integrate.integrator import Integrator
+from robot_dyn.simulation.detection import none
 from robot_dyn.simulation.followed import Followed
 from robot_dyn.simulation.observation import NOTHING
 from robot_dyn.simulation.observer import Observer
 from robot_dyn.simulation.plan import plan_of
 from robot_dyn.simulation.record import MOST_SHARED, Path, Record
-from robot_dyn.simulation.schedule import paced
+from robot_dyn.simulation.schedule import ON_STEP, paced
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.state_functions import interpreted, sample, system
@@ -34,6 +35,7 @@ from robot_dyn.simulation.watch import DivergedError, Watch, one_step
 _DOUBTFUL = 1e6  # of Σ |y| in machine code, which does not see that M becomes singular
 
 _FIRST = np.zeros(1, np.int64)
+_UNCUT = none(1)
 
 Advance = Callable[..., int]
 Made = Callable[[StateEquation], tuple[Functions, np.ndarray]]
@@ -86,7 +88,7 @@ class FixedStep(Followed):
             np.empty((states, m + 2)), *shown,
         )  # fmt: skip
         self.now, self.stop = np.zeros(len(Now), np.int64), np.zeros(1, np.int64)
-        self.clock = np.array([0.0 if pace == 1 else inf, setup.record_period_s, 1e-9 * setup.step_s])
+        self.clock = np.array([0.0 if pace == 1 else inf, setup.record_period_s, ON_STEP * setup.step_s])
 
     def _shared(self, pace: Fraction) -> tuple[int, int]:
         """Steps between states that companions share, and how many of these to one that is kept."""
@@ -123,7 +125,7 @@ class FixedStep(Followed):
 
     def _advance(self) -> Ended:
         _, coefficients, work = self.stepper
-        arguments = self.functions, self.plan, self.runs, self.records, self.rules, coefficients, work
+        arguments = self.functions, self.plan, self.runs, self.records, self.rules, coefficients, work, _UNCUT
         try:
             return Ended(self.advance(*arguments, self.now, self.clock, self.stop))
         except RobotDynError as error:  # of a step; y is the state before it
@@ -211,14 +213,15 @@ class FixedStep(Followed):
 
 
 def rules_of(
-    equation: StateEquation, alone: bool, largest: float, every: int = 0, thin: int = 1, base: int = 0
-) -> Rules:
+    equation: StateEquation, alone: bool, largest: float, every: int = 0, thin: int = 1, base: int = 0,
+    watched: int = WATCHED,
+) -> Rules:  # fmt: skip
     """The rules of a loop over a state equation."""
     n, controller = equation.plant.dynamics.n, equation.controller
     of = (1, 0, 0) if controller is None else (len(controller.instants), controller.acting_instant, controller.deviates)
     return Rules(
         n, len(equation.sources), equation.state_size, n if equation.sampled else 0, *of,
-        equation.canonical, alone, largest, every, thin, base,
+        equation.canonical, alone, largest, every, thin, base, watched,
     )  # fmt: skip
 
 

@@ -24,6 +24,7 @@ class Followed(ABC):
         observer: Sees each step, or None.
         compiled: Whether its loop is machine code.
         now: Where it is; see `time_loop.Now`.
+        stop: Its first entry ends the run at its next step where it is not 0, as Ctrl-C does.
         first: Steps of machine code before its speed is known.
     """
 
@@ -31,6 +32,7 @@ class Followed(ABC):
     observer: Observer | None
     compiled: bool
     now: Array
+    stop: Array
     first: ClassVar[int]
 
     @property
@@ -60,6 +62,8 @@ class Followed(ABC):
             ended = self._go(budget)
             if ended is Ended.DONE:
                 break
+            if self.stop[0]:
+                raise KeyboardInterrupt
             self._judge(ended)
             if ended is Ended.PAUSED and self.compiled:
                 spent = perf_counter() - began

@@ -51,6 +51,10 @@ class Levels(NamedTuple):
     limits: Array
     bounds: Array
 
+    def of_runs(self, numbers: Any) -> Levels:
+        """Those of some of the runs."""
+        return Levels(self.levels, self.limits[:, numbers], self.bounds[:, numbers])
+
 
 NO_LEVELS = Levels((), np.empty((0, 1)), np.empty((0, 1)))
 

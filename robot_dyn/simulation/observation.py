@@ -6,8 +6,9 @@ step. A run of which a number is nan has ended: nothing of it is taken.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import NamedTuple, final
 
 import numpy as np
@@ -17,6 +18,8 @@ from robot_dyn.integrate.primitives import enclose
 from robot_dyn.simulation.chatter import Chatter, Episode, chatter_of, close_all, tick
 from robot_dyn.simulation.levels import Level, Levels
 from robot_dyn.values import Value, read_only
+
+_NONE: Mapping[int, Observation] = MappingProxyType({})
 
 
 class Observation(NamedTuple):
@@ -160,16 +163,27 @@ class Observed(Value):
         return {int(joint): Episode(*self.episodes[run, joint].tolist()) for joint in known}
 
 
-def observed(parts: Iterable[Observation], levels: Levels) -> Observed:
-    """What was observed of runs, those of one observation after those of the other, once they have ended."""
+def observed(parts: Iterable[Observation], levels: Levels, again: Mapping[int, Observation] = _NONE) -> Observed:
+    """What was observed of runs that have ended.
+
+    Args:
+        parts: Of all runs, those of one after those of the other.
+        levels: Of all runs.
+        again: Of single runs, by number, in place of what `parts` have.
+    """
     parts = tuple(parts)
-    for part in parts:
+    for part in (*parts, *again.values()):
         close_all(part.chatter)
-    low, high = (np.concatenate([getattr(part, name) for part in parts], axis=1) for name in ("low", "high"))
-    extremes = np.stack([low.reshape(3, -1, low.shape[1]), high.reshape(3, -1, high.shape[1])], axis=1)
+    arrays = [np.concatenate(of, axis=-1) for of in zip(*map(_results, parts), strict=True)]
+    for run, part in again.items():
+        for array, x in zip(arrays, _results(part), strict=True):
+            array[..., run] = x[..., 0]
+    extremes, visits, episodes = arrays
     extremes[np.isinf(extremes)] = np.nan
-    visits, episodes = (
-        np.concatenate(each, axis=2)
-        for each in ([part.visits for part in parts], [part.chatter.episodes for part in parts])
-    )
     return Observed(np.moveaxis(extremes, -1, 0), levels.levels, levels.limits.T, visits.T, episodes.T)
+
+
+def _results(of: Observation) -> tuple[Array, Array, Array]:
+    """Extremes (3, 2, n, W), visits and episodes."""
+    shape = 3, of.low.shape[0] // 3, of.low.shape[1]
+    return np.stack([of.low.reshape(shape), of.high.reshape(shape)], axis=1), of.visits, of.chatter.episodes

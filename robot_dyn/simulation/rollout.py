@@ -16,9 +16,10 @@ import numpy as np
 
 from robot_dyn import former
 from robot_dyn.coefficients import rebuilt
-from robot_dyn.compiled.parameters import CONTROLLER, link_parameters, names_of, parameters
+from robot_dyn.compiled.parameters import CONTROLLER, link_parameters, names_of, parameters, with_parameters
 from robot_dyn.compiled.threads import thread_count
 from robot_dyn.effects.plant import Plant
+from robot_dyn.effects.rigid_stops import RigidStops
 from robot_dyn.errors import QueryError, nearest, shown
 from robot_dyn.integrate.adaptive import AUTO, EXPLICIT
 from robot_dyn.integrate.integrator import Integrator
@@ -26,20 +27,20 @@ from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.model.edits import Edits
 from robot_dyn.simulation.machine.batch import LANES, Batch
 from robot_dyn.simulation.machine.making import machine
-from robot_dyn.simulation.machine.one_by_one import OneByOne
+from robot_dyn.simulation.machine.one_by_one import one_by_one
+from robot_dyn.simulation.machine.thresholds import Thresholds, thresholds
 from robot_dyn.simulation.options import Options, setup_of, takes_options
 from robot_dyn.simulation.origin import edits_of_machine_code
 from robot_dyn.simulation.rollout_result import Rollouts
-from robot_dyn.simulation.setup import Setup
+from robot_dyn.simulation.setup import Setup, check_stops
 from robot_dyn.simulation.size import MOST_BYTES
 from robot_dyn.simulation.state_equation import StateEquation
-from robot_dyn.validate import choice, instance, integer, joint_values, numbers
+from robot_dyn.validate import choice, instance, integer, joint_values, numbers, truth
 
 RECORDS = ("q", "v", "u", "energy", "work")
 _WITHOUT_EFFECT = {
     "estimate_error": "simulate one of the runs for that",
     "accuracy": "simulate one of the runs for that",
-    "engine": "rollouts run in machine code",
 }
 
 
@@ -52,6 +53,7 @@ def rollouts(
     *,
     params: Mapping[str, Any] | None = None,
     record: Iterable[str] = ("q", "v"),
+    cuts: bool = True,
     threads: int | None = None,
     most_bytes: int = MOST_BYTES,
     on_progress: Callable[[float], object] | None = None,
@@ -59,10 +61,12 @@ def rollouts(
 ) -> Rollouts:
     """Run a plant or a robot from many starts, or a setup with the options that are given in place of its own.
 
-    By an explicit, Gauss or Rosenbrock method of fixed step, such as `integrator="rk4"`, the runs go side by side in
-    machine code, and are not cut where a stop is touched; through dry friction that sticks and rigid stops by
-    `integrator="time_stepping"`. By a method that chooses its steps, such as the default, they
-    go one after the other on each thread, each as `simulate` makes it.
+    Each run is that of `simulate`, to rounding. By an explicit, Gauss or Rosenbrock method of fixed step, such as
+    `integrator="rk4"`, and by time stepping, the runs go side by side in machine code. Those that may pass a threshold
+    (a stop, an effort limit, a reversal of friction with states) are made again one after the other on each thread,
+    with their steps cut there, which takes some 0.5 ms for each threshold passed. So are all runs by a method that
+    chooses its steps, such as the default, and by one of fixed step where dry friction, rigid stops, payloads that
+    come and go, or events end steps.
 
     Args:
         what: What to run.
@@ -77,13 +81,15 @@ def rollouts(
             theirs: they are "model.gravity", ….
         record: Which of "q", "v", "u", "energy", "work" to keep at the samples; states of effects and controllers are
             those of `simulate`.
+        cuts: False for runs in lock step whose steps do not end at thresholds, which the summary then names: faster,
+            and wrong by as much as a step that passes one.
         threads: Number of threads; None for all processors.
         most_bytes: Refuse to record more than this.
         on_progress: Called with the time that the runs have reached, the mean in [s], some ten times a second; with
             a record period of 0 it grows as tiles of 64 runs end.
-        **options: As of `simulate`; all but `estimate_error`, `accuracy` and `engine`, which have no effect here: no
-            error is estimated (`simulate` one of the runs for that), and the engine is machine code. The method "auto"
-            is DOP853 here.
+        **options: As of `simulate`; all but `estimate_error` and `accuracy`, which have no effect here: no error is
+            estimated (`simulate` one of the runs for that). The method "auto" is DOP853 here, and the engine "auto" is
+            machine code; "interpreted" makes the runs one after the other in Python.
 
     Runs are not watched at every step, as those of `simulate` are: they carry no remarks.
 
@@ -103,32 +109,43 @@ def rollouts(
             f"rollouts run by an explicit, Gauss or Rosenbrock method, or by one that chooses its steps, not by"
             f" {setup.integrator.name}: give integrator='rk4' and its step_s; simulate takes any method"
         )
-    held, method = setup.plant.equation_of_motion.set_valued, setup.integrator
-    if held and not (method.controls_error or method.nonsmooth):
-        raise QueryError(
-            f"rollouts: {held[0].name} holds joints and lets them go, and steps in lock step do not end there; take"
-            " integrator='time_stepping' with a step_s, or 'DOP853', by which runs go one after the other"
-        )
-    if setup.plant.equation_of_motion.payloads and not setup.integrator.controls_error:
-        raise QueryError(
-            "rollouts: carried_payload changes the state at once, and runs in lock step do not stop there; take"
-            " integrator='DOP853', by which runs go one after the other"
-        )
-    if setup.events:
-        raise QueryError("rollouts: events has no effect, since runs in lock step are not cut; simulate takes them")
     if params is not None and not (isinstance(params, Mapping) and all(isinstance(name, str) for name in params)):
         raise QueryError(f"params must give values by name, such as {{'kp': …}}, got {shown(params)}")
-    instance("record", record, Iterable, f"give names of {', '.join(RECORDS)}")
-    recorded = tuple(record)
-    if any(isinstance(name, str) and name == "tau" for name in recorded):
-        former.tell("record 'tau' of rollouts", "'u'", up=3)
-        recorded = tuple("u" if isinstance(name, str) and name == "tau" else name for name in recorded)
-    recorded = tuple(choice("record", name, RECORDS) for name in recorded)
+    recorded, threads = _recorded(record), thread_count(threads)
     q, v, sweep = _starts(setup, q0, v0, params or {})
-    if setup.integrator.controls_error:
-        singles = OneByOne(setup, q, v, sweep, recorded, most_bytes)
-        runs = singles.run(thread_count(threads), on_progress)
-        return replace(runs, about=edits_of_machine_code(setup) | runs.about)
+    why = _why_one_by_one(setup)
+    if not truth("cuts", cuts) and why:
+        raise QueryError(f"cuts=False: {why}, and so runs are made one after the other; leave it out")
+    passed = None if why else thresholds(setup, sweep, len(q))
+    if why or (cuts and passed is not None and not setup.samples_on_steps):
+        runs = one_by_one(setup, q, v, sweep, recorded, most_bytes, threads, on_progress)
+    else:
+        at = passed if cuts else None
+        runs = _side_by_side(setup, q, v, sweep, recorded, most_bytes, at, threads, on_progress)
+        if at is not passed:
+            runs = replace(runs, uncut=passed.names)
+    return replace(runs, about=edits_of_machine_code(setup) | runs.about)
+
+
+def _why_one_by_one(setup: Setup) -> str:
+    """Why runs of a setup do not go in lock step; "" if they do."""
+    motion, method = setup.plant.equation_of_motion, setup.integrator
+    if method.controls_error:
+        return f"{method.name} chooses its steps"
+    if setup.engine == "interpreted":
+        return "the engine is interpreted"
+    if motion.set_valued and not method.nonsmooth:
+        return f"{motion.set_valued[0].name} holds joints and lets them go, where steps must end"
+    if motion.payloads:
+        return f"{motion.payloads[0].name} comes and goes, where steps must end"
+    return "steps end at events" if setup.events else ""
+
+
+def _side_by_side(
+    setup: Setup, q: np.ndarray, v: np.ndarray, sweep: dict[str, np.ndarray], recorded: tuple[str, ...], most: int,
+    passed: Thresholds | None, threads: int, on_progress: Callable[[float], object] | None,
+) -> Rollouts:  # fmt: skip
+    """The runs in lock step, of which those that pass a threshold are made again."""
     equation = StateEquation(setup.plant, setup.controller, setup.integrator.canonical)
     asked = {"u": "u" in recorded, "v": equation.canonical and "v" in recorded, "energy": "energy" in recorded}
     kept = tuple(name for name, yes in asked.items() if yes)
@@ -142,8 +159,17 @@ def rollouts(
         nonsmooth=setup.integrator.nonsmooth,
     )
     made.check(setup)
-    runs = Batch(setup, made, q, v, sweep, recorded, kept, most_bytes).run(thread_count(threads), on_progress)
-    return replace(runs, about=edits_of_machine_code(setup) | runs.about)
+    return Batch(setup, made, q, v, sweep, recorded, kept, most, passed).run(threads, on_progress)
+
+
+def _recorded(record: Any) -> tuple[str, ...]:
+    """Names of what is to be kept."""
+    instance("record", record, Iterable, f"give names of {', '.join(RECORDS)}")
+    recorded = tuple(record)
+    if any(isinstance(name, str) and name == "tau" for name in recorded):
+        former.tell("record 'tau' of rollouts", "'u'", up=4)
+        recorded = tuple("u" if isinstance(name, str) and name == "tau" else name for name in recorded)
+    return tuple(choice("record", name, RECORDS) for name in recorded)
 
 
 def _setup(what: Setup | Plant | Dynamics, q0: Any, options: Mapping[str, Any]) -> Setup:
@@ -156,7 +182,11 @@ def _setup(what: Setup | Plant | Dynamics, q0: Any, options: Mapping[str, Any]) 
         if q0 is not None:
             q = joint_values("q0", q0, what.dynamics.joint_names)
             start = {"q0": q.reshape(-1, q.shape[-1])[0] if q.size else np.zeros(q.shape[-1])}
-    return setup_of("rollouts", what, {**start, **options})
+    setup = setup_of("rollouts", what, {**start, **options})
+    if setup.accuracy is not None:
+        without = "give the setup without it, as dataclasses.replace(setup, accuracy=None)"
+        raise QueryError(f"rollouts: accuracy has no effect, {_WITHOUT_EFFECT['accuracy']}; {without}")
+    return setup
 
 
 def _starts(
@@ -173,7 +203,12 @@ def _starts(
         shapes = {"q0": q.shape, "v0": v.shape} | {name: x.shape for name, x in sweep.items()}
         raise QueryError(f"starts and params must be of one number of runs, (B, {n}), got {shapes}")
     B = counts.pop()
-    return np.broadcast_to(q, (B, n)), np.broadcast_to(v, (B, n)), sweep
+    q = np.broadcast_to(q, (B, n))
+    if any(isinstance(each, RigidStops) for each in setup.plant.effects):
+        for run in range(B):
+            plant, _ = with_parameters(setup.plant, setup.controller, {name: x[run] for name, x in sweep.items()})
+            check_stops(plant, q[run], f"q0 of run {run}")
+    return q, np.broadcast_to(v, (B, n)), sweep
 
 
 def _values(setup: Setup, name: str, values: Any) -> np.ndarray:
@@ -188,6 +223,11 @@ def _values(setup: Setup, name: str, values: Any) -> np.ndarray:
         if several:
             both = " and ".join(repr(f"{each}.{key}") for each in dict.fromkeys(several))
             raise QueryError(f"params: {name} names a coefficient of several effects of the plant; give {both}")
+        if name.startswith("payload_") and not any(each.name.startswith("payload_") for each in swept):
+            payload = f"rd.Payload({name.partition(':')[2] or 'link'!r}, 1.0)"
+            raise QueryError(
+                f"params: no {name!r}: the arm carries no payload; add one, as robot.with_(payload={payload})"
+            )
         names = dict.fromkeys((*(each.name for each in swept), *link_parameters(plant.dynamics)))
         raise QueryError(f"params: no {name!r}; {nearest(name, names)}")
     n, declared = mine[0].size, mine[0].declared

@@ -21,7 +21,7 @@ from robot_dyn.simulation.trajectory import Ending, Outcome, Statistics, Traject
 from robot_dyn.validate import integer
 from robot_dyn.values import Value, read_only
 
-_SHARED = ("joint_names", "t", "statistics", "sources", "about", "setup", "saved")  # by all runs
+_SHARED = ("joint_names", "t", "statistics", "sources", "about", "setup", "uncut", "saved")  # by all runs
 
 
 @final
@@ -39,9 +39,9 @@ class Rollouts(Value):
         kinetic, potential: Energies, (B, m), in [J].
         work: Done up to each sample by the control and by each other effect, by name, (B, m), in [J].
         ended: When each run ended, (B,), in [s].
-        diverged: Whether it ended before its time, (B,).
+        diverged: Whether it diverged then, (B,).
         stopped: Whether it was interrupted, (B,).
-        advice: Why a run diverged and what to do, as of `simulate`; empty for the others.
+        advice: Why a run diverged and what to do, or which event ended it, as of `simulate`; empty for the others.
         steps: Of each run, (B,).
         evaluations: Of the equation of motion, by the 64 runs that each was side by side with, (B,).
         statistics: Of the longest run; its time is that of all runs.
@@ -49,6 +49,7 @@ class Rollouts(Value):
         about: Texts that make the runs whole, as of a `Trajectory`; of all runs, without `params`.
         params: Values that differ from run to run, by name, (B, n).
         setup: What was run; None for runs that were read from a file.
+        uncut: Names of the thresholds at which steps do not end, as `cuts=False` asks.
         q0, v0: Starts, (B, n).
         observed: Extremes, limits passed and chatter of each run, over all steps; None in files of older versions.
         saved: Of runs that were read from a file; None for others.
@@ -73,6 +74,7 @@ class Rollouts(Value):
     about: dict[str, str]
     params: dict[str, np.ndarray]
     setup: Setup | None = None
+    uncut: tuple[str, ...] = ()
     q0: np.ndarray | None = None
     v0: np.ndarray | None = None
     observed: Observed | None = None
@@ -126,7 +128,7 @@ class Rollouts(Value):
         if self.stopped[run]:
             return Outcome(Ending.STOPPED, ended, "interrupted; all samples up to here are kept")
         if not self.diverged[run]:
-            return Outcome(Ending.FINISHED, ended)
+            return Outcome(Ending.FINISHED, ended, self.advice[run])
         return Outcome(Ending.DIVERGED, ended, self.advice[run])
 
     def setup_of(self, run: int) -> Setup:
@@ -174,6 +176,9 @@ class Rollouts(Value):
         """How many runs, how many ended before their time and why; remarks; tracking error; which run to look at."""
         early = f"{int(self.diverged.sum())} diverged, {int(self.stopped.sum())} stopped"
         lines = [f"{len(self)} runs of {len(self.t)} samples to t = {self.t[-1]:g} s; {early}"]
+        if self.uncut:
+            levels = ", ".join(self.uncut)
+            lines.append(f"cuts=False: no step ends at {levels}, and a run that passes one is not that of simulate")
         if self.diverged.any():
             run = int(self.diverged.argmax())
             lines.append(f"run {run} diverged at t = {self.ended[run]:g} s; {self.advice[run]}")

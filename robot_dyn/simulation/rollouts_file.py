@@ -62,7 +62,9 @@ def _checked(arrays: Arrays, about: dict[str, Any]) -> Rollouts:
         raise ArchiveError(f"'advice' is of {len(runs.advice)} runs, not of {len(runs)}")
     if runs.work is not None and set(runs.work) != set(runs.sources):
         raise ArchiveError("members 'work/…' and 'sources' have different names")
-    whole = ~(runs.diverged | runs.stopped)
+    whole = ~(runs.diverged | runs.stopped)[:, None] & (
+        (runs.t < runs.ended[:, None]) | (runs.ended >= runs.t[-1])[:, None]
+    )
     for name in ("q", "v", "u", "kinetic", "potential"):
         array = getattr(runs, name)
         if array is not None and not np.isfinite(array[whole]).all():

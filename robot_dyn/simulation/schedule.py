@@ -19,6 +19,7 @@ from robot_dyn.errors import QueryError
 
 LEAST_STEPS = 3  # on a segment: fewer leave no room for a longer step
 ULPS = 4  # times that differ by no more units in the last place are one
+ON_STEP = 1e-9  # of step_s: a sample that lies so near to the end of a step is taken there
 _ROUNDED = 1e-9  # of the period: k · period, as computed, is the time that the user wrote
 
 
@@ -73,13 +74,13 @@ def cuts(
         period_s * np.add.outer(np.arange(max(1, count) + 1), instants).ravel(),
         np.array([*inside, duration_s]),
     )
-    near = _near(fixed, ticks)
-    ticks = np.where(np.abs(near - ticks) <= _ROUNDED * period_s + ULPS * np.spacing(near), near, ticks)
+    nearest = near(fixed, ticks)
+    ticks = np.where(np.abs(nearest - ticks) <= _ROUNDED * period_s + ULPS * np.spacing(nearest), nearest, ticks)
     acting = set(ticks[ticks <= duration_s].tolist()) if period_s > 0 else {0.0}
     return [(t, t in acting) for t in sorted({*inside, *acting, duration_s})]
 
 
-def _near(fixed: np.ndarray, t: np.ndarray) -> np.ndarray:
+def near(fixed: np.ndarray, t: np.ndarray) -> np.ndarray:
     """The entry of ascending `fixed` nearest to each of t."""
     right = np.clip(np.searchsorted(fixed, t), 1, len(fixed) - 1)
     return np.where(t - fixed[right - 1] < fixed[right] - t, fixed[right - 1], fixed[right])

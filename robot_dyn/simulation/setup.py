@@ -22,7 +22,7 @@ from robot_dyn.integrate.adaptive import AUTO, Adaptive
 from robot_dyn.integrate.methods import as_method
 from robot_dyn.simulation.asked import asked
 from robot_dyn.simulation.event import Event
-from robot_dyn.simulation.schedule import LEAST_STEPS, Segment, cuts, steps_on
+from robot_dyn.simulation.schedule import LEAST_STEPS, ON_STEP, Segment, cuts, near, nodes, steps_on
 from robot_dyn.simulation.size import check_segments
 from robot_dyn.simulation.smoothness import may_switch
 from robot_dyn.simulation.state_equation import StateEquation
@@ -146,11 +146,7 @@ class Setup(Value):
                 )
         if method.nonsmooth and (other := [x for x in effects if not (x.rubs or x.stops)]):
             raise QueryError(f"{other[0].name}: has no law for {method.name}; take integrator='DOP853'")
-        for each in effects:
-            if isinstance(each, RigidStops) and (depth := each.beyond_by(self.q0)).any():
-                i = int(np.argmax(depth))
-                name, which = self.plant.dynamics.joint_names[i], "lower" if each.touched(self.q0)[i] < 0 else "upper"
-                raise QueryError(f"q0: {name!r} is {depth[i]:.3g} beyond its {which} stop; start between the stops")
+        check_stops(self.plant, self.q0)
 
     def _check_payloads(self) -> None:
         """That the state is one of velocities where payloads come and go."""
@@ -260,13 +256,21 @@ class Setup(Value):
         """Whether the controller acts at the end of the run."""
         return self._cuts[-1][1]
 
-    @cached_property
+    @property
     def finds_events(self) -> bool:
         """Whether steps end where effects and the controller switch, and at events asked for."""
         if self.integrator.controls_error or self.integrator.nonsmooth:
             return not self.integrator.nonsmooth
         equation = StateEquation(self.plant, self.controller, self.integrator.canonical, self.events)
         return equation.switches and self.steps <= MOST_CUT
+
+    @property
+    def samples_on_steps(self) -> bool:
+        """Whether each sample of a method of fixed step is at the end of a step that is not cut."""
+        if not self.record_period_s:
+            return True
+        ends, due = nodes(self.segments), np.arange(0.0, self.duration_s, self.record_period_s)
+        return bool((np.abs(near(ends, due) - due) <= ON_STEP * self.step_s).all())
 
     @property
     def steps(self) -> int:
@@ -286,6 +290,19 @@ class Setup(Value):
         error control does not see what no stage meets. A fixed step is the user's.
         """
         return min(_LONGEST_STEP_S, self.duration_s / _LEAST_STEPS) if may_switch(self) else inf
+
+
+def check_stops(plant: Plant, q0: Array, of: str = "q0") -> None:
+    """That a start is not beyond a rigid stop.
+
+    Raises:
+        QueryError: If it is; names the joint, and by `of` the start.
+    """
+    for each in plant.effects:
+        if isinstance(each, RigidStops) and (depth := each.beyond_by(q0)).any():
+            i = int(np.argmax(depth))
+            name, which = plant.dynamics.joint_names[i], "lower" if each.touched(q0)[i] < 0 else "upper"
+            raise QueryError(f"{of}: {name!r} is {depth[i]:.3g} beyond its {which} stop; start between the stops")
 
 
 def no_step(name: str) -> str:

@@ -52,6 +52,17 @@ def check_record(setup: Setup, equation: StateEquation) -> None:
         raise too_large(f"{samples(setup):.3g} samples", size, MOST_BYTES)
 
 
+def check_batch(setup: Setup, runs: int, numbers: int, most: float) -> None:
+    """Refuse a batch of so many runs, with so many numbers in each sample, that takes more than `most` bytes.
+
+    Raises:
+        QueryError: If it does; says how much and the remedy.
+    """
+    size = 8 * samples(setup) * runs * numbers
+    if size > most:
+        raise too_large(f"{samples(setup):.3g} samples of {runs} runs", size, most, ", fewer runs, or record less")
+
+
 def too_large(what: str, size: float, most: float, or_else: str = "") -> QueryError:
     """The refusal of a record."""
     remedy = f"take a longer record_period_s or a shorter duration_s{or_else}"

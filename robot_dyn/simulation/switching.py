@@ -76,20 +76,31 @@ class Switching:
             return part in self.equation.limited
         return not (each.of_velocity and self.equation.canonical)
 
+    @property
+    def rows(self) -> np.ndarray:
+        """What passes each of the thresholds: entries of y, and then of what reaches the limited parts."""
+        place: dict[int | None, int] = {k: self._n * i for i, k in enumerate(self.equation.limited)}
+        each = list(zip(self._parts, self.thresholds, strict=True))
+        coordinates = [self._row(*one) for one in each[: self.coordinates]]
+        return np.array([*coordinates, *(place[k] + one.joint for k, one in each[self.coordinates :])], np.int64)
+
+    @property
+    def levels(self) -> np.ndarray:
+        """The levels of the thresholds."""
+        return np.array([each.level for each in self.thresholds])
+
     def at(self, t: float, y: np.ndarray, degree: int, functions: object, held: Array | None) -> Switches:
         """The switching functions, on their sides of a state y at t and of the mode, for dense output of a degree."""
         n, E, G = self._n, self.coordinates, len(self.events)
         self.guards = guards = self.modes.guards(y) if self.modes is not None else []
-        rows = np.array([self._row(*each) for each in zip(self._parts[:E], self.thresholds, strict=False)], np.int64)
-        levels = np.array([each.level for each in self.thresholds])
+        rows, actuation = np.split(self.rows, [E])
+        levels = self.levels
         gaps = y[rows] - levels[:E]
         moving = self._moving(t, y, held, rows, gaps)  # on the level itself, where it is going
         sides = np.where(gaps + (gaps == 0) * moving > 0, 1.0, -1.0)
         for i in np.flatnonzero((gaps == 0) & (moving == 0)):  # a stop is touched, and not passed
             sides[i] = 1.0 if self.thresholds[i].falling == "touched" else -1.0
-        place: dict[int | None, int] = {k: n * i for i, k in enumerate(self.equation.limited)}
-        actuation = [place[k] + each.joint for k, each in zip(self._parts[E:], self.thresholds[E:], strict=True)]
-        first = n * len(place)
+        first = n * len(self.equation.limited)
         values = self.values(t, y, held)
         gaps = values[actuation] - levels[E:]
         sides = np.concatenate([sides, np.where(gaps == 0, -np.sign(levels[E:]), np.sign(gaps))])  # a limit is reached

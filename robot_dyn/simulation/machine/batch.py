@@ -1,13 +1,13 @@
 """A batch of runs in tiles of 64 in lock step, each tile run by one thread from beginning to end.
 
-Records are arrays over time, row and run, in this order, so that a tile writes whole vectors.
+Records are arrays over time, row and run, in this order, so that a tile writes whole vectors. Where `simulate` cuts
+steps at thresholds, the runs that may pass one are made again by themselves, and written over what lock step gave.
 """
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import replace
 from time import perf_counter
 from typing import cast, final
@@ -20,18 +20,23 @@ from robot_dyn.compiled.parameters import over_runs
 from robot_dyn.compiled.right_angles import robot_of
 from robot_dyn.effects.plant import Plant
 from robot_dyn.integrate.integrator import PlainMethod
+from robot_dyn.simulation.detection import none
 from robot_dyn.simulation.fixed_step import rules_of, runs_of, samples_at_most
-from robot_dyn.simulation.levels import Levels, levels
+from robot_dyn.simulation.levels import levels
 from robot_dyn.simulation.machine.machine import Machine
+from robot_dyn.simulation.machine.one_by_one import OneByOne, Single, said
+from robot_dyn.simulation.machine.pool import in_threads
+from robot_dyn.simulation.machine.thresholds import Thresholds
 from robot_dyn.simulation.observation import NOTHING, Observation, observation_of, observed
 from robot_dyn.simulation.origin import origin
 from robot_dyn.simulation.plan import plan_of
 from robot_dyn.simulation.rollout_result import Rollouts
+from robot_dyn.simulation.schedule import ON_STEP
 from robot_dyn.simulation.setup import Setup
-from robot_dyn.simulation.size import samples, too_large
+from robot_dyn.simulation.size import check_batch
 from robot_dyn.simulation.state_equation import StateEquation
-from robot_dyn.simulation.time_loop import Ended, Now, Records, Runs, Why
-from robot_dyn.simulation.trajectory import Statistics, diverged_advice
+from robot_dyn.simulation.time_loop import WATCHED, WATCHED_WHERE_CUT, Ended, Now, Records, Runs, Why
+from robot_dyn.simulation.trajectory import Ending, Outcome, Statistics, diverged_advice
 
 LANES = 64  # runs in a tile: with 8, 16 or 32 a step of RK4 took 1.5, 1.1 and 1.05 times as long
 _REASONS = {
@@ -50,10 +55,11 @@ class Batch:
     def __init__(
         self, setup: Setup, machine: Machine, q0: np.ndarray, v0: np.ndarray,
         sweep: dict[str, np.ndarray], recorded: tuple[str, ...], kept: tuple[str, ...], most: int,
+        thresholds: Thresholds | None = None,
     ) -> None:  # fmt: skip
         equation, n = machine.equation, machine.equation.plant.dynamics.n
         self.setup, self.machine, self.recorded, self.kept, self.values = setup, machine, recorded, kept, sweep
-        self.q0, self.v0, self.y = q0, v0, _starts(equation, q0, v0)
+        self.q0, self.v0, self.y, self.thresholds = q0, v0, _starts(equation, q0, v0), thresholds
         self.levels = levels(equation.plant.dynamics, *over_runs(equation.plant, equation.controller, sweep), len(q0))
         self.columns = [*range(n)] * ("q" in recorded)
         if "v" in recorded and not equation.canonical:
@@ -62,10 +68,7 @@ class Batch:
             self.columns += range(equation.size - len(equation.sources), equation.size)
         tiles = -(-len(self.y) // LANES)
         width, more = tiles * LANES, sum({"u": n, "v": n, "energy": 2}[name] for name in kept)
-        size = 8 * samples(setup) * width * (len(self.columns) + more)
-        if size > most:
-            what = f"{samples(setup):.3g} samples of {len(self.y)} runs"
-            raise too_large(what, size, most, ", fewer runs, or record less")
+        check_batch(setup, len(self.y), len(self.columns) + more, most)
         self.plan = plan_of(setup)
         most = samples_at_most(setup, self.plan.counts)
         self.out_y, self.made = np.empty((most, len(self.columns), width)), np.empty((most, more, width))
@@ -74,69 +77,80 @@ class Batch:
         self.lock = threading.Lock()
         self.unfinished = np.ones(tiles, dtype=bool)
         self.why, self.last = np.zeros(width, np.int64), np.zeros((equation.size, width))
-        self.ended = np.full(width, setup.duration_s)
-        self.clocks = np.tile([0.0, setup.record_period_s, 1e-9 * setup.step_s], (tiles, 1))
+        self.ended, self.until = np.full(width, setup.duration_s), np.full(width, np.inf)
+        self.again: dict[int, Single | None] = {}  # runs made again by themselves; None where Ctrl-C came first
+        self.clocks = np.tile([0.0, setup.record_period_s, ON_STEP * setup.step_s], (tiles, 1))
         self.evaluations, self.stop = np.zeros(tiles, np.int64), np.zeros(1, np.int64)
 
     def run(self, threads: int, on_progress: Callable[[float], object] | None = None) -> Rollouts:
         """All tiles, each by one thread; Ctrl-C ends them at their next step, and an error of `on_progress`."""
-        began = perf_counter()
-        tiles = iter(range(len(self.unfinished)))
+        began, end, reached = perf_counter(), self.setup.duration_s, 0.0
 
-        def work() -> None:
-            while True:
-                with self.lock:
-                    tile = next(tiles, None)
-                if tile is None:
-                    return
-                self._tile(tile)
+        def tell(t: float) -> None:
+            nonlocal reached
+            reached = max(reached, t)
+            if on_progress is not None:
+                on_progress(reached)
 
-        workers = min(threads, len(self.unfinished))
-        with ThreadPoolExecutor(workers, "robot_dyn") as pool:
-            futures = [pool.submit(work) for _ in range(workers)]
-            try:
-                while wait(futures, timeout=0.1).not_done:
-                    if on_progress is not None:
-                        on_progress(self._reached())
-            except BaseException as error:
-                self.stop[0] = 1
-                wait(futures)
-                if not isinstance(error, KeyboardInterrupt):
-                    raise
-        for future in futures:
-            future.result()
+        in_threads(self._tile, len(self.unfinished), threads, self.stop, lambda: tell(self._reached()))
+        self._make_again(threads, tell)
         result = self._result()
         if on_progress is not None and not result.stopped.any():
-            on_progress(self.setup.duration_s)
+            tell(end)
         return replace(result, statistics=replace(result.statistics, wall_s=perf_counter() - began))
 
     def _reached(self) -> float:
-        """The time reached, in [s], the mean over the tiles: that of the next sample of each."""
-        end = self.setup.duration_s
-        return float(np.where(self.unfinished, np.minimum(self.clocks[:, 0], end), end).mean())
+        """The time reached, in [s], the mean over the runs: that of the next sample of each that goes on."""
+        end, left = self.setup.duration_s, np.isinf(self.until).reshape(-1, LANES).mean(axis=1)
+        return float((left * np.where(self.unfinished, np.minimum(self.clocks[:, 0], end), end)).mean())
 
-    def _index(self, tile: int) -> np.ndarray:
-        """Numbers of the runs of a tile; one that is not full repeats a run."""
-        return np.minimum(np.arange(tile * LANES, (tile + 1) * LANES), len(self.y) - 1)
+    def _make_again(self, threads: int, tell: Callable[[float], object]) -> None:
+        """Make those runs by themselves that may have passed a threshold, or diverged, where steps are cut."""
+        if self.thresholds is None:
+            return
+        passed = np.isfinite(self.until) | (self.why > 0)
+        numbers = np.flatnonzero(passed[: len(self.y)])
+        self.again = dict.fromkeys(numbers.tolist())
+        if not len(numbers) or self.stop[0]:
+            return
+        sweep = {name: x[numbers] for name, x in self.values.items()}
+        starts, of = (self.q0[numbers], self.v0[numbers]), self.levels.of_runs(numbers)
+        runs = OneByOne(self.setup, *starts, sweep, self.recorded, of, numbers.tolist())
+        part = len(numbers) / len(self.y)
+        runs.run(threads, lambda t: tell((1 - part) * self.setup.duration_s + part * t))
+        self.again = dict(zip(numbers.tolist(), runs.made, strict=True))
+
+    def _write_again(self, t: np.ndarray) -> None:
+        """What these runs recorded, in place of what lock step gave; without them, that up to their thresholds."""
+        names = [name for name in ("q", "v", "work") if name in self.recorded and name not in self.kept]
+        for run, single in self.again.items():
+            if single is None:
+                rows = int(np.searchsorted(t, self.until[run], side="right"))
+            else:
+                rows = len(single.t)
+                for array, of in ((self.out_y, names), (self.made, self.kept)):
+                    array[:rows, :, run] = np.hstack([*(single.columns[name] for name in of), np.empty((rows, 0))])
+            self.out_y[rows:, :, run], self.made[rows:, :, run] = np.nan, np.nan
 
     def _observation(self, tile: int, runs: Runs) -> Observation:
         """What is observed of a tile, before its first step."""
-        index, equation, n = self._index(tile), self.machine.equation, self.machine.equation.plant.dynamics.n
+        numbers, equation, n = self._numbers(tile), self.machine.equation, self.machine.equation.plant.dynamics.n
         u = np.full((n, LANES), np.nan)
         if not equation.sampled and self.machine.equations.functions.rate:  # of which the actuation is a part
             rate = np.empty((equation.size + n, LANES))
             self.machine.in_python.rate(0.0, runs.y, self.plan.parameters[0], runs.own, rate)
             u = rate[equation.size :]
-        of, limits, bounds = self.levels
-        start = np.vstack([self.q0[index].T, self.v0[index].T, u])
-        return observation_of(start, Levels(of, limits[:, index], bounds[:, index]))
+        return observation_of(np.vstack([self.q0[numbers].T, self.v0[numbers].T, u]), self.levels.of_runs(numbers))
 
     def _runs(self, tile: int) -> Runs:
-        """The runs of a tile at their start."""
-        equation = self.machine.equation
-        index = self._index(tile)
+        """The runs of a tile at their start; a tile that is not full repeats a run."""
+        equation, index = self.machine.equation, self._numbers(tile)
         own = self.machine.own({name: values[index] for name, values in self.values.items()})
         return runs_of(equation, self.y[index].T, own, self.made.shape[1], index)
+
+    def _numbers(self, tile: int) -> np.ndarray:
+        """The numbers of the runs in a tile."""
+        return np.minimum(np.arange(tile * LANES, (tile + 1) * LANES), len(self.y) - 1)
 
     def _tile(self, tile: int) -> None:
         equation, n = self.machine.equation, self.machine.equation.plant.dynamics.n
@@ -152,10 +166,17 @@ class Batch:
             np.array(self.columns, np.int64), np.empty((len(self.out_y), 2), np.int64), self.out_y, self.made,
             np.empty((0, equation.size + 2)), np.empty((1 + 3 * n, 0)), self.observations[tile],
         )  # fmt: skip
-        rules = rules_of(equation, False, _LARGEST, base=own.start)
+        self.machine.in_python.energy(0.0, runs.y, self.plan.parameters[0], runs.own, runs.energies)
+        runs.energy[:], runs.scale[:] = runs.energies.sum(axis=0), 1.0 + np.abs(runs.energies).sum(axis=0)
+        cut = self.thresholds is not None
+        rules = rules_of(equation, False, _LARGEST, base=own.start, watched=WATCHED_WHERE_CUT if cut else WATCHED)
+        switches = none(LANES)
+        if self.thresholds is not None:
+            switches = self.thresholds.lanes(self._numbers(tile), equation.size + n)
+        self.until[own] = switches.until
         ended = self.machine.loop(
-            functions, self.plan, runs, records, rules, stepper.coefficients, stepper.work, now,
-            self.clocks[tile], self.stop,
+            functions, self.plan, runs, records, rules, stepper.coefficients, stepper.work,
+            switches._replace(until=self.until[own]), now, self.clocks[tile], self.stop,
         )  # fmt: skip
         self.unfinished[tile], self.evaluations[tile] = ended != Ended.DONE, now[Now.EVALUATIONS]
         with self.lock:
@@ -173,8 +194,18 @@ class Batch:
         B, equation, n = len(self.y), self.machine.equation, self.machine.equation.plant.dynamics.n
         segment, step = self.place.T
         t = self.plan.starts[segment] + step * self.plan.lengths[segment]
+        self._write_again(t)
         why, ended = self.why[:B], self.ended[:B].copy()
-        stopped = np.repeat(self.unfinished, LANES)[:B] & (why == Why.GOES_ON)
+        diverged, advice, steps = why > 0, self._advice(why), self._steps(ended)
+        stopped = np.repeat(self.unfinished, LANES)[:B] & ~diverged
+        evaluations = np.repeat(self.evaluations, LANES)[:B]
+        for run, single in self.again.items():
+            outcome = Outcome(Ending.STOPPED, min(self.until[run], ended[run])) if single is None else single.outcome
+            ended[run], advice[run] = outcome.t, said(outcome)
+            diverged[run], stopped[run] = (outcome.ending is each for each in (Ending.DIVERGED, Ending.STOPPED))
+            if single is not None:
+                steps[run], evaluations[run] = single.steps, single.evaluations
+        alone = {run: single.observation for run, single in self.again.items() if single is not None}
         y, made, lengths = np.moveaxis(self.out_y[: len(t), :, :B], -1, 0), {}, {"u": n, "v": n, "energy": 2}
         at = 0
         for name in self.kept:
@@ -190,10 +221,9 @@ class Batch:
         named = dict(zip(equation.sources, works, strict=True)) if works else None
         return Rollouts(
             equation.plant.dynamics.joint_names, t, q, v if "v" in self.recorded else None, made.get("u"), K, V, named,
-            ended, why > 0, stopped, self._advice(why), self._steps(ended),
-            np.repeat(self.evaluations, LANES)[:B], self._statistics(), tuple(equation.sources),
+            ended, diverged, stopped, tuple(advice), steps, evaluations, self._statistics(), tuple(equation.sources),
             origin(self.setup.plant.dynamics) | self.setup.about, dict(self.values), self._compiled(),
-            self.q0, self.v0, observed(self.observations, self.levels)[:B],
+            (), self.q0, self.v0, observed(self.observations, self.levels, alone)[:B],
         )  # fmt: skip
 
     def _compiled(self) -> Setup:
@@ -205,13 +235,13 @@ class Batch:
         plant = Plant(robot_of(plant.dynamics) or plant.dynamics, plant.effects)
         return replace(self.setup, plant=plant, controller=controller)
 
-    def _advice(self, why: np.ndarray) -> tuple[str, ...]:
+    def _advice(self, why: np.ndarray) -> list[str]:
         """Why runs diverged and what to do; nothing for the others."""
         advice, equation = [""] * len(why), self.machine.equation
         for run in np.flatnonzero(why).tolist():
             fastest = equation.fastest_joint(self.last[:, run])
             advice[run] = diverged_advice(_REASONS[Why(why[run])], fastest, self.setup.taken_step_s)
-        return tuple(advice)
+        return advice
 
     def _steps(self, ended: np.ndarray) -> np.ndarray:
         """Number of steps of each run up to its end."""
@@ -225,6 +255,8 @@ class Batch:
         """Of the batch; its steps and evaluations are those of one run to the end."""
         method, steps = self.setup.integrator, int(self.plan.counts[:-1].sum())
         runs = f"compiled, {len(self.y)} runs side by side"
+        if self.again:
+            runs += f", {len(self.again)} of them made again with steps cut at thresholds"
         most = int(self.evaluations.max())
         return Statistics(method.name, self.setup.duration_s / steps, steps, most, 0.0, engine=runs)
 

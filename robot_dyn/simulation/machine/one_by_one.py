@@ -1,34 +1,49 @@
-"""A batch of runs by a method that chooses its steps: one after the other on each thread, since no two step alike."""
+"""Runs of a batch made one after the other on each thread, each as `simulate` makes it: with its own steps and cuts."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor, wait
+from collections.abc import Callable, Sequence
 from time import perf_counter
-from typing import Any, final
+from typing import NamedTuple, final
 
 import numpy as np
 
 from robot_dyn.coefficients import with_values
 from robot_dyn.compiled.parameters import over_runs, with_parameters
-from robot_dyn.simulation.event_run import EventRun
+from robot_dyn.simulation.choice import machine_of
 from robot_dyn.simulation.levels import Levels, levels
 from robot_dyn.simulation.machine.machine import Machine
-from robot_dyn.simulation.machine.making import machine
+from robot_dyn.simulation.machine.pool import in_threads
 from robot_dyn.simulation.observation import Observation, Observed, observation_of, observed
 from robot_dyn.simulation.observed import observer_of
 from robot_dyn.simulation.origin import origin
+from robot_dyn.simulation.prepared import prepared
 from robot_dyn.simulation.record import Record
 from robot_dyn.simulation.rollout_result import Rollouts
 from robot_dyn.simulation.samples import columns
 from robot_dyn.simulation.setup import Setup
-from robot_dyn.simulation.size import samples, too_large
+from robot_dyn.simulation.size import check_batch
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.trajectory import Ending, Outcome, Statistics
-from robot_dyn.simulation.transfers import Transfers
-from robot_dyn.simulation.watch import Watch
 
-_Q, _V, _U, _WORK, _ENERGY = 0, 1, 3, 4, 6  # of what `columns` gives
+
+class Single(NamedTuple):
+    """A run that was made by itself.
+
+    Attributes:
+        t: Of its samples, (k,), in [s].
+        columns: What was recorded, (k, …) by name.
+        outcome: How it ended.
+        steps, evaluations: Their numbers.
+        observation: What was observed of it.
+    """
+
+    t: np.ndarray
+    columns: dict[str, np.ndarray]
+    outcome: Outcome
+    steps: int
+    evaluations: int
+    observation: Observation
 
 
 @final
@@ -40,121 +55,109 @@ class OneByOne:
         q0, v0: Starts, (B, n).
         sweep: Values that differ from run to run, (B, size) by name.
         recorded: Names of what is kept.
-        most: Bytes of the record, at most.
+        of: Their levels.
+        numbers: Of the runs in their batch, of which their noise is; 0 to B − 1 unless given.
     """
 
     def __init__(
         self, setup: Setup, q0: np.ndarray, v0: np.ndarray, sweep: dict[str, np.ndarray], recorded: tuple[str, ...],
-        most: int,
+        of: Levels, numbers: Sequence[int] | None = None,
     ) -> None:  # fmt: skip
-        self.setup, self.q0, self.v0, self.sweep, self.recorded = setup, q0, v0, sweep, recorded
-        self.equation, self.machine = self._of(0)
-        self.machine.check(setup)
-        size = 8 * samples(setup) * len(q0) * (2 * self.equation.size + setup.plant.dynamics.n + 2)
-        if size > most:
-            what = f"{samples(setup):.3g} samples of {len(q0)} runs"
-            raise too_large(what, size, most, ", fewer runs, or record less")
-        self.levels = levels(setup.plant.dynamics, *over_runs(setup.plant, setup.controller, sweep), len(q0))
-        self.observations: dict[int, Observation] = {}
-        self.records: list[Record | None] = [None] * len(q0)
-        self.going: set[EventRun] = set()
-        self.stopped = False
+        self.setup, self.q0, self.v0, self.sweep, self.recorded, self.levels = setup, q0, v0, sweep, recorded, of
+        self.numbers = range(len(q0)) if numbers is None else numbers
+        self.compiled = setup.engine != "interpreted"
+        _, _, machine = self._of(0)
+        if machine is not None:
+            machine.check(setup)
+        self.made: list[Single | None] = [None] * len(q0)
+        self.stop = np.zeros(1, np.int64)
 
-    def _of(self, run: int) -> tuple[StateEquation, Machine]:
-        """The state equation of a run and its machine code, which is that of all."""
+    def _of(self, run: int) -> tuple[Setup, StateEquation, Machine | None]:
+        """The setup of a run, its state equation, and its machine code, which is that of all."""
         plant, controller = self.setup.plant, self.setup.controller
         if self.sweep:
             plant, controller = with_parameters(plant, controller, {name: x[run] for name, x in self.sweep.items()})
         if controller is not None:
-            controller = controller.of_run(run)
-        equation, method = StateEquation(plant, controller), self.setup.integrator
-        code = machine(equation.in_a_mode, method, swept=tuple(self.sweep), jacobian=method.needs_jacobian, cuts=True)
-        return equation, code
+            controller = controller.of_run(self.numbers[run])
+        own = {"plant": plant, "controller": controller, "q0": self.q0[run], "v0": self.v0[run]}
+        setup = with_values(self.setup, own)
+        equation = StateEquation(plant, controller, setup.integrator.canonical, setup.events)
+        return setup, equation, machine_of(setup, equation, tuple(self.sweep)) if self.compiled else None
 
-    def run(self, threads: int, on_progress: Callable[[float], object] | None = None) -> Rollouts:
-        """All runs; Ctrl-C ends them, and an error of `on_progress`."""
-        began, end = perf_counter(), self.setup.duration_s
-        with ThreadPoolExecutor(threads, "robot_dyn") as pool:
-            futures = [pool.submit(self._run, i) for i in range(len(self.q0))]
-            try:
-                while wait(futures, timeout=0.1).not_done:
-                    if on_progress is not None:
-                        on_progress(end * sum(each is not None for each in self.records) / len(self.records))
-            except BaseException as error:
-                self.stopped = True
-                for each in list(self.going):
-                    each.stop[0] = 1
-                wait(futures)
-                if not isinstance(error, KeyboardInterrupt):
-                    raise
-        for future in futures:
-            future.result()
-        if on_progress is not None and not self.stopped:
+    def run(self, threads: int, on_progress: Callable[[float], object] | None = None) -> None:
+        """All runs; Ctrl-C ends them, and an error of `on_progress`, which is told the mean of the times reached."""
+        end = self.setup.duration_s
+
+        def look() -> None:
+            if on_progress is not None:
+                on_progress(end * sum(each is not None for each in self.made) / len(self.made))
+
+        in_threads(self._run, len(self.made), threads if self.compiled else 1, self.stop, look)
+        if on_progress is not None and not self.stop[0]:
             on_progress(end)
-        return self._result(perf_counter() - began)
 
     def _run(self, i: int) -> None:
-        if self.stopped:
+        if self.stop[0]:
             return
-        noisy = self.equation.controller is not None and self.equation.controller.deviates
-        equation, code = self._of(i) if self.sweep or noisy else (self.equation, self.machine)
-        setup = with_values(
-            self.setup,
-            {"plant": equation.plant, "controller": equation.controller, "q0": self.q0[i], "v0": self.v0[i]},
-        )
+        setup, equation, machine = self._of(i)
+        observer = observer_of(setup, equation, self.levels.of_runs([i]))
+        run = prepared(setup, equation, machine, observer=observer)
+        run.stop = self.stop
+        self.made[i] = self._kept(equation, run.record(), observer.observation)
 
-        def made(of: StateEquation) -> tuple[Any, np.ndarray]:
-            return code.equations.functions, code.parameters if of is equation else code.of(of)
+    def _kept(self, equation: StateEquation, record: Record, observation: Observation) -> Single:
+        """What is recorded of a run; not the sample at an event that ended it, which no other run has."""
+        outcome = record.outcome
+        early = outcome.ending is Ending.FINISHED and outcome.t < self.setup.duration_s
+        rows = int(np.searchsorted(record.t, outcome.t)) if early else len(record.t)
+        names = "q", "v", "a", "u", "work", "power", "energy"
+        values = dict(zip(names, columns(equation, record.t, record.y, record.made), strict=True))
+        kept = {name: values[name][:rows].copy() for name in self.recorded}
+        return Single(record.t[:rows], kept, outcome, record.steps, record.evaluations, observation)
 
-        transfers, observer = Transfers(equation), observer_of(setup, equation, self._levels(i))
-        self.observations[i] = observer.observation
-        watch = Watch(setup, transfers.equation)
-        run = EventRun(watch, transfers, made, None, code.loop, observer=observer, in_python=code.in_python)
-        self.going.add(run)
-        try:
-            self.records[i] = run.record()
-        finally:
-            self.going.discard(run)
 
-    def _levels(self, i: int) -> Levels:
-        """Those of one run."""
-        return Levels(self.levels.levels, self.levels.limits[:, i : i + 1], self.levels.bounds[:, i : i + 1])
+def one_by_one(
+    setup: Setup, q0: np.ndarray, v0: np.ndarray, sweep: dict[str, np.ndarray], recorded: tuple[str, ...], most: int,
+    threads: int, on_progress: Callable[[float], object] | None = None,
+) -> Rollouts:  # fmt: skip
+    """The rollouts of a setup, as of `OneByOne`; `most` is the number of bytes to record at most."""
+    B, n, equation = len(q0), setup.plant.dynamics.n, StateEquation(setup.plant, setup.controller)
+    sizes = {"q": n, "v": n, "u": n, "work": len(equation.sources), "energy": 2}
+    check_batch(setup, B, sum(sizes[name] for name in recorded), most)
+    of = levels(setup.plant.dynamics, *over_runs(setup.plant, setup.controller, sweep), B)
+    runs, began = OneByOne(setup, q0, v0, sweep, recorded, of), perf_counter()
+    runs.run(threads, on_progress)
+    t = max((each.t for each in runs.made if each is not None), key=len, default=np.zeros(1))
+    kept = {name: np.full((B, len(t), sizes[name]), np.nan) for name in recorded}
+    for i, each in enumerate(runs.made):
+        for name, x in ({} if each is None else each.columns).items():
+            kept[name][i, : len(x)] = x
+    outcomes = [Outcome(Ending.STOPPED, 0.0) if each is None else each.outcome for each in runs.made]
+    steps = np.array([0 if each is None else each.steps for each in runs.made], np.int64)
+    evaluations = np.array([0 if each is None else each.evaluations for each in runs.made], np.int64)
+    engine = f"{'compiled' if runs.compiled else 'interpreted'}, {B} runs one after the other on each thread"
+    step = 0.0 if setup.integrator.controls_error else setup.duration_s / setup.steps
+    statistics = Statistics(
+        setup.integrator.name, step, int(steps.max()), int(evaluations.max()), perf_counter() - began, engine=engine
+    )
+    ending = np.array([each.ending.value for each in outcomes])
+    K, V = (kept["energy"][:, :, k] if "energy" in kept else None for k in (0, 1))
+    work = {name: kept["work"][:, :, k] for k, name in enumerate(equation.sources)} if "work" in kept else None
+    return Rollouts(
+        setup.plant.dynamics.joint_names, t, *(kept.get(name) for name in ("q", "v", "u")), K, V, work,
+        np.array([each.t for each in outcomes]), ending == Ending.DIVERGED, ending == Ending.STOPPED,
+        tuple(said(each) for each in outcomes), steps, evaluations, statistics, tuple(equation.sources),
+        origin(setup.plant.dynamics) | setup.about, dict(sweep), setup, (), q0, v0, _observed(runs),
+    )  # fmt: skip
 
-    def _observed(self) -> Observed:
-        """What was observed; of a run that was not begun, its start."""
-        for i in self.observations.keys() ^ range(len(self.q0)):
-            start = np.concatenate([self.q0[i], self.v0[i], np.full_like(self.q0[i], np.nan)])
-            self.observations[i] = observation_of(start[:, None], self._levels(i))
-        return observed([self.observations[i] for i in range(len(self.q0))], self.levels)
 
-    def _result(self, wall_s: float) -> Rollouts:
-        B, n, equation = len(self.q0), self.setup.plant.dynamics.n, self.equation
-        t = max((each.t for each in self.records if each is not None), key=len, default=np.zeros(1))
-        kept = [np.full((B, len(t), k), np.nan) for k in (n, n, n, n, len(equation.sources), len(equation.sources), 2)]
-        outcomes = []
-        for i, record in enumerate(self.records):
-            outcomes.append(Outcome(Ending.STOPPED, 0.0) if record is None else record.outcome)
-            if record is not None:
-                for array, x in zip(kept, columns(equation, record.t, record.y, record.made), strict=True):
-                    array[i, : len(x)] = x
-        asked = {name: name in self.recorded for name in ("q", "v", "u", "work", "energy")}
-        work = {name: kept[_WORK][:, :, k] for k, name in enumerate(equation.sources)}
-        steps, evaluations = (
-            np.array([0 if each is None else getattr(each, name) for each in self.records], np.int64)
-            for name in ("steps", "evaluations")
-        )
-        statistics = Statistics(
-            self.setup.integrator.name, 0.0, int(steps.max()), int(evaluations.max()), wall_s,
-            engine=f"compiled, {B} runs one after the other on each thread",
-        )  # fmt: skip
-        ending = np.array([each.ending.value for each in outcomes])
-        advice = tuple(each.advice if each.ending is Ending.DIVERGED else "" for each in outcomes)
-        K, V = (kept[_ENERGY][:, :, k] if asked["energy"] else None for k in (0, 1))
-        return Rollouts(
-            self.setup.plant.dynamics.joint_names, t, kept[_Q] if asked["q"] else None,
-            kept[_V] if asked["v"] else None, kept[_U] if asked["u"] else None,
-            K, V, work if asked["work"] else None, np.array([each.t for each in outcomes]), ending == Ending.DIVERGED,
-            ending == Ending.STOPPED, advice, steps, evaluations, statistics, tuple(equation.sources),
-            origin(self.setup.plant.dynamics) | self.setup.about,
-            dict(self.sweep), self.setup, self.q0, self.v0, self._observed(),
-        )  # fmt: skip
+def _observed(runs: OneByOne) -> Observed:
+    """What was observed of all runs; of one that was not begun, its start."""
+    starts = np.vstack([runs.q0.T, runs.v0.T, np.full_like(runs.q0.T, np.nan)])
+    made = {i: each.observation for i, each in enumerate(runs.made) if each is not None}
+    return observed([observation_of(starts, runs.levels)], runs.levels, made)
+
+
+def said(outcome: Outcome) -> str:
+    """What a batch keeps of the words of an outcome."""
+    return "" if outcome.ending is Ending.STOPPED else outcome.advice

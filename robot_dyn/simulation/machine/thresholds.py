@@ -1,0 +1,103 @@
+"""The thresholds of the runs of a batch, where coefficients may differ from run to run, and levels with them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from robot_dyn.compiled.parameters import CONTROLLER, parameters, with_parameters
+from robot_dyn.simulation.detection import LockStep, lock_step
+from robot_dyn.simulation.setup import MOST_CUT, Setup
+from robot_dyn.simulation.state_equation import StateEquation
+from robot_dyn.simulation.switching import Switching
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Thresholds:
+    """The thresholds of B runs, K of each.
+
+    Attributes:
+        rows, coordinates: As of `LockStep`.
+        levels: Of each run, inf where it has none, (K, B).
+        functions: Number of the functions of the actuation.
+        others: Runs in which other parts have thresholds than in the compiled equation, (B,).
+        names: What the thresholds are, each once.
+    """
+
+    rows: np.ndarray
+    coordinates: int
+    levels: np.ndarray
+    functions: int
+    others: np.ndarray
+    names: tuple[str, ...]
+
+    def lanes(self, runs: np.ndarray, rows: int) -> LockStep:
+        """The switching functions of some of the runs at their start; the rate of their states has so many rows."""
+        made = lock_step(self.rows, self.coordinates, self.levels[:, runs], rows, self.functions)
+        made.until[self.others[runs]] = 0.0
+        made.left[0] -= self.others[runs].sum()
+        return made
+
+
+def thresholds(setup: Setup, sweep: Mapping[str, np.ndarray], count: int) -> Thresholds | None:
+    """Those of so many runs of a setup, where `simulate` cuts steps; None where it does not.
+
+    Args:
+        setup: Of all runs.
+        sweep: Values that differ from run to run, (B, size) by name.
+        count: B.
+    """
+    if setup.steps > MOST_CUT or setup.integrator.nonsmooth:
+        return None
+    equation = StateEquation(setup.plant, setup.controller, setup.integrator.canonical)
+    of_runs = _of_runs(equation, sweep, count)
+    others = np.array([each.equation.limited != equation.limited for each, _ in of_runs])
+    known = [(each, runs) for (each, runs), other in zip(of_runs, others, strict=True) if not other]
+    names = tuple(dict.fromkeys(threshold.name for each, _ in of_runs for threshold in each.thresholds))
+    if not names:
+        return None
+    places = [_places(each) for each, _ in known]
+    union = sorted({place for each in places for place in each})
+    levels = np.full((len(union), count), np.inf)
+    for (each, runs), own in zip(known, places, strict=True):
+        for place, level in zip(own, each.levels, strict=True):
+            levels[union.index(place), runs] = level
+    unknown = np.zeros(count, bool)
+    for (_, runs), other in zip(of_runs, others, strict=True):
+        unknown[runs] = other
+    rows = np.array([row for _, row, _ in union], np.int64)
+    coordinates = sum(not function for function, _, _ in union)
+    return Thresholds(rows, coordinates, levels, len(equation.limited) * equation.plant.dynamics.n, unknown, names)
+
+
+def _places(switching: Switching) -> list[tuple[bool, int, int]]:
+    """Where each threshold is: whether of a function, its row, and which one of that row."""
+    made: list[tuple[bool, int, int]] = []
+    for k, row in enumerate(switching.rows.tolist()):
+        function = k >= switching.coordinates
+        made.append((function, row, sum(each[:2] == (function, row) for each in made)))
+    return made
+
+
+def _of_runs(
+    equation: StateEquation, sweep: Mapping[str, np.ndarray], count: int
+) -> list[tuple[Switching, np.ndarray]]:
+    """The thresholds of the runs, with the numbers of those that have them, (k,)."""
+    plant, controller = equation.plant, equation.controller
+    known = parameters(plant.dynamics, plant.effects, controller, sweep)
+    names = [each.name for each in known if each.part[0] == "effect" or each.part == CONTROLLER]
+    own = {name: sweep[name] for name in dict.fromkeys(names) if name in sweep}
+    if not own:
+        return [(Switching(equation), np.arange(count))]
+    values, which = np.unique(np.hstack([*own.values()]), axis=0, return_inverse=True)
+    ends = np.cumsum([x.shape[1] for x in own.values()])[:-1]
+    made = []
+    for k, row in enumerate(values):
+        parts = with_parameters(plant, controller, dict(zip(own, np.split(row, ends), strict=True)))
+        of = StateEquation(*parts, equation.canonical)
+        made.append((Switching(of), np.flatnonzero(which.ravel() == k)))
+    return made

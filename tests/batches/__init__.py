@@ -1,0 +1,1 @@
+"""Random batches, each run of which is compared with the run that `simulate` makes of it."""
