@@ -106,8 +106,9 @@ def counted(runs: Rollouts, of: Observed, remedy: Callable[[int], Callable[[Epis
         _, duration, _, value = np.moveaxis(of.visits[:, both], 2, 0)
         some = ~np.isnan(duration).all(axis=1)
         if some.any():
-            size = duration if kind is Kind.EFFORT_REACHED else np.abs(value - of.limits[:, both])
-            worst = int(np.nan_to_num(size, nan=-1.0).max(axis=1).argmax())
+            beyond = np.abs(value - of.limits[:, both])
+            size = np.nansum(duration, axis=1) if kind is Kind.EFFORT_REACHED else np.fmax.reduce(beyond, axis=1)
+            worst = int(np.nanargmax(np.where(some, size, np.nan)))
             visits = {x: visit for x, visit in of.visits_of(worst).items() if (x.kind, x.row) == (kind, row)}
             (remark,) = of_steps(*named, visits, {}, remedy(worst))
             yield _in_runs(remark, worst, some)

@@ -80,6 +80,7 @@ class Functions(NamedTuple):
         jacobian: As of `RightSide`.
         events: Values of the events.
         step, behind: As of `RightSide`.
+        actuation: u alone, of runs in lock step without a rate under control at all times.
     """
 
     rate: Any
@@ -90,6 +91,7 @@ class Functions(NamedTuple):
     events: Any = 0
     step: Any = 0
     behind: Any = 0
+    actuation: Any = 0
 
 
 class Plan(NamedTuple):

@@ -135,12 +135,13 @@ class Batch:
     def _observation(self, tile: int, runs: Runs) -> Observation:
         """What is observed of a tile, before its first step."""
         numbers, equation, n = self._numbers(tile), self.machine.equation, self.machine.equation.plant.dynamics.n
-        u = np.full((n, LANES), np.nan)
-        if not equation.sampled and self.machine.equations.functions.rate:  # of which the actuation is a part
-            rate = np.empty((equation.size + n, LANES))
-            self.machine.in_python.rate(0.0, runs.y, self.plan.parameters[0], runs.own, rate)
-            u = rate[equation.size :]
-        return observation_of(np.vstack([self.q0[numbers].T, self.v0[numbers].T, u]), self.levels.of_runs(numbers))
+        functions, u = self.machine.in_python, np.full((equation.size + n, LANES), np.nan)
+        if not equation.sampled:  # at a tick it becomes known
+            function = functions.rate or functions.actuation
+            function(0.0, runs.y, self.plan.parameters[0], runs.own, u if functions.rate else u[equation.size :])
+        return observation_of(
+            np.vstack([self.q0[numbers].T, self.v0[numbers].T, u[equation.size :]]), self.levels.of_runs(numbers)
+        )
 
     def _runs(self, tile: int) -> Runs:
         """The runs of a tile at their start; a tile that is not full repeats a run."""
