@@ -7,15 +7,14 @@ Bernstein's form its coefficients enclose it. Any other function is judged by it
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Callable
+from functools import cache
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.integrate.primitives import copy, evaluate
-
-if TYPE_CHECKING:
-    from robot_dyn.simulation.time_loop import Functions, Rules, Runs
 
 FASTEST = 1e6  # [rad/s] or [m/s]: a method that cuts its steps would follow an exploding state without end
 _ROOM = 4.0  # times the change of a limited actuation in a step, or in the one before
@@ -28,6 +27,7 @@ class LockStep(NamedTuple):
     Attributes:
         rows: Entry of y, and then of the values of the functions, (K,).
         coordinates: E.
+        positions: Number of positions, which y' has the accelerations of; 0 where y has momenta.
         levels: The level of each run, (K, W); inf where it has none.
         sides: 1 above its level, −1 below; 0 before the first step, (K, W).
         rate, next_rate: y' and u at the start and at the end of a step, (m + n, W).
@@ -39,6 +39,7 @@ class LockStep(NamedTuple):
 
     rows: Array
     coordinates: int
+    positions: int
     levels: Array
     sides: Array
     rate: Array
@@ -50,19 +51,24 @@ class LockStep(NamedTuple):
     left: Array
 
 
-def lock_step(rows: Array, coordinates: int, levels: Array, of_rate: int, functions: int) -> LockStep:
+class Detecting(NamedTuple):
+    """The arrays of a step in lock step, those of the method among them, K its rates; and the switching functions."""
+
+    method: Any
+    K: Array
+    switches: LockStep
+
+
+def lock_step(
+    rows: Array, coordinates: int, levels: Array, of_rate: int, functions: int, positions: int
+) -> LockStep:  # fmt: skip
     """The switching functions of runs at their start, with `of_rate` rows of a rate; W is that of the levels (K, W)."""
     W = levels.shape[1]
     rates, values = (np.zeros((k, W)) for k in (of_rate if coordinates else 0, functions))
     return LockStep(
-        rows, coordinates, np.array(levels, order="C"), np.zeros(levels.shape), rates, rates.copy(), values,
+        rows, coordinates, positions, np.array(levels, order="C"), np.zeros(levels.shape), rates, rates.copy(), values,
         values.copy(), values.copy(), np.full(W, np.inf), np.array([W]),
     )  # fmt: skip
-
-
-def none(W: int) -> LockStep:
-    """Those of runs whose steps are not cut."""
-    return lock_step(np.zeros(0, np.int64), 0, np.zeros((0, W)), 0, 0)
 
 
 def enclosure(x0: float, x1: float, d0: float, d1: float, h: float) -> tuple[float, float]:
@@ -103,32 +109,52 @@ def leaves(x0: float, d0: float, d1: float, low: float, high: float, level: floa
     return on_side and side * d0 > 0.0 and abs(d1 - d0) <= _STEADY * abs(d0)
 
 
-def start_segment(f: Functions, runs: Runs, t: float, p: Array, of: LockStep) -> int:
-    """Rates and values at the start of a segment, and the sides at that of the run; evaluations."""
+@cache
+def detecting(step: Callable[..., int]) -> Callable[..., int]:
+    """The step of a method in lock step, which also marks the runs that may pass a level in it, or move without bound.
+
+    Once all are marked, no step is made.
+    """
+
+    def detecting_step(
+        f: Any, c: Any, t: float, h: float, y: Array, p: Array, own: Array, after: Array, work: Detecting, lost: Array
+    ) -> int:
+        of = work.switches
+        if of.left[0] == 0:
+            copy(after, y)
+            return 0
+        if t <= p[0]:  # the first step of a segment: the controller may have acted
+            start(f, t, y, p, own, of)
+        evaluations = step(f, c, t, h, y, p, own, after, work.method, lost)
+        return evaluations + detect(f, t, h, y, p, own, after, of)
+
+    return detecting_step
+
+
+def start(f: Any, t: float, y: Array, p: Array, own: Array, of: LockStep) -> None:
+    """Rates and values at the start of a segment, and the sides at that of the run."""
     E = of.coordinates
     if E > 0:
-        evaluate(f.rate, t, runs.y, p, runs.own, of.rate)
+        evaluate(f.rate, t, y, p, own, of.rate)
     if len(of.values) > 0:
-        evaluate(f.events, t, runs.y, p, runs.own, of.values)
+        evaluate(f.events, t, y, p, own, of.values)
     for e in range(len(of.rows)):
         row = of.rows[e]
         for b in range(len(of.until)):
             if of.sides[e, b] == 0.0:
-                x = runs.y[row, b] if e < E else of.values[row, b]
+                x = y[row, b] if e < E else of.values[row, b]
                 of.sides[e, b] = np.sign(x - of.levels[e, b])
                 if x == of.levels[e, b] and e < E:  # on the level itself, where it is going
                     of.sides[e, b] = np.sign(of.rate[row, b])
-    return 1 if E > 0 else 0
 
 
-def detect(f: Functions, runs: Runs, rules: Rules, t: float, h: float, p: Array, of: LockStep) -> int:
+def detect(f: Any, t: float, h: float, y: Array, p: Array, own: Array, after: Array, of: LockStep) -> int:
     """Mark the runs that may pass a level in the step from y to y⁺, or move without bound; evaluations."""
-    y, after, E = runs.y, runs.after, of.coordinates
-    n = 0 if rules.canonical else rules.n  # p' is no acceleration
+    E, n = of.coordinates, of.positions
     if E > 0:
-        evaluate(f.rate, t + h, after, p, runs.own, of.next_rate)
+        evaluate(f.rate, t + h, after, p, own, of.next_rate)
     if len(of.values) > 0:
-        evaluate(f.events, t + h, after, p, runs.own, of.next_values)
+        evaluate(f.events, t + h, after, p, own, of.next_values)
     for e in range(len(of.rows)):
         row = of.rows[e]
         for b in range(len(of.until)):

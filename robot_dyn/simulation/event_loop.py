@@ -27,6 +27,7 @@ from robot_dyn.simulation.time_loop import Ended, Functions, Now, Plan, Rules, R
 _EARLY = 1e-9  # of a period: a sample at the end of a segment belongs to the next one
 _ROOTS = 6  # steps made anew for an event, at most
 _SHORT = 1e-8  # of a step: over so little of it y is a straight line, to rounding
+_WATCHED = 8  # steps between looks at the energy
 
 
 class Kept(NamedTuple):
@@ -188,7 +189,7 @@ def event_loop(
                 settle_sides(switches)
                 if not rules.canonical and fast(y, rules.n):
                     return Ended.FAST
-                if now[Now.STEPS] % rules.watched == 0 and not conserve(f, runs, rules, t1, p):
+                if now[Now.STEPS] % _WATCHED == 0 and not conserve(f, runs, rules, t1, p):
                     return Ended.GAINS
                 if now[Now.BUDGET] <= 0 or stop[0] != 0:
                     return Ended.PAUSED

@@ -37,7 +37,7 @@ from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.state_functions import interpreted, system
 from robot_dyn.simulation.stiffness import FIRST_LOOK, changes_over
 from robot_dyn.simulation.switching import Switching
-from robot_dyn.simulation.time_loop import WATCHED_WHERE_CUT, Ended, Functions, Now
+from robot_dyn.simulation.time_loop import Ended, Functions, Now
 from robot_dyn.simulation.trajectory import Ending, Outcome
 from robot_dyn.simulation.transfers import Transfers
 from robot_dyn.simulation.watch import DivergedError, Watch, one_step
@@ -134,7 +134,7 @@ class EventRun(Followed):
         self.runs.energy[0], self.runs.scale[0] = self.watch.energy, self.watch.scale
         of = self.stepper
         self.advance = machine_code or event_loop(of.begin, of.step, of.error, of.accept, of.dense)
-        self.rules = rules_of(equation, True, inf, watched=WATCHED_WHERE_CUT)
+        self.rules = rules_of(equation, True, inf)
         self.times = _times(setup, mesh, samples)
         compared = self.times.compared
         S, rows = len(self.plan.counts), int(most_samples(setup)) + 2 if samples else 0

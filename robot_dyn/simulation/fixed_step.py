@@ -17,7 +17,6 @@ from robot_dyn.arithmetic import FLOAT64, Array
 from robot_dyn.errors import RobotDynError
 from robot_dyn.foreign import is_mistake
 from robot_dyn.integrate.integrator import Integrator
-from robot_dyn.simulation.detection import none
 from robot_dyn.simulation.followed import Followed
 from robot_dyn.simulation.observation import NOTHING
 from robot_dyn.simulation.observer import Observer
@@ -35,7 +34,6 @@ from robot_dyn.simulation.watch import DivergedError, Watch, one_step
 _DOUBTFUL = 1e6  # of Σ |y| in machine code, which does not see that M becomes singular
 
 _FIRST = np.zeros(1, np.int64)
-_UNCUT = none(1)
 
 Advance = Callable[..., int]
 Made = Callable[[StateEquation], tuple[Functions, np.ndarray]]
@@ -125,7 +123,7 @@ class FixedStep(Followed):
 
     def _advance(self) -> Ended:
         _, coefficients, work = self.stepper
-        arguments = self.functions, self.plan, self.runs, self.records, self.rules, coefficients, work, _UNCUT
+        arguments = self.functions, self.plan, self.runs, self.records, self.rules, coefficients, work
         try:
             return Ended(self.advance(*arguments, self.now, self.clock, self.stop))
         except RobotDynError as error:  # of a step; y is the state before it
@@ -213,15 +211,14 @@ class FixedStep(Followed):
 
 
 def rules_of(
-    equation: StateEquation, alone: bool, largest: float, every: int = 0, thin: int = 1, base: int = 0,
-    watched: int = WATCHED,
-) -> Rules:  # fmt: skip
+    equation: StateEquation, alone: bool, largest: float, every: int = 0, thin: int = 1, base: int = 0
+) -> Rules:
     """The rules of a loop over a state equation."""
     n, controller = equation.plant.dynamics.n, equation.controller
     of = (1, 0, 0) if controller is None else (len(controller.instants), controller.acting_instant, controller.deviates)
     return Rules(
         n, len(equation.sources), equation.state_size, n if equation.sampled else 0, *of,
-        equation.canonical, alone, largest, every, thin, base, watched,
+        equation.canonical, alone, largest, every, thin, base,
     )  # fmt: skip
 
 

@@ -156,6 +156,7 @@ def _side_by_side(
         kept=kept,
         swept=tuple(sweep),
         jacobian=setup.integrator.needs_jacobian,
+        detects=passed is not None,
         nonsmooth=setup.integrator.nonsmooth,
     )
     made.check(setup)

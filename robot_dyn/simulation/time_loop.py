@@ -15,12 +15,10 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.integrate.primitives import copy, evaluate, sizes
-from robot_dyn.simulation.detection import LockStep, detect, start_segment
 from robot_dyn.simulation.observation import Observation, observe
 from robot_dyn.simulation.philox import draw
 
 WATCHED = 64  # steps between looks at the energy
-WATCHED_WHERE_CUT = 8  # the same of a run whose steps are cut at events
 RUNAWAY = 1e3  # times all the energy there was, that may come from nowhere
 
 
@@ -180,7 +178,6 @@ class Rules(NamedTuple):
         largest: Σ |y| beyond which a step is doubtful, or a run in lock step ends.
         every, thin: Steps between shared states, 0 for none; and how many of these to one that is kept.
         base: First run of the records.
-        watched: Steps between looks at the energy.
     """
 
     n: int
@@ -196,22 +193,22 @@ class Rules(NamedTuple):
     every: int
     thin: int
     base: int
-    watched: int
 
 
 def time_loop(step: Callable[..., int]) -> Callable[..., int]:
     """The time loop of a step function; see `Stepper`.
 
-    advance(functions, plan, runs, records, rules, coefficients, work, switches, now, clock, stop) → Ended, with `clock`
-    the time of the next sample, the record period, and what a sample may be early by; `stop[0]` other than 0 ends it.
-    Where runs in lock step have `switches`, those that may pass one are marked; once all are, no step is made.
+    advance(functions, plan, runs, records, rules, coefficients, work, now, clock, stop) → Ended, with `clock` the time
+    of the next sample, the record period, and what a sample may be early by; `stop[0]` other than 0 ends it.
     """
 
     def advance(
         functions: Functions, plan: Plan, runs: Runs, records: Records, rules: Rules, coefficients: Any, work: Any,
-        switches: LockStep, now: Array, clock: Array, stop: Array,
+        now: Array, clock: Array, stop: Array,
     ) -> int:  # fmt: skip
         last = len(plan.counts) - 1
+        if not rules.alone:
+            own_energy(functions, runs, plan.parameters[0])
         while now[Now.SEGMENT] <= last:
             s = now[Now.SEGMENT]
             start, h, p = plan.starts[s], plan.lengths[s], plan.parameters[s]
@@ -220,28 +217,24 @@ def time_loop(step: Callable[..., int]) -> Callable[..., int]:
             tick, at_tick = plan.ticks[s], plan.at_ticks[s]
             if now[Now.STEP] == 0 and tick > 0 and not act(functions, runs, rules, start, at_tick, tick):
                 return Ended.TICK
-            if len(switches.rows) > 0:
-                now[Now.EVALUATIONS] += start_segment(functions, runs, start, p, switches)
             while now[Now.STEP] < plan.counts[s]:
                 k = now[Now.STEP]
                 t = start + k * h
                 share(runs, records, rules, now, s == last)
                 if t >= clock[0] - clock[2] or (s == last and clock[0] < np.inf):
                     sample(functions, runs, records, rules, now, clock, t, p)
-                if s == last or switches.left[0] == 0:
+                if s == last:
                     now[Now.STEP] += 1
                     continue
                 y, own, after, lost = runs.y, runs.own, runs.after, runs.lost
                 now[Now.EVALUATIONS] += step(functions, coefficients, t, h, y, p, own, after, work, lost)
-                if len(switches.rows) > 0:
-                    now[Now.EVALUATIONS] += detect(functions, runs, rules, t, h, p, switches)
                 if not take(runs, rules, t):
                     return Ended.DOUBTFUL
                 now[Now.STEP] += 1
                 now[Now.STEPS] += 1
                 now[Now.BUDGET] -= 1
                 show(runs, records, rules, work.K[len(work.K) - 1], now, t, t + h, k == 0 and acts(rules, tick))
-                if now[Now.STEPS] % rules.watched == 0 and not conserve(functions, runs, rules, t + h, p):
+                if now[Now.STEPS] % WATCHED == 0 and not conserve(functions, runs, rules, t + h, p):
                     return Ended.GAINS
                 if now[Now.BUDGET] <= 0 or stop[0] != 0:
                     return Ended.PAUSED
@@ -342,6 +335,14 @@ def conserve(functions: Functions, runs: Runs, rules: Rules, t: float, p: Array)
     if ended:
         erase_ended(runs)
     return True
+
+
+def own_energy(functions: Functions, runs: Runs, p: Array) -> None:
+    """E(0) of each run in lock step, and its scale."""
+    evaluate(functions.energy, 0.0, runs.y, p, runs.own, runs.energies)
+    for b in range(len(runs.size)):
+        K, V = runs.energies[0, b], runs.energies[1, b]
+        runs.energy[b], runs.scale[b] = K + V, 1.0 + abs(K) + abs(V)
 
 
 def end(runs: Runs, b: int, t: float, why: int) -> None:

@@ -20,7 +20,7 @@ from robot_dyn.compiled.parameters import over_runs
 from robot_dyn.compiled.right_angles import robot_of
 from robot_dyn.effects.plant import Plant
 from robot_dyn.integrate.integrator import PlainMethod
-from robot_dyn.simulation.detection import none
+from robot_dyn.simulation.detection import Detecting
 from robot_dyn.simulation.fixed_step import rules_of, runs_of, samples_at_most
 from robot_dyn.simulation.levels import levels
 from robot_dyn.simulation.machine.machine import Machine
@@ -35,7 +35,7 @@ from robot_dyn.simulation.schedule import ON_STEP
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import check_batch
 from robot_dyn.simulation.state_equation import StateEquation
-from robot_dyn.simulation.time_loop import WATCHED, WATCHED_WHERE_CUT, Ended, Now, Records, Runs, Why
+from robot_dyn.simulation.time_loop import Ended, Now, Records, Runs, Why
 from robot_dyn.simulation.trajectory import Ending, Outcome, Statistics, diverged_advice
 
 LANES = 64  # runs in a tile: with 8, 16 or 32 a step of RK4 took 1.5, 1.1 and 1.05 times as long
@@ -167,18 +167,16 @@ class Batch:
             np.array(self.columns, np.int64), np.empty((len(self.out_y), 2), np.int64), self.out_y, self.made,
             np.empty((0, equation.size + 2)), np.empty((1 + 3 * n, 0)), self.observations[tile],
         )  # fmt: skip
-        self.machine.in_python.energy(0.0, runs.y, self.plan.parameters[0], runs.own, runs.energies)
-        runs.energy[:], runs.scale[:] = runs.energies.sum(axis=0), 1.0 + np.abs(runs.energies).sum(axis=0)
-        cut = self.thresholds is not None
-        rules = rules_of(equation, False, _LARGEST, base=own.start, watched=WATCHED_WHERE_CUT if cut else WATCHED)
-        switches = none(LANES)
+        rules = rules_of(equation, False, _LARGEST, base=own.start)
+        work = stepper.work
         if self.thresholds is not None:
-            switches = self.thresholds.lanes(self._numbers(tile), equation.size + n)
-        self.until[own] = switches.until
+            positions = 0 if equation.canonical else n
+            switches = self.thresholds.lanes(self._numbers(tile), equation.size + n, positions)
+            self.until[own] = switches.until
+            work = Detecting(work, work.K, switches._replace(until=self.until[own]))
         ended = self.machine.loop(
-            functions, self.plan, runs, records, rules, stepper.coefficients, stepper.work,
-            switches._replace(until=self.until[own]), now, self.clocks[tile], self.stop,
-        )  # fmt: skip
+            functions, self.plan, runs, records, rules, stepper.coefficients, work, now, self.clocks[tile], self.stop
+        )
         self.unfinished[tile], self.evaluations[tile] = ended != Ended.DONE, now[Now.EVALUATIONS]
         with self.lock:
             if now[Now.ROW] > len(self.place):

@@ -24,6 +24,7 @@ from robot_dyn.integrate import hermite
 from robot_dyn.integrate.adaptive import STEPPERS
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.model.robot import Robot
+from robot_dyn.simulation.detection import detecting
 from robot_dyn.simulation.event_loop import event_loop
 from robot_dyn.simulation.machine.machine import Equations, Machine
 from robot_dyn.simulation.machine.structure import structure
@@ -84,6 +85,7 @@ def machine(
     swept: tuple[str, ...] = (),
     jacobian: bool = False,
     cuts: bool = False,
+    detects: bool = False,
     nonsmooth: bool = False,
 ) -> Machine:
     """The machine of a state equation, from the latest ones if it is among them; not compiled yet.
@@ -96,6 +98,7 @@ def machine(
         swept: Names of the parameters that differ from run to run.
         jacobian: Whether the method needs that of the rate.
         cuts: Whether steps are chosen, or cut at events.
+        detects: Whether steps in lock step tell which runs may pass a threshold.
         nonsmooth: Whether velocities may jump within steps.
 
     Raises:
@@ -119,7 +122,7 @@ def machine(
             f"the run takes {equations.instructions} instructions, more than the {_MOST_INSTRUCTIONS} worth compiling;"
             " simulate it with engine='interpreted'"
         )
-    return Machine(own, equations, known, None if method is None else _loop(method, cuts), swept)
+    return Machine(own, equations, known, None if method is None else _loop(method, cuts, detects), swept)
 
 
 def machine_of_constants(equation: StateEquation, method: Integrator, *, lanes: int = 1) -> Machine:
@@ -191,10 +194,11 @@ def _traced(
     return {name: program_of(each) for name, each in traced.items()}
 
 
-def _loop(method: Any, cuts: bool) -> Callable[..., int]:
+def _loop(method: Any, cuts: bool, detects: bool = False) -> Callable[..., int]:
     from robot_dyn.simulation.machine.loop import loop
 
     if not cuts:
-        return loop(time_loop, method.stepper(FLOAT64, 1, 0, 1).step)
+        step = method.stepper(FLOAT64, 1, 0, 1).step
+        return loop(time_loop, detecting(step) if detects else step)
     made = STEPPERS[method.method](1, 1, 1) if method.controls_error else hermite.stepper(method, 1, 0, 1, None)
     return loop(event_loop, made.begin, made.step, made.error, made.accept, made.dense)

@@ -35,9 +35,9 @@ class Thresholds:
     others: np.ndarray
     names: tuple[str, ...]
 
-    def lanes(self, runs: np.ndarray, rows: int) -> LockStep:
-        """The switching functions of some of the runs at their start; the rate of their states has so many rows."""
-        made = lock_step(self.rows, self.coordinates, self.levels[:, runs], rows, self.functions)
+    def lanes(self, runs: np.ndarray, rows: int, positions: int) -> LockStep:
+        """The switching functions of some of the runs at their start: of rates of so many rows, and `positions`."""
+        made = lock_step(self.rows, self.coordinates, self.levels[:, runs], rows, self.functions, positions)
         made.until[self.others[runs]] = 0.0
         made.left[0] -= self.others[runs].sum()
         return made
