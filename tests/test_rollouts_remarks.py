@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.errors import QueryError
 from robot_dyn.simulation.remarks import Kind, lines
+from robot_dyn.simulation.table import export_csv
 
 COUNTED = (Kind.CHATTER, Kind.EFFORT_REACHED, Kind.STOP_REACHED, Kind.BEYOND)
 CART = rd.load("cart_pole")  # 2 m, 5 m/s and 100 N are the limits of its slide
@@ -107,6 +109,23 @@ def test_remarks_survive_files_and_slices(batch, tmp_path: Path) -> None:
     assert [x.text for x in told(back[1:4]).values()] == [x.text for x in told(runs[1:4]).values()]
     with pytest.raises(QueryError, match="runs that were read from a file have no setup"):
         back.setup_of(0)
+
+
+def test_a_table_of_runs_has_a_row_for_each(batch, tmp_path: Path) -> None:
+    """Parameters, outcomes, tracking errors, remarks and extremes, read back as text; another kind of file is kept."""
+    runs, _ = batch
+    path = export_csv(runs, tmp_path / "table")
+    rows = [*csv.DictReader(path.read_text(encoding="utf-8").splitlines())]
+    assert [row["run"] for row in rows] == [str(i) for i in range(B)]
+    of_slide = [float(row["largest u slide [N]"]) for row in rows]
+    np.testing.assert_array_equal(of_slide, runs.observed.extremes[:, 2, 1, 0])
+    np.testing.assert_array_equal([float(row["tracking error [rad or m]"]) for row in rows], runs.tracking_error)
+    for i, row in enumerate(rows):
+        assert row["outcome"] == runs.outcome(i).ending and float(row["ended [s]"]) == runs.ended[i]
+        about = {f"{kind} {quantity} {joint}" for kind, joint, quantity in told(runs[i])}
+        assert about <= set(row["remarks"].split("; "))
+    with pytest.raises(rd.RobotDynError, match=r"table\.csv"):
+        export_csv(runs[0], path)
 
 
 def test_a_sampled_loop_is_linearised_in_the_worst_run() -> None:
