@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import final
+from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.compiled.parameters import CONTROLLER, parameters, with_parameters
+from robot_dyn.coefficients import with_values
+from robot_dyn.compiled.parameters import CONTROLLER, Part, joined, parameters, rows, split
+from robot_dyn.effects.plant import Plant
 from robot_dyn.simulation.detection import LockStep, lock_step
 from robot_dyn.simulation.setup import MOST_CUT, Setup
 from robot_dyn.simulation.state_equation import StateEquation
@@ -89,15 +91,22 @@ def _of_runs(
     """The thresholds of the runs, with the numbers of those that have them, (k,)."""
     plant, controller = equation.plant, equation.controller
     known = parameters(plant.dynamics, plant.effects, controller, sweep)
-    names = [each.name for each in known if each.part[0] == "effect" or each.part == CONTROLLER]
-    own = {name: sweep[name] for name in dict.fromkeys(names) if name in sweep}
-    if not own:
-        return [(Switching(equation), np.arange(count))]
-    values, which = np.unique(np.hstack([*own.values()]), axis=0, return_inverse=True)
-    ends = np.cumsum([x.shape[1] for x in own.values()])[:-1]
+    parts = {each.part for each in known if each.name in sweep and each.part[0] in ("effect", *CONTROLLER)}
+    known = [each for each in known if each.part in parts]
+    of = {part: controller if part == CONTROLLER else plant.effects[part[1]] for part in parts}
+    values, places = joined(known), {each.name: rows(known, each.name) for each in known if each.name in sweep}
+    groups: dict[Any, tuple[dict[Part, Any], list[int]]] = {}
+    for run in range(count if parts else 1):
+        for name, place in places.items():
+            values[place] = sweep[name][run]
+        own = {part: with_values(of[part], made) for part, made in split(known, values).items()}
+        declared = tuple(
+            each.thresholds() if part == CONTROLLER else each.thresholds(plant.dynamics.n) for part, each in own.items()
+        )
+        groups.setdefault(declared, (own, []))[1].append(run)
     made = []
-    for k, row in enumerate(values):
-        parts = with_parameters(plant, controller, dict(zip(own, np.split(row, ends), strict=True)))
-        of = StateEquation(*parts, equation.canonical)
-        made.append((Switching(of), np.flatnonzero(which.ravel() == k)))
+    for own, runs in groups.values():
+        effects = [own.get(("effect", i), each) for i, each in enumerate(plant.effects)]
+        state = StateEquation(Plant(plant.dynamics, effects), own.get(CONTROLLER, controller), equation.canonical)
+        made.append((Switching(state), np.array(runs if parts else range(count))))
     return made
