@@ -105,6 +105,7 @@ if TYPE_CHECKING:
     from robot_dyn.simulation.run_file import save_run as save_run
     from robot_dyn.simulation.setup import Setup as Setup
     from robot_dyn.simulation.simulate import simulate as simulate
+    from robot_dyn.simulation.table import export_csv as export_csv
     from robot_dyn.simulation.trajectory import Trajectory as Trajectory
     from robot_dyn.stress_test.page import save_stress as save_stress
     from robot_dyn.stress_test.result import Stress as Stress
@@ -194,6 +195,7 @@ _HOME = {
     "compare": "accuracy.compare",
     "cost": "accuracy.cost",
     "euler_lagrange": "lagrange.euler_lagrange",
+    "export_csv": "simulation.table",
     "gains_from": "control.independent_joint",
     "hold": "control.reference",
     "joint_stops": "effects.joint_limit",

@@ -202,7 +202,8 @@ def test_a_run_of_a_batch_is_the_trajectory_of_simulate(setup: rd.Setup, record:
         assert_alike(ours, theirs) if known else np.testing.assert_array_equal(ours, np.full_like(theirs, np.nan))
     assert run.power.keys() == alone.power.keys() == run.ledger.work.keys()
     assert run.outcome == alone.outcome and run.statistics.steps == alone.statistics.steps
-    assert run.error is None and run.extremes is None
+    assert run.error is None
+    assert_alike(run.extremes, alone.extremes)
     assert ("was not recorded" in run.summary) is not everything
     assert {name: run.about[name] for name in alone.about} == alone.about
 

@@ -291,6 +291,7 @@ def examples(folder: Path) -> dict[str, Example]:
         "list_robots": (rd.list_robots, {}),
         "load": (rd.load, {"name_or_path": urdf, "package_dirs": [folder], "xacro": None}),
         "load_run": (rd.load_run, {"path": saved, "max_bytes": 2**30}),
+        "export_csv": (rd.export_csv, {"run": several, "path": folder / "table"}),
         "load_rollouts": (rd.load_rollouts, {"path": rd.save_rollouts(several, folder / "all"), "max_bytes": 2**30}),
         "method": (rd.method, {"name": "rk4"}),
         "midpoint": (rd.midpoint, {"x": rd.Lagrangian(robot, rd.Ball(60)).N(q)}),

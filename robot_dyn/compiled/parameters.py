@@ -246,3 +246,13 @@ def with_parameters(plant: Plant, controller: Controller | None, given: Mapping[
         made |= {name: with_numbers(each, of.get(("model", name), {})) for name, each in controller.models.items()}
         controller = with_values(controller, made)
     return Plant(with_numbers(plant.dynamics, of.get(ROBOT, {})), effects), controller
+
+
+def over_runs(plant: Plant, controller: Controller | None, given: Mapping[str, Any]) -> tuple[tuple[Effect, ...], Any]:
+    """Effects and controller with arrays over runs, (B, size) by name, as their coefficients: to read, not to run."""
+    of: dict[Part, dict[str, Any]] = {}
+    for each in parameters(plant.dynamics, plant.effects, controller):
+        if each.name in given:
+            of.setdefault(each.part, {})[each.key] = given[each.name]
+    effects = tuple(with_values(each, of.get(("effect", i), {})) for i, each in enumerate(plant.effects))
+    return effects, None if controller is None else with_values(controller, of.get(CONTROLLER, {}))

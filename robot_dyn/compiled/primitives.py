@@ -197,6 +197,18 @@ def _sizes(x: Any, out: Any) -> Any:
     return loops
 
 
+@overload(primitives.enclose, strict=False)
+def _enclose(low: Any, high: Any, first: Any, x: Any) -> Any:
+    def loops(low, high, first, x):
+        at, of = first * x.shape[1], _part(x, 0, x.size)
+        least, largest = _part(low, at, x.size), _part(high, at, x.size)
+        for i in range(x.size):
+            least[i] = of[i] if of[i] < least[i] else least[i]
+            largest[i] = of[i] if of[i] > largest[i] else largest[i]
+
+    return loops
+
+
 @overload(primitives.subtract, strict=False)
 def _subtract(x: Any, y: Any) -> Any:
     def loops(x, y):

@@ -54,6 +54,13 @@ def sizes(x: Array, out: Array) -> None:
     out[...] = np.abs(x).sum(axis=0)
 
 
+def enclose(low: Array, high: Array, first: int, x: Array) -> None:
+    """Let low and high (r, W) from the row `first` on enclose x (n, W); of nan nothing is taken."""
+    rows = slice(first, first + len(x))
+    np.fmin(low[rows], x, low[rows])
+    np.fmax(high[rows], x, high[rows])
+
+
 def subtract(x: Array, y: Array) -> None:
     """X − y in place of x, of one shape."""
     x[...] = x - y

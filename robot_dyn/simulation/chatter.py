@@ -3,18 +3,23 @@
 Sampled damping does so where its gain is too large for the period: v⁺ ≈ (1 − M⁻¹ kd T) v changes its sign at each tick
 when an eigenvalue of M⁻¹ kd T is above 1, and grows when it is above 2. [Åström, Wittenmark, Computer-Controlled
 Systems, 3rd ed., 1997, ch. 2]
+
+Plain functions of arrays over joints and runs, (n, W), as both time loops call them at each tick.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import final
+from typing import NamedTuple, final
 
 import numpy as np
 
+from robot_dyn.arithmetic import Array
+from robot_dyn.integrate.primitives import copy
+
 _REVERSALS = 10  # in a row, at least; no motion that is sampled well has so many
-_PART = 0.02  # of the largest actuation of its joint: smaller changes are noise
-_LEAST = 1e-6  # of the largest actuation of any joint
+_PART = 0.02  # of the largest actuation of its joint so far: smaller changes are noise
+_LEAST = 1e-6  # of the largest actuation of any joint so far
 _OTHER = 10.0  # times the amplitude: the smaller of two episodes is not told
 
 
@@ -28,67 +33,90 @@ class Episode:
     amplitude: float
 
 
-@final
-class Chatter:
-    """The chatter of n joints, from their actuation at one tick after another.
+class Chatter(NamedTuple):
+    """The reversals of W runs.
 
     Attributes:
-        episodes: By joint.
+        t: Of the latest tick, (1,), in [s].
+        ticks: Their number, (1,).
+        u: The actuation at the latest three, tick k in place k mod 3, (3, n, W); nan before there are three.
+        count: Reversals in a row so far, (n, W).
+        streak: Their start, duration and amplitude, (3, n, W).
+        going: In how many runs there are some, (n,).
+        episodes: Start, duration and amplitude of those told, (3, n, W); of amplitude 0 where there are none.
     """
 
-    def __init__(self, n: int) -> None:
-        self.episodes: dict[int, Episode] = {}
-        self._largest = np.zeros(n)
-        self._t, self._u = np.empty(0), np.empty((n, 0))  # of the last two ticks
-        self._streaks: dict[int, tuple[int, Episode]] = {}  # that go on: reversals so far
+    t: Array
+    ticks: Array
+    u: Array
+    count: Array
+    streak: Array
+    going: Array
+    episodes: Array
 
-    def take(self, t: np.ndarray, u: np.ndarray, largest: np.ndarray) -> None:
-        """Further ticks at t (k,) with the actuation u (n, k), which is `largest` (n,) at most."""
-        if not len(t):
-            return
-        t, u = np.append(self._t, t), np.concatenate([self._u, u], axis=1)
-        self._t, self._u = t[-2:], u[:, -2:].copy()
-        before, self._largest = self._largest, np.fmax(self._largest, largest)
-        if len(t) < 3:
-            return
-        change = u[:, 1:] - u[:, :-1]
-        turned = change[:, 1:] * change[:, :-1]
-        some = turned.min(axis=1) < -(np.maximum(_PART * before, _LEAST * before.max()) ** 2)
-        some[list(self._streaks)] = True
-        if not some.any():
-            return
-        # against what there was up to a tick: what grows is not small beside what it becomes
-        so_far = np.maximum(before[:, None], np.maximum.accumulate(np.abs(u), axis=1)[:, 1:-1])
-        least = np.maximum(_PART * so_far, _LEAST * so_far.max(axis=0))
-        for joint in np.flatnonzero(some):
-            self._runs(int(joint), t, np.abs(change[joint]) / 2, turned[joint] < -(least[joint] ** 2))
 
-    def close(self) -> None:
-        """No more ticks: what goes on has ended."""
-        for joint in list(self._streaks):
-            self._close(joint)
+def chatter_of(n: int, W: int) -> Chatter:
+    """Of W runs before their first tick."""
+    u, going, count = np.full((3, n, W), np.nan), np.zeros(n, np.int64), np.zeros((n, W), np.int64)
+    return Chatter(np.zeros(1), np.zeros(1, np.int64), u, count, np.zeros((3, n, W)), going, np.zeros((3, n, W)))
 
-    def _runs(self, joint: int, t: np.ndarray, size: np.ndarray, reverses: np.ndarray) -> None:
-        """Join the reversals of a joint that follow each other; reversal k lies at tick k + 1."""
-        ends = np.flatnonzero(np.diff(np.concatenate([[0], reverses, [0]]).astype(int))).reshape(-1, 2)
-        if len(ends) == 0 or ends[0, 0] > 0:
-            self._close(joint)
-        for a, b in ends:
-            amplitude = float(size[a : b + 1].max())
-            count, streak = self._streaks.get(joint, (0, Episode(float(t[a + 1]), 0.0, amplitude)))
-            streak.duration = float(t[b + 1]) - streak.start
-            streak.amplitude = max(streak.amplitude, amplitude)
-            self._streaks[joint] = count + int(b - a), streak
-            if b < len(reverses):
-                self._close(joint)
 
-    def _close(self, joint: int) -> None:
-        count, streak = self._streaks.pop(joint, (0, None))
-        if streak is None or count < _REVERSALS:
-            return
-        known = self.episodes.get(joint)
-        if known is None or streak.amplitude > _OTHER * known.amplitude:
-            self.episodes[joint] = streak
-        elif streak.amplitude > known.amplitude / _OTHER:
-            known.duration += streak.duration
-            known.amplitude = max(known.amplitude, streak.amplitude)
+def tick(of: Chatter, t: float, u: Array, low: Array, high: Array) -> None:
+    """A tick at t with the actuation u (n, W), which lay between low and high (n, W) before."""
+    k = of.ticks[0]
+    before, middle, now = of.u[(k + 1) % 3], of.u[(k + 2) % 3], of.u[k % 3]
+    copy(now, u)
+    for j in range(len(u)):
+        if of.going[j] > 0 or turns(before[j], middle[j], now[j]):
+            for b in range(u.shape[1]):
+                change, next_change = middle[j, b] - before[j, b], now[j, b] - middle[j, b]
+                if change * next_change < 0.0 or of.count[j, b] > 0:
+                    count(of, j, b, t, change, next_change, low[:, b], high[:, b])
+    of.t[0] = t
+    of.ticks[0] = k + 1
+
+
+def turns(before: Array, middle: Array, now: Array) -> bool:
+    """Whether the actuation (W,) of a joint turns back at the middle one of three ticks in any run."""
+    found = False
+    for b in range(len(now)):
+        found |= (middle[b] - before[b]) * (now[b] - middle[b]) < 0.0
+    return found
+
+
+def count(
+    of: Chatter, j: int, b: int, t: float, change: float, next_change: float, low: Array, high: Array
+) -> None:  # fmt: skip
+    """Count a reversal of joint j in run b at the tick before t, unless it is noise, or the end of a row of them."""
+    largest = 0.0
+    for i in range(len(low)):
+        largest = max(largest, high[i], -low[i])
+    least = max(_PART * max(high[j], -low[j]), _LEAST * largest)
+    if change * next_change < -(least**2):
+        if of.count[j, b] == 0:
+            of.going[j] += 1
+            of.streak[0, j, b], of.streak[2, j, b] = of.t[0], 0.0
+        of.count[j, b] += 1
+        of.streak[1, j, b] = t - of.streak[0, j, b]
+        of.streak[2, j, b] = max(of.streak[2, j, b], abs(change) / 2, abs(next_change) / 2)
+    elif of.count[j, b] > 0:
+        close(of, j, b)
+
+
+def close(of: Chatter, j: int, b: int) -> None:
+    """The end of a row of reversals: an episode if there were enough of them."""
+    if of.count[j, b] >= _REVERSALS:
+        duration, amplitude, known = of.streak[1, j, b], of.streak[2, j, b], of.episodes[2, j, b]
+        if amplitude > _OTHER * known:
+            of.episodes[0, j, b], of.episodes[1, j, b], of.episodes[2, j, b] = of.streak[0, j, b], duration, amplitude
+        elif amplitude > known / _OTHER:
+            of.episodes[1, j, b] += duration
+            of.episodes[2, j, b] = max(known, amplitude)
+    of.count[j, b] = 0
+    of.going[j] -= 1
+
+
+def close_all(of: Chatter) -> None:
+    """No more ticks: what goes on has ended."""
+    for j, b in np.argwhere(of.count > 0):
+        close(of, j, b)

@@ -30,7 +30,7 @@ class LockStep(NamedTuple):
         positions: Number of positions, which y' has the accelerations of; 0 where y has momenta.
         levels: The level of each run, (K, W); inf where it has none.
         sides: 1 above its level, −1 below; 0 before the first step, (K, W).
-        rate, next_rate: y' at the start and at the end of a step, (m, W).
+        rate, next_rate: y' and u at the start and at the end of a step, (m + n, W).
         values, next_values: Those of the F functions there, (F, W).
         change: By how much they changed in the step before, (F, W).
         until: Start of the first step in which a run may pass a level; inf where it passes none, (W,), in [s].
@@ -60,11 +60,11 @@ class Detecting(NamedTuple):
 
 
 def lock_step(
-    rows: Array, coordinates: int, levels: Array, size: int, functions: int, positions: int
+    rows: Array, coordinates: int, levels: Array, of_rate: int, functions: int, positions: int
 ) -> LockStep:  # fmt: skip
-    """The switching functions of runs at their start, with states of that size; W is that of the levels (K, W)."""
+    """The switching functions of runs at their start, with `of_rate` rows of a rate; W is that of the levels (K, W)."""
     W = levels.shape[1]
-    rates, values = (np.zeros((k, W)) for k in (size if coordinates else 0, functions))
+    rates, values = (np.zeros((k, W)) for k in (of_rate if coordinates else 0, functions))
     return LockStep(
         rows, coordinates, positions, np.array(levels, order="C"), np.zeros(levels.shape), rates, rates.copy(), values,
         values.copy(), values.copy(), np.full(W, np.inf), np.array([W]),

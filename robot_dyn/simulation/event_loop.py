@@ -21,7 +21,8 @@ from robot_dyn.integrate.primitives import between, copy, evaluate
 from robot_dyn.integrate.step_control import At, chosen_step, finite, first_step, shortened
 from robot_dyn.simulation.crossings import Switches, approaches, correction, first_event, nears, remember, settle_sides
 from robot_dyn.simulation.detection import FASTEST
-from robot_dyn.simulation.time_loop import Ended, Functions, Now, Plan, Rules, Runs, act, acts, conserve
+from robot_dyn.simulation.observation import Observation
+from robot_dyn.simulation.time_loop import Ended, Functions, Now, Plan, Rules, Runs, act, acts, conserve, show
 
 _EARLY = 1e-9  # of a period: a sample at the end of a segment belongs to the next one
 _ROOTS = 6  # steps made anew for an event, at most
@@ -36,7 +37,7 @@ class Kept(NamedTuple):
         t, y, made: Times of samples (R,), the states (R, m, 1), and what else a sample holds (R, d, 1).
         shared_t, shared: States that companion runs share, (S,) and (S, m).
         walked_t, walked: The ends of steps, (K,), and the states at the first of them, (k, m).
-        columns: As of `Observer.columns`; without any, no step is shown.
+        columns, observation: As of `time_loop.Records`.
     """
 
     t: Array
@@ -47,6 +48,7 @@ class Kept(NamedTuple):
     walked_t: Array
     walked: Array
     columns: Array
+    observation: Observation
 
 
 class Times(NamedTuple):
@@ -178,7 +180,8 @@ def event_loop(
                     keep(f, runs, kept, now, t1, y, p)
                 now[Now.STEPS] += 1
                 now[Now.BUDGET] -= 1
-                walk(runs, kept, rules, now, t1, work.last, t == start and acts(rules, plan.ticks[s]))
+                walk(runs, kept, now, t1)
+                show(runs, kept, rules, work.last, now, t, t1, t == start and acts(rules, plan.ticks[s]))
                 if event >= 0:
                     now[Now.EVENT] = event
                     now[Now.STEP] = 1
@@ -265,22 +268,14 @@ def share(kept: Kept, now: Array, t: float, y: Array) -> None:
     now[Now.SHARED] += 1
 
 
-def walk(runs: Runs, kept: Kept, rules: Rules, now: Array, t: float, latest: Array, acted: bool) -> None:
-    """Keep the end of a step, and show it to the observer, as of `Observer.step`, while there is room."""
-    row, n, m = now[Now.WALKED], rules.n, len(runs.y)
+def walk(runs: Runs, kept: Kept, now: Array, t: float) -> None:
+    """Keep the end of a step, while there is room."""
+    row = now[Now.WALKED]
     if row < len(kept.walked_t):
         kept.walked_t[row] = t
         if row < len(kept.walked):
             copy(kept.walked[row], runs.y[:, 0])
         now[Now.WALKED] += 1
-    if kept.columns.shape[1] == 0:
-        return
-    column = now[Now.COLUMN]
-    kept.columns[0, column], kept.columns[1, column] = t, acted or rules.held == 0
-    copy(kept.columns[2 : 2 + n, column], runs.y[:n, 0])
-    copy(kept.columns[2 + n : 2 + 2 * n, column], latest[:n, 0] if rules.canonical else runs.y[n : 2 * n, 0])
-    copy(kept.columns[2 + 2 * n :, column], latest[m : m + n, 0])
-    now[Now.COLUMN] += 1
 
 
 def fast(y: Array, n: int) -> bool:

@@ -25,6 +25,7 @@ from robot_dyn.simulation.event_loop import Kept, Times, event_loop
 from robot_dyn.simulation.fixed_step import rules_of, runs_of
 from robot_dyn.simulation.followed import Followed
 from robot_dyn.simulation.modes import Guard
+from robot_dyn.simulation.observation import NOTHING
 from robot_dyn.simulation.observer import Observer
 from robot_dyn.simulation.plan import plan_of
 from robot_dyn.simulation.record import MOST_SHARED, Path, Record
@@ -138,10 +139,10 @@ class EventRun(Followed):
         compared = self.times.compared
         S, rows = len(self.plan.counts), int(most_samples(setup)) + 2 if samples else 0
         states = 0 if compared == inf else _COMPARED + S + 2
-        columns = np.empty((2 + 3 * n, 0)) if observer is None else observer.columns
+        shown = (np.empty((1 + 3 * n, 0)), NOTHING) if observer is None else (observer.columns, observer.observation)
         self.kept = Kept(
             np.empty(rows), np.empty((rows, m, 1)), np.empty((rows, m + n + 2, 1)), np.empty(states),
-            np.empty((states, m)), np.empty(_CHUNK), np.empty((_CHUNK, m)), columns,
+            np.empty((states, m)), np.empty(_CHUNK), np.empty((_CHUNK, m)), *shown,
         )  # fmt: skip
         if self.switching.modes is not None:
             self.switching.modes.start(self.start)

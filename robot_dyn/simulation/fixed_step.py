@@ -18,6 +18,7 @@ from robot_dyn.errors import RobotDynError
 from robot_dyn.foreign import is_mistake
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.simulation.followed import Followed
+from robot_dyn.simulation.observation import NOTHING
 from robot_dyn.simulation.observer import Observer
 from robot_dyn.simulation.plan import plan_of
 from robot_dyn.simulation.record import MOST_SHARED, Path, Record
@@ -79,10 +80,10 @@ class FixedStep(Followed):
         self.rules = rules_of(equation, True, largest, every, thin)
         rows = samples_at_most(setup, self.plan.counts) if pace == 1 else 1
         states = int((-(-self.plan.counts // every)).sum()) // thin + 2
-        columns = np.empty((2 + 3 * n, 0)) if observer is None else observer.columns
+        shown = (np.empty((1 + 3 * n, 0)), NOTHING) if observer is None else (observer.columns, observer.observation)
         self.records = Records(
             np.arange(m), np.empty((rows, 2), np.int64), np.empty((rows, m, 1)), np.empty((rows, m + n + 2, 1)),
-            np.empty((states, m + 2)), columns,
+            np.empty((states, m + 2)), *shown,
         )  # fmt: skip
         self.now, self.stop = np.zeros(len(Now), np.int64), np.zeros(1, np.int64)
         self.clock = np.array([0.0 if pace == 1 else inf, setup.record_period_s, ON_STEP * setup.step_s])
@@ -162,7 +163,7 @@ class FixedStep(Followed):
             self.runs.y[:, 0] = y = one_step(method, right_side, t, y, h, self.watch)
         if observer is not None:
             ticked = self.now[Now.STEP] == 0 and acts(self.rules, int(self.plan.ticks[s]))
-            observer.step(t + h, y, ticked or not self.equation.sampled)
+            observer.step(t, t + h, y, ticked or not self.equation.sampled)
         self.now[Now.STEP] += 1
         self.now[Now.STEPS] += 1
         if self.now[Now.STEPS] % WATCHED == 0:

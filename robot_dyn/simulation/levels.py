@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any, final
+from typing import Any, NamedTuple, final
 
 import numpy as np
 
+from robot_dyn.arithmetic import Array
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.actuator import EffortLimit
+from robot_dyn.effects.effect import Effect
 from robot_dyn.effects.joint_limit import JointStopSpring
-from robot_dyn.effects.plant import Plant
 from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.remarks import Kind
 
@@ -22,44 +23,71 @@ _NONE = 1e9  # stops and limits beyond it do not exist
 @final
 @dataclass(frozen=True)
 class Level:
-    """A value that a quantity of a joint may pass: above `bound` if `side` is 1, below it if −1.
+    """A value that a quantity of a joint may pass: upwards if `side` is 1, downwards if −1.
 
     Attributes:
         kind: What passing it means.
         row: Of q, v, u one below the other, (3n,).
         side: 1 or −1.
-        bound: Where it counts as passed.
         limit: The limit as stated.
     """
 
     kind: Kind
     row: int
     side: int
-    bound: float
     limit: float
 
 
-def levels(plant: Plant, controller: Controller | None) -> tuple[Level, ...]:
-    """All levels of a plant under a controller."""
-    return tuple(
-        Level(kind, row * plant.dynamics.n + joint, side, float(side * slack + bound), float(bound))
-        for kind, row, side, bounds, part in _bounds(plant, controller)
-        for joint, bound in enumerate(np.broadcast_to(bounds, plant.dynamics.n))
-        if abs(bound) < _NONE
-        for slack in (part * max(abs(bound), 1e-3),)
-    )
+class Levels(NamedTuple):
+    """L levels of W runs.
+
+    Attributes:
+        levels: In the order of rows, with the limits of the first run that has them.
+        limits: As stated for each run, (L, W); nan where it has none.
+        bounds: Where they count as passed, (L, W).
+    """
+
+    levels: tuple[Level, ...]
+    limits: Array
+    bounds: Array
+
+    def of_runs(self, numbers: Any) -> Levels:
+        """Those of some of the runs."""
+        return Levels(self.levels, self.limits[:, numbers], self.bounds[:, numbers])
 
 
-def _bounds(plant: Plant, controller: Controller | None) -> Iterator[tuple[Kind, int, int, np.ndarray, float]]:
-    """Kind, 0, 1, 2 for q, v, u, side, bounds (n,), and the part of a bound by which it must be passed."""
-    n, robot = plant.dynamics.n, getattr(plant.dynamics, "robot", plant.dynamics)
+NO_LEVELS = Levels((), np.empty((0, 1)), np.empty((0, 1)))
+
+
+def levels(dynamics: Any, effects: Iterable[Effect], controller: Controller | None, W: int = 1) -> Levels:
+    """All levels of a plant under a controller, whose coefficients may be arrays over W runs, (W, n) or (W, 1)."""
+    n, found = dynamics.n, []
+    for kind, row, side, bounds, part in _bounds(dynamics, tuple(effects), controller):
+        for joint, limits in enumerate(np.broadcast_to(bounds, (W, n)).T):
+            known = np.abs(limits) < _NONE
+            if known.any():
+                limits = np.where(known, limits, np.nan)
+                slack = part * np.maximum(np.abs(limits), 1e-3)
+                level = Level(kind, row * n + joint, side, float(limits[known][0]))
+                found.append((level, limits, side * slack + limits))
+    if not found:
+        return Levels((), np.empty((0, W)), np.empty((0, W)))
+    of, limits, bounds = zip(*sorted(found, key=lambda each: each[0].row), strict=True)
+    return Levels(of, np.array(limits), np.array(bounds))
+
+
+def _bounds(
+    dynamics: Any, effects: tuple[Effect, ...], controller: Controller | None
+) -> Iterator[tuple[Kind, int, int, np.ndarray, float]]:
+    """Kind, 0, 1, 2 for q, v, u, side, bounds (n,) or (W, n), and the part of a bound by which it must be passed."""
+    n, robot = dynamics.n, getattr(dynamics, "robot", dynamics)
     effort: Any = np.inf if controller is None else controller.saturation
-    for limit in (effect.limit for effect in plant.effects if isinstance(effect, EffortLimit)):
+    for limit in (effect.limit for effect in effects if isinstance(effect, EffortLimit)):
         effort = np.minimum(effort, limit)
     yield from ((Kind.EFFORT_REACHED, 2, side, side * effort, -_ROUNDING) for side in (1, -1))
     lower, upper = np.full(n, -np.inf), np.full(n, np.inf)
-    for stop in (effect for effect in plant.effects if isinstance(effect, JointStopSpring)):
-        acts = np.broadcast_to(stop.stiffness > 0, n)
+    for stop in (effect for effect in effects if isinstance(effect, JointStopSpring)):
+        acts = stop.stiffness > 0
         lower = np.where(acts, np.maximum(lower, stop.lower), lower)
         upper = np.where(acts, np.minimum(upper, stop.upper), upper)
     yield Kind.STOP_REACHED, 0, 1, upper, 0.0

@@ -73,6 +73,13 @@ OF_ROLLOUTS: Mapping[str, Member] = MappingProxyType(
         "steps": Member(("B",), "int64"),
         "evaluations": Member(("B",), "int64"),
         "params/*": Member(("B", None)),
+        "q0": Member(("B", "n")),
+        "v0": Member(("B", "n")),
+        "observed/extremes": Member(("B", 3, 2, "n"), finite=False),
+        "observed/limits": Member(("B", "L"), finite=False),
+        "observed/visits": Member(("B", "L", 4), finite=False),
+        "observed/episodes": Member(("B", "n", 3)),
+        "saved/tracking_error": Member(("B",), finite=False),
     }
 )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from typing import Any
 
@@ -12,48 +12,78 @@ from robot_dyn.effects.effect import Conservative, Dissipative, Stateful
 from robot_dyn.errors import RobotDynError
 from robot_dyn.model.robot import Robot
 from robot_dyn.model.units import unit
+from robot_dyn.simulation.chatter import Episode
 from robot_dyn.simulation.creep import creeping
-from robot_dyn.simulation.levels import Level, levels
-from robot_dyn.simulation.observer import Observer, Visit
+from robot_dyn.simulation.levels import Level, Levels, levels
+from robot_dyn.simulation.observation import Observed, Visit
+from robot_dyn.simulation.observer import Observer
 from robot_dyn.simulation.remarks import Kind, Remark
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.state_equation import StateEquation
 
+Units = list[tuple[str, str, str]]  # of q, v and u of each joint
 QUANTITIES = ("q", "v", "u")
+KINDS = Kind.EFFORT_REACHED, Kind.STOP_REACHED, Kind.BEYOND  # of levels, in the order in which they are told
 _HIDDEN = 0.1  # of the range of a quantity: what the samples beside a window leave out
 _ROUNDING = 1e-9  # of a quantity: a smaller range is noise
 
 
-def observer_of(setup: Setup, equation: StateEquation) -> Observer:
-    """An observer of a run that has not begun."""
+def observer_of(setup: Setup, equation: StateEquation, of: Levels | None = None) -> Observer:
+    """An observer of a run that has not begun, for its levels unless others are given."""
     u = np.full(len(setup.q0), np.nan)
     if not equation.sampled:
         with suppress(RobotDynError):  # the run will tell
             u = equation.actuation(0.0, setup.q0, setup.v0, np.zeros(equation.states), None)
     start = np.concatenate([setup.q0, setup.v0, u])
-    return Observer(start, levels(setup.plant, setup.controller), equation.canonical)
+    of = of or levels(setup.plant.dynamics, setup.plant.effects, setup.controller)
+    return Observer(start, of, equation.canonical)
 
 
 def remarks(
-    setup: Setup, observer: Observer, t: np.ndarray, samples: np.ndarray, power: dict[str, np.ndarray]
+    setup: Setup, observer: Observer, of: Observed, t: np.ndarray, samples: np.ndarray, power: dict[str, np.ndarray]
 ) -> tuple[Remark, ...]:
     """All remarks on a run, chatter first.
 
     Args:
         setup: What ran.
         observer: Closed, at the end of the run.
+        of: What it observed.
         t: Times of its samples, (m,), in [s].
         samples: q, v and u beside each other, (m, 3n).
         power: Of each source, (m,), in [W].
     """
-    units = _units(setup)
-    found = [*_chatter(setup, observer, t, samples, units)]
-    for kind in (Kind.EFFORT_REACHED, Kind.STOP_REACHED, Kind.BEYOND):
-        visits = {level: visit for level, visit in observer.visits.items() if level.kind is kind}
-        found += _passed(setup, visits, units)
-    v = samples[:, len(units) : 2 * len(units)]
-    creeps = creeping(setup, t, v, units)
-    return (*found, *_coarse(setup, observer, t, samples, units), *_gaining(setup, t, power), *creeps)
+    units, n = units_of(setup.plant.dynamics), len(setup.q0)
+    v = samples[:, n : 2 * n]
+    of_run = (
+        setup.plant.dynamics.joint_names,
+        units,
+        of.visits_of(0),
+        of.episodes_of(0),
+        against(setup, t, samples[:, :n]),
+    )
+    return (
+        *of_steps(*of_run), *_coarse(setup, observer, t, samples, units), *_gaining(setup, t, power),
+        *creeping(setup, t, v, units),
+    )  # fmt: skip
+
+
+def of_steps(
+    names: tuple[str, ...], units: Units, visits: dict[Level, Visit], episodes: dict[int, Episode],
+    remedy: Callable[[Episode], str],
+) -> list[Remark]:  # fmt: skip
+    """Remarks on what was observed at every step: chatter, then levels.
+
+    Args:
+        names: Of the joints.
+        units: As of `units_of`.
+        visits: By level.
+        episodes: Of chatter, by joint.
+        remedy: What to do about one.
+    """
+    found = [*_chatter(names, units, episodes, remedy)]
+    for kind in KINDS:
+        found += _passed(names, units, {level: visit for level, visit in visits.items() if level.kind is kind})
+    return found
 
 
 def _gaining(setup: Setup, t: np.ndarray, power: dict[str, np.ndarray]) -> Iterator[Remark]:
@@ -71,17 +101,16 @@ def _gaining(setup: Setup, t: np.ndarray, power: dict[str, np.ndarray]) -> Itera
         )  # fmt: skip
 
 
-def _units(setup: Setup) -> list[tuple[str, str, str]]:
+def units_of(dynamics: Any) -> Units:
     """Units of q, v and u of each joint."""
-    dynamics = setup.plant.dynamics
     robot: Any = getattr(dynamics, "robot", dynamics)
     types = robot.joint_types if isinstance(robot, Robot) else (None,) * dynamics.n
     return [(unit("q", each), unit("v", each), unit("u", each)) for each in types]
 
 
-def _passed(setup: Setup, visits: dict[Level, Visit], units: list[tuple[str, str, str]]) -> Iterator[Remark]:
+def _passed(names: tuple[str, ...], units: Units, visits: dict[Level, Visit]) -> Iterator[Remark]:
     """Levels passed, both sides of a limit as one."""
-    n, names = len(units), setup.plant.dynamics.joint_names
+    n = len(units)
     rows: dict[int, list[tuple[Level, Visit]]] = {}
     for level, visit in sorted(visits.items(), key=lambda each: each[1].start):
         rows.setdefault(level.row, []).append((level, visit))
@@ -106,20 +135,25 @@ def _size(level: Level) -> float:
 
 
 def _chatter(
-    setup: Setup, observer: Observer, t: np.ndarray, samples: np.ndarray, units: list[tuple[str, str, str]]
+    names: tuple[str, ...], units: Units, episodes: dict[int, Episode], remedy: Callable[[Episode], str]
 ) -> Iterator[Remark]:
-    period, names = setup.controller.period_s if setup.controller else 0.0, setup.plant.dynamics.joint_names
-    remedy = "the step is too long for the gains: take a smaller one"
-    for joint, episode in sorted(observer.chatter.episodes.items(), key=lambda each: -each[1].amplitude):
-        if period:
-            near = samples[np.clip(np.searchsorted(t, episode.start), 0, len(t) - 1)]
-            remedy = _remedy(setup, episode.start, near[: len(names)], period)
+    for joint, episode in sorted(episodes.items(), key=lambda each: -each[1].amplitude):
         unit = f" {units[joint][2]}".rstrip()
         text = f"{names[joint]} ±{episode.amplitude:.3g}{unit} from {episode.start:.4g} s for {episode.duration:.3g} s"
         yield Remark(
             Kind.CHATTER, names[joint], "u", episode.start, episode.duration, episode.start, episode.amplitude,
-            None, text, remedy,
+            None, text, remedy(episode),
         )  # fmt: skip
+
+
+def against(setup: Setup, t: np.ndarray, q: np.ndarray) -> Callable[[Episode], str]:
+    """What to do about chatter of a run with positions q (m, n) at times t (m,)."""
+    period = setup.controller.period_s if setup.controller else 0.0
+    if not period:
+        return lambda episode: "the step is too long for the gains: take a smaller one"
+    return lambda episode: _remedy(
+        setup, episode.start, q[np.clip(np.searchsorted(t, episode.start), 0, len(t) - 1)], period
+    )
 
 
 def _remedy(setup: Setup, t: float, q: np.ndarray, period: float) -> str:
@@ -143,9 +177,7 @@ def _remedy(setup: Setup, t: float, q: np.ndarray, period: float) -> str:
     )
 
 
-def _coarse(
-    setup: Setup, observer: Observer, t: np.ndarray, samples: np.ndarray, units: list[tuple[str, str, str]]
-) -> Iterator[Remark]:
+def _coarse(setup: Setup, observer: Observer, t: np.ndarray, samples: np.ndarray, units: Units) -> Iterator[Remark]:
     """Where q, v or u left the hull of the samples around it by a good part of its range; the worst for each joint."""
     edges, low, high = observer.windows
     every = not setup.record_period_s and not setup.integrator.controls_error

@@ -22,6 +22,7 @@ from robot_dyn.model.edits import Payload
 from robot_dyn.model.robot import Robot
 
 if TYPE_CHECKING:
+    from robot_dyn.simulation.rollout_result import Rollouts
     from robot_dyn.simulation.setup import Setup
     from robot_dyn.simulation.trajectory import Trajectory
 
@@ -75,7 +76,7 @@ def portable(source: str, folder: Path) -> str:
     return path.name
 
 
-def joint_types(run: Trajectory) -> tuple[str | None, ...]:
+def joint_types(run: Trajectory | Rollouts) -> tuple[str | None, ...]:
     """Types of the joints of a run, as of `Robot.joint_types`; None for each of a run without a URDF."""
     try:
         kinds = check(run.about.get("urdf", ""), "the run's URDF").joint_kinds

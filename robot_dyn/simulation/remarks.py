@@ -62,6 +62,9 @@ class Remark:
         limit: What it compares with: a limit, or the extreme that the samples show; None for a chatter.
         text: Joint, value and time in words.
         remedy: What to do about it; alike for all remarks of a kind in a run.
+        runs: Of a batch, the numbers of the runs that it is about; the first is the worst, whose values and text these
+            are. Empty for a single run.
+        looked: Of a batch, how many runs were looked at.
     """
 
     kind: Kind
@@ -74,6 +77,8 @@ class Remark:
     limit: float | None
     text: str
     remedy: str = ""
+    runs: tuple[int, ...] = ()
+    looked: int = 0
 
 
 def lines(remarks: Iterable[Remark]) -> list[str]:
@@ -85,7 +90,15 @@ def lines(remarks: Iterable[Remark]) -> list[str]:
 
 
 def _line(kind: Kind, remarks: list[Remark]) -> str:
-    texts = [remark.text for remark in remarks[:_NAMED]]
+    texts = [remark.text + _of_runs(remark) for remark in remarks[:_NAMED]]
     more = f", and {len(remarks) - _NAMED} more" if len(remarks) > _NAMED else ""
     remedy = f"; {remarks[0].remedy}" if remarks[0].remedy else ""
     return f"{_HEADINGS[kind]}: {', '.join(texts)}{more}{remedy}"
+
+
+def _of_runs(remark: Remark) -> str:
+    """Of which runs of a batch; nothing of a single run."""
+    if not remark.runs:
+        return ""
+    count = f"{len(remark.runs)} of {remark.looked} runs" if remark.looked > 1 else "the only run looked at"
+    return f" (run {remark.runs[0]}; {count})"

@@ -91,7 +91,8 @@ def rollouts(
             estimated (`simulate` one of the runs for that). The method "auto" is DOP853 here, and the engine "auto" is
             machine code; "interpreted" makes the runs one after the other in Python.
 
-    Runs are not watched at every step, as those of `simulate` are: they carry no remarks.
+    Runs are watched at every step: `Rollouts.remarks` counts in how many of them actuation reverses at every tick, and
+    in how many a limit or a stop is reached or passed. The other remarks of `simulate` are made on single runs alone.
 
     Returns:
         The runs, in the order given. Ctrl-C ends them, and keeps what there is.

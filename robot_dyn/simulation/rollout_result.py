@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from operator import index
 from typing import Any, final, overload
 
@@ -11,12 +12,16 @@ import numpy as np
 
 from robot_dyn import former
 from robot_dyn.errors import QueryError
+from robot_dyn.simulation.observation import Observed
+from robot_dyn.simulation.overview import Overview, of_some, overview
+from robot_dyn.simulation.remarks import Remark
+from robot_dyn.simulation.remarks import lines as said
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.trajectory import Ending, Outcome, Statistics, Trajectory
 from robot_dyn.validate import integer
 from robot_dyn.values import Value, read_only
 
-_SHARED = ("joint_names", "t", "statistics", "sources", "about", "setup", "uncut")  # by all runs
+_SHARED = ("joint_names", "t", "statistics", "sources", "about", "setup", "uncut", "saved")  # by all runs
 
 
 @final
@@ -45,6 +50,9 @@ class Rollouts(Value):
         params: Values that differ from run to run, by name, (B, n).
         setup: What was run; None for runs that were read from a file.
         uncut: Names of the thresholds at which steps do not end, as `cuts=False` asks.
+        q0, v0: Starts, (B, n).
+        observed: Extremes, limits passed and chatter of each run, over all steps; None in files of older versions.
+        saved: Of runs that were read from a file; None for others.
     """
 
     joint_names: tuple[str, ...]
@@ -67,6 +75,10 @@ class Rollouts(Value):
     params: dict[str, np.ndarray]
     setup: Setup | None = None
     uncut: tuple[str, ...] = ()
+    q0: np.ndarray | None = None
+    v0: np.ndarray | None = None
+    observed: Observed | None = None
+    saved: Overview | None = None
 
     def __post_init__(self) -> None:
         read_only(self)
@@ -90,7 +102,8 @@ class Rollouts(Value):
         Positions and velocities are those recorded. The rest is recorded, or follows from them and the setup: the
         acceleration, the powers and energies, and the torque of a continuous controller without an integral. What
         neither tells is nan: work that was not recorded; the torque of other controllers; and all but what was
-        recorded of runs that were read from a file. It has no error estimate and no remarks, which `simulate` gives.
+        recorded of runs that were read from a file. It has no error estimate, and of the remarks that `simulate` makes
+        those on limits, stops and chatter.
 
         Raises:
             QueryError: If q or v was not recorded, or `run` is neither a whole number nor a slice.
@@ -99,7 +112,9 @@ class Rollouts(Value):
         from robot_dyn.simulation.rollout_run import trajectory
 
         if isinstance(run, slice):
-            return replace(self, **{name: _taken(x, run) for name, x in self._by_run().items()})
+            some = replace(self, **{name: _taken(x, run) for name, x in self._by_run().items()}, saved=None)
+            whole = None if self.saved is None else of_some(some, range(len(self))[run], self.saved)
+            return replace(some, saved=whole)
         try:
             number = range(len(self))[index(run)]
         except TypeError:
@@ -116,18 +131,67 @@ class Rollouts(Value):
             return Outcome(Ending.FINISHED, ended, self.advice[run])
         return Outcome(Ending.DIVERGED, ended, self.advice[run])
 
+    def setup_of(self, run: int) -> Setup:
+        """The setup of a run by itself: `rd.simulate(runs.setup_of(17))` repeats it, and estimates its error.
+
+        Raises:
+            QueryError: If there is no run of that number, or the runs were read from a file.
+        """
+        from robot_dyn.simulation.rollout_run import setup_of
+
+        if self.setup is None:
+            raise QueryError("runs that were read from a file have no setup; make them again, and keep the result")
+        return setup_of(self, self.setup, integer("run", run, least=-len(self), most=len(self) - 1) % len(self))
+
+    @cached_property
+    def overview(self) -> Overview:
+        """What all runs come to."""
+        return self.saved or overview(self)
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """What `simulate` remarks on the limits, stops and chatter of each run, one of each kind, joint and quantity.
+
+        `Remark.runs` are the numbers of the runs that it is about, the worst first, whose values and text it has. A
+        sampled loop is linearised in one run alone, `worst`.
+        """
+        return self.overview.remarks
+
+    @property
+    def tracking_error(self) -> np.ndarray | None:
+        """Of each run, as of a `Trajectory`, (B,); None without a reference, or if q was not recorded."""
+        return self.overview.tracking_error
+
+    @property
+    def worst(self) -> int:
+        """The run to look at first.
+
+        The first to diverge; else that with the largest chatter; that farthest beyond a limit of the file, as a part of
+        it; that with the largest tracking error; or 0.
+        """
+        return self.overview.worst
+
     @property
     def summary(self) -> str:
-        """How many runs, how many of them ended before their time, and what the first of these says."""
+        """How many runs, how many ended before their time and why; remarks; tracking error; which run to look at."""
         early = f"{int(self.diverged.sum())} diverged, {int(self.stopped.sum())} stopped"
-        line = f"{len(self)} runs of {len(self.t)} samples to t = {self.t[-1]:g} s; {early}"
+        lines = [f"{len(self)} runs of {len(self.t)} samples to t = {self.t[-1]:g} s; {early}"]
         if self.uncut:
             levels = ", ".join(self.uncut)
-            line += f"\ncuts=False: no step ends at {levels}, and a run that passes one is not that of simulate"
-        if not self.diverged.any():
-            return line
-        run = int(self.diverged.argmax())
-        return f"{line}\nrun {run} diverged at t = {self.ended[run]:g} s; {self.advice[run]}"
+            lines.append(f"cuts=False: no step ends at {levels}, and a run that passes one is not that of simulate")
+        if self.diverged.any():
+            run = int(self.diverged.argmax())
+            lines.append(f"run {run} diverged at t = {self.ended[run]:g} s; {self.advice[run]}")
+        lines += said(self.remarks) if self.observed is not None else ["between samples: not watched"]
+        errors = self.tracking_error
+        if errors is not None and np.isfinite(errors).any():
+            most = int(np.nanargmax(errors))
+            lines.append(
+                f"tracking error: {np.nanmedian(errors):.3e} rms in the median, {errors[most]:.3e} in run {most}"
+            )
+        again = "" if self.setup is None else f"; rd.simulate(runs.setup_of({self.worst})) repeats it by itself"
+        lines.append(f"look at run {self.worst} first{again}")
+        return "\n".join(lines)
 
     def _by_run(self) -> dict[str, Any]:
         return {each.name: getattr(self, each.name) for each in fields(self) if each.name not in _SHARED}

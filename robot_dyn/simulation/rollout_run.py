@@ -15,10 +15,12 @@ from robot_dyn.errors import QueryError
 from robot_dyn.simulation.acting import acting
 from robot_dyn.simulation.ledger import Ledger
 from robot_dyn.simulation.loads import at_stop, wrenches
+from robot_dyn.simulation.overview import remarks_of
 from robot_dyn.simulation.samples import columns
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.state_functions import sample
+from robot_dyn.simulation.tracking import deviation_of
 from robot_dyn.simulation.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -38,7 +40,7 @@ def trajectory(runs: Rollouts, run: int) -> Trajectory:
     unknown = np.full_like(q, np.nan)
     u = unknown if runs.u is None else runs.u[run, known]
     a, power, energy = unknown, np.full((len(t), len(runs.sources)), np.nan), np.full((len(t), 2), np.nan)
-    setup = None if runs.setup is None else _own(runs, runs.setup, run)
+    setup = None if runs.setup is None else setup_of(runs, runs.setup, run)
     if setup is not None:
         a, u, power, energy = _follows(setup, t, q, v, None if runs.u is None else u)
     if runs.kinetic is not None and runs.potential is not None:
@@ -48,8 +50,6 @@ def trajectory(runs: Rollouts, run: int) -> Trajectory:
         work = {name: x[run, known] for name, x in runs.work.items()}
     desired, deviation, loads, stops, acts = None, None, {}, None, None
     if setup is not None:
-        from robot_dyn.simulation.simulate import deviation_of
-
         desired, deviation = deviation_of(setup, t, q)
         loads, stops, acts = wrenches(setup.plant, t, q), at_stop(setup.plant, q), acting(setup)
     steps, evaluations = int(runs.steps[run]), int(runs.evaluations[run])
@@ -58,12 +58,13 @@ def trajectory(runs: Rollouts, run: int) -> Trajectory:
         runs.joint_names, t, q, v, a, u, dict(zip(runs.sources, power.T, strict=True)),
         Ledger(energy[:, 0], energy[:, 1], work), desired, deviation, runs.outcome(run),
         replace(runs.statistics, steps=steps, evaluations=evaluations), None, about, loads, stops,
-        acting=acts,
+        acting=acts, remarks=remarks_of(runs, run, setup, t, q),
+        extremes=None if runs.observed is None else runs.observed.extremes[run],
     )  # fmt: skip
 
 
-def _own(runs: Rollouts, setup: Setup, run: int) -> Setup:
-    """The setup of a run, with its own start and parameters."""
+def setup_of(runs: Rollouts, setup: Setup, run: int) -> Setup:
+    """As of `Rollouts`: the setup of a batch with the start, parameters and noise of a run."""
     if runs.params:
         plant, controller = with_parameters(
             setup.plant, setup.controller, {name: x[run] for name, x in runs.params.items()}
@@ -71,7 +72,12 @@ def _own(runs: Rollouts, setup: Setup, run: int) -> Setup:
         setup = replace(setup, plant=plant, controller=controller)
     if setup.controller is not None:
         setup = replace(setup, controller=setup.controller.of_run(run))
-    return setup
+    return replace(
+        setup,
+        q0=setup.q0 if runs.q0 is None else runs.q0[run],
+        v0=setup.v0 if runs.v0 is None else runs.v0[run],
+        estimate_error=True,
+    )
 
 
 def _follows(

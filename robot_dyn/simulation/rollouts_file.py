@@ -25,7 +25,7 @@ def save_rollouts(runs: Rollouts, path: str | Path) -> Path:
     """
     if not isinstance(runs, Rollouts):
         raise RunFileError(f"save_rollouts takes the Rollouts of rd.rollouts, got {type(runs).__name__}")
-    return write_whole(replace(runs, setup=None), path, ROLLOUTS_FORMAT, _checked)
+    return write_whole(replace(runs, setup=None, saved=runs.overview), path, ROLLOUTS_FORMAT, _checked)
 
 
 def load_rollouts(path: str | Path, *, max_bytes: int = MAX_BYTES) -> Rollouts:
@@ -53,6 +53,11 @@ def _checked(arrays: Arrays, about: dict[str, Any]) -> Rollouts:
         raise ArchiveError("the times of member 't' are not finite, or do not grow")
     if not np.isfinite(runs.ended).all() or (runs.ended < 0).any() or (runs.diverged & runs.stopped).any():
         raise ArchiveError("members 'ended', 'diverged' and 'stopped' are not those of runs")
+    numbered = (number for each in (() if runs.saved is None else runs.saved.remarks) for number in each.runs)
+    if runs.observed is not None and len(runs.observed.levels) != runs.observed.limits.shape[1]:
+        raise ArchiveError("'observed/levels' are not those of member 'observed/limits'")
+    if not all(0 <= number < len(runs) for number in (*numbered, 0 if runs.saved is None else runs.saved.worst)):
+        raise ArchiveError(f"'saved' tells of a run that is not one of the {len(runs)}")
     if len(runs.advice) != len(runs):
         raise ArchiveError(f"'advice' is of {len(runs.advice)} runs, not of {len(runs)}")
     if runs.work is not None and set(runs.work) != set(runs.sources):

@@ -25,11 +25,11 @@ from robot_dyn.simulation.trajectory import Ending, Trajectory
 from robot_dyn.validate import integer
 
 FORMAT = 4
-ROLLOUTS_FORMAT = "rollouts 2"
+ROLLOUTS_FORMAT = "rollouts 3"
 # The formats before, which are read as well, and what some members were called there.
 _BEFORE: Mapping[int | str, Mapping[int | str, Mapping[str, str]]] = {
     FORMAT: {3: {"wanted": "desired", "tau": "u"}},
-    ROLLOUTS_FORMAT: {"rollouts 1": {"tau": "u"}},
+    ROLLOUTS_FORMAT: {"rollouts 1": {"tau": "u"}, "rollouts 2": {}},
 }
 RUN = Kind("a run file", ".npz", b"PK\x03\x04")
 MAX_BYTES = 4 * 2**30  # of the arrays of a run that is read without being asked for more

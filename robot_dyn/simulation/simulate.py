@@ -14,8 +14,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
 
 import numpy as np
 
-from robot_dyn.control.cartesian import CartesianReference
-from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.effects.plant import Plant
 from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, STIFF
 from robot_dyn.integrate.time_stepping import TimeStepping
@@ -41,6 +39,7 @@ from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import check_record
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.stiffness import StiffError, bounded_by_stability
+from robot_dyn.simulation.tracking import deviation_of
 from robot_dyn.simulation.trajectory import Ending, Outcome, Statistics, Trajectory
 from robot_dyn.simulation.unstable_loop import unstable
 from robot_dyn.validate import function
@@ -110,7 +109,6 @@ def simulate(
         finished - ran.ready, 0.0 if error is None else estimated - finished, ran.engine, ran.ready - began,
         companion_evaluations=spent,
     )  # fmt: skip
-    ran.observer.close()
     made = _trajectory(ran, equation, record, statistics, error)
     if made.leak and record.outcome.ending is not Ending.STOPPED:  # no more of the user's code is called then
         why = cause(setup, equation, record, made.ledger.closes)
@@ -176,7 +174,7 @@ def _trajectory(
     ran: _Ran, equation: StateEquation, record: Record, statistics: Statistics, error: ErrorEstimate | None
 ) -> Trajectory:
     """The samples with what follows from them."""
-    setup, observer = ran.setup, ran.observer
+    setup, observed = ran.setup, ran.observer.close()
     edits = {} if ran.machine is None else edits_of_machine_code(setup)
     t = record.t
     q, v, a, u, _, P, _ = columns(equation, t, record.y, record.made)
@@ -190,10 +188,10 @@ def _trajectory(
         names, t, q, v, a, u, power, ledger(equation, record), desired, deviation, record.outcome, statistics, error,
         about, wrenches(plant, t, q), at_stop(plant, q),
         (
-            *remarks(setup, observer, t, np.hstack([q, v, u]), power), *ran.said,
+            *remarks(setup, ran.observer, observed, t, np.hstack([q, v, u]), power), *ran.said,
             *bounded_by_stability(setup, equation, record), *_of_control(setup, equation, record),
         ),
-        observer.extremes, acting(setup),
+        observed.extremes[0], acting(setup),
         equation.controller_states(record.y), record.events, equation.effect_states(record.y),
     )  # fmt: skip
 
@@ -203,17 +201,3 @@ def _of_control(setup: Setup, equation: StateEquation, record: Record) -> tuple[
     if record.outcome.ending is Ending.STOPPED:
         return ()
     return (*unstable(setup, equation, record.t, record.y), *damped(setup, record))
-
-
-def deviation_of(setup: Setup, t: np.ndarray, q: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:
-    """Desired positions, and how far the joints, or the frame, are from the reference."""
-    controller = setup.controller
-    if controller is None:
-        return None, None
-    reference = controller.desired
-    if isinstance(reference, PiecewisePolynomial):
-        wanted = reference.at(t)[0]
-        return wanted, q - wanted
-    if isinstance(reference, CartesianReference) and controller.task_frame is not None:
-        return None, setup.plant.dynamics.placement(q, controller.task_frame)[:, :3, 3] - reference.at(t)[0]
-    return None, None

@@ -15,6 +15,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.integrate.primitives import copy, evaluate, sizes
+from robot_dyn.simulation.observation import Observation, observe
 from robot_dyn.simulation.philox import draw
 
 WATCHED = 64  # steps between looks at the energy
@@ -77,6 +78,7 @@ class Functions(NamedTuple):
         jacobian: As of `RightSide`.
         events: Values of the events.
         step, behind: As of `RightSide`.
+        actuation: u alone, of runs in lock step without a rate under control at all times.
     """
 
     rate: Any
@@ -87,6 +89,7 @@ class Functions(NamedTuple):
     events: Any = 0
     step: Any = 0
     behind: Any = 0
+    actuation: Any = 0
 
 
 class Plan(NamedTuple):
@@ -148,7 +151,8 @@ class Records(NamedTuple):
         place: Segment and step of each sample, (R, 2).
         y, made: Those entries, and what else a sample holds, (R, c, B) and (R, d, B).
         shared: States that companion runs share, with segment and step, (K, m + 2).
-        columns: As of `Observer.columns`; without any, no step is shown.
+        columns: As of `Observer.columns`; without any, none is written.
+        observation: What was observed of the runs; of none, no step is shown.
     """
 
     which: Array
@@ -157,6 +161,7 @@ class Records(NamedTuple):
     made: Array
     shared: Array
     columns: Array
+    observation: Observation
 
 
 class Rules(NamedTuple):
@@ -228,7 +233,7 @@ def time_loop(step: Callable[..., int]) -> Callable[..., int]:
                 now[Now.STEP] += 1
                 now[Now.STEPS] += 1
                 now[Now.BUDGET] -= 1
-                show(runs, records, rules, work.K, now, t + h, rules.held == 0 or (k == 0 and acts(rules, tick)))
+                show(runs, records, rules, work.K[len(work.K) - 1], now, t, t + h, k == 0 and acts(rules, tick))
                 if now[Now.STEPS] % WATCHED == 0 and not conserve(functions, runs, rules, t + h, p):
                     return Ended.GAINS
                 if now[Now.BUDGET] <= 0 or stop[0] != 0:
@@ -359,14 +364,29 @@ def erase(x: Array, b: int) -> None:
         x[e, b] = np.nan
 
 
-def show(runs: Runs, records: Records, rules: Rules, K: Array, now: Array, t: float, acted: bool) -> None:
-    """A column for the observer, as of `Observer.step`; there is one while the driver leaves room for it."""
+def show(
+    runs: Runs, records: Any, rules: Rules, latest: Array, now: Array, began: float, t: float, acted: bool
+) -> None:
+    """Observe a step: y at its end, and u, or v and u, of its latest evaluation, which is nan in runs that ended.
+
+    For an observer it is written into a column, too, for which its driver leaves room.
+    """
+    if records.observation.low.shape[1] == 0:
+        return
+    if not rules.alone:
+        for b in range(len(runs.alive)):
+            if runs.alive[b] == 0:
+                erase(latest, b)
+    n, m = rules.n, len(runs.y)
+    q, v, u = runs.y[:n], runs.y[n : 2 * n], latest[m : m + n]
+    if rules.canonical:
+        v = latest[:n]
+    observe(records.observation, began, t, q, v, u, acted or rules.held == 0)
     if records.columns.shape[1] == 0:
         return
-    c, n, m = now[Now.COLUMN], rules.n, len(runs.y)
-    records.columns[0, c], records.columns[1, c] = t, acted
-    latest = K[len(K) - 1]
-    copy(records.columns[2 : 2 + n, c], runs.y[:n, 0])
-    copy(records.columns[2 + n : 2 + 2 * n, c], latest[:n, 0] if rules.canonical else runs.y[n : 2 * n, 0])
-    copy(records.columns[2 + 2 * n :, c], latest[m : m + n, 0])
+    c = now[Now.COLUMN]
+    records.columns[0, c] = t
+    copy(records.columns[1 : 1 + n, c], q[:, 0])
+    copy(records.columns[1 + n : 1 + 2 * n, c], v[:, 0])
+    copy(records.columns[1 + 2 * n :, c], u[:, 0])
     now[Now.COLUMN] += 1

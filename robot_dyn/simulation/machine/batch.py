@@ -16,15 +16,18 @@ import numpy as np
 
 from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.coefficients import with_values
+from robot_dyn.compiled.parameters import over_runs
 from robot_dyn.compiled.right_angles import robot_of
 from robot_dyn.effects.plant import Plant
 from robot_dyn.integrate.integrator import PlainMethod
 from robot_dyn.simulation.detection import Detecting
 from robot_dyn.simulation.fixed_step import rules_of, runs_of, samples_at_most
+from robot_dyn.simulation.levels import levels
 from robot_dyn.simulation.machine.machine import Machine
 from robot_dyn.simulation.machine.one_by_one import OneByOne, Single, said
 from robot_dyn.simulation.machine.pool import in_threads
 from robot_dyn.simulation.machine.thresholds import Thresholds
+from robot_dyn.simulation.observation import NOTHING, Observation, observation_of, observed
 from robot_dyn.simulation.origin import origin
 from robot_dyn.simulation.plan import plan_of
 from robot_dyn.simulation.rollout_result import Rollouts
@@ -57,6 +60,7 @@ class Batch:
         equation, n = machine.equation, machine.equation.plant.dynamics.n
         self.setup, self.machine, self.recorded, self.kept, self.values = setup, machine, recorded, kept, sweep
         self.q0, self.v0, self.y, self.thresholds = q0, v0, _starts(equation, q0, v0), thresholds
+        self.levels = levels(equation.plant.dynamics, *over_runs(equation.plant, equation.controller, sweep), len(q0))
         self.columns = [*range(n)] * ("q" in recorded)
         if "v" in recorded and not equation.canonical:
             self.columns += range(n, 2 * n)
@@ -68,6 +72,7 @@ class Batch:
         self.plan = plan_of(setup)
         most = samples_at_most(setup, self.plan.counts)
         self.out_y, self.made = np.empty((most, len(self.columns), width)), np.empty((most, more, width))
+        self.observations: list[Observation] = [NOTHING] * tiles
         self.place = np.zeros((0, 2), np.int64)  # segment and step of each sample, of the tile that has most
         self.lock = threading.Lock()
         self.unfinished = np.ones(tiles, dtype=bool)
@@ -109,7 +114,8 @@ class Batch:
         if not len(numbers) or self.stop[0]:
             return
         sweep = {name: x[numbers] for name, x in self.values.items()}
-        runs = OneByOne(self.setup, self.q0[numbers], self.v0[numbers], sweep, self.recorded, numbers.tolist())
+        starts, of = (self.q0[numbers], self.v0[numbers]), self.levels.of_runs(numbers)
+        runs = OneByOne(self.setup, *starts, sweep, self.recorded, of, numbers.tolist())
         part = len(numbers) / len(self.y)
         runs.run(threads, lambda t: tell((1 - part) * self.setup.duration_s + part * t))
         self.again = dict(zip(numbers.tolist(), runs.made, strict=True))
@@ -126,6 +132,17 @@ class Batch:
                     array[:rows, :, run] = np.hstack([*(single.columns[name] for name in of), np.empty((rows, 0))])
             self.out_y[rows:, :, run], self.made[rows:, :, run] = np.nan, np.nan
 
+    def _observation(self, tile: int, runs: Runs) -> Observation:
+        """What is observed of a tile, before its first step."""
+        numbers, equation, n = self._numbers(tile), self.machine.equation, self.machine.equation.plant.dynamics.n
+        functions, u = self.machine.in_python, np.full((equation.size + n, LANES), np.nan)
+        if not equation.sampled:  # at a tick it becomes known
+            function = functions.rate or functions.actuation
+            function(0.0, runs.y, self.plan.parameters[0], runs.own, u if functions.rate else u[equation.size :])
+        return observation_of(
+            np.vstack([self.q0[numbers].T, self.v0[numbers].T, u[equation.size :]]), self.levels.of_runs(numbers)
+        )
+
     def _runs(self, tile: int) -> Runs:
         """The runs of a tile at their start; a tile that is not full repeats a run."""
         equation, index = self.machine.equation, self._numbers(tile)
@@ -141,18 +158,20 @@ class Batch:
         own, runs = slice(tile * LANES, (tile + 1) * LANES), self._runs(tile)
         method = cast(PlainMethod, self.setup.integrator)
         assert self.machine.loop is not None
-        stepper = method.stepper(FLOAT64, equation.size, n, equation.size, LANES)
+        rows = (equation.size + n) | 1  # odd: stages a power of two apart would share the sets of a cache
+        stepper = method.stepper(FLOAT64, equation.size, n, rows, LANES)
         functions, now = self.machine.equations.functions, np.zeros(len(Now), dtype=np.int64)
         now[Now.BUDGET] = np.iinfo(np.int64).max
+        self.observations[tile] = self._observation(tile, runs)
         records = Records(
             np.array(self.columns, np.int64), np.empty((len(self.out_y), 2), np.int64), self.out_y, self.made,
-            np.empty((0, equation.size + 2)), np.empty((2 + 3 * n, 0)),
+            np.empty((0, equation.size + 2)), np.empty((1 + 3 * n, 0)), self.observations[tile],
         )  # fmt: skip
         rules = rules_of(equation, False, _LARGEST, base=own.start)
         work = stepper.work
         if self.thresholds is not None:
             positions = 0 if equation.canonical else n
-            switches = self.thresholds.lanes(self._numbers(tile), equation.size, positions)
+            switches = self.thresholds.lanes(self._numbers(tile), equation.size + n, positions)
             self.until[own] = switches.until
             work = Detecting(work, work.K, switches._replace(until=self.until[own]))
         ended = self.machine.loop(
@@ -185,6 +204,7 @@ class Batch:
             diverged[run], stopped[run] = (outcome.ending is each for each in (Ending.DIVERGED, Ending.STOPPED))
             if single is not None:
                 steps[run], evaluations[run] = single.steps, single.evaluations
+        alone = {run: single.observation for run, single in self.again.items() if single is not None}
         y, made, lengths = np.moveaxis(self.out_y[: len(t), :, :B], -1, 0), {}, {"u": n, "v": n, "energy": 2}
         at = 0
         for name in self.kept:
@@ -202,6 +222,7 @@ class Batch:
             equation.plant.dynamics.joint_names, t, q, v if "v" in self.recorded else None, made.get("u"), K, V, named,
             ended, diverged, stopped, tuple(advice), steps, evaluations, self._statistics(), tuple(equation.sources),
             origin(self.setup.plant.dynamics) | self.setup.about, dict(self.values), self._compiled(),
+            (), self.q0, self.v0, observed(self.observations, self.levels, alone)[:B],
         )  # fmt: skip
 
     def _compiled(self) -> Setup:

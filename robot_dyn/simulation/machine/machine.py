@@ -235,8 +235,11 @@ class Machine:
         if "rate" in ours:
             yield ours["rate"][:m], rate
         yield ours["energy"], energy
-        if self.equations.runs == 1 and "rate" in ours:
+        if "rate" in ours:
             yield ours["rate"][m:], u
+        if "actuation" in ours:
+            yield ours["actuation"], u
+        if self.equations.runs == 1 and "rate" in ours:
             yield from zip(np.split(ours["sample"], [m, m + n]), (rate, u, energy), strict=True)
         if "events" in ours:
             q, v, z, _ = self.equation.state(y)

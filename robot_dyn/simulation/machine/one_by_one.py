@@ -9,10 +9,13 @@ from typing import NamedTuple, final
 import numpy as np
 
 from robot_dyn.coefficients import with_values
-from robot_dyn.compiled.parameters import with_parameters
+from robot_dyn.compiled.parameters import over_runs, with_parameters
 from robot_dyn.simulation.choice import machine_of
+from robot_dyn.simulation.levels import Levels, levels
 from robot_dyn.simulation.machine.machine import Machine
 from robot_dyn.simulation.machine.pool import in_threads
+from robot_dyn.simulation.observation import Observation, Observed, observation_of, observed
+from robot_dyn.simulation.observed import observer_of
 from robot_dyn.simulation.origin import origin
 from robot_dyn.simulation.prepared import prepared
 from robot_dyn.simulation.record import Record
@@ -32,6 +35,7 @@ class Single(NamedTuple):
         columns: What was recorded, (k, …) by name.
         outcome: How it ended.
         steps, evaluations: Their numbers.
+        observation: What was observed of it.
     """
 
     t: np.ndarray
@@ -39,6 +43,7 @@ class Single(NamedTuple):
     outcome: Outcome
     steps: int
     evaluations: int
+    observation: Observation
 
 
 @final
@@ -50,14 +55,15 @@ class OneByOne:
         q0, v0: Starts, (B, n).
         sweep: Values that differ from run to run, (B, size) by name.
         recorded: Names of what is kept.
+        of: Their levels.
         numbers: Of the runs in their batch, of which their noise is; 0 to B − 1 unless given.
     """
 
     def __init__(
         self, setup: Setup, q0: np.ndarray, v0: np.ndarray, sweep: dict[str, np.ndarray], recorded: tuple[str, ...],
-        numbers: Sequence[int] | None = None,
+        of: Levels, numbers: Sequence[int] | None = None,
     ) -> None:  # fmt: skip
-        self.setup, self.q0, self.v0, self.sweep, self.recorded = setup, q0, v0, sweep, recorded
+        self.setup, self.q0, self.v0, self.sweep, self.recorded, self.levels = setup, q0, v0, sweep, recorded, of
         self.numbers = range(len(q0)) if numbers is None else numbers
         self.compiled = setup.engine != "interpreted"
         _, _, machine = self._of(0)
@@ -94,11 +100,12 @@ class OneByOne:
         if self.stop[0]:
             return
         setup, equation, machine = self._of(i)
-        run = prepared(setup, equation, machine)
+        observer = observer_of(setup, equation, self.levels.of_runs([i]))
+        run = prepared(setup, equation, machine, observer=observer)
         run.stop = self.stop
-        self.made[i] = self._kept(equation, run.record())
+        self.made[i] = self._kept(equation, run.record(), observer.observation)
 
-    def _kept(self, equation: StateEquation, record: Record) -> Single:
+    def _kept(self, equation: StateEquation, record: Record, observation: Observation) -> Single:
         """What is recorded of a run; not the sample at an event that ended it, which no other run has."""
         outcome = record.outcome
         early = outcome.ending is Ending.FINISHED and outcome.t < self.setup.duration_s
@@ -106,7 +113,7 @@ class OneByOne:
         names = "q", "v", "a", "u", "work", "power", "energy"
         values = dict(zip(names, columns(equation, record.t, record.y, record.made), strict=True))
         kept = {name: values[name][:rows].copy() for name in self.recorded}
-        return Single(record.t[:rows], kept, outcome, record.steps, record.evaluations)
+        return Single(record.t[:rows], kept, outcome, record.steps, record.evaluations, observation)
 
 
 def one_by_one(
@@ -117,7 +124,8 @@ def one_by_one(
     B, n, equation = len(q0), setup.plant.dynamics.n, StateEquation(setup.plant, setup.controller)
     sizes = {"q": n, "v": n, "u": n, "work": len(equation.sources), "energy": 2}
     check_batch(setup, B, sum(sizes[name] for name in recorded), most)
-    runs, began = OneByOne(setup, q0, v0, sweep, recorded), perf_counter()
+    of = levels(setup.plant.dynamics, *over_runs(setup.plant, setup.controller, sweep), B)
+    runs, began = OneByOne(setup, q0, v0, sweep, recorded, of), perf_counter()
     runs.run(threads, on_progress)
     t = max((each.t for each in runs.made if each is not None), key=len, default=np.zeros(1))
     kept = {name: np.full((B, len(t), sizes[name]), np.nan) for name in recorded}
@@ -139,8 +147,15 @@ def one_by_one(
         setup.plant.dynamics.joint_names, t, *(kept.get(name) for name in ("q", "v", "u")), K, V, work,
         np.array([each.t for each in outcomes]), ending == Ending.DIVERGED, ending == Ending.STOPPED,
         tuple(said(each) for each in outcomes), steps, evaluations, statistics, tuple(equation.sources),
-        origin(setup.plant.dynamics) | setup.about, dict(sweep), setup,
+        origin(setup.plant.dynamics) | setup.about, dict(sweep), setup, (), q0, v0, _observed(runs),
     )  # fmt: skip
+
+
+def _observed(runs: OneByOne) -> Observed:
+    """What was observed of all runs; of one that was not begun, its start."""
+    starts = np.vstack([runs.q0.T, runs.v0.T, np.full_like(runs.q0.T, np.nan)])
+    made = {i: each.observation for i, each in enumerate(runs.made) if each is not None}
+    return observed([observation_of(starts, runs.levels)], runs.levels, made)
 
 
 def said(outcome: Outcome) -> str:

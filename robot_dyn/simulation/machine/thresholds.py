@@ -37,9 +37,9 @@ class Thresholds:
     others: np.ndarray
     names: tuple[str, ...]
 
-    def lanes(self, runs: np.ndarray, size: int, positions: int) -> LockStep:
-        """The switching functions of some of the runs at their start; `size` of their states, and `positions`."""
-        made = lock_step(self.rows, self.coordinates, self.levels[:, runs], size, self.functions, positions)
+    def lanes(self, runs: np.ndarray, rows: int, positions: int) -> LockStep:
+        """The switching functions of some of the runs at their start: of rates of so many rows, and `positions`."""
+        made = lock_step(self.rows, self.coordinates, self.levels[:, runs], rows, self.functions, positions)
         made.until[self.others[runs]] = 0.0
         made.left[0] -= self.others[runs].sum()
         return made

@@ -44,8 +44,8 @@ def trace(
         equation: What to trace.
         bodies: Gives the symbols of a robot, the plant's or a model's.
         known: The parameters.
-        kept: Which of "u", "v" and "energy" a sample of runs in lock step holds; None for a single run, whose rate
-            gives u as well and whose samples hold y', u, K and V.
+        kept: Which of "u", "v" and "energy" a sample of runs in lock step holds; None for a single run, whose
+            samples hold y', u, K and V.
         jacobian: Whether a method needs it.
         nonsmooth: Whether the method asks for the convex problem of each step in place of the rate.
 
@@ -69,10 +69,12 @@ def trace(
             rate, u = symbolic.rate(time, state, held_here)
         parts = {"u": wide(u, n), "v": v, "energy": symbolic.energies(time, q, v)}
         single = kept is None
-        made = {"rate": np.concatenate([rate, parts["u"]]) if single else rate, "energy": parts["energy"]}
+        made = {"rate": np.concatenate([rate, parts["u"]]), "energy": parts["energy"]}
         made["sample"] = np.concatenate(
             [rate, parts["u"], parts["energy"]] if single else [parts[x] for x in kept] or [[]]
         )
+        if nonsmooth and not single and not equation.sampled:
+            made["actuation"] = parts["u"]
         if equation.events or equation.limited:
             demands = symbolic.demands(time, q, v, z, held_here, equation.limited)
             values = [wide(each, n) for each in demands] + [_value(each, time, q, v) for each in equation.events]
