@@ -207,9 +207,8 @@ def converted(what: str, array: Any, joint_names: Sequence[str], arithmetic: Any
         OverflowedError: If the position q or the time t is rounded so much that it is not known to LEAST_EXACT.
     """
     dtype = _F8 if arithmetic is None else arithmetic.dtype
-    if array.dtype == dtype:
-        numbers = array
-    else:  # what is too large for the arithmetic becomes infinite
+    numbers = array
+    if array.dtype != dtype:  # what is too large for the arithmetic becomes infinite
         numbers = float64(array) if arithmetic is None else arithmetic.asarray(array)
     check_finite(what, numbers, joint_names, arithmetic)
     if numbers is not array and what in ("q", "t"):

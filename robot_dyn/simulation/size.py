@@ -34,8 +34,8 @@ def check_segments(setup: Setup) -> None:
         )
     if steps(setup) > MOST_STEPS:
         raise QueryError(
-            f"a run of {setup.duration_s:g} s takes {steps(setup):.3g} steps of step_s = {setup.step_s:g} s, more than "
-            f"{MOST_STEPS:g}: take a longer step_s, or a shorter duration_s"
+            f"a run of {setup.duration_s:g} s takes {steps(setup):.3g} steps of step_s = {setup.nominal_step_s:g} s,"
+            f" more than {MOST_STEPS:g}: take a longer step_s, or a shorter duration_s"
         )
 
 
@@ -70,7 +70,7 @@ def steps(setup: Setup) -> float:
     """About so many steps of a fixed-step method; 0 for an adaptive one, which chooses them."""
     if setup.integrator.controls_error:
         return 0.0
-    step = min(setup.step_s, setup.record_period_s or inf)  # samples lie on steps
+    step = min(setup.nominal_step_s, setup.record_period_s or inf)  # samples lie on steps
     return setup.duration_s / step + 4 * segments(setup)
 
 

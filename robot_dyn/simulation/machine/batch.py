@@ -70,7 +70,7 @@ class Batch:
         self.unfinished = np.ones(tiles, dtype=bool)
         self.why, self.last = np.zeros(width, np.int64), np.zeros((equation.size, width))
         self.ended = np.full(width, setup.duration_s)
-        self.clocks = np.tile([0.0, setup.record_period_s, 1e-9 * setup.step_s], (tiles, 1))
+        self.clocks = np.tile([0.0, setup.record_period_s, 1e-9 * setup.nominal_step_s], (tiles, 1))
         self.evaluations, self.stop = np.zeros(tiles, np.int64), np.zeros(1, np.int64)
 
     def run(self, threads: int, on_progress: Callable[[float], object] | None = None) -> Rollouts:
