@@ -13,6 +13,7 @@ from robot_dyn.compiled.symbolic import TraceError
 from robot_dyn.effects.effect import Active
 from robot_dyn.errors import QueryError
 from robot_dyn.simulation.machine import batch
+from tests.command import refusal, said
 
 ARM = rd.load("planar_2r")
 Q, V = np.array([0.4, -0.7]), np.array([0.3, 0.5])
@@ -242,6 +243,19 @@ def test_a_diverged_run_names_its_joint_its_time_and_what_to_do(method: str) -> 
     assert not runs.outcome(0).advice and f"run 1 diverged at t = {runs.ended[1]:g} s; " in runs.summary
 
 
+@pytest.mark.parametrize("command", [("replay", "--html", "page.html"), ("plot",)], ids=lambda command: command[0])
+def test_commands_say_what_a_file_of_rollouts_is(command: tuple[str, ...], tmp_path: Path, monkeypatch) -> None:
+    """Not that it is damaged; what they advise makes a file that they take."""
+    monkeypatch.chdir(tmp_path)
+    rd.save_rollouts(rd.rollouts(SETUP, starts(3), V), "runs.npz")
+    text = refusal((command[0], "runs.npz", *command[1:]))
+    assert "is a file of rollouts" in text and "simulate again" not in text
+    rd.save_run(rd.load_rollouts("runs.npz")[0], "run.npz")
+    assert "written: " in said(command[0], "run.npz", *command[1:])
+    with pytest.raises(rd.RobotDynError, match=r"is a file of one run, not of rollouts; rd.load_run reads it"):
+        rd.load_rollouts("run.npz")
+
+
 @pytest.mark.parametrize("record", [EVERYTHING, ("q", "v"), ("u",)])
 def test_rollouts_are_saved_and_read(record: tuple[str, ...], tmp_path: Path) -> None:
     """Bit for bit, and a file that was cut short, or is of another kind, is refused."""
@@ -254,7 +268,9 @@ def test_rollouts_are_saved_and_read(record: tuple[str, ...], tmp_path: Path) ->
         np.testing.assert_array_equal(x, y)
     assert back.setup is None and [back.outcome(i) for i in range(4)] == [runs.outcome(i) for i in range(4)]
     assert back.about["urdf"] == runs.about["urdf"] and back.params["kp"][3, 0] == 3.0
-    with pytest.raises(rd.RobotDynError, match="load_rollouts reads it"):
+    with pytest.raises(
+        rd.RobotDynError, match=r"is a file of rollouts, which are many runs; rd.load_rollouts reads it"
+    ):
         rd.load_run(path)
     path.write_bytes(path.read_bytes()[:-100])
     with pytest.raises(rd.RobotDynError, match="is not a complete run file"):

@@ -101,8 +101,9 @@ def read_whole(
     with reading(path, RunFileError, f"write one with robot-dyn simulate … -o {path}") as stream:
         try:
             archive = Archive(stream)
-            about = _about(archive, form)
-            names = _BEFORE.get(form, {}).get(about["format"], {})
+            about, found = _about(archive)
+            _check_format(found, form, path)
+            names = _BEFORE[form].get(found, {})
             check_headers(_renamed(archive.headers, names), about, members)
             if archive.size > max_bytes:
                 held = f"{archive.size / 2**30:.3g} GiB, more than {max_bytes / 2**30:.3g} GiB"
@@ -115,20 +116,29 @@ def read_whole(
             raise RunFileError(f"{path}: is not a complete run file: {error}; simulate again") from None
 
 
-def _about(archive: Archive, form: int | str) -> dict[str, Any]:
-    """The plain data, of this format or one before it."""
+def _about(archive: Archive) -> tuple[dict[str, Any], Any]:
+    """The plain data, and the format that it states."""
     if "about" in archive.headers and archive.headers["about"].size > _MAX_TEXT:
         raise ArchiveError(f"member 'about' is larger than {_MAX_TEXT >> 20} MiB")
     try:
         about = json.loads(archive.text("about"))
-        found = about["format"]
+        return about, about["format"]
     except (ValueError, TypeError, KeyError, RecursionError, MemoryError) as error:
         raise ArchiveError(f"member 'about' is not the JSON of a run ({type(error).__name__})") from None
-    if found not in (form, *_BEFORE.get(form, {})):
-        other = "; rd.load_rollouts reads it" if found == ROLLOUTS_FORMAT else "; rd.load_run reads it"
-        also = other if found in (FORMAT, ROLLOUTS_FORMAT) else ""
-        raise ArchiveError(f"it has format {shorten(repr(found))}, this version reads {form!r}{also}")
-    return about
+
+
+def _check_format(found: Any, form: int | str, path: Path) -> None:
+    """Refuse a format that is neither the one that is read nor one before it; names a file of the other kind."""
+    if found in (form, *_BEFORE[form]):
+        return
+    if found in (ROLLOUTS_FORMAT, *_BEFORE[ROLLOUTS_FORMAT]):
+        raise RunFileError(
+            f"{path}: is a file of rollouts, which are many runs; rd.load_rollouts reads it, and rd.save_run writes one"
+            " of them, such as rd.load_rollouts(…)[0], to a run file"
+        )
+    if found in (FORMAT, *_BEFORE[FORMAT]):
+        raise RunFileError(f"{path}: is a file of one run, not of rollouts; rd.load_run reads it")
+    raise ArchiveError(f"it has format {shorten(repr(found))}, this version reads {form!r}")
 
 
 def _renamed(members: Mapping[str, Part], names: Mapping[str, str]) -> dict[str, Part]:

@@ -5,10 +5,11 @@ bytes = samples · 8 · numbers of a sample,   or   segments · (an object, and 
 
 from __future__ import annotations
 
-from math import inf
+from math import inf, ulp
 from typing import TYPE_CHECKING
 
 from robot_dyn.errors import QueryError
+from robot_dyn.validate import LEAST_EXACT
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.setup import Setup
@@ -20,10 +21,10 @@ _SEGMENT_BYTES, _SEGMENT_BYTES_PER_JOINT = 500, 100  # by estimate; the second i
 
 
 def check_segments(setup: Setup) -> None:
-    """Refuse a run of more steps, ticks or switches than can be made.
+    """Refuse a run of more steps, ticks or switches than can be made, or of times that floats do not tell apart.
 
     Raises:
-        QueryError: If there are too many; says how many and the remedy.
+        QueryError: If it is one; says how many and the remedy.
     """
     cut = segments(setup)
     size = cut * (_SEGMENT_BYTES + _SEGMENT_BYTES_PER_JOINT * setup.plant.dynamics.n)
@@ -36,6 +37,11 @@ def check_segments(setup: Setup) -> None:
         raise QueryError(
             f"a run of {setup.duration_s:g} s takes {steps(setup):.3g} steps of step_s = {setup.nominal_step_s:g} s,"
             f" more than {MOST_STEPS:g}: take a longer step_s, or a shorter duration_s"
+        )
+    if (told := ulp(setup.duration_s)) > LEAST_EXACT:
+        raise QueryError(
+            f"a run of {setup.duration_s:g} s ends at a time that floats tell to {told:.1g} s only: take a shorter"
+            " duration_s"
         )
 
 
