@@ -10,7 +10,7 @@ from typing import Any, final, overload
 import numpy as np
 
 from robot_dyn import former
-from robot_dyn.errors import QueryError
+from robot_dyn.errors import QueryError, escaped
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.trajectory import Ending, Outcome, Statistics, Trajectory
 from robot_dyn.validate import integer
@@ -122,7 +122,7 @@ class Rollouts(Value):
         if not self.diverged.any():
             return line
         run = int(self.diverged.argmax())
-        return f"{line}\nrun {run} diverged at t = {self.ended[run]:g} s; {self.advice[run]}"
+        return f"{line}\n" + escaped(f"run {run} diverged at t = {self.ended[run]:g} s; {self.advice[run]}")
 
     def _by_run(self) -> dict[str, Any]:
         return {each.name: getattr(self, each.name) for each in fields(self) if each.name not in _SHARED}

@@ -21,6 +21,7 @@ from robot_dyn.simulation.archive import Archive, ArchiveError, Header, write
 from robot_dyn.simulation.members import MEMBERS, Member, check_headers, member
 from robot_dyn.simulation.origin import packed, unpacked
 from robot_dyn.simulation.serialise import Arrays, SerialError, build, take_apart
+from robot_dyn.simulation.size import LONGEST_S
 from robot_dyn.simulation.trajectory import Ending, Trajectory
 from robot_dyn.validate import integer
 
@@ -161,12 +162,21 @@ def _checked(arrays: Arrays, about: dict[str, Any]) -> Trajectory:
             if known.finite and not np.isfinite(array).all() and not (known.absent and np.isnan(array).all()):
                 raise ArchiveError(f"member {shorten(name)!r} of a run that did not diverge holds nan or inf")
     for name, t in (("t", run.t), *((f"wrenches/{link}", F[:, 0]) for link, F in run.wrenches.items())):
-        if not np.isfinite(t).all() or not (np.diff(t) >= 0).all():
-            raise ArchiveError(f"the times of member {shorten(name)!r} are not finite, or do not grow")
+        if not are_times(t) or len(t) < len(run.t):
+            raise ArchiveError(f"the times of member {shorten(name)!r} are not those of a run, or do not grow")
+    if run.error is not None and not are_times(run.error.t):
+        raise ArchiveError("the times of member 'error/t' are not those of a run, or do not grow")
     if run.power.keys() != run.ledger.work.keys():
         raise ArchiveError("members 'power/…' and 'ledger/work/…' have different names")
     if run.desired is not None and run.deviation is not None and run.deviation.shape != run.desired.shape:
         raise ArchiveError("members 'desired' and 'deviation' differ in shape")
-    if not 0 <= run.outcome.t < np.inf:
+    if run.desired is None and run.deviation is not None and (run.deviation.shape[1] != 3 or "frame" not in run.about):
+        raise ArchiveError("member 'deviation' of joints needs 'desired', which is missing")
+    if not are_times(np.array([run.outcome.t])):
         raise ArchiveError(f"'outcome/t' holds {run.outcome.t!r}, not a time in [s]")
     return run
+
+
+def are_times(t: np.ndarray) -> bool:
+    """Whether these are times of a run: as long as one can be, and none before the last."""
+    return bool(np.all((t >= 0) & (t <= LONGEST_S)) and np.all(t[1:] >= t[:-1]))

@@ -6,6 +6,7 @@ bytes = samples · 8 · numbers of a sample,   or   segments · (an object, and 
 from __future__ import annotations
 
 from math import inf, ulp
+from sys import float_info
 from typing import TYPE_CHECKING
 
 from robot_dyn.errors import QueryError
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from robot_dyn.simulation.state_equation import StateEquation
 
 MOST_BYTES = 8 * 2**30  # of all that is recorded, unless said
+LONGEST_S = LEAST_EXACT / float_info.epsilon  # up to there floats tell the times of a run
 MOST_STEPS = 1e11  # about a day of the fastest machine code
 _SEGMENT_BYTES, _SEGMENT_BYTES_PER_JOINT = 500, 100  # by estimate; the second is a quintic at its start and along it
 
@@ -38,10 +40,10 @@ def check_segments(setup: Setup) -> None:
             f"a run of {setup.duration_s:g} s takes {steps(setup):.3g} steps of step_s = {setup.nominal_step_s:g} s,"
             f" more than {MOST_STEPS:g}: take a longer step_s, or a shorter duration_s"
         )
-    if (told := ulp(setup.duration_s)) > LEAST_EXACT:
+    if setup.duration_s > LONGEST_S:
         raise QueryError(
-            f"a run of {setup.duration_s:g} s ends at a time that floats tell to {told:.1g} s only: take a shorter"
-            " duration_s"
+            f"a run of {setup.duration_s:g} s ends at a time that floats tell to {ulp(setup.duration_s):.1g} s only:"
+            f" take a shorter duration_s, {LONGEST_S:.2g} s at most"
         )
 
 

@@ -9,7 +9,7 @@ from typing import Any, Protocol, final, runtime_checkable
 import numpy as np
 
 from robot_dyn import former
-from robot_dyn.errors import QueryError, shown
+from robot_dyn.errors import QueryError, escaped, shown
 from robot_dyn.model.units import units
 from robot_dyn.simulation.error import ErrorEstimate
 from robot_dyn.simulation.event import Occurrence
@@ -258,7 +258,7 @@ class Trajectory(Value):
         lines.append(
             "time: " + ", ".join(f"{name} {spent:.2g} s" for name, spent in parts if spent >= _NOTICED or name == "run")
         )
-        return "\n".join(lines)
+        return "\n".join(map(escaped, lines))
 
 
 def _told(events: tuple[Occurrence, ...]) -> str:
