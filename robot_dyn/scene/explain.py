@@ -155,7 +155,7 @@ def _in_words(effects: Iterable[Effect], setup: Setup) -> Iterator[str]:
 def _numbers(part: Part, indent: str) -> Iterator[str]:
     unused = {*part.unused, *LINES} if isinstance(part, Control) else ()
     for key in type(part).model_fields:
-        if key != "kind" and getattr(part, key) is not None and key not in unused:
+        if key != "kind" and getattr(part, key) not in (None, ()) and key not in unused:
             yield f"{indent}{key} = {_shown(getattr(part, key))}  ({_source(part, key)})"
 
 

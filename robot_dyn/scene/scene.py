@@ -21,7 +21,7 @@ from robot_dyn.model.loading import load
 from robot_dyn.model.robot import Robot
 from robot_dyn.reading import read
 from robot_dyn.scene.complaint import complaint, located, where
-from robot_dyn.scene.control import AnyReference, Control, Hold, Sampled
+from robot_dyn.scene.control import AnyReference, Control, Hold, Sampled, ViaPoints
 from robot_dyn.scene.declared import Acting
 from robot_dyn.scene.effects import AnyEffect, Edit, kinds
 from robot_dyn.scene.own_effects import Makers, OwnEffect, check_makers, own_or
@@ -94,7 +94,7 @@ class Scene(Part):
         with placed("start"):
             q0, v0 = (per_joint(name, value, robot) for name, value in (("q", self.start.q), ("v", self.start.v)))
         reference = self.reference
-        if isinstance(reference, Sampled):
+        if isinstance(reference, Sampled | ViaPoints) and reference.file is not None:
             reference = reference.model_copy(update={"file": str(folder / reference.file)})
         with placed("control"):
             controller = None if self.control is None else self.control.build(described, robot, q0, reference)
