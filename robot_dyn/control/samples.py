@@ -36,7 +36,8 @@ class Samples(PiecewisePolynomial):
     Between samples it is a spline of degree 5 with four continuous derivatives (not-a-knot; through fewer than six
     samples the one polynomial of least degree) where positions alone are given; Hermite's polynomial of degree 3 with
     velocities, and of degree 5 with velocities and accelerations. Steps of integration end at its breaks, so that no
-    method loses its order there; they are no longer than the samples lie apart.
+    method loses its order there; they are no longer than the samples lie apart. It begins as fast as the spline does:
+    for a few way points from rest take `via_points`.
 
     Args:
         t: Increasing times, shape (m,), m at least 2, in [s].

@@ -15,6 +15,7 @@ from robot_dyn.model.units import unit
 from robot_dyn.simulation.creep import creeping
 from robot_dyn.simulation.levels import Level, levels
 from robot_dyn.simulation.observer import Observer, Visit
+from robot_dyn.simulation.reference_remarks import held, jumps
 from robot_dyn.simulation.remarks import Kind, Remark
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.state_equation import StateEquation
@@ -52,8 +53,8 @@ def remarks(
         visits = {level: visit for level, visit in observer.visits.items() if level.kind is kind}
         found += _passed(setup, visits, units)
     v = samples[:, len(units) : 2 * len(units)]
-    creeps = creeping(setup, t, v, units)
-    return (*found, *_coarse(setup, observer, t, samples, units), *_gaining(setup, t, power), *creeps)
+    found += [*_coarse(setup, observer, t, samples, units), *_gaining(setup, t, power), *creeping(setup, t, v, units)]
+    return (*found, *jumps(setup, units), *held(setup, observer.extremes, t, units))
 
 
 def _gaining(setup: Setup, t: np.ndarray, power: dict[str, np.ndarray]) -> Iterator[Remark]:
