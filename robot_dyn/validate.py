@@ -14,10 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.errors import NotFiniteError, QueryError, RobotDynError, nearest, shorten, shown
+from robot_dyn.errors import NotFiniteError, OverflowedError, QueryError, RobotDynError, nearest, shorten, shown
 
 Shape = tuple[int | str, ...]  # a length with a name, such as "n", may be any but 0
 Kind = type[RobotDynError]
+LEAST_EXACT = 1e-3  # [rad], [m] or [s]: to which rounding must leave positions and times known
 _F8 = np.dtype(np.float64)
 _PLAIN = {float, int, np.float64}  # most entries of lists; bool is another class
 
@@ -171,32 +172,60 @@ def is_moderate(x: np.ndarray, most: float = 1e100) -> bool:
 
 
 def joint_values(what: str, values: Any, joint_names: Sequence[str], arithmetic: Any = None) -> Any:
-    """Finite numbers of each joint, shape (..., n), not copied; errors as of `shaped` and `check_finite`."""
-    array = shaped(what, values, joint_names, arithmetic)
-    check_finite(what, array, joint_names, arithmetic)
-    return array
+    """Finite numbers of each joint, shape (..., n), not copied; errors as of `shaped` and `converted`."""
+    return converted(what, shaped(what, values, joint_names, arithmetic), joint_names, arithmetic)
 
 
 def shaped(what: str, values: Any, joint_names: Sequence[str], arithmetic: Any = None) -> Any:
-    """Numbers of each joint, finite or not, shape (..., n), not copied.
+    """Numbers of each joint, finite or not, shape (..., n), not copied; floats and integers keep their type.
 
     Args:
         what: What messages call them.
         values: The argument.
         joint_names: Of the n joints.
-        arithmetic: An `Arithmetic` whose numbers they become; float64 unless given.
+        arithmetic: An `Arithmetic`; float64 unless given.
 
     Raises:
         QueryError: If they are not real numbers, or have another shape.
     """
     n = len(joint_names)
+    floats = arithmetic is None or arithmetic.dtype.kind == "f"
     try:
-        array = float64(values) if arithmetic is None else arithmetic.asarray(values)
+        array = real(values) if floats else arithmetic.asarray(values)
     except (TypeError, ValueError, OverflowError) as found:
         raise QueryError(f"{what} must be an array of {n} real numbers, got {found}") from None
     if array.ndim == 0 or array.shape[-1] != n:
         raise QueryError(f"{what} must have shape ({n},) or (..., {n}), got {array.shape}")
     return array
+
+
+def converted(what: str, array: Any, joint_names: Sequence[str], arithmetic: Any = None) -> Any:
+    """An array of real numbers as numbers of an arithmetic, float64 unless given; not copied if it has them.
+
+    Raises:
+        NotFiniteError: If one is not finite; names the joint.
+        OverflowedError: If the position q or the time t is rounded so much that it is not known to LEAST_EXACT.
+    """
+    dtype = _F8 if arithmetic is None else arithmetic.dtype
+    numbers = array
+    if array.dtype != dtype:  # what is too large for the arithmetic becomes infinite
+        numbers = float64(array) if arithmetic is None else arithmetic.asarray(array)
+    check_finite(what, numbers, joint_names, arithmetic)
+    if numbers is not array and what in ("q", "t"):
+        _check_rounding(what, array, numbers, joint_names)
+    return numbers
+
+
+def _check_rounding(what: str, exact: np.ndarray, rounded: np.ndarray, joint_names: Sequence[str]) -> None:
+    """Raise OverflowedError where numbers were rounded and the arithmetic does not tell them to LEAST_EXACT."""
+    far = np.finfo(rounded.dtype).eps * np.abs(rounded) > LEAST_EXACT
+    if far.any() and (lost := far & (exact.astype(np.longdouble) != rounded)).any():
+        place = tuple(np.argwhere(lost)[0])
+        joint = "" if what == "t" else f" of joint {joint_names[place[-1]]!r}"
+        raise OverflowedError(
+            f"{what}{joint} is so large that {rounded.dtype} does not tell it to {LEAST_EXACT:g} rad, m or s, got"
+            f" {exact[place]}; take a smaller one, or numbers with more digits"
+        )
 
 
 def check_finite(what: str, array: Any, joint_names: Sequence[str], arithmetic: Any = None) -> None:

@@ -78,3 +78,12 @@ def test_the_lock_holds_what_is_declared() -> None:
     for asked in map(Requirement, [*PROJECT["project"]["dependencies"], *PROJECT["dependency-groups"]["dev"]]):
         (version,) = locked[normal(asked.name)].specifier
         assert asked.specifier.contains(version.version), asked
+
+
+def test_the_source_distribution_holds_the_whole_tree() -> None:
+    """Whoever unpacks it can run the tests, which read SECURITY.md and run make; hidden files are the repository's."""
+    ignored = {line.strip("/") for line in (ROOT / ".gitignore").read_text(encoding="utf-8").splitlines()}
+    tree = {path.name for path in ROOT.iterdir() if not path.name.startswith(".")} - ignored
+    tree = {name for name in tree if not name.endswith(".egg-info") and name not in ("__pycache__", "PKG-INFO")}
+    included = set(PROJECT["tool"]["hatch"]["build"]["targets"]["sdist"]["include"])
+    assert tree - {"pyproject.toml"} == included  # which is always in it

@@ -34,6 +34,18 @@ def test_dense_output_is_within_the_tolerance(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("atol", [0.0, 5e-324, 1e-200])
+def test_a_state_at_rest_starts_under_a_relative_tolerance_alone(name: str, atol: float) -> None:
+    """ÿ = −y from (1, 0): the error of an entry that is 0 is infinite on that scale, and the first step is no number.
+
+    Until 1 s no other entry passes 0; 100 tolerances bound the error as above.
+    """
+    solution = Adaptive(name, rtol=1e-8, atol=atol).solve(OSCILLATOR, 0.0, np.array([1.0, 0.0]), 1.0)
+    assert solution.status is Status.FINISHED
+    assert np.abs(solution(1.0) - [np.cos(1), -np.sin(1)]).max() < 1e-6
+
+
+@pytest.mark.parametrize("name", ALL)
 def test_evaluations_are_all_counted(name: str) -> None:
     """One a row: those of Jacobians come in batches."""
     rows: list[int] = []

@@ -51,7 +51,7 @@ def test_a_robot_a_plant_and_a_setup_give_the_same_run() -> None:
 def test_rollouts_take_the_same() -> None:
     setup, q0 = rd.Setup(PLANT, Q, V, **OPTIONS), Q + 0.1 * np.arange(6.0).reshape(3, 2)
     expected = rd.rollouts(setup, q0, record=("q", "v", "u"))
-    other = replace(setup, duration_s=9.0, integrator="DOP853", step_s=1e-3)
+    other = replace(setup, duration_s=9.0, integrator="DOP853", step_s=None)
     for made in (
         rd.rollouts(PLANT, q0, V, record=("q", "v", "u"), **OPTIONS),
         rd.rollouts(other, q0=q0, record=("q", "v", "u"), **OPTIONS),
@@ -85,6 +85,11 @@ def test_rollouts_take_the_same() -> None:
         (lambda: rd.rollouts(ARM, Q, integrator="sdirk_3"), "not by sdirk_3: give integrator='rk4' and its step_s"),
         (lambda: rd.rollouts(ARM, Q, estimate_error=True), "estimate_error has no effect, simulate one of the runs"),
         (lambda: rd.simulate(ARM, Q, step_s=2e-3), "step_s has no effect on auto, .* integrator='rk4'"),
+        (lambda: rd.simulate(ARM, Q, step_s=1e-3), "step_s has no effect on auto"),
+        (lambda: rd.simulate(rd.Setup(PLANT, Q), step_s=1e-3), "step_s has no effect on auto"),
+        (lambda: rd.simulate(ARM, Q, accuracy=1e-6, step_s=1e-3), "step_s has no effect on auto"),
+        (lambda: rd.Setup(PLANT, Q, integrator="DOP853", step_s=1e-3), "step_s has no effect on DOP853"),
+        (lambda: rd.simulate(ARM, Q, integrator="rk4", step_s="1 ms"), "step_s must be a real number"),
         (lambda: rd.simulate(ARM, Q, integrator="Rosenbrock", step_s=1e-3), "step_s has no effect on Rosenbrock"),
         (lambda: rd.rollouts("ur5", Q), r"dynamics: give a robot, such as rd.load\('ur5'\)"),
     ],
@@ -92,6 +97,12 @@ def test_rollouts_take_the_same() -> None:
 def test_what_means_nothing_is_refused(ask, message: str) -> None:
     with pytest.raises(rd.RobotDynError, match=message):
         ask()
+
+
+def test_a_step_that_was_not_given_is_one_millisecond_and_stands_in_the_way_of_no_other_method() -> None:
+    setup = rd.Setup(PLANT, Q, duration_s=0.05, integrator="rk4", estimate_error=False)
+    assert setup.taken_step_s == pytest.approx(1e-3, rel=1e-12)
+    assert rd.simulate(replace(setup, integrator="DOP853")).statistics.method == "DOP853"
 
 
 def test_former_names_of_arguments_and_records() -> None:

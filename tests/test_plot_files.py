@@ -45,6 +45,16 @@ def test_targets_that_cannot_be_written_are_refused(cart, tmp_path) -> None:
         save_plot(cart, tmp_path / "plot.png", "joints", dpi=50_000)
 
 
+@pytest.mark.parametrize("size", [1e308, 5e-324])
+def test_numbers_at_the_ends_of_floats_are_drawn_as_far_as_an_axis_reaches(cart, size: float) -> None:
+    """Of a run file that says that the run did not diverge; without a warning of NumPy's or Matplotlib's."""
+    sides = size * (-1.0) ** np.arange(len(cart.t))
+    ledger = replace(cart.ledger, kinetic=sides, work=dict.fromkeys(cart.ledger.work, -sides))
+    strange = replace(cart, q=np.full_like(cart.q, size), ledger=ledger)
+    assert isinstance(strange.summary, str)
+    plot(strange).canvas.draw()
+
+
 def test_a_run_without_samples_is_refused(cart) -> None:
     with pytest.raises(PlotError, match="no samples"):
         plot(replace(cart, t=cart.t[:0]))

@@ -291,7 +291,7 @@ def test_samples_are_read_from_the_table_of_a_run(tmp_path) -> None:
         "t,q a,accel a\n0,1,2\n1,2,3": "column 'accel a' is unknown",
         "q a\n0\n1": "no column t",
         "t,q c\n0,1\n1,2": "no column 'q a'",
-        "t,q a,q b\n0,1,2\n1,x,3": "row 2 is not 3 numbers",
+        "t,q a,q b\n0,1,2\n1,x,3": "line 3: column 'q a' holds 'x', not a number; correct it",
         "t,q a,q b\n0,1,2\n1,nan,3": "must be finite",
         "t,q a,q b\n0,1,2\n0,1,3": "must increase",
     }.items():

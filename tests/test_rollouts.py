@@ -13,6 +13,7 @@ from robot_dyn.compiled.symbolic import TraceError
 from robot_dyn.effects.effect import Active
 from robot_dyn.errors import QueryError
 from robot_dyn.simulation.machine import pool
+from tests.command import refusal, said
 
 ARM = rd.load("planar_2r")
 Q, V = np.array([0.4, -0.7]), np.array([0.3, 0.5])
@@ -240,6 +241,19 @@ def test_a_diverged_run_names_its_joint_its_time_and_what_to_do(method: str) -> 
     assert not runs.outcome(0).advice and f"run 1 diverged at t = {runs.ended[1]:g} s; " in runs.summary
 
 
+@pytest.mark.parametrize("command", [("replay", "--html", "page.html"), ("plot",)], ids=lambda command: command[0])
+def test_commands_say_what_a_file_of_rollouts_is(command: tuple[str, ...], tmp_path: Path, monkeypatch) -> None:
+    """Not that it is damaged; what they advise makes a file that they take."""
+    monkeypatch.chdir(tmp_path)
+    rd.save_rollouts(rd.rollouts(SETUP, starts(3), V), "runs.npz")
+    text = refusal((command[0], "runs.npz", *command[1:]))
+    assert "is a file of rollouts" in text and "simulate again" not in text
+    rd.save_run(rd.load_rollouts("runs.npz")[0], "run.npz")
+    assert "written: " in said(command[0], "run.npz", *command[1:])
+    with pytest.raises(rd.RobotDynError, match=r"is a file of one run, not of rollouts; rd.load_run reads it"):
+        rd.load_rollouts("run.npz")
+
+
 @pytest.mark.parametrize("record", [EVERYTHING, ("q", "v"), ("u",)])
 def test_rollouts_are_saved_and_read(record: tuple[str, ...], tmp_path: Path) -> None:
     """Bit for bit, and a file that was cut short, or is of another kind, is refused."""
@@ -252,7 +266,9 @@ def test_rollouts_are_saved_and_read(record: tuple[str, ...], tmp_path: Path) ->
         np.testing.assert_array_equal(x, y)
     assert back.setup is None and [back.outcome(i) for i in range(4)] == [runs.outcome(i) for i in range(4)]
     assert back.about["urdf"] == runs.about["urdf"] and back.params["kp"][3, 0] == 3.0
-    with pytest.raises(rd.RobotDynError, match="load_rollouts reads it"):
+    with pytest.raises(
+        rd.RobotDynError, match=r"is a file of rollouts, which are many runs; rd.load_rollouts reads it"
+    ):
         rd.load_run(path)
     path.write_bytes(path.read_bytes()[:-100])
     with pytest.raises(rd.RobotDynError, match="is not a complete run file"):
@@ -324,7 +340,7 @@ def test_runs_of_chosen_steps_are_those_of_simulate() -> None:
     """One after the other on each thread: gains and stops that differ, events included, to rounding of two engines."""
     stops = rd.joint_stops([-1.0, -1.0], [0.4, 1.0], 1e4)
     setup = replace(
-        SETUP, plant=rd.Plant(ARM, [rd.ViscousFriction(0.5), *stops]), integrator=rd.Adaptive(), step_s=1e-3,
+        SETUP, plant=rd.Plant(ARM, [rd.ViscousFriction(0.5), *stops]), integrator=rd.Adaptive(), step_s=None,
         record_period_s=0.05,
     )  # fmt: skip
     upper, kp, q0 = np.array([[0.4, 1.0], [0.3, 0.8], [0.35, 0.9]]), np.array([20.0, 30.0, 40.0]), starts(3)

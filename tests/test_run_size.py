@@ -28,8 +28,18 @@ def test_a_run_that_fits_no_memory_is_refused_before_it_starts(duration, method,
     """Some 1e11 numbers or ticks and more: an attempt to hold them would not return."""
     if isinstance(method, rd.Adaptive) and not options:
         return  # it keeps 1000 samples and chooses its steps
+    if isinstance(method, rd.Adaptive) and "controller" not in options and duration > 1e13:
+        remedy = "floats tell"  # with no record either
     with pytest.raises(QueryError, match=f"{remedy}.*shorter duration_s"):
         rd.simulate(ARM, q0=[0.1, 0.2], duration_s=duration, integrator=method, **options)
+
+
+@pytest.mark.parametrize("duration", [1e13, 1e154, 1e300, 1e308])
+def test_a_run_that_ends_at_a_time_that_floats_do_not_tell_is_refused(duration: float) -> None:
+    """A method that chooses its steps is bounded by no number of them; from 2^43 s floats lie 2 ms apart and more."""
+    for run in (rd.simulate, rd.rollouts, rd.work_precision):
+        with pytest.raises(QueryError, match=r"ends at a time that floats tell to .* take a shorter duration_s, "):
+            run(ARM, [0.1, 0.2], duration_s=duration)
 
 
 def test_a_batch_that_fits_no_memory_is_refused_before_it_starts() -> None:

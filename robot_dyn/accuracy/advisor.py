@@ -17,7 +17,7 @@ import numpy as np
 from robot_dyn.arithmetic import Array
 from robot_dyn.effects.joint_limit import JointStopSpring
 from robot_dyn.effects.plant import Plant
-from robot_dyn.errors import QueryError, RobotDynError
+from robot_dyn.errors import QueryError, RobotDynError, escaped
 from robot_dyn.integrate.methods import FIXED_STEP, method
 from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.simulation.options import Options, setup_of, starts, takes_options
@@ -70,7 +70,7 @@ class Advice:
     def text(self) -> str:
         """A line for each thing: the step, the period, the error, the fastest motion."""
         parts = [self._of_step(), *self._of_period(), self._of_error(), f"{self.fastest}, at {self.at:.3g} s"]
-        return "\n".join(parts)
+        return "\n".join(map(escaped, parts))
 
     def _of_step(self) -> str:
         limit = self.limits.get(self.method, inf)

@@ -102,7 +102,7 @@ def whole(setup: Setup) -> Setup:
 def recorded(setup: Setup, duration_s: float) -> Setup:
     """The setup up to that time, with some RECORDS records and no error estimate."""
     return replace(
-        setup, integrator=Adaptive(), step_s=Setup.step_s, estimate_error=False, accuracy=None, events=(),
+        setup, integrator=Adaptive(), step_s=None, estimate_error=False, accuracy=None, events=(),
         duration_s=duration_s, record_period_s=_record_period(setup, duration_s),
     )  # fmt: skip
 

@@ -49,7 +49,8 @@ def digits(robot: Robot, quantity: str, state: tuple[Any, ...]) -> float:
             f"digits of {asked.name} are asked with {', '.join(asked.arguments)}; got {len(state)} of them"
         )
     arrays = {
-        name: np.array(shaped(name, x, robot.joint_names)) for name, x in zip(asked.arguments, state, strict=True)
+        name: np.array(shaped(name, x, robot.joint_names), float)
+        for name, x in zip(asked.arguments, state, strict=True)
     }
     for name, x in arrays.items():
         if x.ndim != 1:

@@ -38,11 +38,13 @@ def certificate(made: Certificate) -> dict[str, Any]:
 def tables(made: Certificate) -> Iterator[Any]:
     """The sentence, a line for each quantity and road, and what it rests on."""
     yield made.sentence
+    yield ""
     yield (
-        f"\n{made.robot}: decimal digits that hold, against balls of {made.bits} bits: error of M_ij relative to"
-        " √(M_ii M_jj); of C, N and inverse\ndynamics to the largest entry in the units √M_ii of the joints, or its rms"
-        " at random states if that is more;\nof forward dynamics to M⁻¹τ, M⁻¹C v and M⁻¹N, in the norm of M"
+        f"{made.robot}: decimal digits that hold, against balls of {made.bits} bits: error of M_ij relative to"
+        " √(M_ii M_jj); of C, N and inverse"
     )
+    yield "dynamics to the largest entry in the units √M_ii of the joints, or its rms at random states if that is more;"
+    yield "of forward dynamics to M⁻¹τ, M⁻¹C v and M⁻¹N, in the norm of M"
     given = any(each.given is not None for each in made.held)
     table = Table(box=None, pad_edge=False, header_style="bold")
     shown = [heading for heading in _HEADINGS if given or heading != "given"]

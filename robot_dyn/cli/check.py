@@ -64,7 +64,9 @@ def check(
     documents = [_document(file, each, written.get(file)) for file, each in zip(files, made, strict=True)]
     say_json({"files": documents}) if as_json else say(*(line for each in documents for line in _lines(each)))
     if fix and not as_json:
-        tell("".join(f"{file}: nothing that can be repaired\n" for file in files if file not in written).rstrip())
+        for file in files:
+            if file not in written:
+                tell(f"{file}: nothing that can be repaired")
     if not all(each.ok for each in made):
         raise typer.Exit(1)
 

@@ -45,22 +45,24 @@ def demo(
     files = {end: arguments.output(folder / f"panda.{end}", kind, error, (), force) for end, kind, error in kinds}
     save(files["toml"], lambda stream: stream.write(starter("panda_computed_torque").encode()), SceneError)
     panda = rd.load("panda").with_(lock={"panda_finger_joint1": 0.0})
-    say(*report.demo_tables(panda), "\nThe same arm under computed torque, its model 20 % too heavy\n")
+    say(*report.demo_tables(panda), "", "The same arm under computed torque, its model 20 % too heavy", "")
     scene = rd.read_scene(files["toml"])
     run = rd.simulate(scene)
     if run.outcome.ending == "stopped":
-        say(run.summary)
+        say(*run.summary.split("\n"))
         raise typer.Exit(130)
     rd.save_run(run, files["npz"])
     rd.save_replay(run, files["html"])
     rd.save_plot(run, files["png"])
-    say(run.summary)
-    say(f"""
-Now look:
-  {files["html"]}  the replay: open it in a browser
-  {files["png"]}   its plots
-  {files["npz"]}   the run itself
-  {files["toml"]}  its scene: change it, then robot-dyn simulate {files["toml"]}""")
+    say(*run.summary.split("\n"))
+    say(
+        "",
+        "Now look:",
+        f"  {files['html']}  the replay: open it in a browser",
+        f"  {files['png']}   its plots",
+        f"  {files['npz']}   the run itself",
+        f"  {files['toml']}  its scene: change it, then robot-dyn simulate {files['toml']}",
+    )
     say(*_price(rd.Setup(rd.Plant(panda), scene.q0, engine="compiled")))
 
 
@@ -68,7 +70,8 @@ def _price(swing: rd.Setup) -> Iterator[str]:
     """What digits of a free swing cost, here and now."""
     from robot_dyn.cli import prices
 
-    yield f"\nWhat 1e-8 rad takes here: {swing.duration_s:g} s of the same arm, swinging freely"
+    yield ""
+    yield f"What 1e-8 rad takes here: {swing.duration_s:g} s of the same arm, swinging freely"
     try:
         with spending(_BUDGET_S) as spent:
             result = rd.work_precision(swing, methods=[_METHOD], budget_s=_BUDGET_S, repeats=5, on_progress=spent)

@@ -159,7 +159,7 @@ def advise(
     from robot_dyn.cli import prices
 
     advice = rd.advise(rd.read_scene(scene))
-    say_json(prices.advice(advice)) if as_json else say(advice.text)
+    say_json(prices.advice(advice)) if as_json else say(*advice.text.split("\n"))
     if not advice.stable:
         raise typer.Exit(1)
 

@@ -98,7 +98,8 @@ def cost(result: Cost) -> Document:
 def cost_tables(result: Cost) -> Iterator[Any]:
     """The sentence, and a line for each alternative, by what they are of."""
     yield result.sentence
-    yield f"\n{result.name}: {', '.join(result.acting) or 'no effects'}"
+    yield ""
+    yield f"{result.name}: {', '.join(result.acting) or 'no effects'}"
     table = Table(box=None, pad_edge=False, header_style="bold")
     for heading in ("per", "what", "first / second", "instructions", "ratio", "time", "ratio"):
         table.add_column(heading, justify="left" if heading in ("per", "what", "first / second") else "right")
@@ -132,7 +133,8 @@ def work_precision_tables(result: WorkPrecision) -> Iterator[Any]:
     """The sentence, what it rests on, and a line for each method."""
     of = result.reference
     yield result.sentence()
-    yield f"\n{result.name}: {', '.join(result.acting) or 'no effects'}"
+    yield ""
+    yield f"{result.name}: {', '.join(result.acting) or 'no effects'}"
     yield (
         f"error: largest |q − q_ref| over joints and {len(of.t) - 1} records in {of.horizon_s:g} s, in {result.unit};"
         f" reference: {of.methods[0]}, {of.error:.1e} from {of.methods[1]}: no error below that is believed"
@@ -167,7 +169,8 @@ def work_precision_tables(result: WorkPrecision) -> Iterator[Any]:
 def _beyond(result: WorkPrecision) -> Iterator[Any]:
     """Energy and the way back where no error can be measured, a line for each method."""
     returns = any(each.returned is not None for each in result.beyond)
-    yield f"\nover all of {result.duration_s:g} s, where no error can be measured, the finest runs:"
+    yield ""
+    yield f"over all of {result.duration_s:g} s, where no error can be measured, the finest runs:"
     table = Table(box=None, pad_edge=False, header_style="bold")
     for heading in ("method", "setting", "energy", *["there and back"] * returns):
         table.add_column(heading, no_wrap=True, justify="left" if heading == "method" else "right")

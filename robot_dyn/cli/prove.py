@@ -28,7 +28,7 @@ def prove(
     setup = rd.read_scene(scene)
     with bar(setup.duration_s if until is None else until) as advance:
         made = rd.prove(setup, until, bits, budget_s=budget, on_progress=advance)
-    say_json(document(made)) if as_json else say(made.summary)
+    say_json(document(made)) if as_json else say(*made.summary.split("\n"))
     if not made.proven:
         raise typer.Exit(1)
 

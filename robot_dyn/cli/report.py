@@ -221,11 +221,13 @@ def query_tables(answer: Document) -> Iterator[Any]:
     of_C = {"N m": "N m s/rad", "N": "N s/m"}.get(force, "rows times v: N m, N")
     meanings = (("M", "mass matrix", of_M), ("C", "Coriolis matrix", of_C), ("N", "gravity and effects", force))
     for name, meaning, of_entries in meanings:
-        yield f"\n{name}, {meaning} [{of_entries}]:"
+        yield ""
+        yield f"{name}, {meaning} [{of_entries}]:"
         rows = answer[name] if name != "N" else [[x] for x in answer[name]]
         yield from (f"  {_row(row)}  {joint}" for row, joint in zip(rows, joints, strict=True))
     if not answer["gravity_acts"]:
-        yield f"\n{no_torque(tuple(answer['gravity']))} without effects"
+        yield ""
+        yield f"{no_torque(tuple(answer['gravity']))} without effects"
     yield from _held_table(answer)
     if "why" in answer:
         yield from _why_tables(answer["why"])
@@ -235,7 +237,8 @@ def _held_table(answer: Document) -> Iterator[Any]:
     """The joints that are held, each with its load and what it would bear."""
     if not answer["held"]:
         return
-    yield f"\nheld at rest [{units('tau', answer['types'])}]:"
+    yield ""
+    yield f"held at rest [{units('tau', answer['types'])}]:"
     table = _table("joint", "from", "load", "slides below", "slides above", "margin")
     for each in answer["held"]:
         numbers = ("—" if each[key] is None else f"{each[key]:.6g}" for key in ("load", "least", "most", "margin"))
@@ -244,7 +247,8 @@ def _held_table(answer: Document) -> Iterator[Any]:
 
 
 def _why_tables(why: Document) -> Iterator[Any]:
-    yield f"\nwhy {why['joint']} needs {why['tau']:.6g} {why['unit']}:"
+    yield ""
+    yield f"why {why['joint']} needs {why['tau']:.6g} {why['unit']}:"
     table = _table("from", "inertia", "Coriolis", "gravity", "effect", "sum")
     rows = [(s["source"], s["inertia"], s["coriolis"], s["gravity"], 0.0) for s in why["shares"]]
     named = {effect: ", ".join((effect, *numbers)) for effect, numbers in why["coefficients"].items()}
@@ -292,7 +296,9 @@ def demo_tables(robot: Robot) -> Iterator[Any]:
     """A robot, its dynamics at a general state, and the cross-check."""
     yield from info_tables(robot)
     q, v, a = np.round(np.random.default_rng(7).uniform(-1, 1, (3, robot.n)), 2)
-    yield "\nM(q) a + C(q, v) v + N(q) = tau at a general state\n"
+    yield ""
+    yield "M(q) a + C(q, v) v + N(q) = tau at a general state"
+    yield ""
     yield from query_tables(query(Plant(robot), q, v, a, None))
     yield ""
     yield from comparison_tables([(robot.name, compare(robot, samples=20))], {})

@@ -43,7 +43,7 @@ def simulate(
     try:  # the files first: a terminal or pipe may be gone
         written = [path for path in (kept and rd.save_run(run, kept), table and export_csv(run, table)) if path]
     finally:
-        say_json(report.run(run)) if as_json else say(run.summary)
+        say_json(report.run(run)) if as_json else say(*run.summary.split("\n"))
     for path in written:
         tell(f"written: {path}")
     if run.outcome.ending != "finished":

@@ -99,7 +99,8 @@ def _tables(made: rd.Stress) -> Iterator[Any]:
         ("random runs: errors of q in rad or m", RUNS, made.runs),
     ):
         if findings:
-            yield f"\n{title}"
+            yield ""
+            yield title
             table = Table(box=None, pad_edge=False, header_style="bold")
             for heading in headings:
                 table.add_column(heading)

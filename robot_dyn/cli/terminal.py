@@ -6,7 +6,6 @@ import json
 import os
 import re
 import sys
-from collections.abc import Iterable
 from typing import Any
 
 from robot_dyn.errors import RobotDynError, escaped
@@ -32,7 +31,7 @@ def open_streams() -> None:
 
 
 def say(*renderables: Any) -> None:
-    """Print texts, whose lines stay lines, and tables.
+    """Print tables, and texts of one line each.
 
     A reader of a pipe that has seen enough is not an error: the rest is dropped.
 
@@ -40,17 +39,16 @@ def say(*renderables: Any) -> None:
         OutputError: If standard output cannot be written.
     """
     from rich.console import Console
-    from rich.segment import Segment
+    from rich.text import Text
 
     class Safe(Console):
-        def render(self, *args: Any, **options: Any) -> Iterable[Segment]:
-            for segment in super().render(*args, **options):
-                yield segment if segment.control else segment._replace(text=_lines(segment.text))
+        def render_str(self, text: str, **options: Any) -> Text:  # a cell of a table, to measure and to print
+            return super().render_str(escaped(text), **options)
 
     watched = sys.stdout.isatty()
     console = Safe(highlight=False, markup=False, emoji=False, width=None if watched else 1000)  # a pipe has no edge
     for each in renderables:
-        put(f"{_lines(each)}\n") if isinstance(each, str) else _guarded(lambda each=each: console.print(each))
+        put(f"{escaped(each)}\n") if isinstance(each, str) else _guarded(lambda each=each: console.print(each))
 
 
 def put(text: str) -> None:
@@ -98,10 +96,6 @@ def _drop(stream: Any) -> None:
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, stream.fileno())
     os.close(nowhere)
-
-
-def _lines(text: str) -> str:
-    return "\n".join(map(escaped, text.split("\n")))
 
 
 def _json_escaped(letter: str) -> str:

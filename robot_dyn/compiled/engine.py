@@ -22,10 +22,10 @@ from robot_dyn.compiled.self_check import STATES, SelfCheck
 from robot_dyn.compiled.status import Status
 from robot_dyn.compiled.store import Store
 from robot_dyn.compiled.trace import Traced
-from robot_dyn.errors import RobotDynWarning
+from robot_dyn.errors import QueryError, RobotDynWarning
 from robot_dyn.model.batch import DoubtError, answered
 from robot_dyn.model.quantity import Quantity
-from robot_dyn.validate import shaped, times
+from robot_dyn.validate import converted, shaped, times
 
 # Measured on chains: forward dynamics of 64 joints, 48 875 instructions, takes 8 s to compile; a batch is then 13 times
 # as fast as Pinocchio, one state from Python twice. The time grows as the count: above this, a quarter of a minute.
@@ -164,7 +164,11 @@ class Engine:
             t = arguments[0]
             if type(t) is not np.ndarray or t.dtype.kind not in "fiu" or t.shape != states:
                 return None
-            arguments = (t.astype(self.dtype)[:, None], *arguments[1:])
+            try:
+                t = converted("t", t[:, None], self.joint_names, Float(np.dtype(self.dtype)))
+            except QueryError:
+                return None
+            arguments = (t, *arguments[1:])
         try:
             if all(type(x) is np.ndarray and x.flags.aligned for x in arguments):
                 y = np.empty(

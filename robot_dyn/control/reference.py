@@ -22,6 +22,7 @@ from robot_dyn.values import Value
 
 # values given at each end of a piece, by kind of spline
 _DERIVATIVES = {"cubic": 2, "quintic": 3}
+_MOST_POINTS = 2000  # of a spline: their equations are solved together, in 200 MB
 _FACTORIALS = np.array([factorial(j) for j in range(6)], dtype=float)
 # The inverse of [j!/(j − r)!] with r < m ≤ j < 2m: from what the low half leaves at s = 1 to the high half.
 _UPPER = {
@@ -188,7 +189,7 @@ def via_points(
         v1: Velocity at the end, likewise.
 
     Raises:
-        ControlError: If times do not increase, shapes do not match or the kind is unknown.
+        ControlError: If times do not increase, shapes do not match, the kind is unknown or points are over 2000.
 
     Source: de Boor, A Practical Guide to Splines, 2001; Siciliano et al. 2009, sec. 4.2.2.
     """
@@ -196,6 +197,8 @@ def via_points(
     m, points = _DERIVATIVES[kind], numbers("points", points, ("k + 1", "n"))
     if len(points) < 2:
         raise ControlError(f"points must be 2 at least, got {len(points)}; to rest at one, hold(q)")
+    if len(points) > _MOST_POINTS:
+        raise ControlError(f"points must be {_MOST_POINTS} at most, got {len(points)}; rd.Samples takes more")
     t = increasing("times_s", times_s, len(points))
     unit = (t[-1] - t[0]) / (len(t) - 1)  # of time: derivatives of one size keep the solve well conditioned
     shape = points.shape[1:]

@@ -36,7 +36,8 @@ class Samples(PiecewisePolynomial):
     Between samples it is a spline of degree 5 with four continuous derivatives (not-a-knot; through fewer than six
     samples the one polynomial of least degree) where positions alone are given; Hermite's polynomial of degree 3 with
     velocities, and of degree 5 with velocities and accelerations. Steps of integration end at its breaks, so that no
-    method loses its order there; they are no longer than the samples lie apart.
+    method loses its order there; they are no longer than the samples lie apart. It begins as fast as the spline does:
+    for a few way points from rest take `via_points`.
 
     Args:
         t: Increasing times, shape (m,), m at least 2, in [s].
@@ -78,27 +79,36 @@ class Samples(PiecewisePolynomial):
         Raises:
             ControlError: If it cannot be read, a column or a joint is unknown or missing, or an entry is not a number.
         """
-        if joint_names is not None:
-            for name in instance("joint_names", joint_names, list | tuple, _NAMES, error=ControlError):
-                instance("joint_names", name, str, _NAMES, error=ControlError)
-        data = read(path, MAX_BYTES, ControlError, "give a CSV file with columns t, q …")
+        table = read_table(path, joint_names)
         try:
-            lines = csv.reader(data.decode("utf-8-sig").splitlines(), strict=True)
-            heads = next(lines, [])
-            rows = [line for line in lines if line]
-        except (UnicodeDecodeError, csv.Error) as error:
-            raise ControlError(f"{path}: is not a CSV file in UTF-8 ({error}); write it again") from None
-        columns = _columns(path, heads, joint_names)
-        try:
-            table = np.array([[float(line[i]) for i in range(len(heads))] for line in rows]).reshape(-1, len(heads))
-        except (ValueError, IndexError):
-            wrong = next(k for k, line in enumerate(rows) if len(line) != len(heads) or not _are_numbers(line))
-            raise ControlError(f"{path}: row {wrong + 1} is not {len(heads)} numbers; correct it") from None
-        try:
-            given = {name: table[:, at] for name, at in columns.items()}
-            return cls(given["t"][:, 0], **{name: x for name, x in given.items() if name != "t"})
+            return cls(**table)
         except ControlError as error:
             raise ControlError(f"{path}: {shorten(error, 200)}") from None
+
+
+def read_table(path: str | Path, joint_names: Sequence[str] | None) -> dict[str, np.ndarray]:
+    """The columns of a CSV file as of `Samples.from_csv`: t (m,), and q, and if given v and a, (m, n).
+
+    Raises:
+        ControlError: If it cannot be read, a column or a joint is unknown or missing, or an entry is not a number.
+    """
+    if joint_names is not None:
+        for name in instance("joint_names", joint_names, list | tuple, _NAMES, error=ControlError):
+            instance("joint_names", name, str, _NAMES, error=ControlError)
+    data = read(path, MAX_BYTES, ControlError, "give a CSV file with columns t, q …")
+    try:
+        lines = csv.reader(data.decode("utf-8-sig").splitlines(), strict=True)
+        heads = next(lines, [])
+        rows = [(lines.line_num, line) for line in lines if line]
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise ControlError(f"{path}: is not a CSV file in UTF-8 ({error}); write it again") from None
+    columns = _columns(path, heads, joint_names)
+    try:
+        table = np.array([list(map(float, line)) for _, line in rows]).reshape(-1, len(heads))
+    except ValueError:  # no number, or a ragged list
+        raise ControlError(f"{path}: {_wrong(heads, rows)}; correct it") from None
+    given = {name: table[:, at] for name, at in columns.items()}
+    return given | {"t": given["t"][:, 0]}
 
 
 def _spline(t: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -140,8 +150,14 @@ def _columns(path: str | Path, heads: list[str], joint_names: Sequence[str] | No
     }
 
 
-def _are_numbers(line: list[str]) -> bool:
-    try:
-        return bool([float(x) for x in line])
-    except ValueError:
-        return False
+def _wrong(heads: list[str], rows: list[tuple[int, list[str]]]) -> str:
+    """The first line that is not a number for each column."""
+    for number, line in rows:
+        if len(line) != len(heads):
+            return f"line {number} has {len(line)} entries for {len(heads)} columns"
+        for head, text in zip(heads, line, strict=True):
+            try:
+                float(text)
+            except ValueError:
+                return f"line {number}: column {shorten(head)!r} holds {shorten(text)!r}, not a number"
+    return "its lines have different numbers of entries"

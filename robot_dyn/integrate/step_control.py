@@ -94,14 +94,15 @@ def first_step(
     k, rtol, atol = work.error.shape[1], control[At.RTOL], control[At.ATOL]
     x, rate = y[:k], work.K[0][:k]
     size, slope = norm(x, x, x, rtol, atol), norm(rate, x, x, rtol, atol)
-    h = 1e-6 if size < 1e-5 or slope < 1e-5 else 0.01 * size / slope
+    known = size >= 1e-5 and 1e-5 <= slope < np.inf  # inf where an entry is 0 and atol is (nearly) 0
+    h = 0.01 * size / slope if known else 1e-6
     h = min(h, abs(end - t), control[At.LONGEST])
     signed = h if end >= t else -h
     combination(after, y, signed, _ONE, work.K, 1)
     evaluate(f.rate, t + signed, after, p, own, work.last)
     subtract(work.last, work.K[0])
     steepest = max(slope, norm(work.last[:k], x, x, rtol, atol) / h)
-    other = (0.01 / steepest) ** control[At.EXPONENT] if steepest > 1e-15 else max(1e-6, 1e-3 * h)
+    other = (0.01 / steepest) ** control[At.EXPONENT] if 1e-15 < steepest < np.inf else max(1e-6, 1e-3 * h)
     control[At.NEXT] = min(100 * h, other)
     return 1
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import FLOAT64, Arithmetic, Array
 from robot_dyn.errors import NotFiniteError, OverflowedError, QueryError, RobotDynError, SingularError, shown
-from robot_dyn.validate import check_batches, check_finite
+from robot_dyn.validate import check_batches, converted
 
 _REFUSALS = (NotFiniteError, OverflowedError, SingularError)  # of a state; all else is wrong with the query
 
@@ -33,7 +33,7 @@ def answered(
 
     Args:
         equation: (x₁, x₂, …) → answers, for one state (n,) or a batch; may raise SingularError or OverflowedError.
-        arrays: Its arguments by name, each (..., n), or (..., 1) for the time t.
+        arrays: Its arguments by name, each (..., n), or (..., 1) for the time t; floats and integers of any type.
         shape: Of the answer for one state.
         joint_names: For messages.
         errors: "raise", or "nan" to answer NaN where a state has no answer.
@@ -41,7 +41,7 @@ def answered(
 
     Raises:
         QueryError: If the batch axes do not match, or `errors` is neither; NotFiniteError if an argument is not finite.
-        OverflowedError: If the answer of a state is not finite.
+        OverflowedError: If the answer of a state is not finite, or the arithmetic does not hold its q or t.
         SingularError: Where forward dynamics has no answer. In a batch each names the row.
     """
     if errors.__class__ is not str or errors not in ("raise", "nan"):
@@ -49,9 +49,7 @@ def answered(
     batch = check_batches(**arrays)
 
     def attempt(*given: Array) -> Array:
-        for name, x in zip(arrays, given, strict=True):
-            check_finite(name, x, joint_names, arithmetic)
-        answer = equation(*given)
+        answer = equation(*(converted(*each, joint_names, arithmetic) for each in zip(arrays, given, strict=True)))
         if (
             isinstance(answer, np.ndarray) and answer.dtype == object
         ):  # entries that are 0 or 1 whatever the state are integers still

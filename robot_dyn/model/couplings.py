@@ -11,9 +11,8 @@ import numpy as np
 
 from robot_dyn.arithmetic import Arithmetic, Array
 from robot_dyn.errors import OverflowedError
+from robot_dyn.validate import LEAST_EXACT
 from robot_dyn.values import Value
-
-LEAST_EXACT = 1e-3  # [rad] or [m], of joints that follow others
 
 
 @final

@@ -12,7 +12,7 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.arithmetic import Array, Ball
-from robot_dyn.errors import QueryError
+from robot_dyn.errors import QueryError, escaped
 from robot_dyn.proof.node import Node, on_the_way
 from robot_dyn.proof.packed import Packed, unpacked
 from robot_dyn.proof.start import numbers_of
@@ -162,7 +162,7 @@ class Proof(Value):
             lines.append(f"Not proven beyond t = {self.until_s!r} s, because {self.why_not}.")
         lines += ["Which numbers are meant:", *(f"  {each}" for each in self.assumed)]
         lines += [f"Trusted: {'; '.join(self.trusted)}.", f"{len(self.nodes) - 1} steps, balls of {self.bits} bits"]
-        return "\n".join(lines)
+        return "\n".join(map(escaped, lines))
 
     @property
     def _claim(self) -> str:

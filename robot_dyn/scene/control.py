@@ -16,7 +16,7 @@ from robot_dyn.control.loop import LINES, Loop
 from robot_dyn.control.multirate import Multirate
 from robot_dyn.control.operational_space import OperationalSpace
 from robot_dyn.control.reference import PiecewisePolynomial, hold, numbers, quintic, via_points
-from robot_dyn.control.samples import Samples
+from robot_dyn.control.samples import Samples, read_table
 from robot_dyn.effects.actuator import stated_efforts
 from robot_dyn.errors import SceneError
 from robot_dyn.model.robot import Robot
@@ -64,22 +64,44 @@ class Quintic(Part):
 
 
 class ViaPoints(Part):
-    """A spline from the start, at rest, through points; at rest at the end unless v_end is given."""
+    """A spline from the start, at rest, through points; at rest at the end unless v_end is given.
+
+    The points are those of times_s and points, or of a file; up to 2000 of them.
+    """
 
     kind: Literal["via_points"]
-    times_s: list[Positive]
+    times_s: tuple[Positive, ...] = ()
     """Time of each point."""
-    points: list[list[Number]]
+    points: tuple[list[Number], ...] = ()
     """Position at each time, a list of n numbers, in rad, or m for a prismatic joint."""
+    file: str | None = None
+    """Path of a CSV file with columns t and q of each joint, from the folder of the scene."""
     v_end: PerJoint = 0.0
     """Velocity at the last point."""
 
     def build(self, robot: Robot, q0: np.ndarray, frame: str | None) -> PiecewisePolynomial:
         """The reference."""
-        if len(self.times_s) != len(self.points):
-            raise SceneError(f"reference: {len(self.times_s)} times_s for {len(self.points)} points; give one for each")
+        times, points = self._given(robot)
+        if len(times) != len(points):
+            raise SceneError(f"reference: {len(times)} times_s for {len(points)} points; give one for each")
         v1 = per_joint("v_end", self.v_end, robot)
-        return via_points([0.0, *self.times_s], [q0.tolist(), *self.points], v1=v1)
+        if len(times) and times[0] == 0:
+            return via_points(times, points, v1=v1)
+        return via_points([0.0, *times], [q0.tolist(), *points], v1=v1)
+
+    def _given(self, robot: Robot) -> tuple[list[float], list[list[float]]]:
+        """Times and points, of the scene or of the file."""
+        if (self.file is None) != bool(self.times_s or self.points):
+            raise SceneError("reference: give times_s and points, or a file of both")
+        if self.file is None:
+            return list(self.times_s), list(self.points)
+        table = read_table(self.file, robot.joint_names)
+        if more := table.keys() - {"t", "q"}:
+            raise SceneError(f"{self.file}: columns of {min(more)} are for kind = 'samples'; leave them out")
+        t = table["t"]
+        if len(t) and t[0] < 0:
+            raise SceneError(f"{self.file}: the first time is {t[0]:g} s; start at 0 s or later")
+        return t.tolist(), table["q"].tolist()
 
 
 class Sampled(Part):

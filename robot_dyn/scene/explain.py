@@ -45,34 +45,40 @@ def explain(scene: Scene, setup: Setup) -> Iterator[str]:
     N = f"−{N}" if not gravity and forces else N
     n, names = setup.plant.dynamics.n, setup.plant.dynamics.joint_names
     yield f"{scene.robot}: {n} joint{'s' if n > 1 else ''}, {', '.join(names)}"
-    yield "\n    M(q) a + C(q, v) v + N = u"
+    yield ""
+    yield "    M(q) a + C(q, v) v + N = u"
     yield f"    N = {N}"
     slow = "" if scene.control is None or scene.control.slow is None else " + u_slow"
     yield f"    u = {'0' if scene.control is None else LAWS[scene.control.kind].removeprefix('u = ')}{slow}"
-    yield "\neffects:" if scene.effect else "\neffects: none"
+    yield ""
+    yield "effects:" if scene.effect else "effects: none"
     made = iter(setup.plant.effects)
     for effect in scene.effect:
         yield f"  {effect.kind}: {(_TERMS | _EDITS)[effect.kind]}"
         yield from _numbers(effect, "    ")
         if isinstance(effect, Acting):
             yield from _in_words(islice(made, len(effect.build(setup.plant.dynamics))), setup)  # pyright: ignore
-    yield "\nnot simulated, since the scene does not name it:"
+    yield ""
+    yield "not simulated, since the scene does not name it:"
     missing = [kind for kind in (*_EDITS, *_TERMS) if kind not in named]
     yield f"  {', '.join(missing)}"
     if scene.control is not None and (ideal := _ideal(scene.control)):
         yield f"  of the control: {', '.join(ideal)}"
     if scene.control is not None:
         every = f"every {scene.control.period_s:g} s, constant between" if scene.control.period_s else "continuously"
-        yield f"\ncontrol: {scene.control.kind}, {every}"
+        yield ""
+        yield f"control: {scene.control.kind}, {every}"
         yield from _numbers(scene.control, "  ")
         yield from _blocks(scene.control)
         yield f"reference: {scene.reference.kind}"
         yield from _numbers(scene.reference, "  ")
     if scene.accuracy is not None:
-        yield f"\nmethod: chosen for an error of q of at most {scene.accuracy:g}, {scene.duration_s:g} s"
+        yield ""
+        yield f"method: chosen for an error of q of at most {scene.accuracy:g}, {scene.duration_s:g} s"
         used = ("accuracy",)
     else:
-        yield f"\nmethod: {scene.method}, {scene.duration_s:g} s"
+        yield ""
+        yield f"method: {scene.method}, {scene.duration_s:g} s"
         used = ("rtol", "atol") if scene.method in ADAPTIVE else ("step_s",)
     for key in (*used, "record_period_s", "estimate_error", "engine"):
         yield f"  {key} = {getattr(scene, key)}  ({_source(scene, key)})"
@@ -81,7 +87,8 @@ def explain(scene: Scene, setup: Setup) -> Iterator[str]:
     yield from _machine_code(setup)
     if scene.control is not None and scene.control.period_s:
         yield from _of_tick(scene.control, setup)
-    yield f"\nthe file of the robot: {setup.plant.dynamics.description.source}"  # pyright: ignore[reportAttributeAccessIssue]
+    yield ""
+    yield f"the file of the robot: {setup.plant.dynamics.description.source}"  # pyright: ignore[reportAttributeAccessIssue]
 
 
 def _machine_code(setup: Setup) -> Iterator[str]:
@@ -92,11 +99,13 @@ def _machine_code(setup: Setup) -> Iterator[str]:
         compiled: Any = Compiled(StateEquation(setup.plant, None).in_a_mode.plant)
         by_effect, which = compiled.instructions_by_effect, compiled.engine.traces["forward_dynamics"]
     except RobotDynError as error:
-        yield f"\nmachine code: none, {error}"
+        yield ""
+        yield f"machine code: none, {error}"
         return
     whole = which.counts[which.formulation]
     parts = ", ".join(f"{name} {count}" for name, count in by_effect.items()) or "none"
-    yield f"\nmachine code of the acceleration, by the {which.formulation}: {whole} instructions; of effects: {parts}"
+    yield ""
+    yield f"machine code of the acceleration, by the {which.formulation}: {whole} instructions; of effects: {parts}"
     if edits := edits_of_machine_code(setup):
         yield f"  edited there: {edits['right_angles']}"
 
@@ -146,7 +155,7 @@ def _in_words(effects: Iterable[Effect], setup: Setup) -> Iterator[str]:
 def _numbers(part: Part, indent: str) -> Iterator[str]:
     unused = {*part.unused, *LINES} if isinstance(part, Control) else ()
     for key in type(part).model_fields:
-        if key != "kind" and getattr(part, key) is not None and key not in unused:
+        if key != "kind" and getattr(part, key) not in (None, ()) and key not in unused:
             yield f"{indent}{key} = {_shown(getattr(part, key))}  ({_source(part, key)})"
 
 

@@ -21,12 +21,12 @@ from robot_dyn.model.loading import load
 from robot_dyn.model.robot import Robot
 from robot_dyn.reading import read
 from robot_dyn.scene.complaint import complaint, located, where
-from robot_dyn.scene.control import AnyReference, Control, Hold, Sampled
+from robot_dyn.scene.control import AnyReference, Control, Hold, Sampled, ViaPoints
 from robot_dyn.scene.declared import Acting
 from robot_dyn.scene.effects import AnyEffect, Edit, kinds
 from robot_dyn.scene.own_effects import Makers, OwnEffect, check_makers, own_or
 from robot_dyn.scene.schema import NotNegative, Part, PerJoint, PlacedError, Positive, Truth, per_joint, placed
-from robot_dyn.simulation.setup import Setup
+from robot_dyn.simulation.setup import STEP_S, Setup
 
 MAX_BYTES = 2**20
 SCENE = Kind("a scene", ".toml")
@@ -50,7 +50,7 @@ class Scene(Part):
     """Length of the run."""
     method: str = Setup.integrator
     """Integrator."""
-    step_s: Positive = Setup.step_s
+    step_s: Positive = STEP_S
     """Step of a method with a fixed step."""
     rtol: Positive = Adaptive.rtol
     """Relative tolerance of an adaptive method."""
@@ -94,13 +94,14 @@ class Scene(Part):
         with placed("start"):
             q0, v0 = (per_joint(name, value, robot) for name, value in (("q", self.start.q), ("v", self.start.v)))
         reference = self.reference
-        if isinstance(reference, Sampled):
+        if isinstance(reference, Sampled | ViaPoints) and reference.file is not None:
             reference = reference.model_copy(update={"file": str(folder / reference.file)})
         with placed("control"):
             controller = None if self.control is None else self.control.build(described, robot, q0, reference)
+        step_s = self.step_s if "step_s" in self.model_fields_set else None
         return Setup(
             Plant(robot, acting), q0, v0, self.duration_s, controller, self.integrator(),
-            self.step_s, self.record_period_s, self.estimate_error, about, self.engine,
+            step_s, self.record_period_s, self.estimate_error, about, self.engine,
             accuracy=self.accuracy,
         )  # fmt: skip
 

@@ -31,7 +31,7 @@ from robot_dyn.simulation.plan import plan_of
 from robot_dyn.simulation.record import MOST_SHARED, Path, Record
 from robot_dyn.simulation.remarks import Kind, Remark
 from robot_dyn.simulation.schedule import nodes
-from robot_dyn.simulation.setup import Setup
+from robot_dyn.simulation.setup import STEP_S, Setup
 from robot_dyn.simulation.size import samples as most_samples
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.state_functions import interpreted, system
@@ -345,7 +345,7 @@ class EventRun(Followed):
             remedy = "soft stops and regularised friction" if alone else "integrator='time_stepping' and a step_s"
             raise DivergedError(t, f"events accumulate at t = {t}: {what}; take {remedy}")
         velocity = float(np.abs(y[self.rules.n : 2 * self.rules.n]).max())
-        remedy = f"made by time stepping with steps of {Setup.step_s} s, without an estimate of its error"
+        remedy = f"made by time stepping with steps of {STEP_S} s, without an estimate of its error"
         raise AccumulationError(
             Remark(
                 Kind.ACCUMULATE, joint, "v", first, t - first, t, velocity, None, f"{what}, at t = {t:.6g} s", remedy

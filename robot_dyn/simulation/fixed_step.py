@@ -86,7 +86,7 @@ class FixedStep(Followed):
             np.empty((states, m + 2)), *shown,
         )  # fmt: skip
         self.now, self.stop = np.zeros(len(Now), np.int64), np.zeros(1, np.int64)
-        self.clock = np.array([0.0 if pace == 1 else inf, setup.record_period_s, ON_STEP * setup.step_s])
+        self.clock = np.array([0.0 if pace == 1 else inf, setup.record_period_s, ON_STEP * setup.nominal_step_s])
 
     def _shared(self, pace: Fraction) -> tuple[int, int]:
         """Steps between states that companions share, and how many of these to one that is kept."""

@@ -42,11 +42,13 @@ class Ledger(Value):
         read_only(self)
 
     @property
+    @np.errstate(all="ignore")
     def energy(self) -> np.ndarray:
         """E = K + Σ potentials."""
         return self.kinetic + self.potential
 
     @property
+    @np.errstate(all="ignore")  # a run that diverged may have energies that overflow
     def residual(self) -> np.ndarray:
         """E(t) − E(0) − Σ W_k(t): energy that nothing accounts for, the error of the run in energy."""
         return self.energy - self.energy[0] - sum(self.work.values(), start=np.zeros_like(self.kinetic))
@@ -57,6 +59,7 @@ class Ledger(Value):
         return not np.isnan(self.residual).all()
 
     @property
+    @np.errstate(all="ignore")
     def exchanged(self) -> float:
         """Energy exchanged: max K + Σ ∫ |P_k|, K over steps and samples, the integrals over the samples."""
         moved = sum(float(np.nansum(np.abs(np.diff(work)))) for work in self.work.values())

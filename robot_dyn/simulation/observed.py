@@ -17,6 +17,7 @@ from robot_dyn.simulation.creep import creeping
 from robot_dyn.simulation.levels import Level, Levels, levels
 from robot_dyn.simulation.observation import Observed, Visit
 from robot_dyn.simulation.observer import Observer
+from robot_dyn.simulation.reference_remarks import held, jumps
 from robot_dyn.simulation.remarks import Kind, Remark
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.state_equation import StateEquation
@@ -63,7 +64,7 @@ def remarks(
     )
     return (
         *of_steps(*of_run), *_coarse(setup, observer, t, samples, units), *_gaining(setup, t, power),
-        *creeping(setup, t, v, units),
+        *creeping(setup, t, v, units), *jumps(setup, units), *held(setup, of.extremes[0], t, units),
     )  # fmt: skip
 
 

@@ -25,7 +25,7 @@ class Options(TypedDict, total=False):
     duration_s: float
     controller: Any
     integrator: Any
-    step_s: float
+    step_s: float | None
     record_period_s: float
     estimate_error: bool
     about: dict[str, str]
@@ -67,7 +67,7 @@ def setup_of(caller: str, what: Setup | Plant | Dynamics, options: Mapping[str, 
     if "integrator" in options and (method := as_method(options["integrator"])).controls_error:
         if "step_s" in options:
             raise QueryError(no_step(method.name))
-        options = {"step_s": Setup.step_s, **options}  # that of the setup was given for another method
+        options = {"step_s": None, **options}  # that of the setup was given for another method
     if isinstance(what, Setup):
         return replace(what, **options) if options else what
     plant = what if isinstance(what, Plant) else Plant(what)

@@ -2,7 +2,8 @@
 
 chatter · an effort limit or a stop reached · beyond a limit that the file states · a record coarser than the motion ·
 an effect declared dissipative that does positive work · friction that creeps · steps that stability bounds ·
-a sampled loop that is unstable · a task that is damped
+a sampled loop that is unstable · a task that is damped · a reference that jumps where it begins · a joint that is held
+while its reference moves
 """
 
 from __future__ import annotations
@@ -29,6 +30,8 @@ class Kind(StrEnum):
     STIFF = "steps_bounded_by_stability"
     UNSTABLE = "sampled_loop_unstable"
     DAMPED = "task_damped"
+    JUMPS = "reference_jumps"
+    HELD = "held_while_reference_moves"
 
 
 _HEADINGS = {
@@ -43,6 +46,8 @@ _HEADINGS = {
     Kind.STIFF: "steps bounded by stability",
     Kind.UNSTABLE: "sampled loop unstable, deviations grow",
     Kind.DAMPED: "task damped near a singularity",
+    Kind.JUMPS: "reference does not begin as the joint does",
+    Kind.HELD: "held by friction at every step",
 }
 
 

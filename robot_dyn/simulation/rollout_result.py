@@ -11,7 +11,7 @@ from typing import Any, final, overload
 import numpy as np
 
 from robot_dyn import former
-from robot_dyn.errors import QueryError
+from robot_dyn.errors import QueryError, escaped
 from robot_dyn.simulation.observation import Observed
 from robot_dyn.simulation.overview import Overview, of_some, overview
 from robot_dyn.simulation.remarks import Remark
@@ -191,7 +191,7 @@ class Rollouts(Value):
             )
         again = "" if self.setup is None else f"; rd.simulate(runs.setup_of({self.worst})) repeats it by itself"
         lines.append(f"look at run {self.worst} first{again}")
-        return "\n".join(lines)
+        return "\n".join(escaped(line) for line in lines)
 
     def _by_run(self) -> dict[str, Any]:
         return {each.name: getattr(self, each.name) for each in fields(self) if each.name not in _SHARED}

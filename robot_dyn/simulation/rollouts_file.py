@@ -11,7 +11,14 @@ import numpy as np
 from robot_dyn.simulation.archive import ArchiveError, Header
 from robot_dyn.simulation.members import OF_ROLLOUTS, check_headers
 from robot_dyn.simulation.rollout_result import Rollouts
-from robot_dyn.simulation.run_file import MAX_BYTES, ROLLOUTS_FORMAT, RunFileError, read_whole, write_whole
+from robot_dyn.simulation.run_file import (
+    MAX_BYTES,
+    ROLLOUTS_FORMAT,
+    RunFileError,
+    are_times,
+    read_whole,
+    write_whole,
+)
 from robot_dyn.simulation.serialise import Arrays, build
 
 
@@ -49,9 +56,9 @@ def _checked(arrays: Arrays, about: dict[str, Any]) -> Rollouts:
     runs = build(Rollouts, {key: value for key, value in about.items() if key != "format"}, arrays)
     if arrays:
         raise ArchiveError(f"member {min(arrays)!r} belongs to nothing")
-    if not np.isfinite(runs.t).all() or not (np.diff(runs.t) >= 0).all() or not len(runs.t):
+    if not are_times(runs.t) or not len(runs.t):
         raise ArchiveError("the times of member 't' are not finite, or do not grow")
-    if not np.isfinite(runs.ended).all() or (runs.ended < 0).any() or (runs.diverged & runs.stopped).any():
+    if not all(map(are_times, runs.ended[:, None])) or (runs.diverged & runs.stopped).any():
         raise ArchiveError("members 'ended', 'diverged' and 'stopped' are not those of runs")
     numbered = (number for each in (() if runs.saved is None else runs.saved.remarks) for number in each.runs)
     if runs.observed is not None and len(runs.observed.levels) != runs.observed.limits.shape[1]:

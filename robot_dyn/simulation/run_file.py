@@ -21,6 +21,7 @@ from robot_dyn.simulation.archive import Archive, ArchiveError, Header, write
 from robot_dyn.simulation.members import MEMBERS, Member, check_headers, member
 from robot_dyn.simulation.origin import packed, unpacked
 from robot_dyn.simulation.serialise import Arrays, SerialError, build, take_apart
+from robot_dyn.simulation.size import LONGEST_S
 from robot_dyn.simulation.trajectory import Ending, Trajectory
 from robot_dyn.validate import integer
 
@@ -101,8 +102,9 @@ def read_whole(
     with reading(path, RunFileError, f"write one with robot-dyn simulate … -o {path}") as stream:
         try:
             archive = Archive(stream)
-            about = _about(archive, form)
-            names = _BEFORE.get(form, {}).get(about["format"], {})
+            about, found = _about(archive)
+            _check_format(found, form, path)
+            names = _BEFORE[form].get(found, {})
             check_headers(_renamed(archive.headers, names), about, members)
             if archive.size > max_bytes:
                 held = f"{archive.size / 2**30:.3g} GiB, more than {max_bytes / 2**30:.3g} GiB"
@@ -115,20 +117,29 @@ def read_whole(
             raise RunFileError(f"{path}: is not a complete run file: {error}; simulate again") from None
 
 
-def _about(archive: Archive, form: int | str) -> dict[str, Any]:
-    """The plain data, of this format or one before it."""
+def _about(archive: Archive) -> tuple[dict[str, Any], Any]:
+    """The plain data, and the format that it states."""
     if "about" in archive.headers and archive.headers["about"].size > _MAX_TEXT:
         raise ArchiveError(f"member 'about' is larger than {_MAX_TEXT >> 20} MiB")
     try:
         about = json.loads(archive.text("about"))
-        found = about["format"]
+        return about, about["format"]
     except (ValueError, TypeError, KeyError, RecursionError, MemoryError) as error:
         raise ArchiveError(f"member 'about' is not the JSON of a run ({type(error).__name__})") from None
-    if found not in (form, *_BEFORE.get(form, {})):
-        other = "; rd.load_rollouts reads it" if found == ROLLOUTS_FORMAT else "; rd.load_run reads it"
-        also = other if found in (FORMAT, ROLLOUTS_FORMAT) else ""
-        raise ArchiveError(f"it has format {shorten(repr(found))}, this version reads {form!r}{also}")
-    return about
+
+
+def _check_format(found: Any, form: int | str, path: Path) -> None:
+    """Refuse a format that is neither the one that is read nor one before it; names a file of the other kind."""
+    if found in (form, *_BEFORE[form]):
+        return
+    if found in (ROLLOUTS_FORMAT, *_BEFORE[ROLLOUTS_FORMAT]):
+        raise RunFileError(
+            f"{path}: is a file of rollouts, which are many runs; rd.load_rollouts reads it, and rd.save_run writes one"
+            " of them, such as rd.load_rollouts(…)[0], to a run file"
+        )
+    if found in (FORMAT, *_BEFORE[FORMAT]):
+        raise RunFileError(f"{path}: is a file of one run, not of rollouts; rd.load_run reads it")
+    raise ArchiveError(f"it has format {shorten(repr(found))}, this version reads {form!r}")
 
 
 def _renamed(members: Mapping[str, Part], names: Mapping[str, str]) -> dict[str, Part]:
@@ -151,12 +162,21 @@ def _checked(arrays: Arrays, about: dict[str, Any]) -> Trajectory:
             if known.finite and not np.isfinite(array).all() and not (known.absent and np.isnan(array).all()):
                 raise ArchiveError(f"member {shorten(name)!r} of a run that did not diverge holds nan or inf")
     for name, t in (("t", run.t), *((f"wrenches/{link}", F[:, 0]) for link, F in run.wrenches.items())):
-        if not np.isfinite(t).all() or not (np.diff(t) >= 0).all():
-            raise ArchiveError(f"the times of member {shorten(name)!r} are not finite, or do not grow")
+        if not are_times(t) or len(t) < len(run.t):
+            raise ArchiveError(f"the times of member {shorten(name)!r} are not those of a run, or do not grow")
+    if run.error is not None and not are_times(run.error.t):
+        raise ArchiveError("the times of member 'error/t' are not those of a run, or do not grow")
     if run.power.keys() != run.ledger.work.keys():
         raise ArchiveError("members 'power/…' and 'ledger/work/…' have different names")
     if run.desired is not None and run.deviation is not None and run.deviation.shape != run.desired.shape:
         raise ArchiveError("members 'desired' and 'deviation' differ in shape")
-    if not 0 <= run.outcome.t < np.inf:
+    if run.desired is None and run.deviation is not None and (run.deviation.shape[1] != 3 or "frame" not in run.about):
+        raise ArchiveError("member 'deviation' of joints needs 'desired', which is missing")
+    if not are_times(np.array([run.outcome.t])):
         raise ArchiveError(f"'outcome/t' holds {run.outcome.t!r}, not a time in [s]")
     return run
+
+
+def are_times(t: np.ndarray) -> bool:
+    """Whether these are times of a run: as long as one can be, and none before the last."""
+    return bool(np.all((t >= 0) & (t <= LONGEST_S)) and np.all(t[1:] >= t[:-1]))

@@ -31,6 +31,7 @@ from robot_dyn.values import Value
 
 MOST_CUT = 200_000  # steps of a run of fixed step that is cut at events
 ENGINES = ("auto", "interpreted", "compiled")
+STEP_S = 1e-3  # of a method of fixed step, unless given
 _LONGEST_STEP_S, _LEAST_STEPS = 0.01, 200  # where something may switch between steps
 
 
@@ -48,8 +49,8 @@ class Setup(Value):
         integrator: The method, by its name as in a scene or itself: "auto", "DOP853" and "Rosenbrock", or an `Adaptive`
             with other tolerances, choose their steps; "rk4", "order_8", "gauss_4" and others of `rd.method` have a
             fixed one.
-        step_s: Fixed step; made smaller where samples, ticks, switches and the end ask for it. Not to be given
-            for a method that chooses its steps.
+        step_s: Fixed step, 1 ms unless given; made smaller where samples, ticks, switches and the end ask for it. It is
+            not to be given for a method that chooses its steps.
         record_period_s: Time between samples; 0 for every step, or 1000 samples where the method chooses its steps.
         estimate_error: Whether companion runs are made, which cost about as much as the run; five times as much
             where only shorter steps can tell.
@@ -68,7 +69,7 @@ class Setup(Value):
     duration_s: float = 1.0
     controller: Any = None
     integrator: Any = "auto"
-    step_s: float = 1e-3
+    step_s: float | None = None
     record_period_s: float = 0.0
     estimate_error: bool = True
     about: dict[str, str] = field(default_factory=dict, repr=False)
@@ -89,8 +90,8 @@ class Setup(Value):
         for name in ("q0", "v0"):
             object.__setattr__(self, name, one_state(name, getattr(self, name), names))
         for name in ("duration_s", "step_s", "record_period_s"):
-            seconds = duration(name, getattr(self, name), zero=name == "record_period_s")
-            object.__setattr__(self, name, seconds)
+            if (seconds := getattr(self, name)) is not None or name != "step_s":
+                object.__setattr__(self, name, duration(name, seconds, zero=name == "record_period_s"))
         truth("estimate_error", self.estimate_error)
         if self.accuracy is not None:
             self._check_accuracy()
@@ -99,7 +100,7 @@ class Setup(Value):
         ):
             instance("about", text, str, "give texts by name")
         object.__setattr__(self, "about", dict(self.about))
-        if self.integrator.controls_error and self.step_s != Setup.step_s:
+        if self.integrator.controls_error and self.step_s is not None:
             raise QueryError(no_step(self.integrator.name))
         choice("engine", self.engine, ENGINES)
         object.__setattr__(self, "events", _events(self.events))
@@ -228,7 +229,7 @@ class Setup(Value):
         Raises:
             QueryError: If two switches lie closer together than floats can tell.
         """
-        starts, step = self._cuts[:-1], self.step_s
+        starts, step = self._cuts[:-1], self.nominal_step_s
         ends = [t for t, _ in self._cuts[1:]]
         counts = [
             steps_on(end - start, step, self.record_period_s) for (start, _), end in zip(starts, ends, strict=True)
@@ -278,8 +279,13 @@ class Setup(Value):
         return self.segments[-1].first + self.segments[-1].steps
 
     @property
+    def nominal_step_s(self) -> float:
+        """Step of a method of fixed step before it is made smaller, in [s]."""
+        return STEP_S if self.step_s is None else self.step_s
+
+    @property
     def taken_step_s(self) -> float:
-        """Longest step that a method of fixed step takes, in [s]: at most `step_s` and the record period."""
+        """Longest step that a method of fixed step takes, in [s]: at most `nominal_step_s` and the record period."""
         return max((each.end - each.start) / each.steps for each in self.segments)
 
     @property

@@ -37,6 +37,7 @@ from robot_dyn.simulation.remarks import Remark
 from robot_dyn.simulation.samples import columns, ledger
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import check_record
+from robot_dyn.simulation.smoothness import foreign, named
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.stiffness import StiffError, bounded_by_stability
 from robot_dyn.simulation.tracking import deviation_of
@@ -83,15 +84,15 @@ def simulate(
     began = perf_counter()
     ran = _by_choice(setup, equation, on_progress)
     setup, record, finished = ran.setup, ran.record, perf_counter()
-    error, spent = None, 0
+    error, spent, companions = None, 0, 0
     at_the_end = None if on_progress is None else lambda _: on_progress(record.outcome.t)
 
     def companion(pace: Any, of: Setup) -> Record:
-        nonlocal spent
+        nonlocal spent, companions
         made = prepared(of, equation, ran.machine, pace, at_the_end, samples=False).record()
         if made.outcome.ending is Ending.STOPPED:
             raise KeyboardInterrupt
-        spent += made.evaluations
+        spent, companions = spent + made.evaluations, companions + 1
         return made
 
     if setup.estimate_error and record.outcome.ending is not Ending.STOPPED:
@@ -107,7 +108,7 @@ def simulate(
     statistics = Statistics(
         EXPLICIT if setup.integrator.name == AUTO else setup.integrator.name, step, record.steps, record.evaluations,
         finished - ran.ready, 0.0 if error is None else estimated - finished, ran.engine, ran.ready - began,
-        companion_evaluations=spent,
+        companion_evaluations=spent, companion_runs=companions, user_code=", ".join(map(named, foreign(setup))),
     )  # fmt: skip
     made = _trajectory(ran, equation, record, statistics, error)
     if made.leak and record.outcome.ending is not Ending.STOPPED:  # no more of the user's code is called then

@@ -5,25 +5,28 @@ bytes = samples · 8 · numbers of a sample,   or   segments · (an object, and 
 
 from __future__ import annotations
 
-from math import inf
+from math import inf, ulp
+from sys import float_info
 from typing import TYPE_CHECKING
 
 from robot_dyn.errors import QueryError
+from robot_dyn.validate import LEAST_EXACT
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.setup import Setup
     from robot_dyn.simulation.state_equation import StateEquation
 
 MOST_BYTES = 8 * 2**30  # of all that is recorded, unless said
+LONGEST_S = LEAST_EXACT / float_info.epsilon  # up to there floats tell the times of a run
 MOST_STEPS = 1e11  # about a day of the fastest machine code
 _SEGMENT_BYTES, _SEGMENT_BYTES_PER_JOINT = 500, 100  # by estimate; the second is a quintic at its start and along it
 
 
 def check_segments(setup: Setup) -> None:
-    """Refuse a run of more steps, ticks or switches than can be made.
+    """Refuse a run of more steps, ticks or switches than can be made, or of times that floats do not tell apart.
 
     Raises:
-        QueryError: If there are too many; says how many and the remedy.
+        QueryError: If it is one; says how many and the remedy.
     """
     cut = segments(setup)
     size = cut * (_SEGMENT_BYTES + _SEGMENT_BYTES_PER_JOINT * setup.plant.dynamics.n)
@@ -34,8 +37,13 @@ def check_segments(setup: Setup) -> None:
         )
     if steps(setup) > MOST_STEPS:
         raise QueryError(
-            f"a run of {setup.duration_s:g} s takes {steps(setup):.3g} steps of step_s = {setup.step_s:g} s, more than "
-            f"{MOST_STEPS:g}: take a longer step_s, or a shorter duration_s"
+            f"a run of {setup.duration_s:g} s takes {steps(setup):.3g} steps of step_s = {setup.nominal_step_s:g} s,"
+            f" more than {MOST_STEPS:g}: take a longer step_s, or a shorter duration_s"
+        )
+    if setup.duration_s > LONGEST_S:
+        raise QueryError(
+            f"a run of {setup.duration_s:g} s ends at a time that floats tell to {ulp(setup.duration_s):.1g} s only:"
+            f" take a shorter duration_s, {LONGEST_S:.2g} s at most"
         )
 
 
@@ -81,7 +89,7 @@ def steps(setup: Setup) -> float:
     """About so many steps of a fixed-step method; 0 for an adaptive one, which chooses them."""
     if setup.integrator.controls_error:
         return 0.0
-    step = min(setup.step_s, setup.record_period_s or inf)  # samples lie on steps
+    step = min(setup.nominal_step_s, setup.record_period_s or inf)  # samples lie on steps
     return setup.duration_s / step + 4 * segments(setup)
 
 

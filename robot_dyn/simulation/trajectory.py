@@ -10,7 +10,7 @@ from typing import Any, Protocol, final, runtime_checkable
 import numpy as np
 
 from robot_dyn import former
-from robot_dyn.errors import QueryError, shown
+from robot_dyn.errors import QueryError, escaped, shown
 from robot_dyn.model.units import units
 from robot_dyn.simulation.error import ErrorEstimate
 from robot_dyn.simulation.event import Occurrence
@@ -82,6 +82,8 @@ class Statistics:
         compile_s: Time before the run, for the choice of the loop and for compiling it.
         samples_s: Time after it, for what follows from the states of its samples.
         companion_evaluations: Evaluations of the error estimate.
+        companion_runs: Companion runs of the error estimate.
+        user_code: Parts of the setup that are code of the user's, by name; each run calls them.
     """
 
     method: str
@@ -94,6 +96,8 @@ class Statistics:
     compile_s: float = 0.0
     samples_s: float = 0.0
     companion_evaluations: int = 0
+    companion_runs: int = 0
+    user_code: str = ""
 
 
 @final
@@ -256,6 +260,11 @@ class Trajectory(Value):
             lines.append(f"tracking error of {what}: {self.tracking_error:.3e} rms")
         step = f"step {s.step_s:.4g} s, " if s.step_s else ""
         lines.append(f"{s.method}: {step}{s.steps} steps, {s.evaluations} evaluations, {s.engine}")
+        if s.user_code and s.companion_runs:
+            lines.append(
+                f"error estimate: {s.companion_evaluations} evaluations in {s.companion_runs} companion runs, which"
+                f" call {s.user_code} as well; estimate_error=False leaves them out"
+            )
         parts = (
             ("compile", s.compile_s),
             ("run", s.wall_s),
@@ -265,7 +274,7 @@ class Trajectory(Value):
         lines.append(
             "time: " + ", ".join(f"{name} {spent:.2g} s" for name, spent in parts if spent >= _NOTICED or name == "run")
         )
-        return "\n".join(lines)
+        return "\n".join(map(escaped, lines))
 
 
 def _told(events: tuple[Occurrence, ...]) -> str:

@@ -58,7 +58,7 @@ def judged(setup: Setup, what: str, deadline: Deadline) -> Judged:
     error = run.error
     if error is None or run.outcome.ending is not Ending.FINISHED or not error.resolved_until:
         return Judged(what, setup.duration_s, np.nan, np.nan, np.nan, said, False, _lines(setup))
-    sure = replace(setup, step_s=Setup.step_s, estimate_error=False, integrator=_BETTER[0])
+    sure = replace(setup, step_s=None, estimate_error=False, integrator=_BETTER[0])
     better = [simulate(replace(sure, integrator=each), on_progress=deadline.check) for each in _BETTER]
     known = run.t <= error.resolved_until
     if any(each.outcome.ending is not Ending.FINISHED for each in better):

@@ -62,7 +62,7 @@ def _scene(robot: Robot, family: str, scale: np.ndarray, rng: np.random.Generato
             setup = Setup(Plant(robot, effects), q, v, duration, control, made, record_period_s=record, **step)
         except RobotDynError:  # not every method takes every effect
             continue
-        steps = f", step {setup.step_s:g} s" if step else f", rtol {setup.integrator.rtol:.0e}"
+        steps = f", step {setup.nominal_step_s:g} s" if step else f", rtol {setup.integrator.rtol:.0e}"
         return Scene(setup, f"{family}: {setup.integrator.name}{steps}")
     return Scene(Setup(Plant(robot, effects), q, v, duration, control), f"{family}: auto")
 

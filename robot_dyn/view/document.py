@@ -62,6 +62,7 @@ class Shown:
     notes: tuple[str, ...]
 
 
+@np.errstate(all="ignore")  # what is far out is drawn as far as it can be
 def document(
     runs: tuple[Trajectory, ...], package_dirs: Iterable[str | Path], frame: str | None, inertia: bool
 ) -> dict[str, Any]:

@@ -6,7 +6,7 @@ Nothing global is set: no pyplot, no rcParams, so that figures can be drawn in a
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, final
 
@@ -24,6 +24,7 @@ _LINE, _WIDE = 0.15, 160  # height of a line of text in [inch], its letters
 _ACROSS = 6  # entries of a legend beside each other
 NEAR = 0.2  # of its effort limit: a torque that stays below is drawn without it
 _MOST_MARKS = 200  # in a cell
+_LARGEST = 8e307  # on an axis: Matplotlib takes the difference of its ends
 _PIXELS = 1000  # across a cell; of the samples that fall on one, the least and the largest are drawn
 THEMES: dict[str, dict[str, Any]] = {  # colours of Okabe and Ito, told apart by the colour-blind, by contrast
     "light": {"paper": "#ffffff", "ink": "#1a1a1a", "grid": "#dddddd", "veil": "#eeeeee"}
@@ -154,8 +155,9 @@ def _fill(axes: Any, cell: Cell, theme: Mapping[str, Any], diverged: bool) -> No
     axes.tick_params(which="both", colors=theme["ink"], labelsize=7, labelbottom=bool(cell.x))
     axes.set_xlabel(cell.x, labelpad=2, **ink)
     axes.set_ylabel(cell.y, **ink)
-    log = cell.log and any(np.any(curve.y > 0) for curve in cell.curves)  # of zeros alone there is no logarithm
-    for curve in cell.curves:
+    curves = [replace(curve, x=_shown(curve.x), y=_shown(curve.y)) for curve in cell.curves]
+    log = cell.log and any(np.any(curve.y > 0) for curve in curves)  # of zeros alone there is no logarithm
+    for curve in curves:
         x, y = curve.x, np.where(curve.y > 0, curve.y, np.nan) if log else curve.y
         at, (hue, dash) = _thinned(x, y), curve.style
         shape = {"marker": "o", "markersize": 4} if len(x) == 1 else {"linestyle": _DASHES[dash % len(_DASHES)]}
@@ -172,14 +174,19 @@ def _fill(axes: Any, cell: Cell, theme: Mapping[str, Any], diverged: bool) -> No
         shade = {"color": colours[_STOP], "alpha": 0.25} if each.at_stop else {"color": theme["grid"]}
         axes.axvspan(each.start, each.end, linewidth=0, zorder=0.5, label="_rest", **shade)
     if np.isfinite(cell.until):
-        axes.axvspan(cell.until, cell.curves[0].x[-1], color=theme["veil"], zorder=0.5, label="_not resolved")
-    _scale(axes, "y", np.concatenate([curve.y for curve in cell.curves]), cell.limit, diverged, log)
-    begin, end = cell.curves[0].x[[0, -1]]
+        axes.axvspan(cell.until, curves[0].x[-1], color=theme["veil"], zorder=0.5, label="_not resolved")
+    _scale(axes, "y", np.concatenate([curve.y for curve in curves]), cell.limit, diverged, log)
+    begin, end = curves[0].x[[0, -1]]
     if cell.x.startswith("q"):
-        _scale(axes, "x", cell.curves[0].x, np.inf, diverged, False)
+        _scale(axes, "x", curves[0].x, np.inf, diverged, False)
     else:
         _scale(axes, "x", np.array([begin, end]), np.inf, False, False)
         axes.set_xlim(begin, end if end > begin else begin + 1)
+
+
+def _shown(z: np.ndarray) -> np.ndarray:
+    """What is drawn of numbers: nothing where an axis cannot reach."""
+    return np.where(np.abs(z) < _LARGEST, z, np.nan)
 
 
 def _scale(axes: Any, side: str, z: np.ndarray, limit: float, diverged: bool, log: bool) -> None:
@@ -193,7 +200,7 @@ def _scale(axes: Any, side: str, z: np.ndarray, limit: float, diverged: bool, lo
     if log:
         axes.set_yscale("log")
         bounds = (
-            10.0 ** np.floor(np.log10(np.quantile(z, 0.01, method="lower"))),
+            10.0 ** max(np.floor(np.log10(np.quantile(z, 0.01, method="lower"))), -307),
             10.0 ** min(np.ceil(np.log10(high) + 0.01), 308),
         )
         axis.set_major_locator(LogLocator(numticks=6))
@@ -215,7 +222,7 @@ def _scale(axes: Any, side: str, z: np.ndarray, limit: float, diverged: bool, lo
             lambda x, _: f"{x:.5g}".replace("e+0", "e").replace("e-0", "e-").replace("e+", "e").replace("-", "−")
         )
     )
-    getattr(axes, f"set_{side}lim")(*np.clip(bounds, -8e307, 8e307))
+    getattr(axes, f"set_{side}lim")(*np.clip(bounds, -_LARGEST, _LARGEST))
 
 
 def _thinned(x: np.ndarray, y: np.ndarray) -> np.ndarray:

@@ -256,7 +256,7 @@ def _view(run: Trajectory, only: Collection[str] | None, limits: np.ndarray | No
     units = tuple(unit("q", None if j is None else j.get("type")) for j in known)
     if limits is None:
         limits = np.array([np.inf if j is None else float(j.find("limit").get("effort")) for j in known])
-    efforts = shaped("limits", limits, run.joint_names)  # nan: none is known
+    efforts = shaped("limits", limits, run.joint_names).astype(float)  # nan: none is known
     if efforts.ndim != 1:
         raise QueryError(f"limits must have shape ({len(known)},), got {efforts.shape}")
     return View(run, shown, units, np.where((efforts > 0) & (efforts < 1e300), efforts, np.inf))  # 0: none is stated

@@ -1,7 +1,7 @@
 """Run files: damaged bytes; members changed, exchanged, missing or lying about their size; JSON with other values.
 
 Half of the mutants carry the digest of what they hold, so that damage gets past it. What is accepted is used: its
-summary, its table, its robot.
+summary, its table, its robot, what is drawn of it.
 """
 
 from __future__ import annotations
@@ -17,10 +17,13 @@ from typing import Any
 import numpy as np
 
 import robot_dyn as rd
+from robot_dyn.errors import RobotDynError
 from robot_dyn.scene.starters import starter
 from robot_dyn.simulation import archive
 from robot_dyn.simulation.origin import robot_of
 from robot_dyn.simulation.table import export_csv
+from robot_dyn.view.document import document
+from robot_dyn.view.plots import PLOTS, PlotError, _view
 from tests.fuzz.bytes import WORDS, damage
 
 ODD = [None, True, -1, 0.5, 10**400, float("nan"), "", "x", "\ud800", "\x1b[31m", [], {}, [[]], {"a": 1}]
@@ -69,6 +72,12 @@ def attempt(mutant: bytes, folder: Path) -> str:
     export_csv(run, folder / "mutant.csv")
     rd.save_run(run, path)
     robot_of(run)
+    with suppress(RobotDynError):  # of a run that plots or replays refuse
+        view = _view(run, None, None)
+        for panel in PLOTS.values():
+            with suppress(PlotError), np.errstate(all="ignore"):
+                panel(view)
+        document((run,), (), None, False)
     return "accepted"
 
 

@@ -67,7 +67,7 @@ def _controlled(case: str, motion: Motion, setup: rd.Setup) -> Row:
 
 def _fixed(case: str, name: str, motion: Motion, setup: rd.Setup) -> Row:
     run = rd.simulate(setup)
-    what = f"{name} of {setup.step_s:g} s: true error over estimate"
+    what = f"{name} of {setup.nominal_step_s:g} s: true error over estimate"
     if run.outcome.ending != "finished":
         return Row(case, what, float("nan"), 1 / LEAST, run.outcome.advice)
     if not run.error.resolved_until > 0:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from llvmlite import ir
 
 from robot_dyn.compiled.llvm import numpy_array as arrays
@@ -15,6 +16,9 @@ from robot_dyn.compiled.llvm.lanes import F64
 from robot_dyn.compiled.llvm.python_function import api, function_of
 from robot_dyn.compiled.llvm.vectors import I32, I64
 from robot_dyn.compiled.status import Status
+from robot_dyn.validate import LEAST_EXACT
+
+_LARGEST_NARROW = LEAST_EXACT / float(np.finfo(np.float32).eps)
 
 
 def write_state_entry(
@@ -95,14 +99,24 @@ def _require(builder: Any, conditions: list[Any], refuse: Any) -> None:
 
 
 def _number(builder: Any, value: Any, kind: Any, refuse: Any) -> Any:
-    """A number of Python's; what is not one is refused."""
+    """A number of Python's; what is not one is refused, and what float32 rounds as `validate.converted` says."""
     x = api(builder, "PyFloat_AsDouble", value)
     with builder.if_then(builder.fcmp_ordered("==", x, ir.Constant(F64, -1.0)), likely=False):
         error = builder.ptrtoint(api(builder, "PyErr_Occurred"), I64)
         with builder.if_then(builder.icmp_signed("!=", error, ir.Constant(I64, 0)), likely=False):
             api(builder, "PyErr_Clear")
             builder.branch(refuse)
-    return x if kind is F64 else builder.fptrunc(x, kind)
+    if kind is F64:
+        return x
+    narrow = builder.fptrunc(x, kind)
+    known = builder.fcmp_unordered("<=", builder.call(_magnitude(builder), [x]), ir.Constant(F64, _LARGEST_NARROW))
+    exact = builder.fcmp_unordered("==", builder.fpext(narrow, F64), x)
+    _require(builder, [builder.or_(known, exact)], refuse)
+    return narrow
+
+
+def _magnitude(builder: Any) -> Any:
+    return builder.module.declare_intrinsic("llvm.fabs", [F64])
 
 
 def _answer(builder: Any, status: Any) -> None:

@@ -79,7 +79,7 @@ class Batch:
         self.why, self.last = np.zeros(width, np.int64), np.zeros((equation.size, width))
         self.ended, self.until = np.full(width, setup.duration_s), np.full(width, np.inf)
         self.again: dict[int, Single | None] = {}  # runs made again by themselves; None where Ctrl-C came first
-        self.clocks = np.tile([0.0, setup.record_period_s, ON_STEP * setup.step_s], (tiles, 1))
+        self.clocks = np.tile([0.0, setup.record_period_s, ON_STEP * setup.nominal_step_s], (tiles, 1))
         self.evaluations, self.stop = np.zeros(tiles, np.int64), np.zeros(1, np.int64)
 
     def run(self, threads: int, on_progress: Callable[[float], object] | None = None) -> Rollouts:
