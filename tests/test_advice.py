@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.simulation.sampled_loop import longest_period
+from robot_dyn.simulation.sampled_loop import linearised
 from robot_dyn.simulation.stability import longest_step
 from tests.command import run
 from tests.estimates.advised import blow_up, limited
@@ -98,7 +98,7 @@ def test_the_period_of_a_loop_with_delays_is_that_of_its_exact_map(name: str, la
     gains = 400 * inertia, 36 * inertia
     law = rd.PD(rd.hold(q + arm.N(q) / gains[0]), *gains, 1e-3)  # which holds the arm where it is
     loop = rd.Loop(law, measurement_delay=late[0], actuation_delay=late[1])
-    found = longest_period(rd.Plant(arm), loop, 0.0, np.concatenate([q, 0 * q]), 20.0)
+    found = linearised(rd.Plant(arm), loop, 0.0, np.concatenate([q, 0 * q])).longest_period()
     assert growth(arm, q, gains, 0.99 * found, late) <= 1 + 1e-6  # gravity's slope is by differences
     assert growth(arm, q, gains, 1.01 * found, late) > 1 + 1e-4
 
@@ -110,7 +110,7 @@ def test_blocks_and_rates_of_a_loop_bound_its_period() -> None:
     both = rd.Multirate(law, rd.PD(rd.hold([0.0]), slow, 0.0, 0.004))
     blocks: dict[str, Any] = {"velocity": [rd.Differences(), rd.LowPass(cutoff, 1)], "position": rd.Quantisation(1e-4)}
     loop = rd.Loop(both, **blocks, actuation=[rd.RateLimit(9.0), rd.Noise(0.1)], measurement_delay=1.0)
-    found = longest_period(rd.Plant(BLOCK), loop, 0.0, np.zeros(2), 20.0)
+    found = linearised(rd.Plant(BLOCK), loop, 0.0, np.zeros(2)).longest_period()
 
     def radius(T: float) -> float:
         """Of (q, v, q̂, the difference's q̂₋, the filter's y₋ and x₋, the slow torque)."""
@@ -134,7 +134,7 @@ def test_friction_a_thousand_times_faster_than_the_period_does_not_hide_its_limi
     """Of m v̇ = u − b v with m/b ≪ T gives q⁺ = (1 − kp T/b) q: |·| = 1 at T = 2 b/kp, but for m/b and growth."""
     b, kp = 1e6, 5e8
     law, plant = rd.PD(rd.hold([0.0]), kp, 0.0, 1e-3), rd.Plant(BLOCK, [rd.ViscousFriction(b)])
-    assert longest_period(plant, law, 0.0, np.zeros(2), 20.0) == pytest.approx(2 * b / kp, rel=0.01)
+    assert linearised(plant, law, 0.0, np.zeros(2)).longest_period() == pytest.approx(2 * b / kp, rel=0.01)
 
 
 def test_a_loop_that_no_period_makes_stable_says_so() -> None:

@@ -24,6 +24,7 @@ from robot_dyn.integrate.adaptive import AUTO, EXPLICIT
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.model.edits import Edits
+from robot_dyn.simulation.divergence import causes
 from robot_dyn.simulation.machine.batch import LANES, Batch
 from robot_dyn.simulation.machine.making import machine
 from robot_dyn.simulation.machine.one_by_one import OneByOne
@@ -128,7 +129,7 @@ def rollouts(
     if setup.integrator.controls_error:
         singles = OneByOne(setup, q, v, sweep, recorded, most_bytes)
         runs = singles.run(thread_count(threads), on_progress)
-        return replace(runs, about=edits_of_machine_code(setup) | runs.about)
+        return replace(runs, about=edits_of_machine_code(setup) | runs.about, advice=causes(runs, setup, q, v))
     equation = StateEquation(setup.plant, setup.controller, setup.integrator.canonical)
     asked = {"u": "u" in recorded, "v": equation.canonical and "v" in recorded, "energy": "energy" in recorded}
     kept = tuple(name for name, yes in asked.items() if yes)
@@ -143,7 +144,7 @@ def rollouts(
     )
     made.check(setup)
     runs = Batch(setup, made, q, v, sweep, recorded, kept, most_bytes).run(thread_count(threads), on_progress)
-    return replace(runs, about=edits_of_machine_code(setup) | runs.about)
+    return replace(runs, about=edits_of_machine_code(setup) | runs.about, advice=causes(runs, setup, q, v))
 
 
 def _setup(what: Setup | Plant | Dynamics, q0: Any, options: Mapping[str, Any]) -> Setup:

@@ -38,7 +38,7 @@ def trajectory(runs: Rollouts, run: int) -> Trajectory:
     unknown = np.full_like(q, np.nan)
     u = unknown if runs.u is None else runs.u[run, known]
     a, power, energy = unknown, np.full((len(t), len(runs.sources)), np.nan), np.full((len(t), 2), np.nan)
-    setup = None if runs.setup is None else _own(runs, runs.setup, run)
+    setup = None if runs.setup is None else of_run(runs, runs.setup, run)
     if setup is not None:
         a, u, power, energy = _follows(setup, t, q, v, None if runs.u is None else u)
     if runs.kinetic is not None and runs.potential is not None:
@@ -62,8 +62,8 @@ def trajectory(runs: Rollouts, run: int) -> Trajectory:
     )  # fmt: skip
 
 
-def _own(runs: Rollouts, setup: Setup, run: int) -> Setup:
-    """The setup of a run, with its own start and parameters."""
+def of_run(runs: Rollouts, setup: Setup, run: int) -> Setup:
+    """The setup of a run, with its own parameters and noise."""
     if runs.params:
         plant, controller = with_parameters(
             setup.plant, setup.controller, {name: x[run] for name, x in runs.params.items()}

@@ -27,7 +27,7 @@ from robot_dyn.simulation.stability import NO_BOUND, STILL, Growth, Stability, f
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.stiffness import jacobian
 
-_NOISE = 1e-9  # of an entry of the map, by differences; and, in [1/s], of an entry of A that should be 0
+_NOISE = 1e-10  # of an entry of the map, by differences; and, in [1/s], of an entry of A that should be 0
 _ROUNDING = 1e-15
 _FADES = 1.03  # at a period so much longer growth is ten times its doubt, unless it fades as a power of the period
 

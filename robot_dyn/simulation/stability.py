@@ -27,7 +27,7 @@ _SMOOTH = 0.03  # h |λ| of the fastest motion up to which Φ(h) is smooth on a 
 _SCAN = (2, 8, 5)  # lengths in each factor of ten up to there, beyond, and in each radian of an oscillation
 _MOST = 500  # lengths that are tried at each part of a radian, before they grow by factors alone
 _DECAYED = 5.0  # h |Re λ| from which an oscillation is over before the next tick
-_SHARP = 1e-4  # of a limit
+_SHARP = 3e-4  # of a limit
 
 
 class Stability(StrEnum):
