@@ -1,5 +1,6 @@
 """Whether steps are short enough: stability about states of a motion, and the error to expect.
 
+It is that of the method and of the loop, however short the run: by how much deviations grow over it is said beside.
 J, and the derivatives of a sampled loop, are taken at the fastest of some states along a pilot run with control at all
 times; a motion that leaves them behind may be stable with longer steps, or unstable with shorter ones.
 """
@@ -9,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from math import inf, isfinite
+from math import exp, inf, isfinite, log
 from typing import Any, Unpack, final
 
 import numpy as np
@@ -21,10 +22,10 @@ from robot_dyn.errors import QueryError, RobotDynError, escaped
 from robot_dyn.integrate.methods import FIXED_STEP, method
 from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.simulation.options import Options, setup_of, starts, takes_options
-from robot_dyn.simulation.sampled_loop import longest_period
+from robot_dyn.simulation.sampled_loop import linearised, remedy
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.simulate import simulate
-from robot_dyn.simulation.stability import below, longest_step
+from robot_dyn.simulation.stability import Stability, below, longest_step, radius, step_map, worst
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.stiffness import Fastest, fastest, jacobian
 from robot_dyn.simulation.trajectory import Ending, Trajectory
@@ -32,6 +33,8 @@ from robot_dyn.simulation.trajectory import Ending, Trajectory
 _LOOKS = 9  # states along the pilot run
 _FAST = 3  # of them, where motion is fastest: limits are looked for there
 _MOST_STEPS = 200_000  # of a run that is made for its error estimate
+_BEARS = 1e3  # growth of deviations over such a run
+_LARGEST = 300.0  # ln of a growth that is told
 
 State = tuple[float, Array]  # t and y
 
@@ -48,8 +51,14 @@ class Advice:
         at: When it was met, in [s].
         limits: Longest stable step of each method of fixed step, in [s]; inf where every step is stable.
         period_s: Period of the sampled control, in [s]; 0 without.
-        longest_period_s: The longest stable one, in [s]; inf without sampled control.
-        run: The run of the setup with its error estimate; None if it is unstable, or has too many steps.
+        longest_period_s: The period up to which the loop is stable, in [s]; 0 if none is, inf if every one is, or
+            without sampled control.
+        at_period: What the loop is at its own period, which may be stable though a shorter one is not.
+        period_growth: Spectral radius: the factor by which deviations grow in each period in the long run; 1 without.
+        grows_anyway: Rate at which they grow under the same control at all times, in [1/s]; 0 if they do not.
+        growth: Factor by which they grow over the run, by steps or periods that are too long.
+        run: The run of the setup with its error estimate; None if deviations grow a thousandfold in it, or it has too
+            many steps.
     """
 
     method: str
@@ -59,18 +68,22 @@ class Advice:
     limits: dict[str, float]
     period_s: float
     longest_period_s: float
+    at_period: Stability = Stability.STABLE
+    period_growth: float = 1.0
+    grows_anyway: float = 0.0
+    growth: float = 1.0
     run: Trajectory | None = None
 
     @property
     def stable(self) -> bool:
-        """Whether step and period are within their limits."""
-        return self.step_s <= self.limits.get(self.method, inf) and self.period_s <= self.longest_period_s
+        """Whether the step is within its limit, and deviations do not grow at the period."""
+        return self.step_s <= self.limits.get(self.method, inf) and self.at_period is not Stability.UNSTABLE
 
     @property
     def text(self) -> str:
-        """A line for each thing: the step, the period, the error, the fastest motion."""
-        parts = [self._of_step(), *self._of_period(), self._of_error(), f"{self.fastest}, at {self.at:.3g} s"]
-        return "\n".join(map(escaped, parts))
+        """A line for each thing: the step, the period, growth over the run, the error, the fastest motion."""
+        parts = [self._of_step(), *self._of_period(), *self._of_growth(), self._of_error()]
+        return "\n".join(map(escaped, [*parts, f"{self.fastest}, at {self.at:.3g} s"]))
 
     def _of_step(self) -> str:
         limit = self.limits.get(self.method, inf)
@@ -88,21 +101,28 @@ class Advice:
         )
 
     def _of_period(self) -> Iterator[str]:
-        limit = self.longest_period_s
-        if self.period_s and self.period_s <= limit:
-            to = f"the loop is up to {limit:.3g} s" if isfinite(limit) else "as every period is here"
-            yield f"control period {self.period_s:.3g} s: stable; {to}"
-        elif self.period_s and not limit:
-            yield f"control period {self.period_s:.3g} s: unstable, as every period is: take lower gains, or less delay"
-        elif self.period_s:
-            yield (
-                f"control period {self.period_s:.3g} s: unstable; the loop is stable up to {limit:.3g} s: take"
-                f" period_s={below(limit)}, or lower gains"
-            )
+        if not self.period_s:
+            return
+        limit, unstable = self.longest_period_s, self.at_period is Stability.UNSTABLE
+        if unstable and not limit:
+            to = f", as every period is: take {remedy(self.grows_anyway)}"
+        elif unstable:
+            to = f"; the loop is stable up to {limit:.3g} s: take period_s={below(limit)}, or lower gains"
+        elif self.period_s > limit:
+            to = f"; but not every shorter one: the loop is stable up to {limit:.3g} s"
+        else:
+            to = f"; the loop is up to {limit:.3g} s" if isfinite(limit) else "; as every period is here"
+        between = ", some deviations neither decay nor grow" * (self.at_period is Stability.MARGINAL)
+        yield f"control period {self.period_s:.3g} s: {self.at_period}{between}{to}"
+
+    def _of_growth(self) -> Iterator[str]:
+        if not self.stable:
+            each = f", by {self.period_growth:.4g} in each period" * (self.at_period is Stability.UNSTABLE)
+            yield f"over this run deviations grow by {self.growth:.3g}{each}"
 
     def _of_error(self) -> str:
         if self.run is None:
-            return "error to expect: not told of a run that is unstable, or of too many steps"
+            return "error to expect: not told of a run in which deviations grow so, or of too many steps"
         end = self.run.outcome
         if end.ending is not Ending.FINISHED:
             return f"the run {end.ending} at {end.t:.3g} s: {end.advice}"
@@ -124,7 +144,7 @@ def advise(what: Setup | Plant | Dynamics, q0: Any = None, v0: Any = None, **opt
     """
     setup = setup_of("advise", what, {**starts(q0, v0), **options})
     made = advice_about(setup, _along)
-    makes = made.stable and (setup.integrator.controls_error or setup.steps <= _MOST_STEPS)
+    makes = made.growth < _BEARS and (setup.integrator.controls_error or setup.steps <= _MOST_STEPS)
     return replace(made, run=simulate(replace(setup, estimate_error=True))) if makes else made
 
 
@@ -144,15 +164,25 @@ def advice_about(setup: Setup, states_of: Callable[[Setup, StateEquation], list[
     loop = StateEquation(plant, None if controller is None else controller.at_period(0.0)).in_a_mode
     motion, at, states = _fastest(loop, states_of(setup, loop))
     matrices = [_between_ticks(plant, loop, t, y) if period else jacobian(loop, t, y, None) for t, y in states]
-    limits = {
-        name: min(longest_step(method(name), J, plant.dynamics.n, duration) for J in matrices) for name in FIXED_STEP
-    }
-    periods = [longest_period(plant, setup.controller, t, _own(loop, y), duration) for t, y in states if period]
-    chooses = setup.integrator.controls_error
+    n, own = plant.dynamics.n, setup.integrator
+    limits = {name: min(longest_step(method(name), J, n) for J in matrices) for name in FIXED_STEP}
+    step = 0.0 if own.controls_error else setup.taken_step_s
+    loops = [linearised(plant, setup.controller, t, _own(loop, y)) for t, y in states if period]
+    rates = [_excess(own, J, n, step) for J in matrices if step]
+    rates += [log(each.factor(period)) * (duration // period) / duration for each in loops]
     return Advice(
-        setup.integrator.name, 0.0 if chooses else setup.taken_step_s, motion, at, limits, period,
-        min(periods, default=inf),
+        own.name, step, motion, at, limits, period,
+        min((each.longest_period(period) for each in loops), default=inf),
+        worst(each.growth(period) for each in loops).verdict if loops else Stability.STABLE,
+        max((each.factor(period) for each in loops), default=1.0),
+        max((each.grows_anyway() for each in loops), default=0.0),
+        exp(min(_LARGEST, duration * max(0.0, *rates, 0.0))),
     )  # fmt: skip
+
+
+def _excess(method: Any, J: Array, n: int, h: float) -> float:
+    """The rate at which steps h of a method let deviations grow beyond the motion itself, in [1/s]."""
+    return log(max(radius(step_map(method, J, n), h), 1e-300)) / h - max(0.0, float(np.linalg.eigvals(J).real.max()))
 
 
 def at_rest(setup: Setup, loop: StateEquation) -> list[State]:

@@ -25,6 +25,7 @@ from robot_dyn.integrate.adaptive import AUTO, EXPLICIT
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.model.edits import Edits
+from robot_dyn.simulation.divergence import causes
 from robot_dyn.simulation.machine.batch import LANES, Batch
 from robot_dyn.simulation.machine.making import machine
 from robot_dyn.simulation.machine.one_by_one import one_by_one
@@ -125,7 +126,7 @@ def rollouts(
         runs = _side_by_side(setup, q, v, sweep, recorded, most_bytes, at, threads, on_progress)
         if at is not passed:
             runs = replace(runs, uncut=passed.names)
-    return replace(runs, about=edits_of_machine_code(setup) | runs.about)
+    return replace(runs, about=edits_of_machine_code(setup) | runs.about, advice=causes(runs, setup, q, v))
 
 
 def _why_one_by_one(setup: Setup) -> str:

@@ -11,42 +11,103 @@ The two integrals are one exponential. [Åström, Wittenmark, Computer-Controlle
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from dataclasses import dataclass
+from math import inf
+from typing import Any, final
 
 import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.plant import Plant
+from robot_dyn.errors import RobotDynError
 from robot_dyn.foreign import call
 from robot_dyn.integrate.differences import by_state
-from robot_dyn.simulation.stability import longest
+from robot_dyn.simulation.stability import NO_BOUND, STILL, Growth, Stability, first_unstable, growth, lengths
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.stiffness import jacobian
 
+_NOISE = 1e-10  # of an entry of the map, by differences; and, in [1/s], of an entry of A that should be 0
+_ROUNDING = 1e-15
+_FADES = 1.03  # at a period so much longer growth is ten times its doubt, unless it fades as a power of the period
 
-def longest_period(plant: Plant, controller: Controller, t: float, y: Array, duration_s: float) -> float:
-    """The longest stable period, in [s]; inf if every period of a run is. Delays are as many periods at each.
+
+@final
+@dataclass(frozen=True, eq=False)
+class SampledLoop:
+    """A sampled loop about a state.
+
+    Attributes:
+        matrix: Gives the map of (x, u, z) over a cycle of ticks, of their period in [s].
+        A: Of the plant with its actuation held, (m, m).
+        continuous: Of the plant and the controller at all times, without the blocks and delays of a `Loop`.
+        ticks: Periods in a cycle.
+        stateless: Whether there is no z.
+    """
+
+    matrix: Callable[[float], Array]
+    A: Array
+    continuous: Array
+    ticks: int
+    stateless: bool
+
+    def growth(self, period_s: float) -> Growth:
+        """How deviations grow in a cycle; of no bound where the loop has no meaning at the period, as a filter's."""
+        try:
+            with np.errstate(all="ignore"):
+                made = self.matrix(period_s)
+        except (RobotDynError, np.linalg.LinAlgError):
+            return NO_BOUND
+        m, size = len(self.A), float(np.abs(np.linalg.eigvals(self.continuous)).max())
+        part = min(1.0, period_s * size) if self.stateless else 1.0
+        error = (_NOISE * part + _ROUNDING) * np.abs(made)
+        error[:m, :m] += _NOISE * period_s
+        return growth(made, error)
+
+    def factor(self, period_s: float) -> float:
+        """The factor by which deviations grow in each period in the long run."""
+        return self.growth(period_s).factor ** (1 / self.ticks)
+
+    def grows_anyway(self) -> float:
+        """The rate in [1/s] at which deviations grow under control at all times; 0 if they do not."""
+        rates = np.linalg.eigvals(self.continuous)
+        fastest = float(rates.real.max())
+        return fastest if fastest > STILL * max(1.0, float(np.abs(rates).max())) else 0.0
+
+    def longest_period(self, also: float = 0.0) -> float:
+        """The period up to which it is stable, in [s]; inf if every one is, 0 if none is.
+
+        Delays are as many periods at each. It may be stable again at longer ones.
+
+        Args:
+            also: A period that is tried too.
+        """
+        free, loop = np.linalg.eigvals(self.A), np.linalg.eigvals(self.continuous)
+        tried = sorted({*lengths(np.concatenate([free, loop]), free), *([also] if also else [])})
+        limit = first_unstable(lambda period: self.growth(period).verdict is Stability.UNSTABLE, tried)
+        return limit if limit == inf or self._crosses(limit) else 0.0
+
+    def _crosses(self, limit: float) -> bool:
+        """Whether growth begins at a limit; otherwise it is that of shorter periods, below what can be told."""
+        if not limit or self.growth(limit / 1.1).most < 0:
+            return limit > 0
+        beyond = self.growth(limit * _FADES)
+        return beyond.least > 10 * beyond.doubt
+
+
+def remedy(grows_anyway: float) -> str:
+    """What makes a loop stable that no period does, by the rate at which deviations grow under control at all times."""
+    return "other gains: it is unstable under control at all times, too" if grows_anyway else "lower gains, or less delay"
+
+
+def linearised(plant: Plant, controller: Controller, t: float, y: Array) -> SampledLoop:
+    """The loop about a state.
 
     Args:
         plant: What is controlled.
         controller: What controls it.
         t: Time, in [s].
         y: State (q, v, z), z of the continuous controller and then of the effects.
-        duration_s: Of the run.
-    """
-    cycle, loop = linearised(plant, controller, t, y)
-    return longest(cycle, loop, duration_s, controller.cycle)
-
-
-def linearised(plant: Plant, controller: Controller, t: float, y: Array) -> tuple[Callable[[float], Array], Array]:
-    """The map of (x, u, z) over a cycle of ticks, of their period in [s]; and J of the loop at all times, of x.
-
-    Args:
-        plant: As of `longest_period`, like the others.
-        controller: What controls it.
-        t: Time, in [s].
-        y: State.
     """
     from scipy.linalg import expm
 
@@ -59,7 +120,6 @@ def linearised(plant: Plant, controller: Controller, t: float, y: Array) -> tupl
     A = jacobian(free, t, x, u)
     m = len(A)
     B = by_state(_rows(lambda each: free.rate(t, x, each)[0][:m]), t, u).T
-    K = by_state(_law(continuous, continuous.torque, t, n), t, law).T[:, : 2 * n]
     driven = np.block([[A, B], [np.zeros((n, m + n))]])
 
     def cycle(period: float) -> Array:
@@ -74,9 +134,22 @@ def linearised(plant: Plant, controller: Controller, t: float, y: Array) -> tupl
                 z = np.asarray(call(of_period.next_state, t, law[:n], law[n : 2 * n], z), dtype=float)
         return made
 
-    loop = A.copy()
-    loop[:, : 2 * n] += B @ K
-    return cycle, loop
+    at_all_times = _at_all_times(A, B, continuous, t, law)
+    return SampledLoop(cycle, A, at_all_times, controller.cycle, not controller.state_size)
+
+
+def _at_all_times(A: Array, B: Array, controller: Controller, t: float, law: Array) -> Array:
+    """J of (x, z) under a continuous controller at (q, v, z)."""
+    m, n, size = len(A), B.shape[1], controller.state_size
+    made = np.zeros((m + size, m + size))
+    made[:m, :m] = A
+    of_u = by_state(_law(controller, controller.torque, t, n), t, law).T
+    made[:m, : 2 * n] += B @ of_u[:, : 2 * n]
+    if size:
+        of_z = by_state(_law(controller, controller.state_rate, t, n), t, law).T
+        made[:m, m:] = B @ of_u[:, 2 * n :]
+        made[m:, : 2 * n], made[m:, m:] = of_z[:, : 2 * n], of_z[:, 2 * n :]
+    return made
 
 
 def _between(flow: Array, size: int) -> Array:

@@ -271,7 +271,7 @@ class Setup(Value):
         if not self.record_period_s:
             return True
         ends, due = nodes(self.segments), np.arange(0.0, self.duration_s, self.record_period_s)
-        return bool((np.abs(near(ends, due) - due) <= ON_STEP * self.step_s).all())
+        return bool((np.abs(near(ends, due) - due) <= ON_STEP * self.nominal_step_s).all())
 
     @property
     def steps(self) -> int:

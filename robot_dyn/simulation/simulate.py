@@ -22,6 +22,7 @@ from robot_dyn.simulation.accuracy import run_to
 from robot_dyn.simulation.acting import acting
 from robot_dyn.simulation.choice import choose, most_interpreted
 from robot_dyn.simulation.damped_task import damped
+from robot_dyn.simulation.divergence import explained
 from robot_dyn.simulation.error import ErrorEstimate, no_estimate
 from robot_dyn.simulation.estimate import estimate
 from robot_dyn.simulation.event_run import AccumulationError, TooLongError
@@ -185,12 +186,14 @@ def _trajectory(
     names, about = plant.dynamics.joint_names, origin(plant.dynamics) | edits | setup.about
     if setup.controller is not None and setup.controller.task_frame is not None:
         about = {"frame": link_of(plant.dynamics, setup.controller.task_frame)} | about
+    of_control = _of_control(setup, equation, record)
+    outcome = explained(record.outcome, setup, of_control)
     return Trajectory(
-        names, t, q, v, a, u, power, ledger(equation, record), desired, deviation, record.outcome, statistics, error,
+        names, t, q, v, a, u, power, ledger(equation, record), desired, deviation, outcome, statistics, error,
         about, wrenches(plant, t, q), at_stop(plant, q),
         (
             *remarks(setup, ran.observer, observed, t, np.hstack([q, v, u]), power), *ran.said,
-            *bounded_by_stability(setup, equation, record), *_of_control(setup, equation, record),
+            *bounded_by_stability(setup, equation, record), *of_control,
         ),
         observed.extremes[0], acting(setup),
         equation.controller_states(record.y), record.events, equation.effect_states(record.y),

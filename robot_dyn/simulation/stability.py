@@ -1,15 +1,17 @@
-"""The longest stable step of a method about states of a motion.
+"""Stability of linear maps δx⁺ = Φ(h) δx, and the longest step of a method or period of a loop at which they are stable.
 
-    δx⁺ = Φ(h) δx on δx' = J δx,   stable while ρ(Φ(h)) grows no more than max(1, ρ(e^{hJ})) does
+    a sampled loop:  |λ_i(Φ)| ≤ 1,   known to  |δλ_i| ≤ |w_i|ᵀ |δΦ| |x_i| / |w_iᴴ x_i|   [Stewart, Sun 1990, IV.2]
+    a method on δx' = J δx:  ln ρ(Φ(h)) / h ≤ max(0, Re λ(J))   [Hairer, Wanner 1996, IV.2]
 
-[Hairer, Wanner, Solving Ordinary Differential Equations II, 2nd ed., 1996, IV.2]
+x_i and w_i are the right and left eigenvectors. Neither depends on how long a run is.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from math import inf, log
-from typing import Any
+from collections.abc import Callable, Iterable
+from enum import StrEnum
+from math import inf
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,16 +19,77 @@ from robot_dyn.arithmetic import Array
 from robot_dyn.errors import RobotDynError
 from robot_dyn.integrate.integrator import System
 
-_GROWTH = 1e3  # over the run, beyond that of the motion itself: a run that grows by more has blown up
-_RANGE = (1e-4, 1e3)  # h |λ| where limits are looked for, of the fastest and of the slowest motion
-_STILL = 1e-9  # of the fastest |λ|: differences do not tell less from zero
-_LEAST_STEPS = 20  # of a run: longer steps are not judged
-_SCAN = 5  # lengths in each factor of ten
-_SHARP = 1e-3  # of a limit
+_BAND = 1e-3  # of |λ|: no eigenvalue further from 1 is taken for one at 1, however defective it is
+_AMPLIFIES = 1e-6  # per radian of the fastest motion: an oscillation that a method amplifies by less is its error
+_RANGE = (1e-6, 1e3)  # h |λ| where limits are looked for, of the fastest and of the slowest motion
+STILL = 1e-5  # of the fastest |λ|, and per second: differences do not tell less from zero
+_SMOOTH = 0.03  # h |λ| of the fastest motion up to which Φ(h) is smooth on a scale of factors
+_SCAN = (2, 8, 5)  # lengths in each factor of ten up to there, beyond, and in each radian of an oscillation
+_MOST = 500  # lengths that are tried at each part of a radian, before they grow by factors alone
+_DECAYED = 5.0  # h |Re λ| from which an oscillation is over before the next tick
+_SHARP = 3e-4  # of a limit
 
 
-def longest_step(method: Any, J: Array, n: int, duration_s: float) -> float:
-    """The longest step of a method that is stable on δx' = J δx, in [s]; inf if every step of a run is.
+class Stability(StrEnum):
+    """What a map is."""
+
+    STABLE = "stable"
+    MARGINAL = "marginal"
+    UNSTABLE = "unstable"
+
+
+class Growth(NamedTuple):
+    """How deviations grow under a map.
+
+    Attributes:
+        factor: Spectral radius.
+        least, most: Bounds of max |λ_i| − 1, from the error of each eigenvalue.
+        doubt: The error of the eigenvalue that the lower bound is of.
+    """
+
+    factor: float
+    least: float
+    most: float
+    doubt: float
+
+    @property
+    def verdict(self) -> Stability:
+        """Unstable if some deviation grows for certain, stable if all decay for certain."""
+        if self.least > 0:
+            return Stability.UNSTABLE
+        return Stability.STABLE if self.most < 0 else Stability.MARGINAL
+
+
+def worst(growths: Iterable[Growth]) -> Growth:
+    """Of several maps, the bounds that hold for all."""
+    return Growth(*map(max, zip(*growths, strict=True)))
+
+
+NO_BOUND = Growth(inf, inf, inf, 0.0)
+
+
+def growth(made: Array, error: Array) -> Growth:
+    """Growth under a map whose entries are known to an error.
+
+    Args:
+        made: The map, (m, m).
+        error: Of its entries, (m, m), not negative.
+    """
+    from scipy.linalg import eig
+
+    if not np.isfinite(made).all():
+        return NO_BOUND
+    with np.errstate(all="ignore"):  # a defective eigenvalue has left and right vectors at right angles
+        values, left, right = eig(made, left=True, right=True)
+        doubt = np.einsum("ik,ij,jk->k", np.abs(left), error, np.abs(right)) / np.abs((left.conj() * right).sum(axis=0))
+    size, doubt = np.abs(values), np.minimum(np.nan_to_num(doubt, nan=_BAND), _BAND)
+    worst = int((size - doubt).argmax())
+    least, most = float(size[worst] - doubt[worst]) - 1, float((size + doubt).max()) - 1
+    return Growth(float(size.max()), least, most, float(doubt[worst]))
+
+
+def longest_step(method: Any, J: Array, n: int) -> float:
+    """The longest step of a method that is stable on δx' = J δx, in [s]; inf if every step is.
 
     Steps whose stages are not found, as long ones of Gauss methods by fixed-point iteration, count as unstable.
 
@@ -34,9 +97,19 @@ def longest_step(method: Any, J: Array, n: int, duration_s: float) -> float:
         method: A method of fixed step.
         J: (m, m).
         n: Number of positions, the first entries of x.
-        duration_s: Of the run.
     """
-    return longest(step_map(method, J, n), J, duration_s)
+    rates, made = np.linalg.eigvals(J), step_map(method, J, n)
+    allowed = max(0.0, float(rates.real.max())) + _AMPLIFIES * float(np.abs(rates).max())
+    return first_unstable(lambda h: np.log(radius(made, h)) / h > allowed, lengths(rates))
+
+
+def radius(matrix: Callable[[float], Array], h: float) -> float:
+    """Spectral radius of Φ(h), inf if there is none."""
+    try:
+        with np.errstate(all="ignore"):
+            return float(np.abs(np.linalg.eigvals(matrix(h))).max())
+    except (RobotDynError, np.linalg.LinAlgError):
+        return inf
 
 
 def step_map(method: Any, J: Array, n: int) -> Callable[[float], Array]:
@@ -50,48 +123,47 @@ def step_map(method: Any, J: Array, n: int) -> Callable[[float], Array]:
     return lambda h: np.asarray(method.step(system, 0.0, np.eye(len(J)), h)).T
 
 
-def blows_up(made: Array, J: Array, h: float, duration_s: float, steps: int = 1) -> bool:
-    """Whether the powers of a matrix, of so many steps h, grow by 1e3 more than the motion with J does over a run."""
-    with np.errstate(all="ignore"):
-        rate = np.log(np.abs(np.linalg.eigvals(made)).max()) / (steps * h)
-    growth = max(0.0, float(np.linalg.eigvals(J).real.max()))
-    return not rate - growth <= log(_GROWTH) / duration_s
-
-
 def below(limit: float) -> str:
     """A length safely below a limit, in one digit."""
     return f"{float(f'{limit / 2:.0e}'):g}"
 
 
-def longest(matrix: Callable[[float], Array], J: Array, duration_s: float, steps: int = 1) -> float:
-    """The longest h for which the powers of a matrix, of so many steps h, grow no more than the motion with J does.
+def lengths(rates: Array, rings: Array = np.zeros(0)) -> list[float]:
+    """Lengths h to try, the shortest first, for motions of these rates λ; none if nothing moves.
 
-    It is inf if each is, and 0 if none is. It is looked for from short to long, so that what is stable again beyond
-    does not count.
+    Args:
+        rates: Eigenvalues, in [1/s].
+        rings: Those of oscillations by which stability may come and go as h grows.
     """
-    rates = np.abs(np.linalg.eigvals(J))
-    size = float(rates.max())
+    sizes = np.abs(rates)
+    fastest = float(sizes.max(initial=0.0))
+    told = sizes[sizes > STILL * max(1.0, fastest)]
+    if not len(told):
+        return []
+    h, last, made = _RANGE[0] / fastest, _RANGE[1] / float(told.min()), []
+    while h < last:
+        made.append(h)
+        goes_on = np.abs(rings.imag)[-rings.real * h < _DECAYED] if len(made) < _MOST else np.zeros(0)
+        step = 1 / (_SCAN[2] * goes_on.max()) if goes_on.any() else inf
+        h = min(h * 10 ** (1 / _SCAN[int(h * fastest > _SMOOTH)]), h + step)
+    return made
 
-    def stable(h: float) -> bool:
-        try:
-            return not blows_up(matrix(h), J, h, duration_s, steps)
-        except (RobotDynError, np.linalg.LinAlgError):
-            return False
 
-    if not size > 0:
+def first_unstable(unstable: Callable[[float], bool], tried: list[float]) -> float:
+    """The length up to which nothing is unstable; inf if nothing tried is, 0 if the shortest is.
+
+    Args:
+        unstable: Whether Φ(h) is.
+        tried: Lengths, the shortest first.
+    """
+    before = 0.0
+    for after in tried:
+        if unstable(after):
+            break
+        before = after
+    else:
         return inf
-    slowest = float(rates[rates > _STILL * size].min())  # it may be what a long period makes unstable
-    low, high = _RANGE[0] / size, min(_RANGE[1] / slowest, duration_s / _LEAST_STEPS)
-    if low >= high:
-        return inf
-    before, after = 0.0, inf
-    with np.errstate(all="ignore"):
-        for h in np.geomspace(low, high, 2 + int(_SCAN * np.log10(high / low))).tolist():
-            if not stable(h):
-                after = h
-                break
-            before = h
-        while low * _SHARP < after < inf and after - before > _SHARP * after:
-            middle = (before + after) / 2
-            before, after = (middle, after) if stable(middle) else (before, middle)
-    return before if after < inf else inf
+    while before and after - before > _SHARP * after:
+        middle = (before + after) / 2
+        before, after = (before, middle) if unstable(middle) else (middle, after)
+    return before

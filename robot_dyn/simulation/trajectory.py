@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import StrEnum
 from math import inf
-from typing import Any, Protocol, final, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, final, runtime_checkable
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from robot_dyn.simulation.remarks import Remark
 from robot_dyn.simulation.remarks import lines as said
 from robot_dyn.simulation.tracking import root_mean_square
 from robot_dyn.values import Value, read_only
+
+if TYPE_CHECKING:
+    from robot_dyn.simulation.setup import Setup
 
 # Residuals, as parts of the energy exchanged. Over 150 random scenes they were at most 10 times the estimated error of
 # q, as a part of the motion; one that is far larger contradicts the estimate.
@@ -61,9 +64,12 @@ class Outcome:
     advice: str = ""
 
 
-def diverged_advice(why: str, joint: str, step_s: float) -> str:
-    """Why a run diverged, which joint moved fastest then, and what to do."""
-    return f"{why}; the fastest joint is {joint!r}: take a smaller step than {step_s:g} s, or an implicit method"
+def diverged_advice(why: str, joint: str, setup: Setup) -> str:
+    """Why a run diverged, which joint moved fastest then, and what to do, as long as its loop does not explain it."""
+    advice = f"take a smaller step than {setup.taken_step_s:g} s, or an implicit method"
+    if setup.controller is not None and setup.controller.period_s:
+        advice += f"; or, if the sampled loop is unstable, a shorter period than {setup.controller.period_s:g} s"
+    return f"{why}; the fastest joint is {joint!r}: {advice}"
 
 
 @final
@@ -254,7 +260,7 @@ class Trajectory(Value):
         lines += [] if self.accuracy is None else [f"accuracy: {self.accuracy}"]
         lines += ["between samples: not watched"] if self.extremes is None else []
         lines += [f"events: {_told(self.events)}"] if self.events else []
-        lines += said(self.remarks)
+        lines += [line for line in said(self.remarks) if line != self.outcome.advice]
         if self.tracking_error is not None:
             what = "the frame [m]" if self.desired is None else f"q [{unit}]"
             lines.append(f"tracking error of {what}: {self.tracking_error:.3e} rms")

@@ -1,12 +1,13 @@
-"""Whether the loop of a sampled controller is stable about states of a run; what grows slowly may end before it shows.
+"""Whether the loop of a sampled controller is unstable about states of a run; what grows slowly may end before it shows.
 
-δx⁺ = Φ(T) δx over a period T:   ρ(Φ)^(duration/T) > 1e3, beyond the growth of the same loop with control at all times
+δx⁺ = Φ(T) δx over a period T:   ρ(Φ) > 1, and more than the square of e^{T max Re λ} under control at all times
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
+from math import exp, log
 from typing import NamedTuple
 
 import numpy as np
@@ -15,11 +16,10 @@ from robot_dyn.arithmetic import Array
 from robot_dyn.control.controller import Controller
 from robot_dyn.errors import RobotDynError
 from robot_dyn.simulation.remarks import Kind, Remark
-from robot_dyn.simulation.sampled_loop import linearised
+from robot_dyn.simulation.sampled_loop import SampledLoop, linearised, remedy
 from robot_dyn.simulation.setup import Setup
-from robot_dyn.simulation.stability import below, blows_up, longest
+from robot_dyn.simulation.stability import Stability, below
 from robot_dyn.simulation.state_equation import StateEquation
-
 
 def unstable(setup: Setup, equation: StateEquation, t: np.ndarray, y: np.ndarray) -> Iterator[Remark]:
     """A remark if the loop is unstable about the start, the middle or the end of a run, as far as it is finite there.
@@ -30,55 +30,62 @@ def unstable(setup: Setup, equation: StateEquation, t: np.ndarray, y: np.ndarray
         t: Times of its samples, (m,), in [s].
         y: Its states there, (m, size).
     """
-    controller, motion = setup.controller, equation.equation_of_motion
-    if controller is None or not equation.sampled or equation.canonical:
-        return
-    if motion.payloads or any(drive.coupled for drive in motion.drives.values()):  # no one linearisation holds
-        return
-    n, first = setup.plant.dynamics.n, 2 * setup.plant.dynamics.n + equation.state_size
     good = np.flatnonzero(np.isfinite(y).all(axis=1))
     looks = sorted({int(k) for k in good[[0, len(good) // 2, -1]]}) if len(good) else []
-    found = []
-    for k in looks:
-        with suppress(RobotDynError, np.linalg.LinAlgError, ValueError):  # too far out to be linearised
-            z = np.zeros(controller.at_period(0.0).state_size)
-            x = np.concatenate([y[k, : 2 * n], z, y[k, first : first + motion.state_size]])
-            found += _growths(setup, controller, float(t[k]), x)
-    if found:
-        yield _remark(setup, controller, max(found, key=lambda each: each.factor))
+    for k in looks:  # the first of them: later ones may be far out
+        if found := growing(setup, equation, float(t[k]), y[k]):
+            yield _remark(setup, found)
+            return
 
 
-class _Growth(NamedTuple):
-    """How deviations grow about a state: when, of which joint most, by which factor in a period; and the loop there."""
+class Growing(NamedTuple):
+    """A loop in which deviations grow: when, of which joint most, by which factor in a period; and its linearisation."""
 
     t: float
-    joint: int
+    joint: str
     factor: float
-    cycle: Callable[[float], Array]
-    loop: Array
+    loop: SampledLoop
+
+    def over(self, duration_s: float, period_s: float) -> float:
+        """By how much they grow in the whole periods of a time; no more than 1e300."""
+        return exp(min(log(self.factor) * (duration_s // period_s), 690.0))
+
+    def remedy(self, period_s: float) -> str:
+        """What to do about it."""
+        if limit := self.loop.longest_period(period_s):
+            return f"the loop is stable up to {limit:.3g} s: take period_s={below(limit)}, or lower gains"
+        return f"so it is with every period: take {remedy(self.loop.grows_anyway())}"
 
 
-def _growths(setup: Setup, controller: Controller, t: float, x: np.ndarray) -> list[_Growth]:
-    """The growth about a state (q, v, z), if it is one."""
-    n, period = setup.plant.dynamics.n, controller.period_s
-    with np.errstate(all="ignore"):
-        cycle, loop = linearised(setup.plant, controller, t, x)
-        made = cycle(period)
-        if not np.isfinite(made).all() or not blows_up(made, loop, period, setup.duration_s, controller.cycle):
-            return []
-        values, vectors = np.linalg.eig(made)
-    worst = int(np.argmax(np.abs(values)))
-    part = np.abs(vectors[:n, worst]) + period * np.abs(vectors[n : 2 * n, worst])
-    return [_Growth(t, int(np.argmax(part)), float(np.abs(values[worst]) ** (1 / controller.cycle)), cycle, loop)]
+def growing(setup: Setup, equation: StateEquation, t: float, y: np.ndarray) -> Growing | None:
+    """The loop about a state y of a run if it is sampled and deviations grow there, more than at all times; else None.
+
+    Where they grow under control at all times, as about an arm that falls, ticks have a part if they grow twice as fast.
+    """
+    controller, motion, n = setup.controller, equation.equation_of_motion, setup.plant.dynamics.n
+    if controller is None or not equation.sampled or equation.canonical:
+        return None
+    if motion.payloads or any(drive.coupled for drive in motion.drives.values()):  # no one linearisation holds
+        return None
+    z, first, period = np.zeros(controller.at_period(0.0).state_size), 2 * n + equation.state_size, controller.period_s
+    x = np.concatenate([y[: 2 * n], z, y[first : first + motion.state_size]])
+    with suppress(RobotDynError, np.linalg.LinAlgError, ValueError), np.errstate(all="ignore"):  # too far out
+        loop = linearised(setup.plant, controller, t, x)
+        factor = loop.factor(period)
+        if loop.growth(period).verdict is not Stability.UNSTABLE or log(factor) < 2 * loop.grows_anyway() * period:
+            return None
+        values, vectors = np.linalg.eig(loop.matrix(period))
+        worst = vectors[:, int(np.argmax(np.abs(values)))]
+        part = np.abs(worst[:n]) + period * np.abs(worst[n : 2 * n])
+        return Growing(t, setup.plant.dynamics.joint_names[int(np.argmax(part))], factor, loop)
+    return None
 
 
-def _remark(setup: Setup, controller: Controller, most: _Growth) -> Remark:
-    period, joint = controller.period_s, setup.plant.dynamics.joint_names[most.joint]
-    limit = longest(most.cycle, most.loop, setup.duration_s, controller.cycle)
-    text = f"{joint} by {most.factor:.4g} in each period of {period:.4g} s about the state at {most.t:.4g} s"
-    remedy = (
-        f"the loop is stable up to {limit:.3g} s: take period_s={below(limit)}, or lower gains"
-        if limit
-        else "so it is with every period: take lower gains, or less delay"
+def _remark(setup: Setup, found: Growing) -> Remark:
+    assert setup.controller is not None
+    period, joint, t = setup.controller.period_s, found.joint, found.t
+    text = (
+        f"{joint} by {found.factor:.4g} in each period of {period:.4g} s about the state at {t:.4g} s, by"
+        f" {found.over(setup.duration_s, period):.2g} over the run"
     )
-    return Remark(Kind.UNSTABLE, joint, "q", most.t, 0.0, most.t, most.factor, 1.0, text, remedy)
+    return Remark(Kind.UNSTABLE, joint, "q", t, 0.0, t, found.factor, 1.0, text, found.remedy(period))

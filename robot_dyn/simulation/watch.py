@@ -116,5 +116,4 @@ class Watch:
 
     def diverged(self, t: float, y: Array, why: str) -> DivergedError:
         """The end of a run at time t and state y, with the fastest joint and the remedy."""
-        fastest = self.equation.fastest_joint(y)
-        return DivergedError(t, diverged_advice(why, fastest, self.setup.taken_step_s))
+        return DivergedError(t, diverged_advice(why, self.equation.fastest_joint(y), self.setup))

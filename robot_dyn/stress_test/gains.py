@@ -17,7 +17,7 @@ from robot_dyn.control.computed_torque import PDGravity
 from robot_dyn.errors import RobotDynError
 from robot_dyn.simulation.sampled_loop import linearised
 from robot_dyn.simulation.setup import Setup
-from robot_dyn.simulation.stability import blows_up
+from robot_dyn.simulation.stability import Stability
 from robot_dyn.stress_test.confirm import BEYOND, WITHIN, pushed, told
 from robot_dyn.stress_test.finding import Limit
 from robot_dyn.stress_test.lines import expression
@@ -61,8 +61,7 @@ def _largest(of: Callable[[float], Setup], deadline: Deadline) -> float:
         at = of(omega)
         y = np.concatenate([at.q0, np.zeros(len(at.q0))])
         try:
-            cycle, loop = linearised(at.plant, at.controller, 0.0, y)
-            return not blows_up(cycle(PERIOD_S), loop, PERIOD_S, at.duration_s)
+            return linearised(at.plant, at.controller, 0.0, y).growth(PERIOD_S).verdict is not Stability.UNSTABLE
         except np.linalg.LinAlgError:  # it is not finite
             return False
 
@@ -81,8 +80,8 @@ def _judged(of: Callable[[float], Setup], low: float, inertia: np.ndarray, seed:
     """What advisor and runs say on both sides of the limit."""
     both = [of(part * low) for part in (WITHIN, BEYOND)]
     at, y = both[0].q0, np.concatenate([both[0].q0, both[0].v0])
-    cycle, _ = linearised(both[1].plant, both[1].controller, 0.0, y)
-    start = pushed(both[0], cycle(PERIOD_S), seed)
+    loop = linearised(both[1].plant, both[1].controller, 0.0, y)
+    start = pushed(both[0], loop.matrix(PERIOD_S), seed)
     python = (
         f"m = {expression(inertia)}\nq = {expression(at)}\nfor omega in ({WITHIN * low!r}, {BEYOND * low!r}):\n"
         f"    law = rd.PDGravity(robot, rd.hold(q), np.array(m) * omega**2, 2 * np.array(m) * omega, {PERIOD_S!r})\n"

@@ -2,7 +2,7 @@
 
     0.98 T*: |q − q*| over the last tenth ≤ that of the start;   1.02 T*: twice that at 0.98 at least, and it is said
 
-T* is `longest_period`, linearised at the equilibrium q*, without an allowance for growth: periods as slow as there are.
+T* is the longest stable period of `linearised` at the equilibrium q*.
 Its truth is the spectral radius of the exact map of a period, by matrix exponentials of M⁻¹ and ∂N/∂q, with no line of
 the library's own map: ρ(0.98 T*) ≤ 1 < ρ(1.02 T*), to 1e-6 for ∂N/∂q by differences. A loop that starts within 1e-3 rad
 stays where it is linear; 1500 periods are enough for growth by e even where ρ − 1 = 1e-3. What grows ends where the
@@ -20,7 +20,7 @@ import numpy as np
 
 import robot_dyn as rd
 from robot_dyn.simulation.remarks import Kind, lines
-from robot_dyn.simulation.sampled_loop import longest_period
+from robot_dyn.simulation.sampled_loop import linearised
 from tests.hard.case import Case, Row
 from tests.loops import growth
 
@@ -41,7 +41,6 @@ ARMS = (
 SHORT = ("planar_2r", "ur5")
 PERIODS, START, BANDWIDTH = 1500, 1e-3, 20.0
 LATE = {"PD": (0.0, 0.0), "PD with delay": (0.4, 1.3)}  # of measurement and actuation, in periods
-FOREVER = 1e9  # [s]: so that no growth is allowed
 
 
 def at_rest(name: str, seed: int) -> tuple[rd.Robot, np.ndarray, tuple[np.ndarray, np.ndarray]]:
@@ -85,7 +84,7 @@ def limit_of(name: str, kind: str, seed: int) -> Iterator[Row]:
     arm, q, gains = at_rest(name, seed)
     case, law = f"{name}, {kind}", controller(arm, q, gains, kind)
     z = arm.N(q) if kind not in LATE else np.zeros(0)
-    limit = longest_period(rd.Plant(arm), law, 0.0, np.concatenate([q, 0 * q, z]), FOREVER)
+    limit = linearised(rd.Plant(arm), law, 0.0, np.concatenate([q, 0 * q, z])).longest_period()
     if kind in LATE:
         radii = [growth(arm, q, gains, part * limit, LATE[kind]) for part in (0.98, 1.02)]
         yield Row(case, "ρ of the exact map at 0.98, less 1", radii[0] - 1, 1e-6)

@@ -239,7 +239,7 @@ class Batch:
         advice, equation = [""] * len(why), self.machine.equation
         for run in np.flatnonzero(why).tolist():
             fastest = equation.fastest_joint(self.last[:, run])
-            advice[run] = diverged_advice(_REASONS[Why(why[run])], fastest, self.setup.taken_step_s)
+            advice[run] = diverged_advice(_REASONS[Why(why[run])], fastest, self.setup)
         return advice
 
     def _steps(self, ended: np.ndarray) -> np.ndarray:
