@@ -1,7 +1,7 @@
 """The choice of the engine that runs a setup: machine code, or Python where compiling does not pay or cannot be.
 
-It is made by a count, about how often the equation of motion is evaluated: the same for a setup on every machine. Machine
-code that this process already has is used in any case.
+It is made by a count, about how often the equation of motion is evaluated: the same for a setup on every machine.
+Machine code that this process already has is used in any case.
 """
 
 from __future__ import annotations
@@ -59,9 +59,9 @@ def choose(setup: Setup, equation: StateEquation, seen: float = 0) -> tuple[Mach
 def most_interpreted(setup: Setup, equation: StateEquation, machine: Machine | None) -> float:
     """Evaluations after which a run is begun again in machine code: a count that was guessed too low."""
     guessed = setup.engine == "auto" and machine is None and setup.integrator.controls_error
-    return (
-        _COMPILED / _in_all(setup, equation.size) if guessed and not undeclared(setup.plant, setup.controller) else inf
-    )
+    if not guessed or undeclared(setup.plant, setup.controller):
+        return inf
+    return _COMPILED / _in_all(setup, equation.size)
 
 
 def _machine(setup: Setup, equation: StateEquation) -> Machine:

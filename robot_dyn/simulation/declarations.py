@@ -63,7 +63,7 @@ def _missing(part: Any) -> str:
         return "declares no knots for its own at(t): define knots, the times at which it is not smooth"
     if name := next(_not_frozen(part), ""):
         return f"may change its attribute {name!r} in a run: make it a frozen dataclass, with that as a field"
-    if name := next((name for name, x in vars(part).items() if isinstance(x, _CHANGING)), ""):
+    if name := next((name for name in attributes(part) if isinstance(getattr(part, name, None), _CHANGING)), ""):
         return f"may change what its attribute {name!r} holds: make that a tuple or an array, or declare states"
     return ""
 
@@ -73,13 +73,24 @@ def _of_no_file(dynamics: Any) -> str:
     return "" if isinstance(robot, Robot) else "comes from no robot's file: give a Robot"
 
 
+def attributes(part: Any) -> tuple[str, ...]:
+    """Names of the attributes that it depends on; what is cached follows from them."""
+    kind, known = type(part), getattr(part, "__dict__", {}).keys()
+    own = (name for name in known if not isinstance(getattr_static(kind, name, None), cached_property))
+    return tuple(dict.fromkeys([*_fields(kind), *own]))
+
+
+def _fields(kind: type) -> tuple[str, ...]:
+    return tuple(each.name for each in fields(kind)) if is_dataclass(kind) else ()
+
+
 def _not_frozen(part: Any) -> Iterator[str]:
-    """Its attributes that code may set anew."""
+    """Its attributes that code may set anew; the period of a controller is set by its interface."""
     kind = type(part)
     frozen = is_dataclass(kind) and kind.__dataclass_params__.frozen  # pyright: ignore[reportAttributeAccessIssue]
-    known = {each.name for each in fields(kind)} if frozen else set()
-    names = (name for name in getattr(part, "__dict__", ()) if name not in known)
-    return (name for name in names if not isinstance(getattr_static(kind, name, None), cached_property))
+    known = set(_fields(kind)) if frozen else set()
+    known |= vars(Controller)["__annotations__"].keys() if isinstance(part, Controller) else set()
+    return (name for name in attributes(part) if name not in known)
 
 
 def _defines(kind: type, name: str, base: type) -> bool:

@@ -1,8 +1,8 @@
 """Where the right-hand side of a run is smooth, and where it may not be.
 
-A method of order p converges with order p only where f has p derivatives. Thresholds at which no step ends, dry friction
-whose layer |v| < v_s is crossed within a step, and parts that do not declare where they switch may have kinks between
-the ends of steps. [Hairer, Nørsett, Wanner 1993, II.6]
+A method of order p converges with order p only where f has p derivatives. Thresholds at which no step ends, dry
+friction whose layer |v| < v_s is crossed within a step, and parts that do not declare where they switch may have kinks
+between the ends of steps. [Hairer, Nørsett, Wanner 1993, II.6]
 """
 
 from __future__ import annotations

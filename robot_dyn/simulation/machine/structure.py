@@ -6,7 +6,7 @@ class that is not of this library, is told by identity.
 
 from __future__ import annotations
 
-from dataclasses import fields, is_dataclass
+from dataclasses import is_dataclass
 from enum import Enum
 from hashlib import sha256
 from typing import Any
@@ -18,7 +18,7 @@ from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.model.edits import Edits, Payload
 from robot_dyn.model.robot import Robot
-from robot_dyn.simulation.declarations import is_frozen
+from robot_dyn.simulation.declarations import attributes, is_frozen
 from robot_dyn.simulation.state_equation import StateEquation
 
 _PLAIN = bool, int, float, str, bytes, type(None)
@@ -67,7 +67,7 @@ def _of(value: Any, objects: list[Any]) -> Any:
         return "polynomial", value.coefficients.shape[1:]
     if is_dataclass(value) and is_frozen(value):
         inside: list[Any] = []
-        described = _class(type(value), inside), *(_of_field(value, each.name, inside) for each in fields(value))
+        described = _class(type(value), inside), *(_of_field(value, name, inside) for name in attributes(value))
         if all(map(_weakly, inside)):
             objects += inside
             return described
