@@ -55,7 +55,7 @@ class Setup(Value):
             where only shorter steps can tell.
         about: Texts kept with the run.
         engine: "interpreted"; "compiled", the run in machine code, right angles of the file written out in
-            full; or "auto", which compiles where that pays.
+            full; or "auto", which compiles where that pays, and uses machine code that this process already has.
         events: What to look out for: steps end there, and the run does if one is terminal.
         accuracy: Largest error of q to have, over joints and times: a number for rad and m alike, or one of each, as
             {"rad": 1e-8, "m": 1e-6}, of which the least holds. Pilot runs choose method and tolerance, and the error
