@@ -59,6 +59,6 @@ class Threshold:
         return self.of_actuation or self.state is not None
 
 
-def smooth(part: object, *joints: int) -> tuple[Threshold, ...]:
+def smooth(self: object, n: int = 0) -> tuple[Threshold, ...]:
     """No thresholds: with `thresholds = smooth` a class declares that its formulas are smooth everywhere."""
     return ()

@@ -45,17 +45,15 @@ def engine_of(part: Any) -> str:
     return choose(setup, StateEquation(setup.plant, setup.controller))[1]
 
 
-def smooth(part: Any, *n: int) -> tuple[()]:
-    """What a user's class returns that is smooth everywhere."""
-    return ()
-
-
 @dataclass(frozen=True, eq=False)
 class Drag(rd.Dissipative):
     """τ = −c tanh(v): what is written outside of the library, and declared."""
 
     c: Any = field(metadata=rd.coefficient("N m", symbol="c", least=0))
-    thresholds = smooth
+
+    def thresholds(self, n=0):
+        return ()
+
     calls: ClassVar[int] = 0
 
     def torque(self, dynamics, t, q, v):
@@ -103,7 +101,8 @@ def test_an_undeclared_part_runs_interpreted_and_the_summary_says_what_to_declar
 
 
 class Bare(rd.Active):
-    thresholds = smooth
+    def thresholds(self, n=0):
+        return ()
 
     def __init__(self, c: float) -> None:
         self.c = c
@@ -115,7 +114,9 @@ class Bare(rd.Active):
 @dataclass(frozen=True, eq=False)
 class Remembers(rd.Active):
     memory: Any = field(default_factory=dict)
-    thresholds = smooth
+
+    def thresholds(self, n=0):
+        return ()
 
     def torque(self, dynamics, t, q, v):
         return self.memory.setdefault("v", v) - v
@@ -124,7 +125,9 @@ class Remembers(rd.Active):
 @dataclass(frozen=True, eq=False)
 class Cached(rd.Active):
     c: float = 2.0
-    thresholds = smooth
+
+    def thresholds(self, n=0):
+        return ()
 
     @cached_property
     def square(self) -> float:
@@ -197,7 +200,9 @@ class Law(rd.Stateless):
 
     formula: Any
     n: int = 2
-    thresholds = smooth
+
+    def thresholds(self, n=0):
+        return ()
 
     def torque(self, t, q, v, z):
         return self.formula(t, q, v)
@@ -291,7 +296,9 @@ class Gravity(rd.Stateless):
     robot: Any
     part: float
     n: int = 2
-    thresholds = smooth
+
+    def thresholds(self, n=0):
+        return ()
 
     def torque(self, t, q, v, z):
         return self.part * self.robot.N(q) - v

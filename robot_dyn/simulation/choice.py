@@ -11,6 +11,7 @@ from math import inf
 from typing import TYPE_CHECKING, Any
 
 from robot_dyn.errors import RobotDynError
+from robot_dyn.integrate.methods import has_name
 from robot_dyn.simulation.declarations import named, undeclared
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import segments
@@ -44,6 +45,8 @@ def choose(setup: Setup, equation: StateEquation, seen: float = 0) -> tuple[Mach
         return _machine(setup, equation), _label(setup)
     if parts := undeclared(setup.plant, setup.controller):  # they may do what a trace would lose
         return None, _interpreted(setup, " ".join((named(parts[0][0]), parts[0][1])))
+    if not has_name(setup.integrator):  # whether its step can be compiled only the first call of its loop would tell
+        return None, _interpreted(setup, f"the step of {setup.integrator.name} is compiled by engine='compiled' alone")
     try:
         made = _existing(setup, equation)
         if made is None:
@@ -59,7 +62,7 @@ def choose(setup: Setup, equation: StateEquation, seen: float = 0) -> tuple[Mach
 def most_interpreted(setup: Setup, equation: StateEquation, machine: Machine | None) -> float:
     """Evaluations after which a run is begun again in machine code: a count that was guessed too low."""
     guessed = setup.engine == "auto" and machine is None and setup.integrator.controls_error
-    if not guessed or undeclared(setup.plant, setup.controller):
+    if not guessed or undeclared(setup.plant, setup.controller):  # what is not compiled would never end
         return inf
     return _COMPILED / _in_all(setup, equation.size)
 
@@ -88,7 +91,7 @@ def _code(setup: Setup, equation: StateEquation) -> tuple[StateEquation, Any]:
     return equation if method.nonsmooth else equation.in_a_mode, method if method.plain else None
 
 
-def _needs(setup: Setup) -> dict[str, bool]:
+def _needs(setup: Setup) -> dict[str, Any]:
     method: Any = setup.integrator
     return {"jacobian": method.needs_jacobian, "cuts": setup.finds_events, "nonsmooth": method.nonsmooth}
 

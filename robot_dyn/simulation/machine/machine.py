@@ -208,8 +208,9 @@ class Machine:
                     self._compare_lane(t, y, p, own, made, lane)
             except RobotDynError:
                 raise
-            except Exception as error:  # of a user's code
-                raise MachineError(f"{self._of_parts} raises at t = {t:.3g} s ({because(error)})") from error
+            except Exception as error:  # of changeable code
+                parts = " or ".join(self.equations.changeable)
+                raise MachineError(f"{parts} raises at t = {t:.3g} s ({because(error)})") from error
             if "jacobian" in made:
                 J = made["jacobian"][:, 0].reshape(m + 1, m)
                 worst = by_differences(self.equation, t, y[:, 0], own[:n, 0] if held else None, p, J)
@@ -246,18 +247,17 @@ class Machine:
             yield out[:m, lane], theirs[:m]
             yield out[m : m + 2 * n, lane], theirs[m : m + 2 * n]
 
-    @property
-    def _of_parts(self) -> str:
-        return " or ".join(self.equations.changeable) or f"the state equation of {self.equations.name}"
-
     def _differs(self, what: str, worst: float, allowed: float, t: float) -> MachineError:
-        if self.equations.changeable:
-            remedy = "its methods must be functions of their arguments and of its declared attributes alone"
-        else:
-            remedy = "take engine='interpreted', and report it"
+        of, remedy = f"of {self.equations.name}", "take engine='interpreted', and report it"
+        if parts := self.equations.changeable:
+            of = f"with {' or '.join(parts)}"
+            remedy = (
+                "methods must be functions of their arguments and of what their part declares; take"
+                " engine='interpreted', or make a part anew that was changed after a run"
+            )
         return MachineError(
-            f"the compiled {what} with {self._of_parts} differs from the interpreted one by {worst:.1e} of its size,"
-            f" {allowed:.1e} allowed, at t = {t:.3g} s: {remedy}"
+            f"the compiled {what} {of} differs from the interpreted one by {worst:.1e} of its size at t = {t:.3g} s,"
+            f" {allowed:.1e} allowed: {remedy}"
         )
 
     def _pairs(
