@@ -57,3 +57,8 @@ class Threshold:
     def own(self) -> bool:
         """Whether it is of what belongs to its effect, and of no coordinate, which effects share."""
         return self.of_actuation or self.state is not None
+
+
+def smooth(self: object, n: int = 0) -> tuple[Threshold, ...]:
+    """No thresholds: with `thresholds = smooth` a class declares that its formulas are smooth everywhere."""
+    return ()

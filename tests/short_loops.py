@@ -173,7 +173,12 @@ def at_rest(name: str, rng: np.random.Generator) -> Arm:
     x, M = np.concatenate([q, v]), pin.crba(model, data, q).copy()
     M = np.triu(M) + np.triu(M, 1).T
     slope = [
-        (45 * (a(x + h * e) - a(x - h * e)) - 9 * (a(x + 2 * h * e) - a(x - 2 * h * e)) + a(x + 3 * h * e) - a(x - 3 * h * e))
+        (
+            45 * (a(x + h * e) - a(x - h * e))
+            - 9 * (a(x + 2 * h * e) - a(x - 2 * h * e))
+            + a(x + 3 * h * e)
+            - a(x - 3 * h * e)
+        )
         / (60 * h)
         for e in np.eye(2 * robot.n)
     ]  # of order 6
@@ -246,7 +251,9 @@ def main() -> int:
             print("     " if found[-1].holds else "WRONG", found[-1], flush=True)
     radii = {said: [each.radius for each in found if each.stable == said] for said in (True, False)}
     limits, worst = [each.exact for each in found], max(found, key=lambda each: each.off)
-    print(f"seed {options.seed}: {len(radii[True])} called stable, of radius {max(radii[True], default=0):.9g} at most;")
+    print(
+        f"seed {options.seed}: {len(radii[True])} called stable, of radius {max(radii[True], default=0):.9g} at most;"
+    )
     print(f"{len(radii[False])} called unstable, of radius {min(radii[False], default=inf):.9g} at least;")
     print(f"{limits.count(0.0)} that no period makes stable, {limits.count(inf)} that every one does;")
     print(f"stated periods off by {worst.off:.2g} at most: {worst}")

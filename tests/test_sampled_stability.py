@@ -44,8 +44,16 @@ def test_a_period_is_judged_itself_where_a_shorter_one_is_unstable() -> None:
     """A spring and a damper under P control: unstable from some period on, and stable again before ω T = 2 π."""
     k, d, kp = 100.0, 1.0, 60.0
     A, one = np.array([[0.0, 1.0], [-k, -d]]), np.ones(1)
-    arm = Arm("spring", rd.Plant(BLOCK, [rd.Spring([k]), rd.ViscousFriction([d])]), A, np.array([[0.0], [1.0]]), one,
-              0.1 * one, 0 * one, 0 * one)
+    arm = Arm(
+        "spring",
+        rd.Plant(BLOCK, [rd.Spring([k]), rd.ViscousFriction([d])]),
+        A,
+        np.array([[0.0], [1.0]]),
+        one,
+        0.1 * one,
+        0 * one,
+        0 * one,
+    )
     loop = ShortLoop(arm, kp * one, None, 0 * one, (0.0, 0.0), False, 0, 1.0, 10)
     first = loop.longest()
     again = next(T for T in np.arange(first, 1.0, 1e-3) if loop.radius(T) > 1 and loop.radius(T + 2e-3) < 0.999) + 2e-3

@@ -17,7 +17,7 @@ from robot_dyn.coefficients import with_values
 from robot_dyn.compiled.parameters import CONTROLLER, Part
 from robot_dyn.compiled.symbolic import Symbols, TraceError, column, every_branch
 from robot_dyn.control.controller import Controller
-from robot_dyn.control.reference import polynomial
+from robot_dyn.control.reference import PiecewisePolynomial, polynomial
 from robot_dyn.effects.carried_payload import CarriedPayload
 from robot_dyn.effects.effect import Active, Bound, Conservative, Drive, Effect, Stateful
 from robot_dyn.effects.plant import Plant
@@ -54,6 +54,11 @@ def symbolic_controller(
     made: dict[str, Any] = dict(values.get(CONTROLLER, {})) | dict(models)
     left = list(pieces)
     for name, reference in controller.references.items():
+        if isinstance(reference, PiecewisePolynomial) and type(reference).at is not PiecewisePolynomial.at:
+            raise TraceError(
+                f"reference {type(reference).__name__} cannot be compiled: its at(t) is not that of its polynomials;"
+                " give an rd.PiecewisePolynomial, or take engine='interpreted'"
+            )
         own = {attribute: left.pop(0) for attribute in reference.polynomials}
         made[name] = own.get("") or with_values(reference, own | dict(values.get(("reference", name), {})))
     return TracedController(with_values(controller, made), controller)

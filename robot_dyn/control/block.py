@@ -32,7 +32,7 @@ class Block(Value, ABC):
     Attributes:
         term: Its equation in a few signs.
         linear: Whether it acts on small signals; one that does not is left out where a loop is linearised.
-        rounds: Whether its output jumps where its input does not.
+        rounds: Whether its output jumps where its input does not; a class that does not define it declares nothing.
         random: Whether its states are standard normal deviates, drawn anew at each tick.
     """
 

@@ -16,6 +16,7 @@ from robot_dyn.control.independent_joint import DAMPING, STIFFNESS, joint_count
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.errors import ControlError
 from robot_dyn.model.dynamics import Dynamics
+from robot_dyn.threshold import smooth
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +39,8 @@ class ModelBased(Stateless):
     kp: Any = field(metadata=STIFFNESS)
     kd: Any = field(metadata=DAMPING)
     period_s: float = 0.0
+
+    thresholds = smooth
 
     def __post_init__(self) -> None:
         check_model(self.model)

@@ -123,6 +123,7 @@ class Controller(Value, ABC):
     def thresholds(self) -> tuple[Threshold, ...]:
         """Levels of its `demand`, where its formulas pass from one smooth one to another; `beyond` says to which.
 
+        () if they are smooth everywhere; a class that does not define this declares nothing, as of `Effect`.
         Where it acts continuously, steps of integration end where one is passed.
         """
         return ()

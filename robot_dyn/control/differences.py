@@ -19,6 +19,7 @@ class Differences(Block):
     """
 
     term = "y = (x − x₋)/T"
+    rounds = False
 
     def state_size(self, n: int) -> int:
         return n

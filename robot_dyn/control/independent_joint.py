@@ -17,7 +17,7 @@ from robot_dyn.control.controller import Controller, Stateless
 from robot_dyn.control.reference import PiecewisePolynomial, numbers
 from robot_dyn.errors import ControlError, shown
 from robot_dyn.saturation import limits_reached, middle_of, piece, saturated
-from robot_dyn.threshold import Threshold
+from robot_dyn.threshold import Threshold, smooth
 
 STIFFNESS = coefficient("N m/rad", symbol="kp", least=0)
 DAMPING = coefficient("N m s/rad", symbol="kd", least=0)
@@ -39,6 +39,8 @@ class PD(Stateless):
     kp: Any = field(metadata=STIFFNESS)
     kd: Any = field(metadata=DAMPING)
     period_s: float = 0.0
+
+    thresholds = smooth
 
     @property
     def n(self) -> int:

@@ -26,6 +26,7 @@ from robot_dyn.control.differences import Differences
 from robot_dyn.control.nested import check_sampled, nested
 from robot_dyn.control.tick import tick
 from robot_dyn.errors import ControlError, shown
+from robot_dyn.threshold import smooth
 from robot_dyn.validate import integer
 
 LINES = ("position", "velocity", "actuation")
@@ -66,6 +67,8 @@ class Loop(Controller):
     seed: int = 0
     run: int = 0
     period_s: float = field(init=False, default=0.0)
+
+    thresholds = smooth  # a sampled controller's torque is constant between ticks
 
     def __post_init__(self) -> None:
         check_sampled("controller", self.controller)

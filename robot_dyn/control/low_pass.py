@@ -32,6 +32,7 @@ class LowPass(Block):
     """
 
     term = "y = x through Butterworth's filter"
+    rounds = False
 
     cutoff: Any = field(metadata=coefficient("rad/s", symbol="ω", above=0))
     order: int = 2

@@ -17,6 +17,7 @@ from robot_dyn.coefficients import with_values
 from robot_dyn.control.controller import Controller, Nested
 from robot_dyn.control.nested import check_sampled, nested
 from robot_dyn.errors import ControlError
+from robot_dyn.threshold import smooth
 
 _ROUNDED = 1e-9  # of a ratio of periods: it is a whole number
 
@@ -41,6 +42,8 @@ class Multirate(Controller):
     slow: Controller
     period_s: float = field(init=False, default=0.0)
     ratio: int = field(init=False, default=1)
+
+    thresholds = smooth  # of the torque, which is constant between ticks
 
     def __post_init__(self) -> None:
         for name in ("fast", "slow"):

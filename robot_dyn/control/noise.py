@@ -23,7 +23,7 @@ class Noise(Block):
     """
 
     term = "y = x + σ ξ"
-    linear, random = False, True
+    linear, rounds, random = False, False, True
 
     deviation: Any = field(metadata=coefficient(SIGNAL, symbol="σ", least=0))
 

@@ -20,6 +20,7 @@ from robot_dyn.control.orientation import orientation_error
 from robot_dyn.control.reference import number, numbers
 from robot_dyn.errors import ControlError, shown
 from robot_dyn.model.dynamics import Dynamics, acceleration
+from robot_dyn.threshold import smooth
 from robot_dyn.values import Value, read_only
 
 POSITION, POSE = (0, 1, 2), (0, 1, 2, 3, 4, 5)  # rows of a twist
@@ -147,6 +148,8 @@ class OperationalSpace(Stateless):
     rows: Any = None
     threshold: Any = field(default=0.01, metadata=coefficient("1/kg", shapes=((),), above=0))
     period_s: float = 0.0
+
+    thresholds = smooth
 
     def __post_init__(self) -> None:
         check_model(self.model)

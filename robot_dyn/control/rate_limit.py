@@ -27,7 +27,7 @@ class RateLimit(Block):
     """
 
     term = "y = y₋ + sat(x − y₋, r T)"
-    linear = False
+    linear, rounds = False, False
 
     rate: Any = field(metadata=coefficient(f"{SIGNAL}/s", symbol="r", above=0))
 

@@ -13,7 +13,7 @@ from robot_dyn.effects.effect import Bound, Effect, Stateful
 from robot_dyn.errors import EffectError
 from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.saturation import limits_reached, middle_of, piece, saturated
-from robot_dyn.threshold import Threshold
+from robot_dyn.threshold import Threshold, smooth
 
 if TYPE_CHECKING:
     import numpy as np
@@ -72,6 +72,7 @@ class ActuatorLag(Stateful, Bound):
     time_constant: Any = field(metadata=coefficient("s", symbol="T", above=0))
 
     term = "u' = (u_command − u) / T"
+    thresholds = smooth
 
     def state_size(self, n: int) -> int:
         return n

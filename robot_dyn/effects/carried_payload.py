@@ -18,6 +18,7 @@ from robot_dyn.coefficients import coefficient, with_values
 from robot_dyn.effects.effect import Effect
 from robot_dyn.errors import EditError, EffectError
 from robot_dyn.model.edits import Payload
+from robot_dyn.threshold import smooth
 from robot_dyn.validate import instance, truth
 
 _START = coefficient("s", shapes=((),), swept=False)
@@ -47,6 +48,7 @@ class CarriedPayload(Effect):
     carried: bool | None = field(default=None, init=False, repr=False)
 
     term = "a rigid body on a link, in M, C and N while it is carried"
+    thresholds = smooth
 
     def __post_init__(self) -> None:
         instance("payload", self.payload, Payload, "give one, as rd.Payload('tool0', 1.5)", error=EffectError)

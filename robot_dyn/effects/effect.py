@@ -77,10 +77,11 @@ class Effect(Value):
         return ()
 
     def thresholds(self, n: int) -> tuple[Threshold, ...]:
-        """Where it switches from one smooth formula to another, on an arm of n joints.
+        """Where it switches from one smooth formula to another, on an arm of n joints; () if it is smooth everywhere.
 
-        A step of integration ends where one is passed; `beyond` says what the effect is on either side. Levels of the
-        actuation are for bounds: of what reaches them.
+        A step of integration ends where one is passed; `beyond` says what the effect is on either side. A class that
+        does not define this declares nothing: it runs interpreted unless machine code is asked for, and error estimates
+        do not rest on the order of a method. Levels of the actuation are for bounds: of what reaches them.
         """
         return ()
 
@@ -92,7 +93,8 @@ class Effect(Value):
     def widths(self) -> tuple[Any, Any]:
         """Changes of q and of v over which its torque bends, each a scalar or (n,); inf where it is smooth.
 
-        An implicit method takes its Jacobian from differences inside them.
+        An implicit method takes its Jacobian from differences inside them. Where v reverses within a few steps through
+        such a layer about 0, an error estimate does not rest on the order of the method.
         """
         return inf, inf
 

@@ -6,10 +6,13 @@ from dataclasses import dataclass, field
 from math import inf
 from typing import Any, final
 
+import numpy as np
+
 from robot_dyn.arithmetic import Array, tanh
 from robot_dyn.coefficients import coefficient
 from robot_dyn.effects.effect import Dissipative
 from robot_dyn.model.dynamics import Dynamics
+from robot_dyn.threshold import smooth
 
 
 @final
@@ -24,6 +27,7 @@ class ViscousFriction(Dissipative):
     damping: Any = field(metadata=coefficient("N m s/rad", symbol="b", least=0, stated="damping"))
 
     term = "−b v"
+    thresholds = smooth
 
     def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
         return -self.damping * v
@@ -45,10 +49,11 @@ class RegularisedCoulombFriction(Dissipative):
     velocity_scale: Any = field(default=0.01, metadata=coefficient("rad/s", symbol="v_s", above=0))
 
     term = "−f tanh(v / v_s)"
+    thresholds = smooth
 
     @property
     def widths(self) -> tuple[Any, Any]:
-        return inf, self.velocity_scale
+        return inf, np.where(np.asarray(self.friction) > 0, self.velocity_scale, inf)
 
     def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
         return -self.friction * tanh(v / self.velocity_scale)

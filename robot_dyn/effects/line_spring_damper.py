@@ -18,6 +18,7 @@ from robot_dyn.effects.effect import Conservative, Dissipative, Effect
 from robot_dyn.errors import EffectError, QueryError
 from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.spatial import hat
+from robot_dyn.threshold import smooth
 from robot_dyn.validate import instance
 
 _POINT = coefficient("m", symbol="p, in the axes of the frame", shapes=((3,),))
@@ -35,6 +36,8 @@ class _Line(Effect):
     other_frame: str | None
     point: Any = field(default=(0.0, 0.0, 0.0), metadata=_POINT)
     other_point: Any = field(default=(0.0, 0.0, 0.0), metadata=_OTHER)
+
+    thresholds = smooth
 
     def __post_init__(self) -> None:
         for name, frame in zip(("frame", "other_frame"), self._frames, strict=False):

@@ -18,6 +18,7 @@ import numpy as np
 from robot_dyn.arithmetic import Array
 from robot_dyn.convex import minimum
 from robot_dyn.effects.effect import Dissipative
+from robot_dyn.threshold import smooth
 
 _ROUNDING = 1e-12  # of the accelerations that add up
 
@@ -54,6 +55,8 @@ class SetValued(Dissipative):
     held: Any
     rubs: ClassVar[bool] = False
     stops: ClassVar[bool] = False
+
+    thresholds = smooth  # but where its mode ends
 
     @abstractmethod
     def in_mode(self, mode: Mode) -> SetValued:

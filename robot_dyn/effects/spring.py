@@ -9,6 +9,7 @@ from robot_dyn.arithmetic import Array
 from robot_dyn.coefficients import coefficient
 from robot_dyn.effects.effect import Conservative
 from robot_dyn.model.dynamics import Dynamics
+from robot_dyn.threshold import smooth
 
 
 @final
@@ -25,6 +26,7 @@ class Spring(Conservative):
     rest: Any = field(default=0.0, metadata=coefficient("rad", symbol="q₀"))
 
     term = "−k (q − q₀)"
+    thresholds = smooth
 
     def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
         return -self.stiffness * (q - self.rest)

@@ -14,6 +14,7 @@ from robot_dyn.coefficients import coefficient
 from robot_dyn.effects.effect import Active
 from robot_dyn.errors import EffectError, QueryError
 from robot_dyn.model.dynamics import Axes, Dynamics
+from robot_dyn.threshold import smooth
 from robot_dyn.validate import instance, rows
 
 _TIME = coefficient("s", shapes=((),), infinite=True, swept=False)
@@ -39,6 +40,7 @@ class ExternalWrench(Active):
     end_s: float = field(default=inf, metadata=_TIME)
 
     term = "Jᵀ F"
+    thresholds = smooth
 
     def __post_init__(self) -> None:
         instance("frame", self.frame, str, "give the name of a link", error=EffectError)

@@ -1,7 +1,8 @@
 """What acts between the ends of two steps and at neither, so that no companion run need see it.
 
-Joint stops: the cubic through q and v at the ends of a step tells how far the joint went between them. Code that this
-library did not write: its torque is looked at between the ends of steps.
+Thresholds of positions, where no step ends at them: the cubic through q and v at the ends of a step tells how far the
+joint went between them. Parts that do not declare where they switch: their torque is looked at between the ends of
+steps.
 """
 
 from __future__ import annotations
@@ -13,13 +14,13 @@ import numpy as np
 
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.effect import Force
-from robot_dyn.effects.joint_limit import JointStopSpring
 from robot_dyn.errors import RobotDynError
 from robot_dyn.foreign import call
+from robot_dyn.simulation.declarations import named, undeclared
 from robot_dyn.simulation.record import Path, Record
 from robot_dyn.simulation.schedule import LEAST_STEPS
 from robot_dyn.simulation.setup import Setup
-from robot_dyn.simulation.smoothness import LOOKS, extremes, foreign, named
+from robot_dyn.simulation.smoothness import LOOKS, extremes
 from robot_dyn.simulation.state_equation import StateEquation
 
 _STANDS_OUT = 50.0  # times the change of the torque from step to step
@@ -47,8 +48,8 @@ def stepped_over(setup: Setup, equation: StateEquation, path: Path, error: float
         return None
     q, v = path.y[:, : equation.plant.dynamics.n], equation.velocities(path.y)
     effects = () if setup.finds_events else setup.plant.effects
-    found = [_stop(equation, effect, path, q, v, error) for effect in effects]
-    found += [_code(equation, part, path, q, v, error) for part in foreign(setup)]
+    found = [_crossed(equation, effect, path, q, v, error) for effect in effects]
+    found += [_code(equation, part, path, q, v, error) for part, _ in undeclared(setup.plant, setup.controller)]
     return min((each for each in found if each is not None), key=lambda each: each.t, default=None)
 
 
@@ -70,24 +71,40 @@ def cut_alike(setup: Setup, run: Record) -> Missed | None:
     return min(found, key=lambda each: each.t, default=None)
 
 
-def _stop(
+def _crossed(
     equation: StateEquation, effect: Any, path: Path, q: np.ndarray, v: np.ndarray, error: float
 ) -> Missed | None:
-    """A stop that a joint passed and left again within a step."""
-    if not isinstance(effect, JointStopSpring):
-        return None
+    """A threshold of a position that a joint passed and passed back within a step."""
+    levels = effect.thresholds(q.shape[1]) if isinstance(effect, Force) else ()
     low, high = extremes(path.t, q, v)
-    depth = np.maximum(effect.lower - low, high - effect.upper)
-    ends = np.maximum(effect.lower - q, q - effect.upper) > 0
-    depth[ends[:-1] | ends[1:]] = 0.0
-    torque = np.broadcast_to(effect.stiffness, depth.shape) * np.maximum(depth, 0.0)
-    for k in np.flatnonzero(torque.any(axis=1)):
-        joint = int(torque[k].argmax())
-        if _displacement(equation, path, q, int(k), torque[k]) > error:
-            name, h = equation.plant.dynamics.joint_names[joint], path.t[k + 1] - path.t[k]
-            why = f"joint {name!r} passes its stop by {depth[k, joint]:.1e} and leaves it within one step of {h:.1e} s"
-            return Missed(float(path.t[k]), why)
-    return None
+    missed = []
+    for each in levels:
+        if each.of_velocity or each.own:
+            continue
+        i, beyond = each.joint, np.sign(q[:, each.joint] - each.level)
+        far = np.where(beyond[:-1] > 0, low[:, i], high[:, i])
+        back = (beyond[:-1] == beyond[1:]) & (np.sign(far - each.level) == -beyond[:-1]) & (beyond[:-1] != 0)
+        for k in np.flatnonzero(back):
+            torque = _change(equation, effect, path, q[k], v[k], int(k), i, far[k])
+            if _displacement(equation, path, q, int(k), torque) > error:
+                name, h = equation.plant.dynamics.joint_names[i], path.t[k + 1] - path.t[k]
+                depth = abs(far[k] - each.level)
+                why = f"joint {name!r} passes its {each.name} by {depth:.1e} and leaves it within one step of {h:.1e} s"
+                missed.append(Missed(float(path.t[k]), why))
+                break
+    return min(missed, key=lambda found: found.t, default=None)
+
+
+def _change(
+    equation: StateEquation, effect: Any, path: Path, q: np.ndarray, v: np.ndarray, k: int, joint: int, far: float
+) -> np.ndarray:
+    """How far the torque of an effect in step k, where a joint turns, is from that at its start, (n,)."""
+    n, states = len(q), _states_of(equation, effect)
+    z = () if states is None else (path.y[k, 2 * n : 2 * n + equation.states][states],)
+    turned, stands = q.copy(), v.copy()
+    turned[joint], stands[joint] = far, 0.0
+    there, here = (call(effect.torque, equation.plant.dynamics, float(path.t[k]), x, stands, *z) for x in (turned, q))
+    return np.broadcast_to(np.abs(np.subtract(there, here)), (n,))
 
 
 def _code(equation: StateEquation, part: Any, path: Path, q: np.ndarray, v: np.ndarray, error: float) -> Missed | None:

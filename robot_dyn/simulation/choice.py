@@ -1,17 +1,20 @@
 """The choice of the engine that runs a setup: machine code, or Python where compiling does not pay or cannot be.
 
 It is made by a count, about how often the equation of motion is evaluated: the same for a setup on every machine.
+Machine code that this process already has is used in any case.
 """
 
 from __future__ import annotations
 
+import sys
 from math import inf
 from typing import TYPE_CHECKING, Any
 
 from robot_dyn.errors import RobotDynError
+from robot_dyn.integrate.methods import has_name
+from robot_dyn.simulation.declarations import named, undeclared
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import segments
-from robot_dyn.simulation.smoothness import foreign, named
 from robot_dyn.simulation.state_equation import StateEquation
 
 if TYPE_CHECKING:
@@ -40,20 +43,28 @@ def choose(setup: Setup, equation: StateEquation, seen: float = 0) -> tuple[Mach
         return None, _interpreted(setup)
     if setup.engine == "compiled":
         return _machine(setup, equation), _label(setup)
-    if parts := foreign(setup):  # they may have effects of their own, which a trace would lose
-        return None, _interpreted(setup, f"{named(parts[0])} is not the library's own")
-    if max(seen * _in_all(setup, equation.size), _evaluations(setup, equation.size)) < _COMPILED:
-        return None, _interpreted(setup, "short: compiling does not pay")
+    if parts := undeclared(setup.plant, setup.controller):  # they may do what a trace would lose
+        return None, _interpreted(setup, " ".join((named(parts[0][0]), parts[0][1])))
+    if not has_name(setup.integrator):  # whether its step can be compiled only the first call of its loop would tell
+        return None, _interpreted(setup, f"the step of {setup.integrator.name} is compiled by engine='compiled' alone")
     try:
-        return _machine(setup, equation), _label(setup)
+        made = _existing(setup, equation)
+        if made is None:
+            if max(seen * _in_all(setup, equation.size), _evaluations(setup, equation.size)) < _COMPILED:
+                return None, _interpreted(setup, "short: compiling does not pay")
+            made = _made(setup, equation)
+        made.check(setup)
+        return made, _label(setup)
     except (ImportError, RobotDynError) as error:
         return None, _interpreted(setup, str(error))
 
 
 def most_interpreted(setup: Setup, equation: StateEquation, machine: Machine | None) -> float:
     """Evaluations after which a run is begun again in machine code: a count that was guessed too low."""
-    guessed = setup.engine == "auto" and machine is None and setup.integrator.controls_error and not foreign(setup)
-    return _COMPILED / _in_all(setup, equation.size) if guessed else inf
+    guessed = setup.engine == "auto" and machine is None and setup.integrator.controls_error
+    if not guessed or undeclared(setup.plant, setup.controller):  # what is not compiled would never end
+        return inf
+    return _COMPILED / _in_all(setup, equation.size)
 
 
 def _machine(setup: Setup, equation: StateEquation) -> Machine:
@@ -70,11 +81,24 @@ def machine_of(setup: Setup, equation: StateEquation, swept: tuple[str, ...] = (
     """
     from robot_dyn.simulation.machine.making import machine
 
+    return machine(*_code(setup, equation), swept=swept, **_needs(setup))
+
+
+def _existing(setup: Setup, equation: StateEquation) -> Machine | None:
+    """The machine code that this process already has."""
+    making = sys.modules.get("robot_dyn.simulation.machine.making")  # imported by the first run that compiled
+    return None if making is None else making.existing(*_code(setup, equation), **_needs(setup))
+
+
+def _code(setup: Setup, equation: StateEquation) -> tuple[StateEquation, Any]:
+    """The equation that is compiled, and the method if its steps are."""
     method: Any = setup.integrator
-    return machine(
-        equation if method.nonsmooth else equation.in_a_mode, method if method.plain else None, swept=swept,
-        jacobian=method.needs_jacobian, cuts=setup.finds_events, nonsmooth=method.nonsmooth,
-    )  # fmt: skip
+    return equation if method.nonsmooth else equation.in_a_mode, method if method.plain else None
+
+
+def _needs(setup: Setup) -> dict[str, Any]:
+    method: Any = setup.integrator
+    return {"jacobian": method.needs_jacobian, "cuts": setup.finds_events, "nonsmooth": method.nonsmooth}
 
 
 def _interpreted(setup: Setup, why: str = "") -> str:

@@ -21,10 +21,10 @@ from robot_dyn.foreign import call
 from robot_dyn.integrate.adaptive import AUTO, Adaptive
 from robot_dyn.integrate.methods import as_method
 from robot_dyn.simulation.asked import asked
+from robot_dyn.simulation.declarations import undeclared
 from robot_dyn.simulation.event import Event
 from robot_dyn.simulation.schedule import LEAST_STEPS, ON_STEP, Segment, cuts, near, nodes, steps_on
 from robot_dyn.simulation.size import check_segments
-from robot_dyn.simulation.smoothness import may_switch
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.validate import choice, duration, instance, integer, one_state, returned, truth
 from robot_dyn.values import Value
@@ -32,7 +32,7 @@ from robot_dyn.values import Value
 MOST_CUT = 200_000  # steps of a run of fixed step that is cut at events
 ENGINES = ("auto", "interpreted", "compiled")
 STEP_S = 1e-3  # of a method of fixed step, unless given
-_LONGEST_STEP_S, _LEAST_STEPS = 0.01, 200  # where something may switch between steps
+_LONGEST_STEP_S, _LEAST_STEPS = 0.01, 200  # where a part does not declare where it switches
 
 
 @final
@@ -56,7 +56,7 @@ class Setup(Value):
             where only shorter steps can tell.
         about: Texts kept with the run.
         engine: "interpreted"; "compiled", the run in machine code, right angles of the file written out in
-            full; or "auto", which compiles where that pays.
+            full; or "auto", which compiles where that pays, and uses machine code that this process already has.
         events: What to look out for: steps end there, and the run does if one is terminal.
         accuracy: Largest error of q to have, over joints and times: a number for rad and m alike, or one of each, as
             {"rad": 1e-8, "m": 1e-6}, of which the least holds. Pilot runs choose method and tolerance, and the error
@@ -290,12 +290,13 @@ class Setup(Value):
 
     @property
     def longest_step_s(self) -> float:
-        """Longest step that an adaptive method may take, in [s]: 10 ms and 1/200 of the run where something may switch.
+        """Longest step that an adaptive method may take, in [s]: 10 ms and 1/200 of the run with an undeclared part.
 
-        Joint stops, effects that act for a time, and code written elsewhere may act between the ends of a step, and
-        error control does not see what no stage meets. A fixed step is the user's.
+        What does not declare where it switches may act between the ends of a step, and error control does not see what
+        no stage meets. A fixed step is the user's.
         """
-        return min(_LONGEST_STEP_S, self.duration_s / _LEAST_STEPS) if may_switch(self) else inf
+        longest = min(_LONGEST_STEP_S, self.duration_s / _LEAST_STEPS)
+        return longest if undeclared(self.plant, self.controller) else inf
 
 
 def check_stops(plant: Plant, q0: Array, of: str = "q0") -> None:

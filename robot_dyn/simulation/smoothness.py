@@ -1,54 +1,31 @@
 """Where the right-hand side of a run is smooth, and where it may not be.
 
-A method of order p converges with order p only where f has p derivatives. Joint stops, effort limits that cut a
-continuous control, dry friction whose layer |v| < v_s is crossed within a step, and code that this library did not
-write may have kinks between the ends of steps. [Hairer, Nørsett, Wanner 1993, II.6]
+A method of order p converges with order p only where f has p derivatives. Thresholds at which no step ends, dry
+friction whose layer |v| < v_s is crossed within a step, and parts that do not declare where they switch may have kinks
+between the ends of steps. [Hairer, Nørsett, Wanner 1993, II.6]
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from robot_dyn.control.block import Block
-from robot_dyn.control.control_law import ControlLaw
-from robot_dyn.control.controller import Controller
-from robot_dyn.effects.actuator import EffortLimit
-from robot_dyn.effects.dahl import DahlFriction
-from robot_dyn.effects.friction import RegularisedCoulombFriction
-from robot_dyn.effects.joint_limit import JointStopDamper, JointStopSpring
-from robot_dyn.effects.lugre import LuGreFriction
-from robot_dyn.effects.series_elastic import SeriesElastic
+from robot_dyn.simulation.declarations import named, undeclared
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.record import Path
     from robot_dyn.simulation.setup import Setup
     from robot_dyn.simulation.state_equation import StateEquation
 
-STOPS = (JointStopSpring, JointStopDamper)
 _IN_LAYER = 4  # steps within |v| < v_s that show a method's order
-_NEAR_LIMIT = 0.95  # of the effort limit
-LOOKS = 4000  # at foreign code, between steps
+_NEAR_LIMIT = 0.95  # of a level of the actuation
+LOOKS = 4000  # between steps, at parts that do not declare where they switch
 _LOOKS = 300  # states at which the actuation is computed
 
-
-def foreign(setup: Setup) -> tuple[Any, ...]:
-    """The parts of a setup that are not of this library's classes."""
-    parts = (setup.plant.dynamics, *setup.plant.effects, setup.controller, setup.integrator)
-    if setup.controller is not None:
-        parts += (*setup.controller.models.values(), *setup.controller.references.values())
-        parts += tuple(each.part for each in setup.controller.parts)
-    return tuple(part for part in parts if part is not None and _is_foreign(part))
-
-
-def _is_foreign(part: Any) -> bool:
-    return isinstance(part, ControlLaw) or not type(part).__module__.startswith("robot_dyn.")
-
-
-def named(part: Any) -> str:
-    """Its name for people: that of its class, or of the function that it is."""
-    return part.name if isinstance(part, Controller) else type(part).__name__
+Kink = tuple[float, str]  # time in [s], and why
 
 
 def rounds(part: Any) -> bool:
@@ -56,21 +33,7 @@ def rounds(part: Any) -> bool:
     return isinstance(part, Block) and part.rounds
 
 
-def looked_s(setup: Setup) -> float:
-    """Time in [s] between looks at what foreign code does, where steps are longer."""
-    return setup.duration_s / LOOKS
-
-
-def may_switch(setup: Setup) -> bool:
-    """Whether something may act between two steps without acting at either."""
-    if setup.finds_events:  # and windows are ends of segments
-        return bool(foreign(setup))
-    effects = setup.plant.effects
-    windows = any(0.0 < t < setup.duration_s for effect in effects for t in effect.switches)
-    return windows or any(isinstance(effect, STOPS) for effect in effects) or bool(foreign(setup))
-
-
-def first_kink(setup: Setup, equation: StateEquation, path: Path) -> tuple[float, str]:
+def first_kink(setup: Setup, equation: StateEquation, path: Path) -> Kink:
     """Time in [s] from which the right-hand side may not be smooth, and why; inf and "" if it is to the end.
 
     Args:
@@ -78,36 +41,51 @@ def first_kink(setup: Setup, equation: StateEquation, path: Path) -> tuple[float
         equation: Its state equation.
         path: Its states, step by step.
     """
-    if parts := foreign(setup):
-        return (
-            0.0,
-            f"{named(parts[0])} may switch, and what is shorter than {looked_s(setup):.1g} s is not seen",
-        )
+    if parts := undeclared(setup.plant, setup.controller):
+        shortest = setup.duration_s / LOOKS
+        return 0.0, f"{named(parts[0][0])} {parts[0][1]}; what is shorter than {shortest:.1g} s is not seen"
     if setup.controller is not None and any(rounds(each.part) for each in setup.controller.parts):
         return 0.0, "what is rounded at a tick may be rounded the other way"
     if len(path.t) < 2:
         return np.inf, ""
-    n = equation.plant.dynamics.n
-    q, v = path.y[:, :n], equation.velocities(path.y)
+    q, v = path.y[:, : equation.plant.dynamics.n], equation.velocities(path.y)
     found = [(np.inf, "")]
-    for effect in () if setup.integrator.controls_error else setup.plant.effects:
-        if isinstance(effect, STOPS) and not setup.finds_events:
-            low, high = extremes(path.t, q, v)
-            found.append(_first(path.t, (low < effect.lower) | (high > effect.upper), "a joint touches its stop"))
-        elif isinstance(effect, RegularisedCoulombFriction):
-            steps = np.diff(path.key)[:, None] if (path.key >= 0).all() else 1
-            crosses = (v[:-1] * v[1:] <= 0) & (np.abs(np.diff(v, axis=0)) * _IN_LAYER > effect.velocity_scale * steps)
-            crosses &= np.broadcast_to(np.asarray(effect.friction) > 0, crosses.shape)
-            found.append(_first(path.t, crosses, "dry friction reverses within a few steps"))
-        elif isinstance(effect, LuGreFriction | DahlFriction) and not (
-            setup.finds_events and not setup.integrator.canonical
-        ):
-            found.append(_first(path.t, v[:-1] * v[1:] <= 0, "a joint with bristles stands or reverses"))
-        elif isinstance(effect, SeriesElastic) and effect.backlash is not None and not setup.finds_events:
-            found.append((0.0, "a backlash opens or closes"))
+    if not setup.integrator.controls_error:
+        found += _passed(setup, equation, path, q, v)
+        found += _reversed(setup, path, v)
     if not setup.finds_events:
         found.append(_saturation(setup, equation, path, q, v))
     return min(found)
+
+
+def _passed(setup: Setup, equation: StateEquation, path: Path, q: np.ndarray, v: np.ndarray) -> Iterator[Kink]:
+    """When thresholds at which no step ends are passed."""
+    n, states = equation.plant.dynamics.n, equation.equation_of_motion.states
+    low, high = extremes(path.t, q, v)
+    for k, effect in enumerate(setup.plant.effects):
+        for each in effect.thresholds(n):
+            if each.of_actuation or (setup.finds_events and not (each.of_velocity and setup.integrator.canonical)):
+                continue
+            if each.of_velocity or each.state is not None:
+                z = path.y[:, 2 * n + equation.state_size :]
+                x = v[:, each.joint] if each.state is None else z[:, states[k].start + each.state]
+                below, above = np.minimum(x[:-1], x[1:]), np.maximum(x[:-1], x[1:])
+            else:
+                below, above = low[:, each.joint], high[:, each.joint]
+            name = equation.plant.dynamics.joint_names[each.joint]
+            happens = (below <= each.level) & (above >= each.level)
+            yield _first(path.t, happens[:, None], f"{name!r} passes its {each.name} within a step")
+
+
+def _reversed(setup: Setup, path: Path, v: np.ndarray) -> Iterator[Kink]:
+    """When joints reverse within a few steps where a torque bends about v = 0, and no step ends."""
+    n, steps = v.shape[1], np.diff(path.key)[:, None] if (path.key >= 0).all() else 1
+    for effect in setup.plant.effects:
+        cut = [each.joint for each in effect.thresholds(n) if each.of_velocity]
+        layer = np.broadcast_to(effect.widths[1], n).copy()
+        layer[cut] = np.inf
+        happens = (v[:-1] * v[1:] <= 0) & (np.abs(np.diff(v, axis=0)) * _IN_LAYER > layer * steps)
+        yield _first(path.t, happens, f"{effect.name} reverses within a few steps")
 
 
 def extremes(t: np.ndarray, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -135,21 +113,22 @@ def extremes(t: np.ndarray, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, n
     return low, high
 
 
-def _saturation(setup: Setup, equation: StateEquation, path: Path, q: np.ndarray, v: np.ndarray) -> tuple[float, str]:
-    """When a continuous control comes near an effort limit."""
-    limits = [np.asarray(x.limit) for x in setup.plant.effects if isinstance(x, EffortLimit)]
-    if setup.controller is not None:
-        limits.append(np.asarray(setup.controller.saturation))
-    if equation.sampled or setup.controller is None or not any(np.isfinite(x).any() for x in limits):
-        return np.inf, ""
+def _saturation(setup: Setup, equation: StateEquation, path: Path, q: np.ndarray, v: np.ndarray) -> Kink:
+    """When a continuous control comes near a level of the actuation."""
     n, m = equation.plant.dynamics.n, equation.state_size
+    least = np.full(n, np.inf)
+    if setup.controller is not None and not equation.sampled:
+        declared = [setup.controller.thresholds(), *(effect.thresholds(n) for effect in setup.plant.effects)]
+        for each in (each for of in declared for each in of if each.of_actuation):
+            least[each.joint] = min(least[each.joint], abs(each.level))
+    if not np.isfinite(least).any():
+        return np.inf, ""
     rows = np.unique(np.linspace(0, len(path.t) - 1, _LOOKS).astype(int))
     u = np.array([equation.command(float(path.t[i]), q[i], v[i], path.y[i, 2 * n : 2 * n + m]) for i in rows])
-    least = np.min([np.broadcast_to(x, (n,)) for x in limits], axis=0)
-    return _first(path.t[rows], np.abs(u[1:]) > _NEAR_LIMIT * least, "an effort limit cuts the control")
+    return _first(path.t[rows], np.abs(u[1:]) > _NEAR_LIMIT * least, "a limit cuts the control")
 
 
-def _first(t: np.ndarray, happens: np.ndarray, why: str) -> tuple[float, str]:
+def _first(t: np.ndarray, happens: np.ndarray, why: str) -> Kink:
     """Start of the first interval on which something happens at any joint."""
     rows = np.flatnonzero(happens.any(axis=1))
     return (float(t[rows[0]]), why) if len(rows) else (np.inf, "")

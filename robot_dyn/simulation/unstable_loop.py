@@ -21,6 +21,7 @@ from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.stability import Stability, below
 from robot_dyn.simulation.state_equation import StateEquation
 
+
 def unstable(setup: Setup, equation: StateEquation, t: np.ndarray, y: np.ndarray) -> Iterator[Remark]:
     """A remark if the loop is unstable about the start, the middle or the end of a run, as far as it is finite there.
 

@@ -1,6 +1,6 @@
 """The state equation of a setup as machine code, compared with the interpreted one before use.
 
-|y' − y'_interpreted| ≤ 1e-13 · cond(M) · scale   at random states, or it is refused
+|y' − y'_interpreted| ≤ 1e-13 · cond(M) · scale   at states of the run or at random ones, or it is refused
 """
 
 from __future__ import annotations
@@ -24,16 +24,17 @@ from robot_dyn.control.controller import Controller
 from robot_dyn.convex import PASSES
 from robot_dyn.effects.effect import Effect
 from robot_dyn.errors import RobotDynError
+from robot_dyn.foreign import because
 from robot_dyn.simulation.machine.jacobian_check import DIFFERENCES, by_differences
+from robot_dyn.simulation.machine.states import States, random_states, some, states_of
 from robot_dyn.simulation.moreau_jean import stepped
 from robot_dyn.simulation.plan import plan_of
 from robot_dyn.simulation.setup import Setup
-from robot_dyn.simulation.smoothness import foreign
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.state_functions import sample
 from robot_dyn.simulation.time_loop import Functions
 
-_STATES = 4
+_LANES = 4  # runs in lock step that are compared
 _AGREES = 1e-13
 _LENGTH = 1e-3  # [s], of a step that is compared
 STEP = "problem", "newton", "behind"  # programs of one function; the last is one by itself, too
@@ -54,13 +55,16 @@ class Equations:
         runs: W.
         name: What moves, for people.
         shared: As of `write_function`.
+        changeable: Names of the parts whose code may be another at the next run, or do what a trace does not see.
+        checked: States at which they were compared with the interpreted equation, by the loops that they ran in.
     """
 
     programs: Mapping[str, Program]
     runs: int
     name: str
     shared: Mapping[int, int] = field(default_factory=dict)
-    checked: set[bool] = field(default_factory=set, repr=False)
+    changeable: tuple[str, ...] = ()
+    checked: dict[Any, States] = field(default_factory=dict, repr=False)
 
     @property
     def instructions(self) -> int:
@@ -163,46 +167,72 @@ class Machine:
         """The functions as Python calls them."""
         return Functions(*(_callable(address) if address else 0 for address in self.equations.functions))
 
-    def check(self, setup: Setup) -> None:
-        """Hold the functions to the interpreted equations at random states.
+    @property
+    def ready(self) -> bool:
+        """Whether it has been compiled, with its loop, and compared."""
+        return self.loop in self.equations.checked
 
-        Once is enough for parts of this library, which do not change; a user's own may.
+    def check(self, setup: Setup) -> None:
+        """Hold the functions to the interpreted equations.
+
+        Once is enough, at random states, where the version of this library tells the code of all parts. Any other part
+        is compared at states of the first second of its run, and at some of these before each later run.
 
         Raises:
             MachineError: If they differ by more than rounding.
         """
-        if self.equations.checked and not foreign(setup):
-            return
+        known = next(iter(self.equations.checked.values()), None)
+        if known is None:
+            known = states_of(setup) if self.equations.changeable else random_states(setup, self.equation.size)
+            self._compare(setup, known)
+        elif self.equations.changeable:
+            self._compare(setup, some(known))
+        self.equations.checked[self.loop] = known
+
+    def _compare(self, setup: Setup, states: States) -> None:
         rng, n, m = np.random.default_rng(20), self.equation.plant.dynamics.n, self.equation.size
         W = self.equations.runs
         plan, held = plan_of(setup), n * self.equation.sampled
         made = {name: np.empty((len(program.outputs), W)) for name, program in self.equations.programs.items()}
-        for i in range(_STATES):
-            s = int(rng.integers(len(plan.counts) - 1))
-            t, y = float(plan.starts[s] + plan.lengths[s]), rng.normal(size=(m, W))
-            swept = {each.name: np.tile(each.value.ravel(), (W, 1)) for each in self.known if each.name in self.swept}
-            own = self.own(swept)
+        swept = {each.name: np.tile(each.value.ravel(), (W, 1)) for each in self.known if each.name in self.swept}
+        own = self.own(swept)
+        for i, at in enumerate(states.t.tolist()):
+            p = plan.parameters[int(np.searchsorted(plan.starts[:-1], at, side="right")) - 1]
+            t, y = min(max(at, p[0]), p[1]), np.ascontiguousarray(states.y[(i + np.arange(W)) % len(states.y)].T)
             own[:held] = rng.normal(size=(held, W))
             for name, out in made.items():
                 if name not in STEP:
-                    getattr(self.in_python, name)(t, y, plan.parameters[s], own, out)
-            for lane in range(min(W, _STATES)):
-                ours = {name: out[:, lane] for name, out in made.items()}
-                held_here = own[:n, lane] if held else None
-                pairs = [*self._pairs(t, y[:, lane], held_here, ours)]
-                if "problem" in made and not lane:
-                    pairs += self._of_step(t, y, plan.parameters[s], own, min(W, _STATES))
-                allowed = _AGREES * max(1.0, float(np.linalg.cond(self.equation.plant.M(y[:n, lane]))))
-                worst = max(_difference(mine, theirs, y[:, lane]) for mine, theirs in pairs)
-                if not worst <= allowed:
-                    raise self._differs("state equation", worst, allowed, i)
+                    getattr(self.in_python, name)(t, y, p, own, out)
+            try:
+                for lane in range(min(W, _LANES)):
+                    self._compare_lane(t, y, p, own, made, lane)
+            except RobotDynError:
+                raise
+            except Exception as error:  # of changeable code
+                parts = " or ".join(self.equations.changeable)
+                raise MachineError(f"{parts} raises at t = {t:.3g} s ({because(error)})") from error
             if "jacobian" in made:
                 J = made["jacobian"][:, 0].reshape(m + 1, m)
-                held_here = own[:n, 0] if held else None
-                worst = by_differences(self.equation, t, y[:, 0], held_here, plan.parameters[s], J)
+                worst = by_differences(self.equation, t, y[:, 0], own[:n, 0] if held else None, p, J)
                 if not worst <= 1:
-                    raise self._differs("Jacobian", worst * DIFFERENCES, DIFFERENCES, i)
-        self.equations.checked.add(True)
+                    raise self._differs("Jacobian", worst * DIFFERENCES, DIFFERENCES, t)
+
+    def _compare_lane(
+        self, t: float, y: np.ndarray, p: np.ndarray, own: np.ndarray, made: Mapping[str, np.ndarray], lane: int
+    ) -> None:
+        """What the functions made of one run, beside what the equation makes of it."""
+        n = self.equation.plant.dynamics.n
+        ours, held = (
+            {name: out[:, lane] for name, out in made.items()},
+            own[:n, lane] if self.equation.sampled else None,
+        )
+        pairs = [*self._pairs(t, y[:, lane], held, ours)]
+        if "problem" in made and not lane:
+            pairs += self._of_step(t, y, p, own, min(self.equations.runs, _LANES))
+        allowed = _AGREES * max(1.0, float(np.linalg.cond(self.equation.plant.M(y[:n, lane]))))
+        worst = max(_difference(mine, theirs, y[:, lane]) for mine, theirs in pairs)
+        if not worst <= allowed:
+            raise self._differs("state equation", worst, allowed, t)
 
     def _of_step(
         self, t: float, y: np.ndarray, p: np.ndarray, own: np.ndarray, lanes: int
@@ -217,11 +247,17 @@ class Machine:
             yield out[:m, lane], theirs[:m]
             yield out[m : m + 2 * n, lane], theirs[m : m + 2 * n]
 
-    def _differs(self, what: str, worst: float, allowed: float, state: int) -> MachineError:
+    def _differs(self, what: str, worst: float, allowed: float, t: float) -> MachineError:
+        of, remedy = f"of {self.equations.name}", "take engine='interpreted', and report it"
+        if parts := self.equations.changeable:
+            of = f"with {' or '.join(parts)}"
+            remedy = (
+                "methods must be functions of their arguments and of what their part declares; take"
+                " engine='interpreted', or make a part anew that was changed after a run"
+            )
         return MachineError(
-            f"the compiled {what} of {self.equations.name} differs from the interpreted one by {worst:.1e} of its size,"
-            f" {allowed:.1e} allowed: take engine='interpreted', or make a part anew that was changed after a run; if"
-            f" none was, report it (random state {state})"
+            f"the compiled {what} {of} differs from the interpreted one by {worst:.1e} of its size at t = {t:.3g} s,"
+            f" {allowed:.1e} allowed: {remedy}"
         )
 
     def _pairs(

@@ -9,7 +9,7 @@ import weakref
 from collections.abc import Callable
 from dataclasses import replace
 from threading import RLock
-from typing import Any, final
+from typing import Any, NamedTuple, final
 
 from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.compiled.cache import default_store
@@ -27,7 +27,7 @@ from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.detection import detecting
 from robot_dyn.simulation.event_loop import event_loop
 from robot_dyn.simulation.machine.machine import Equations, Machine
-from robot_dyn.simulation.machine.structure import structure
+from robot_dyn.simulation.machine.structure import changeable, of_library, structure
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.time_loop import time_loop
 
@@ -55,6 +55,13 @@ class Recent:
                 del self._kept[next(iter(self._kept))]
             return found[1]
 
+    def known(self, objects: tuple[Any, ...], more: tuple[Any, ...]) -> Any:
+        """The value that `get` would give without making it, or None."""
+        with self._lock:
+            found = self._kept.get((*map(id, objects), *more))
+            same = found is not None and all(ref() is each for ref, each in zip(found[0], objects, strict=True))
+            return found[1] if found is not None and same else None
+
 
 _robots, _symbols, _equations = Recent(), Recent(), Recent()
 
@@ -64,7 +71,7 @@ def _robot(dynamics: Any) -> Robot:
 
     def make() -> Robot | None:
         robot = robot_of(dynamics)
-        if robot is None:
+        if robot is None or not of_library(type(dynamics)):  # another class may have equations of its own
             raise TraceError(
                 f"{type(dynamics).__name__} comes from no robot's file and cannot be compiled: take a Robot, "
                 "or engine='interpreted'"
@@ -104,25 +111,54 @@ def machine(
     Raises:
         TraceError: If a part of the equation cannot be compiled; names it, with the remedy.
     """
-    plant, controller = equation.plant, equation.controller
-    robot = _robot(plant.dynamics)
-    own = equation if robot is plant.dynamics else replace(equation, plant=Plant(robot, plant.effects))
-    known = parameters(robot, plant.effects, controller, swept)
-    described, objects = structure(own)
-    described = described, tuple(each.place for each in known)
+    made = _identified(equation, swept)
 
     def make() -> Equations:
-        programs = _programs(own, known, kept, jacobian, nonsmooth, None if objects else described)
-        return Equations(programs, lanes, robot.name, _shared(own, known, lanes, swept))
+        described = None if made.objects else made.described
+        programs = _programs(made.equation, made.known, kept, jacobian, nonsmooth, described)
+        shared = _shared(made.equation, made.known, lanes, swept)
+        return Equations(programs, lanes, made.equation.plant.dynamics.name, shared, changeable(made.equation))  # pyright: ignore
 
-    names = tuple(name for name in dict.fromkeys(each.name for each in known) if name in swept)
-    equations = _equations.get(objects, (described, lanes, kept, names, jacobian, nonsmooth), make)
+    names = tuple(name for name in dict.fromkeys(each.name for each in made.known) if name in swept)
+    equations = _equations.get(made.objects, (made.described, lanes, kept, names, jacobian, nonsmooth), make)
     if equations.instructions > _MOST_INSTRUCTIONS:
         raise TraceError(
             f"the run takes {equations.instructions} instructions, more than the {_MOST_INSTRUCTIONS} worth compiling;"
             " simulate it with engine='interpreted'"
         )
-    return Machine(own, equations, known, None if method is None else _loop(method, cuts, detects), swept)
+    return Machine(
+        made.equation, equations, made.known, None if method is None else _loop(method, cuts, detects), swept
+    )
+
+
+def existing(
+    equation: StateEquation, method: Integrator | None, *, jacobian: bool, cuts: bool, nonsmooth: bool
+) -> Machine | None:
+    """The machine of a single run, arguments as of `machine`, if it has been compiled in this process; or None."""
+    made = _identified(equation, ())
+    equations = _equations.known(made.objects, (made.described, 1, None, (), jacobian, nonsmooth))
+    if equations is None:
+        return None
+    found = Machine(made.equation, equations, made.known, None if method is None else _loop(method, cuts))
+    return found if found.ready else None
+
+
+class _Identified(NamedTuple):
+    """A state equation, of the robot whose equations are compiled, with its parameters and its structure."""
+
+    equation: StateEquation
+    known: tuple[Parameter, ...]
+    described: tuple[Any, ...]
+    objects: tuple[Any, ...]
+
+
+def _identified(equation: StateEquation, swept: tuple[str, ...]) -> _Identified:
+    plant = equation.plant
+    robot = _robot(plant.dynamics)
+    own = equation if robot is plant.dynamics else replace(equation, plant=Plant(robot, plant.effects))
+    known = parameters(robot, plant.effects, equation.controller, swept)
+    described, objects = structure(own)
+    return _Identified(own, known, (described, tuple(each.place for each in known)), objects)
 
 
 def machine_of_constants(equation: StateEquation, method: Integrator, *, lanes: int = 1) -> Machine:

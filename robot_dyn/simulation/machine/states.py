@@ -1,0 +1,72 @@
+"""States at which machine code is compared with the interpreted equations before it is used."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from robot_dyn.simulation.event_run import TooLongError
+from robot_dyn.simulation.plan import plan_of
+from robot_dyn.simulation.prepared import prepared
+from robot_dyn.simulation.record import Path
+from robot_dyn.simulation.setup import Setup
+from robot_dyn.simulation.state_equation import StateEquation
+from robot_dyn.simulation.trajectory import Ending
+
+_RANDOM = 4
+_FIRST_S, _MOST = 1.0, 2000  # [s] of a run that are interpreted first, and its evaluations, some 0.2 s
+_ALONG, _AT_TIMES = 100, 100
+_AGAIN = 4  # of either
+
+
+class States(NamedTuple):
+    """Times (k,), in [s], and states (k, m)."""
+
+    t: np.ndarray
+    y: np.ndarray
+
+
+def random_states(setup: Setup, size: int) -> States:
+    """Random states of that size at random segments of a run."""
+    rng, plan = np.random.default_rng(20), plan_of(setup)
+    segments = rng.integers(len(plan.counts) - 1, size=_RANDOM)
+    return States(plan.starts[segments] + plan.lengths[segments], rng.normal(size=(_RANDOM, size)))
+
+
+def states_of(setup: Setup) -> States:
+    """States of the first second of a run, at their times and at random times of the whole run.
+
+    The latter are for code that does on symbols what it does on early times.
+    """
+    path = _first_second(setup)
+    along = np.unique(np.linspace(0, len(path.t) - 1, _ALONG).astype(int))
+    t = np.random.default_rng(20).uniform(0.0, setup.duration_s, size=_AT_TIMES)
+    return States(np.append(path.t[along], t), path.y[np.append(along, np.resize(along, _AT_TIMES))])
+
+
+def some(states: States) -> States:
+    """A few of these states, the first and the last among them."""
+    rows = np.unique(np.linspace(0, len(states.t) - 1, 2 * _AGAIN).astype(int))
+    return States(states.t[rows], states.y[rows])
+
+
+def _first_second(setup: Setup) -> Path:
+    """The first second of a run by the interpreted engine, or as much of it as takes few evaluations."""
+    span = min(setup.duration_s, _FIRST_S)
+    if not setup.integrator.controls_error:
+        span = min(span, _MOST / (setup.integrator.evaluations_per_step or 1) * setup.taken_step_s)
+    while True:
+        short = replace(
+            setup, duration_s=span, record_period_s=0.0, estimate_error=False, accuracy=None, engine="interpreted"
+        )
+        equation = StateEquation(short.plant, short.controller, short.integrator.canonical, short.events)
+        try:
+            record = prepared(short, equation, None, samples=False, most=_MOST).record()
+        except TooLongError:
+            span /= 10
+            continue
+        if record.outcome.ending is Ending.STOPPED:
+            raise KeyboardInterrupt
+        return record.walked
