@@ -113,7 +113,7 @@ class ShortLoop:
         T, before, last = 1e-4 / rates.max(), 0.0, min(300 / rates[rates > 1e-6 * rates.max()].min(), self.highest)
         while self.radius(T) <= 1 + 1e-11:  # rounding
             before, T = T, min(1.04 * T, T + 1 / (20 * ring)) if 0 < ring * T < 100 else 1.04 * T
-            if T >= last:
+            if last <= T:
                 return self.highest
         while before and T - before > 1e-9 * T:
             middle = (before + T) / 2

@@ -9,8 +9,8 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.simulation.remarks import Kind
-from tests.short_loops import Arm, ShortLoop, judge
 from tests.estimates.scenes import RAIL
+from tests.short_loops import Arm, ShortLoop, judge
 
 BLOCK = rd.Robot.from_text(RAIL)  # 1 kg
 SHORT = 28  # seed

@@ -52,7 +52,7 @@ def choose(setup: Setup, equation: StateEquation, seen: float = 0) -> tuple[Mach
         if made is None:
             if max(seen * _in_all(setup, equation.size), _evaluations(setup, equation.size)) < _COMPILED:
                 return None, _interpreted(setup, "short: compiling does not pay")
-            made = _made(setup, equation)
+            made = machine_of(setup, equation)
         made.check(setup)
         return made, _label(setup)
     except (ImportError, RobotDynError) as error:

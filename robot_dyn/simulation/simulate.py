@@ -22,6 +22,7 @@ from robot_dyn.simulation.accuracy import run_to
 from robot_dyn.simulation.acting import acting
 from robot_dyn.simulation.choice import choose, most_interpreted
 from robot_dyn.simulation.damped_task import damped
+from robot_dyn.simulation.declarations import named, undeclared
 from robot_dyn.simulation.divergence import explained
 from robot_dyn.simulation.error import ErrorEstimate, no_estimate
 from robot_dyn.simulation.estimate import estimate
@@ -38,7 +39,6 @@ from robot_dyn.simulation.remarks import Remark
 from robot_dyn.simulation.samples import columns, ledger
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import check_record
-from robot_dyn.simulation.smoothness import foreign, named
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.stiffness import StiffError, bounded_by_stability
 from robot_dyn.simulation.tracking import deviation_of
@@ -109,7 +109,8 @@ def simulate(
     statistics = Statistics(
         EXPLICIT if setup.integrator.name == AUTO else setup.integrator.name, step, record.steps, record.evaluations,
         finished - ran.ready, 0.0 if error is None else estimated - finished, ran.engine, ran.ready - began,
-        companion_evaluations=spent, companion_runs=companions, user_code=", ".join(map(named, foreign(setup))),
+        companion_evaluations=spent, companion_runs=companions,
+        user_code=", ".join(named(part) for part, _ in undeclared(setup.plant, setup.controller)),
     )  # fmt: skip
     made = _trajectory(ran, equation, record, statistics, error)
     if made.leak and record.outcome.ending is not Ending.STOPPED:  # no more of the user's code is called then

@@ -12,8 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
-from robot_dyn.control.controller import Controller
 from robot_dyn.errors import RobotDynError
 from robot_dyn.simulation.remarks import Kind, Remark
 from robot_dyn.simulation.sampled_loop import SampledLoop, linearised, remedy
