@@ -121,7 +121,8 @@ class Batch:
         equation, n = self.machine.equation, self.machine.equation.plant.dynamics.n
         own, runs = slice(tile * LANES, (tile + 1) * LANES), self._runs(tile)
         method = cast(PlainMethod, self.setup.integrator)
-        assert self.machine.loop is not None
+        advance = self.machine.advance()
+        assert advance is not None
         stepper = method.stepper(FLOAT64, equation.size, n, equation.size, LANES)
         functions, now = self.machine.equations.functions, np.zeros(len(Now), dtype=np.int64)
         now[Now.BUDGET] = np.iinfo(np.int64).max
@@ -130,7 +131,7 @@ class Batch:
             np.empty((0, equation.size + 2)), np.empty((2 + 3 * n, 0)),
         )  # fmt: skip
         rules = rules_of(equation, False, _LARGEST, base=own.start)
-        ended = self.machine.loop(
+        ended = advance(
             functions, self.plan, runs, records, rules, stepper.coefficients, stepper.work, now,
             self.clocks[tile], self.stop,
         )  # fmt: skip

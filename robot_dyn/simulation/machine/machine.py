@@ -17,6 +17,7 @@ from robot_dyn.coefficients import value_at
 from robot_dyn.compiled.cache import default_store
 from robot_dyn.compiled.identity import digest
 from robot_dyn.compiled.llvm import machine_code
+from robot_dyn.compiled.loops.call import MachineFunction
 from robot_dyn.compiled.llvm.lock_step import write_function, write_step
 from robot_dyn.compiled.parameters import CONTROLLER, ROBOT, Parameter, Part, joined, parameters
 from robot_dyn.compiled.program import Program
@@ -108,7 +109,7 @@ class Machine:
     equation: StateEquation
     equations: Equations
     known: tuple[Parameter, ...]
-    loop: Callable[..., int] | None
+    loop: MachineFunction | None
 
     swept: tuple[str, ...] = ()
 
@@ -116,6 +117,10 @@ class Machine:
     def parameters(self) -> np.ndarray:
         """The values of the parameters, one row after the other."""
         return joined(self.known)
+
+    def advance(self) -> Callable[..., int] | None:
+        """The loop for one run, which keeps the addresses of its arrays."""
+        return None if self.loop is None else self.loop.calls()
 
     def with_parts(self, effects: Sequence[Effect], controller: Controller | None, dynamics: Any = None) -> np.ndarray:
         """The values of the parameters where effects and controller have other coefficients, and bodies other numbers.

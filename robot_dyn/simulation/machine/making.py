@@ -14,6 +14,7 @@ from typing import Any, final
 from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.compiled.cache import default_store
 from robot_dyn.compiled.identity import digest
+from robot_dyn.compiled.loops.call import MachineFunction
 from robot_dyn.compiled.interrupts import interrupts_later
 from robot_dyn.compiled.parameters import Parameter, Part, parameters
 from robot_dyn.compiled.program import Program
@@ -191,7 +192,7 @@ def _traced(
     return {name: program_of(each) for name, each in traced.items()}
 
 
-def _loop(method: Any, cuts: bool) -> Callable[..., int]:
+def _loop(method: Any, cuts: bool) -> MachineFunction:
     from robot_dyn.simulation.machine.loop import loop
 
     if not cuts:

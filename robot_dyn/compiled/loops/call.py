@@ -1,0 +1,182 @@
+"""A plain function as machine code: compiled for the types of its arguments, or taken from a store.
+
+The words of arguments, such as the addresses of arrays, are made once, and again only for those that are others.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import threading
+from collections.abc import Callable, Mapping
+from time import perf_counter
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.compiled.identity import digest
+from robot_dyn.compiled.llvm import machine_code
+from robot_dyn.compiled.llvm.machine_code import Passes
+from robot_dyn.compiled.loops.identity import identity, sources_of_the_translator
+from robot_dyn.compiled.loops.kinds import Kind, Number, Static, TupleKind, kind_of, packed, unpacked, words
+from robot_dyn.compiled.store import Store
+from robot_dyn.errors import RobotDynError
+
+_ENTRY = ctypes.CFUNCTYPE(ctypes.c_char_p, ctypes.c_void_p, ctypes.c_void_p)
+_LETTERS: Mapping[str, str] = {"float": "f", "int": "i", "uint": "u", "bool": "b"}
+_NUMBERS = {letter: Number(name) for name, letter in _LETTERS.items()}
+PASSES = Passes(level=1, effort=1)
+
+
+class MachineCodeError(RobotDynError, ArithmeticError):
+    """Machine code that ended at an index out of range, an integer that overflows or a division of integers by zero."""
+
+
+class _Spent(threading.local):
+    """Of each thread on its own: what another one compiles is no time of this one's run."""
+
+    seconds = 0.0
+
+
+_spent = _Spent()
+
+
+def spent_on_loops() -> float:
+    """Time that this thread has spent on loading and compiling functions, in [s]; a run's first call does so."""
+    return _spent.seconds
+
+
+@final
+class MachineFunction:
+    """A function as machine code, for whatever types it is called with; `calls` gives what calls it.
+
+    Args:
+        function: A plain function.
+        instead: As of `Program`.
+        store: Gives where machine code is kept, or None.
+        about: What it is of, for a reader of the store.
+    """
+
+    def __init__(
+        self, function: Callable[..., Any], instead: Mapping[Any, Callable[..., Any]],
+        store: Callable[[], Store | None], about: str,
+    ) -> None:  # fmt: skip
+        self.function, self.about = function, about
+        self._instead, self._store, self._lock = instead, store, threading.Lock()
+        self._known: dict[tuple[Kind, ...], tuple[Any, Kind]] = {}
+
+    def calls(self) -> Call:
+        """What calls it, for one thread at a time."""
+        return Call(self)
+
+    def key(self, kinds: tuple[Kind, ...]) -> str:
+        """Of its machine code in a store."""
+        types = [repr(each) for each in kinds]
+        return digest(["loop", sources_of_the_translator(), *types, *identity(self.function, self._instead)])
+
+    def is_kept(self, kinds: tuple[Kind, ...]) -> bool:
+        """Whether its machine code is in memory or in the store."""
+        store = self._store()
+        return kinds in self._known or (store is not None and store.load(self.key(kinds)) is not None)
+
+    def entry(self, kinds: tuple[Kind, ...]) -> tuple[Any, Kind]:
+        """The function of words, and the type of its result.
+
+        Raises:
+            SubsetError: If it is not of the subset.
+        """
+        if kinds in self._known:
+            return self._known[kinds]
+        began = perf_counter()
+        with self._lock:
+            if kinds not in self._known:
+                self._known[kinds] = self._compiled(kinds)
+        _spent.seconds += perf_counter() - began
+        return self._known[kinds]
+
+    def _compiled(self, kinds: tuple[Kind, ...]) -> tuple[Any, Kind]:
+        def write(module: Any, prefix: str) -> None:
+            from llvmlite import ir
+
+            from robot_dyn.compiled.loops.kinds import TEXT
+            from robot_dyn.compiled.loops.program import Program
+
+            program = Program(module, prefix, self._instead)
+            result = program.entry(self.function, kinds, "call")  # type: ignore[arg-type]
+            told = ir.Function(module, ir.FunctionType(TEXT, []), f"{prefix}result")
+            ir.IRBuilder(told.append_basic_block()).ret(program.text(_written(result)))
+
+        key, store = self.key(kinds), self._store()
+        call = machine_code.address("call", key, write, store, self.about, PASSES)
+        told = machine_code.address("result", key, write, store, self.about, PASSES)
+        text = ctypes.CFUNCTYPE(ctypes.c_char_p)(told)().decode()
+        return _ENTRY(call), _read(text)
+
+
+@final
+class Call:
+    """A call of machine code whose arguments are much the same from one time to the next.
+
+    Raises:
+        MachineCodeError: If it fails; says where.
+    """
+
+    def __init__(self, function: MachineFunction) -> None:
+        self._function = function
+        self._given: list[Any] = []
+        self._words: list[np.ndarray] = []
+        self._kinds: list[Kind] = []
+        self._entry: Any = None
+
+    def __call__(self, *given: Any) -> Any:
+        """The result for these arguments."""
+        before = self._given
+        if len(before) != len(given):
+            self._take(range(len(given)), given)
+        else:
+            others = [i for i, each in enumerate(given) if each is not before[i]]
+            if others:
+                self._take(others, given)
+        text = self._entry(self._addresses, self._out_address)
+        if text is not None:
+            raise MachineCodeError(text.decode())
+        return self._result()
+
+    def _take(self, others: Any, given: tuple[Any, ...]) -> None:
+        """The words of the arguments that are not those of the call before."""
+        if len(self._given) != len(given):
+            self._given, self._kinds = [None] * len(given), [Static.of(None)] * len(given)
+            self._words, self._entry = [np.zeros(0, np.int64)] * len(given), None
+            self._block = np.zeros(len(given), np.int64)
+        for i in others:
+            kind = kind_of(given[i])
+            if kind != self._kinds[i]:
+                self._kinds[i], self._entry = kind, None
+            self._given[i], self._words[i] = given[i], np.array([*packed(given[i], kind)], np.int64)
+            self._block[i] = self._words[i].ctypes.data
+        if self._entry is None:
+            self._entry, self._kind = self._function.entry(tuple(self._kinds))
+            self._out = np.zeros(max(1, words(self._kind)), np.int64)
+            self._addresses, self._out_address = self._block.ctypes.data, self._out.ctypes.data
+
+    def _result(self) -> Any:
+        return unpacked(self._out.tolist(), self._kind)
+
+
+def _written(kind: Kind) -> str:
+    if isinstance(kind, TupleKind):
+        return f"({''.join(map(_written, kind.items))})"
+    return _LETTERS[kind.name] if isinstance(kind, Number) else "-"
+
+
+def _read(text: str) -> Kind:
+    """The type that `_written` tells."""
+    stack: list[list[Kind]] = [[]]
+    for letter in text:
+        if letter == "(":
+            stack.append([])
+        elif letter == ")":
+            items = stack.pop()
+            stack[-1].append(TupleKind(tuple(items)))
+        else:
+            stack[-1].append(_NUMBERS.get(letter, Static.of(None)))
+    return stack[0][0]
