@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from llvmlite import ir
 
+from robot_dyn.compiled.llvm.vectors import Vectors
 from robot_dyn.compiled.loops import arrays, vectors
 from robot_dyn.compiled.loops.kinds import F64, FLOAT, INT
 from robot_dyn.compiled.loops.numbers import converted, scalar, truth
@@ -185,8 +186,7 @@ def _multiply(f: Function, node: ast.AST, x: ArrayValue, y: Value, out: ArrayVal
 
 
 def _with_size(b: Any, x: Any, y: Any) -> Any:
-    absolute = b.module.declare_intrinsic("llvm.fabs", [y.type], ir.FunctionType(y.type, [y.type]))
-    return b.fadd(x, b.call(absolute, [y]))
+    return b.fadd(x, Vectors(b, F64, getattr(y.type, "count", 1)).intrinsic("fabs", y))
 
 
 # The primitives
