@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import ctypes
 import threading
-from collections.abc import Callable, Mapping
+from array import array
+from collections.abc import Callable, Mapping, Sequence
 from time import perf_counter
 from typing import Any, final
 
@@ -17,7 +18,8 @@ from robot_dyn.compiled.identity import digest
 from robot_dyn.compiled.llvm import machine_code
 from robot_dyn.compiled.llvm.machine_code import Passes
 from robot_dyn.compiled.loops.identity import identity, sources_of_the_translator
-from robot_dyn.compiled.loops.kinds import Kind, Number, Static, TupleKind, kind_of, packed, unpacked, words
+from robot_dyn.compiled.loops.kinds import Kind, Number, Static, TupleKind, unpacked, words
+from robot_dyn.compiled.loops.packing import Packed, pack
 from robot_dyn.compiled.store import Store
 from robot_dyn.errors import RobotDynError
 
@@ -62,7 +64,7 @@ class MachineFunction:
     ) -> None:  # fmt: skip
         self.function, self.about = function, about
         self._instead, self._store, self._lock = instead, store, threading.Lock()
-        self._known: dict[tuple[Kind, ...], tuple[Any, Kind]] = {}
+        self._known: dict[Any, tuple[Any, Kind]] = {}
 
     def calls(self) -> Call:
         """What calls it, for one thread at a time."""
@@ -73,25 +75,30 @@ class MachineFunction:
         types = [repr(each) for each in kinds]
         return digest(["loop", sources_of_the_translator(), *types, *identity(self.function, self._instead)])
 
-    def is_kept(self, kinds: tuple[Kind, ...]) -> bool:
-        """Whether its machine code is in memory or in the store."""
-        store = self._store()
+    def is_kept(self, given: tuple[Any, ...]) -> bool:
+        """Whether its machine code for such arguments is in memory or in the store."""
+        kinds, store = pack(given).kinds, self._store()
         return kinds in self._known or (store is not None and store.load(self.key(kinds)) is not None)
 
-    def entry(self, kinds: tuple[Kind, ...]) -> tuple[Any, Kind]:
+    def entry(self, place: Any, kinds: Sequence[Kind]) -> tuple[Any, Kind]:
         """The function of words, and the type of its result.
+
+        Args:
+            place: What the types are known by, or a number of their own.
+            kinds: Types of the arguments.
 
         Raises:
             SubsetError: If it is not of the subset.
         """
-        if kinds in self._known:
-            return self._known[kinds]
-        began = perf_counter()
+        if place in self._known:
+            return self._known[place]
+        began, known = perf_counter(), tuple(kinds)
         with self._lock:
-            if kinds not in self._known:
-                self._known[kinds] = self._compiled(kinds)
+            if known not in self._known:
+                self._known[known] = self._compiled(known)
+            self._known[place] = self._known[known]
         _spent.seconds += perf_counter() - began
-        return self._known[kinds]
+        return self._known[place]
 
     def _compiled(self, kinds: tuple[Kind, ...]) -> tuple[Any, Kind]:
         def write(module: Any, prefix: str) -> None:
@@ -123,17 +130,19 @@ class Call:
     def __init__(self, function: MachineFunction) -> None:
         self._function = function
         self._given: list[Any] = []
-        self._words: list[np.ndarray] = []
         self._kinds: list[Kind] = []
+        self._packed: dict[tuple[int, ...], Packed] = {}  # by which arguments it is of
         self._entry: Any = None
 
     def __call__(self, *given: Any) -> Any:
         """The result for these arguments."""
         before = self._given
         if len(before) != len(given):
-            self._take(range(len(given)), given)
+            self._given, self._packed, self._kinds = [None] * len(given), {}, [Static.of(None)] * len(given)
+            self._block = array("q", bytes(8 * len(given)))
+            self._take(tuple(range(len(given))), given)
         else:
-            others = [i for i, each in enumerate(given) if each is not before[i]]
+            others = tuple([i for i, each in enumerate(given) if each is not before[i]])
             if others:
                 self._take(others, given)
         text = self._entry(self._addresses, self._out_address)
@@ -141,22 +150,18 @@ class Call:
             raise MachineCodeError(text.decode())
         return self._result()
 
-    def _take(self, others: Any, given: tuple[Any, ...]) -> None:
+    def _take(self, others: tuple[int, ...], given: tuple[Any, ...]) -> None:
         """The words of the arguments that are not those of the call before."""
-        if len(self._given) != len(given):
-            self._given, self._kinds = [None] * len(given), [Static.of(None)] * len(given)
-            self._words, self._entry = [np.zeros(0, np.int64)] * len(given), None
-            self._block = np.zeros(len(given), np.int64)
-        for i in others:
-            kind = kind_of(given[i])
-            if kind != self._kinds[i]:
-                self._kinds[i], self._entry = kind, None
-            self._given[i], self._words[i] = given[i], np.array([*packed(given[i], kind)], np.int64)
-            self._block[i] = self._words[i].ctypes.data
-        if self._entry is None:
-            self._entry, self._kind = self._function.entry(tuple(self._kinds))
-            self._out = np.zeros(max(1, words(self._kind)), np.int64)
-            self._addresses, self._out_address = self._block.ctypes.data, self._out.ctypes.data
+        made, same = pack(tuple([given[i] for i in others])), True
+        self._packed[others] = made
+        for i, start, kind in zip(others, made.starts, made.kinds, strict=True):
+            same &= self._kinds[i] is kind
+            self._given[i], self._block[i], self._kinds[i] = given[i], start, kind
+        if not same:
+            whole = made.number if len(others) == len(given) else tuple(self._kinds)
+            self._entry, self._kind = self._function.entry(whole, self._kinds)
+            self._out = array("q", bytes(8 * max(1, words(self._kind))))
+            self._addresses, self._out_address = self._block.buffer_info()[0], self._out.buffer_info()[0]
 
     def _result(self) -> Any:
         return unpacked(self._out.tolist(), self._kind)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, final
 
@@ -59,8 +58,8 @@ class ArrayKind:
 
     @property
     def words(self) -> int:
-        """Words of its description: address, lengths and, unless it is contiguous, strides in entries."""
-        return 1 + self.ndim * (1 if self.contiguous else 2)
+        """Words of its description: address, lengths, and strides in bytes."""
+        return 1 + 2 * self.ndim
 
 
 @final
@@ -161,20 +160,6 @@ def _kind_of_array(x: np.ndarray) -> ArrayKind:
     return ArrayKind(_OF_DTYPE[x.dtype], x.ndim, x.flags.c_contiguous, single, not x.flags.writeable)
 
 
-def packed(value: Any, kind: Kind) -> Iterator[int]:
-    """The words of a value; those of arrays hold as long as the array lives."""
-    if isinstance(kind, Number):
-        yield _bits(float(value)) if kind == FLOAT else int(value) if int(value) < 2**63 else int(value) - 2**64
-    elif isinstance(kind, ArrayKind):
-        yield value.__array_interface__["data"][0]
-        yield from value.shape
-        if not kind.contiguous:
-            yield from (each // value.itemsize for each in value.strides)
-    elif not isinstance(kind, Static):
-        for each, of in zip(value, kind.kinds if isinstance(kind, RecordKind) else kind.items, strict=True):
-            yield from packed(each, of)
-
-
 def unpacked(found: list[int], kind: Kind) -> Any:
     """The value of words of numbers, or of tuples of them."""
     if isinstance(kind, TupleKind):
@@ -186,6 +171,3 @@ def unpacked(found: list[int], kind: Kind) -> Any:
         return np.uint64(found[0] % 2**64)
     return None if isinstance(kind, Static) else bool(found[0]) if kind == BOOL else found[0]
 
-
-def _bits(x: float) -> int:
-    return struct.unpack("q", struct.pack("d", x))[0]

@@ -115,6 +115,8 @@ class Program:
             return Scalar(kind, b.bitcast(made[0], kind.llvm) if kind == FLOAT else of_word)
         n = kind.ndim
         lengths, apart = made[1 : 1 + n - kind.single], made[1 + n : 1 + 2 * n - kind.single]
+        bytes_ = ir.Constant(I64, 1 if kind.of == BOOL else 8)
+        apart = [] if kind.contiguous else [b.sdiv(each, bytes_, flags=("exact",)) for each in apart]
         return of_leaves(kind, [b.inttoptr(made[0], kind.of.stored.as_pointer()), *lengths, *apart])
 
     def known_load(self, b: Any, pointer: Any) -> Any:

@@ -117,7 +117,8 @@ def leaf_types(kind: Kind) -> list[ir.Type]:
     if isinstance(kind, Number):
         return [kind.llvm]
     if isinstance(kind, ArrayKind):
-        return [kind.of.stored.as_pointer(), *[I64] * (kind.words - 1 - kind.single * (1 if kind.contiguous else 2))]
+        known = kind.ndim - kind.single
+        return [kind.of.stored.as_pointer(), *[I64] * (known if kind.contiguous else 2 * known)]
     if isinstance(kind, RecordKind):
         return [WORDS]
     return [] if isinstance(kind, Static) else [leaf for each in kind.items for leaf in leaf_types(each)]

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from robot_dyn.compiled.loops.function import Function
 
 _WIDTHS = 8, 4, 1
+ZERO = ir.Constant(I64, 0)
 Rule = Callable[..., Any]  # (builder, numbers or vectors of them) → the same
 
 
@@ -44,18 +45,17 @@ def each(f: Function, node: ast.AST, to: ArrayValue, operands: list[Value], rule
 
 def chunks(f: Function, count: Scalar, widths: tuple[int, ...]) -> Iterator[tuple[int, Any]]:
     """Loops over entries, so many at a time: first of the largest width, then what is left by smaller ones."""
-    b, first = f.builder, ir.Constant(I64, 0)
+    b, first = f.builder, ZERO
     for width in widths:
         last = b.and_(count.ir, ir.Constant(I64, -width))
-        with steps(f, first, last, width) as e:
+        with steps(b, first, last, width) as e:
             yield width, e
         first = last
 
 
 @contextmanager
-def steps(f: Function, start: Any, stop: Any, step: int) -> Iterator[Any]:
+def steps(b: Any, start: Any, stop: Any, step: int) -> Iterator[Any]:
     """A loop in steps, by a phi: it needs no variable."""
-    b = f.builder
     before, look, body, behind = b.block, *(b.append_basic_block() for _ in range(3))
     b.branch(look)
     b.position_at_end(look)
