@@ -11,7 +11,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.arithmetic import FLOAT64
-from robot_dyn.compiled.leaf_loops import INSTEAD
+from robot_dyn.compiled.primitives import INSTEAD
 from robot_dyn.compiled.loops.call import MachineFunction
 from robot_dyn.integrate.adaptive import ADAPTIVE
 from robot_dyn.integrate.methods import FIXED_STEP, method

@@ -13,7 +13,7 @@ def digest(identity: list[str]) -> str:
     """The SHA-256 of what these texts, the package's source, this processor and these versions determine."""
     import llvmlite.binding as llvm
 
-    versions = [f"{name} {version_of(name)}" for name in ("robot-dyn", "numba", "llvmlite", "casadi", "numpy")]
+    versions = [f"{name} {version_of(name)}" for name in ("robot-dyn", "llvmlite", "casadi", "numpy")]
     machine = [platform.python_version(), llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()]
     parts = [*identity, source_digest(), *versions, *machine]
     return hashlib.sha256("\0".join(f"{len(part)} {part}" for part in parts).encode()).hexdigest()

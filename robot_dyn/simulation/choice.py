@@ -39,13 +39,15 @@ def choose(setup: Setup, equation: StateEquation, seen: float = 0) -> tuple[Mach
     if setup.engine == "interpreted":
         return None, _interpreted(setup)
     if setup.engine == "compiled":
-        return _machine(setup, equation), _label(setup)
+        made = _machine(setup, equation)
+        return made, _label(made)
     if parts := foreign(setup):  # they may have effects of their own, which a trace would lose
         return None, _interpreted(setup, f"{named(parts[0])} is not the library's own")
     if max(seen * _in_all(setup, equation.size), _evaluations(setup, equation.size)) < _COMPILED:
         return None, _interpreted(setup, "short: compiling does not pay")
     try:
-        return _machine(setup, equation), _label(setup)
+        made = _machine(setup, equation)
+        return made, _label(made)
     except (ImportError, RobotDynError) as error:
         return None, _interpreted(setup, str(error))
 
@@ -77,8 +79,11 @@ def _interpreted(setup: Setup, why: str = "") -> str:
     return f"interpreted ({'; '.join(words)})" if words else "interpreted"
 
 
-def _label(setup: Setup) -> str:
-    return "compiled" if setup.integrator.plain else "compiled (the equation of motion; steps in Python)"
+def _label(machine: Machine) -> str:
+    if machine.loop is not None:
+        return "compiled"
+    why = f": {machine.refused}" if machine.refused else ""
+    return f"compiled (the equation of motion; steps in Python{why})"
 
 
 def _evaluations(setup: Setup, size: int) -> float:

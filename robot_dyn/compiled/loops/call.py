@@ -21,16 +21,12 @@ from robot_dyn.compiled.loops.identity import identity, sources_of_the_translato
 from robot_dyn.compiled.loops.kinds import Kind, Number, Static, TupleKind, unpacked, words
 from robot_dyn.compiled.loops.packing import Packed, pack
 from robot_dyn.compiled.store import Store
-from robot_dyn.errors import RobotDynError
+from robot_dyn.errors import MachineCodeError
 
 _ENTRY = ctypes.CFUNCTYPE(ctypes.c_char_p, ctypes.c_void_p, ctypes.c_void_p)
 _LETTERS: Mapping[str, str] = {"float": "f", "int": "i", "uint": "u", "bool": "b"}
 _NUMBERS = {letter: Number(name) for name, letter in _LETTERS.items()}
-PASSES = Passes(level=1, effort=1)
-
-
-class MachineCodeError(RobotDynError, ArithmeticError):
-    """Machine code that ended at an index out of range, an integer that overflows or a division of integers by zero."""
+_PASSES = Passes(level=2, effort=1)  # at 1 the iteration of Gauss methods in lock step takes twice as long
 
 
 class _Spent(threading.local):
@@ -69,6 +65,16 @@ class MachineFunction:
     def calls(self) -> Call:
         """What calls it, for one thread at a time."""
         return Call(self)
+
+    def check(self, *given: Any) -> None:
+        """Translate it for such arguments, without compiling it.
+
+        Raises:
+            SubsetError: If it is not of the subset.
+        """
+        from robot_dyn.compiled.loops.program import translated
+
+        translated(self.function, pack(given).kinds, self._instead)
 
     def key(self, kinds: tuple[Kind, ...]) -> str:
         """Of its machine code in a store."""
@@ -113,8 +119,8 @@ class MachineFunction:
             ir.IRBuilder(told.append_basic_block()).ret(program.text(_written(result)))
 
         key, store = self.key(kinds), self._store()
-        call = machine_code.address("call", key, write, store, self.about, PASSES)
-        told = machine_code.address("result", key, write, store, self.about, PASSES)
+        call = machine_code.address("call", key, write, store, self.about, _PASSES)
+        told = machine_code.address("result", key, write, store, self.about, _PASSES)
         text = ctypes.CFUNCTYPE(ctypes.c_char_p)(told)().decode()
         return _ENTRY(call), _read(text)
 

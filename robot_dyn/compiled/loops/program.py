@@ -182,3 +182,8 @@ def _only_numbers(kind: Kind) -> bool:
         return all(map(_only_numbers, kind.items))
     return isinstance(kind, Number | Static)
 
+
+
+def translated(function: Any, kinds: tuple[Kind, ...], instead: Instead) -> Kind:
+    """Translate a function for arguments of these types, for nothing but its type and its errors."""
+    return Program(ir.Module(), "", instead).written(function, kinds, Program._alone).result

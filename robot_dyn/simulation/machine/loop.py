@@ -8,9 +8,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cache
 
+import numpy as np
+
+from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.compiled.cache import default_store
-from robot_dyn.compiled.leaf_loops import INSTEAD
+from robot_dyn.compiled.primitives import INSTEAD
 from robot_dyn.compiled.loops.call import MachineFunction
+from robot_dyn.compiled.loops.source import SubsetError
+from robot_dyn.integrate.integrator import PlainMethod
+from robot_dyn.simulation.state_equation import StateEquation
+from robot_dyn.simulation.time_loop import Functions
 
 
 @cache
@@ -18,3 +25,19 @@ def loop(make: Callable[..., Callable[..., int]], *functions: Callable[..., int]
     """The loop that `make` gives of the plain functions of a method."""
     of = functions[0]
     return MachineFunction(make(*functions), INSTEAD, default_store, f"the time loop of {of.__module__}.{of.__name__}")
+
+
+def refusal(method: PlainMethod, equation: StateEquation, lanes: int) -> SubsetError | None:
+    """Why the step of a method written elsewhere cannot be machine code; None if it can, as those of this library."""
+    n, m = equation.plant.dynamics.n, equation.size
+    made = method.stepper(FLOAT64, m, n, m + n, lanes)
+    if made.step.__module__.startswith("robot_dyn."):
+        return None
+    y, own, lost = np.zeros((m, lanes)), np.zeros((1, lanes)), np.zeros(lanes, np.int64)
+    step = MachineFunction(made.step, INSTEAD, lambda: None, "")
+    functions = Functions(*[0] * len(Functions._fields))
+    try:
+        step.check(functions, made.coefficients, 0.0, 1.0, y, np.zeros(2), own, np.zeros((m, lanes)), made.work, lost)
+    except SubsetError as error:
+        return error
+    return None

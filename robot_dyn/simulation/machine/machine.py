@@ -104,6 +104,7 @@ class Machine:
         known: Its parameters, with the values of the setup.
         loop: The time loop as machine code; None if steps are made in Python.
         swept: Names of the parameters that differ from run to run.
+        refused: Why steps are made in Python, of a method that might have them as machine code.
     """
 
     equation: StateEquation
@@ -112,6 +113,7 @@ class Machine:
     loop: MachineFunction | None
 
     swept: tuple[str, ...] = ()
+    refused: str = ""
 
     @cached_property
     def parameters(self) -> np.ndarray:

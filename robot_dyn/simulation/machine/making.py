@@ -15,6 +15,7 @@ from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.compiled.cache import default_store
 from robot_dyn.compiled.identity import digest
 from robot_dyn.compiled.loops.call import MachineFunction
+from robot_dyn.compiled.loops.source import SubsetError
 from robot_dyn.compiled.interrupts import interrupts_later
 from robot_dyn.compiled.parameters import Parameter, Part, parameters
 from robot_dyn.compiled.program import Program
@@ -120,7 +121,10 @@ def machine(
             f"the run takes {equations.instructions} instructions, more than the {_MOST_INSTRUCTIONS} worth compiling;"
             " simulate it with engine='interpreted'"
         )
-    return Machine(own, equations, known, None if method is None else _loop(method, cuts), swept)
+    made = None if method is None else _loop(method, own, cuts, lanes)
+    if isinstance(made, SubsetError):
+        return Machine(own, equations, known, None, swept, str(made))
+    return Machine(own, equations, known, made, swept)
 
 
 def machine_of_constants(equation: StateEquation, method: Integrator, *, lanes: int = 1) -> Machine:
@@ -137,7 +141,10 @@ def machine_of_constants(equation: StateEquation, method: Integrator, *, lanes: 
     robot = _robot(equation.plant.dynamics)
     own = replace(equation, plant=Plant(robot, equation.plant.effects))
     programs = _traced(own, (), None if lanes == 1 else (), method.needs_jacobian, method.nonsmooth, constants=True)
-    return Machine(own, Equations(programs, lanes, robot.name), (), _loop(method, False))
+    made = _loop(method, own, False, lanes)
+    if isinstance(made, SubsetError):
+        raise made
+    return Machine(own, Equations(programs, lanes, robot.name), (), made)
 
 
 def _shared(
@@ -192,9 +199,14 @@ def _traced(
     return {name: program_of(each) for name, each in traced.items()}
 
 
-def _loop(method: Any, cuts: bool) -> MachineFunction:
-    from robot_dyn.simulation.machine.loop import loop
+def _loop(method: Any, equation: StateEquation, cuts: bool, lanes: int) -> MachineFunction | SubsetError:
+    """The loop of a method; or why its step, written elsewhere, cannot be machine code. Runs in lock step need it."""
+    from robot_dyn.simulation.machine.loop import loop, refusal
 
+    if not method.controls_error and (refused := refusal(method, equation, lanes)) is not None:
+        if lanes > 1:
+            raise refused
+        return refused
     if not cuts:
         return loop(time_loop, method.stepper(FLOAT64, 1, 0, 1).step)
     made = STEPPERS[method.method](1, 1, 1) if method.controls_error else hermite.stepper(method, 1, 0, 1, None)
