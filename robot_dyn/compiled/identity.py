@@ -1,34 +1,51 @@
-"""What machine code depends on, in one key: its program, the source of this package, versions, and the processor."""
+"""What machine code depends on, in one key: its program, the sources of what writes it, versions, and the processor."""
 
 from __future__ import annotations
 
 import hashlib
 import platform
+from collections.abc import Iterable
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 
+_ROOT = Path(__file__).parents[1]
+# Rooms above the simulation, which nothing that is traced imports: the layers in pyproject.toml see to it.
+_ABOVE = {"accuracy", "cli", "doctor", "proof", "scene", "stress_test", "view"}
+
+
 def digest(identity: list[str]) -> str:
-    """The SHA-256 of what these texts, the package's source, this processor and these versions determine."""
+    """The SHA-256 of what these texts, this processor and these versions determine; sources are among the texts."""
     import llvmlite.binding as llvm
 
     versions = [f"{name} {version_of(name)}" for name in ("robot-dyn", "llvmlite", "casadi", "numpy")]
     machine = [platform.python_version(), llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()]
-    parts = [*identity, source_digest(), *versions, *machine]
+    parts = [*identity, *versions, *machine]
     return hashlib.sha256("\0".join(f"{len(part)} {part}" for part in parts).encode()).hexdigest()
 
 
 @cache
-def source_digest() -> str:
-    """The SHA-256 of all modules of robot_dyn: one that is edited must not run what it wrote before."""
-    return digest_of_folder(Path(__file__).parents[1])
+def sources_of_the_writer() -> str:
+    """The SHA-256 of what writes programs as machine code."""
+    return digest_of(_ROOT / "compiled", [*(_ROOT / "compiled" / "llvm").rglob("*.py"), _ROOT / "compiled/program.py"])
 
 
-def digest_of_folder(folder: Path) -> str:
-    """The SHA-256 of the names and contents of all Python files in a folder and below it."""
+@cache
+def sources_of_programs() -> str:
+    """The SHA-256 of all that may be traced to a program, or traces it."""
+    return digest_of(_ROOT, traced_sources())
+
+
+def traced_sources() -> list[Path]:
+    """The modules of this package but for those above the simulation."""
+    return [path for path in _ROOT.rglob("*.py") if path.relative_to(_ROOT).parts[0] not in _ABOVE]
+
+
+def digest_of(folder: Path, paths: Iterable[Path]) -> str:
+    """The SHA-256 of the names, from a folder on, and of the contents of files."""
     made = hashlib.sha256()
-    for path in sorted(folder.rglob("*.py")):
+    for path in sorted(paths):
         data = path.read_bytes()
         made.update(f"{path.relative_to(folder).as_posix()} {len(data)}\n".encode() + data)
     return made.hexdigest()

@@ -15,7 +15,7 @@ import numpy as np
 
 from robot_dyn.coefficients import value_at
 from robot_dyn.compiled.cache import default_store
-from robot_dyn.compiled.identity import digest
+from robot_dyn.compiled.identity import digest, sources_of_the_writer
 from robot_dyn.compiled.llvm import machine_code
 from robot_dyn.compiled.loops.call import MachineFunction
 from robot_dyn.compiled.llvm.lock_step import write_function, write_step
@@ -71,7 +71,7 @@ class Equations:
     @cached_property
     def _key(self) -> str:
         texts = (f"{name} {program}" for name, program in self.programs.items())
-        return digest([str(self.runs), str(sorted(self.shared.items())), *texts])
+        return digest([sources_of_the_writer(), str(self.runs), str(sorted(self.shared.items())), *texts])
 
     @cached_property
     def functions(self) -> Functions:

@@ -13,7 +13,7 @@ from typing import Any, final
 
 from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.compiled.cache import default_store
-from robot_dyn.compiled.identity import digest
+from robot_dyn.compiled.identity import digest, sources_of_programs
 from robot_dyn.compiled.loops.call import MachineFunction
 from robot_dyn.compiled.loops.source import SubsetError
 from robot_dyn.compiled.interrupts import interrupts_later
@@ -166,7 +166,7 @@ def _programs(
 ) -> dict[str, Program]:  # fmt: skip
     """The programs of a state equation, from the store if the structure of all its parts is known."""
     store = None if described is None else default_store()
-    key = digest(["programs", repr(described), repr(kept), repr(jacobian), repr(nonsmooth)])
+    key = digest(["programs", sources_of_programs(), repr(described), repr(kept), repr(jacobian), repr(nonsmooth)])
     if store is not None and (payload := store.load(key)) is not None:
         texts = payload.decode().split("\n\n")
         return {name: Program.read(text) for name, _, text in (each.partition("\n") for each in texts)}
