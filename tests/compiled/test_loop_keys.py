@@ -102,14 +102,14 @@ def test_after_an_edit_the_old_object_is_not_used(where: str, monkeypatch: pytes
     for each in (text, edited):
         function = built(each)
         assert in_another_process(function, store, monkeypatch)(X, 3) == function(X, 3)
-    assert len(store) == 2
+    assert len(store) == 2 * 2  # each with a note that it is there
 
 
 def test_a_value_of_the_closure_and_a_type_of_an_argument_are_in_the_key(monkeypatch: pytest.MonkeyPatch) -> None:
     store, text = Memory(), HELPERS + LOOP
     for function, x in [(built(text), X), (built(text, 3.5), X), (built(text, 3), X), (built(text), np.arange(6.0)[::2])]:
         assert in_another_process(function, store, monkeypatch)(x, 3) == function(x, 3)
-    assert len(store) == 4
+    assert len(store) == 4 + 3  # types of arguments share the note
 
 
 @pytest.mark.parametrize(
@@ -140,3 +140,15 @@ def test_a_word_in_another_file_and_a_function_that_is_not_reached_change_no_key
     key = of_loops.identity(built(text), INSTEAD)
     assert of_loops.identity(built(text.replace("return x - 1.0", "return x - 2.0")), INSTEAD) == key
     assert of_loops.identity(built(text), INSTEAD) == key
+
+
+def test_whether_machine_code_is_there_is_known_before_it_is_called(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the store of another process, or in memory."""
+    store, text = Memory(), HELPERS + LOOP
+    machine = MachineFunction(built(text), INSTEAD, lambda: store, "")
+    assert not machine.is_kept()
+    machine.calls()(X, 3)
+    assert machine.is_kept()
+    assert MachineFunction(built(text), INSTEAD, lambda: store, "").is_kept()
+    assert not MachineFunction(built(text, 9.0), INSTEAD, lambda: store, "").is_kept()
+    assert MachineFunction(machine.function, INSTEAD, lambda: None, "").is_kept() is False

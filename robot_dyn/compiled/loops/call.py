@@ -26,7 +26,7 @@ from robot_dyn.errors import MachineCodeError
 _ENTRY = ctypes.CFUNCTYPE(ctypes.c_char_p, ctypes.c_void_p, ctypes.c_void_p)
 _LETTERS: Mapping[str, str] = {"float": "f", "int": "i", "uint": "u", "bool": "b"}
 _NUMBERS = {letter: Number(name) for name, letter in _LETTERS.items()}
-_PASSES = Passes(level=2, effort=1)  # at 1 the iteration of Gauss methods in lock step takes twice as long
+QUICK = Passes(level=1, effort=1)  # the work is behind addresses
 
 
 class _Spent(threading.local):
@@ -52,13 +52,14 @@ class MachineFunction:
         instead: As of `Program`.
         store: Gives where machine code is kept, or None.
         about: What it is of, for a reader of the store.
+        passes: How hard LLVM works.
     """
 
     def __init__(
         self, function: Callable[..., Any], instead: Mapping[Any, Callable[..., Any]],
-        store: Callable[[], Store | None], about: str,
+        store: Callable[[], Store | None], about: str, passes: Passes = QUICK,
     ) -> None:  # fmt: skip
-        self.function, self.about = function, about
+        self.function, self.about, self._passes = function, about, passes
         self._instead, self._store, self._lock = instead, store, threading.Lock()
         self._known: dict[Any, tuple[Any, Kind]] = {}
 
@@ -79,12 +80,12 @@ class MachineFunction:
     def key(self, kinds: tuple[Kind, ...]) -> str:
         """Of its machine code in a store."""
         types = [repr(each) for each in kinds]
-        return digest(["loop", sources_of_the_translator(), *types, *identity(self.function, self._instead)])
+        return digest(["loop", str(self._passes), sources_of_the_translator(), *types, *identity(self.function, self._instead)])
 
-    def is_kept(self, given: tuple[Any, ...]) -> bool:
-        """Whether its machine code for such arguments is in memory or in the store."""
-        kinds, store = pack(given).kinds, self._store()
-        return kinds in self._known or (store is not None and store.load(self.key(kinds)) is not None)
+    def is_kept(self) -> bool:
+        """Whether its machine code, for some types of arguments, is in memory or in the store."""
+        store = self._store()
+        return bool(self._known) or (store is not None and store.load(self.key(())) is not None)
 
     def entry(self, place: Any, kinds: Sequence[Kind]) -> tuple[Any, Kind]:
         """The function of words, and the type of its result.
@@ -119,8 +120,10 @@ class MachineFunction:
             ir.IRBuilder(told.append_basic_block()).ret(program.text(_written(result)))
 
         key, store = self.key(kinds), self._store()
-        call = machine_code.address("call", key, write, store, self.about, _PASSES)
-        told = machine_code.address("result", key, write, store, self.about, _PASSES)
+        call = machine_code.address("call", key, write, store, self.about, self._passes)
+        told = machine_code.address("result", key, write, store, self.about, self._passes)
+        if store is not None and store.load(self.key(())) is None:
+            store.save(self.key(()), b"", f"{self.about} is there")
         text = ctypes.CFUNCTYPE(ctypes.c_char_p)(told)().decode()
         return _ENTRY(call), _read(text)
 

@@ -20,7 +20,7 @@ from robot_dyn.compiled.loops.kinds import (
     F64, I64, INT, TEXT, ArrayKind, Kind, Number, Static, TupleKind,
 )  # fmt: skip
 from robot_dyn.compiled.loops.numbers import converted, joined
-from robot_dyn.compiled.loops.source import SubsetError, names_of, refused, syntax
+from robot_dyn.compiled.loops.source import SubsetError, names_of, refused, stores, syntax
 from robot_dyn.compiled.loops.values import (
     Scalar, StaticValue, TupleValue, Value, leaf_types, leaves, number, of_leaves,
 )  # fmt: skip
@@ -83,8 +83,7 @@ class Function:
         self.tree, self.builder = syntax(function), _Silent()
         self.arguments = dict(zip(self._parameters(len(kinds)), kinds, strict=True))
         self.known = names_of(function)
-        stored = (x.id for x in ast.walk(self.tree) if isinstance(x, ast.Name) and isinstance(x.ctx, ast.Store))
-        self._times = Counter([*self.arguments, *stored])
+        self._times = Counter(self.arguments.keys()) + stores(self.tree)
         self._kinds: dict[str, Kind] = dict(self.arguments)
         self._values: dict[str, Value] = {}  # of names that are assigned at one place
         self._slots: dict[str, list[Any]] = {}  # of the others
@@ -93,6 +92,7 @@ class Function:
         self.may_fail = False
         self.leaving: list[Any] = []
         self._failure: Any = None
+        self._settled = True
 
     @property
     def silent(self) -> bool:
@@ -117,9 +117,9 @@ class Function:
     def written(self) -> Written:
         """The function, written into the module of its program."""
         for _ in range(_PASSES):
-            before = dict(self._kinds), self.result
+            self._settled = True
             self._body([None] * sum(len(leaf_types(each)) for each in self.arguments.values()))
-            if before == (self._kinds, self.result):
+            if self._settled:
                 break
         else:
             raise self.refused(self.tree, "a function whose types do not settle", "give each name one type")
@@ -164,6 +164,7 @@ class Function:
         kind = self._kinds.get(name)
         if kind is None or (self.silent and kind != value.kind):
             self._kinds[name] = value.kind if kind is None else self.common(kind, value.kind, node)
+            self._settled &= kind is None  # else what was made of the first one is to be made again
         self._bind(name, self.fitted(value, self._kinds[name], node))
         self.assigned.add(name)
 
@@ -233,7 +234,9 @@ class Function:
 
     def give(self, value: Value, node: ast.AST) -> None:
         """End the function with a result."""
-        self.result = value.kind if self.result is None else self.common(self.result, value.kind, node)
+        before = self.result
+        self.result = value.kind if before is None else self.common(before, value.kind, node)
+        self._settled &= before is None or before == self.result
         if not self.silent:
             self._leave(ir.Constant(TEXT, None), leaves(self.fitted(value, self.result, node)))
 

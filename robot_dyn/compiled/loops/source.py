@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import builtins
 import linecache
-from collections import ChainMap
+from collections import ChainMap, Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from functools import lru_cache
@@ -69,12 +69,27 @@ def _module(
     codes = {(each.co_qualname, each.co_firstlineno): each for each in _codes(code)}
     places = {(name.rpartition(".")[2], line): (name, line) for name, line in codes}
     found = {}
-    for node in ast.walk(tree):
-        if isinstance(node, ast.FunctionDef):
-            place = places.get((node.name, min(each.lineno for each in (node, *node.decorator_list))))
-            if place is not None:
-                found[place] = node
+    for node in _functions(tree):
+        place = places.get((node.name, min(each.lineno for each in (node, *node.decorator_list))))
+        if place is not None:
+            found[place] = node
     return found, codes
+
+
+def _functions(node: ast.AST) -> Iterator[ast.FunctionDef]:
+    """The functions in a module, in its classes, branches and other functions."""
+    for name in ("body", "orelse", "finalbody", "handlers"):
+        for each in getattr(node, name, []):
+            if isinstance(each, ast.FunctionDef):
+                yield each
+            if isinstance(each, ast.stmt | ast.excepthandler):
+                yield from _functions(each)
+
+
+@lru_cache(maxsize=1024)
+def stores(tree: ast.FunctionDef) -> Counter[str]:
+    """How many assignments there are to each name of a function."""
+    return Counter(x.id for x in ast.walk(tree) if isinstance(x, ast.Name) and isinstance(x.ctx, ast.Store))
 
 
 def _codes(code: CodeType) -> Iterator[CodeType]:

@@ -208,6 +208,6 @@ def _loop(method: Any, equation: StateEquation, cuts: bool, lanes: int) -> Machi
             raise refused
         return refused
     if not cuts:
-        return loop(time_loop, method.stepper(FLOAT64, 1, 0, 1).step)
+        return loop(time_loop, method.stepper(FLOAT64, 1, 0, 1).step, works=method.nonsmooth)
     made = STEPPERS[method.method](1, 1, 1) if method.controls_error else hermite.stepper(method, 1, 0, 1, None)
     return loop(event_loop, made.begin, made.step, made.error, made.accept, made.dense)
