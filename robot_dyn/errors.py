@@ -46,7 +46,7 @@ class TraceError(RobotDynError):
 
 
 class MachineCodeError(RobotDynError, ArithmeticError):
-    """Machine code that ended at an index out of range, an integer that overflows, or a division of integers by zero."""
+    """Machine code that ended at an index out of range, an integer that overflows or one divided by zero."""
 
 
 class ControlError(RobotDynError):

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
 import robot_dyn as rd
 from robot_dyn.arithmetic import FLOAT64
-from robot_dyn.compiled.primitives import INSTEAD
 from robot_dyn.compiled.loops.call import MachineFunction
+from robot_dyn.compiled.loops.source import SubsetError
+from robot_dyn.compiled.primitives import INSTEAD
+from robot_dyn.errors import MachineCodeError
 from robot_dyn.integrate.adaptive import ADAPTIVE
+from robot_dyn.integrate.integrator import PlainMethod, Stepper
 from robot_dyn.integrate.methods import FIXED_STEP, method
+from robot_dyn.integrate.primitives import evaluate
 from robot_dyn.simulation.choice import choose
 from robot_dyn.simulation.fixed_step import rules_of, runs_of, samples_at_most
 from robot_dyn.simulation.machine.making import machine
@@ -154,3 +158,78 @@ def test_the_loops_are_translated_as_they_stand() -> None:
     """No loop has a text of its own for machine code."""
     of = method("rk4").stepper(FLOAT64, 2, 1, 2)
     assert MachineFunction(time_loop(of.step), INSTEAD, lambda: None, "").function.__name__ == "advance"
+
+
+class Weights(NamedTuple):
+    half: float
+
+
+class Work(NamedTuple):
+    K: np.ndarray
+
+
+def heun(f, c, t, h, y, p, own, after, work, lost):
+    """A step of the subset, over entries."""
+    evaluate(f.rate, t, y, p, own, work.K[0])
+    for e in range(len(y)):
+        for b in range(y.shape[1]):
+            after[e, b] = y[e, b] + h * work.K[0, e, b]
+    evaluate(f.rate, t + h, after, p, own, work.K[1])
+    for e in range(len(y)):
+        for b in range(y.shape[1]):
+            after[e, b] = y[e, b] + c.half * h * (work.K[0, e, b] + work.K[1, e, b])
+    return 2
+
+
+def heun_by_arrays(f, c, t, h, y, p, own, after, work, lost):
+    """The same as NumPy has it, which is outside the subset."""
+    evaluate(f.rate, t, y, p, own, work.K[0])
+    after[...] = y + h * work.K[0, : len(y)]
+    evaluate(f.rate, t + h, after, p, own, work.K[1])
+    after[...] = y + (work.K[0, : len(y)] + work.K[1, : len(y)]) * (c.half * h)
+    return 2
+
+
+def heun_that_errs(f, c, t, h, y, p, own, after, work, lost):
+    """It takes one entry too many."""
+    evaluate(f.rate, t, y, p, own, work.K[0])
+    for e in range(len(y) + 1):
+        after[e, 0] = y[e, 0] + h * work.K[0, e, 0]
+    return 1
+
+
+@dataclass(frozen=True)
+class Heun(PlainMethod):
+    of: Any
+    name = "heun"
+    order = 2
+    evaluations_per_step = 2
+
+    def stepper(self, kind, m, n, rows, runs=1, widths=None):
+        return Stepper(self.of, Weights(0.5), Work(np.zeros((2, rows, runs), kind.dtype)))
+
+
+def test_a_step_of_the_users_own_is_machine_code_or_the_summary_says_why_not() -> None:
+    """Both take the compiled equation; a step in arrays runs in Python, and says the line and what to write."""
+    options: dict[str, Any] = {"engine": "compiled", "step_s": 2e-3, "duration_s": 0.4, "estimate_error": False}
+    made = [rd.simulate(rd.Plant(ARM, SMOOTH), Q0, V0, integrator=Heun(of), **options) for of in (heun, heun_by_arrays)]
+    np.testing.assert_allclose(made[0].q, made[1].q, rtol=0, atol=1e-13)  # rounding of another order
+    assert made[0].statistics.engine == "compiled"
+    said = made[1].statistics.engine
+    line = heun_by_arrays.__code__.co_firstlineno + 3
+    assert "the equation of motion; steps in Python" in said
+    assert f"line {line}, in heun_by_arrays: an operation on what is not a number is not translated; write it" in said
+    assert said in made[1].summary
+    with pytest.raises(SubsetError, match=f"line {line}, in heun_by_arrays"):
+        rd.rollouts(
+            rd.Plant(ARM, SMOOTH), [Q0] * 3, [V0] * 3, integrator=Heun(heun_by_arrays), step_s=2e-3, duration_s=0.1
+        )
+
+
+def test_a_step_that_errs_ends_the_run_with_its_line() -> None:
+    """Not as a run that diverged."""
+    with pytest.raises(MachineCodeError, match=r"heun_that_errs, line \d+: an index is out of range"):
+        rd.simulate(
+            rd.Plant(ARM, SMOOTH), Q0, V0, integrator=Heun(heun_that_errs), engine="compiled", step_s=2e-3,
+            duration_s=0.4, estimate_error=False,
+        )  # fmt: skip

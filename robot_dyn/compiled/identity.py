@@ -9,7 +9,6 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-
 _ROOT = Path(__file__).parents[1]
 # Rooms above the simulation, which nothing that is traced imports: the layers in pyproject.toml see to it.
 _ABOVE = {"accuracy", "cli", "doctor", "proof", "scene", "stress_test", "view"}
@@ -39,15 +38,17 @@ def sources_of_programs() -> str:
 
 def traced_sources() -> list[Path]:
     """The modules of this package but for those above the simulation."""
-    return [path for path in _ROOT.rglob("*.py") if path.relative_to(_ROOT).parts[0] not in _ABOVE]
+    rooms = [room for room in _ROOT.iterdir() if room.name not in _ABOVE]
+    return [path for room in rooms for path in ([room] if room.suffix == ".py" else room.rglob("*.py"))]
 
 
 def digest_of(folder: Path, paths: Iterable[Path]) -> str:
     """The SHA-256 of the names, from a folder on, and of the contents of files."""
-    made = hashlib.sha256()
-    for path in sorted(paths):
-        data = path.read_bytes()
-        made.update(f"{path.relative_to(folder).as_posix()} {len(data)}\n".encode() + data)
+    made, before = hashlib.sha256(), len(folder.as_posix()) + 1
+    for name in sorted(path.as_posix() for path in paths):
+        with open(name, "rb") as file:
+            data = file.read()
+        made.update(f"{name[before:]} {len(data)}\n".encode() + data)
     return made.hexdigest()
 
 

@@ -14,7 +14,6 @@ from robot_dyn.compiled.identity import digest, digest_of, sources_of_the_writer
 from robot_dyn.compiled.llvm import numpy_array
 from robot_dyn.compiled.llvm.numpy_array import ArrayStructureError, check_structure
 
-
 ROOT = Path(rd.__file__).parent
 
 

@@ -107,14 +107,17 @@ def test_after_an_edit_the_old_object_is_not_used(where: str, monkeypatch: pytes
 
 def test_a_value_of_the_closure_and_a_type_of_an_argument_are_in_the_key(monkeypatch: pytest.MonkeyPatch) -> None:
     store, text = Memory(), HELPERS + LOOP
-    for function, x in [(built(text), X), (built(text, 3.5), X), (built(text, 3), X), (built(text), np.arange(6.0)[::2])]:
+    for function, x in [
+        (built(text), X),
+        (built(text, 3.5), X),
+        (built(text, 3), X),
+        (built(text), np.arange(6.0)[::2]),
+    ]:
         assert in_another_process(function, store, monkeypatch)(x, 3) == function(x, 3)
     assert len(store) == 4 + 3  # types of arguments share the note
 
 
-@pytest.mark.parametrize(
-    "change", ["the translator", "a version", "the processor", "what stands in for a function"]
-)
+@pytest.mark.parametrize("change", ["the translator", "a version", "the processor", "what stands in for a function"])
 def test_the_translator_and_the_machine_are_in_the_key(change: str, monkeypatch: pytest.MonkeyPatch) -> None:
     function = MachineFunction(built(HELPERS + LOOP), INSTEAD, lambda: None, "")
     kinds = kind_of(X), kind_of(3)

@@ -49,7 +49,9 @@ class Writer:
 
     def number(self, deep: int = 0) -> str:
         if deep > 3 or self.random.random() < 0.25:
-            return self.choice("a", "b", "c", "x[i % 4]", "x[j % 4]", "x[-1]", "y[k % 3, 1]", "0.5", "-1.25", "1e-3", "2.0")
+            return self.choice(
+                "a", "b", "c", "x[i % 4]", "x[j % 4]", "x[-1]", "y[k % 3, 1]", "0.5", "-1.25", "1e-3", "2.0"
+            )
         made = self.number(deep + 1), self.number(deep + 1)
         return self.choice(
             f"({made[0]} + {made[1]})", f"({made[0]} - {made[1]})", f"({made[0]} * {made[1]})",
@@ -92,9 +94,13 @@ class Writer:
         elif kind == 1:
             self.write(f"{self.choice('i', 'j', 'k')} = ({self.integer()}) % 1000")
         elif kind == 2:
-            self.write(f"{self.choice('a', 'b', 'c', 'x[k % 4]', 'y[i % 3, j % 2]')} {self.choice('+', '-', '*')}= {self.number()}")
+            self.write(
+                f"{self.choice('a', 'b', 'c', 'x[k % 4]', 'y[i % 3, j % 2]')} {self.choice('+', '-', '*')}= {self.number()}"
+            )
         elif kind == 3:
-            self.write(f"x[{self.choice('0', '-2', 'i % 4', 'k % 4')}], n[j % 3] = {self.number()}, ({self.integer()}) % 1000")
+            self.write(
+                f"x[{self.choice('0', '-2', 'i % 4', 'k % 4')}], n[j % 3] = {self.number()}, ({self.integer()}) % 1000"
+            )
         elif kind == 4:
             self.write("a, b, c = b, c, a")
         elif kind == 5:
@@ -151,7 +157,9 @@ def same(x: Any, y: Any) -> None:
             np.testing.assert_array_equal(np.signbit(a[~np.isnan(a)]), np.signbit(b[~np.isnan(b)]))
 
 
-@pytest.mark.parametrize("seeds", [range(30), pytest.param(range(30, 200), marks=pytest.mark.stress)], ids=["30", "200"])
+@pytest.mark.parametrize(
+    "seeds", [range(30), pytest.param(range(30, 200), marks=pytest.mark.stress)], ids=["30", "200"]
+)
 def test_random_programs_do_what_python_does(seeds: range) -> None:
     """From 4 general starts: results and every array, to the last bit. Scalars are NumPy's, by IEEE 754."""
     compared = 0
@@ -161,7 +169,10 @@ def test_random_programs_do_what_python_does(seeds: range) -> None:
         machine = compiled(function)
         rng = np.random.default_rng(seed)
         for _ in range(4):
-            numbers = [*map(np.float64, rng.normal(size=3) * 10.0 ** rng.integers(-2, 3, 3)), *map(int, rng.integers(-9, 99, 3))]
+            numbers = [
+                *map(np.float64, rng.normal(size=3) * 10.0 ** rng.integers(-2, 3, 3)),
+                *map(int, rng.integers(-9, 99, 3)),
+            ]
             arrays = [rng.normal(size=4), rng.normal(size=(3, 4))[:, 1:3], rng.integers(-5, 50, 3)]
             ours, theirs = [x.copy() for x in arrays], [x.copy() for x in arrays]
             ours[1], theirs[1] = (np.zeros((3, 5))[:, ::2][:, :2] for _ in range(2))

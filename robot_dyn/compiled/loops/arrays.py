@@ -188,5 +188,3 @@ def _product(f: Function, lengths: Any) -> Scalar:
     for each in lengths:
         made = times(made, each, f.builder)
     return made
-
-

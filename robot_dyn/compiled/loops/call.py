@@ -12,8 +12,6 @@ from collections.abc import Callable, Mapping, Sequence
 from time import perf_counter
 from typing import Any, final
 
-import numpy as np
-
 from robot_dyn.compiled.identity import digest
 from robot_dyn.compiled.llvm import machine_code
 from robot_dyn.compiled.llvm.machine_code import Passes
@@ -60,7 +58,7 @@ class MachineFunction:
         store: Callable[[], Store | None], about: str, passes: Passes = QUICK,
     ) -> None:  # fmt: skip
         self.function, self.about, self._passes = function, about, passes
-        self._instead, self._store, self._lock = instead, store, threading.Lock()
+        self.store, self._instead, self._lock = store, instead, threading.Lock()
         self._known: dict[Any, tuple[Any, Kind]] = {}
 
     def calls(self) -> Call:
@@ -75,16 +73,18 @@ class MachineFunction:
         """
         from robot_dyn.compiled.loops.program import translated
 
-        translated(self.function, pack(given).kinds, self._instead)
+        translated(self.function, pack(given, self.store).kinds, self._instead)
 
     def key(self, kinds: tuple[Kind, ...]) -> str:
         """Of its machine code in a store."""
         types = [repr(each) for each in kinds]
-        return digest(["loop", str(self._passes), sources_of_the_translator(), *types, *identity(self.function, self._instead)])
+        return digest(
+            ["loop", str(self._passes), sources_of_the_translator(), *types, *identity(self.function, self._instead)]
+        )
 
     def is_kept(self) -> bool:
         """Whether its machine code, for some types of arguments, is in memory or in the store."""
-        store = self._store()
+        store = self.store()
         return bool(self._known) or (store is not None and store.load(self.key(())) is not None)
 
     def entry(self, place: Any, kinds: Sequence[Kind]) -> tuple[Any, Kind]:
@@ -119,7 +119,7 @@ class MachineFunction:
             told = ir.Function(module, ir.FunctionType(TEXT, []), f"{prefix}result")
             ir.IRBuilder(told.append_basic_block()).ret(program.text(_written(result)))
 
-        key, store = self.key(kinds), self._store()
+        key, store = self.key(kinds), self.store()
         call = machine_code.address("call", key, write, store, self.about, self._passes)
         told = machine_code.address("result", key, write, store, self.about, self._passes)
         if store is not None and store.load(self.key(())) is None:
@@ -161,7 +161,7 @@ class Call:
 
     def _take(self, others: tuple[int, ...], given: tuple[Any, ...]) -> None:
         """The words of the arguments that are not those of the call before."""
-        made, same = pack(tuple([given[i] for i in others])), True
+        made, same = pack(tuple([given[i] for i in others]), self._function.store), True
         self._packed[others] = made
         for i, start, kind in zip(others, made.starts, made.kinds, strict=True):
             same &= self._kinds[i] is kind

@@ -14,7 +14,15 @@ from llvmlite import ir
 from robot_dyn.compiled.loops import arrays, numbers
 from robot_dyn.compiled.loops.kinds import F64, FLOAT, I64, INT, TEXT, UINT, Kind
 from robot_dyn.compiled.loops.values import (
-    ArrayValue, Scalar, StaticValue, TupleValue, Value, leaf_types, leaves, number, of_leaves,
+    ArrayValue,
+    Scalar,
+    StaticValue,
+    TupleValue,
+    Value,
+    leaf_types,
+    leaves,
+    number,
+    of_leaves,
 )  # fmt: skip
 
 if TYPE_CHECKING:

@@ -12,7 +12,15 @@ from llvmlite import ir
 from robot_dyn.compiled.loops import arrays, calls, numbers
 from robot_dyn.compiled.loops.kinds import BOOL, I64, RecordKind, Static, TupleKind
 from robot_dyn.compiled.loops.values import (
-    ArrayValue, RecordValue, Scalar, StaticValue, TupleValue, Value, leaf_types, number, of_leaves,
+    ArrayValue,
+    RecordValue,
+    Scalar,
+    StaticValue,
+    TupleValue,
+    Value,
+    leaf_types,
+    number,
+    of_leaves,
 )  # fmt: skip
 
 if TYPE_CHECKING:
@@ -22,7 +30,9 @@ if TYPE_CHECKING:
 def value(f: Function, node: ast.expr) -> Value:
     """The value of an expression."""
     if type(node) not in EXPRESSIONS:
-        raise f.refused(node, f"the expression {ast.unparse(node)} ({type(node).__name__})", "write it with plain loops")
+        raise f.refused(
+            node, f"the expression {ast.unparse(node)} ({type(node).__name__})", "write it with plain loops"
+        )
     return EXPRESSIONS[type(node)](f, node)
 
 

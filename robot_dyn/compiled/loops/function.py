@@ -17,12 +17,27 @@ from llvmlite import ir
 
 from robot_dyn.compiled.loops import expressions, statements
 from robot_dyn.compiled.loops.kinds import (
-    F64, I64, INT, TEXT, ArrayKind, Kind, Number, Static, TupleKind,
+    F64,
+    I64,
+    INT,
+    TEXT,
+    ArrayKind,
+    Kind,
+    Number,
+    Static,
+    TupleKind,
 )  # fmt: skip
 from robot_dyn.compiled.loops.numbers import converted, joined
 from robot_dyn.compiled.loops.source import SubsetError, names_of, refused, stores, syntax
 from robot_dyn.compiled.loops.values import (
-    Scalar, StaticValue, TupleValue, Value, leaf_types, leaves, number, of_leaves,
+    Scalar,
+    StaticValue,
+    TupleValue,
+    Value,
+    leaf_types,
+    leaves,
+    number,
+    of_leaves,
 )  # fmt: skip
 
 if TYPE_CHECKING:
@@ -80,7 +95,8 @@ class Function:
 
     def __init__(self, program: Program, function: Callable[..., Any], kinds: Sequence[Kind], checks: bool) -> None:
         self.program, self.function, self.checks = program, function, checks
-        self.tree, self.builder = syntax(function), _Silent()
+        self.tree = syntax(function)
+        self.builder: Any = _Silent()
         self.arguments = dict(zip(self._parameters(len(kinds)), kinds, strict=True))
         self.known = names_of(function)
         self._times = Counter(self.arguments.keys()) + stores(self.tree)
@@ -324,4 +340,3 @@ def _llvm_result(kind: Kind, may_fail: bool) -> Any:
 
 def _known(kind: Kind | None) -> Kind:
     return Static.of(None) if kind is None else kind
-

@@ -170,4 +170,3 @@ def unpacked(found: list[int], kind: Kind) -> Any:
     if kind == UINT:
         return np.uint64(found[0] % 2**64)
     return None if isinstance(kind, Static) else bool(found[0]) if kind == BOOL else found[0]
-

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from robot_dyn.compiled.loops.function import Function
 
 _LEAST = -(2**63)
+Names = Mapping[type[ast.operator], str]
 _IN_PYTHON: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = MappingProxyType(
     {
         ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
@@ -29,11 +30,11 @@ _IN_PYTHON: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = MappingProx
         ast.LShift: operator.lshift, ast.RShift: operator.rshift,
     }
 )  # fmt: skip
-_CHECKED = MappingProxyType({ast.Add: "sadd", ast.Sub: "ssub", ast.Mult: "smul"})
-_PLAIN = MappingProxyType({ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul"})
-_FLOATING = MappingProxyType({ast.Add: "fadd", ast.Sub: "fsub", ast.Mult: "fmul", ast.Div: "fdiv"})
-_BITS = MappingProxyType({ast.BitAnd: "and_", ast.BitOr: "or_", ast.BitXor: "xor"})
-_RELATIONS = MappingProxyType(
+_CHECKED: Names = MappingProxyType({ast.Add: "sadd", ast.Sub: "ssub", ast.Mult: "smul"})
+_PLAIN: Names = MappingProxyType({ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul"})
+_FLOATING: Names = MappingProxyType({ast.Add: "fadd", ast.Sub: "fsub", ast.Mult: "fmul", ast.Div: "fdiv"})
+_BITS: Names = MappingProxyType({ast.BitAnd: "and_", ast.BitOr: "or_", ast.BitXor: "xor"})
+_RELATIONS: Mapping[type[ast.cmpop], str] = MappingProxyType(
     {ast.Eq: "==", ast.NotEq: "!=", ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">="}
 )
 

@@ -10,7 +10,6 @@ import struct
 from array import array
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 from typing import Any, final
 
 import numpy as np
@@ -18,8 +17,21 @@ from llvmlite import ir
 
 from robot_dyn.compiled.identity import digest
 from robot_dyn.compiled.llvm import machine_code, numpy_array
+from robot_dyn.compiled.loops.identity import sources_of_the_translator
+from robot_dyn.compiled.loops.kinds import (
+    I8,
+    I64,
+    WORDS,
+    ArrayKind,
+    Kind,
+    RecordKind,
+    Static,
+    TupleKind,
+    kind_of,
+    words,
+)
 from robot_dyn.compiled.loops.vectors import ZERO, steps
-from robot_dyn.compiled.loops.kinds import I8, I64, WORDS, ArrayKind, Kind, RecordKind, Static, TupleKind, kind_of, words
+from robot_dyn.compiled.store import Store
 
 _I32 = ir.IntType(32)
 _FORM = 2  # words of the form of an array: flags, axes and whether the last is of length 1; and its dtype
@@ -66,8 +78,12 @@ _layouts: dict[tuple[Any, ...], _Layout] = {}
 _kinds: dict[tuple[Any, ...], tuple[int, tuple[Kind, ...], Any]] = {}  # with what must live, so that no address is new
 
 
-def pack(values: tuple[Any, ...]) -> Packed:
+def pack(values: tuple[Any, ...], store: Callable[[], Store | None]) -> Packed:
     """The words of arguments.
+
+    Args:
+        values: The arguments.
+        store: Gives where machine code is kept, or None.
 
     Raises:
         TraceError: If machine code cannot take one.
@@ -84,7 +100,8 @@ def pack(values: tuple[Any, ...]) -> Packed:
     start = made.buffer_info()[0]
     if arrays:
         objects = array("q", arrays)
-        _reader()(len(arrays), *(each.buffer_info()[0] for each in (objects, layout.firsts)), start, forms.buffer_info()[0])
+        places = (each.buffer_info()[0] for each in (objects, layout.firsts, made, forms))
+        _reader(store)(len(arrays), *places)
     for (at, word), each in zip(layout.numbers, numbers, strict=True):
         made[at] = word(each)
     known = shape, forms.tobytes()
@@ -147,12 +164,16 @@ def _signed(x: Any) -> int:
     return int(x) if x < 2**63 else int(x) - 2**64
 
 
-@cache
-def _reader() -> Any:
+_readers: list[Any] = []
+
+
+def _reader(store: Callable[[], Store | None]) -> Any:
     """The function (count, arrays, first words, words, forms) that reads arrays."""
-    numpy_array.check_structure()
-    key = digest(["arrays", str(sorted(numpy_array.OFFSETS.items()))])
-    return _HEADER(machine_code.address("read", key, _write, None, "the arrays of arguments"))
+    if not _readers:
+        numpy_array.check_structure()
+        key = digest(["arrays", sources_of_the_translator(), str(sorted(numpy_array.OFFSETS.items()))])
+        _readers.append(_HEADER(machine_code.address("read", key, _write, store(), "the arrays of arguments")))
+    return _readers[0]
 
 
 def _write(module: Any, prefix: str) -> None:

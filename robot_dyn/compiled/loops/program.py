@@ -12,15 +12,36 @@ from llvmlite import ir
 
 from robot_dyn.compiled.loops.function import Function, Written
 from robot_dyn.compiled.loops.kinds import (
-    BOOL, FLOAT, I8, I64, TEXT, WORDS, ArrayKind, Kind, Number, RecordKind, Static, TupleKind, kind_of, words,
+    BOOL,
+    FLOAT,
+    I8,
+    I64,
+    TEXT,
+    WORDS,
+    ArrayKind,
+    Kind,
+    Number,
+    RecordKind,
+    Static,
+    TupleKind,
+    kind_of,
+    words,
 )  # fmt: skip
 from robot_dyn.compiled.loops.source import SubsetError
 from robot_dyn.compiled.loops.values import (
-    ArrayValue, Scalar, StaticValue, Value, leaves, number, of_leaves, word,
+    ArrayValue,
+    Scalar,
+    StaticValue,
+    Value,
+    leaves,
+    number,
+    of_leaves,
+    word,
 )  # fmt: skip
 
 Refuse = Callable[[str, str], NoReturn]
 Instead = Mapping[Any, Callable[..., Any]]
+_KNOWN = (str, tuple, ModuleType, type, Enum)
 
 
 @final
@@ -142,7 +163,7 @@ class Program:
         return self._texts[text]
 
     def _global(self, kind: Any, data: Any) -> Any:
-        made = ir.GlobalVariable(self.module, kind, f"{self.prefix}data_{len(self.module.globals)}")
+        made: Any = ir.GlobalVariable(self.module, kind, f"{self.prefix}data_{len(self.module.globals)}")
         made.linkage, made.global_constant, made.initializer = "internal", True, ir.Constant(kind, data)
         return made
 
@@ -153,12 +174,14 @@ class Program:
         if isinstance(value, np.bool_):
             return number(bool(value))
         if isinstance(value, bool | float) or (isinstance(value, int | np.integer) and -(2**63) <= value < 2**63):
-            return number(value if isinstance(value, bool) else float(value) if isinstance(value, float) else int(value))
+            return number(
+                value if isinstance(value, bool) else float(value) if isinstance(value, float) else int(value)
+            )
         if isinstance(value, np.ndarray):
             return self._constant_array(value)
-        if isinstance(value, str | tuple | ModuleType | FunctionType | type | Enum) or value is None or callable(value):
+        if isinstance(value, _KNOWN) or value is None or callable(value):
             return StaticValue(value)
-        refuse(f"a value of type {type(value).__name__}", "take numbers, arrays, tuples and functions")
+        return refuse(f"a value of type {type(value).__name__}", "take numbers, arrays, tuples and functions")
 
     def _constant_array(self, x: np.ndarray) -> ArrayValue:
         kind = kind_of(x)
@@ -181,7 +204,6 @@ def _only_numbers(kind: Kind) -> bool:
     if isinstance(kind, TupleKind):
         return all(map(_only_numbers, kind.items))
     return isinstance(kind, Number | Static)
-
 
 
 def translated(function: Any, kinds: tuple[Kind, ...], instead: Instead) -> Kind:

@@ -1,4 +1,4 @@
-"""The syntax tree of a plain function, that of the code which Python runs; and the error of what cannot be translated."""
+"""The syntax tree of a plain function, that of the code which Python runs; and what cannot be translated."""
 
 from __future__ import annotations
 
@@ -48,18 +48,17 @@ def syntax(function: Callable[..., Any]) -> ast.FunctionDef:
 
 
 def names_of(function: FunctionType | Callable[..., Any]) -> Mapping[str, Any]:
-    """The values of names that are no variables of a function: of where it was made, of its module, and Python's own."""
+    """The values of names that are not a function's own: of where it was made, of its module, and Python's."""
     made = {}
     for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
         with suppress(ValueError):  # it has no value yet
             made[name] = cell.cell_contents
-    return ChainMap(made, function.__globals__, vars(builtins))
+    maps: list[Any] = [made, function.__globals__, vars(builtins)]
+    return ChainMap(*maps)
 
 
 @lru_cache(maxsize=64)
-def _module(
-    text: str, file: str
-) -> tuple[dict[tuple[str, int], ast.FunctionDef], dict[tuple[str, int], CodeType]]:
+def _module(text: str, file: str) -> tuple[dict[tuple[str, int], ast.FunctionDef], dict[tuple[str, int], CodeType]]:
     """The functions of a module by name and first line: their trees, and their code."""
     try:
         tree = ast.parse(text)

@@ -10,7 +10,12 @@ from typing import TYPE_CHECKING, Any
 from robot_dyn.compiled.loops import arrays, expressions, numbers
 from robot_dyn.compiled.loops.kinds import INT
 from robot_dyn.compiled.loops.values import (
-    ArrayValue, Scalar, StaticValue, TupleValue, Value, number,
+    ArrayValue,
+    Scalar,
+    StaticValue,
+    TupleValue,
+    Value,
+    number,
 )  # fmt: skip
 
 if TYPE_CHECKING:

@@ -13,10 +13,10 @@ import numpy as np
 
 from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.compiled.cache import default_store
-from robot_dyn.compiled.primitives import INSTEAD
 from robot_dyn.compiled.llvm.machine_code import Passes
 from robot_dyn.compiled.loops.call import QUICK, MachineFunction
 from robot_dyn.compiled.loops.source import SubsetError
+from robot_dyn.compiled.primitives import INSTEAD
 from robot_dyn.integrate.integrator import PlainMethod
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.time_loop import Functions
@@ -28,7 +28,7 @@ HARD = Passes(level=3, effort=3)
 def loop(
     make: Callable[..., Callable[..., int]], *functions: Callable[..., Any], works: bool = False
 ) -> MachineFunction:
-    """The loop that `make` gives of the plain functions of a method; one that works itself, or leaves it to addresses."""
+    """The loop that `make` gives of the plain functions of a method, and whether it works beside what it calls."""
     about = f"the time loop of {functions[0].__module__}.{functions[0].__name__}"
     return MachineFunction(make(*functions), INSTEAD, default_store, about, HARD if works else QUICK)
 

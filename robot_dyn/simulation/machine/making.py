@@ -14,9 +14,9 @@ from typing import Any, final
 from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.compiled.cache import default_store
 from robot_dyn.compiled.identity import digest, sources_of_programs
+from robot_dyn.compiled.interrupts import interrupts_later
 from robot_dyn.compiled.loops.call import MachineFunction
 from robot_dyn.compiled.loops.source import SubsetError
-from robot_dyn.compiled.interrupts import interrupts_later
 from robot_dyn.compiled.parameters import Parameter, Part, parameters
 from robot_dyn.compiled.program import Program
 from robot_dyn.compiled.right_angles import robot_of

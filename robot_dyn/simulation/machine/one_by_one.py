@@ -102,7 +102,9 @@ class OneByOne:
             return code.equations.functions, code.parameters if of is equation else code.of(of)
 
         transfers = Transfers(equation)
-        run = EventRun(Watch(setup, transfers.equation), transfers, made, None, code.advance(), in_python=code.in_python)
+        run = EventRun(
+            Watch(setup, transfers.equation), transfers, made, None, code.advance(), in_python=code.in_python
+        )
         self.going.add(run)
         try:
             self.records[i] = run.record()
