@@ -29,4 +29,4 @@ with tempfile.TemporaryDirectory() as folder:
     np.testing.assert_array_equal(rd.load_run(path).q, runs[1].q)
     rd.save_plot(runs[1], Path(folder) / "run.png")
     rd.save_replay(runs[1], Path(folder) / "run.html")
-print("Python", sys.version.split()[0], *(f"{name} {version(name)}" for name in ("pin", "numpy", "scipy", "numba")))
+print("Python", sys.version.split()[0], *(f"{name} {version(name)}" for name in ("pin", "numpy", "scipy", "llvmlite")))

@@ -45,6 +45,10 @@ class TraceError(RobotDynError):
     """A function that cannot be traced: it does what symbols cannot."""
 
 
+class MachineCodeError(RobotDynError, ArithmeticError):
+    """Machine code that ended at an index out of range, an integer that overflows or one divided by zero."""
+
+
 class ControlError(RobotDynError):
     """A controller or reference with values that are not allowed, or of the wrong shape."""
 

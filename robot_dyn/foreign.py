@@ -8,7 +8,14 @@ from pathlib import Path
 from traceback import walk_tb
 from typing import Any
 
-from robot_dyn.errors import NotFiniteError, OverflowedError, QueryError, RobotDynError
+from robot_dyn.errors import (
+    MachineCodeError,
+    NotFiniteError,
+    OverflowedError,
+    QueryError,
+    RobotDynError,
+    TraceError,
+)  # fmt: skip
 
 _NOT_A_USERS = {"robot_dyn", "numpy", "scipy", "casadi", *sys.stdlib_module_names}
 
@@ -41,8 +48,11 @@ def users_line(error: BaseException) -> str:
 def is_mistake(error: RobotDynError) -> bool:
     """Whether a user's code gave the library an argument that it refuses, such as one of a wrong shape.
 
-    Other errors of the library, raised or met there, are outcomes of a run: numbers that overflow, a singular M.
+    So does a step that cannot be machine code, or fails as such. Other errors of the library, raised or met there, are
+    outcomes of a run: numbers that overflow, a singular M.
     """
+    if isinstance(error, TraceError | MachineCodeError):
+        return True
     refused = isinstance(error, QueryError) and not isinstance(error, NotFiniteError | OverflowedError)
     return refused and bool(users_line(error))
 

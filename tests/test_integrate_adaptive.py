@@ -159,3 +159,18 @@ def test_meaningless_options_are_refused(options: dict[str, Any], message: str) 
 def test_an_unfit_start_is_refused(y0: np.ndarray, t1: float, message: str) -> None:
     with pytest.raises(QueryError, match=message):
         Adaptive().solve(OSCILLATOR, 0.0, y0, t1)
+
+
+def test_the_table_of_dop853_is_scipys(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From its file, and from its class where there is no such file."""
+    from scipy.integrate import DOP853
+
+    from robot_dyn.integrate import dop853
+
+    names = "A", "B", "C", "D", "E3", "E5", "A_EXTRA", "C_EXTRA"
+    table = dop853.table()
+    assert table is not DOP853
+    for name in names:
+        np.testing.assert_array_equal(getattr(table, name), getattr(DOP853, name), err_msg=name)
+    monkeypatch.setattr(dop853, "find_spec", lambda name: None)
+    assert dop853.table() is DOP853

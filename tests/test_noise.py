@@ -9,13 +9,14 @@ import pytest
 from scipy.special import ndtr, ndtri
 
 import robot_dyn as rd
-from robot_dyn.compiled.primitives import machine_code
+from robot_dyn.compiled.loops.call import MachineFunction
+from robot_dyn.compiled.primitives import INSTEAD
 from robot_dyn.simulation.philox import draw, normal, philox
 
 ARM = rd.Plant(rd.load("planar_2r").with_(gravity=(0.0, 0.0, 0.0)))
 WEAK = 2.0**-100  # [N m/rad]: the arm moves by less than a unit of rounding of the noise
 SEED, TICKS, PERIOD = 2**62 + 11, 25, 0.01
-_draw = machine_code(draw)
+_draw = MachineFunction(draw, INSTEAD, lambda: None, "").calls()
 
 
 def deviates(seed: int, run: int, ticks: int, channels: int) -> np.ndarray:

@@ -195,8 +195,8 @@ def test_elimination_solves_each_system() -> None:
 
 @pytest.mark.parametrize("runs", [1, 3, 64])
 def test_elimination_in_machine_code_gives_equal_bits(runs: int) -> None:
-    import robot_dyn.compiled.elimination  # noqa: F401
-    from robot_dyn.compiled.primitives import machine_code
+    from robot_dyn.compiled.loops.call import MachineFunction
+    from robot_dyn.compiled.primitives import INSTEAD
 
     def both(A: Any, J: Any, scale: Any, rows: Any, lost: Any, x: Any) -> int:
         factor(A, J, scale, rows, lost)
@@ -205,7 +205,7 @@ def test_elimination_in_machine_code_gives_equal_bits(runs: int) -> None:
 
     J, x = systems(7, runs)
     results = []
-    for function in (both, machine_code(both)):
+    for function in (both, MachineFunction(both, INSTEAD, lambda: None, "").calls()):
         LU, rows, got, lost = np.empty((7, 7, runs)), np.empty((7, runs), np.int64), x.copy(), np.empty(runs, np.int64)
         function(LU, J, 1.7, rows, lost, got)
         results.append((LU, rows, got, lost))

@@ -95,7 +95,7 @@ def draw(result: Cost, theme: str = "light") -> Figure:
 
 def _caption(result: Cost) -> str:
     versions = result.environment
-    programs = ", ".join(f"{k} {x}" for k, x in versions.items() if k in ("robot-dyn", "pin", "numba", "casadi"))
+    programs = ", ".join(f"{k} {x}" for k, x in versions.items() if k in ("robot-dyn", "pin", "llvmlite", "casadi"))
     return (
         f"{result.name}: {', '.join(result.acting) or 'no effects'}. Times of the processor: medians over turns."
         f" {programs}; {versions.get('processor', '')}."

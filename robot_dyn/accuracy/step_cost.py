@@ -136,7 +136,7 @@ def _alone(short: Setup, made: Machine) -> Way:
     def run() -> float:
         functions, equation = (made.equations.functions, made.parameters), made.equation
         watch, transfers = Watch(short, equation), Transfers(equation)
-        steps = FixedStep(watch, transfers, lambda _: functions, Fraction(1), made.loop)
+        steps = FixedStep(watch, transfers, lambda _: functions, Fraction(1), made.advance())
         began = process_time()
         record = steps.record()
         spent = process_time() - began

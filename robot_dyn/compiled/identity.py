@@ -1,36 +1,54 @@
-"""What machine code depends on, in one key: its program, the source of this package, versions, and the processor."""
+"""What machine code depends on, in one key: its program, the sources of what writes it, versions, and the processor."""
 
 from __future__ import annotations
 
 import hashlib
 import platform
+from collections.abc import Iterable
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+_ROOT = Path(__file__).parents[1]
+# Rooms above the simulation, which nothing that is traced imports: the layers in pyproject.toml see to it.
+_ABOVE = {"accuracy", "cli", "doctor", "proof", "scene", "stress_test", "view"}
+
 
 def digest(identity: list[str]) -> str:
-    """The SHA-256 of what these texts, the package's source, this processor and these versions determine."""
+    """The SHA-256 of what these texts, this processor and these versions determine; sources are among the texts."""
     import llvmlite.binding as llvm
 
-    versions = [f"{name} {version_of(name)}" for name in ("robot-dyn", "numba", "llvmlite", "casadi", "numpy")]
+    versions = [f"{name} {version_of(name)}" for name in ("robot-dyn", "llvmlite", "casadi", "numpy")]
     machine = [platform.python_version(), llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()]
-    parts = [*identity, source_digest(), *versions, *machine]
+    parts = [*identity, *versions, *machine]
     return hashlib.sha256("\0".join(f"{len(part)} {part}" for part in parts).encode()).hexdigest()
 
 
 @cache
-def source_digest() -> str:
-    """The SHA-256 of all modules of robot_dyn: one that is edited must not run what it wrote before."""
-    return digest_of_folder(Path(__file__).parents[1])
+def sources_of_the_writer() -> str:
+    """The SHA-256 of what writes programs as machine code."""
+    return digest_of(_ROOT / "compiled", [*(_ROOT / "compiled" / "llvm").rglob("*.py"), _ROOT / "compiled/program.py"])
 
 
-def digest_of_folder(folder: Path) -> str:
-    """The SHA-256 of the names and contents of all Python files in a folder and below it."""
-    made = hashlib.sha256()
-    for path in sorted(folder.rglob("*.py")):
-        data = path.read_bytes()
-        made.update(f"{path.relative_to(folder).as_posix()} {len(data)}\n".encode() + data)
+@cache
+def sources_of_programs() -> str:
+    """The SHA-256 of all that may be traced to a program, or traces it."""
+    return digest_of(_ROOT, traced_sources())
+
+
+def traced_sources() -> list[Path]:
+    """The modules of this package but for those above the simulation."""
+    rooms = [room for room in _ROOT.iterdir() if room.name not in _ABOVE]
+    return [path for room in rooms for path in ([room] if room.suffix == ".py" else room.rglob("*.py"))]
+
+
+def digest_of(folder: Path, paths: Iterable[Path]) -> str:
+    """The SHA-256 of the names, from a folder on, and of the contents of files."""
+    made, before = hashlib.sha256(), len(folder.as_posix()) + 1
+    for name in sorted(path.as_posix() for path in paths):
+        with open(name, "rb") as file:
+            data = file.read()
+        made.update(f"{name[before:]} {len(data)}\n".encode() + data)
     return made.hexdigest()
 
 

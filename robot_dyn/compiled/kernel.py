@@ -13,7 +13,7 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.compiled.identity import digest
+from robot_dyn.compiled.identity import digest, sources_of_the_writer
 from robot_dyn.compiled.llvm import machine_code
 from robot_dyn.compiled.llvm.batch import batch_function, lanes
 from robot_dyn.compiled.llvm.entries import write_batch_entry, write_state_entry
@@ -145,5 +145,5 @@ class Kernel:
 
     def _address(self, function: str, what: str, write: Callable[[Any, str], None]) -> int:
         form = str(self.shape), self.dtype, str(self.times), repr(self.doubtful), str(self._parametrised)
-        key = digest([what, str(self.program), *form])
+        key = digest([what, sources_of_the_writer(), str(self.program), *form])
         return machine_code.address(function, key, write, self.store, f"{self.about}, {what}")

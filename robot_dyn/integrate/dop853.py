@@ -13,6 +13,10 @@ from __future__ import annotations
 
 from fractions import Fraction
 from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+from runpy import run_path
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -57,8 +61,7 @@ class Work(NamedTuple):
 @cache
 def coefficients() -> Coefficients:
     """SciPy's coefficients, for differences of the stages."""
-    from scipy.integrate import DOP853
-
+    DOP853 = table()
     a = np.zeros((_EXTENDED, _EXTENDED))
     a[:_STAGES, :_STAGES], a[_STAGES + 1 :] = DOP853.A, DOP853.A_EXTRA
     a[_STAGES, :_STAGES] = DOP853.B
@@ -74,6 +77,23 @@ def coefficients() -> Coefficients:
     end = np.zeros(_STAGES + 1)
     end[[0, _STAGES]] = 1.0
     return Coefficients(a, b, c, e3, e5, d, end)
+
+
+def table() -> Any:
+    """SciPy's table, from its file: to import `scipy.integrate` takes longer than to load a run's machine code."""
+    package = find_spec("scipy")
+    try:
+        assert package is not None
+        file = Path((package.submodule_search_locations or [""])[0], "integrate", "_ivp", "dop853_coefficients.py")
+        known, s = run_path(str(file)), _STAGES
+        A, B, C, D, E3, E5 = (known[name] for name in ("A", "B", "C", "D", "E3", "E5"))
+    except (AssertionError, KeyError, OSError):  # it is kept elsewhere
+        from scipy.integrate import DOP853
+
+        return DOP853
+    return SimpleNamespace(
+        A=A[:s, :s], B=B, C=C[:s], D=D, E3=E3, E5=E5, A_EXTRA=A[s + 1 :], C_EXTRA=C[s + 1 :]
+    )  # fmt: skip
 
 
 def stepper(m: int, rows: int, bounded: int) -> ControlledStepper:

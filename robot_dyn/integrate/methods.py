@@ -57,11 +57,6 @@ def method(name: str) -> Any:
     return METHODS[choice("integration method", name, METHODS)]()
 
 
-def has_name(given: Any) -> bool:
-    """Whether a method is of the class of one that has a name here, as an explicit one of any tableau is."""
-    return isinstance(given, (Adaptive, *map(type, _READY)))
-
-
 def as_method(given: Any) -> Integrator | Adaptive:
     """The method that is meant: one by its name, or a method as it is.
 

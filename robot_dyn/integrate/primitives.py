@@ -51,7 +51,9 @@ def copy(to: Array, x: Array) -> None:
 
 def sizes(x: Array, out: Array) -> None:
     """Σ |x_e| of each run."""
-    out[...] = np.abs(x).sum(axis=0)
+    out[...] = 0
+    for row in x:  # in the order of machine code
+        out += np.abs(row)
 
 
 def enclose(low: Array, high: Array, first: int, x: Array) -> None:
@@ -101,7 +103,7 @@ def settle(Z: Array, new: Array, y: Array, least: Array, stale: Array, state: Ar
     change, own, size = (np.abs(_middle(x)).max(axis=0) for x in (new - Z, new, y[None]))
     Z[..., going] = new[..., going]
     shrinks = ((change < least) & (change > epsilon * own)).any(axis=0)
-    np.minimum(least, change, out=least)
+    least[:, going] = np.minimum(least, change)[:, going]
     stale[going] = np.where(shrinks, 0, stale + 1)[going]
     # an increment of some power of epsilon between 1/2 and 1 is rounding of Φ: far below any error that matters
     slack = NOISE * epsilon * np.maximum(1.0, size.max(axis=0))

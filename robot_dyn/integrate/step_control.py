@@ -47,7 +47,7 @@ class _Entries(NamedTuple):
     MESH: int = 9  # the next time of a mesh
 
 
-At = _Entries()  # no enumeration: Numba before 0.62 takes none as an index
+At = _Entries()
 
 
 class ControlledStepper(NamedTuple):

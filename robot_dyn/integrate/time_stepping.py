@@ -95,7 +95,8 @@ def time_step(
                     after[e, b] = work.again[e, b]
     copy(work.y[m + 1 :], made[m + n : m + 2 * n])
     copy(work.K[0, :n], y[n : 2 * n])
-    copy(work.K[0, m : m + n], made[m + rows.u : m + rows.u + n])
+    seen = work.K.shape[1] - m  # no run in lock step shows its actuation
+    copy(work.K[0, m:], made[m + rows.u : m + rows.u + seen])
     return 1
 
 

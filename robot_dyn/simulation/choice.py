@@ -11,7 +11,6 @@ from math import inf
 from typing import TYPE_CHECKING, Any
 
 from robot_dyn.errors import RobotDynError
-from robot_dyn.integrate.methods import has_name
 from robot_dyn.simulation.declarations import named, undeclared
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import segments
@@ -42,11 +41,10 @@ def choose(setup: Setup, equation: StateEquation, seen: float = 0) -> tuple[Mach
     if setup.engine == "interpreted":
         return None, _interpreted(setup)
     if setup.engine == "compiled":
-        return _machine(setup, equation), _label(setup)
+        made = _machine(setup, equation)
+        return made, _label(made)
     if parts := undeclared(setup.plant, setup.controller):  # they may do what a trace would lose
         return None, _interpreted(setup, " ".join((named(parts[0][0]), parts[0][1])))
-    if not has_name(setup.integrator):  # whether its step can be compiled only the first call of its loop would tell
-        return None, _interpreted(setup, f"the step of {setup.integrator.name} is compiled by engine='compiled' alone")
     try:
         made = _existing(setup, equation)
         if made is None:
@@ -54,7 +52,7 @@ def choose(setup: Setup, equation: StateEquation, seen: float = 0) -> tuple[Mach
                 return None, _interpreted(setup, "short: compiling does not pay")
             made = machine_of(setup, equation)
         made.check(setup)
-        return made, _label(setup)
+        return made, _label(made)
     except (ImportError, RobotDynError) as error:
         return None, _interpreted(setup, str(error))
 
@@ -106,8 +104,11 @@ def _interpreted(setup: Setup, why: str = "") -> str:
     return f"interpreted ({'; '.join(words)})" if words else "interpreted"
 
 
-def _label(setup: Setup) -> str:
-    return "compiled" if setup.integrator.plain else "compiled (the equation of motion; steps in Python)"
+def _label(machine: Machine) -> str:
+    if machine.loop is not None:
+        return "compiled"
+    why = f": {machine.refused}" if machine.refused else ""
+    return f"compiled (the equation of motion; steps in Python{why})"
 
 
 def _evaluations(setup: Setup, size: int) -> float:

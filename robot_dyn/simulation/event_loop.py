@@ -172,8 +172,8 @@ def event_loop(
                 copy(y, after)
                 if event >= 0:
                     arrive(y, work.last, rest, switches, event)
-                for e in switches.zeroed:
-                    y[e, 0] = 0.0
+                for row in switches.zeroed:
+                    y[row, 0] = 0.0
                 times.reached[0] = t1
                 copy(work.K[0], work.last)
                 if times.every and event < 0 and t1 < end:

@@ -13,7 +13,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from robot_dyn.compiled.overload import version_of
+from robot_dyn.compiled.identity import version_of
 from robot_dyn.compiled.right_angles import written_out
 from robot_dyn.errors import DescriptionError, QueryError
 from robot_dyn.model import catalog

@@ -62,7 +62,7 @@ def prepared(
         functions = machine.in_python if machine.loop is None else machine.equations.functions
         return functions, machine.parameters if of is equation else machine.of(of)
 
-    loop, in_python = (None, None) if machine is None else (machine.loop, machine.in_python)
+    loop, in_python = (None, None) if machine is None else (machine.advance(), machine.in_python)
     if setup.finds_events:
         ends = pace if isinstance(pace, np.ndarray) else None
         if not setup.integrator.controls_error:

@@ -168,7 +168,7 @@ def _spent_on_loops(machine: Machine | None) -> float:
     """On the clock of what is compiled in the first call of a loop, which is no time of the run."""
     if machine is None:
         return 0.0
-    from robot_dyn.simulation.machine.loop import spent_on_loops
+    from robot_dyn.compiled.loops.call import spent_on_loops
 
     return spent_on_loops()
 

@@ -64,7 +64,7 @@ class _Entries(NamedTuple):
     EVENT: int = 12  # the switching function that has changed sign
 
 
-Now = _Entries()  # no enumeration: Numba before 0.62 takes none as an index
+Now = _Entries()
 
 
 class Functions(NamedTuple):

@@ -83,7 +83,7 @@ def _one(setup: rd.Setup, made: Machine) -> Any:
     def run() -> float:
         functions, equation = (made.equations.functions, made.parameters), made.equation
         watch, transfers = Watch(setup, equation), Transfers(equation)
-        advance = FixedStep(watch, transfers, lambda _: functions, Fraction(1), made.loop)
+        advance = FixedStep(watch, transfers, lambda _: functions, Fraction(1), made.advance())
         began = perf_counter()
         advance.record()
         return perf_counter() - began

@@ -172,7 +172,7 @@ def test_a_call_is_restored_from_a_store(double: Kernel, monkeypatch: pytest.Mon
 
 
 def test_what_is_loaded_is_kept_once(double: Kernel) -> None:
-    """Numba never frees machine code: 600 kernels that are alike share it, and what is new to a store still gets there.
+    """Machine code is never freed: 600 kernels that are alike share it, and what is new to a store still gets there.
 
     No module of LLVM and no function is left over; 10 MB allow for what the count itself allocates, 4 MB late in the
     suite (24 MB were lost).

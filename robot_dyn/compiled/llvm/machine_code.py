@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
-from typing import Any
+from typing import Any, final
 
 import llvmlite.binding as binding
 from llvmlite import ir
@@ -22,7 +23,27 @@ _lock = threading.RLock()
 _loaded: dict[str, bytes] = {}  # object files by key
 
 
-def address(function: str, key: str, write: Callable[[Any, str], None], store: Store | None, about: str = "") -> int:
+@final
+@dataclass(frozen=True)
+class Passes:
+    """How hard LLVM works on a module.
+
+    Attributes:
+        level: Of its passes over instructions, 0 to 3.
+        effort: On registers, 0 to 3; None for as hard as its length allows.
+    """
+
+    level: int = 3
+    effort: int | None = None
+
+
+_ALL = Passes()
+
+
+def address(
+    function: str, key: str, write: Callable[[Any, str], None], store: Store | None, about: str = "",
+    passes: Passes = _ALL,
+) -> int:  # fmt: skip
     """The address of a function of a module, which is restored from the store if it is there.
 
     Args:
@@ -31,12 +52,13 @@ def address(function: str, key: str, write: Callable[[Any, str], None], store: S
         write: Writes the functions into a module, each by its name after the module's.
         store: Where to look and keep; None for nowhere.
         about: What it is of, for a reader of the store.
+        passes: How hard LLVM works.
     """
     name = f"robot_dyn_{key}_"
     with _lock:
         kept = _opened(store.load(key)) if store is not None else None
         if key not in _loaded:
-            made = object_file(write, name) if kept is None else kept
+            made = object_file(write, name, passes) if kept is None else kept
             _engine().add_object_file(binding.ObjectFileRef.from_data(made))
             _engine().finalize_object()
             _loaded[key] = made
@@ -45,10 +67,10 @@ def address(function: str, key: str, write: Callable[[Any, str], None], store: S
         return _engine().get_function_address(name + function)
 
 
-def object_file(write: Callable[[Any, str], None], name: str) -> bytes:
+def object_file(write: Callable[[Any, str], None], name: str, passes: Passes = _ALL) -> bytes:
     """The object file of a module."""
-    module = _optimised(write, name)
-    return _machine(_effort(module)).emit_object(module)
+    module = _optimised(write, name, passes.level)
+    return _machine(_effort(module) if passes.effort is None else passes.effort).emit_object(module)
 
 
 def assembly(write: Callable[[Any, str], None], name: str) -> str:
@@ -56,12 +78,12 @@ def assembly(write: Callable[[Any, str], None], name: str) -> str:
     return _machine().emit_assembly(_optimised(write, name))
 
 
-def _optimised(write: Callable[[Any, str], None], name: str) -> Any:
+def _optimised(write: Callable[[Any, str], None], name: str, level: int = 3) -> Any:
     module, machine = ir.Module(name), _machine()
     module.triple, module.data_layout = machine.triple, str(machine.target_data)
     write(module, name)
     parsed = binding.parse_assembly(str(module))
-    options = binding.create_pipeline_tuning_options(speed_level=3)
+    options = binding.create_pipeline_tuning_options(speed_level=level)
     options.loop_vectorization = options.slp_vectorization = options.loop_unrolling = False  # it is in vectors
     builder = binding.create_pass_builder(machine, options)
     builder.getModulePassManager().run(parsed, builder)

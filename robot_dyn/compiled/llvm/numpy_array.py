@@ -24,6 +24,7 @@ OFFSETS = {
     "data": _HEAD,
     "axes": _HEAD + 8,
     "lengths": _HEAD + 16,
+    "strides": _HEAD + 24,
     "dtype": _HEAD + 40,
     "flags": _HEAD + 48,
 }
@@ -50,6 +51,9 @@ def check_structure() -> None:
     if not wrong:  # then what stands between axes and dtype is a pointer, to be followed
         shape = ctypes.POINTER(ctypes.c_ssize_t).from_address(id(x) + OFFSETS["lengths"])
         wrong = [] if (shape[0], shape[1]) == x.shape else ["lengths"]
+    if not wrong:
+        places = [ctypes.c_void_p.from_address(id(x) + OFFSETS[name]).value or 0 for name in ("lengths", "strides")]
+        wrong = [] if places[1] - places[0] == 2 * ctypes.sizeof(ctypes.c_ssize_t) else ["strides"]  # behind them
     if wrong:
         raise ArrayStructureError(
             f"NumPy {np.__version__} does not keep {', '.join(wrong)} of an array where versions {TESTED} do;"

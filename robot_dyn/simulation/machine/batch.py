@@ -157,7 +157,8 @@ class Batch:
         equation, n = self.machine.equation, self.machine.equation.plant.dynamics.n
         own, runs = slice(tile * LANES, (tile + 1) * LANES), self._runs(tile)
         method = cast(PlainMethod, self.setup.integrator)
-        assert self.machine.loop is not None
+        advance = self.machine.advance()
+        assert advance is not None
         rows = (equation.size + n) | 1  # odd: stages a power of two apart would share the sets of a cache
         stepper = method.stepper(FLOAT64, equation.size, n, rows, LANES)
         functions, now = self.machine.equations.functions, np.zeros(len(Now), dtype=np.int64)
@@ -174,7 +175,7 @@ class Batch:
             switches = self.thresholds.lanes(self._numbers(tile), equation.size + n, positions)
             self.until[own] = switches.until
             work = Detecting(work, work.K, switches._replace(until=self.until[own]))
-        ended = self.machine.loop(
+        ended = advance(
             functions, self.plan, runs, records, rules, stepper.coefficients, work, now, self.clocks[tile], self.stop
         )
         self.unfinished[tile], self.evaluations[tile] = ended != Ended.DONE, now[Now.EVALUATIONS]

@@ -5,66 +5,45 @@ The functions of the state equation are addresses; so a loop is compiled once fo
 
 from __future__ import annotations
 
-import sys
-import threading
 from collections.abc import Callable
 from functools import cache
-from inspect import getsource
-from time import perf_counter
 from typing import Any
 
-from robot_dyn.compiled import elimination as elimination  # a step of a stiff method calls it
+import numpy as np
+
+from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.compiled.cache import default_store
-from robot_dyn.compiled.overload import compiled
-from robot_dyn.compiled.primitives import machine_code, reached
+from robot_dyn.compiled.llvm.machine_code import Passes
+from robot_dyn.compiled.loops.call import QUICK, MachineFunction
+from robot_dyn.compiled.loops.source import SubsetError
+from robot_dyn.compiled.primitives import INSTEAD
+from robot_dyn.integrate.integrator import PlainMethod
+from robot_dyn.simulation.state_equation import StateEquation
+from robot_dyn.simulation.time_loop import Functions
 
-Loop = Callable[..., int]
-
-
-class _Spent(threading.local):
-    """Of each thread on its own: what another one compiles is no time of this one's run."""
-
-    seconds = 0.0
-
-
-_spent = _Spent()
-
-
-def spent_on_loops() -> float:
-    """Time that this thread has spent on loading and compiling loops, in [s]; a run's first call does so."""
-    return _spent.seconds
+HARD = Passes(level=3, effort=3)
 
 
 @cache
-def loop(make: Callable[..., Loop], *functions: Callable[..., Any]) -> Loop:
-    """The loop that `make` gives of the plain functions of a method, compiled for the arguments of its first call."""
-    made: list[Any] = []
-    lock = threading.Lock()
-
-    def advance(*arguments: Any) -> int:
-        if not made:
-            began = perf_counter()
-            with lock:
-                made[:] = made or [_compiled(make(*functions), arguments, functions[0])]
-            _spent.seconds += perf_counter() - began
-        return made[0](*arguments)
-
-    return advance
+def loop(
+    make: Callable[..., Callable[..., int]], *functions: Callable[..., Any], works: bool = False
+) -> MachineFunction:
+    """The loop that `make` gives of the plain functions of a method, and whether it works beside what it calls."""
+    about = f"the time loop of {functions[0].__module__}.{functions[0].__name__}"
+    return MachineFunction(make(*functions), INSTEAD, default_store, about, HARD if works else QUICK)
 
 
-def _compiled(advance: Loop, arguments: tuple[Any, ...], of: Callable[..., Any]) -> Any:
-    import numba as nb
-
-    types, functions = [nb.typeof(each) for each in arguments], reached(advance)
-    about = f"the time loop of {of.__module__}.{of.__name__}"
-    if not all(map(_imported, functions[1:])):  # a step of a user's own, of types that no other process has
-        return compiled(lambda: machine_code(advance), types, None, [], about)
-    identity = [f"{each.__module__}.{each.__qualname__} {getsource(each)}" for each in functions]
-    return compiled(lambda: machine_code(advance), types, default_store(), identity, about)
-
-
-def _imported(function: Callable[..., Any]) -> bool:
-    """Whether another process finds a function by its name, as not one of a script or of an interactive session."""
-    module = function.__module__ or "__main__"
-    found = getattr(sys.modules.get(module), function.__qualname__, None)
-    return module.startswith("robot_dyn.") or (module != "__main__" and found is function)
+def refusal(method: PlainMethod, equation: StateEquation, lanes: int) -> SubsetError | None:
+    """Why the step of a method written elsewhere cannot be machine code; None if it can, as those of this library."""
+    n, m = equation.plant.dynamics.n, equation.size
+    made = method.stepper(FLOAT64, m, n, m + n, lanes)
+    if made.step.__module__.startswith("robot_dyn."):
+        return None
+    y, own, lost = np.zeros((m, lanes)), np.zeros((1, lanes)), np.zeros(lanes, np.int64)
+    step = MachineFunction(made.step, INSTEAD, lambda: None, "")
+    functions = Functions(*[0] * len(Functions._fields))
+    try:
+        step.check(functions, made.coefficients, 0.0, 1.0, y, np.zeros(2), own, np.zeros((m, lanes)), made.work, lost)
+    except SubsetError as error:
+        return error
+    return None

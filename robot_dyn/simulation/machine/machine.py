@@ -15,9 +15,10 @@ import numpy as np
 
 from robot_dyn.coefficients import value_at
 from robot_dyn.compiled.cache import default_store
-from robot_dyn.compiled.identity import digest
+from robot_dyn.compiled.identity import digest, sources_of_the_writer
 from robot_dyn.compiled.llvm import machine_code
 from robot_dyn.compiled.llvm.lock_step import write_function, write_step
+from robot_dyn.compiled.loops.call import MachineFunction
 from robot_dyn.compiled.parameters import CONTROLLER, ROBOT, Parameter, Part, joined, parameters
 from robot_dyn.compiled.program import Program
 from robot_dyn.control.controller import Controller
@@ -74,7 +75,7 @@ class Equations:
     @cached_property
     def _key(self) -> str:
         texts = (f"{name} {program}" for name, program in self.programs.items())
-        return digest([str(self.runs), str(sorted(self.shared.items())), *texts])
+        return digest([sources_of_the_writer(), str(self.runs), str(sorted(self.shared.items())), *texts])
 
     @cached_property
     def functions(self) -> Functions:
@@ -107,19 +108,25 @@ class Machine:
         known: Its parameters, with the values of the setup.
         loop: The time loop as machine code; None if steps are made in Python.
         swept: Names of the parameters that differ from run to run.
+        refused: Why steps are made in Python, of a method that might have them as machine code.
     """
 
     equation: StateEquation
     equations: Equations
     known: tuple[Parameter, ...]
-    loop: Callable[..., int] | None
+    loop: MachineFunction | None
 
     swept: tuple[str, ...] = ()
+    refused: str = ""
 
     @cached_property
     def parameters(self) -> np.ndarray:
         """The values of the parameters, one row after the other."""
         return joined(self.known)
+
+    def advance(self) -> Callable[..., int] | None:
+        """The loop for one run, which keeps the addresses of its arrays."""
+        return None if self.loop is None else self.loop.calls()
 
     def with_parts(self, effects: Sequence[Effect], controller: Controller | None, dynamics: Any = None) -> np.ndarray:
         """The values of the parameters where effects and controller have other coefficients, and bodies other numbers.

@@ -13,8 +13,10 @@ from typing import Any, NamedTuple, final
 
 from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.compiled.cache import default_store
-from robot_dyn.compiled.identity import digest
+from robot_dyn.compiled.identity import digest, sources_of_programs
 from robot_dyn.compiled.interrupts import interrupts_later
+from robot_dyn.compiled.loops.call import MachineFunction
+from robot_dyn.compiled.loops.source import SubsetError
 from robot_dyn.compiled.parameters import Parameter, Part, parameters
 from robot_dyn.compiled.program import Program
 from robot_dyn.compiled.right_angles import robot_of
@@ -126,9 +128,7 @@ def machine(
             f"the run takes {equations.instructions} instructions, more than the {_MOST_INSTRUCTIONS} worth compiling;"
             " simulate it with engine='interpreted'"
         )
-    return Machine(
-        made.equation, equations, made.known, None if method is None else _loop(method, cuts, detects), swept
-    )
+    return _with_loop(made, equations, method, lanes, cuts, detects, swept)
 
 
 def existing(
@@ -139,7 +139,7 @@ def existing(
     equations = _equations.known(made.objects, (made.described, 1, None, (), jacobian, nonsmooth))
     if equations is None:
         return None
-    found = Machine(made.equation, equations, made.known, None if method is None else _loop(method, cuts))
+    found = _with_loop(made, equations, method, cuts=cuts)
     return found if found.ready else None
 
 
@@ -161,6 +161,17 @@ def _identified(equation: StateEquation, swept: tuple[str, ...]) -> _Identified:
     return _Identified(own, known, (described, tuple(each.place for each in known)), objects)
 
 
+def _with_loop(
+    made: _Identified, equations: Equations, method: Any, lanes: int = 1, cuts: bool = False, detects: bool = False,
+    swept: tuple[str, ...] = (),
+) -> Machine:  # fmt: skip
+    """The machine of these equations with the loop of a method; without one where its step cannot be machine code."""
+    found = None if method is None else _loop(method, made.equation, cuts, lanes, detects)
+    if isinstance(found, SubsetError):
+        return Machine(made.equation, equations, made.known, None, swept, str(found))
+    return Machine(made.equation, equations, made.known, found, swept)
+
+
 def machine_of_constants(equation: StateEquation, method: Integrator, *, lanes: int = 1) -> Machine:
     """The machine of a state equation whose numbers are constants of the code: none of them can be changed.
 
@@ -175,7 +186,10 @@ def machine_of_constants(equation: StateEquation, method: Integrator, *, lanes: 
     robot = _robot(equation.plant.dynamics)
     own = replace(equation, plant=Plant(robot, equation.plant.effects))
     programs = _traced(own, (), None if lanes == 1 else (), method.needs_jacobian, method.nonsmooth, constants=True)
-    return Machine(own, Equations(programs, lanes, robot.name), (), _loop(method, False))
+    made = _loop(method, own, False, lanes)
+    if isinstance(made, SubsetError):
+        raise made
+    return Machine(own, Equations(programs, lanes, robot.name), (), made)
 
 
 def _shared(
@@ -197,7 +211,7 @@ def _programs(
 ) -> dict[str, Program]:  # fmt: skip
     """The programs of a state equation, from the store if the structure of all its parts is known."""
     store = None if described is None else default_store()
-    key = digest(["programs", repr(described), repr(kept), repr(jacobian), repr(nonsmooth)])
+    key = digest(["programs", sources_of_programs(), repr(described), repr(kept), repr(jacobian), repr(nonsmooth)])
     if store is not None and (payload := store.load(key)) is not None:
         texts = payload.decode().split("\n\n")
         return {name: Program.read(text) for name, _, text in (each.partition("\n") for each in texts)}
@@ -230,11 +244,18 @@ def _traced(
     return {name: program_of(each) for name, each in traced.items()}
 
 
-def _loop(method: Any, cuts: bool, detects: bool = False) -> Callable[..., int]:
-    from robot_dyn.simulation.machine.loop import loop
+def _loop(
+    method: Any, equation: StateEquation, cuts: bool, lanes: int, detects: bool = False
+) -> MachineFunction | SubsetError:
+    """The loop of a method; or why its step, written elsewhere, cannot be machine code. Runs in lock step need it."""
+    from robot_dyn.simulation.machine.loop import loop, refusal
 
+    if not method.controls_error and (refused := refusal(method, equation, lanes)) is not None:
+        if lanes > 1:
+            raise refused
+        return refused
     if not cuts:
         step = method.stepper(FLOAT64, 1, 0, 1).step
-        return loop(time_loop, detecting(step) if detects else step)
+        return loop(time_loop, detecting(step) if detects else step, works=method.nonsmooth)
     made = STEPPERS[method.method](1, 1, 1) if method.controls_error else hermite.stepper(method, 1, 0, 1, None)
     return loop(event_loop, made.begin, made.step, made.error, made.accept, made.dense)

@@ -1,0 +1,172 @@
+"""The types of the subset: numbers, arrays of them, named tuples by reference, tuples, and what is known beforehand."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass, field
+from typing import Any, final
+
+import numpy as np
+from llvmlite import ir
+
+from robot_dyn.errors import TraceError
+
+I1, I8, I64, F64 = ir.IntType(1), ir.IntType(8), ir.IntType(64), ir.DoubleType()
+TEXT, WORDS = I8.as_pointer(), I64.as_pointer()
+
+
+@final
+@dataclass(frozen=True)
+class Number:
+    """A number: float64, int64, uint64 or a truth value."""
+
+    name: str
+
+    @property
+    def llvm(self) -> ir.Type:
+        """LLVM's type of it."""
+        return {"float": F64, "bool": I1}.get(self.name, I64)
+
+    @property
+    def stored(self) -> ir.Type:
+        """LLVM's type of an entry of an array."""
+        return I8 if self.name == "bool" else self.llvm
+
+
+FLOAT, INT, UINT, BOOL = Number("float"), Number("int"), Number("uint"), Number("bool")
+_OF_DTYPE = {np.dtype(of): number for of, number in ((float, FLOAT), (np.int64, INT), (np.uint64, UINT), (bool, BOOL))}
+
+
+@final
+@dataclass(frozen=True)
+class ArrayKind:
+    """An array.
+
+    Attributes:
+        of: Its numbers.
+        ndim: Number of axes.
+        contiguous: Whether it is contiguous in C order; otherwise strides are known only at run time.
+        single: Whether the last of several axes is known to be of length 1, as that of a single run.
+        frozen: Whether nothing may be written into it.
+    """
+
+    of: Number
+    ndim: int
+    contiguous: bool = True
+    single: bool = False
+    frozen: bool = False
+
+    @property
+    def words(self) -> int:
+        """Words of its description: address, lengths, and strides in bytes."""
+        return 1 + 2 * self.ndim
+
+
+@final
+@dataclass(frozen=True)
+class RecordKind:
+    """A named tuple, by the address of the words of its fields.
+
+    Attributes:
+        name: Of its class.
+        names, kinds: Its fields.
+    """
+
+    name: str
+    names: tuple[str, ...]
+    kinds: tuple[Kind, ...]
+
+    @property
+    def words(self) -> int:
+        """Words of all fields."""
+        return sum(map(words, self.kinds))
+
+    def first(self, name: str) -> int:
+        """The first word of a field."""
+        return sum(map(words, self.kinds[: self.names.index(name)]))
+
+
+@final
+@dataclass(frozen=True)
+class TupleKind:
+    """Several values."""
+
+    items: tuple[Kind, ...]
+
+
+@final
+@dataclass(frozen=True)
+class Static:
+    """A value known when the function is translated: a function, a module, a class, a tuple of constants.
+
+    Attributes:
+        value: It.
+        token: Tells it from others; 1, 1.0 and True are not the same.
+    """
+
+    value: Any = field(compare=False)
+    token: str
+
+    @staticmethod
+    def of(value: Any) -> Static:
+        """The type of a value."""
+        return Static(value, f"{id(value)}" if callable(value) else repr(value))
+
+
+Kind = Number | ArrayKind | RecordKind | TupleKind | Static
+
+
+def words(kind: Kind) -> int:
+    """Number of 64-bit words that a value takes."""
+    if isinstance(kind, Number):
+        return 1
+    if isinstance(kind, TupleKind):
+        return sum(map(words, kind.items))
+    return 0 if isinstance(kind, Static) else kind.words
+
+
+def is_record(value: Any) -> bool:
+    """Whether it is a named tuple."""
+    return isinstance(value, tuple) and hasattr(value, "_fields")
+
+
+def kind_of(value: Any) -> Kind:
+    """The type of an argument.
+
+    Raises:
+        TraceError: If machine code cannot take it.
+    """
+    if isinstance(value, np.ndarray):
+        return _kind_of_array(value)
+    if is_record(value):
+        return RecordKind(type(value).__name__, value._fields, tuple(map(kind_of, value)))
+    if isinstance(value, tuple):
+        return TupleKind(tuple(map(kind_of, value)))
+    for of, number in (((bool, np.bool_), BOOL), (np.uint64, UINT), ((int, np.integer), INT), ((float,), FLOAT)):
+        if isinstance(value, of):
+            return number
+    if callable(value) or value is None:
+        return Static.of(value)
+    raise TraceError(f"machine code takes numbers, arrays and named tuples of them, got a {type(value).__name__}")
+
+
+def _kind_of_array(x: np.ndarray) -> ArrayKind:
+    if x.dtype not in _OF_DTYPE or not x.flags.aligned or not x.ndim:
+        raise TraceError(
+            f"machine code takes arrays of float64, int64, uint64 or bool with an axis at least, got {x.dtype} of shape"
+            f" {x.shape}: convert it"
+        )
+    single = x.ndim > 1 and x.shape[-1] == 1
+    return ArrayKind(_OF_DTYPE[x.dtype], x.ndim, x.flags.c_contiguous, single, not x.flags.writeable)
+
+
+def unpacked(found: list[int], kind: Kind) -> Any:
+    """The value of words of numbers, or of tuples of them."""
+    if isinstance(kind, TupleKind):
+        ends = np.cumsum([0, *map(words, kind.items)])
+        return tuple(unpacked(found[a:b], each) for a, b, each in zip(ends, ends[1:], kind.items, strict=False))
+    if kind == FLOAT:
+        return struct.unpack("d", struct.pack("q", found[0]))[0]
+    if kind == UINT:
+        return np.uint64(found[0] % 2**64)
+    return None if isinstance(kind, Static) else bool(found[0]) if kind == BOOL else found[0]

@@ -1,0 +1,109 @@
+"""The syntax tree of a plain function, that of the code which Python runs; and what cannot be translated."""
+
+from __future__ import annotations
+
+import ast
+import builtins
+import linecache
+from collections import ChainMap, Counter
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from functools import lru_cache
+from types import CodeType, FunctionType
+from typing import Any
+
+from robot_dyn.errors import TraceError
+
+
+class SubsetError(TraceError):
+    """A construct that is not translated to machine code."""
+
+
+def refused(function: Callable[..., Any], line: int, what: str, remedy: str) -> SubsetError:
+    """The error of a construct: where it stands, and what to write in its place."""
+    code = function.__code__
+    return SubsetError(f"{code.co_filename}, line {line}, in {code.co_qualname}: {what} is not translated; {remedy}")
+
+
+def syntax(function: Callable[..., Any]) -> ast.FunctionDef:
+    """The syntax tree of a function.
+
+    Raises:
+        SubsetError: If there is no source, or it is not that of the function any more.
+    """
+    if not isinstance(function, FunctionType):
+        raise SubsetError(f"{function!r} is not translated; call plain functions")
+    code = function.__code__
+    linecache.checkcache(code.co_filename)
+    text = "".join(linecache.getlines(code.co_filename))
+    place = code.co_qualname, code.co_firstlineno
+    trees, codes = _module(text, code.co_filename)
+    if place not in trees:
+        remedy = "write it with def, in a file or a cell of a notebook"
+        raise refused(function, code.co_firstlineno, "a function without its source", remedy)
+    if not _same(codes[place], code):
+        remedy = "import the module again"
+        raise refused(function, code.co_firstlineno, "a function whose source has changed since it was read", remedy)
+    return trees[place]
+
+
+def names_of(function: FunctionType | Callable[..., Any]) -> Mapping[str, Any]:
+    """The values of names that are not a function's own: of where it was made, of its module, and Python's."""
+    made = {}
+    for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
+        with suppress(ValueError):  # it has no value yet
+            made[name] = cell.cell_contents
+    maps: list[Any] = [made, function.__globals__, vars(builtins)]
+    return ChainMap(*maps)
+
+
+@lru_cache(maxsize=64)
+def _module(text: str, file: str) -> tuple[dict[tuple[str, int], ast.FunctionDef], dict[tuple[str, int], CodeType]]:
+    """The functions of a module by name and first line: their trees, and their code."""
+    try:
+        tree = ast.parse(text)
+        code = compile(tree, file, "exec", dont_inherit=True)
+    except (SyntaxError, ValueError):
+        return {}, {}
+    codes = {(each.co_qualname, each.co_firstlineno): each for each in _codes(code)}
+    places = {(name.rpartition(".")[2], line): (name, line) for name, line in codes}
+    found = {}
+    for node in _functions(tree):
+        place = places.get((node.name, min(each.lineno for each in (node, *node.decorator_list))))
+        if place is not None:
+            found[place] = node
+    return found, codes
+
+
+def _functions(node: ast.AST) -> Iterator[ast.FunctionDef]:
+    """The functions in a module, in its classes, branches and other functions."""
+    for name in ("body", "orelse", "finalbody", "handlers"):
+        for each in getattr(node, name, []):
+            if isinstance(each, ast.FunctionDef):
+                yield each
+            if isinstance(each, ast.stmt | ast.excepthandler):
+                yield from _functions(each)
+
+
+@lru_cache(maxsize=1024)
+def stores(tree: ast.FunctionDef) -> Counter[str]:
+    """How many assignments there are to each name of a function."""
+    return Counter(x.id for x in ast.walk(tree) if isinstance(x, ast.Name) and isinstance(x.ctx, ast.Store))
+
+
+def _codes(code: CodeType) -> Iterator[CodeType]:
+    yield code
+    for each in code.co_consts:
+        if isinstance(each, CodeType):
+            yield from _codes(each)
+
+
+def _same(x: CodeType, y: CodeType) -> bool:
+    """Whether two pieces of code do the same."""
+    names = "co_code", "co_names", "co_varnames", "co_freevars", "co_cellvars"
+    if any(getattr(x, name) != getattr(y, name) for name in names) or len(x.co_consts) != len(y.co_consts):
+        return False
+    pairs = zip(x.co_consts, y.co_consts, strict=True)
+    return all(
+        _same(a, b) if isinstance(a, CodeType) and isinstance(b, CodeType) else repr(a) == repr(b) for a, b in pairs
+    )
