@@ -57,7 +57,8 @@ class Observer:
         column[1 + 2 * n :] = self.seen[n:]
         if self.canonical:
             column[1 + n : 1 + 2 * n] = self.seen[:n]
-        observe(self.observation, began, t, *column[1:].reshape(3, n, 1), acted)
+        q, v, u = column[1:].reshape(3, n, 1)
+        observe(self.observation, began, t, q, v, u, acted)
         self.filled += 1
         self.look()
 

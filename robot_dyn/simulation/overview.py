@@ -149,7 +149,7 @@ def tracking_errors(runs: Rollouts) -> np.ndarray | None:
     """As of `Rollouts.tracking_error`; nan for a run that was not begun."""
     if runs.q is None or runs.setup is None or runs.setup.controller is None:
         return None
-    known = ~np.isnan(runs.q).any(axis=2)
+    known = np.isfinite(runs.q.sum(axis=2))
     q = np.where(known[..., None], runs.q, 0.0)
     _, deviation = deviation_of(runs.setup, runs.t, q)
     if deviation is None:
