@@ -113,7 +113,7 @@ class ShortLoop:
         T, before, last = 1e-4 / rates.max(), 0.0, min(300 / rates[rates > 1e-6 * rates.max()].min(), self.highest)
         while self.radius(T) <= 1 + 1e-11:  # rounding
             before, T = T, min(1.04 * T, T + 1 / (20 * ring)) if 0 < ring * T < 100 else 1.04 * T
-            if T >= last:
+            if last <= T:
                 return self.highest
         while before and T - before > 1e-9 * T:
             middle = (before + T) / 2
@@ -173,7 +173,12 @@ def at_rest(name: str, rng: np.random.Generator) -> Arm:
     x, M = np.concatenate([q, v]), pin.crba(model, data, q).copy()
     M = np.triu(M) + np.triu(M, 1).T
     slope = [
-        (45 * (a(x + h * e) - a(x - h * e)) - 9 * (a(x + 2 * h * e) - a(x - 2 * h * e)) + a(x + 3 * h * e) - a(x - 3 * h * e))
+        (
+            45 * (a(x + h * e) - a(x - h * e))
+            - 9 * (a(x + 2 * h * e) - a(x - 2 * h * e))
+            + a(x + 3 * h * e)
+            - a(x - 3 * h * e)
+        )
         / (60 * h)
         for e in np.eye(2 * robot.n)
     ]  # of order 6
@@ -246,7 +251,9 @@ def main() -> int:
             print("     " if found[-1].holds else "WRONG", found[-1], flush=True)
     radii = {said: [each.radius for each in found if each.stable == said] for said in (True, False)}
     limits, worst = [each.exact for each in found], max(found, key=lambda each: each.off)
-    print(f"seed {options.seed}: {len(radii[True])} called stable, of radius {max(radii[True], default=0):.9g} at most;")
+    print(
+        f"seed {options.seed}: {len(radii[True])} called stable, of radius {max(radii[True], default=0):.9g} at most;"
+    )
     print(f"{len(radii[False])} called unstable, of radius {min(radii[False], default=inf):.9g} at least;")
     print(f"{limits.count(0.0)} that no period makes stable, {limits.count(inf)} that every one does;")
     print(f"stated periods off by {worst.off:.2g} at most: {worst}")

@@ -97,7 +97,9 @@ class SampledLoop:
 
 def remedy(grows_anyway: float) -> str:
     """What makes a loop stable that no period does, by the rate at which deviations grow under control at all times."""
-    return "other gains: it is unstable under control at all times, too" if grows_anyway else "lower gains, or less delay"
+    return (
+        "other gains: it is unstable under control at all times, too" if grows_anyway else "lower gains, or less delay"
+    )
 
 
 def linearised(plant: Plant, controller: Controller, t: float, y: Array) -> SampledLoop:

@@ -1,16 +1,17 @@
-"""Stability of linear maps δx⁺ = Φ(h) δx, and the longest step of a method or period of a loop at which they are stable.
+"""Stability of linear maps δx⁺ = Φ(h) δx, and the longest step of a method, or period of a loop, at which it holds.
 
-    a sampled loop:  |λ_i(Φ)| ≤ 1,   known to  |δλ_i| ≤ |w_i|ᵀ |δΦ| |x_i| / |w_iᴴ x_i|   [Stewart, Sun 1990, IV.2]
-    a method on δx' = J δx:  ln ρ(Φ(h)) / h ≤ max(0, Re λ(J))   [Hairer, Wanner 1996, IV.2]
+    a sampled loop:          |λ_i(Φ)| ≤ 1,   known to |δλ_i| ≤ |w_i|ᵀ |δΦ| |x_i| / |w_iᴴ x_i|
+    a method on δx' = J δx:  ln ρ(Φ(h)) / h ≤ max(0, Re λ(J))
 
-x_i and w_i are the right and left eigenvectors. Neither depends on how long a run is.
+x_i and w_i are the right and left eigenvectors. [Golub, Van Loan, Matrix Computations, 4th ed., 2013, 7.2; Hairer,
+Wanner, Solving Ordinary Differential Equations II, 2nd ed., 1996, IV.2]
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from enum import StrEnum
-from math import inf
+from math import exp, inf, log
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,6 +29,7 @@ _SCAN = (2, 8, 5)  # lengths in each factor of ten up to there, beyond, and in e
 _MOST = 500  # lengths that are tried at each part of a radian, before they grow by factors alone
 _DECAYED = 5.0  # h |Re λ| from which an oscillation is over before the next tick
 _SHARP = 3e-4  # of a limit
+_LARGEST = 690.0  # ln of a growth that is told
 
 
 class Stability(StrEnum):
@@ -83,9 +85,9 @@ def growth(made: Array, error: Array) -> Growth:
         values, left, right = eig(made, left=True, right=True)
         doubt = np.einsum("ik,ij,jk->k", np.abs(left), error, np.abs(right)) / np.abs((left.conj() * right).sum(axis=0))
     size, doubt = np.abs(values), np.minimum(np.nan_to_num(doubt, nan=_BAND), _BAND)
-    worst = int((size - doubt).argmax())
-    least, most = float(size[worst] - doubt[worst]) - 1, float((size + doubt).max()) - 1
-    return Growth(float(size.max()), least, most, float(doubt[worst]))
+    k = int((size - doubt).argmax())
+    least, most = float(size[k] - doubt[k]) - 1, float((size + doubt).max()) - 1
+    return Growth(float(size.max()), least, most, float(doubt[k]))
 
 
 def longest_step(method: Any, J: Array, n: int) -> float:
@@ -100,7 +102,7 @@ def longest_step(method: Any, J: Array, n: int) -> float:
     """
     rates, made = np.linalg.eigvals(J), step_map(method, J, n)
     allowed = max(0.0, float(rates.real.max())) + _AMPLIFIES * float(np.abs(rates).max())
-    return first_unstable(lambda h: np.log(radius(made, h)) / h > allowed, lengths(rates))
+    return first_unstable(lambda h: np.log(radius(made, h)) / h > allowed, lengths(rates, np.zeros(0)))
 
 
 def radius(matrix: Callable[[float], Array], h: float) -> float:
@@ -123,12 +125,22 @@ def step_map(method: Any, J: Array, n: int) -> Callable[[float], Array]:
     return lambda h: np.asarray(method.step(system, 0.0, np.eye(len(J)), h)).T
 
 
+def after(factor: float, times: float) -> float:
+    """factor^times, at most 1e299."""
+    return exp(min(times * log(factor), _LARGEST)) if factor > 0 and times else float(not times)
+
+
+def shown(factor: float) -> str:
+    """A factor in four digits, or as 1 and two digits."""
+    return f"1 + {factor - 1:.2g}" if 0 < factor - 1 < _BAND else f"{factor:.4g}"
+
+
 def below(limit: float) -> str:
     """A length safely below a limit, in one digit."""
     return f"{float(f'{limit / 2:.0e}'):g}"
 
 
-def lengths(rates: Array, rings: Array = np.zeros(0)) -> list[float]:
+def lengths(rates: Array, rings: Array) -> list[float]:
     """Lengths h to try, the shortest first, for motions of these rates λ; none if nothing moves.
 
     Args:
@@ -157,13 +169,13 @@ def first_unstable(unstable: Callable[[float], bool], tried: list[float]) -> flo
         tried: Lengths, the shortest first.
     """
     before = 0.0
-    for after in tried:
-        if unstable(after):
+    for beyond in tried:
+        if unstable(beyond):
             break
-        before = after
+        before = beyond
     else:
         return inf
-    while before and after - before > _SHARP * after:
-        middle = (before + after) / 2
-        before, after = (before, middle) if unstable(middle) else (middle, after)
+    while before and beyond - before > _SHARP * beyond:
+        middle = (before + beyond) / 2
+        before, beyond = (before, middle) if unstable(middle) else (middle, beyond)
     return before
