@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from enum import StrEnum
 from math import exp, inf, log
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from robot_dyn.integrate.integrator import System
 
 _BAND = 1e-3  # of |λ|: no eigenvalue further from 1 is taken for one at 1, however defective it is
 _AMPLIFIES = 1e-6  # per radian of the fastest motion: an oscillation that a method amplifies by less is its error
-_RANGE = (1e-6, 1e3)  # h |λ| where limits are looked for, of the fastest and of the slowest motion
+_LEAST, _FARTHEST = 1e-6, 1e3  # h |λ| between which limits are looked for, of the fastest and of the slowest motion
 STILL = 1e-5  # of the fastest |λ|, and per second: differences do not tell less from zero
 _SMOOTH = 0.03  # h |λ| of the fastest motion up to which Φ(h) is smooth on a scale of factors
 _SCAN = (2, 8, 5)  # lengths in each factor of ten up to there, beyond, and in each radian of an oscillation
@@ -82,7 +82,7 @@ def growth(made: Array, error: Array) -> Growth:
     if not np.isfinite(made).all():
         return NO_BOUND
     with np.errstate(all="ignore"):  # a defective eigenvalue has left and right vectors at right angles
-        values, left, right = eig(made, left=True, right=True)
+        values, left, right = cast(tuple[Array, Array, Array], eig(made, left=True, right=True))
         doubt = np.einsum("ik,ij,jk->k", np.abs(left), error, np.abs(right)) / np.abs((left.conj() * right).sum(axis=0))
     size, doubt = np.abs(values), np.minimum(np.nan_to_num(doubt, nan=_BAND), _BAND)
     k = int((size - doubt).argmax())
@@ -140,19 +140,20 @@ def below(limit: float) -> str:
     return f"{float(f'{limit / 2:.0e}'):g}"
 
 
-def lengths(rates: Array, rings: Array) -> list[float]:
+def lengths(rates: Array, rings: Array, least: float = _LEAST) -> list[float]:
     """Lengths h to try, the shortest first, for motions of these rates λ; none if nothing moves.
 
     Args:
         rates: Eigenvalues, in [1/s].
         rings: Those of oscillations by which stability may come and go as h grows.
+        least: The first h |λ|, of the fastest motion.
     """
     sizes = np.abs(rates)
     fastest = float(sizes.max(initial=0.0))
     told = sizes[sizes > STILL * max(1.0, fastest)]
     if not len(told):
         return []
-    h, last, made = _RANGE[0] / fastest, _RANGE[1] / float(told.min()), []
+    h, last, made = least / fastest, _FARTHEST / float(told.min()), []
     while h < last:
         made.append(h)
         goes_on = np.abs(rings.imag)[-rings.real * h < _DECAYED] if len(made) < _MOST else np.zeros(0)
