@@ -195,6 +195,7 @@ def drawn(seed: int, index: int) -> tuple[ShortLoop, float]:
     omega, zeta = 10 ** rng.uniform(0.5, 1.7, n), 10 ** rng.uniform(-1.3, 0.3, n) * (rng.random() > 0.1)
     kp, kd = arm.inertia * omega**2, 2 * zeta * omega * arm.inertia
     ki = kp * omega * zeta * rng.uniform(0.05, 1.5, n) if rng.random() < 0.4 and zeta.all() else None
+    ki = None if arm.load.any() else ki  # an integral leaves the posture
     late = [(0.0, 0.0), tuple(rng.integers(0, 3, 2).astype(float)), tuple(np.round(rng.uniform(0, 2, 2), 3))]
     loop = ShortLoop(
         arm, kp, ki, kd, late[int(rng.integers(3))], bool(rng.random() < 0.3), int(rng.choice([0, 0, 1, 2])),

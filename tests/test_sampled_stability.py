@@ -13,13 +13,12 @@ from tests.estimates.scenes import RAIL
 from tests.short_loops import Arm, ShortLoop, judge
 
 BLOCK = rd.Robot.from_text(RAIL)  # 1 kg
-SHORT = 28  # seed
 
 
-@pytest.mark.parametrize("index", [4, 9, 12])
-def test_a_loop_is_stable_up_to_where_the_radius_of_a_period_passes_1(index: int) -> None:
+@pytest.mark.parametrize(("seed", "index"), [(28, 4), (28, 9), (2026, 97)])
+def test_a_loop_is_stable_up_to_where_the_radius_of_a_period_passes_1(seed: int, index: int) -> None:
     """Slides, an arm and a filter, in runs of a few periods; `python -m tests.short_loops` judges a hundred."""
-    judged = judge(SHORT, index)
+    judged = judge(seed, index)
     assert judged.holds, judged
 
 
@@ -36,7 +35,7 @@ def test_a_short_run_makes_no_loop_stable(period: float, duration: float) -> Non
     assert advice.period_growth == pytest.approx(radius, rel=1e-6)
     assert advice.growth == pytest.approx(radius ** (duration // period), rel=1e-6)
     assert "unstable; the loop is stable up to 0.05 s: take period_s=0.02, or lower gains" in advice.text
-    assert f"over this run deviations grow by {advice.growth:.3g}, by {radius:.4g} in each period" in advice.text
+    assert f"over this run deviations grow by {advice.growth:.4g}, by {radius:.4g} in each period" in advice.text
     assert (advice.run is None) == (advice.growth > 1e3)  # what the run bears is run
 
 
@@ -65,7 +64,7 @@ def test_a_period_is_judged_itself_where_a_shorter_one_is_unstable() -> None:
 
 
 def test_what_neither_grows_nor_decays_is_marginal_and_hides_no_limit() -> None:
-    """The first joint of a planar arm that lies flat and is not driven; the exact limit is that of the map without it."""
+    """A planar arm that lies flat, with its first joint not driven: the exact limit is that of the map without it."""
     arm = rd.load("planar_2r").with_(gravity=(0.0, 0.0, 0.0))
     q, (kp, kd) = np.array([0.4, -0.7]), ((0.0, 50.0), (0.0, 5.0))
     M = np.linalg.inv(arm.M(q))[1, 1]  # of the second joint while no torque acts on the first
@@ -107,7 +106,7 @@ def test_a_step_has_its_limit_however_short_the_run() -> None:
 
 @pytest.mark.parametrize("options", [{"integrator": "rk4", "step_s": 1e-3}, {"integrator": "DOP853"}])
 def test_a_run_that_its_loop_ends_says_so_and_not_to_take_a_smaller_step(options) -> None:
-    """A pendulum on ticks of 1 s: whatever the step. A damper of 1e5/s that RK4 cannot follow is one of the step."""
+    """A pendulum with a spring of 1e8 N m/rad on ticks of 10 ms, whatever the step."""
     joint, law = rd.load("pendulum"), rd.PD(rd.hold([0.0]), 1e8, 0.0, 0.01)
     run = rd.simulate(joint, [0.1], duration_s=5.0, controller=law, estimate_error=False, **options)
     runs = rd.rollouts(joint, [[0.1], [0.2]], duration_s=5.0, controller=law, **options)

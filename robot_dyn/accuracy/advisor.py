@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from math import exp, inf, isfinite, log
+from math import exp, inf, isfinite
 from typing import Any, Unpack, final
 
 import numpy as np
@@ -25,7 +25,7 @@ from robot_dyn.simulation.options import Options, setup_of, starts, takes_option
 from robot_dyn.simulation.sampled_loop import linearised, remedy
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.simulate import simulate
-from robot_dyn.simulation.stability import Stability, below, longest_step, radius, step_map, worst
+from robot_dyn.simulation.stability import Stability, after, below, longest_step, radius, shown, step_map, worst
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.stiffness import Fastest, fastest, jacobian
 from robot_dyn.simulation.trajectory import Ending, Trajectory
@@ -34,7 +34,6 @@ _LOOKS = 9  # states along the pilot run
 _FAST = 3  # of them, where motion is fastest: limits are looked for there
 _MOST_STEPS = 200_000  # of a run that is made for its error estimate
 _BEARS = 1e3  # growth of deviations over such a run
-_LARGEST = 300.0  # ln of a growth that is told
 
 State = tuple[float, Array]  # t and y
 
@@ -117,8 +116,8 @@ class Advice:
 
     def _of_growth(self) -> Iterator[str]:
         if not self.stable:
-            each = f", by {self.period_growth:.4g} in each period" * (self.at_period is Stability.UNSTABLE)
-            yield f"over this run deviations grow by {self.growth:.3g}{each}"
+            each = f", by {shown(self.period_growth)} in each period" * (self.at_period is Stability.UNSTABLE)
+            yield f"over this run deviations grow by {shown(self.growth)}{each}"
 
     def _of_error(self) -> str:
         if self.run is None:
@@ -168,21 +167,21 @@ def advice_about(setup: Setup, states_of: Callable[[Setup, StateEquation], list[
     limits = {name: min(longest_step(method(name), J, n) for J in matrices) for name in FIXED_STEP}
     step = 0.0 if own.controls_error else setup.taken_step_s
     loops = [linearised(plant, setup.controller, t, _own(loop, y)) for t, y in states if period]
-    rates = [_excess(own, J, n, step) for J in matrices if step]
-    rates += [log(each.factor(period)) * (duration // period) / duration for each in loops]
+    factors = [after(each.factor(period), duration // period) for each in loops]
+    factors += [after(_excess(own, J, n, step), setup.steps) for J in matrices if step]
     return Advice(
         own.name, step, motion, at, limits, period,
         min((each.longest_period(period) for each in loops), default=inf),
         worst(each.growth(period) for each in loops).verdict if loops else Stability.STABLE,
         max((each.factor(period) for each in loops), default=1.0),
         max((each.grows_anyway() for each in loops), default=0.0),
-        exp(min(_LARGEST, duration * max(0.0, *rates, 0.0))),
+        max(1.0, *factors, 1.0),
     )  # fmt: skip
 
 
 def _excess(method: Any, J: Array, n: int, h: float) -> float:
-    """The rate at which steps h of a method let deviations grow beyond the motion itself, in [1/s]."""
-    return log(max(radius(step_map(method, J, n), h), 1e-300)) / h - max(0.0, float(np.linalg.eigvals(J).real.max()))
+    """The factor by which a step h of a method lets deviations grow beyond the motion itself."""
+    return radius(step_map(method, J, n), h) / exp(h * max(0.0, float(np.linalg.eigvals(J).real.max())))
 
 
 def at_rest(setup: Setup, loop: StateEquation) -> list[State]:

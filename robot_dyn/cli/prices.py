@@ -66,6 +66,9 @@ def advice(made: Advice) -> Document:
         "limits": {name: finite(limit) for name, limit in made.limits.items()},
         "period_s": made.period_s,
         "longest_period_s": finite(made.longest_period_s),
+        "at_period": str(made.at_period),
+        "period_growth": finite(made.period_growth),
+        "growth": made.growth,
         "fastest": {
             "rate": abs(made.fastest.eigenvalue), "joint": made.fastest.joint, "source": made.fastest.source,
             "decays": made.fastest.decays, "t": made.at,

@@ -45,7 +45,8 @@ def causes(runs: Rollouts, setup: Setup, q0: np.ndarray, v0: np.ndarray) -> tupl
     Args:
         runs: A batch.
         setup: Of all of it.
-        q0, v0: Starts, (B, n).
+        q0: Positions at the starts, (B, n).
+        v0: Velocities there.
     """
     from robot_dyn.simulation.rollout_run import setup_of
 

@@ -29,6 +29,7 @@ from robot_dyn.simulation.stiffness import jacobian
 
 _NOISE = 1e-10  # of an entry of the map, by differences; and, in [1/s], of an entry of A that should be 0
 _ROUNDING = 1e-15
+_LEAST_OF_STATES = 1e-3  # first period tried times the fastest rate, where z keeps what goes around: errors of L_z stay
 _FADES = 1.03  # at a period so much longer growth is ten times its doubt, unless it fades as a power of the period
 
 
@@ -83,7 +84,9 @@ class SampledLoop:
             also: A period that is tried too.
         """
         free, loop = np.linalg.eigvals(self.A), np.linalg.eigvals(self.continuous)
-        tried = sorted({*lengths(np.concatenate([free, loop]), free), *([also] if also else [])})
+        rates = np.concatenate([free, loop])
+        tried = lengths(rates, free) if self.stateless else lengths(rates, free, _LEAST_OF_STATES)
+        tried = sorted([*tried, also]) if also else tried
         limit = first_unstable(lambda period: self.growth(period).verdict is Stability.UNSTABLE, tried)
         return limit if limit == inf or self._crosses(limit) else 0.0
 

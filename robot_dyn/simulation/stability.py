@@ -1,17 +1,18 @@
-"""Stability of linear maps δx⁺ = Φ(h) δx, and the longest step of a method or period of a loop at which they are stable.
+"""Stability of linear maps δx⁺ = Φ(h) δx, and the longest step of a method, or period of a loop, at which it holds.
 
-    a sampled loop:  |λ_i(Φ)| ≤ 1,   known to  |δλ_i| ≤ |w_i|ᵀ |δΦ| |x_i| / |w_iᴴ x_i|   [Stewart, Sun 1990, IV.2]
-    a method on δx' = J δx:  ln ρ(Φ(h)) / h ≤ max(0, Re λ(J))   [Hairer, Wanner 1996, IV.2]
+    a sampled loop:          |λ_i(Φ)| ≤ 1,   known to |δλ_i| ≤ |w_i|ᵀ |δΦ| |x_i| / |w_iᴴ x_i|
+    a method on δx' = J δx:  ln ρ(Φ(h)) / h ≤ max(0, Re λ(J))
 
-x_i and w_i are the right and left eigenvectors. Neither depends on how long a run is.
+x_i and w_i are the right and left eigenvectors. [Golub, Van Loan, Matrix Computations, 4th ed., 2013, 7.2; Hairer,
+Wanner, Solving Ordinary Differential Equations II, 2nd ed., 1996, IV.2]
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from enum import StrEnum
-from math import inf
-from typing import Any, NamedTuple
+from math import exp, inf, log
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -21,13 +22,14 @@ from robot_dyn.integrate.integrator import System
 
 _BAND = 1e-3  # of |λ|: no eigenvalue further from 1 is taken for one at 1, however defective it is
 _AMPLIFIES = 1e-6  # per radian of the fastest motion: an oscillation that a method amplifies by less is its error
-_RANGE = (1e-6, 1e3)  # h |λ| where limits are looked for, of the fastest and of the slowest motion
+_LEAST, _FARTHEST = 1e-6, 1e3  # h |λ| between which limits are looked for, of the fastest and of the slowest motion
 STILL = 1e-5  # of the fastest |λ|, and per second: differences do not tell less from zero
 _SMOOTH = 0.03  # h |λ| of the fastest motion up to which Φ(h) is smooth on a scale of factors
 _SCAN = (2, 8, 5)  # lengths in each factor of ten up to there, beyond, and in each radian of an oscillation
 _MOST = 500  # lengths that are tried at each part of a radian, before they grow by factors alone
 _DECAYED = 5.0  # h |Re λ| from which an oscillation is over before the next tick
 _SHARP = 3e-4  # of a limit
+_LARGEST = 690.0  # ln of a growth that is told
 
 
 class Stability(StrEnum):
@@ -80,12 +82,12 @@ def growth(made: Array, error: Array) -> Growth:
     if not np.isfinite(made).all():
         return NO_BOUND
     with np.errstate(all="ignore"):  # a defective eigenvalue has left and right vectors at right angles
-        values, left, right = eig(made, left=True, right=True)
+        values, left, right = cast(tuple[Array, Array, Array], eig(made, left=True, right=True))
         doubt = np.einsum("ik,ij,jk->k", np.abs(left), error, np.abs(right)) / np.abs((left.conj() * right).sum(axis=0))
     size, doubt = np.abs(values), np.minimum(np.nan_to_num(doubt, nan=_BAND), _BAND)
-    worst = int((size - doubt).argmax())
-    least, most = float(size[worst] - doubt[worst]) - 1, float((size + doubt).max()) - 1
-    return Growth(float(size.max()), least, most, float(doubt[worst]))
+    k = int((size - doubt).argmax())
+    least, most = float(size[k] - doubt[k]) - 1, float((size + doubt).max()) - 1
+    return Growth(float(size.max()), least, most, float(doubt[k]))
 
 
 def longest_step(method: Any, J: Array, n: int) -> float:
@@ -100,7 +102,7 @@ def longest_step(method: Any, J: Array, n: int) -> float:
     """
     rates, made = np.linalg.eigvals(J), step_map(method, J, n)
     allowed = max(0.0, float(rates.real.max())) + _AMPLIFIES * float(np.abs(rates).max())
-    return first_unstable(lambda h: np.log(radius(made, h)) / h > allowed, lengths(rates))
+    return first_unstable(lambda h: np.log(radius(made, h)) / h > allowed, lengths(rates, np.zeros(0)))
 
 
 def radius(matrix: Callable[[float], Array], h: float) -> float:
@@ -123,24 +125,35 @@ def step_map(method: Any, J: Array, n: int) -> Callable[[float], Array]:
     return lambda h: np.asarray(method.step(system, 0.0, np.eye(len(J)), h)).T
 
 
+def after(factor: float, times: float) -> float:
+    """factor^times, at most 1e299."""
+    return exp(min(times * log(factor), _LARGEST)) if factor > 0 and times else float(not times)
+
+
+def shown(factor: float) -> str:
+    """A factor in four digits, or as 1 and two digits."""
+    return f"1 + {factor - 1:.2g}" if 0 < factor - 1 < _BAND else f"{factor:.4g}"
+
+
 def below(limit: float) -> str:
     """A length safely below a limit, in one digit."""
     return f"{float(f'{limit / 2:.0e}'):g}"
 
 
-def lengths(rates: Array, rings: Array = np.zeros(0)) -> list[float]:
+def lengths(rates: Array, rings: Array, least: float = _LEAST) -> list[float]:
     """Lengths h to try, the shortest first, for motions of these rates λ; none if nothing moves.
 
     Args:
         rates: Eigenvalues, in [1/s].
         rings: Those of oscillations by which stability may come and go as h grows.
+        least: The first h |λ|, of the fastest motion.
     """
     sizes = np.abs(rates)
     fastest = float(sizes.max(initial=0.0))
     told = sizes[sizes > STILL * max(1.0, fastest)]
     if not len(told):
         return []
-    h, last, made = _RANGE[0] / fastest, _RANGE[1] / float(told.min()), []
+    h, last, made = least / fastest, _FARTHEST / float(told.min()), []
     while h < last:
         made.append(h)
         goes_on = np.abs(rings.imag)[-rings.real * h < _DECAYED] if len(made) < _MOST else np.zeros(0)
@@ -157,13 +170,13 @@ def first_unstable(unstable: Callable[[float], bool], tried: list[float]) -> flo
         tried: Lengths, the shortest first.
     """
     before = 0.0
-    for after in tried:
-        if unstable(after):
+    for beyond in tried:
+        if unstable(beyond):
             break
-        before = after
+        before = beyond
     else:
         return inf
-    while before and after - before > _SHARP * after:
-        middle = (before + after) / 2
-        before, after = (before, middle) if unstable(middle) else (middle, after)
+    while before and beyond - before > _SHARP * beyond:
+        middle = (before + beyond) / 2
+        before, beyond = (before, middle) if unstable(middle) else (middle, beyond)
     return before

@@ -1,4 +1,4 @@
-"""Whether the loop of a sampled controller is unstable about states of a run; what grows slowly may end before it shows.
+"""Whether the loop of a sampled controller is unstable about states of a run; slow growth may end before it shows.
 
 δx⁺ = Φ(T) δx over a period T:   ρ(Φ) > 1, and more than the square of e^{T max Re λ} under control at all times
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
-from math import exp, log
+from math import log
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +16,7 @@ from robot_dyn.errors import RobotDynError
 from robot_dyn.simulation.remarks import Kind, Remark
 from robot_dyn.simulation.sampled_loop import SampledLoop, linearised, remedy
 from robot_dyn.simulation.setup import Setup
-from robot_dyn.simulation.stability import Stability, below
+from robot_dyn.simulation.stability import Stability, after, below, shown
 from robot_dyn.simulation.state_equation import StateEquation
 
 
@@ -38,16 +38,12 @@ def unstable(setup: Setup, equation: StateEquation, t: np.ndarray, y: np.ndarray
 
 
 class Growing(NamedTuple):
-    """A loop in which deviations grow: when, of which joint most, by which factor in a period; and its linearisation."""
+    """A loop in which deviations grow: when, of which joint most, by which factor a period; and its linearisation."""
 
     t: float
     joint: str
     factor: float
     loop: SampledLoop
-
-    def over(self, duration_s: float, period_s: float) -> float:
-        """By how much they grow in the whole periods of a time; no more than 1e300."""
-        return exp(min(log(self.factor) * (duration_s // period_s), 690.0))
 
     def remedy(self, period_s: float) -> str:
         """What to do about it."""
@@ -57,9 +53,9 @@ class Growing(NamedTuple):
 
 
 def growing(setup: Setup, equation: StateEquation, t: float, y: np.ndarray) -> Growing | None:
-    """The loop about a state y of a run if it is sampled and deviations grow there, more than at all times; else None.
+    """The loop about a state y of a run, if it is sampled and deviations grow there because it is; otherwise None.
 
-    Where they grow under control at all times, as about an arm that falls, ticks have a part if they grow twice as fast.
+    Where they grow under control at all times too, as of an arm that falls, that is if they grow twice as fast.
     """
     controller, motion, n = setup.controller, equation.equation_of_motion, setup.plant.dynamics.n
     if controller is None or not equation.sampled or equation.canonical:
@@ -84,7 +80,7 @@ def _remark(setup: Setup, found: Growing) -> Remark:
     assert setup.controller is not None
     period, joint, t = setup.controller.period_s, found.joint, found.t
     text = (
-        f"{joint} by {found.factor:.4g} in each period of {period:.4g} s about the state at {t:.4g} s, by"
-        f" {found.over(setup.duration_s, period):.2g} over the run"
+        f"{joint} by {shown(found.factor)} in each period of {period:.4g} s about the state at {t:.4g} s, by"
+        f" {shown(after(found.factor, setup.duration_s // period))} over the run"
     )
     return Remark(Kind.UNSTABLE, joint, "q", t, 0.0, t, found.factor, 1.0, text, found.remedy(period))
