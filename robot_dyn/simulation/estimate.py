@@ -92,6 +92,8 @@ def _by_steps(
         made = magnified.from_longer_steps(paths, method.order)
         if made.resolved_until >= estimated.path.t[-1] and not estimated.doubts(made, paths, method.order):
             return made
+        known = estimated.path.t < estimated.lost_at(paths[COARSE[1]])  # later it tells nothing of what rounding does
+        estimated = replace(estimated, floor=np.where(known, magnified.floor, estimated.floor))
     half = companion(FINE[0], setup).shared
     if made.resolved_until > 0 and estimated.lost_at(half) < _GAIN * made.resolved_until:
         return made  # chaos: no step of practical length resolves it
