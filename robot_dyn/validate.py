@@ -189,9 +189,8 @@ def shaped(what: str, values: Any, joint_names: Sequence[str], arithmetic: Any =
         QueryError: If they are not real numbers, or have another shape.
     """
     n = len(joint_names)
-    floats = arithmetic is None or arithmetic.dtype.kind == "f"
     try:
-        array = real(values) if floats else arithmetic.asarray(values)
+        array = real(values) if arithmetic is None or arithmetic.dtype.kind == "f" else arithmetic.asarray(values)
     except (TypeError, ValueError, OverflowError) as found:
         raise QueryError(f"{what} must be an array of {n} real numbers, got {found}") from None
     if array.ndim == 0 or array.shape[-1] != n:

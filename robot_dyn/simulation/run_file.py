@@ -170,7 +170,7 @@ def _checked(arrays: Arrays, about: dict[str, Any]) -> Trajectory:
         raise ArchiveError("members 'power/…' and 'ledger/work/…' have different names")
     if run.desired is not None and run.deviation is not None and run.deviation.shape != run.desired.shape:
         raise ArchiveError("members 'desired' and 'deviation' differ in shape")
-    if run.desired is None and run.deviation is not None and (run.deviation.shape[1] != 3 or "frame" not in run.about):
+    if run.desired is None and run.deviation is not None and run.deviation.shape[1] != 3:
         raise ArchiveError("member 'deviation' of joints needs 'desired', which is missing")
     if not are_times(np.array([run.outcome.t])):
         raise ArchiveError(f"'outcome/t' holds {run.outcome.t!r}, not a time in [s]")
