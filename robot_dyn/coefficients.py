@@ -11,7 +11,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from copy import copy
 from dataclasses import MISSING, Field, dataclass, fields, is_dataclass, replace
-from functools import cache
+from functools import cache, cached_property
+from inspect import getattr_static
 from typing import Any, final
 
 import numpy as np
@@ -169,12 +170,21 @@ def with_values(part: Any, values: Mapping[str, Any]) -> Any:
     if not values:
         return part
     made, inside = copy(part), _by_head(values)
+    if declared(type(part)).keys() & values.keys():
+        for name in cached(made):  # it may follow from them
+            del vars(made)[name]
     for name, value in values.items():
         if "." not in name:
             object.__setattr__(made, name, value)
     for head, below in inside.items():
         object.__setattr__(made, head, _within(getattr(made, head), below, with_values))
     return made
+
+
+def cached(part: Any) -> tuple[str, ...]:
+    """Names of its cached properties that are known."""
+    known, kind = getattr(part, "__dict__", ()), type(part)
+    return tuple(name for name in known if isinstance(getattr_static(kind, name, None), cached_property))
 
 
 def rebuilt(part: Any, values: Mapping[str, Any]) -> Any:

@@ -124,7 +124,7 @@ class Remembers(rd.Active):
 
 @dataclass(frozen=True, eq=False)
 class Cached(rd.Active):
-    c: float = 2.0
+    c: Any = field(default=2.0, metadata=rd.coefficient("N m s/rad", least=0))
 
     def thresholds(self, n=0):
         return ()
@@ -158,6 +158,15 @@ def test_what_may_change_unseen_is_not_declared(effects: Any, block: Any, said: 
     assert [why for _, why in found] == [] if not said else said in found[0][1]
     if not block and not said:
         assert engine_of(effects[0]) == "compiled"
+
+
+def test_what_follows_from_a_coefficient_is_not_kept_where_that_is_swept() -> None:
+    """A cached property stayed what it was for the first run of a batch, and for other values of machine code."""
+    setup = setup_of(Cached(1.0))
+    rd.simulate(setup, engine="interpreted")  # which keeps c² = 1
+    runs = rd.rollouts(setup, params={"cached.c": [1.0, 3.0]})
+    for k, c in enumerate((1.0, 3.0)):
+        np.testing.assert_allclose(runs.q[k], run(Cached(c), "interpreted").q, rtol=0, atol=1e-12)
 
 
 def concrete(base: type) -> list[type]:

@@ -12,10 +12,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
-from functools import cached_property
-from inspect import getattr_static
 from typing import Any
 
+from robot_dyn.coefficients import cached
 from robot_dyn.control.block import Block
 from robot_dyn.control.controller import Controller
 from robot_dyn.control.reference import Reference
@@ -75,9 +74,9 @@ def _of_no_file(dynamics: Any) -> str:
 
 def attributes(part: Any) -> tuple[str, ...]:
     """Names of the attributes that it depends on; what is cached follows from them."""
-    kind, known = type(part), getattr(part, "__dict__", {}).keys()
-    own = (name for name in known if not isinstance(getattr_static(kind, name, None), cached_property))
-    return tuple(dict.fromkeys([*_fields(kind), *own]))
+    follows = cached(part)
+    own = (name for name in getattr(part, "__dict__", ()) if name not in follows)
+    return tuple(dict.fromkeys([*_fields(type(part)), *own]))
 
 
 def _fields(kind: type) -> tuple[str, ...]:

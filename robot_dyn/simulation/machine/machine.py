@@ -217,7 +217,7 @@ class Machine:
                 raise
             except Exception as error:  # of changeable code
                 parts = " or ".join(self.equations.changeable)
-                raise MachineError(f"{parts} raises at t = {t:.3g} s ({because(error)})") from error
+                raise MachineError(f"{parts} raises at t = {round(t, 9):g} s ({because(error)})") from error
             if "jacobian" in made:
                 J = made["jacobian"][:, 0].reshape(m + 1, m)
                 worst = by_differences(self.equation, t, y[:, 0], own[:n, 0] if held else None, p, J)
@@ -263,8 +263,8 @@ class Machine:
                 " engine='interpreted', or make a part anew that was changed after a run"
             )
         return MachineError(
-            f"the compiled {what} {of} differs from the interpreted one by {worst:.1e} of its size at t = {t:.3g} s,"
-            f" {allowed:.1e} allowed: {remedy}"
+            f"the compiled {what} {of} differs from the interpreted one by {worst:.1e} of its size at"
+            f" t = {round(t, 9):g} s, {allowed:.1e} allowed: {remedy}"
         )
 
     def _pairs(

@@ -19,6 +19,7 @@ _RANDOM = 4
 _FIRST_S, _MOST = 1.0, 2000  # [s] of a run that are interpreted first, and its evaluations, some 0.2 s
 _ALONG, _AT_TIMES = 100, 100
 _AGAIN = 4  # of either
+_TRIES = 4  # of spans, each a tenth; then the start alone is left
 
 
 class States(NamedTuple):
@@ -38,12 +39,15 @@ def random_states(setup: Setup, size: int) -> States:
 def states_of(setup: Setup) -> States:
     """States of the first second of a run, at their times and at random times of the whole run.
 
-    The latter are for code that does on symbols what it does on early times.
+    They lie halfway between the ends of steps, where rates may have kinks. Those at other times are for code that does
+    on symbols what it does on early times.
     """
     path = _first_second(setup)
-    along = np.unique(np.linspace(0, len(path.t) - 1, _ALONG).astype(int))
-    t = np.random.default_rng(20).uniform(0.0, setup.duration_s, size=_AT_TIMES)
-    return States(np.append(path.t[along], t), path.y[np.append(along, np.resize(along, _AT_TIMES))])
+    ends = np.unique(np.linspace(0, max(len(path.t) - 2, 0), _ALONG).astype(int))
+    after = np.minimum(ends + 1, len(path.t) - 1)
+    t, y = (path.t[ends] + path.t[after]) / 2, (path.y[ends] + path.y[after]) / 2
+    times = np.random.default_rng(20).uniform(0.0, setup.duration_s, size=_AT_TIMES)
+    return States(np.append(t, times), np.vstack([y, y[np.resize(np.arange(len(y)), _AT_TIMES)]]))
 
 
 def some(states: States) -> States:
@@ -53,11 +57,11 @@ def some(states: States) -> States:
 
 
 def _first_second(setup: Setup) -> Path:
-    """The first second of a run by the interpreted engine, or as much of it as takes few evaluations."""
+    """The first second of a run by the interpreted engine, or as much of it as takes few evaluations; or its start."""
     span = min(setup.duration_s, _FIRST_S)
     if not setup.integrator.controls_error:
         span = min(span, _MOST / (setup.integrator.evaluations_per_step or 1) * setup.taken_step_s)
-    while True:
+    for _ in range(_TRIES):
         short = replace(
             setup, duration_s=span, record_period_s=0.0, estimate_error=False, accuracy=None, engine="interpreted"
         )
@@ -70,3 +74,5 @@ def _first_second(setup: Setup) -> Path:
         if record.outcome.ending is Ending.STOPPED:
             raise KeyboardInterrupt
         return record.walked
+    equation = StateEquation(setup.plant, setup.controller, setup.integrator.canonical, setup.events)
+    return Path(np.zeros(1, np.int64), np.zeros(1), equation.start(setup.q0, setup.v0)[None])
