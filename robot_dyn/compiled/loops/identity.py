@@ -71,7 +71,8 @@ def _described(value: Any, instead: Mapping[Any, Callable[..., Any]]) -> str:
     if isinstance(value, FunctionType | ModuleType):
         return f"{value.__name__} of {getattr(value, '__module__', '')}"
     if isinstance(value, EnumMeta):
-        return str([(name, repr(each.value)) for name, each in value.__members__.items()])
+        members: dict[str, Any] = dict(value.__members__)
+        return str([(name, repr(each.value)) for name, each in members.items()])
     if isinstance(value, np.ndarray):
         return f"{value.dtype} {value.shape} {value.tobytes().hex()}"
     if isinstance(value, tuple):

@@ -34,6 +34,9 @@ class Number:
 
 
 FLOAT, INT, UINT, BOOL = Number("float"), Number("int"), Number("uint"), Number("bool")
+_CLASSES: tuple[tuple[Number, Any], ...] = (
+    (BOOL, (bool, np.bool_)), (UINT, np.uint64), (INT, (int, np.integer)), (FLOAT, float),
+)  # fmt: skip
 _OF_DTYPE = {np.dtype(of): number for of, number in ((float, FLOAT), (np.int64, INT), (np.uint64, UINT), (bool, BOOL))}
 
 
@@ -142,7 +145,7 @@ def kind_of(value: Any) -> Kind:
         return RecordKind(type(value).__name__, value._fields, tuple(map(kind_of, value)))
     if isinstance(value, tuple):
         return TupleKind(tuple(map(kind_of, value)))
-    for of, number in (((bool, np.bool_), BOOL), (np.uint64, UINT), ((int, np.integer), INT), ((float,), FLOAT)):
+    for number, of in _CLASSES:
         if isinstance(value, of):
             return number
     if callable(value) or value is None:

@@ -41,7 +41,7 @@ from robot_dyn.compiled.loops.values import (
 
 Refuse = Callable[[str, str], NoReturn]
 Instead = Mapping[Any, Callable[..., Any]]
-_KNOWN = (str, tuple, ModuleType, type, Enum)
+_KNOWN: Any = (str, tuple, ModuleType, type, Enum)
 
 
 @final
