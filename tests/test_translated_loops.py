@@ -21,7 +21,9 @@ from robot_dyn.integrate.methods import FIXED_STEP, method
 from robot_dyn.integrate.primitives import evaluate
 from robot_dyn.simulation.choice import choose
 from robot_dyn.simulation.fixed_step import rules_of, runs_of, samples_at_most
+from robot_dyn.simulation.levels import levels
 from robot_dyn.simulation.machine.making import machine
+from robot_dyn.simulation.observation import observation_of
 from robot_dyn.simulation.plan import plan_of
 from robot_dyn.simulation.prepared import prepared
 from robot_dyn.simulation.setup import Setup
@@ -128,6 +130,7 @@ def test_lanes_in_lock_step_give_the_same_bits(name: str) -> None:
     rng = np.random.default_rng(3)
     starts = np.stack([equation.start(q, v) for q, v in rng.normal(size=(W, 2, 2))]).T
     starts[n, 5] = 1e200  # overflows at once
+    of_levels = levels(made.plant.dynamics, made.plant.effects, made.controller, W)
     results = []
     for interpreted in (False, True):
         runs = runs_of(equation, starts, code.own({}), n + 2, np.arange(W))
@@ -137,7 +140,8 @@ def test_lanes_in_lock_step_give_the_same_bits(name: str) -> None:
         rows = samples_at_most(made, plan.counts)
         records = Records(
             np.arange(m), np.zeros((rows, 2), np.int64), np.zeros((rows, m, W)), np.zeros((rows, n + 2, W)),
-            np.empty((0, m + 2)), np.empty((2 + 3 * n, 0)),
+            np.empty((0, m + 2)), np.empty((1 + 3 * n, 0)),
+            observation_of(np.vstack([starts[: 2 * n], np.full((n, W), np.nan)]), of_levels),
         )  # fmt: skip
         now, clock = np.zeros(len(Now), np.int64), np.array([0.0, 0.02, 1e-12])
         now[Now.BUDGET] = 10**6
