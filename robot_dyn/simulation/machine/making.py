@@ -172,6 +172,13 @@ def _with_loop(
     return Machine(made.equation, equations, made.known, found, swept)
 
 
+def with_numbers(made: Machine, equation: StateEquation) -> Machine:
+    """The machine of an equation that differs from the compiled one in parameters alone, swept ones among them."""
+    robot, plant = _robot(equation.plant.dynamics), equation.plant
+    own = equation if robot is plant.dynamics else replace(equation, plant=Plant(robot, plant.effects))
+    return replace(made, equation=own, known=parameters(robot, plant.effects, equation.controller, made.swept))
+
+
 def machine_of_constants(equation: StateEquation, method: Integrator, *, lanes: int = 1) -> Machine:
     """The machine of a state equation whose numbers are constants of the code: none of them can be changed.
 

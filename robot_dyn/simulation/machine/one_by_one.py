@@ -13,6 +13,7 @@ from robot_dyn.compiled.parameters import over_runs, with_parameters
 from robot_dyn.simulation.choice import machine_of
 from robot_dyn.simulation.levels import Levels, levels
 from robot_dyn.simulation.machine.machine import Machine
+from robot_dyn.simulation.machine.making import with_numbers
 from robot_dyn.simulation.machine.pool import in_threads
 from robot_dyn.simulation.observation import Observation, Observed, observation_of, observed
 from robot_dyn.simulation.observed import observer_of
@@ -66,9 +67,11 @@ class OneByOne:
         self.setup, self.q0, self.v0, self.sweep, self.recorded, self.levels = setup, q0, v0, sweep, recorded, of
         self.numbers = range(len(q0)) if numbers is None else numbers
         self.compiled = setup.engine != "interpreted"
-        _, _, machine = self._of(0)
-        if machine is not None:
-            machine.check(setup)
+        self.machine: Machine | None = None
+        if self.compiled:
+            whole = StateEquation(setup.plant, setup.controller, setup.integrator.canonical, setup.events)
+            self.machine = machine_of(setup, whole, tuple(sweep))
+            self.machine.check(setup)
         self.made: list[Single | None] = [None] * len(q0)
         self.stop = np.zeros(1, np.int64)
 
@@ -82,7 +85,11 @@ class OneByOne:
         own = {"plant": plant, "controller": controller, "q0": self.q0[run], "v0": self.v0[run]}
         setup = with_values(self.setup, own)
         equation = StateEquation(plant, controller, setup.integrator.canonical, setup.events)
-        return setup, equation, machine_of(setup, equation, tuple(self.sweep)) if self.compiled else None
+        if self.machine is None:
+            return setup, equation, None
+        if self.machine.equation.limited != equation.limited or setup.finds_events != self.setup.finds_events:
+            return setup, equation, machine_of(setup, equation, tuple(self.sweep))
+        return setup, equation, with_numbers(self.machine, equation.in_a_mode)  # only numbers differ
 
     def run(self, threads: int, on_progress: Callable[[float], object] | None = None) -> None:
         """All runs; Ctrl-C ends them, and an error of `on_progress`, which is told the mean of the times reached."""
@@ -110,7 +117,7 @@ class OneByOne:
         outcome = record.outcome
         early = outcome.ending is Ending.FINISHED and outcome.t < self.setup.duration_s
         rows = int(np.searchsorted(record.t, outcome.t)) if early else len(record.t)
-        names = "q", "v", "a", "u", "work", "power", "energy"
+        names: tuple[str, ...] = "q", "v", "a", "u", "work", "power", "energy"
         values = dict(zip(names, columns(equation, record.t, record.y, record.made), strict=True))
         kept = {name: values[name][:rows].copy() for name in self.recorded}
         return Single(record.t[:rows], kept, outcome, record.steps, record.evaluations, observation)
