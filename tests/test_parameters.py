@@ -113,9 +113,7 @@ def test_every_number_is_a_sweep_parameter(name: str, values: np.ndarray, monkey
     monkeypatch.undo()
     for i in range(2):
         own = with_value(base, name, values[i])
-        with monkeypatch.context() as patched:  # a single run is cut at stops and limits, runs in lock step are not
-            patched.setattr(rd.Setup, "finds_events", False)
-            theirs = rd.simulate(own, engine="interpreted").q
+        theirs = rd.simulate(own, engine="interpreted").q
         assert np.abs(runs.q[i] - theirs).max() < 1e-12
     assert np.abs(runs.q[0] - runs.q[1]).max() > 1e-6
 

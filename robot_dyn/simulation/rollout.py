@@ -123,7 +123,7 @@ def rollouts(
     else:
         at = passed if cuts else None
         runs = _side_by_side(setup, q, v, sweep, recorded, most_bytes, at, threads, on_progress)
-        if at is not passed:
+        if passed is not None and not cuts:
             runs = replace(runs, uncut=passed.names)
     return replace(runs, about=edits_of_machine_code(setup) | runs.about)
 

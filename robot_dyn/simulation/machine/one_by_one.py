@@ -141,11 +141,10 @@ def one_by_one(
         setup.integrator.name, step, int(steps.max()), int(evaluations.max()), perf_counter() - began, engine=engine
     )
     ending = np.array([each.ending.value for each in outcomes])
-    q, v, u = (kept.get(name) for name in ("q", "v", "u"))
     K, V = (kept["energy"][:, :, k] if "energy" in kept else None for k in (0, 1))
     work = {name: kept["work"][:, :, k] for k, name in enumerate(equation.sources)} if "work" in kept else None
     return Rollouts(
-        setup.plant.dynamics.joint_names, t, q, v, u, K, V, work,
+        setup.plant.dynamics.joint_names, t, kept.get("q"), kept.get("v"), kept.get("u"), K, V, work,
         np.array([each.t for each in outcomes]), ending == Ending.DIVERGED, ending == Ending.STOPPED,
         tuple(said(each) for each in outcomes), steps, evaluations, statistics, tuple(equation.sources),
         origin(setup.plant.dynamics) | setup.about, dict(sweep), setup, (), q0, v0, _observed(runs),
