@@ -134,7 +134,7 @@ def test_lanes_in_lock_step_give_the_same_bits(name: str) -> None:
     results = []
     for interpreted in (False, True):
         runs = runs_of(equation, starts, code.own({}), n + 2, np.arange(W))
-        stepper = of.stepper(FLOAT64, m, n, m, W)
+        stepper = of.stepper(FLOAT64, m, n, m + n, W)
         for _, x in numbers((stepper.work, runs.made, runs.command, runs.energies, runs.size)):
             x[...] = 0
         rows = samples_at_most(made, plan.counts)

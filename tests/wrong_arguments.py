@@ -208,6 +208,7 @@ def examples(folder: Path) -> dict[str, Example]:
              "mass_scale": 1.1},
         ),
         "Rollouts.outcome": (several.outcome, {"run": 1}),
+        "Rollouts.setup_of": (several.setup_of, {"run": 1}),
         "Samples": (rd.Samples, {"t": [0.0, 0.5, 1.0], "q": points, "v": points, "a": points}),
         "Samples.at": (rd.Samples([0.0, 0.5, 1.0], points).at, {"t": 0.1}),
         "Samples.from_csv": (rd.Samples.from_csv, {"path": table, "joint_names": ["y", "x"]}),
