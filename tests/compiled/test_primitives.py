@@ -92,8 +92,9 @@ def test_combinations(m: int, W: int) -> None:
     """Weights of 0 are left out, whatever their term is; without any other, y is copied, sign of 0 and all."""
     rng = np.random.default_rng(m * W)
     y, K, x = numbers(rng, m, W), numbers(rng, 5, m + 2, W), np.zeros((m, W))
-    for h, w in [(1e-3, numbers(rng, 5, special=0.0)), (-2.0, np.array([0.5, 0.0, -1.0, 0.0, 3.0])), (-1.0, np.zeros(5)),
-                 (np.inf, np.zeros(5)), (0.25, np.array([0, 0, 1.0, 0, 0])), (1.0, np.array([0.0, -0.0, np.nan, 1, 1]))]:  # fmt: skip
+    some, none = [0.5, 0.0, -1.0, 0.0, 3.0], [0.0] * 5
+    weights = rng.normal(size=5).tolist(), some, none, none, [0, 0, 1.0, 0, 0], [0.0, -0.0, np.nan, 1, 1]
+    for h, w in zip((1e-3, -2.0, -1.0, np.inf, 0.25, 1.0), map(np.array, weights), strict=True):
         three_ways(combined, loops.combination, x, y, h, w, K, 5)
         three_ways(combined, loops.combination, x, y, h, w, K, 3)
     three_ways(combined, loops.combination, x, y, 0.5, np.ones(5), K, 0)
@@ -148,7 +149,8 @@ def test_elimination(m: int, W: int) -> None:
     """Pivots of equal size, of 0 and nan; each run has its own."""
     rng = np.random.default_rng(m + W)
     for special in (0.0, 0.02, 0.3):
-        J = np.where(rng.random((m + 1, m, W)) < 0.3, rng.integers(-2, 3, (m + 1, m, W)), numbers(rng, m + 1, m, W, special=special))  # fmt: skip
+        shape = m + 1, m, W
+        J = np.where(rng.random(shape) < 0.3, rng.integers(-2, 3, shape), numbers(rng, *shape, special=special))
         J[0, :, 0] = 0.0
         J[0, 0, 0] = 0.5  # 1 − 2 · 0.5 = 0
         A, rows, lost = np.zeros((m, m, W)), np.zeros((m, W), np.int64), np.zeros(W, np.int64)
@@ -161,8 +163,8 @@ def test_elimination(m: int, W: int) -> None:
 @pytest.mark.parametrize(
     ("function", "given", "message"),
     [
-        (combined, (np.ones((3, 1)), np.ones((3, 1)), 1.0, np.ones(2), np.ones((4, 3, 1)), 4), "arrays of a combination"),
-        (combined, (np.ones((3, 1)), np.ones((3, 1)), 1.0, np.ones(4), np.ones((4, 2, 1)), 4), "arrays of a combination"),
+        (combined, (np.ones((3, 1)), np.ones((3, 1)), 1.0, np.ones(2), np.ones((4, 3, 1)), 4), "of a combination"),
+        (combined, (np.ones((3, 1)), np.ones((3, 1)), 1.0, np.ones(4), np.ones((4, 2, 1)), 4), "of a combination"),
         (subtracted, (np.ones((3, 1)), np.ones((2, 1))), "have different sizes"),
         (normed, (np.ones((3, 1)), np.ones((2, 1)), np.ones((3, 1)), 1.0, 1.0), "arrays of a norm"),
         (solved, (np.ones((3, 3, 1)), np.full((3, 1), 7), np.ones((3, 1))), "a row to exchange is out of range"),
