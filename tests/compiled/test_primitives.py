@@ -62,6 +62,10 @@ def subtracted(x, y):
     primitives.subtract(x, y)
 
 
+def enclosed(low, high, first, x):
+    primitives.enclose(low, high, first, x)
+
+
 def normed(x, y, after, rtol, atol):
     return primitives.norm(x, y, after, rtol, atol)
 
@@ -92,8 +96,9 @@ def test_combinations(m: int, W: int) -> None:
     """Weights of 0 are left out, whatever their term is; without any other, y is copied, sign of 0 and all."""
     rng = np.random.default_rng(m * W)
     y, K, x = numbers(rng, m, W), numbers(rng, 5, m + 2, W), np.zeros((m, W))
-    for h, w in [(1e-3, numbers(rng, 5, special=0.0)), (-2.0, np.array([0.5, 0.0, -1.0, 0.0, 3.0])), (-1.0, np.zeros(5)),
-                 (np.inf, np.zeros(5)), (0.25, np.array([0, 0, 1.0, 0, 0])), (1.0, np.array([0.0, -0.0, np.nan, 1, 1]))]:  # fmt: skip
+    some, none = [0.5, 0.0, -1.0, 0.0, 3.0], [0.0] * 5
+    weights = rng.normal(size=5).tolist(), some, none, none, [0, 0, 1.0, 0, 0], [0.0, -0.0, np.nan, 1, 1]
+    for h, w in zip((1e-3, -2.0, -1.0, np.inf, 0.25, 1.0), map(np.array, weights), strict=True):
         three_ways(combined, loops.combination, x, y, h, w, K, 5)
         three_ways(combined, loops.combination, x, y, h, w, K, 3)
     three_ways(combined, loops.combination, x, y, 0.5, np.ones(5), K, 0)
@@ -110,6 +115,16 @@ def test_entries(W: int) -> None:
         three_ways(subtracted, None, x, y)
         three_ways(multiplied, None, x, -0.3, y)
         three_ways(summed, loops.sizes, numbers(rng, m, W, special=0.02), np.full(W, np.nan))
+
+
+@RUNS
+def test_bounds(W: int) -> None:
+    """Rows that enclose others; nothing is taken of nan, and nan gives way. Which zero is the lesser is left open."""
+    rng = np.random.default_rng(W)
+    for m in (1, 7, 12):
+        low, high, x = numbers(rng, m + 3, W), numbers(rng, m + 3, W), numbers(rng, m, W)
+        low, high, x = (np.where(each == 0.0, 1.0, each) for each in (low, high, x))
+        three_ways(enclosed, loops.enclose, low, high, 2, x)
 
 
 def test_norms() -> None:
@@ -148,7 +163,8 @@ def test_elimination(m: int, W: int) -> None:
     """Pivots of equal size, of 0 and nan; each run has its own."""
     rng = np.random.default_rng(m + W)
     for special in (0.0, 0.02, 0.3):
-        J = np.where(rng.random((m + 1, m, W)) < 0.3, rng.integers(-2, 3, (m + 1, m, W)), numbers(rng, m + 1, m, W, special=special))  # fmt: skip
+        shape = m + 1, m, W
+        J = np.where(rng.random(shape) < 0.3, rng.integers(-2, 3, shape), numbers(rng, *shape, special=special))
         J[0, :, 0] = 0.0
         J[0, 0, 0] = 0.5  # 1 − 2 · 0.5 = 0
         A, rows, lost = np.zeros((m, m, W)), np.zeros((m, W), np.int64), np.zeros(W, np.int64)
@@ -161,9 +177,10 @@ def test_elimination(m: int, W: int) -> None:
 @pytest.mark.parametrize(
     ("function", "given", "message"),
     [
-        (combined, (np.ones((3, 1)), np.ones((3, 1)), 1.0, np.ones(2), np.ones((4, 3, 1)), 4), "arrays of a combination"),
-        (combined, (np.ones((3, 1)), np.ones((3, 1)), 1.0, np.ones(4), np.ones((4, 2, 1)), 4), "arrays of a combination"),
+        (combined, (np.ones((3, 1)), np.ones((3, 1)), 1.0, np.ones(2), np.ones((4, 3, 1)), 4), "of a combination"),
+        (combined, (np.ones((3, 1)), np.ones((3, 1)), 1.0, np.ones(4), np.ones((4, 2, 1)), 4), "of a combination"),
         (subtracted, (np.ones((3, 1)), np.ones((2, 1))), "have different sizes"),
+        (enclosed, (np.ones((4, 1)), np.ones((4, 1)), 2, np.ones((3, 1))), "bounds of fewer rows"),
         (normed, (np.ones((3, 1)), np.ones((2, 1)), np.ones((3, 1)), 1.0, 1.0), "arrays of a norm"),
         (solved, (np.ones((3, 3, 1)), np.full((3, 1), 7), np.ones((3, 1))), "a row to exchange is out of range"),
         (factored, (np.ones((3, 3, 1)), np.ones((2, 3, 1)), 1.0, np.zeros((3, 1), np.int64), np.zeros(1, np.int64)),

@@ -80,8 +80,9 @@ class Writer:
         return self.choice(
             f"({self.number(deep + 1)} {sign} {self.number(deep + 1)})",
             f"({self.integer(deep + 1)} {sign} {self.integer(deep + 1)})",
-            f"({self.truth(deep + 1)} and {self.truth(deep + 1)})", f"({self.truth(deep + 1)} or {self.truth(deep + 1)})",
-            f"(not {self.truth(deep + 1)})", f"(-3 < {self.integer(deep + 1)} <= {self.integer(deep + 1)})",
+            f"({self.truth(deep + 1)} and {self.truth(deep + 1)})",
+            f"({self.truth(deep + 1)} or {self.truth(deep + 1)})", f"(not {self.truth(deep + 1)})",
+            f"(-3 < {self.integer(deep + 1)} <= {self.integer(deep + 1)})",
         )  # fmt: skip
 
     def write(self, text: str) -> None:
@@ -94,9 +95,8 @@ class Writer:
         elif kind == 1:
             self.write(f"{self.choice('i', 'j', 'k')} = ({self.integer()}) % 1000")
         elif kind == 2:
-            self.write(
-                f"{self.choice('a', 'b', 'c', 'x[k % 4]', 'y[i % 3, j % 2]')} {self.choice('+', '-', '*')}= {self.number()}"
-            )
+            to = self.choice("a", "b", "c", "x[k % 4]", "y[i % 3, j % 2]")
+            self.write(f"{to} {self.choice('+', '-', '*')}= {self.number()}")
         elif kind == 3:
             self.write(
                 f"x[{self.choice('0', '-2', 'i % 4', 'k % 4')}], n[j % 3] = {self.number()}, ({self.integer()}) % 1000"
@@ -263,7 +263,7 @@ def test_a_failure_passes_through_the_functions_that_call() -> None:
 
     machine = compiled(outer)
     assert machine(np.ones(3), 2) == machine(np.ones(3), -1) == 4.0
-    with pytest.raises(MachineCodeError, match="inner, line .* an index is out of range"):
+    with pytest.raises(MachineCodeError, match=r"inner, line \d+: an index is out of range"):
         machine(np.ones(3), 3)
 
 
@@ -287,7 +287,7 @@ def test_a_failure_passes_through_the_functions_that_call() -> None:
         ("i = 1\n    i = x[0] * i\n    i = len(x)\n    return i", "an integer where a float is elsewhere"),
         ("if len(x) > 2:\n        y = 1.0\n    return y", "'y', which may have no value here"),
         ("for i in range(len(x)):\n        y = 1.0\n    return y", "'y', which may have no value here"),
-        ("while True:\n        if x[0] > 1:\n            break\n        y = 1.0\n    return y", "'y', which may have no"),
+        ("while True:\n        if x[0] > 1:\n            break\n        y = 1.0\n    return y", "'y', which may"),
         ("if x[0] > 1:\n        return 1.0", "a function that ends without its result"),
         ("y = x\n    y = 1.0\n    return y", "of different types"),
         ("return nothing", "the name 'nothing', which has no value"),

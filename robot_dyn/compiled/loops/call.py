@@ -13,6 +13,7 @@ from time import perf_counter
 from typing import Any, final
 
 from robot_dyn.compiled.identity import digest
+from robot_dyn.compiled.interrupts import interrupts_later
 from robot_dyn.compiled.llvm import machine_code
 from robot_dyn.compiled.llvm.machine_code import Passes
 from robot_dyn.compiled.loops.identity import identity, sources_of_the_translator
@@ -100,7 +101,7 @@ class MachineFunction:
         if place in self._known:
             return self._known[place]
         began, known = perf_counter(), tuple(kinds)
-        with self._lock:
+        with self._lock, interrupts_later():
             if known not in self._known:
                 self._known[known] = self._compiled(known)
             self._known[place] = self._known[known]

@@ -10,7 +10,7 @@ import ast
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NoReturn, final
 
 from llvmlite import ir
@@ -18,8 +18,6 @@ from llvmlite import ir
 from robot_dyn.compiled.loops import expressions, statements
 from robot_dyn.compiled.loops.kinds import (
     F64,
-    I64,
-    INT,
     TEXT,
     ArrayKind,
     Kind,
@@ -34,6 +32,7 @@ from robot_dyn.compiled.loops.values import (
     StaticValue,
     TupleValue,
     Value,
+    Written,
     leaf_types,
     leaves,
     number,
@@ -57,22 +56,6 @@ class _Silent:
 
 def _nothing(*_: Any, **__: Any) -> None:
     return None
-
-
-@final
-@dataclass(frozen=True)
-class Written:
-    """A function of a module.
-
-    Attributes:
-        ir: LLVM's function.
-        result: The type of what it gives.
-        may_fail: Whether it gives the text of a failure first.
-    """
-
-    ir: Any
-    result: Kind
-    may_fail: bool
 
 
 @final
@@ -302,35 +285,8 @@ class Function:
     @contextmanager
     def loop(self, count: Scalar) -> Iterator[Scalar]:
         """Instructions that are done for each index from 0 to before a count."""
-        with counted(self, number(0), count, 1) as (index, _):
+        with statements.counted(self, number(0), count, 1) as (index, _):
             yield index
-
-
-@contextmanager
-def counted(f: Function, start: Scalar, stop: Scalar, step: int) -> Iterator[tuple[Scalar, Any]]:
-    """A loop over a range: its number, and the blocks of its next round and behind it."""
-    b = f.builder
-    slot = None if f.silent else _slot(b)
-    b.store(start.ir, slot)
-    look, body, following, behind = (b.append_basic_block(each) for each in ("look", "body", "next", "behind"))
-    b.branch(look)
-    b.position_at_end(look)
-    index = b.load(slot)
-    b.cbranch(b.icmp_signed("<" if step > 0 else ">", index, stop.ir), body, behind)
-    b.position_at_end(body)
-    yield Scalar(INT, index), (following, behind)
-    if not f.silent and not b.block.is_terminated:
-        b.branch(following)
-    b.position_at_end(following)
-    b.store(b.add(index, ir.Constant(I64, step), flags=("nsw",)), slot)
-    b.branch(look)
-    b.position_at_end(behind)
-
-
-def _slot(b: Any) -> Any:
-    """Room for a counter, at the start of the function, so that loops do not use up the stack."""
-    with b.goto_entry_block():
-        return b.alloca(I64)
 
 
 def _llvm_result(kind: Kind, may_fail: bool) -> Any:

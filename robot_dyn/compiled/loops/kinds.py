@@ -148,7 +148,7 @@ def kind_of(value: Any) -> Kind:
     for number, of in _CLASSES:
         if isinstance(value, of):
             return number
-    if callable(value) or value is None:
+    if value is None:
         return Static.of(value)
     raise TraceError(f"machine code takes numbers, arrays and named tuples of them, got a {type(value).__name__}")
 

@@ -10,6 +10,7 @@ import struct
 from array import array
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import count
 from typing import Any, final
 
 import numpy as np
@@ -74,6 +75,7 @@ class Packed:
     starts: tuple[int, ...]
 
 
+_numbers = count()  # runs may start in several threads
 _layouts: dict[tuple[Any, ...], _Layout] = {}
 _kinds: dict[tuple[Any, ...], tuple[int, tuple[Kind, ...], Any]] = {}  # with what must live, so that no address is new
 
@@ -107,7 +109,7 @@ def pack(values: tuple[Any, ...], store: Callable[[], Store | None]) -> Packed:
     known = shape, forms.tobytes()
     found = _kinds.get(known)
     if found is None:
-        found = _kinds.setdefault(known, (len(_kinds), tuple(map(kind_of, values)), _dtypes(values)))
+        found = _kinds.setdefault(known, (next(_numbers), tuple(map(kind_of, values)), _dtypes(values)))
     return Packed(found[1], found[0], made, tuple([start + 8 * each for each in layout.starts]))
 
 
@@ -117,13 +119,13 @@ def _flatten(value: tuple[Any, ...], form: list[Any], arrays: list[int], numbers
     form.append(len(value))
     for each in value:
         kind = type(each)
-        if kind is np.ndarray:
+        if isinstance(each, np.ndarray):
             form.append(each.ndim)
             arrays.append(id(each))
         elif isinstance(each, tuple):
             _flatten(each, form, arrays, numbers)
-        elif callable(each) or each is None:
-            form.append(each)
+        elif each is None:
+            form.append(None)
         else:
             form.append(kind)
             numbers.append(each)
@@ -180,8 +182,8 @@ def _write(module: Any, prefix: str) -> None:
     shape = ir.FunctionType(ir.VoidType(), [I64, *[WORDS] * 4])
     function = ir.Function(module, shape, f"{prefix}read")
     b = ir.IRBuilder(function.append_basic_block())
-    count, objects, firsts, made, forms = function.args
-    with steps(b, ZERO, count, 1) as k:
+    total, objects, firsts, made, forms = function.args
+    with steps(b, ZERO, total, 1) as k:
         array = b.inttoptr(b.load(b.gep(objects, [k])), I8.as_pointer())
         to = b.gep(made, [b.load(b.gep(firsts, [k]))])
         axes = b.sext(numpy_array.field(b, array, "axes", _I32), I64)

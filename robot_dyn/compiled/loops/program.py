@@ -10,7 +10,7 @@ from typing import Any, NoReturn, final
 import numpy as np
 from llvmlite import ir
 
-from robot_dyn.compiled.loops.function import Function, Written
+from robot_dyn.compiled.loops.function import Function
 from robot_dyn.compiled.loops.kinds import (
     BOOL,
     FLOAT,
@@ -33,6 +33,7 @@ from robot_dyn.compiled.loops.values import (
     Scalar,
     StaticValue,
     Value,
+    Written,
     leaves,
     number,
     of_leaves,

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from llvmlite import ir
+
 from robot_dyn.compiled.loops import arrays, expressions, numbers
-from robot_dyn.compiled.loops.kinds import INT
+from robot_dyn.compiled.loops.kinds import I64, INT
 from robot_dyn.compiled.loops.values import (
     ArrayValue,
     Scalar,
@@ -126,8 +129,6 @@ def _while(f: Function, node: ast.While) -> bool:
 
 def _for(f: Function, node: ast.For) -> bool:
     _no_else(f, node)
-    from robot_dyn.compiled.loops.function import counted
-
     over = _range(f, node.iter)
     of = None if over else f.expression(node.iter)
     if over is None and not (isinstance(of, ArrayValue) and of.kind.ndim == 1):
@@ -140,6 +141,33 @@ def _for(f: Function, node: ast.For) -> bool:
         _body(f, node.body, following, behind)
     f.assigned = before
     return False
+
+
+@contextmanager
+def counted(f: Function, start: Scalar, stop: Scalar, step: int) -> Iterator[tuple[Scalar, Any]]:
+    """A loop over a range: its number, and the blocks of its next round and behind it."""
+    b = f.builder
+    slot = None if f.silent else _slot(b)
+    b.store(start.ir, slot)
+    look, body, following, behind = (b.append_basic_block(each) for each in ("look", "body", "next", "behind"))
+    b.branch(look)
+    b.position_at_end(look)
+    index = b.load(slot)
+    b.cbranch(b.icmp_signed("<" if step > 0 else ">", index, stop.ir), body, behind)
+    b.position_at_end(body)
+    yield Scalar(INT, index), (following, behind)
+    if not f.silent and not b.block.is_terminated:
+        b.branch(following)
+    b.position_at_end(following)
+    b.store(b.add(index, ir.Constant(I64, step), flags=("nsw",)), slot)
+    b.branch(look)
+    b.position_at_end(behind)
+
+
+def _slot(b: Any) -> Any:
+    """Room for a counter, at the start of the function, so that loops do not use up the stack."""
+    with b.goto_entry_block():
+        return b.alloca(I64)
 
 
 def _range(f: Function, node: ast.expr) -> tuple[Scalar, Scalar, int] | None:

@@ -95,6 +95,22 @@ class StaticValue:
         return Static.of(self.value)
 
 
+@final
+@dataclass(frozen=True)
+class Written:
+    """A function of a module.
+
+    Attributes:
+        ir: LLVM's function.
+        result: The type of what it gives.
+        may_fail: Whether it gives the text of a failure first.
+    """
+
+    ir: Any
+    result: Kind
+    may_fail: bool
+
+
 Value = Scalar | ArrayValue | RecordValue | TupleValue | StaticValue
 
 

@@ -148,6 +148,7 @@ def one_by_one(
         setup.integrator.name, step, int(steps.max()), int(evaluations.max()), perf_counter() - began, engine=engine
     )
     ending = np.array([each.ending.value for each in outcomes])
+    q, v, u = (kept.get(name) for name in ("q", "v", "u"))
     K, V = (kept["energy"][:, :, k] if "energy" in kept else None for k in (0, 1))
     work = {name: kept["work"][:, :, k] for k, name in enumerate(equation.sources)} if "work" in kept else None
     return Rollouts(

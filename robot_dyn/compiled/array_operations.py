@@ -1,0 +1,214 @@
+"""Operations on whole arrays that are written in instructions of LLVM, each with what it does in Python.
+
+The primitives of machine code are made of them.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from llvmlite import ir
+
+from robot_dyn.compiled.llvm.vectors import Vectors
+from robot_dyn.compiled.loops import arrays, vectors
+from robot_dyn.compiled.loops.kinds import F64, FLOAT, INT
+from robot_dyn.compiled.loops.numbers import converted, scalar, truth
+from robot_dyn.compiled.loops.values import ArrayValue, Scalar, StaticValue, Value
+
+if TYPE_CHECKING:
+    from robot_dyn.arithmetic import Array
+    from robot_dyn.compiled.loops.function import Function
+
+_POINTER = F64.as_pointer()
+_NUMBERS = 32, 8, 4, 1  # of a sum at a time, in registers
+NOTHING = StaticValue(None)
+
+
+def emits(handler: Callable[..., Value]) -> Callable[..., Value]:
+    """Mark a function that writes instructions: (f, node, arguments) → value."""
+    handler.emits = True  # type: ignore[attr-defined]
+    return handler
+
+
+def require(holds: bool, what: str) -> None:
+    """Fail unless a condition holds."""
+    if not holds:
+        raise ValueError(what)
+
+
+def part(x: Array, first: int, count: int) -> Array:
+    """So many entries of a contiguous array, in one axis."""
+    return x.reshape(-1)[first : first + count]
+
+
+def weighted_sum(x: Array, y: Array, h: float, weights: Array, K: Array, count: int) -> None:
+    """X = y + h Σ w_j K_j over the weights that are not 0, one at least; sums in registers."""
+    for e in range(y.size):
+        total = -0.0  # which leaves the first term as it is
+        for j in range(count):
+            if weights[j] != 0.0:
+                total += part(K[j], e, 1)[0] * weights[j]
+        part(x, e, 1)[0] = part(y, e, 1)[0] + total * h
+
+
+def subtract_multiple(x: Array, y: Array, s: float) -> None:
+    """X − s y in place of x."""
+    x -= y * s
+
+
+def subtract_product(x: Array, y: Array, z: Array) -> None:
+    """X − y z in place of x, entry by entry."""
+    x -= y * z
+
+
+def divide(x: Array, s: Any) -> None:
+    """X / s in place of x, of a number or entry by entry."""
+    x /= s
+
+
+def add_sizes(x: Array, y: Array) -> None:
+    """X + |y| in place of x."""
+    x += np.abs(y)
+
+
+def keep_least(x: Array, y: Array) -> None:
+    """The lesser of x and y in place of x, entry by entry; of nan the other."""
+    np.fmin(x, y, x)
+
+
+def keep_largest(x: Array, y: Array) -> None:
+    """The larger of x and y in place of x, entry by entry; of nan the other."""
+    np.fmax(x, y, x)
+
+
+@emits
+def evaluation(f: Function, node: ast.AST, function: Scalar, t: Scalar, *given: ArrayValue) -> Value:
+    """A call of an address."""
+    for x in given:
+        if not isinstance(x, ArrayValue) or x.kind.of != FLOAT or not x.kind.contiguous:
+            raise f.refused(node, "an evaluation at what is no contiguous array of floats", "copy it into one that is")
+    if not f.silent:
+        shape = ir.FunctionType(ir.VoidType(), [F64, *[_POINTER] * len(given)])
+        pointer = f.builder.inttoptr(converted(f, function, INT, node).ir, shape.as_pointer())
+        f.builder.call(pointer, [converted(f, t, FLOAT, node).ir, *(x.data for x in given)])
+    return NOTHING
+
+
+@emits
+def _require(f: Function, node: ast.AST, holds: Scalar, what: StaticValue) -> Value:
+    f.check(truth(f, holds), node, what.value)
+    return NOTHING
+
+
+@emits
+def _part(f: Function, node: ast.AST, x: ArrayValue, first: Scalar, count: Scalar) -> Value:
+    return arrays.part(f, x, first, count, node)
+
+
+@emits
+def _weighted_sum(
+    f: Function, node: ast.AST, x: ArrayValue, y: ArrayValue, h: Value, weights: ArrayValue, K: ArrayValue, count: Any
+) -> Value:
+    if not all(each.kind.contiguous for each in (x, y, weights, K)):
+        raise f.refused(node, "a combination of arrays that are not contiguous", "copy them first")
+    if f.silent:
+        return NOTHING
+    b, h = f.builder, converted(f, scalar(f, h, node), FLOAT, node)
+    stage = K.strides(b)[0].ir
+    for width, e in vectors.chunks(f, arrays.size(f, y), _NUMBERS):
+        kind = vectors.kind(width, FLOAT)
+        entry, look = b.block, b.append_basic_block()
+        add, following, behind = (b.append_basic_block() for _ in range(3))
+        b.branch(look)
+        b.position_at_end(look)
+        j, total = b.phi(INT.llvm), b.phi(kind)
+        j.add_incoming(ir.Constant(INT.llvm, 0), entry)
+        total.add_incoming(ir.Constant(kind, -0.0 if width == 1 else [-0.0] * width), entry)
+        weight = b.load(b.gep(weights.data, [j], inbounds=True))
+        b.cbranch(b.fcmp_unordered("!=", weight, ir.Constant(F64, 0.0)), add, following)
+        b.position_at_end(add)
+        term = vectors.loaded(b, K.data, b.add(b.mul(j, stage), e), width, FLOAT)
+        more = b.fadd(total, b.fmul(term, vectors.spread(b, weight, width, FLOAT)))
+        b.branch(following)
+        b.position_at_end(following)
+        so_far = b.phi(kind)
+        so_far.add_incoming(total, look)
+        so_far.add_incoming(more, add)
+        after = b.add(j, ir.Constant(INT.llvm, 1))
+        j.add_incoming(after, following)
+        total.add_incoming(so_far, following)
+        b.cbranch(b.icmp_signed("<", after, count.ir), look, behind)
+        b.position_at_end(behind)
+        moved = b.fmul(so_far, vectors.spread(b, h.ir, width, FLOAT))
+        vectors.stored(b, b.fadd(vectors.loaded(b, y.data, e, width, FLOAT), moved), x.data, e, width, FLOAT)
+    return NOTHING
+
+
+def _in_place(rule: Callable[..., Any]) -> Callable[..., Value]:
+    """X ← rule(x, …), entry by entry."""
+
+    @emits
+    def handler(f: Function, node: ast.AST, x: ArrayValue, *others: Value) -> Value:
+        vectors.each(f, node, x, [x, *others], rule)
+        return NOTHING
+
+    return handler
+
+
+@emits
+def copying(f: Function, node: ast.AST, to: ArrayValue, x: ArrayValue) -> Value:
+    """Of arrays of one shape, whatever their strides."""
+    if to.kind.ndim != x.kind.ndim or to.kind.frozen or to.kind.of != x.kind.of:
+        raise f.refused(node, "a copy of an array into one of other axes or numbers", "take arrays that are alike")
+    for i in range(to.kind.ndim):
+        same = f.builder.icmp_signed("==", to.shape[i].ir, x.shape[i].ir)
+        f.check(same, node, "a copy of an array into one of another shape")
+    if to.kind.contiguous and x.kind.contiguous:
+        vectors.each(f, node, to, [x], lambda b, x: x)
+    else:
+        _copied(f, to, x, [])
+    return NOTHING
+
+
+def _copied(f: Function, to: ArrayValue, x: ArrayValue, indices: list[Scalar]) -> None:
+    if len(indices) == to.kind.ndim:
+        arrays.store(f, to, indices, arrays.load(f, x, indices))
+        return
+    with f.loop(to.shape[len(indices)]) as index:
+        _copied(f, to, x, [*indices, index])
+
+
+@emits
+def multiplication(f: Function, node: ast.AST, x: ArrayValue, y: Value, out: ArrayValue) -> Value:
+    """X y, of an array and another or a number."""
+    vectors.each(f, node, out, [x, y], lambda b, x, y: b.fmul(x, y))
+    return NOTHING
+
+
+def _with_size(b: Any, x: Any, y: Any) -> Any:
+    return b.fadd(x, Vectors(b, F64, getattr(y.type, "count", 1)).intrinsic("fabs", y))
+
+
+def _kept(order: str) -> Callable[..., Any]:
+    """Y where it is in that order to x, or x is nan; else x."""
+
+    def rule(b: Any, x: Any, y: Any) -> Any:
+        return b.select(b.or_(b.fcmp_ordered(order, y, x), b.fcmp_unordered("uno", x, x)), y, x)
+
+    return rule
+
+
+subtraction = _in_place(lambda b, x, y: b.fsub(x, y))
+OPERATIONS: Mapping[Any, Callable[..., Value]] = MappingProxyType(
+    {
+        require: _require, part: _part, weighted_sum: _weighted_sum, np.multiply: multiplication,
+        subtract_multiple: _in_place(lambda b, x, y, s: b.fsub(x, b.fmul(y, s))),
+        subtract_product: _in_place(lambda b, x, y, z: b.fsub(x, b.fmul(y, z))),
+        divide: _in_place(lambda b, x, s: b.fdiv(x, s)), add_sizes: _in_place(_with_size),
+        keep_least: _in_place(_kept("<")), keep_largest: _in_place(_kept(">")),
+    }
+)  # fmt: skip
