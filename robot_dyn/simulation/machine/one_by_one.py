@@ -111,7 +111,9 @@ class OneByOne:
         early = outcome.ending is Ending.FINISHED and outcome.t < self.setup.duration_s
         rows = int(np.searchsorted(record.t, outcome.t)) if early else len(record.t)
         names = "q", "v", "a", "u", "work", "power", "energy"
-        values = dict(zip(names, columns(equation, record.t, record.y, record.made), strict=True))
+        values: dict[str, np.ndarray] = dict(
+            zip(names, columns(equation, record.t, record.y, record.made), strict=True)
+        )
         kept = {name: values[name][:rows].copy() for name in self.recorded}
         return Single(record.t[:rows], kept, outcome, record.steps, record.evaluations, observation)
 
