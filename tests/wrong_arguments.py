@@ -59,7 +59,7 @@ LAX = {  # arguments that may be infinite or unknown, or of any shape
     "ExternalWrench": {"start_s", "end_s"},
     "JointStopDamper": {"lower", "upper"}, "JointStopSpring": {"lower", "upper"}, "PID": {"effort_limit"},
     "PiecewisePolynomial.at": {"t"}, "Samples.at": {"t"},
-    "Rollouts.outcome": {"run"}, "Robot.with_": {"lock", "armature"},
+    "Rollouts.outcome": {"run"}, "Rollouts.setup_of": {"run"}, "Robot.with_": {"lock", "armature"},
     "midpoint": {"x"}, "radius": {"x"}, "coefficient": {"elsewhere"},
     "joint_stops": {"lower", "upper"}, "RigidStops": {"lower", "upper"}, "plot": {"limits"},
 }  # fmt: skip
