@@ -42,6 +42,7 @@ from robot_dyn.compiled.loops.values import (
 
 Refuse = Callable[[str, str], NoReturn]
 Instead = Mapping[Any, Callable[..., Any]]
+_INTEGERS: Any = (int, np.integer)
 _KNOWN: Any = (str, tuple, ModuleType, type, Enum)
 
 
@@ -174,10 +175,12 @@ class Program:
             return word(int(value))
         if isinstance(value, np.bool_):
             return number(bool(value))
-        if isinstance(value, bool | float) or (isinstance(value, int | np.integer) and -(2**63) <= value < 2**63):
-            return number(
-                value if isinstance(value, bool) else float(value) if isinstance(value, float) else int(value)
-            )
+        if isinstance(value, bool):
+            return number(value)
+        if isinstance(value, float):
+            return number(float(value))
+        if isinstance(value, _INTEGERS) and -(2**63) <= value < 2**63:
+            return number(int(value))
         if isinstance(value, np.ndarray):
             return self._constant_array(value)
         if isinstance(value, _KNOWN) or value is None or callable(value):

@@ -201,12 +201,24 @@ def _traced(
 
 def _loop(method: Any, equation: StateEquation, cuts: bool, lanes: int) -> MachineFunction | SubsetError:
     """The loop of a method; or why its step, written elsewhere, cannot be machine code. Runs in lock step need it."""
-    from robot_dyn.simulation.machine.loop import loop, refusal
+    from robot_dyn.simulation.machine.loop import refusal
 
     if not method.controls_error and (refused := refusal(method, equation, lanes)) is not None:
         if lanes > 1:
             raise refused
         return refused
+    return loop_of(method, cuts)
+
+
+def loop_of(method: Any, cuts: bool) -> MachineFunction:
+    """The time loop of a method whose steps are plain; its `is_kept` tells whether it costs milliseconds or a second.
+
+    Args:
+        method: An `Integrator` or `Adaptive`.
+        cuts: Whether steps are chosen, or cut at events.
+    """
+    from robot_dyn.simulation.machine.loop import loop
+
     if not cuts:
         return loop(time_loop, method.stepper(FLOAT64, 1, 0, 1).step, works=method.nonsmooth)
     made = STEPPERS[method.method](1, 1, 1) if method.controls_error else hermite.stepper(method, 1, 0, 1, None)
