@@ -42,6 +42,7 @@ from robot_dyn.compiled.loops.values import (
 
 Refuse = Callable[[str, str], NoReturn]
 Instead = Mapping[Any, Callable[..., Any]]
+_TRUTHS: Any = (bool, np.bool_)
 _INTEGERS: Any = (int, np.integer)
 _KNOWN: Any = (str, tuple, ModuleType, type, Enum)
 
@@ -173,10 +174,8 @@ class Program:
         """A value that is known."""
         if isinstance(value, np.uint64):
             return word(int(value))
-        if isinstance(value, np.bool_):
+        if isinstance(value, _TRUTHS):
             return number(bool(value))
-        if isinstance(value, bool):
-            return number(value)
         if isinstance(value, float):
             return number(float(value))
         if isinstance(value, _INTEGERS) and -(2**63) <= value < 2**63:
