@@ -42,6 +42,7 @@ from robot_dyn.compiled.loops.values import (
 
 Refuse = Callable[[str, str], NoReturn]
 Instead = Mapping[Any, Callable[..., Any]]
+_WORDS: Any = np.uint64
 _TRUTHS: Any = (bool, np.bool_)
 _INTEGERS: Any = (int, np.integer)
 _KNOWN: Any = (str, tuple, ModuleType, type, Enum)
@@ -172,7 +173,7 @@ class Program:
 
     def constant(self, value: Any, refuse: Refuse) -> Value:
         """A value that is known."""
-        if isinstance(value, np.uint64):
+        if isinstance(value, _WORDS):
             return word(int(value))
         if isinstance(value, _TRUTHS):
             return number(bool(value))
