@@ -30,7 +30,7 @@ NOTHING = StaticValue(None)
 
 def emits(handler: Callable[..., Value]) -> Callable[..., Value]:
     """Mark a function that writes instructions: (f, node, arguments) → value."""
-    handler.emits = True  # type: ignore[attr-defined]
+    handler.emits = True  # pyright: ignore
     return handler
 
 

@@ -212,7 +212,7 @@ def take_off(x: Array, column: Array, k: int, low: int, high: int) -> None:
         subtract_product(x[i], column[i], x[k])
 
 
-larger.inlined = True  # type: ignore[attr-defined]
+larger.inlined = True  # pyright: ignore
 
 INSTEAD: Mapping[Any, Callable[..., Any]] = MappingProxyType(
     {

@@ -115,6 +115,10 @@ def test_entries(W: int) -> None:
         three_ways(subtracted, None, x, y)
         three_ways(multiplied, None, x, -0.3, y)
         three_ways(summed, loops.sizes, numbers(rng, m, W, special=0.02), np.full(W, np.nan))
+    for _ in range(9):  # of like sizes, where the order is seen
+        three_ways(summed, loops.sizes, rng.normal(size=(40, W)), np.zeros(W))
+        if W == 1:
+            three_ways(normed, loops.norm, *rng.normal(size=(3, 40, 1)), 1e-6, 1e-9)
 
 
 @RUNS

@@ -116,7 +116,7 @@ class MachineFunction:
             from robot_dyn.compiled.loops.program import Program
 
             program = Program(module, prefix, self._instead)
-            result = program.entry(self.function, kinds, "call")  # type: ignore[arg-type]
+            result = program.entry(self.function, kinds, "call")  # pyright: ignore
             told = ir.Function(module, ir.FunctionType(TEXT, []), f"{prefix}result")
             ir.IRBuilder(told.append_basic_block()).ret(program.text(_written(result)))
 

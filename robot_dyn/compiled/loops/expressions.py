@@ -95,11 +95,11 @@ def _item(f: Function, of: TupleValue, index: Scalar, node: ast.AST) -> Value:
         raise f.refused(node, "an item of a tuple by a number that varies", "take a tuple of numbers of one type")
     index = arrays.index_within(f, index, number(count), node)
     first, *others = of.items
-    made = first.ir  # type: ignore[union-attr]
+    made = first.ir  # pyright: ignore
     for i, each in enumerate(others, 1):
         here = f.builder.icmp_signed("==", index.ir, ir.Constant(I64, i))
-        made = f.builder.select(here, each.ir, made)  # type: ignore[union-attr]
-    return Scalar(first.kind, made)  # type: ignore[arg-type]
+        made = f.builder.select(here, each.ir, made)  # pyright: ignore
+    return Scalar(first.kind, made)  # pyright: ignore
 
 
 def _binary(f: Function, node: ast.BinOp) -> Value:

@@ -203,8 +203,8 @@ class Function:
         if isinstance(value, TupleValue) and isinstance(kind, TupleKind):
             pairs = zip(value.items, kind.items, strict=True)
             return TupleValue(tuple(self.fitted(a, b, node) for a, b in pairs))
-        apart = value.strides(self.builder)  # type: ignore[union-attr]
-        return replace(value, kind=kind, apart=() if kind.contiguous else apart)  # type: ignore[union-attr]
+        apart = value.strides(self.builder)  # pyright: ignore
+        return replace(value, kind=kind, apart=() if kind.contiguous else apart)  # pyright: ignore
 
     def name(self, node: ast.Name) -> Value:
         """The value of a name."""

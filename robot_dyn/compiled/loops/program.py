@@ -42,6 +42,9 @@ from robot_dyn.compiled.loops.values import (
 
 Refuse = Callable[[str, str], NoReturn]
 Instead = Mapping[Any, Callable[..., Any]]
+_WORDS: Any = np.uint64
+_TRUTHS: Any = (bool, np.bool_)
+_INTEGERS: Any = (int, np.integer)
 _KNOWN: Any = (str, tuple, ModuleType, type, Enum)
 
 
@@ -170,14 +173,14 @@ class Program:
 
     def constant(self, value: Any, refuse: Refuse) -> Value:
         """A value that is known."""
-        if isinstance(value, np.uint64):
+        if isinstance(value, _WORDS):
             return word(int(value))
-        if isinstance(value, np.bool_):
+        if isinstance(value, _TRUTHS):
             return number(bool(value))
-        if isinstance(value, bool | float) or (isinstance(value, int | np.integer) and -(2**63) <= value < 2**63):
-            return number(
-                value if isinstance(value, bool) else float(value) if isinstance(value, float) else int(value)
-            )
+        if isinstance(value, float):
+            return number(float(value))
+        if isinstance(value, _INTEGERS) and -(2**63) <= value < 2**63:
+            return number(int(value))
         if isinstance(value, np.ndarray):
             return self._constant_array(value)
         if isinstance(value, _KNOWN) or value is None or callable(value):

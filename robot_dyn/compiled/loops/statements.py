@@ -133,10 +133,10 @@ def _for(f: Function, node: ast.For) -> bool:
     of = None if over else f.expression(node.iter)
     if over is None and not (isinstance(of, ArrayValue) and of.kind.ndim == 1):
         raise f.refused(node, f"a loop over {ast.unparse(node.iter)}", "take a range, or an array with one axis")
-    start, stop, step = over or (number(0), of.shape[0], 1)  # type: ignore[union-attr]
+    start, stop, step = over or (number(0), of.shape[0], 1)  # pyright: ignore
     before = set(f.assigned)
     with counted(f, start, stop, step) as (index, (following, behind)):
-        item = index if of is None else arrays.load(f, of, [index])  # type: ignore[arg-type]
+        item = index if of is None else arrays.load(f, of, [index])  # pyright: ignore
         _store(f, node.target, item, node)
         _body(f, node.body, following, behind)
     f.assigned = before

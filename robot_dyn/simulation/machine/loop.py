@@ -37,7 +37,7 @@ def refusal(method: PlainMethod, equation: StateEquation, lanes: int) -> SubsetE
     """Why the step of a method written elsewhere cannot be machine code; None if it can, as those of this library."""
     n, m = equation.plant.dynamics.n, equation.size
     made = method.stepper(FLOAT64, m, n, m + n, lanes)
-    if made.step.__module__.startswith("robot_dyn."):
+    if (made.step.__module__ or "").startswith("robot_dyn."):
         return None
     y, own, lost = np.zeros((m, lanes)), np.zeros((1, lanes)), np.zeros(lanes, np.int64)
     step = MachineFunction(made.step, INSTEAD, lambda: None, "")

@@ -255,12 +255,24 @@ def _loop(
     method: Any, equation: StateEquation, cuts: bool, lanes: int, detects: bool = False
 ) -> MachineFunction | SubsetError:
     """The loop of a method; or why its step, written elsewhere, cannot be machine code. Runs in lock step need it."""
-    from robot_dyn.simulation.machine.loop import loop, refusal
+    from robot_dyn.simulation.machine.loop import refusal
 
     if not method.controls_error and (refused := refusal(method, equation, lanes)) is not None:
         if lanes > 1:
             raise refused
         return refused
+    return loop_of(method, cuts)
+
+
+def loop_of(method: Any, cuts: bool) -> MachineFunction:
+    """The time loop of a method whose steps are plain; its `is_kept` tells whether it costs milliseconds or a second.
+
+    Args:
+        method: An `Integrator` or `Adaptive`.
+        cuts: Whether steps are chosen, or cut at events.
+    """
+    from robot_dyn.simulation.machine.loop import loop
+
     if not cuts:
         step = method.stepper(FLOAT64, 1, 0, 1).step
         return loop(time_loop, detecting(step) if detects else step, works=method.nonsmooth)
