@@ -105,8 +105,8 @@ def test_a_terminal_event_ends_the_run_there(engine: str) -> None:
 def test_events_that_never_occur_do_not_change_the_steps() -> None:
     """Stops out of reach: the same steps, the same bits, and no evaluation more."""
     options = {"q0": [0.3, 0.4], "v0": [0.2, 0.1], "duration_s": 1.0, "estimate_error": False, "record_period_s": 1.0}
-    bare = rd.simulate(ARM, **options)
-    far = rd.simulate(rd.Plant(ARM, rd.joint_stops([-9.0, -9.0], [9.0, 9.0])), **options)
+    bare = rd.simulate(ARM, **options, engine="interpreted")
+    far = rd.simulate(rd.Plant(ARM, rd.joint_stops([-9.0, -9.0], [9.0, 9.0])), **options, engine="interpreted")
     assert far.statistics.evaluations == bare.statistics.evaluations
     assert np.array_equal(far.q[-1], bare.q[-1])
 
@@ -186,7 +186,8 @@ def test_a_run_that_takes_more_steps_than_was_guessed_goes_on_in_machine_code() 
     run = rd.simulate(plant, [0.3, 0.4], duration_s=0.05, estimate_error=False, integrator="DOP853")
     assert run.statistics.evaluations > 20_000
     assert run.statistics.engine == "compiled"
-    assert rd.simulate(plant, [0.3, 0.4], duration_s=1e-4, estimate_error=False).statistics.engine != "compiled"
+    other = rd.Plant(ARM, [rd.ViscousFriction(3e4), rd.ViscousFriction(1.0)])  # no machine code is there yet
+    assert rd.simulate(other, [0.3, 0.4], duration_s=1e-4, estimate_error=False).statistics.engine != "compiled"
 
 
 def test_a_long_run_that_cannot_be_compiled_is_made_in_python(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -197,7 +198,8 @@ def test_a_long_run_that_cannot_be_compiled_is_made_in_python(monkeypatch: pytes
         tried.append(1.0)
         raise rd.RobotDynError("not here")
 
-    monkeypatch.setattr("robot_dyn.simulation.choice._machine", refuse)
+    monkeypatch.setattr("robot_dyn.simulation.choice._existing", lambda *_: None)
+    monkeypatch.setattr("robot_dyn.simulation.choice.machine_of", refuse)
     monkeypatch.setattr("robot_dyn.simulation.choice._COMPILED", 500)
     tight = rd.Adaptive(rtol=3e-14, atol=1e-15)
     run = rd.simulate(ARM, [0.3, 0.4], duration_s=0.4, estimate_error=False, integrator=tight)

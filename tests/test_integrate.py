@@ -222,5 +222,6 @@ def test_scenes_and_python_have_the_same_defaults() -> None:
     scene = parse_scene('robot = "pendulum"\nduration_s = 1.0\n', "scene.toml")
     setup = rd.Setup(rd.Plant(rd.load("pendulum")), [0.1])
     assert scene.integrator() == setup.integrator == rd.Adaptive("auto")
-    for name in ("step_s", "estimate_error", "engine"):
+    assert scene.step_s == setup.nominal_step_s
+    for name in ("estimate_error", "engine"):
         assert getattr(scene, name) == getattr(setup, name), name

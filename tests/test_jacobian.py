@@ -87,7 +87,7 @@ def test_it_is_held_to_differences_of_the_interpreted_equation() -> None:
 
 def test_wrong_machine_code_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     made = making.machine(equation_of(setup()), None, jacobian=True)
-    wrong = replace(made, equations=replace(made.equations, checked=set()))
+    wrong = replace(made, equations=replace(made.equations, checked={}))
     functions = made.in_python
 
     def jacobian(t: float, y: Any, p: Any, own: Any, out: np.ndarray) -> None:

@@ -113,7 +113,8 @@ def simulate(
         user_code=", ".join(named(part) for part, _ in undeclared(setup.plant, setup.controller)),
     )  # fmt: skip
     made = _trajectory(ran, equation, record, statistics, error)
-    if made.leak and record.outcome.ending is not Ending.STOPPED:  # no more of the user's code is called then
+    asks = setup.estimate_error or not statistics.user_code  # code of the user's that is called only where told
+    if made.leak and asks and record.outcome.ending is not Ending.STOPPED:
         why = cause(setup, equation, record, made.ledger.closes)
         made = replace(made, ledger=replace(made.ledger, cause=why))
     return replace(made, statistics=replace(statistics, samples_s=perf_counter() - estimated))

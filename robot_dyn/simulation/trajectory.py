@@ -223,7 +223,7 @@ class Trajectory(Value):
                 return ""
             why = ledger.cause or "do not trust the estimate, take a smaller step"
             return f"it does not close as the estimated error of q says: {why}"
-        return f"it does not close: {ledger.cause or 'simulate the run by itself, which tells why'}"
+        return f"it does not close: {ledger.cause or 'simulate it by itself with its error estimate, which tells why'}"
 
     def proven_digits(self, proof: Theorem) -> float:
         """Decimal digits of q that a theorem confirms: −log₁₀ of the largest possible error, in [rad] or [m].

@@ -90,6 +90,12 @@ def in_another_process(function: Any, store: Any, monkeypatch: pytest.MonkeyPatc
 X = np.array([0.3, -0.7, 1.9])
 
 
+@pytest.fixture(autouse=True)
+def reads_arguments() -> None:
+    """What reads the words of arguments is compiled once in a process, and stands in no store of these tests."""
+    MachineFunction(built(HELPERS + LOOP), INSTEAD, lambda: None, "").calls()(X, 3)
+
+
 @pytest.mark.parametrize("where", EDITS)
 def test_after_an_edit_the_old_object_is_not_used(where: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Wherever it is; and what comes out is what Python gives then."""

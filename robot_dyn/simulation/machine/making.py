@@ -261,15 +261,16 @@ def _loop(
         if lanes > 1:
             raise refused
         return refused
-    return loop_of(method, cuts)
+    return loop_of(method, cuts, detects)
 
 
-def loop_of(method: Any, cuts: bool) -> MachineFunction:
+def loop_of(method: Any, cuts: bool, detects: bool = False) -> MachineFunction:
     """The time loop of a method whose steps are plain; its `is_kept` tells whether it costs milliseconds or a second.
 
     Args:
         method: An `Integrator` or `Adaptive`.
         cuts: Whether steps are chosen, or cut at events.
+        detects: As of `machine`.
     """
     from robot_dyn.simulation.machine.loop import loop
 
