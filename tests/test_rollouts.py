@@ -215,12 +215,24 @@ def test_runs_are_numbered_as_lists_are() -> None:
     some = runs[1:4]
     assert len(some) == 3 and some.params["kp"][0, 0] == 1.0 and len(list(runs)) == 5
     np.testing.assert_array_equal(some[0].u, runs[1].u)
-    with pytest.raises(IndexError):
+    with pytest.raises(IndexError, match="no run 5: runs are numbered from 0 to 4"):
         runs[5]
+    with pytest.raises(QueryError, match="no run in"):
+        runs[2:2]
     with pytest.raises(QueryError, match="a whole number or a slice"):
         runs["first"]
     with pytest.raises(QueryError, match="if q and v were recorded"):
         rd.rollouts(SETUP, starts(2), record=["q"])[0]
+
+
+def test_a_run_of_a_slice_has_the_noise_that_it_had() -> None:
+    """Noise is of the number of a run in its batch, whatever its number in a slice, a slice of one, or backwards."""
+    loop = rd.Loop(rd.PD(REFERENCE, 40.0, 4.0, period_s=4e-3), position=[rd.Noise(0.01)])
+    runs = rd.rollouts(replace(SETUP, controller=loop), [Q] * 6)
+    for some in (runs[2:5], runs[1:][1:4], runs[::-2]):
+        for i in range(3):
+            alone = rd.simulate(some.setup_of(i), estimate_error=False, engine="compiled")
+            np.testing.assert_allclose(alone.q, some.q[i], rtol=0, atol=1e-12)  # other noise moves q by 1e-3
 
 
 @pytest.mark.parametrize("method", ["rk4", "gauss_2"])

@@ -21,15 +21,16 @@ from robot_dyn.simulation.trajectory import Ending, Outcome, Statistics, Traject
 from robot_dyn.validate import integer
 from robot_dyn.values import Value, read_only
 
-_SHARED = ("joint_names", "t", "statistics", "sources", "about", "setup", "uncut", "saved")  # by all runs
+_SHARED = ("joint_names", "t", "statistics", "sources", "about", "setup", "uncut", "saved", "numbers")  # by all runs
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Rollouts(Value):
-    """B runs, m samples of each. Samples after a run diverged are nan. What was not recorded is None.
+    """B runs, m samples of each. Samples after the end of a run are nan. What was not recorded is None.
 
-    `runs[i]` is the `Trajectory` of a run, `runs[i:j]` some of the runs; both copy no samples.
+    `runs[i]` is the `Trajectory` of a run, `runs[i:j]` some of the runs, numbered from 0; both copy no samples. The
+    state at an event that ends a run is not among its samples, which are at the same times in all runs.
 
     Attributes:
         joint_names: Of the n joints.
@@ -53,6 +54,8 @@ class Rollouts(Value):
         q0, v0: Starts, (B, n).
         observed: Extremes, limits passed and chatter of each run, over all steps; None in files of older versions.
         saved: Of runs that were read from a file; None for others.
+        numbers: Of a slice, the number of each run in the batch that was run, of which its noise is, (B,); None for
+            all runs of a batch, and for runs that were read from a file.
     """
 
     joint_names: tuple[str, ...]
@@ -79,6 +82,7 @@ class Rollouts(Value):
     v0: np.ndarray | None = None
     observed: Observed | None = None
     saved: Overview | None = None
+    numbers: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         read_only(self)
@@ -106,19 +110,26 @@ class Rollouts(Value):
         those on limits, stops and chatter.
 
         Raises:
-            QueryError: If q or v was not recorded, or `run` is neither a whole number nor a slice.
-            IndexError: If there is no such run.
+            QueryError: If q or v was not recorded, a slice has no runs, or `run` is neither a whole number nor a slice.
+            IndexError: If there is no run of that number.
         """
         from robot_dyn.simulation.rollout_run import trajectory
 
         if isinstance(run, slice):
-            some = replace(self, **{name: _taken(x, run) for name, x in self._by_run().items()}, saved=None)
-            whole = None if self.saved is None else of_some(some, range(len(self))[run], self.saved)
+            taken = range(len(self))[run]
+            if not taken:
+                raise QueryError(f"there is no run in {run}: runs are numbered from 0 to {len(self) - 1}")
+            numbers = np.arange(len(self)) if self.numbers is None else self.numbers
+            by_run = {name: _taken(x, run) for name, x in self._by_run().items()}
+            some = replace(self, **by_run, numbers=numbers[run], saved=None)
+            whole = None if self.saved is None else of_some(some, taken, self.saved)
             return replace(some, saved=whole)
         try:
             number = range(len(self))[index(run)]
         except TypeError:
             raise QueryError(f"runs are numbered: give a whole number or a slice, got {run!r}") from None
+        except IndexError:
+            raise IndexError(f"there is no run {run}: runs are numbered from 0 to {len(self) - 1}") from None
         return trajectory(self, number)
 
     def outcome(self, run: int) -> Outcome:
