@@ -456,6 +456,7 @@ def test_events_end_the_runs_of_a_batch_as_they_end_single_ones(tmp_path: Path) 
             np.testing.assert_allclose(runs.q[i, before], alone.q[: before.sum()], rtol=0, atol=1e-11)
             assert np.isnan(runs.q[i, ~before]).all()
         assert "'down'" in runs.outcome(0).advice and not runs.outcome(2).advice
+        assert "; 0 diverged, 0 stopped, 2 ended by an event" in runs.summary
 
 
 def test_payloads_come_and_go_in_a_batch_as_they_do_alone() -> None:
@@ -503,6 +504,29 @@ def test_an_interrupt_ends_the_batch_and_keeps_what_there_is(effects, monkeypatc
     assert runs.outcome(i).ending == "stopped" and runs.ended[i] < 100.0
     assert runs.t[-1] < 100.0 or np.isnan(runs.q[i, runs.t > runs.ended[i]]).all()
     assert len(effects) == 3 or runs.t[-1] < 100.0
+    assert f"{runs.stopped.sum()} stopped by an interrupt, the first at t = " in runs.summary
+
+
+def test_a_run_that_was_not_begun_has_its_start(monkeypatch) -> None:
+    """An interrupt before the first of runs that are made one after the other: each is a trajectory of one sample."""
+
+    wait, calls = pool.wait, []
+
+    def once(*args, **options):
+        calls.append(1)
+        if len(calls) == 1:
+            raise KeyboardInterrupt
+        return wait(*args, **options)
+
+    setup = replace(SETUP, integrator=rd.method("DOP853"), step_s=None)
+    rd.rollouts(setup, starts(1))  # compiled before
+    monkeypatch.setattr(pool, "wait", once)
+    runs = rd.rollouts(setup, starts(200), record=EVERYTHING, threads=2)
+    idle = np.flatnonzero(runs.stopped & (runs.ended == 0.0))
+    assert len(idle)
+    run = runs[int(idle[-1])]
+    np.testing.assert_array_equal(run.q, starts(200)[idle[-1:]])
+    assert run.summary.startswith("stopped at t = 0 s, 1 samples; interrupted")
 
 
 def test_params_are_held_to_what_their_effect_takes() -> None:

@@ -12,7 +12,9 @@ import numpy as np
 
 from robot_dyn import former
 from robot_dyn.errors import QueryError, escaped
+from robot_dyn.model.units import units
 from robot_dyn.simulation.observation import Observed
+from robot_dyn.simulation.origin import joint_types
 from robot_dyn.simulation.overview import Overview, of_some, overview
 from robot_dyn.simulation.remarks import Remark
 from robot_dyn.simulation.remarks import lines as said
@@ -185,24 +187,33 @@ class Rollouts(Value):
     @property
     def summary(self) -> str:
         """How many runs, how many ended before their time and why; remarks; tracking error; which run to look at."""
-        early = f"{int(self.diverged.sum())} diverged, {int(self.stopped.sum())} stopped"
-        lines = [f"{len(self)} runs of {len(self.t)} samples to t = {self.t[-1]:g} s; {early}"]
+        count = "1 run" if len(self) == 1 else f"{len(self)} runs"
+        lines = [f"{count} of {len(self.t)} samples to t = {self.t[-1]:g} s; {self._early()}"]
         if self.uncut:
             levels = ", ".join(self.uncut)
             lines.append(f"cuts=False: no step ends at {levels}, and a run that passes one is not that of simulate")
         if self.diverged.any():
             run = int(self.diverged.argmax())
             lines.append(f"run {run} diverged at t = {self.ended[run]:g} s; {self.advice[run]}")
-        lines += said(self.remarks) if self.observed is not None else ["between samples: not watched"]
+        counted = len(self) > 1
+        remarks = [each if counted else replace(each, runs=()) for each in self.remarks]
+        lines += said(remarks) if self.observed is not None else ["between samples: not watched"]
         errors = self.tracking_error
         if errors is not None and np.isfinite(errors).any():
             most = int(np.nanargmax(errors))
-            lines.append(
-                f"tracking error: {np.nanmedian(errors):.3e} rms in the median, {errors[most]:.3e} in run {most}"
-            )
+            what = "the frame [m]" if "frame" in self.about else f"q [{units('q', joint_types(self))}]"
+            largest = f" in the median, {errors[most]:.3e} in run {most}" if counted else ""
+            lines.append(f"tracking error of {what}: {np.nanmedian(errors):.3e} rms{largest}")
         again = "" if self.setup is None else f"; rd.simulate(runs.setup_of({self.worst})) repeats it by itself"
         lines.append(f"look at run {self.worst} first{again}")
         return "\n".join(escaped(line) for line in lines)
+
+    def _early(self) -> str:
+        """How many runs ended before their time, and why."""
+        at = f" by an interrupt, the first at t = {self.ended[self.stopped].min():g} s" if self.stopped.any() else ""
+        by_event = int((np.array([text != "" for text in self.advice]) & ~self.diverged).sum())
+        early = f"{int(self.diverged.sum())} diverged, {int(self.stopped.sum())} stopped{at}"
+        return early + (f", {by_event} ended by an event" if by_event else "")
 
     def _by_run(self) -> dict[str, Any]:
         return {each.name: getattr(self, each.name) for each in fields(self) if each.name not in _SHARED}
