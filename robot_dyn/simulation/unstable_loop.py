@@ -16,7 +16,7 @@ from robot_dyn.errors import RobotDynError
 from robot_dyn.simulation.remarks import Kind, Remark
 from robot_dyn.simulation.sampled_loop import SampledLoop, linearised, remedy
 from robot_dyn.simulation.setup import Setup
-from robot_dyn.simulation.stability import Stability, after, below, shown
+from robot_dyn.simulation.stability import Stability, after, below, periods, shown
 from robot_dyn.simulation.state_equation import StateEquation
 
 
@@ -81,6 +81,6 @@ def _remark(setup: Setup, found: Growing) -> Remark:
     period, joint, t = setup.controller.period_s, found.joint, found.t
     text = (
         f"{joint} by {shown(found.factor)} in each period of {period:.4g} s about the state at {t:.4g} s, by"
-        f" {shown(after(found.factor, setup.duration_s // period))} over the run"
+        f" {shown(after(found.factor, periods(setup.duration_s, period)))} over the run"
     )
     return Remark(Kind.UNSTABLE, joint, "q", t, 0.0, t, found.factor, 1.0, text, found.remedy(period))
