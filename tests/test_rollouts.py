@@ -203,7 +203,7 @@ def test_a_run_of_a_batch_is_the_trajectory_of_simulate(setup: rd.Setup, record:
         assert_alike(ours, theirs) if known else np.testing.assert_array_equal(ours, np.full_like(theirs, np.nan))
     assert run.power.keys() == alone.power.keys() == run.ledger.work.keys()
     assert run.outcome == alone.outcome and run.statistics.steps == alone.statistics.steps
-    assert run.error is None
+    assert run.error is None and "not estimated (a run of rollouts)" in run.summary
     assert_alike(run.extremes, alone.extremes)
     assert ("was not recorded" in run.summary) is not everything
     assert {name: run.about[name] for name in alone.about} == alone.about
@@ -285,6 +285,8 @@ def test_rollouts_are_saved_and_read(record: tuple[str, ...], tmp_path: Path) ->
     path.write_bytes(path.read_bytes()[:-100])
     with pytest.raises(rd.RobotDynError, match="is not a complete run file"):
         rd.load_rollouts(path)
+    with pytest.raises(rd.RobotDynError, match=r"there is no such file; write one with rd\.save_rollouts"):
+        rd.load_rollouts(tmp_path / "none.npz")
     with pytest.raises(rd.RobotDynError, match="got Rollouts; save_rollouts takes"):
         rd.save_run(runs, path)
 
@@ -329,7 +331,9 @@ def test_what_has_no_meaning_is_refused() -> None:
         "q0 must be finite, got nan for joint": {"q0": bad},
         r"q0 must have shape \(2,\)": {"q0": np.zeros((4, 3))},
         "one number of runs": {"q0": starts(4), "v0": np.zeros((3, 2))},
-        "one number of runs, .*'kp'": {"q0": starts(4), "params": {"kp": np.ones(3)}},
+        r"one number of runs, .*'kp': \(3,\)": {"q0": starts(4), "params": {"kp": np.ones(3)}},
+        "one number of runs, B ≥ 1: ": {"q0": np.zeros((0, 2))},
+        r"mass_scale must have shape \(B,\) or \(B, 1\), got \(\)": {"params": {"mass_scale": 1.1}},
         "params: no 'kq'; nearest: k": {"params": {"kq": np.ones(3)}},
         "params: no 'viscous_friction.damp'; nearest: viscous_friction.damping": {
             "params": {"viscous_friction.damp": np.ones(3)}
@@ -340,7 +344,10 @@ def test_what_has_no_meaning_is_refused() -> None:
         },
         "no record 'torque'": {"record": ("torque",)},
         "threads .* must be a whole number, from 1": {"threads": 0},
-        "takes 0.0 GiB, more than 0.0 GiB: take a longer record_period_s": {"q0": starts(4), "most_bytes": 100},
+        r"at most .* samples of 4 runs takes .*e-0\d GiB, more than 9.31e-08 GiB: take a longer record_period_s": {
+            "q0": starts(4),
+            "most_bytes": 100,
+        },
     }.items():
         with pytest.raises(QueryError, match=message):
             rd.rollouts(SETUP, **options)
@@ -509,7 +516,6 @@ def test_an_interrupt_ends_the_batch_and_keeps_what_there_is(effects, monkeypatc
 
 def test_a_run_that_was_not_begun_has_its_start(monkeypatch) -> None:
     """An interrupt before the first of runs that are made one after the other: each is a trajectory of one sample."""
-
     wait, calls = pool.wait, []
 
     def once(*args, **options):

@@ -122,6 +122,8 @@ def test_a_table_of_runs_has_a_row_for_each(batch, tmp_path: Path) -> None:
     np.testing.assert_array_equal(of_slide, runs.observed.extremes[:, 2, 1, 0])
     np.testing.assert_array_equal([float(row["tracking error [rad or m]"]) for row in rows], runs.tracking_error)
     for i, row in enumerate(rows):
+        assert float(row["start q slide [m]"]) == runs.q0[i, 0]
+        assert float(row["start v hinge [rad/s]"]) == runs.v0[i, 1]
         assert row["outcome"] == runs.outcome(i).ending and float(row["ended [s]"]) == runs.ended[i]
         about = {f"{kind} {quantity} {joint}" for kind, joint, quantity in told(runs[i])}
         assert about <= set(row["remarks"].split("; "))

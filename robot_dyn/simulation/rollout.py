@@ -205,8 +205,9 @@ def _starts(
     sweep = {name: _values(setup, name, x) for name, x in params.items()}
     counts = {len(x) for x in (q, v, *sweep.values()) if x.ndim > 1} or {1}
     if len(counts) > 1 or max(q.ndim, v.ndim) > 2 or counts == {0}:
-        shapes = {"q0": q.shape, "v0": v.shape} | {name: x.shape for name, x in sweep.items()}
-        raise QueryError(f"starts and params must be of one number of runs, (B, {n}), got {shapes}")
+        shapes = {"q0": q.shape, "v0": v.shape} | {name: np.shape(x) for name, x in params.items()}
+        rows = f"starts ({n},) or (B, {n}), params (B,) or (B, …)"
+        raise QueryError(f"starts and params must be of one number of runs, B ≥ 1: {rows}; got {shapes}")
     B = counts.pop()
     q = np.broadcast_to(q, (B, n))
     if any(isinstance(each, RigidStops) for each in setup.plant.effects):
