@@ -84,6 +84,8 @@ def test_a_batch_tells_of_each_run_what_simulate_does(batch) -> None:
         size = [x.duration if x.kind is Kind.EFFORT_REACHED else abs(x.value - (x.limit or 0.0)) for x in of]
         assert size[0] >= max(size) * (1 - 1e-9)
         assert remark.text == of[0].text and remark.looked == B
+        if remark.kind is Kind.STOP_REACHED:  # how far beyond it, as runs are compared
+            assert f" {remark.value:.4g} of {remark.limit:.4g} " in remark.text
         assert f"{remark.text} (run {remark.runs[0]}; {len(of)} of {B} runs)" in "; ".join(lines([remark]))
     assert all(line in runs.summary for line in lines(runs.remarks))
     assert f"rd.simulate(runs.setup_of({runs.worst})) repeats it" in runs.summary
