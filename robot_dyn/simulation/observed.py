@@ -123,14 +123,12 @@ def _passed(names: tuple[str, ...], units: Units, visits: dict[Level, Visit]) ->
         unit = f" {units[joint][quantity]}".rstrip()
         far = f"{most.value:.4g} of {level.limit:.4g}{unit} at {most.at:.4g} s"
         spent = f"for {duration:.3g} s from {start:.4g} s"
-        text = (
-            f"{names[joint]} "
-            + {
-                Kind.BEYOND: far,
-                Kind.STOP_REACHED: f"{far}, {spent}",
-                Kind.EFFORT_REACHED: f"{spent} ({abs(level.limit):.4g}{unit})",
-            }[level.kind]
-        )
+        words = {
+            Kind.BEYOND: far,
+            Kind.STOP_REACHED: f"{far}, {spent}",
+            Kind.EFFORT_REACHED: f"{spent} ({abs(level.limit):.4g}{unit})",
+        }
+        text = f"{names[joint]} {words[level.kind]}"
         yield Remark(
             level.kind, names[joint], QUANTITIES[quantity], start, duration, most.at, most.value, level.limit, text,
             "nothing in the plant enforces them" if level.kind is Kind.BEYOND else "",

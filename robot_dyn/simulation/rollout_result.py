@@ -165,8 +165,8 @@ class Rollouts(Value):
     def remarks(self) -> tuple[Remark, ...]:
         """What `simulate` remarks on the limits, stops and chatter of each run, one of each kind, joint and quantity.
 
-        `Remark.runs` are the numbers of the runs that it is about, the worst first, whose values and text it has. A
-        sampled loop is linearised in one run alone, `worst`.
+        `Remark.runs` are the numbers of the runs that it is about: first the worst, whose values and text it has, then
+        the others in their order. A sampled loop is linearised in one run alone, `worst`.
         """
         return self.overview.remarks
 
