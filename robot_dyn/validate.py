@@ -83,7 +83,7 @@ def numbers(
         least: They must not be less than this.
         infinite: Whether ±inf is taken as well.
     """
-    lengths = " or ".join(str(shape).replace("'", "") for shape in shapes if shape)
+    lengths = " or ".join(str(shape).replace("'", "") for shape in dict.fromkeys(shapes) if shape)
     one = () in shapes
     try:
         array = np.array(float64(values))

@@ -203,7 +203,7 @@ def test_a_run_of_a_batch_is_the_trajectory_of_simulate(setup: rd.Setup, record:
         assert_alike(ours, theirs) if known else np.testing.assert_array_equal(ours, np.full_like(theirs, np.nan))
     assert run.power.keys() == alone.power.keys() == run.ledger.work.keys()
     assert run.outcome == alone.outcome and run.statistics.steps == alone.statistics.steps
-    assert run.error is None
+    assert run.error is None and "not estimated (a run of rollouts)" in run.summary
     assert_alike(run.extremes, alone.extremes)
     assert ("was not recorded" in run.summary) is not everything
     assert {name: run.about[name] for name in alone.about} == alone.about
@@ -215,12 +215,24 @@ def test_runs_are_numbered_as_lists_are() -> None:
     some = runs[1:4]
     assert len(some) == 3 and some.params["kp"][0, 0] == 1.0 and len(list(runs)) == 5
     np.testing.assert_array_equal(some[0].u, runs[1].u)
-    with pytest.raises(IndexError):
+    with pytest.raises(IndexError, match="no run 5: runs are numbered from 0 to 4"):
         runs[5]
+    with pytest.raises(QueryError, match="no run in"):
+        runs[2:2]
     with pytest.raises(QueryError, match="a whole number or a slice"):
         runs["first"]
     with pytest.raises(QueryError, match="if q and v were recorded"):
         rd.rollouts(SETUP, starts(2), record=["q"])[0]
+
+
+def test_a_run_of_a_slice_has_the_noise_that_it_had() -> None:
+    """Noise is of the number of a run in its batch, whatever its number in a slice, a slice of one, or backwards."""
+    loop = rd.Loop(rd.PD(REFERENCE, 40.0, 4.0, period_s=4e-3), position=[rd.Noise(0.01)])
+    runs = rd.rollouts(replace(SETUP, controller=loop), [Q] * 6)
+    for some in (runs[2:5], runs[1:][1:4], runs[::-2]):
+        for i in range(3):
+            alone = rd.simulate(some.setup_of(i), estimate_error=False, engine="compiled")
+            np.testing.assert_allclose(alone.q, some.q[i], rtol=0, atol=1e-12)  # other noise moves q by 1e-3
 
 
 @pytest.mark.parametrize("method", ["rk4", "gauss_2"])
@@ -273,6 +285,8 @@ def test_rollouts_are_saved_and_read(record: tuple[str, ...], tmp_path: Path) ->
     path.write_bytes(path.read_bytes()[:-100])
     with pytest.raises(rd.RobotDynError, match="is not a complete run file"):
         rd.load_rollouts(path)
+    with pytest.raises(rd.RobotDynError, match=r"there is no such file; write one with rd\.save_rollouts"):
+        rd.load_rollouts(tmp_path / "none.npz")
     with pytest.raises(rd.RobotDynError, match="got Rollouts; save_rollouts takes"):
         rd.save_run(runs, path)
 
@@ -317,7 +331,9 @@ def test_what_has_no_meaning_is_refused() -> None:
         "q0 must be finite, got nan for joint": {"q0": bad},
         r"q0 must have shape \(2,\)": {"q0": np.zeros((4, 3))},
         "one number of runs": {"q0": starts(4), "v0": np.zeros((3, 2))},
-        "one number of runs, .*'kp'": {"q0": starts(4), "params": {"kp": np.ones(3)}},
+        r"one number of runs, .*'kp': \(3,\)": {"q0": starts(4), "params": {"kp": np.ones(3)}},
+        "one number of runs, B ≥ 1: ": {"q0": np.zeros((0, 2))},
+        r"mass_scale must have shape \(B,\) or \(B, 1\), got \(\)": {"params": {"mass_scale": 1.1}},
         "params: no 'kq'; nearest: k": {"params": {"kq": np.ones(3)}},
         "params: no 'viscous_friction.damp'; nearest: viscous_friction.damping": {
             "params": {"viscous_friction.damp": np.ones(3)}
@@ -328,7 +344,10 @@ def test_what_has_no_meaning_is_refused() -> None:
         },
         "no record 'torque'": {"record": ("torque",)},
         "threads .* must be a whole number, from 1": {"threads": 0},
-        "takes 0.0 GiB, more than 0.0 GiB: take a longer record_period_s": {"q0": starts(4), "most_bytes": 100},
+        r"at most .* samples of 4 runs takes .*e-0\d GiB, more than 9.31e-08 GiB: take a longer record_period_s": {
+            "q0": starts(4),
+            "most_bytes": 100,
+        },
     }.items():
         with pytest.raises(QueryError, match=message):
             rd.rollouts(SETUP, **options)
@@ -444,6 +463,7 @@ def test_events_end_the_runs_of_a_batch_as_they_end_single_ones(tmp_path: Path) 
             np.testing.assert_allclose(runs.q[i, before], alone.q[: before.sum()], rtol=0, atol=1e-11)
             assert np.isnan(runs.q[i, ~before]).all()
         assert "'down'" in runs.outcome(0).advice and not runs.outcome(2).advice
+        assert "; 0 diverged, 0 stopped, 2 ended by an event" in runs.summary
 
 
 def test_payloads_come_and_go_in_a_batch_as_they_do_alone() -> None:
@@ -491,6 +511,28 @@ def test_an_interrupt_ends_the_batch_and_keeps_what_there_is(effects, monkeypatc
     assert runs.outcome(i).ending == "stopped" and runs.ended[i] < 100.0
     assert runs.t[-1] < 100.0 or np.isnan(runs.q[i, runs.t > runs.ended[i]]).all()
     assert len(effects) == 3 or runs.t[-1] < 100.0
+    assert f"{runs.stopped.sum()} stopped by an interrupt, the first at t = " in runs.summary
+
+
+def test_a_run_that_was_not_begun_has_its_start(monkeypatch) -> None:
+    """An interrupt before the first of runs that are made one after the other: each is a trajectory of one sample."""
+    wait, calls = pool.wait, []
+
+    def once(*args, **options):
+        calls.append(1)
+        if len(calls) == 1:
+            raise KeyboardInterrupt
+        return wait(*args, **options)
+
+    setup = replace(SETUP, integrator=rd.method("DOP853"), step_s=None)
+    rd.rollouts(setup, starts(1))  # compiled before
+    monkeypatch.setattr(pool, "wait", once)
+    runs = rd.rollouts(setup, starts(200), record=EVERYTHING, threads=2)
+    idle = np.flatnonzero(runs.stopped & (runs.ended == 0.0))
+    assert len(idle)
+    run = runs[int(idle[-1])]
+    np.testing.assert_array_equal(run.q, starts(200)[idle[-1:]])
+    assert run.summary.startswith("stopped at t = 0 s, 1 samples; interrupted")
 
 
 def test_params_are_held_to_what_their_effect_takes() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -83,6 +84,8 @@ def test_a_batch_tells_of_each_run_what_simulate_does(batch) -> None:
         size = [x.duration if x.kind is Kind.EFFORT_REACHED else abs(x.value - (x.limit or 0.0)) for x in of]
         assert size[0] >= max(size) * (1 - 1e-9)
         assert remark.text == of[0].text and remark.looked == B
+        if remark.kind is Kind.STOP_REACHED:  # how far beyond it, as runs are compared
+            assert f" {remark.value:.4g} of {remark.limit:.4g} " in remark.text
         assert f"{remark.text} (run {remark.runs[0]}; {len(of)} of {B} runs)" in "; ".join(lines([remark]))
     assert all(line in runs.summary for line in lines(runs.remarks))
     assert f"rd.simulate(runs.setup_of({runs.worst})) repeats it" in runs.summary
@@ -121,6 +124,8 @@ def test_a_table_of_runs_has_a_row_for_each(batch, tmp_path: Path) -> None:
     np.testing.assert_array_equal(of_slide, runs.observed.extremes[:, 2, 1, 0])
     np.testing.assert_array_equal([float(row["tracking error [rad or m]"]) for row in rows], runs.tracking_error)
     for i, row in enumerate(rows):
+        assert float(row["start q slide [m]"]) == runs.q0[i, 0]
+        assert float(row["start v hinge [rad/s]"]) == runs.v0[i, 1]
         assert row["outcome"] == runs.outcome(i).ending and float(row["ended [s]"]) == runs.ended[i]
         about = {f"{kind} {quantity} {joint}" for kind, joint, quantity in told(runs[i])}
         assert about <= set(row["remarks"].split("; "))
@@ -153,3 +158,37 @@ def test_tracking_errors_of_a_frame() -> None:
     assert runs.worst == 2
     alone = [rd.simulate(runs.setup_of(i), estimate_error=False).tracking_error for i in range(3)]
     np.testing.assert_allclose(runs.tracking_error[:2], alone[:2], rtol=1e-9)
+    assert {run.about["frame"] for run in runs} == {"tip"} and "tracking error of the frame [m]: " in runs.summary
+
+
+def test_a_batch_of_one_speaks_of_a_run() -> None:
+    """Its lines are those of the run: there is no other to count, nor one that was not looked at."""
+    given, params = SCENES["chattering"]
+    runs = rd.rollouts(given, params={name: x[:1] for name, x in params.items()})
+    alone = rd.simulate(runs.setup_of(0), estimate_error=False, engine="compiled")
+    assert runs.summary.startswith("1 run of 9 samples to t = 0.8 s; 0 diverged, 0 stopped\n")
+    theirs = lines(each for each in alone.remarks if each.kind in (*COUNTED, Kind.UNSTABLE))
+    theirs += [line for line in alone.summary.splitlines() if line.startswith("tracking error of q [")]
+    assert len(theirs) >= 3 and set(theirs) <= set(runs.summary.splitlines())
+
+
+def test_a_limit_of_no_effort_is_reached_all_the_time_once() -> None:
+    """Both sides of a limit of 0 are one: u = 0 is at it throughout, which is as long as the run, not twice that."""
+    given = rd.Setup(rd.Plant(CART, [rd.EffortLimit([0.0, 1.0])]), Q, V, 0.2, rd.PD(GOAL, 40.0, 4.0, period_s=0.02))
+    runs = rd.rollouts(replace(given, integrator=rd.method("rk4")))
+    for remarks in (runs.remarks, rd.simulate(given, estimate_error=False).remarks):
+        (at,) = (each for each in remarks if each.kind is Kind.EFFORT_REACHED and each.joint == "slide")
+        assert at.duration == pytest.approx(0.2, rel=1e-9)
+
+
+def test_growth_over_a_run_counts_its_periods() -> None:
+    """0.3 s are three periods of 0.1 s, though floats divide to less; beyond 1e299 only a bound is told."""
+    arm, goal = rd.load("pendulum"), rd.hold([0.0])
+    told = {}
+    for duration in (0.3, 60.0):
+        setup = rd.Setup(
+            rd.Plant(arm), [1e-3], None, duration, rd.PD(goal, 40.0, 100.0, period_s=0.1), estimate_error=False
+        )
+        (told[duration],) = (each for each in rd.simulate(setup).remarks if each.kind is Kind.UNSTABLE)
+    assert f"by {told[0.3].value ** 3:.4g} over the run" in told[0.3].text
+    assert 600 * np.log10(told[60.0].value) > 300 and "by more than 1e+299 over the run" in told[60.0].text

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -126,3 +127,30 @@ def test_a_run_that_its_step_ends_under_a_stable_loop_says_so() -> None:
     assert run.outcome.ending == "diverged"
     assert "take a smaller step than 0.001 s" in run.outcome.advice
     assert Kind.UNSTABLE not in {each.kind for each in run.remarks}
+
+
+def test_sampling_is_told_apart_from_an_arm_that_falls_anyway() -> None:
+    """Upright with kp = 0 it falls at each period, slowly; from kd T/M = 2 on its damper overshoots, as 1 − kd T/M.
+
+    The period that the remedy names ends that: no remark is left.
+    """
+    arm, kd = rd.load("pendulum"), 20.0
+    limit = 2 * float(arm.M([np.pi])[0, 0]) / kd
+    plant, upright = rd.Plant(arm), rd.hold([np.pi])
+
+    def remarks(period: float) -> list:
+        law = rd.PD(upright, 0.0, kd, period_s=period)
+        run = rd.simulate(
+            plant, [np.pi - 0.01], duration_s=0.3, controller=law, integrator="rk4", step_s=1e-3, estimate_error=False
+        )
+        return [each.remedy for each in run.remarks if each.kind is Kind.UNSTABLE]
+
+    (remedy,) = remarks(1.5 * limit)
+    told = re.search(r"at ([\d.]+) per second; sampling adds to that beyond ([\d.]+) s: take period_s=([\d.]+)", remedy)
+    assert told is not None
+    rate, beyond, period = map(float, told.groups())
+    falls = float(arm.N([np.pi - 1e-6])[0] - arm.N([np.pi])[0]) / 1e-6  # −∂N/∂q upright
+    M = limit * kd / 2
+    assert rate == pytest.approx((np.sqrt(kd**2 + 4 * M * falls) - kd) / (2 * M), rel=5e-3)  # M λ² + kd λ = falls
+    assert beyond == pytest.approx(limit, rel=0.03)  # gravity moves it by (g/l) T²/4
+    assert not remarks(period)

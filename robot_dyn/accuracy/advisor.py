@@ -25,7 +25,17 @@ from robot_dyn.simulation.options import Options, setup_of, starts, takes_option
 from robot_dyn.simulation.sampled_loop import linearised, remedy
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.simulate import simulate
-from robot_dyn.simulation.stability import Stability, after, below, longest_step, radius, shown, step_map, worst
+from robot_dyn.simulation.stability import (
+    Stability,
+    after,
+    below,
+    longest_step,
+    periods,
+    radius,
+    shown,
+    step_map,
+    worst,
+)
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.stiffness import Fastest, fastest, jacobian
 from robot_dyn.simulation.trajectory import Ending, Trajectory
@@ -167,7 +177,7 @@ def advice_about(setup: Setup, states_of: Callable[[Setup, StateEquation], list[
     limits = {name: min(longest_step(method(name), J, n) for J in matrices) for name in FIXED_STEP}
     step = 0.0 if own.controls_error else setup.taken_step_s
     loops = [linearised(plant, setup.controller, t, _own(loop, y)) for t, y in states if period]
-    factors = [after(each.factor(period), duration // period) for each in loops]
+    factors = [after(each.factor(period), periods(duration, period)) for each in loops]
     factors += [after(_excess(own, J, n, step), setup.steps) for J in matrices if step]
     return Advice(
         own.name, step, motion, at, limits, period,

@@ -14,6 +14,7 @@ import numpy as np
 
 from robot_dyn.simulation.remarks import Kind, Remark, lines
 from robot_dyn.simulation.setup import Setup
+from robot_dyn.simulation.stability import periods
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.trajectory import Ending, Outcome
 from robot_dyn.simulation.unstable_loop import unstable
@@ -31,8 +32,8 @@ def explained(outcome: Outcome, setup: Setup, remarks: Iterable[Remark]) -> Outc
         return outcome
     for remark in remarks:
         if remark.kind is Kind.UNSTABLE:
-            periods = outcome.t // setup.controller.period_s
-            if periods * log(remark.value) > log(_EXPLAINS):
+            elapsed = periods(outcome.t, setup.controller.period_s)
+            if elapsed * log(remark.value) > log(_EXPLAINS):
                 return replace(outcome, advice=lines([remark])[0])
     return outcome
 

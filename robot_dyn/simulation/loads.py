@@ -11,6 +11,7 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.effects.rigid_stops import RigidStops
 from robot_dyn.effects.wrench import ExternalWrench
 from robot_dyn.model.robot import Robot
+from robot_dyn.simulation.setup import Setup
 
 _FAR = 1e9  # a run that diverged has samples beyond any placement
 _BEFORE = 2.0**-22  # of its time, a switch's own past: apart from it in single precision too, which viewers keep
@@ -52,3 +53,10 @@ def at_stop(plant: Plant, q: np.ndarray) -> np.ndarray | None:
     soft = [(q < x.lower) | (q > x.upper) for x in plant.effects if isinstance(x, JointStopSpring)]
     rigid = [x.touched(q) != 0 for x in plant.effects if isinstance(x, RigidStops)]
     return np.any(soft + rigid, axis=0) if soft or rigid else None
+
+
+def frame_of(setup: Setup) -> dict[str, str]:
+    """The link whose motion is controlled, as a text of the run; nothing if it is that of the joints."""
+    if setup.controller is None or setup.controller.task_frame is None:
+        return {}
+    return {"frame": link_of(setup.plant.dynamics, setup.controller.task_frame)}

@@ -118,21 +118,21 @@ def _passed(names: tuple[str, ...], units: Units, visits: dict[Level, Visit]) ->
     for row, both in rows.items():
         quantity, joint = divmod(row, n)
         level, most = max(both, key=lambda each: abs(each[1].value - each[0].limit))
-        start, duration = min(x.start for _, x in both), sum(x.duration for _, x in both)
+        start = min(x.start for _, x in both)
+        duration = sum({level.limit: x.duration for level, x in both}.values())  # a limit of 0 is both sides of one
         unit = f" {units[joint][quantity]}".rstrip()
-        if level.kind is Kind.BEYOND:
-            text = f"{names[joint]} {most.value:.4g} of {level.limit:.4g}{unit} at {most.at:.4g} s"
-        else:
-            text = f"{names[joint]} for {duration:.3g} s from {start:.4g} s ({_size(level):.4g}{unit})"
+        far = f"{most.value:.4g} of {level.limit:.4g}{unit} at {most.at:.4g} s"
+        spent = f"for {duration:.3g} s from {start:.4g} s"
+        words = {
+            Kind.BEYOND: far,
+            Kind.STOP_REACHED: f"{far}, {spent}",
+            Kind.EFFORT_REACHED: f"{spent} ({abs(level.limit):.4g}{unit})",
+        }
+        text = f"{names[joint]} {words[level.kind]}"
         yield Remark(
             level.kind, names[joint], QUANTITIES[quantity], start, duration, most.at, most.value, level.limit, text,
             "nothing in the plant enforces them" if level.kind is Kind.BEYOND else "",
         )  # fmt: skip
-
-
-def _size(level: Level) -> float:
-    """The limit; without the sign of its side, if it is one of efforts."""
-    return abs(level.limit) if level.kind is Kind.EFFORT_REACHED else level.limit
 
 
 def _chatter(

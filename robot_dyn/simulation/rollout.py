@@ -26,6 +26,7 @@ from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.model.edits import Edits
 from robot_dyn.simulation.divergence import causes
+from robot_dyn.simulation.loads import frame_of
 from robot_dyn.simulation.machine.batch import LANES, Batch
 from robot_dyn.simulation.machine.making import machine
 from robot_dyn.simulation.machine.one_by_one import one_by_one
@@ -126,7 +127,8 @@ def rollouts(
         runs = _side_by_side(setup, q, v, sweep, recorded, most_bytes, at, threads, on_progress)
         if passed is not None and not cuts:
             runs = replace(runs, uncut=passed.names)
-    return replace(runs, about=edits_of_machine_code(setup) | runs.about, advice=causes(runs, setup, q, v))
+    about = frame_of(setup) | edits_of_machine_code(setup) | runs.about
+    return replace(runs, about=about, advice=causes(runs, setup, q, v))
 
 
 def _why_one_by_one(setup: Setup) -> str:
@@ -203,8 +205,9 @@ def _starts(
     sweep = {name: _values(setup, name, x) for name, x in params.items()}
     counts = {len(x) for x in (q, v, *sweep.values()) if x.ndim > 1} or {1}
     if len(counts) > 1 or max(q.ndim, v.ndim) > 2 or counts == {0}:
-        shapes = {"q0": q.shape, "v0": v.shape} | {name: x.shape for name, x in sweep.items()}
-        raise QueryError(f"starts and params must be of one number of runs, (B, {n}), got {shapes}")
+        shapes = {"q0": q.shape, "v0": v.shape} | {name: np.shape(x) for name, x in params.items()}
+        rows = f"starts ({n},) or (B, {n}), params (B,) or (B, …)"
+        raise QueryError(f"starts and params must be of one number of runs, B ≥ 1: {rows}; got {shapes}")
     B = counts.pop()
     q = np.broadcast_to(q, (B, n))
     if any(isinstance(each, RigidStops) for each in setup.plant.effects):

@@ -12,7 +12,9 @@ import numpy as np
 
 from robot_dyn import former
 from robot_dyn.errors import QueryError, escaped
+from robot_dyn.model.units import units
 from robot_dyn.simulation.observation import Observed
+from robot_dyn.simulation.origin import joint_types
 from robot_dyn.simulation.overview import Overview, of_some, overview
 from robot_dyn.simulation.remarks import Remark
 from robot_dyn.simulation.remarks import lines as said
@@ -21,15 +23,16 @@ from robot_dyn.simulation.trajectory import Ending, Outcome, Statistics, Traject
 from robot_dyn.validate import integer
 from robot_dyn.values import Value, read_only
 
-_SHARED = ("joint_names", "t", "statistics", "sources", "about", "setup", "uncut", "saved")  # by all runs
+_SHARED = ("joint_names", "t", "statistics", "sources", "about", "setup", "uncut", "saved", "numbers")  # by all runs
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Rollouts(Value):
-    """B runs, m samples of each. Samples after a run diverged are nan. What was not recorded is None.
+    """B runs, m samples of each. Samples after the end of a run are nan. What was not recorded is None.
 
-    `runs[i]` is the `Trajectory` of a run, `runs[i:j]` some of the runs; both copy no samples.
+    `runs[i]` is the `Trajectory` of a run, `runs[i:j]` some of the runs, numbered from 0; both copy no samples. The
+    state at an event that ends a run is not among its samples, which are at the same times in all runs.
 
     Attributes:
         joint_names: Of the n joints.
@@ -53,6 +56,8 @@ class Rollouts(Value):
         q0, v0: Starts, (B, n).
         observed: Extremes, limits passed and chatter of each run, over all steps; None in files of older versions.
         saved: Of runs that were read from a file; None for others.
+        numbers: Of a slice, the number of each run in the batch that was run, of which its noise is, (B,); None for
+            all runs of a batch, and for runs that were read from a file.
     """
 
     joint_names: tuple[str, ...]
@@ -79,6 +84,7 @@ class Rollouts(Value):
     v0: np.ndarray | None = None
     observed: Observed | None = None
     saved: Overview | None = None
+    numbers: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         read_only(self)
@@ -106,19 +112,26 @@ class Rollouts(Value):
         those on limits, stops and chatter.
 
         Raises:
-            QueryError: If q or v was not recorded, or `run` is neither a whole number nor a slice.
-            IndexError: If there is no such run.
+            QueryError: If q or v was not recorded, a slice has no runs, or `run` is neither a whole number nor a slice.
+            IndexError: If there is no run of that number.
         """
         from robot_dyn.simulation.rollout_run import trajectory
 
         if isinstance(run, slice):
-            some = replace(self, **{name: _taken(x, run) for name, x in self._by_run().items()}, saved=None)
-            whole = None if self.saved is None else of_some(some, range(len(self))[run], self.saved)
+            taken = range(len(self))[run]
+            if not taken:
+                raise QueryError(f"there is no run in {run}: runs are numbered from 0 to {len(self) - 1}")
+            numbers = np.arange(len(self)) if self.numbers is None else self.numbers
+            by_run = {name: _taken(x, run) for name, x in self._by_run().items()}
+            some = replace(self, **by_run, numbers=numbers[run], saved=None)
+            whole = None if self.saved is None else of_some(some, taken, self.saved)
             return replace(some, saved=whole)
         try:
             number = range(len(self))[index(run)]
         except TypeError:
             raise QueryError(f"runs are numbered: give a whole number or a slice, got {run!r}") from None
+        except IndexError:
+            raise IndexError(f"there is no run {run}: runs are numbered from 0 to {len(self) - 1}") from None
         return trajectory(self, number)
 
     def outcome(self, run: int) -> Outcome:
@@ -152,8 +165,8 @@ class Rollouts(Value):
     def remarks(self) -> tuple[Remark, ...]:
         """What `simulate` remarks on the limits, stops and chatter of each run, one of each kind, joint and quantity.
 
-        `Remark.runs` are the numbers of the runs that it is about, the worst first, whose values and text it has. A
-        sampled loop is linearised in one run alone, `worst`.
+        `Remark.runs` are the numbers of the runs that it is about: first the worst, whose values and text it has, then
+        the others in their order. A sampled loop is linearised in one run alone, `worst`.
         """
         return self.overview.remarks
 
@@ -174,24 +187,33 @@ class Rollouts(Value):
     @property
     def summary(self) -> str:
         """How many runs, how many ended before their time and why; remarks; tracking error; which run to look at."""
-        early = f"{int(self.diverged.sum())} diverged, {int(self.stopped.sum())} stopped"
-        lines = [f"{len(self)} runs of {len(self.t)} samples to t = {self.t[-1]:g} s; {early}"]
+        count = "1 run" if len(self) == 1 else f"{len(self)} runs"
+        lines = [f"{count} of {len(self.t)} samples to t = {self.t[-1]:g} s; {self._early()}"]
         if self.uncut:
             levels = ", ".join(self.uncut)
             lines.append(f"cuts=False: no step ends at {levels}, and a run that passes one is not that of simulate")
         if self.diverged.any():
             run = int(self.diverged.argmax())
             lines.append(f"run {run} diverged at t = {self.ended[run]:g} s; {self.advice[run]}")
-        lines += said(self.remarks) if self.observed is not None else ["between samples: not watched"]
+        counted = len(self) > 1
+        remarks = [each if counted else replace(each, runs=()) for each in self.remarks]
+        lines += said(remarks) if self.observed is not None else ["between samples: not watched"]
         errors = self.tracking_error
         if errors is not None and np.isfinite(errors).any():
             most = int(np.nanargmax(errors))
-            lines.append(
-                f"tracking error: {np.nanmedian(errors):.3e} rms in the median, {errors[most]:.3e} in run {most}"
-            )
+            what = "the frame [m]" if "frame" in self.about else f"q [{units('q', joint_types(self))}]"
+            largest = f" in the median, {errors[most]:.3e} in run {most}" if counted else ""
+            lines.append(f"tracking error of {what}: {np.nanmedian(errors):.3e} rms{largest}")
         again = "" if self.setup is None else f"; rd.simulate(runs.setup_of({self.worst})) repeats it by itself"
         lines.append(f"look at run {self.worst} first{again}")
         return "\n".join(escaped(line) for line in lines)
+
+    def _early(self) -> str:
+        """How many runs ended before their time, and why."""
+        at = f" by an interrupt, the first at t = {self.ended[self.stopped].min():g} s" if self.stopped.any() else ""
+        by_event = int((np.array([text != "" for text in self.advice]) & ~self.diverged).sum())
+        early = f"{int(self.diverged.sum())} diverged, {int(self.stopped.sum())} stopped{at}"
+        return early + (f", {by_event} ended by an event" if by_event else "")
 
     def _by_run(self) -> dict[str, Any]:
         return {each.name: getattr(self, each.name) for each in fields(self) if each.name not in _SHARED}

@@ -71,7 +71,8 @@ def setup_of(runs: Rollouts, setup: Setup, run: int) -> Setup:
         )
         setup = replace(setup, plant=plant, controller=controller)
     if setup.controller is not None:
-        setup = replace(setup, controller=setup.controller.of_run(run))
+        number = run if runs.numbers is None else int(runs.numbers[run])
+        setup = replace(setup, controller=setup.controller.of_run(number))
     return replace(
         setup,
         q0=setup.q0 if runs.q0 is None else runs.q0[run],

@@ -32,7 +32,7 @@ def save_rollouts(runs: Rollouts, path: str | Path) -> Path:
     """
     if not isinstance(runs, Rollouts):
         raise RunFileError(f"save_rollouts takes the Rollouts of rd.rollouts, got {type(runs).__name__}")
-    return write_whole(replace(runs, setup=None, saved=runs.overview), path, ROLLOUTS_FORMAT, _checked)
+    return write_whole(replace(runs, setup=None, numbers=None, saved=runs.overview), path, ROLLOUTS_FORMAT, _checked)
 
 
 def load_rollouts(path: str | Path, *, max_bytes: int = MAX_BYTES) -> Rollouts:

@@ -99,7 +99,8 @@ def read_whole(
     """Read what `write_whole` wrote; errors as of `load_run`."""
     path = file_path(path, RunFileError)
     max_bytes = integer("max_bytes", max_bytes, most=2**63 - 1, error=RunFileError)
-    with reading(path, RunFileError, f"write one with robot-dyn simulate … -o {path}") as stream:
+    writes = "rd.save_rollouts" if form == ROLLOUTS_FORMAT else f"robot-dyn simulate … -o {path}"
+    with reading(path, RunFileError, f"write one with {writes}") as stream:
         try:
             archive = Archive(stream)
             about, found = _about(archive)

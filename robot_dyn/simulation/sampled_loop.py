@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import inf
+from math import inf, log
 from typing import Any, final
 
 import numpy as np
@@ -83,12 +83,25 @@ class SampledLoop:
         Args:
             also: A period that is tried too.
         """
+        limit = first_unstable(lambda each: self.growth(each).verdict is Stability.UNSTABLE, self._tried(also))
+        return limit if limit == inf or self._crosses(limit) else 0.0
+
+    def adds_growth(self, period_s: float) -> bool:
+        """Whether deviations grow at least twice as fast as under control at all times, where they may grow, too."""
+        made = self.growth(period_s)
+        least = 2 * self.grows_anyway() * period_s * self.ticks
+        return made.verdict is Stability.UNSTABLE and log(made.factor) >= least
+
+    def longest_that_adds_none(self, also: float = 0.0) -> float:
+        """The period up to which sampling adds no growth, as of `adds_growth` and `longest_period`."""
+        return first_unstable(self.adds_growth, self._tried(also))
+
+    def _tried(self, also: float) -> list[float]:
+        """Periods at which limits are looked for, and another unless it is 0."""
         free, loop = np.linalg.eigvals(self.A), np.linalg.eigvals(self.continuous)
         rates = np.concatenate([free, loop])
         tried = lengths(rates, free) if self.stateless else lengths(rates, free, _LEAST_OF_STATES)
-        tried = sorted([*tried, also]) if also else tried
-        limit = first_unstable(lambda period: self.growth(period).verdict is Stability.UNSTABLE, tried)
-        return limit if limit == inf or self._crosses(limit) else 0.0
+        return sorted([*tried, also]) if also else tried
 
     def _crosses(self, limit: float) -> bool:
         """Whether growth begins at a limit; otherwise it is that of shorter periods, below what can be told."""

@@ -28,7 +28,7 @@ from robot_dyn.simulation.error import ErrorEstimate, no_estimate
 from robot_dyn.simulation.estimate import estimate
 from robot_dyn.simulation.event_run import AccumulationError, TooLongError
 from robot_dyn.simulation.imbalance import cause
-from robot_dyn.simulation.loads import at_stop, link_of, wrenches
+from robot_dyn.simulation.loads import at_stop, frame_of, wrenches
 from robot_dyn.simulation.observed import observer_of, remarks
 from robot_dyn.simulation.observer import Observer
 from robot_dyn.simulation.options import Options, setup_of, starts, takes_options
@@ -185,9 +185,7 @@ def _trajectory(
     desired, deviation = deviation_of(setup, t, q)
     power = dict(zip(equation.sources, P.T, strict=True))
     plant = setup.plant
-    names, about = plant.dynamics.joint_names, origin(plant.dynamics) | edits | setup.about
-    if setup.controller is not None and setup.controller.task_frame is not None:
-        about = {"frame": link_of(plant.dynamics, setup.controller.task_frame)} | about
+    names, about = plant.dynamics.joint_names, frame_of(setup) | origin(plant.dynamics) | edits | setup.about
     of_control = _of_control(setup, equation, record)
     outcome = explained(record.outcome, setup, of_control)
     return Trajectory(

@@ -68,7 +68,9 @@ def check_batch(setup: Setup, runs: int, numbers: int, most: float) -> None:
     """
     size = 8 * samples(setup) * runs * numbers
     if size > most:
-        raise too_large(f"{samples(setup):.3g} samples of {runs} runs", size, most, ", fewer runs, or record less")
+        raise too_large(
+            f"at most {samples(setup):.3g} samples of {runs} runs", size, most, ", fewer runs, or record less"
+        )
 
 
 def too_large(what: str, size: float, most: float, or_else: str = "") -> QueryError:
@@ -101,4 +103,4 @@ def samples(setup: Setup) -> float:
 
 
 def _gib(size: float) -> str:
-    return f"{size / 2**30:.1f} GiB"
+    return f"{size / 2**30:.3g} GiB"

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from enum import StrEnum
 from math import exp, inf, log
+from sys import float_info
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -126,12 +127,19 @@ def step_map(method: Any, J: Array, n: int) -> Callable[[float], Array]:
 
 
 def after(factor: float, times: float) -> float:
-    """factor^times, at most 1e299."""
+    """factor^times, at most e^690 = 4.6e299."""
     return exp(min(times * log(factor), _LARGEST)) if factor > 0 and times else float(not times)
 
 
+def periods(duration_s: float, period_s: float) -> int:
+    """Number of whole periods in a duration, each of which may be rounded."""
+    return int(duration_s / period_s * (1 + 4 * float_info.epsilon))
+
+
 def shown(factor: float) -> str:
-    """A factor in four digits, or as 1 and two digits."""
+    """A factor in four digits, or as 1 and two digits; as a bound if it is the largest that is told."""
+    if factor >= exp(_LARGEST):
+        return "more than 1e+299"
     return f"1 + {factor - 1:.2g}" if 0 < factor - 1 < _BAND else f"{factor:.4g}"
 
 

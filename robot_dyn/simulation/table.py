@@ -26,9 +26,9 @@ Column = tuple[str, np.ndarray]  # heading, and a number for each row
 def export_csv(run: Trajectory | Rollouts, path: str | Path) -> Path:
     """Write a row for each sample of a trajectory, or for each run of a batch, to `path`, whole or not at all.
 
-    A row of a run has its parameters, its end, its tracking error in [rad] or [m], what its remarks are about, and the
-    extremes of q, v and u. Another table of the same kind under that name is replaced; a file of another kind is not.
-    The suffix .csv is added if the path has none.
+    A row of a run has its parameters, its start, its end, its tracking error in [rad] or [m], what its remarks are
+    about, and the extremes of q, v and u. Another table of the same kind under that name is replaced; a file of another
+    kind is not. The suffix .csv is added if the path has none.
 
     Raises:
         RunFileError: If it cannot be written.
@@ -62,6 +62,10 @@ def _of_runs(runs: Rollouts) -> Iterator[Column]:
     for name, values in runs.params.items():
         numbered = values.shape[1] > 1
         yield from ((f"{name} {k + 1}" if numbered else name, x) for k, x in enumerate(values.T))
+    types = dict(zip(runs.joint_names, joint_types(runs), strict=True))
+    for key, start in (("q", runs.q0), ("v", runs.v0)):
+        columns = () if start is None else zip(types.items(), start.T, strict=True)
+        yield from ((f"start {key} {name} [{unit(key, kind)}]", x) for (name, kind), x in columns)
     yield "ended [s]", runs.ended
     yield "outcome", np.array([runs.outcome(i).ending.value for i in range(len(runs))])
     yield "steps", runs.steps
@@ -71,7 +75,6 @@ def _of_runs(runs: Rollouts) -> Iterator[Column]:
     yield "remarks", np.array(["; ".join(text for of, text in about if i in of) for i in range(len(runs))])
     if runs.observed is None:
         return
-    types = dict(zip(runs.joint_names, joint_types(runs), strict=True))
     for row, key in enumerate(("q", "v", "u")):
         for joint, (name, kind) in enumerate(types.items()):
             for side, least in enumerate(("least", "largest")):

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 # Residuals, as parts of the energy exchanged. Over 150 random scenes they were at most 10 times the estimated error of
 # q, as a part of the motion; one that is far larger contradicts the estimate.
 _CONTRADICTS, _ROUNDING = 100.0, 1e-12
-_NOT_ESTIMATED = ("not estimated (estimate_error is False)", "not estimated (the run was stopped)")
 _TOLD = 3  # events in a summary
 _NOTICED = 0.01  # [s]: shorter times are not worth a word
 
@@ -243,6 +242,13 @@ class Trajectory(Value):
         return proof.digits_of(self.t, self.q)
 
     @property
+    def _not_estimated(self) -> str:
+        """That its error was not estimated, and why."""
+        if self.outcome.ending is Ending.STOPPED:
+            return "not estimated (the run was stopped)"
+        return f"not estimated ({'a run of rollouts' if 'run' in self.about else 'estimate_error is False'})"
+
+    @property
     def summary(self) -> str:
         """A few lines: outcome, what acted, ledger, error, tracking, cost."""
         from robot_dyn.simulation.origin import joint_types
@@ -255,7 +261,7 @@ class Trajectory(Value):
             *([] if self.acting is None else [f"effects: {', '.join(self.acting) or 'none'}"]),
             *([f"right angles, in machine code: {self.about['right_angles']}"] if "right_angles" in self.about else []),
             f"energy ledger: {residual}" + _after(self.leak) if ledger.known else "energy ledger: was not recorded",
-            f"error of q [{unit}]: {self.error or _NOT_ESTIMATED[self.outcome.ending is Ending.STOPPED]}",
+            f"error of q [{unit}]: {self.error or self._not_estimated}",
         ]
         lines += [] if self.accuracy is None else [f"accuracy: {self.accuracy}"]
         lines += ["between samples: not watched"] if self.extremes is None else []

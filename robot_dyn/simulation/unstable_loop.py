@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
-from math import log
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +16,7 @@ from robot_dyn.errors import RobotDynError
 from robot_dyn.simulation.remarks import Kind, Remark
 from robot_dyn.simulation.sampled_loop import SampledLoop, linearised, remedy
 from robot_dyn.simulation.setup import Setup
-from robot_dyn.simulation.stability import Stability, after, below, shown
+from robot_dyn.simulation.stability import after, below, periods, shown
 from robot_dyn.simulation.state_equation import StateEquation
 
 
@@ -49,7 +49,12 @@ class Growing(NamedTuple):
         """What to do about it."""
         if limit := self.loop.longest_period(period_s):
             return f"the loop is stable up to {limit:.3g} s: take period_s={below(limit)}, or lower gains"
-        return f"so it is with every period: take {remedy(self.loop.grows_anyway())}"
+        anyway = self.loop.grows_anyway()
+        limit = self.loop.longest_that_adds_none(period_s) if anyway else 0.0
+        if 0 < limit < inf:
+            slower = f"under control at all times they grow, too, at {anyway:.3g} per second"
+            return f"{slower}; sampling adds to that beyond {limit:.3g} s: take period_s={below(limit)}, or lower gains"
+        return f"so it is with every period: take {remedy(anyway)}"
 
 
 def growing(setup: Setup, equation: StateEquation, t: float, y: np.ndarray) -> Growing | None:
@@ -66,9 +71,9 @@ def growing(setup: Setup, equation: StateEquation, t: float, y: np.ndarray) -> G
     x = np.concatenate([y[: 2 * n], z, y[first : first + motion.state_size]])
     with suppress(RobotDynError, np.linalg.LinAlgError, ValueError), np.errstate(all="ignore"):  # too far out
         loop = linearised(setup.plant, controller, t, x)
-        factor = loop.factor(period)
-        if loop.growth(period).verdict is not Stability.UNSTABLE or log(factor) < 2 * loop.grows_anyway() * period:
+        if not loop.adds_growth(period):
             return None
+        factor = loop.factor(period)
         values, vectors = np.linalg.eig(loop.matrix(period))
         worst = vectors[:, int(np.argmax(np.abs(values)))]
         part = np.abs(worst[:n]) + period * np.abs(worst[n : 2 * n])
@@ -81,6 +86,6 @@ def _remark(setup: Setup, found: Growing) -> Remark:
     period, joint, t = setup.controller.period_s, found.joint, found.t
     text = (
         f"{joint} by {shown(found.factor)} in each period of {period:.4g} s about the state at {t:.4g} s, by"
-        f" {shown(after(found.factor, setup.duration_s // period))} over the run"
+        f" {shown(after(found.factor, periods(setup.duration_s, period)))} over the run"
     )
     return Remark(Kind.UNSTABLE, joint, "q", t, 0.0, t, found.factor, 1.0, text, found.remedy(period))

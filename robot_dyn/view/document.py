@@ -73,7 +73,7 @@ def document(
         QueryError: If it carries no robot, or no robot has the frame.
     """
     for run in runs:
-        instance("run", run, Trajectory, "give the trajectory of rd.simulate")
+        instance("run", run, Trajectory, "give the trajectory of rd.simulate, or a run of rollouts, as runs[0]")
     package_dirs, inertia = searched(package_dirs), truth("inertia", inertia)
     instance("frame", frame, str | None, "give the name of a link, or None")
     shown = [_shown(number, run, len(runs), package_dirs, inertia) for number, run in enumerate(runs)]

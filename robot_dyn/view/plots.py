@@ -196,7 +196,7 @@ def plot(
         QueryError: If a plot, a joint or a theme is unknown, or the limits have another shape.
         PlotError: If the run has no samples, too many joints, or not what an asked plot shows.
     """
-    instance("run", run, Trajectory, "give the trajectory of rd.simulate")
+    instance("run", run, Trajectory, "give the trajectory of rd.simulate, or a run of rollouts, as runs[0]")
     instance("only", only, Collection | None, "give names of joints")
     for kind, known, asked in (("plot", PLOTS, names), ("theme", THEMES, (theme,)), ("joint", run.joint_names, only)):
         for name in () if asked is None else asked:

@@ -139,8 +139,10 @@ def one_by_one(
     t = max((each.t for each in runs.made if each is not None), key=len, default=np.zeros(1))
     kept = {name: np.full((B, len(t), sizes[name]), np.nan) for name in recorded}
     for i, each in enumerate(runs.made):
-        for name, x in ({} if each is None else each.columns).items():
-            kept[name][i, : len(x)] = x
+        start = {"q": q0[i : i + 1], "v": v0[i : i + 1]}  # of a run that was not begun
+        for name, x in (start if each is None else each.columns).items():
+            if name in kept:
+                kept[name][i, : len(x)] = x
     outcomes = [Outcome(Ending.STOPPED, 0.0) if each is None else each.outcome for each in runs.made]
     steps = np.array([0 if each is None else each.steps for each in runs.made], np.int64)
     evaluations = np.array([0 if each is None else each.evaluations for each in runs.made], np.int64)
