@@ -45,6 +45,7 @@ _REASONS = {
     Why.GAINED: "energy grows without a source",
     Why.NOT_FOUND: "the stages of a step are not found",
 }
+_INSTANTS = 200  # at least, or every step, at which an actuation that changes between ticks is observed
 _LARGEST = 1e100  # of Σ |y|: beyond it products overflow
 
 
@@ -69,7 +70,11 @@ class Batch:
         tiles = -(-len(self.y) // LANES)
         width, more = tiles * LANES, sum({"u": n, "v": n, "energy": 2}[name] for name in kept)
         check_batch(setup, len(self.y), len(self.columns) + more, most)
-        self.plan = plan_of(setup)
+        self.plan, self.apart = plan_of(setup), 0
+        steps = int(self.plan.counts[:-1].sum())
+        if "actuation" in machine.equations.programs:
+            self.apart = 1 if equation.sampled else max(1, steps // _INSTANTS)
+        self.instants = steps // self.apart if self.apart > 1 else 0
         most = samples_at_most(setup, self.plan.counts)
         self.out_y, self.made = np.empty((most, len(self.columns), width)), np.empty((most, more, width))
         self.observations: list[Observation] = [NOTHING] * tiles
@@ -135,13 +140,10 @@ class Batch:
     def _observation(self, tile: int, runs: Runs) -> Observation:
         """What is observed of a tile, before its first step."""
         numbers, equation, n = self._numbers(tile), self.machine.equation, self.machine.equation.plant.dynamics.n
-        functions, u = self.machine.in_python, np.full((equation.size + n, LANES), np.nan)
+        u = np.full((n, LANES), np.nan)
         if not equation.sampled:  # at a tick it becomes known
-            function = functions.rate or functions.actuation
-            function(0.0, runs.y, self.plan.parameters[0], runs.own, u if functions.rate else u[equation.size :])
-        return observation_of(
-            np.vstack([self.q0[numbers].T, self.v0[numbers].T, u[equation.size :]]), self.levels.of_runs(numbers)
-        )
+            self.machine.in_python.actuation(0.0, runs.y, self.plan.parameters[0], runs.own, u)
+        return observation_of(np.vstack([self.q0[numbers].T, self.v0[numbers].T, u]), self.levels.of_runs(numbers))
 
     def _runs(self, tile: int) -> Runs:
         """The runs of a tile at their start; a tile that is not full repeats a run."""
@@ -159,7 +161,7 @@ class Batch:
         method = cast(PlainMethod, self.setup.integrator)
         advance = self.machine.advance()
         assert advance is not None
-        rows = (equation.size + n) | 1  # odd: stages a power of two apart would share the sets of a cache
+        rows = equation.size | 1  # odd: stages a power of two apart would share the sets of a cache
         stepper = method.stepper(FLOAT64, equation.size, n, rows, LANES)
         functions, now = self.machine.equations.functions, np.zeros(len(Now), dtype=np.int64)
         now[Now.BUDGET] = np.iinfo(np.int64).max
@@ -168,11 +170,11 @@ class Batch:
             np.array(self.columns, np.int64), np.empty((len(self.out_y), 2), np.int64), self.out_y, self.made,
             np.empty((0, equation.size + 2)), np.empty((1 + 3 * n, 0)), self.observations[tile],
         )  # fmt: skip
-        rules = rules_of(equation, False, _LARGEST, base=own.start)
+        rules = rules_of(equation, False, _LARGEST, base=own.start, apart=self.apart)
         work = stepper.work
         if self.thresholds is not None:
             positions = 0 if equation.canonical else n
-            switches = self.thresholds.lanes(self._numbers(tile), equation.size + n, positions)
+            switches = self.thresholds.lanes(self._numbers(tile), equation.size, positions)
             self.until[own] = switches.until
             work = Detecting(work, work.K, switches._replace(until=self.until[own]))
         ended = advance(
@@ -223,7 +225,7 @@ class Batch:
             equation.plant.dynamics.joint_names, t, q, v if "v" in self.recorded else None, made.get("u"), K, V, named,
             ended, diverged, stopped, tuple(advice), steps, evaluations, self._statistics(), tuple(equation.sources),
             origin(self.setup.plant.dynamics) | self.setup.about, dict(self.values), self._compiled(),
-            (), self.q0, self.v0, observed(self.observations, self.levels, alone)[:B],
+            (), self.q0, self.v0, observed(self.observations, self.levels, alone, self.instants)[:B],
         )  # fmt: skip
 
     def _compiled(self) -> Setup:
