@@ -208,7 +208,8 @@ INSTEAD: Mapping[Any, Callable[..., Any]] = MappingProxyType(
     {
         **OPERATIONS, primitives.evaluate: evaluation, primitives.copy: copying, primitives.subtract: subtraction,
         primitives.combination: combination, primitives.sizes: sizes, primitives.norm: norm,
-        primitives.enclose: enclosure, primitives.between: between, primitives.settle: settle, primitives.factor: factor, primitives.solve: solve,
+        primitives.enclose: enclosure, primitives.between: between, primitives.settle: settle,
+        primitives.factor: factor, primitives.solve: solve,
         **{each: each for each in (larger, eliminate, take_off)},
     }
 )  # fmt: skip

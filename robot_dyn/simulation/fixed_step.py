@@ -230,8 +230,9 @@ def runs_of(equation: StateEquation, y: np.ndarray, own: np.ndarray, made: int, 
     keys = np.array([np.full(W, seed, np.uint64), np.uint64(run) + numbers.astype(np.uint64)])
     return Runs(
         np.array(y, order="C"), np.array(own, order="C"), np.empty((m, W)), np.empty((made, W)),
-        np.empty((held + states, W)), np.empty((equation.plant.dynamics.n, W)), np.empty((2, W)), np.empty(W), np.zeros(W, np.int64), np.ones(W, np.int64),
-        np.zeros(W, np.int64), np.zeros(W), np.zeros((m, W)), np.zeros(W), np.ones(W), np.zeros(W), keys,
+        np.empty((held + states, W)), np.empty((equation.plant.dynamics.n, W)), np.empty((2, W)), np.empty(W),
+        np.zeros(W, np.int64), np.ones(W, np.int64), np.zeros(W, np.int64), np.zeros(W), np.zeros((m, W)),
+        np.zeros(W), np.ones(W), np.zeros(W), keys,
     )  # fmt: skip
 
 
