@@ -15,7 +15,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.integrate.primitives import enclose
-from robot_dyn.simulation.chatter import Chatter, Episode, chatter_of, close_all, tick
+from robot_dyn.simulation.chatter import Chatter, Episode, chatters_of, close_all, tick
 from robot_dyn.simulation.levels import Level, Levels
 from robot_dyn.values import Value, read_only
 
@@ -48,18 +48,33 @@ class Observation(NamedTuple):
 
 def observation_of(start: Array, levels: Levels) -> Observation:
     """Of W runs that have not begun, from q, v, u at 0 s, (3n, W); nan where u is not known before the first tick."""
-    rows, W = start.shape
+    (of,) = observations_of(start, levels, 1)
+    return of
+
+
+def observations_of(start: Array, levels: Levels, tiles: int) -> list[Observation]:
+    """As of `observation_of`, of runs in tiles of one size, each of which is in lock step."""
+    rows, W = start.shape[0], start.shape[1] // tiles
+
+    def tiled(x: Array) -> Array:
+        """(…, runs) as (tiles, …, W)."""
+        return np.ascontiguousarray(np.moveaxis(x.reshape(*x.shape[:-1], tiles, W), -2, 0))
+
     of = np.array([each.row for each in levels.levels], np.int64)
-    sides, bounds = np.array([float(each.side) for each in levels.levels]), np.ascontiguousarray(levels.bounds)
-    inner, up = np.repeat([[-np.inf], [np.inf]], rows, axis=1), sides > 0
-    np.fmax.at(inner[0], of[~up], np.fmax.reduce(bounds[~up], axis=1, initial=-np.inf))
-    np.fmin.at(inner[1], of[up], np.fmin.reduce(bounds[up], axis=1, initial=np.inf))
-    visits = np.full((4, len(bounds), W), np.nan)
-    beyond = sides[:, None] * (start[of] - bounds) > 0
-    visits[:3, beyond], visits[3, beyond] = 0.0, start[of][beyond]
-    low, high = (np.where(np.isnan(start), none, start) for none in (np.inf, -np.inf))
-    first = np.searchsorted(of, np.arange(rows + 1))
-    return Observation(low, high, inner, first, sides, bounds, visits, chatter_of(rows // 3, W), np.zeros(1))
+    sides = np.array([float(each.side) for each in levels.levels])
+    bounds, x, up = tiled(levels.bounds), tiled(start[of]), sides > 0
+    inner = np.tile([[-np.inf], [np.inf]], (tiles, 1, rows))
+    np.fmax.at(inner[:, 0].T, of[~up], np.fmax.reduce(bounds[:, ~up], axis=2, initial=-np.inf).T)
+    np.fmin.at(inner[:, 1].T, of[up], np.fmin.reduce(bounds[:, up], axis=2, initial=np.inf).T)
+    beyond = sides[:, None] * (x - bounds) > 0
+    visits = np.stack([*[np.where(beyond, 0.0, np.nan)] * 3, np.where(beyond, x, np.nan)], axis=1)
+    low, high = (tiled(np.where(np.isnan(start), none, start)) for none in (np.inf, -np.inf))
+    first, latest = np.searchsorted(of, np.arange(rows + 1)), np.zeros((tiles, 1))
+    chatters = chatters_of(rows // 3, W, tiles)
+    return [
+        Observation(low[k], high[k], inner[k], first, sides, bounds[k], visits[k], chatters[k], latest[k])
+        for k in range(tiles)
+    ]
 
 
 NOTHING = observation_of(np.empty((3, 0)), Levels((), *np.empty((2, 0, 0))))  # of no run: nothing is observed
@@ -190,14 +205,14 @@ def observed(
     for run, part in again.items():
         for array, x in zip(arrays, _results(part), strict=True):
             array[..., run] = x[..., 0]
-    extremes, visits, episodes = arrays
+    low, high, visits, episodes = arrays
+    extremes = np.stack([low, high]).reshape(2, 3, len(low) // 3, -1).transpose(3, 1, 0, 2)
     extremes[np.isinf(extremes)] = np.nan
-    number = np.full(extremes.shape[-1], instants, np.int64)
+    number = np.full(len(extremes), instants, np.int64)
     number[list(again)] = 0
-    return Observed(np.moveaxis(extremes, -1, 0), number, levels.levels, levels.limits.T, visits.T, episodes.T)
+    return Observed(extremes, number, levels.levels, levels.limits.T, visits.T, episodes.T)
 
 
-def _results(of: Observation) -> tuple[Array, Array, Array]:
-    """Extremes (3, 2, n, W), visits and episodes."""
-    shape = 3, of.low.shape[0] // 3, of.low.shape[1]
-    return np.stack([of.low.reshape(shape), of.high.reshape(shape)], axis=1), of.visits, of.chatter.episodes
+def _results(of: Observation) -> tuple[Array, ...]:
+    """Low, high, visits and episodes."""
+    return of.low, of.high, of.visits, of.chatter.episodes

@@ -213,6 +213,8 @@ def time_loop(step: Callable[..., int]) -> Callable[..., int]:
         last = len(plan.counts) - 1
         if not rules.alone:
             own_energy(functions, runs, plan.parameters[0])
+            if rules.apart > 0 and rules.held == 0:
+                show_actuation(functions, runs, records.observation, 0.0, plan.parameters[0], False)
         while now[Now.SEGMENT] <= last:
             s = now[Now.SEGMENT]
             start, h, p = plan.starts[s], plan.lengths[s], plan.parameters[s]

@@ -27,7 +27,7 @@ from robot_dyn.simulation.machine.machine import Machine
 from robot_dyn.simulation.machine.one_by_one import OneByOne, Single, said
 from robot_dyn.simulation.machine.pool import in_threads
 from robot_dyn.simulation.machine.thresholds import Thresholds
-from robot_dyn.simulation.observation import NOTHING, Observation, observation_of, observed
+from robot_dyn.simulation.observation import observations_of, observed
 from robot_dyn.simulation.origin import origin
 from robot_dyn.simulation.plan import plan_of
 from robot_dyn.simulation.rollout_result import Rollouts
@@ -77,7 +77,9 @@ class Batch:
         self.instants = steps // self.apart if self.apart > 1 else 0
         most = samples_at_most(setup, self.plan.counts)
         self.out_y, self.made = np.empty((most, len(self.columns), width)), np.empty((most, more, width))
-        self.observations: list[Observation] = [NOTHING] * tiles
+        numbers = np.minimum(np.arange(width), len(self.y) - 1)
+        start = np.vstack([q0[numbers].T, v0[numbers].T, np.full((n, width), np.nan)])
+        self.observations = observations_of(start, self.levels.of_runs(numbers), tiles)
         self.place = np.zeros((0, 2), np.int64)  # segment and step of each sample, of the tile that has most
         self.lock = threading.Lock()
         self.unfinished = np.ones(tiles, dtype=bool)
@@ -137,14 +139,6 @@ class Batch:
                     array[:rows, :, run] = np.hstack([*(single.columns[name] for name in of), np.empty((rows, 0))])
             self.out_y[rows:, :, run], self.made[rows:, :, run] = np.nan, np.nan
 
-    def _observation(self, tile: int, runs: Runs) -> Observation:
-        """What is observed of a tile, before its first step."""
-        numbers, equation, n = self._numbers(tile), self.machine.equation, self.machine.equation.plant.dynamics.n
-        u = np.full((n, LANES), np.nan)
-        if not equation.sampled:  # at a tick it becomes known
-            self.machine.in_python.actuation(0.0, runs.y, self.plan.parameters[0], runs.own, u)
-        return observation_of(np.vstack([self.q0[numbers].T, self.v0[numbers].T, u]), self.levels.of_runs(numbers))
-
     def _runs(self, tile: int) -> Runs:
         """The runs of a tile at their start; a tile that is not full repeats a run."""
         equation, index = self.machine.equation, self._numbers(tile)
@@ -165,7 +159,6 @@ class Batch:
         stepper = method.stepper(FLOAT64, equation.size, n, rows, LANES)
         functions, now = self.machine.equations.functions, np.zeros(len(Now), dtype=np.int64)
         now[Now.BUDGET] = np.iinfo(np.int64).max
-        self.observations[tile] = self._observation(tile, runs)
         records = Records(
             np.array(self.columns, np.int64), np.empty((len(self.out_y), 2), np.int64), self.out_y, self.made,
             np.empty((0, equation.size + 2)), np.empty((1 + 3 * n, 0)), self.observations[tile],
