@@ -55,6 +55,25 @@ def test_a_sliding_block_stops_within_a_step_of_where_it_must(engine: str) -> No
     assert run.power["dry_friction"][5] == pytest.approx(-f * run.v[5, 0], rel=1e-12)
 
 
+@pytest.mark.parametrize("period_s", [0.0, 0.02], ids=["continuous", "sampled"])
+def test_the_actuation_of_every_step_is_seen_by_both_engines(period_s: float) -> None:
+    """Its extremes are those of the samples at each tick, or at each step to O(h); machine code is as Python."""
+    plant = rd.Plant(ARM, [rd.DryFriction([0.5, 0.2]), rd.ViscousFriction([0.1, 0.1])])
+    control = rd.PD(rd.hold([0.4, -0.2]), [30.0, 20.0], [3.0, 2.0], period_s=period_s)
+    runs = [
+        rd.simulate(
+            plant, [0.9, 0.3], [0.4, -0.7], duration_s=0.4, step_s=1e-3, record_period_s=0.0, controller=control,
+            engine=engine, **FIXED,
+        )
+        for engine in ENGINES
+    ]  # fmt: skip
+    (least, largest), u = runs[0].extremes[2], runs[0].u[:-1]  # what is held from the end on is in no step
+    np.testing.assert_allclose(runs[1].extremes, runs[0].extremes, rtol=1e-9)
+    allowed = 0.0 if period_s else 0.2  # [N m], half a step at 300 N m/s
+    assert np.abs(least - u.min(axis=0)).max() <= allowed
+    assert np.abs(largest - u.max(axis=0)).max() <= allowed
+
+
 @pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
 def test_an_impact_turns_the_velocity_by_its_restitution(e: float) -> None:
     """A block thrown at a stop without friction: v⁺ = −e v, and the ledger has ½ (1 − e²) v²."""

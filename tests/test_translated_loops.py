@@ -36,6 +36,7 @@ Q0, V0 = np.array([0.31, -0.73]), np.array([0.9, -1.7])
 SAMPLED = rd.Loop(
     rd.PD(rd.hold([0.4, -0.2]), [9.0, 5.0], [0.7, 0.4], 0.03), actuation=rd.Noise(0.2), actuation_delay=0.5
 )  # fmt: skip
+CONTINUOUS = rd.PD(rd.hold([0.4, -0.2]), [9.0, 5.0], [0.7, 0.4])
 SMOOTH = [rd.ViscousFriction([0.3, 0.2]), rd.RegularisedCoulombFriction([0.2, 0.1], 0.05)]
 BOUNDED = [*rd.joint_stops([-0.5, -0.9], [0.6, 0.8], 900.0, 4.0), rd.ViscousFriction([0.1, 0.2])]
 BODY = rd.CarriedPayload(rd.Payload("tip", 0.3, (0.1, 0.0, 0.05)), 0.2, 0.4)
@@ -118,11 +119,11 @@ def test_modes_of_dry_friction_and_rigid_stops_give_the_same_bits() -> None:
     assert_same_bits((ours.runs, ours.stepper.work, ours.control), (theirs.runs, theirs.stepper.work, theirs.control))
 
 
-@pytest.mark.parametrize("name", PLAIN)
-def test_lanes_in_lock_step_give_the_same_bits(name: str) -> None:
-    """64 runs, of which some diverge, with ticks and samples; 100 steps."""
+@pytest.mark.parametrize(("name", "controller"), [*((name, SAMPLED) for name in PLAIN), ("rk4", CONTINUOUS)])
+def test_lanes_in_lock_step_give_the_same_bits(name: str, controller: rd.Controller) -> None:
+    """64 runs, of which some diverge, with ticks or with instants at every third step, and samples; 100 steps."""
     W, of = 64, method(name)
-    made = setup(SMOOTH, name, duration_s=0.2, step_s=0.002, controller=SAMPLED)
+    made = setup(SMOOTH, name, duration_s=0.2, step_s=0.002, controller=controller)
     equation = StateEquation(made.plant, made.controller, of.canonical)
     equation = equation if of.nonsmooth else equation.in_a_mode
     code = machine(equation, of, lanes=W, kept=("u", "energy"), jacobian=of.needs_jacobian, nonsmooth=of.nonsmooth)
@@ -131,11 +132,12 @@ def test_lanes_in_lock_step_give_the_same_bits(name: str) -> None:
     starts = np.stack([equation.start(q, v) for q, v in rng.normal(size=(W, 2, 2))]).T
     starts[n, 5] = 1e200  # overflows at once
     of_levels = levels(made.plant.dynamics, made.plant.effects, made.controller, W)
+    rules = rules_of(equation, False, 1e100, apart=0 if equation.sampled else 3)
     results = []
     for interpreted in (False, True):
         runs = runs_of(equation, starts, code.own({}), n + 2, np.arange(W))
-        stepper = of.stepper(FLOAT64, m, n, m + n, W)
-        for _, x in numbers((stepper.work, runs.made, runs.command, runs.energies, runs.size)):
+        stepper = of.stepper(FLOAT64, m, n, m, W)
+        for _, x in numbers((stepper.work, runs.made, runs.command, runs.u, runs.energies, runs.size)):
             x[...] = 0
         rows = samples_at_most(made, plan.counts)
         records = Records(
@@ -149,8 +151,8 @@ def test_lanes_in_lock_step_give_the_same_bits(name: str) -> None:
         functions = code.in_python if interpreted else code.equations.functions
         with np.errstate(all="ignore"):
             ended = advance(
-                functions, plan, runs, records, rules_of(equation, False, 1e100), stepper.coefficients, stepper.work,
-                now, clock, np.zeros(1, np.int64),
+                functions, plan, runs, records, rules, stepper.coefficients, stepper.work, now, clock,
+                np.zeros(1, np.int64),
             )  # fmt: skip
         assert ended == Ended.DONE
         results.append((runs, records, now, clock, stepper.work))

@@ -15,7 +15,7 @@ from llvmlite import ir
 
 from robot_dyn.compiled.llvm.vectors import Vectors
 from robot_dyn.compiled.loops import arrays, vectors
-from robot_dyn.compiled.loops.kinds import F64, FLOAT, INT
+from robot_dyn.compiled.loops.kinds import BOOL, F64, FLOAT, I8, INT
 from robot_dyn.compiled.loops.numbers import converted, scalar, truth
 from robot_dyn.compiled.loops.values import ArrayValue, Scalar, StaticValue, Value
 
@@ -73,16 +73,6 @@ def divide(x: Array, s: Any) -> None:
 def add_sizes(x: Array, y: Array) -> None:
     """X + |y| in place of x."""
     x += np.abs(y)
-
-
-def keep_least(x: Array, y: Array) -> None:
-    """The lesser of x and y in place of x, entry by entry; of nan the other."""
-    np.fmin(x, y, x)
-
-
-def keep_largest(x: Array, y: Array) -> None:
-    """The larger of x and y in place of x, entry by entry; of nan the other."""
-    np.fmax(x, y, x)
 
 
 @emits
@@ -193,13 +183,29 @@ def _with_size(b: Any, x: Any, y: Any) -> Any:
     return b.fadd(x, Vectors(b, F64, getattr(y.type, "count", 1)).intrinsic("fabs", y))
 
 
-def _kept(order: str) -> Callable[..., Any]:
-    """Y where it is in that order to x, or x is nan; else x."""
-
-    def rule(b: Any, x: Any, y: Any) -> Any:
-        return b.select(b.or_(b.fcmp_ordered(order, y, x), b.fcmp_unordered("uno", x, x)), y, x)
-
-    return rule
+@emits
+def enclosure(
+    f: Function, node: ast.AST, low: ArrayValue, high: ArrayValue, x: ArrayValue, least: Value, most: Value
+) -> Value:
+    """Low and high enclose x, and whether any entry of x is outside of two numbers; x is read once."""
+    for bound in (low, high):
+        vectors.check(f, node, bound, [x])
+    if f.silent:
+        return Scalar(BOOL, None)
+    b, (least, most) = f.builder, (converted(f, scalar(f, each, node), FLOAT, node) for each in (least, most))
+    with b.goto_entry_block():
+        found = b.alloca(I8)
+    b.store(ir.Constant(I8, 0), found)
+    for width, e in vectors.chunks(f, arrays.size(f, x), vectors.WIDTHS):
+        given, outside = vectors.loaded(b, x.data, e, width, FLOAT), []
+        for bound, order, limit in ((low, "<", least), (high, ">", most)):
+            known = vectors.loaded(b, bound.data, e, width, FLOAT)
+            farther = b.select(b.fcmp_ordered(order, given, known), given, known)
+            vectors.stored(b, farther, bound.data, e, width, FLOAT)
+            outside.append(b.fcmp_ordered(order, given, vectors.spread(b, limit.ir, width, FLOAT)))
+        bits = b.bitcast(b.or_(*outside), ir.IntType(width))
+        b.store(b.or_(b.load(found), bits if width == 8 else b.zext(bits, I8)), found)
+    return Scalar(BOOL, b.icmp_unsigned("!=", b.load(found), ir.Constant(I8, 0)))
 
 
 subtraction = _in_place(lambda b, x, y: b.fsub(x, y))
@@ -209,6 +215,5 @@ OPERATIONS: Mapping[Any, Callable[..., Value]] = MappingProxyType(
         subtract_multiple: _in_place(lambda b, x, y, s: b.fsub(x, b.fmul(y, s))),
         subtract_product: _in_place(lambda b, x, y, z: b.fsub(x, b.fmul(y, z))),
         divide: _in_place(lambda b, x, s: b.fdiv(x, s)), add_sizes: _in_place(_with_size),
-        keep_least: _in_place(_kept("<")), keep_largest: _in_place(_kept(">")),
     }
 )  # fmt: skip

@@ -17,9 +17,8 @@ from robot_dyn.compiled.array_operations import (
     add_sizes,
     copying,
     divide,
+    enclosure,
     evaluation,
-    keep_largest,
-    keep_least,
     part,
     require,
     subtract_multiple,
@@ -57,15 +56,6 @@ def sizes(x: Array, out: Array) -> None:
         out[b] = 0.0
     for e in range(len(x)):
         add_sizes(out, x[e])
-
-
-def enclose(low: Array, high: Array, first: int, x: Array) -> None:
-    """As of NumPy."""
-    start, W = first * x.shape[1], x.shape[1]
-    require(low.shape[1] == W and high.shape[1] == W and first >= 0, "bounds of other runs")
-    require(first + len(x) <= len(low) and first + len(x) <= len(high), "bounds of fewer rows")
-    keep_least(part(low, start, x.size), part(x, 0, x.size))
-    keep_largest(part(high, start, x.size), part(x, 0, x.size))
 
 
 def norm(x: Array, y: Array, after: Array, rtol: float, atol: float) -> float:
@@ -218,8 +208,8 @@ INSTEAD: Mapping[Any, Callable[..., Any]] = MappingProxyType(
     {
         **OPERATIONS, primitives.evaluate: evaluation, primitives.copy: copying, primitives.subtract: subtraction,
         primitives.combination: combination, primitives.sizes: sizes, primitives.norm: norm,
-        primitives.enclose: enclose,
-        primitives.between: between, primitives.settle: settle, primitives.factor: factor, primitives.solve: solve,
+        primitives.enclose: enclosure, primitives.between: between, primitives.settle: settle,
+        primitives.factor: factor, primitives.solve: solve,
         **{each: each for each in (larger, eliminate, take_off)},
     }
 )  # fmt: skip

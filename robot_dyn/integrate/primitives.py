@@ -56,11 +56,14 @@ def sizes(x: Array, out: Array) -> None:
         out += np.abs(row)
 
 
-def enclose(low: Array, high: Array, first: int, x: Array) -> None:
-    """Let low and high (r, W) from the row `first` on enclose x (n, W); of nan nothing is taken."""
-    rows = slice(first, first + len(x))
-    np.fmin(low[rows], x, low[rows])
-    np.fmax(high[rows], x, high[rows])
+def enclose(low: Array, high: Array, x: Array, least: float, most: float) -> bool:
+    """Let low and high (W,), neither nan, enclose x (W,); whether any of x is below `least` or above `most`.
+
+    A nan in x changes nothing.
+    """
+    np.fmin(low, x, low)
+    np.fmax(high, x, high)
+    return bool(((x < least) | (x > most)).any())
 
 
 def subtract(x: Array, y: Array) -> None:

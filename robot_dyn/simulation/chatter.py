@@ -55,10 +55,12 @@ class Chatter(NamedTuple):
     episodes: Array
 
 
-def chatter_of(n: int, W: int) -> Chatter:
-    """Of W runs before their first tick."""
-    u, going, count = np.full((3, n, W), np.nan), np.zeros(n, np.int64), np.zeros((n, W), np.int64)
-    return Chatter(np.zeros(1), np.zeros(1, np.int64), u, count, np.zeros((3, n, W)), going, np.zeros((3, n, W)))
+def chatters_of(n: int, W: int, tiles: int) -> list[Chatter]:
+    """Of so many times W runs before their first tick."""
+    t, ticks, going = np.zeros((tiles, 1)), np.zeros((tiles, 1), np.int64), np.zeros((tiles, n), np.int64)
+    u, count = np.full((tiles, 3, n, W), np.nan), np.zeros((tiles, n, W), np.int64)
+    streak, episodes = (np.zeros((tiles, 3, n, W)) for _ in range(2))
+    return [Chatter(t[k], ticks[k], u[k], count[k], streak[k], going[k], episodes[k]) for k in range(tiles)]
 
 
 def tick(of: Chatter, t: float, u: Array, low: Array, high: Array) -> None:
@@ -118,5 +120,5 @@ def close(of: Chatter, j: int, b: int) -> None:
 
 def close_all(of: Chatter) -> None:
     """No more ticks: what goes on has ended."""
-    for j, b in np.argwhere(of.count > 0):
+    for j, b in np.argwhere(of.count > 0) if of.ticks[0] else ():
         close(of, j, b)

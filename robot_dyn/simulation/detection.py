@@ -30,7 +30,7 @@ class LockStep(NamedTuple):
         positions: Number of positions, which y' has the accelerations of; 0 where y has momenta.
         levels: The level of each run, (K, W); inf where it has none.
         sides: 1 above its level, −1 below; 0 before the first step, (K, W).
-        rate, next_rate: y' and u at the start and at the end of a step, (m + n, W).
+        rate, next_rate: y' at the start and at the end of a step, (m, W).
         values, next_values: Those of the F functions there, (F, W).
         change: By how much they changed in the step before, (F, W).
         until: Start of the first step in which a run may pass a level; inf where it passes none, (W,), in [s].

@@ -211,14 +211,14 @@ class FixedStep(Followed):
 
 
 def rules_of(
-    equation: StateEquation, alone: bool, largest: float, every: int = 0, thin: int = 1, base: int = 0
+    equation: StateEquation, alone: bool, largest: float, every: int = 0, thin: int = 1, base: int = 0, apart: int = 0
 ) -> Rules:
     """The rules of a loop over a state equation."""
     n, controller = equation.plant.dynamics.n, equation.controller
     of = (1, 0, 0) if controller is None else (len(controller.instants), controller.acting_instant, controller.deviates)
     return Rules(
         n, len(equation.sources), equation.state_size, n if equation.sampled else 0, *of,
-        equation.canonical, alone, largest, every, thin, base,
+        equation.canonical, alone, largest, every, thin, base, apart,
     )  # fmt: skip
 
 
@@ -230,8 +230,9 @@ def runs_of(equation: StateEquation, y: np.ndarray, own: np.ndarray, made: int, 
     keys = np.array([np.full(W, seed, np.uint64), np.uint64(run) + numbers.astype(np.uint64)])
     return Runs(
         np.array(y, order="C"), np.array(own, order="C"), np.empty((m, W)), np.empty((made, W)),
-        np.empty((held + states, W)), np.empty((2, W)), np.empty(W), np.zeros(W, np.int64), np.ones(W, np.int64),
-        np.zeros(W, np.int64), np.zeros(W), np.zeros((m, W)), np.zeros(W), np.ones(W), np.zeros(W), keys,
+        np.empty((held + states, W)), np.empty((equation.plant.dynamics.n, W)), np.empty((2, W)), np.empty(W),
+        np.zeros(W, np.int64), np.ones(W, np.int64), np.zeros(W, np.int64), np.zeros(W), np.zeros((m, W)),
+        np.zeros(W), np.ones(W), np.zeros(W), keys,
     )  # fmt: skip
 
 

@@ -63,7 +63,8 @@ def levels(dynamics: Any, effects: Iterable[Effect], controller: Controller | No
     """All levels of a plant under a controller, whose coefficients may be arrays over W runs, (W, n) or (W, 1)."""
     n, found = dynamics.n, []
     for kind, row, side, bounds, part in _bounds(dynamics, tuple(effects), controller):
-        for joint, limits in enumerate(np.broadcast_to(bounds, (W, n)).T):
+        some = np.atleast_2d(bounds)
+        for joint, limits in enumerate(np.broadcast_to(some, (len(some), n)).T):
             known = np.abs(limits) < _NONE
             if known.any():
                 limits = np.where(known, limits, np.nan)
@@ -72,8 +73,9 @@ def levels(dynamics: Any, effects: Iterable[Effect], controller: Controller | No
                 found.append((level, limits, side * slack + limits))
     if not found:
         return Levels((), np.empty((0, W)), np.empty((0, W)))
-    of, limits, bounds = zip(*sorted(found, key=lambda each: each[0].row), strict=True)
-    return Levels(of, np.array(limits), np.array(bounds))
+    of, *arrays = zip(*sorted(found, key=lambda each: each[0].row), strict=True)
+    limits, bounds = (np.array([np.broadcast_to(x, W) for x in each]) for each in arrays)
+    return Levels(of, limits, bounds)
 
 
 def _bounds(

@@ -76,6 +76,7 @@ OF_ROLLOUTS: Mapping[str, Member] = MappingProxyType(
         "q0": Member(("B", "n")),
         "v0": Member(("B", "n")),
         "observed/extremes": Member(("B", 3, 2, "n"), finite=False),
+        "observed/instants": Member(("B",), "int64"),
         "observed/limits": Member(("B", "L"), finite=False),
         "observed/visits": Member(("B", "L", 4), finite=False),
         "observed/episodes": Member(("B", "n", 3)),

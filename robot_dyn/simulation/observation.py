@@ -1,4 +1,4 @@
-"""What is observed at the end of every step: extremes of q, v and u, the time beyond levels, and chatter.
+"""What is observed of a run: extremes of q, v and u, the time beyond levels, and chatter.
 
 Plain functions of arrays over rows q, v, u and runs, (3n, W), as both time loops call them: for one run, or W in lock
 step. A run of which a number is nan has ended: nothing of it is taken.
@@ -15,7 +15,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.integrate.primitives import enclose
-from robot_dyn.simulation.chatter import Chatter, Episode, chatter_of, close_all, tick
+from robot_dyn.simulation.chatter import Chatter, Episode, chatters_of, close_all, tick
 from robot_dyn.simulation.levels import Level, Levels
 from robot_dyn.values import Value, read_only
 
@@ -32,6 +32,7 @@ class Observation(NamedTuple):
         sides, bounds: Of levels, (L,) and (L, W).
         visits: Start, duration, time and value farthest beyond a level, (4, L, W); nan where a run never was.
         chatter: Of u.
+        latest: The latest instant at which u was observed by itself, (1,), in [s].
     """
 
     low: Array
@@ -42,22 +43,38 @@ class Observation(NamedTuple):
     bounds: Array
     visits: Array
     chatter: Chatter
+    latest: Array
 
 
 def observation_of(start: Array, levels: Levels) -> Observation:
     """Of W runs that have not begun, from q, v, u at 0 s, (3n, W); nan where u is not known before the first tick."""
-    rows, W = start.shape
+    (of,) = observations_of(start, levels, 1)
+    return of
+
+
+def observations_of(start: Array, levels: Levels, tiles: int) -> list[Observation]:
+    """As of `observation_of`, of runs in tiles of one size, each of which is in lock step."""
+    rows, W = start.shape[0], start.shape[1] // tiles
+
+    def tiled(x: Array) -> Array:
+        """(…, runs) as (tiles, …, W)."""
+        return np.ascontiguousarray(np.moveaxis(x.reshape(*x.shape[:-1], tiles, W), -2, 0))
+
     of = np.array([each.row for each in levels.levels], np.int64)
-    sides, bounds = np.array([float(each.side) for each in levels.levels]), np.ascontiguousarray(levels.bounds)
-    inner, up = np.repeat([[-np.inf], [np.inf]], rows, axis=1), sides > 0
-    np.fmax.at(inner[0], of[~up], np.fmax.reduce(bounds[~up], axis=1, initial=-np.inf))
-    np.fmin.at(inner[1], of[up], np.fmin.reduce(bounds[up], axis=1, initial=np.inf))
-    visits = np.full((4, len(bounds), W), np.nan)
-    beyond = sides[:, None] * (start[of] - bounds) > 0
-    visits[:3, beyond], visits[3, beyond] = 0.0, start[of][beyond]
-    low, high = (np.where(np.isnan(start), none, start) for none in (np.inf, -np.inf))
-    first = np.searchsorted(of, np.arange(rows + 1))
-    return Observation(low, high, inner, first, sides, bounds, visits, chatter_of(rows // 3, W))
+    sides = np.array([float(each.side) for each in levels.levels])
+    bounds, x, up = tiled(levels.bounds), tiled(start[of]), sides > 0
+    inner = np.tile([[-np.inf], [np.inf]], (tiles, 1, rows))
+    np.fmax.at(inner[:, 0].T, of[~up], np.fmax.reduce(bounds[:, ~up], axis=2, initial=-np.inf).T)
+    np.fmin.at(inner[:, 1].T, of[up], np.fmin.reduce(bounds[:, up], axis=2, initial=np.inf).T)
+    beyond = sides[:, None] * (x - bounds) > 0
+    visits = np.stack([*[np.where(beyond, 0.0, np.nan)] * 3, np.where(beyond, x, np.nan)], axis=1)
+    low, high = (tiled(np.where(np.isnan(start), none, start)) for none in (np.inf, -np.inf))
+    first, latest = np.searchsorted(of, np.arange(rows + 1)), np.zeros((tiles, 1))
+    chatters = chatters_of(rows // 3, W, tiles)
+    return [
+        Observation(low[k], high[k], inner[k], first, sides, bounds[k], visits[k], chatters[k], latest[k])
+        for k in range(tiles)
+    ]
 
 
 NOTHING = observation_of(np.empty((3, 0)), Levels((), *np.empty((2, 0, 0))))  # of no run: nothing is observed
@@ -78,27 +95,32 @@ def observe(of: Observation, began: float, t: float, q: Array, v: Array, u: Arra
     n = len(u)
     if acted:
         tick(of.chatter, began, u, of.low[2 * n :], of.high[2 * n :])
-    look(of, 0, q, began, t, t)
-    look(of, n, v, began, t, t)
+    observe_motion(of, began, t, q, v)
     look(of, 2 * n, u, began, t, began)
+
+
+def observe_motion(of: Observation, began: float, t: float, q: Array, v: Array) -> None:
+    """A step from `began` to t, without its actuation; arguments as of `observe`."""
+    look(of, 0, q, began, t, t)
+    look(of, len(q), v, began, t, t)
+
+
+def observe_actuation(of: Observation, t: float, u: Array, acted: bool) -> None:
+    """The actuation (n, W) at an instant, which stands for the time since the one before."""
+    first = 2 * len(u)
+    if acted:
+        tick(of.chatter, of.latest[0], u, of.low[first:], of.high[first:])
+    look(of, first, u, of.latest[0], t, t)
+    of.latest[0] = t
 
 
 def look(of: Observation, first: int, x: Array, began: float, t: float, at: float) -> None:
     """Rows x (n, W) from the `first` on, which hold at a time in the step."""
-    enclose(of.low, of.high, first, x)
     for j in range(len(x)):
         row = first + j
-        if beyond(x[j], of.inner[0, row], of.inner[1, row]):
+        if enclose(of.low[row], of.high[row], x[j], of.inner[0, row], of.inner[1, row]):
             for k in range(of.first[row], of.first[row + 1]):
                 visit(of.visits[:, k], of.sides[k], of.bounds[k], x[j], began, t, at)
-
-
-def beyond(x: Array, low: float, high: float) -> bool:
-    """Whether any of x (W,) is."""
-    found = False
-    for b in range(len(x)):
-        found |= (x[b] < low) | (x[b] > high)
-    return found
 
 
 def visit(visits: Array, side: float, bounds: Array, x: Array, began: float, t: float, at: float) -> None:
@@ -130,6 +152,7 @@ class Observed(Value):
 
     Attributes:
         extremes: The least and the largest of q, v and u over all steps, (B, 3, 2, n); nan where u never was.
+        instants: Number of the instants at which, beside samples, u was observed, (B,); 0 where it was at every step.
         levels: L levels, in the order of rows, with the limits of the first run that has them.
         limits: As stated for each run, (B, L); nan where it has none.
         visits: Start, duration, time and value farthest beyond each level, (B, L, 4); nan where a run never was.
@@ -137,6 +160,7 @@ class Observed(Value):
     """
 
     extremes: np.ndarray
+    instants: np.ndarray
     levels: tuple[Level, ...]
     limits: np.ndarray
     visits: np.ndarray
@@ -147,7 +171,7 @@ class Observed(Value):
 
     def __getitem__(self, runs: slice) -> Observed:
         """Of some of the runs."""
-        taken = {name: getattr(self, name)[runs] for name in ("extremes", "limits", "visits", "episodes")}
+        taken = {name: getattr(self, name)[runs] for name in ("extremes", "instants", "limits", "visits", "episodes")}
         return replace(self, **taken)
 
     def visits_of(self, run: int) -> dict[Level, Visit]:
@@ -163,13 +187,16 @@ class Observed(Value):
         return {int(joint): Episode(*self.episodes[run, joint].tolist()) for joint in known}
 
 
-def observed(parts: Iterable[Observation], levels: Levels, again: Mapping[int, Observation] = _NONE) -> Observed:
+def observed(
+    parts: Iterable[Observation], levels: Levels, again: Mapping[int, Observation] = _NONE, instants: int = 0
+) -> Observed:
     """What was observed of runs that have ended.
 
     Args:
         parts: Of all runs, those of one after those of the other.
         levels: Of all runs.
         again: Of single runs, by number, in place of what `parts` have.
+        instants: As of `Observed`, of the runs that are not made again.
     """
     parts = tuple(parts)
     for part in (*parts, *again.values()):
@@ -178,12 +205,14 @@ def observed(parts: Iterable[Observation], levels: Levels, again: Mapping[int, O
     for run, part in again.items():
         for array, x in zip(arrays, _results(part), strict=True):
             array[..., run] = x[..., 0]
-    extremes, visits, episodes = arrays
+    low, high, visits, episodes = arrays
+    extremes = np.stack([low, high]).reshape(2, 3, len(low) // 3, -1).transpose(3, 1, 0, 2)
     extremes[np.isinf(extremes)] = np.nan
-    return Observed(np.moveaxis(extremes, -1, 0), levels.levels, levels.limits.T, visits.T, episodes.T)
+    number = np.full(len(extremes), instants, np.int64)
+    number[list(again)] = 0
+    return Observed(extremes, number, levels.levels, levels.limits.T, visits.T, episodes.T)
 
 
-def _results(of: Observation) -> tuple[Array, Array, Array]:
-    """Extremes (3, 2, n, W), visits and episodes."""
-    shape = 3, of.low.shape[0] // 3, of.low.shape[1]
-    return np.stack([of.low.reshape(shape), of.high.reshape(shape)], axis=1), of.visits, of.chatter.episodes
+def _results(of: Observation) -> tuple[Array, ...]:
+    """Low, high, visits and episodes."""
+    return of.low, of.high, of.visits, of.chatter.episodes

@@ -70,9 +70,9 @@ def remarks(
 
 def of_steps(
     names: tuple[str, ...], units: Units, visits: dict[Level, Visit], episodes: dict[int, Episode],
-    remedy: Callable[[Episode], str],
+    remedy: Callable[[Episode], str], instants: int = 0,
 ) -> list[Remark]:  # fmt: skip
-    """Remarks on what was observed at every step: chatter, then levels.
+    """Remarks on what was observed of a run: chatter, then levels.
 
     Args:
         names: Of the joints.
@@ -80,10 +80,12 @@ def of_steps(
         visits: By level.
         episodes: Of chatter, by joint.
         remedy: What to do about one.
+        instants: As of `Observed`.
     """
     found = [*_chatter(names, units, episodes, remedy)]
     for kind in KINDS:
-        found += _passed(names, units, {level: visit for level, visit in visits.items() if level.kind is kind})
+        of_kind = {level: visit for level, visit in visits.items() if level.kind is kind}
+        found += _passed(names, units, of_kind, instants)
     return found
 
 
@@ -109,7 +111,7 @@ def units_of(dynamics: Any) -> Units:
     return [(unit("q", each), unit("v", each), unit("u", each)) for each in types]
 
 
-def _passed(names: tuple[str, ...], units: Units, visits: dict[Level, Visit]) -> Iterator[Remark]:
+def _passed(names: tuple[str, ...], units: Units, visits: dict[Level, Visit], instants: int) -> Iterator[Remark]:
     """Levels passed, both sides of a limit as one."""
     n = len(units)
     rows: dict[int, list[tuple[Level, Visit]]] = {}
@@ -128,7 +130,8 @@ def _passed(names: tuple[str, ...], units: Units, visits: dict[Level, Visit]) ->
             Kind.STOP_REACHED: f"{far}, {spent}",
             Kind.EFFORT_REACHED: f"{spent} ({abs(level.limit):.4g}{unit})",
         }
-        text = f"{names[joint]} {words[level.kind]}"
+        seen = f" (at samples and {instants} instants)" if QUANTITIES[quantity] == "u" and instants else ""
+        text = f"{names[joint]} {words[level.kind]}{seen}"
         yield Remark(
             level.kind, names[joint], QUANTITIES[quantity], start, duration, most.at, most.value, level.limit, text,
             "nothing in the plant enforces them" if level.kind is Kind.BEYOND else "",

@@ -74,7 +74,8 @@ def remarks_of(runs: Rollouts, run: int, setup: Setup | None, t: np.ndarray, q: 
         return ()
     visits, episodes = runs.observed.visits_of(run), runs.observed.episodes_of(run)
     remedy = (lambda _: "") if setup is None else against(setup, t, q)
-    return tuple(of_steps(runs.joint_names, units(runs), visits, episodes, remedy))
+    instants = int(runs.observed.instants[run])
+    return tuple(of_steps(runs.joint_names, units(runs), visits, episodes, remedy, instants))
 
 
 def units(runs: Rollouts) -> Units:
@@ -110,7 +111,7 @@ def counted(runs: Rollouts, of: Observed, remedy: Callable[[int], Callable[[Epis
             size = np.nansum(duration, axis=1) if kind is Kind.EFFORT_REACHED else np.fmax.reduce(beyond, axis=1)
             worst = int(np.nanargmax(np.where(some, size, np.nan)))
             visits = {x: visit for x, visit in of.visits_of(worst).items() if (x.kind, x.row) == (kind, row)}
-            (remark,) = of_steps(*named, visits, {}, remedy(worst))
+            (remark,) = of_steps(*named, visits, {}, remedy(worst), int(of.instants[worst]))
             yield _in_runs(remark, worst, some)
 
 

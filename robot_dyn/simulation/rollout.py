@@ -94,7 +94,9 @@ def rollouts(
             machine code; "interpreted" makes the runs one after the other in Python.
 
     Runs are watched at every step: `Rollouts.remarks` counts in how many of them actuation reverses at every tick, and
-    in how many a limit or a stop is reached or passed. The other remarks of `simulate` are made on single runs alone.
+    in how many a limit or a stop is reached or passed. In lock step the actuation of a continuous controller is watched
+    at samples and at least 200 instants, or every step if there are fewer; whether it reverses at every step is not.
+    The other remarks of `simulate` are made on single runs alone.
 
     Returns:
         The runs, in the order given. Ctrl-C ends them, and keeps what there is.

@@ -54,7 +54,8 @@ class Rollouts(Value):
         setup: What was run; None for runs that were read from a file.
         uncut: Names of the thresholds at which steps do not end, as `cuts=False` asks.
         q0, v0: Starts, (B, n).
-        observed: Extremes, limits passed and chatter of each run, over all steps; None in files of older versions.
+        observed: Extremes, limits passed and chatter of each run, over all steps but for u of continuous control, see
+            `remarks`; None in files of older versions.
         saved: Of runs that were read from a file; None for others.
         numbers: Of a slice, the number of each run in the batch that was run, of which its noise is, (B,); None for
             all runs of a batch, and for runs that were read from a file.
@@ -166,7 +167,9 @@ class Rollouts(Value):
         """What `simulate` remarks on the limits, stops and chatter of each run, one of each kind, joint and quantity.
 
         `Remark.runs` are the numbers of the runs that it is about: first the worst, whose values and text it has, then
-        the others in their order. A sampled loop is linearised in one run alone, `worst`.
+        the others in their order. A sampled loop is linearised in one run alone, `worst`. Under continuous control in
+        lock step a limit of u that is passed between the instants of `Observed.instants` may be missed, and chatter is
+        not looked for.
         """
         return self.overview.remarks
 

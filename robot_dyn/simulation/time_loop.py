@@ -15,7 +15,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.integrate.primitives import copy, evaluate, sizes
-from robot_dyn.simulation.observation import Observation, observe
+from robot_dyn.simulation.observation import Observation, observe, observe_actuation, observe_motion
 from robot_dyn.simulation.philox import draw
 
 WATCHED = 64  # steps between looks at the energy
@@ -71,14 +71,14 @@ class Functions(NamedTuple):
     """The state equation, each as of `evaluate`, as a step and the time loop call it.
 
     Attributes:
-        rate: y' and u.
+        rate: y', of a single run also u.
         tick: The next own numbers.
         energy: K and V.
         sample: What a sample holds.
         jacobian: As of `RightSide`.
         events: Values of the events.
         step, behind: As of `RightSide`.
-        actuation: u alone, of runs in lock step without a rate under control at all times.
+        actuation: u, of runs in lock step in which it changes between ticks.
     """
 
     rate: Any
@@ -117,7 +117,8 @@ class Runs(NamedTuple):
 
     Attributes:
         y, own: State, and numbers of each run: first what a sampled controller holds.
-        after, made, command, energies, size, lost: y⁺, a sample, a tick, K and V, Σ |y⁺|, stages not found.
+        after, made, command, u, energies, size, lost: y⁺, a sample, a tick, the actuation, K and V, Σ |y⁺|, stages
+            not found.
         alive, why, ended: 1 while it goes on; then the reason and the time.
         last: Its state where it ended, (m, W).
         energy, scale: E(0), and 1 + |K(0)| + |V(0)|.
@@ -130,6 +131,7 @@ class Runs(NamedTuple):
     after: Array
     made: Array
     command: Array
+    u: Array
     energies: Array
     size: Array
     lost: Array
@@ -178,6 +180,7 @@ class Rules(NamedTuple):
         largest: Σ |y| beyond which a step is doubtful, or a run in lock step ends.
         every, thin: Steps between shared states, 0 for none; and how many of these to one that is kept.
         base: First run of the records.
+        apart: In lock step, steps between the instants at which u is observed; 0 where it is held between ticks.
     """
 
     n: int
@@ -193,6 +196,7 @@ class Rules(NamedTuple):
     every: int
     thin: int
     base: int
+    apart: int
 
 
 def time_loop(step: Callable[..., int]) -> Callable[..., int]:
@@ -209,6 +213,8 @@ def time_loop(step: Callable[..., int]) -> Callable[..., int]:
         last = len(plan.counts) - 1
         if not rules.alone:
             own_energy(functions, runs, plan.parameters[0])
+            if rules.apart > 0 and rules.held == 0:
+                show_actuation(functions, runs, records.observation, 0.0, plan.parameters[0], False)
         while now[Now.SEGMENT] <= last:
             s = now[Now.SEGMENT]
             start, h, p = plan.starts[s], plan.lengths[s], plan.parameters[s]
@@ -223,6 +229,8 @@ def time_loop(step: Callable[..., int]) -> Callable[..., int]:
                 share(runs, records, rules, now, s == last)
                 if t >= clock[0] - clock[2] or (s == last and clock[0] < np.inf):
                     sample(functions, runs, records, rules, now, clock, t, p)
+                    if rules.apart > 0 and t > records.observation.latest[0]:
+                        show_actuation(functions, runs, records.observation, t, p, False)
                 if s == last:
                     now[Now.STEP] += 1
                     continue
@@ -233,7 +241,11 @@ def time_loop(step: Callable[..., int]) -> Callable[..., int]:
                 now[Now.STEP] += 1
                 now[Now.STEPS] += 1
                 now[Now.BUDGET] -= 1
-                show(runs, records, rules, work.K[len(work.K) - 1], now, t, t + h, k == 0 and acts(rules, tick))
+                latest, acted = work.K[len(work.K) - 1], k == 0 and acts(rules, tick)
+                if rules.alone:
+                    show(runs, records, rules, latest, now, t, t + h, acted)
+                else:
+                    show_lanes(functions, runs, records.observation, rules, latest, now, t, t + h, p, acted)
                 if now[Now.STEPS] % WATCHED == 0 and not conserve(functions, runs, rules, t + h, p):
                     return Ended.GAINS
                 if now[Now.BUDGET] <= 0 or stop[0] != 0:
@@ -256,6 +268,7 @@ def act(functions: Functions, runs: Runs, rules: Rules, t: float, p: Array, numb
         return False
     copy(runs.own[:held], runs.command[:held])
     copy(runs.y[2 * n : 2 * n + z], runs.command[held:])
+    erase_ended(runs.own[:held], runs)
     return True
 
 
@@ -288,9 +301,7 @@ def sample(
         copy(records.y[row, j, base : base + W], runs.y[records.which[j]])
     if len(runs.made) > 0:
         evaluate(functions.sample, t, runs.y, p, runs.own, runs.made)
-        for b in range(W):
-            if runs.alive[b] == 0:
-                erase(runs.made, b)
+        erase_ended(runs.made, runs)
         copy(records.made[row, :, base : base + W], runs.made)
     now[Now.ROW] += 1
     clock[0] += clock[1]
@@ -310,7 +321,8 @@ def take(runs: Runs, rules: Rules, t: float) -> bool:
                 end(runs, b, t, Why.NOT_FOUND if runs.lost[b] != 0 else Why.OVERFLOWED)
     copy(runs.y, runs.after)
     if ill:
-        erase_ended(runs)
+        erase_ended(runs.y, runs)
+        erase_ended(runs.own[: rules.held], runs)
     return True
 
 
@@ -333,7 +345,8 @@ def conserve(functions: Functions, runs: Runs, rules: Rules, t: float, p: Array)
             end(runs, b, t, Why.GAINED)
             ended = True
     if ended:
-        erase_ended(runs)
+        erase_ended(runs.y, runs)
+        erase_ended(runs.own[: rules.held], runs)
     return True
 
 
@@ -351,11 +364,11 @@ def end(runs: Runs, b: int, t: float, why: int) -> None:
     copy(runs.last[:, b], runs.y[:, b])
 
 
-def erase_ended(runs: Runs) -> None:
-    """Nan for the runs that have ended."""
-    for b in range(len(runs.size)):
+def erase_ended(x: Array, runs: Runs) -> None:
+    """Nan in x (r, W) for the runs that have ended."""
+    for b in range(len(runs.alive)):
         if runs.alive[b] == 0:
-            erase(runs.y, b)
+            erase(x, b)
 
 
 def erase(x: Array, b: int) -> None:
@@ -367,16 +380,12 @@ def erase(x: Array, b: int) -> None:
 def show(
     runs: Runs, records: Any, rules: Rules, latest: Array, now: Array, began: float, t: float, acted: bool
 ) -> None:
-    """Observe a step: y at its end, and u, or v and u, of its latest evaluation, which is nan in runs that ended.
+    """Observe a step of a single run: y at its end, and u, or v and u, of its latest evaluation.
 
     For an observer it is written into a column, too, for which its driver leaves room.
     """
     if records.observation.low.shape[1] == 0:
         return
-    if not rules.alone:
-        for b in range(len(runs.alive)):
-            if runs.alive[b] == 0:
-                erase(latest, b)
     n, m = rules.n, len(runs.y)
     q, v, u = runs.y[:n], runs.y[n : 2 * n], latest[m : m + n]
     if rules.canonical:
@@ -390,3 +399,32 @@ def show(
     copy(records.columns[1 + n : 1 + 2 * n, c], v[:, 0])
     copy(records.columns[1 + 2 * n :, c], u[:, 0])
     now[Now.COLUMN] += 1
+
+
+def show_lanes(
+    functions: Functions, runs: Runs, of: Observation, rules: Rules, latest: Array, now: Array, began: float, t: float,
+    p: Array, acted: bool,
+) -> None:  # fmt: skip
+    """Observe a step of runs in lock step: q, v and what is held; or at instants the actuation, where it changes."""
+    if of.low.shape[1] == 0:
+        return
+    n = rules.n
+    q, v = runs.y[:n], runs.y[n : 2 * n]
+    if rules.canonical:
+        v = latest[:n]
+        erase_ended(v, runs)
+    if rules.apart == 0:
+        observe(of, began, t, q, v, runs.own[:n], acted)
+        return
+    observe_motion(of, began, t, q, v)
+    if now[Now.STEPS] % rules.apart == 0:
+        show_actuation(functions, runs, of, t, p, acted)
+
+
+def show_actuation(functions: Functions, runs: Runs, of: Observation, t: float, p: Array, acted: bool) -> None:
+    """Observe the actuation in the state reached."""
+    if of.low.shape[1] == 0:
+        return
+    evaluate(functions.actuation, t, runs.y, p, runs.own, runs.u)
+    erase_ended(runs.u, runs)
+    observe_actuation(of, t, runs.u, acted)

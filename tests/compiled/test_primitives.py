@@ -62,8 +62,8 @@ def subtracted(x, y):
     primitives.subtract(x, y)
 
 
-def enclosed(low, high, first, x):
-    primitives.enclose(low, high, first, x)
+def enclosed(low, high, x, least, most):
+    return primitives.enclose(low, high, x, least, most)
 
 
 def normed(x, y, after, rtol, atol):
@@ -123,12 +123,18 @@ def test_entries(W: int) -> None:
 
 @RUNS
 def test_bounds(W: int) -> None:
-    """Rows that enclose others; nothing is taken of nan, and nan gives way. Which zero is the lesser is left open."""
+    """Nothing is taken of nan; limits may be infinite, or met exactly. Which zero is the lesser is left open."""
     rng = np.random.default_rng(W)
-    for m in (1, 7, 12):
-        low, high, x = numbers(rng, m + 3, W), numbers(rng, m + 3, W), numbers(rng, m, W)
-        low, high, x = (np.where(each == 0.0, 1.0, each) for each in (low, high, x))
-        three_ways(enclosed, loops.enclose, low, high, 2, x)
+    for length in (W, 7 * W, 12 * W + 5):
+        low, high, x = (np.where(each == 0.0, 1.0, each) for each in numbers(rng, 3, length))
+        low, high = np.nan_to_num(low, nan=np.inf), np.nan_to_num(high, nan=-np.inf)
+        for limits in ((-np.inf, np.inf), (np.fmin.reduce(x), np.fmax.reduce(x)), (-1e9, 1e9)):
+            three_ways(enclosed, None, low, high, x, *limits)
+        for at in rng.integers(0, length, 3):  # one entry outside, by one unit in the last place
+            inside = rng.uniform(-1.0, 1.0, length)
+            for limits in ((np.nextafter(-2.0, -3.0), 1.0), (-1.0, np.nextafter(2.0, 1.0))):
+                inside[at] = -2.0 if limits[1] == 1.0 else 2.0
+                three_ways(enclosed, None, low, high, inside, *limits)
 
 
 def test_norms() -> None:
@@ -184,7 +190,8 @@ def test_elimination(m: int, W: int) -> None:
         (combined, (np.ones((3, 1)), np.ones((3, 1)), 1.0, np.ones(2), np.ones((4, 3, 1)), 4), "of a combination"),
         (combined, (np.ones((3, 1)), np.ones((3, 1)), 1.0, np.ones(4), np.ones((4, 2, 1)), 4), "of a combination"),
         (subtracted, (np.ones((3, 1)), np.ones((2, 1))), "have different sizes"),
-        (enclosed, (np.ones((4, 1)), np.ones((4, 1)), 2, np.ones((3, 1))), "bounds of fewer rows"),
+        (enclosed, (np.ones(4), np.ones(4), np.ones(3), 0.0, 2.0), "have different sizes"),
+        (enclosed, (np.ones(3), np.ones(4), np.ones(3), 0.0, 2.0), "have different sizes"),
         (normed, (np.ones((3, 1)), np.ones((2, 1)), np.ones((3, 1)), 1.0, 1.0), "arrays of a norm"),
         (solved, (np.ones((3, 3, 1)), np.full((3, 1), 7), np.ones((3, 1))), "a row to exchange is out of range"),
         (factored, (np.ones((3, 3, 1)), np.ones((2, 3, 1)), 1.0, np.zeros((3, 1), np.int64), np.zeros(1, np.int64)),

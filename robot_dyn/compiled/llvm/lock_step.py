@@ -77,7 +77,7 @@ def write_step(
 
     y is x and the places, where the second one starts; it is repeated for the runs of a vector until its last result is
     0 for all of them, `passes` times at most, the results before that one being its places then. What comes out is
-    after, found and known; the last only of vectors in which a run has not settled.
+    after, found and known; the last, of runs in lock step, only of vectors in which a run has not settled.
     """
     first, second, third = programs
     n = second.inputs[-1]
@@ -89,9 +89,9 @@ def write_step(
         found = _repeated(writer, second, [t, known.results, [], y[m:]], passes)
         after = writer.write(third, [t, y[:m], [], [*found, *known.results]])
         doubt = writer.builder.fcmp_ordered(">", found[-1], writer.vectors.constant(0.0))
-        before = len(after.results) + len(found)
         results = [*after.results, *found, *known.results]
-        return Computed(results, known.beyond, range(before, len(results)), doubt)
+        seldom = len(after.results) + len(found) if runs > 1 else len(results)
+        return Computed(results, known.beyond, range(seldom, len(results)), doubt)
 
     _write(module, name, (1, m + n, *first.inputs[2:]), body, runs, shared)
 

@@ -16,31 +16,35 @@ from robot_dyn.compiled.loops.values import ArrayValue, Scalar, Value
 if TYPE_CHECKING:
     from robot_dyn.compiled.loops.function import Function
 
-_WIDTHS = 8, 4, 1
+WIDTHS = 8, 4, 1
 ZERO = ir.Constant(I64, 0)
 Rule = Callable[..., Any]  # (builder, numbers or vectors of them) → the same
 
 
 def each(f: Function, node: ast.AST, to: ArrayValue, operands: list[Value], rule: Rule) -> None:
     """Write rule(operands) into the entries of a contiguous array, from those of others and from numbers."""
-    count, of = arrays.size(f, to), to.kind.of
-    for x in operands:
-        if isinstance(x, ArrayValue):
-            same = f.builder.icmp_signed("==", arrays.size(f, x).ir, count.ir)
-            f.check(same, node, "arrays of a primitive have different sizes")
-            if not (x.kind.contiguous and to.kind.contiguous) or x.kind.of != of:
-                raise f.refused(node, "a primitive of arrays that are not contiguous, or not alike", "copy them first")
-    if to.kind.frozen:
-        raise f.refused(node, "a write into an array that is read-only", "pass one that may be written")
+    check(f, node, to, operands)
     if f.silent:
         return
-    b = f.builder
-    for width, e in chunks(f, count, _WIDTHS):
+    b, of = f.builder, to.kind.of
+    for width, e in chunks(f, arrays.size(f, to), WIDTHS):
         given = [
             loaded(b, x.data, e, width, of) if isinstance(x, ArrayValue) else spread(b, x.ir, width, of)
             for x in operands if isinstance(x, ArrayValue | Scalar)
         ]  # fmt: skip
         stored(b, rule(b, *given), to.data, e, width, of)
+
+
+def check(f: Function, node: ast.AST, to: ArrayValue, operands: list[Value]) -> None:
+    """An array that may be written, and others like it: contiguous, of one size and type."""
+    for x in operands:
+        if isinstance(x, ArrayValue):
+            same = f.builder.icmp_signed("==", arrays.size(f, x).ir, arrays.size(f, to).ir)
+            f.check(same, node, "arrays of a primitive have different sizes")
+            if not (x.kind.contiguous and to.kind.contiguous) or x.kind.of != to.kind.of:
+                raise f.refused(node, "a primitive of arrays that are not contiguous, or not alike", "copy them first")
+    if to.kind.frozen:
+        raise f.refused(node, "a write into an array that is read-only", "pass one that may be written")
 
 
 def chunks(f: Function, count: Scalar, widths: tuple[int, ...]) -> Iterator[tuple[int, Any]]:

@@ -27,7 +27,7 @@ from robot_dyn.simulation.machine.machine import Machine
 from robot_dyn.simulation.machine.one_by_one import OneByOne, Single, said
 from robot_dyn.simulation.machine.pool import in_threads
 from robot_dyn.simulation.machine.thresholds import Thresholds
-from robot_dyn.simulation.observation import NOTHING, Observation, observation_of, observed
+from robot_dyn.simulation.observation import observations_of, observed
 from robot_dyn.simulation.origin import origin
 from robot_dyn.simulation.plan import plan_of
 from robot_dyn.simulation.rollout_result import Rollouts
@@ -45,6 +45,7 @@ _REASONS = {
     Why.GAINED: "energy grows without a source",
     Why.NOT_FOUND: "the stages of a step are not found",
 }
+_INSTANTS = 200  # at least, or every step, at which an actuation that changes between ticks is observed
 _LARGEST = 1e100  # of Σ |y|: beyond it products overflow
 
 
@@ -69,10 +70,16 @@ class Batch:
         tiles = -(-len(self.y) // LANES)
         width, more = tiles * LANES, sum({"u": n, "v": n, "energy": 2}[name] for name in kept)
         check_batch(setup, len(self.y), len(self.columns) + more, most)
-        self.plan = plan_of(setup)
+        self.plan, self.apart = plan_of(setup), 0
+        steps = int(self.plan.counts[:-1].sum())
+        if "actuation" in machine.equations.programs:
+            self.apart = 1 if equation.sampled else max(1, steps // _INSTANTS)
+        self.instants = steps // self.apart if self.apart > 1 else 0
         most = samples_at_most(setup, self.plan.counts)
         self.out_y, self.made = np.empty((most, len(self.columns), width)), np.empty((most, more, width))
-        self.observations: list[Observation] = [NOTHING] * tiles
+        numbers = np.minimum(np.arange(width), len(self.y) - 1)
+        start = np.vstack([q0[numbers].T, v0[numbers].T, np.full((n, width), np.nan)])
+        self.observations = observations_of(start, self.levels.of_runs(numbers), tiles)
         self.place = np.zeros((0, 2), np.int64)  # segment and step of each sample, of the tile that has most
         self.lock = threading.Lock()
         self.unfinished = np.ones(tiles, dtype=bool)
@@ -132,17 +139,6 @@ class Batch:
                     array[:rows, :, run] = np.hstack([*(single.columns[name] for name in of), np.empty((rows, 0))])
             self.out_y[rows:, :, run], self.made[rows:, :, run] = np.nan, np.nan
 
-    def _observation(self, tile: int, runs: Runs) -> Observation:
-        """What is observed of a tile, before its first step."""
-        numbers, equation, n = self._numbers(tile), self.machine.equation, self.machine.equation.plant.dynamics.n
-        functions, u = self.machine.in_python, np.full((equation.size + n, LANES), np.nan)
-        if not equation.sampled:  # at a tick it becomes known
-            function = functions.rate or functions.actuation
-            function(0.0, runs.y, self.plan.parameters[0], runs.own, u if functions.rate else u[equation.size :])
-        return observation_of(
-            np.vstack([self.q0[numbers].T, self.v0[numbers].T, u[equation.size :]]), self.levels.of_runs(numbers)
-        )
-
     def _runs(self, tile: int) -> Runs:
         """The runs of a tile at their start; a tile that is not full repeats a run."""
         equation, index = self.machine.equation, self._numbers(tile)
@@ -159,20 +155,19 @@ class Batch:
         method = cast(PlainMethod, self.setup.integrator)
         advance = self.machine.advance()
         assert advance is not None
-        rows = (equation.size + n) | 1  # odd: stages a power of two apart would share the sets of a cache
+        rows = equation.size | 1  # odd: stages a power of two apart would share the sets of a cache
         stepper = method.stepper(FLOAT64, equation.size, n, rows, LANES)
         functions, now = self.machine.equations.functions, np.zeros(len(Now), dtype=np.int64)
         now[Now.BUDGET] = np.iinfo(np.int64).max
-        self.observations[tile] = self._observation(tile, runs)
         records = Records(
             np.array(self.columns, np.int64), np.empty((len(self.out_y), 2), np.int64), self.out_y, self.made,
             np.empty((0, equation.size + 2)), np.empty((1 + 3 * n, 0)), self.observations[tile],
         )  # fmt: skip
-        rules = rules_of(equation, False, _LARGEST, base=own.start)
+        rules = rules_of(equation, False, _LARGEST, base=own.start, apart=self.apart)
         work = stepper.work
         if self.thresholds is not None:
             positions = 0 if equation.canonical else n
-            switches = self.thresholds.lanes(self._numbers(tile), equation.size + n, positions)
+            switches = self.thresholds.lanes(self._numbers(tile), equation.size, positions)
             self.until[own] = switches.until
             work = Detecting(work, work.K, switches._replace(until=self.until[own]))
         ended = advance(
@@ -223,7 +218,7 @@ class Batch:
             equation.plant.dynamics.joint_names, t, q, v if "v" in self.recorded else None, made.get("u"), K, V, named,
             ended, diverged, stopped, tuple(advice), steps, evaluations, self._statistics(), tuple(equation.sources),
             origin(self.setup.plant.dynamics) | self.setup.about, dict(self.values), self._compiled(),
-            (), self.q0, self.v0, observed(self.observations, self.levels, alone)[:B],
+            (), self.q0, self.v0, observed(self.observations, self.levels, alone, self.instants)[:B],
         )  # fmt: skip
 
     def _compiled(self) -> Setup:

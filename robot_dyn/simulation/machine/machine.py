@@ -278,7 +278,7 @@ class Machine:
         if "rate" in ours:
             yield ours["rate"][:m], rate
         yield ours["energy"], energy
-        if "rate" in ours:
+        if "rate" in ours and self.equations.runs == 1:
             yield ours["rate"][m:], u
         if "actuation" in ours:
             yield ours["actuation"], u

@@ -1,6 +1,7 @@
 """The state equation in symbols: the lines of `StateEquation` traced to functions of (t, y, p, own).
 
     rate = (y', u),   tick = (u, z⁺),   energy = (K, V),   sample = what is kept beside the state
+    in lock step rate = y', and actuation = u where it changes between ticks
     jacobian = (∂y'/∂y₁, …, ∂y'/∂y_m, ∂y'/∂t)
 
 p holds what all runs share on a segment: its ends, and the polynomials of the references; `own` what is each run's own:
@@ -69,11 +70,11 @@ def trace(
             rate, u = symbolic.rate(time, state, held_here)
         parts = {"u": wide(u, n), "v": v, "energy": symbolic.energies(time, q, v)}
         single = kept is None
-        made = {"rate": np.concatenate([rate, parts["u"]]), "energy": parts["energy"]}
+        made = {"rate": np.concatenate([rate, parts["u"]]) if single else rate, "energy": parts["energy"]}
         made["sample"] = np.concatenate(
             [rate, parts["u"], parts["energy"]] if single else [parts[x] for x in kept] or [[]]
         )
-        if nonsmooth and not single and not equation.sampled:
+        if not single and (not equation.sampled or equation.equation_of_motion.bounds_at_all_times):
             made["actuation"] = parts["u"]
         if equation.events or equation.limited:
             demands = symbolic.demands(time, q, v, z, held_here, equation.limited)
