@@ -14,6 +14,8 @@ import numpy as np
 
 import robot_dyn as rd
 from robot_dyn.compiled.parameters import with_parameters
+from robot_dyn.simulation.observed import KINDS
+from robot_dyn.simulation.remarks import Kind, Remark
 from tests.batches.scenes import Batch, batch
 
 UNITS = 8  # of rounding, by which a start is pushed
@@ -72,7 +74,23 @@ def differences(runs: rd.Rollouts, run: int, one: rd.Trajectory) -> list[str]:
         found.append(f"{known} samples to {runs.t[known - 1]!r} s for {len(one.t)} to {one.t[-1]!r} s")
     if runs.steps[run] != one.statistics.steps:
         found.append(f"{runs.steps[run]} steps for {one.statistics.steps}")
+    ours = {about(each) for each in runs.remarks if run in each.runs and counted(runs, each)}
+    theirs = {about(each) for each in one.remarks if counted(runs, each)}
+    if ours != theirs and one.outcome.ending != "diverged":
+        found.append(f"remarks {sorted(ours - theirs)} and not {sorted(theirs - ours)}")
     return found
+
+
+def about(remark: Remark) -> tuple[str, str, str]:
+    """What a remark is about."""
+    return str(remark.kind), remark.joint, remark.quantity
+
+
+def counted(runs: rd.Rollouts, remark: Remark) -> bool:
+    """Whether a remark is one that is made on each run of a batch as well; an actuation may be seen at instants."""
+    observed = runs.observed
+    at_instants = remark.quantity == "u" and observed is not None and observed.instants.any()
+    return remark.kind in (*KINDS, Kind.CHATTER) and not at_instants
 
 
 def pushed(setup: rd.Setup) -> list[rd.Trajectory]:
