@@ -439,8 +439,10 @@ def test_levels_that_differ_from_run_to_run() -> None:
 
 def test_samples_between_the_ends_of_steps_are_those_of_simulate() -> None:
     """A period that the run does not hold a whole number of times: where steps are cut at its multiples, else not."""
-    for effects in (PLANT.effects, PLANT.effects[:2]):
-        setup = replace(SETUP, plant=rd.Plant(ARM, effects), duration_s=0.123, record_period_s=0.0101)
+    bristles = rd.LuGreFriction(100.0, 1.0, 0.05, 0.2, 0.3, 0.05)  # steps in (q, p) end nowhere for them
+    for effects, method in ((PLANT.effects, "rk4"), (PLANT.effects[:2], "rk4"), ([bristles], "gauss_4")):
+        of = {"duration_s": 0.123, "record_period_s": 0.0101, "integrator": rd.method(method)}
+        setup = replace(SETUP, plant=rd.Plant(ARM, effects), **of)
         runs, alone = rd.rollouts(setup, starts(2)), rd.simulate(setup, q0=starts(2)[1], estimate_error=False)
         np.testing.assert_allclose(runs.t, alone.t, rtol=1e-15)
         np.testing.assert_allclose(runs.q[1], alone.q, rtol=0, atol=1e-12)

@@ -122,7 +122,8 @@ def rollouts(
     if not truth("cuts", cuts) and why:
         raise QueryError(f"cuts=False: {why}, and so runs are made one after the other; leave it out")
     passed = None if why else thresholds(setup, sweep, len(q))
-    if why or (cuts and passed is not None and not setup.samples_on_steps):
+    cut = passed is not None or setup.finds_events  # samples are then interpolated within steps, which lock step cannot
+    if why or (cuts and cut and not setup.samples_on_steps):
         runs = one_by_one(setup, q, v, sweep, recorded, most_bytes, threads, on_progress)
     else:
         at = passed if cuts else None
