@@ -67,7 +67,10 @@ def observations_of(start: Array, levels: Levels, tiles: int) -> list[Observatio
     np.fmax.at(inner[:, 0].T, of[~up], np.fmax.reduce(bounds[:, ~up], axis=2, initial=-np.inf).T)
     np.fmin.at(inner[:, 1].T, of[up], np.fmin.reduce(bounds[:, up], axis=2, initial=np.inf).T)
     beyond = sides[:, None] * (x - bounds) > 0
-    visits = np.stack([*[np.where(beyond, 0.0, np.nan)] * 3, np.where(beyond, x, np.nan)], axis=1)
+    visits = np.full((tiles, 4, len(of), W), np.nan)
+    if beyond.any():
+        visits[:, :3] = np.where(beyond, 0.0, np.nan)[:, None]
+        visits[:, 3] = np.where(beyond, x, np.nan)
     low, high = (tiled(np.where(np.isnan(start), none, start)) for none in (np.inf, -np.inf))
     first, latest = np.searchsorted(of, np.arange(rows + 1)), np.zeros((tiles, 1))
     chatters = chatters_of(rows // 3, W, tiles)
