@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from robot_dyn.simulation.rollout_result import Rollouts
 
 _EXPLAINS = 1e3  # growth of deviations
-_JUDGED = 8  # runs of a batch with parameters of their own
+_JUDGED = 8  # runs of a batch: each loop is linearised about a start of its own
 
 
 def explained(outcome: Outcome, setup: Setup, remarks: Iterable[Remark]) -> Outcome:
@@ -39,9 +39,9 @@ def explained(outcome: Outcome, setup: Setup, remarks: Iterable[Remark]) -> Outc
 
 
 def causes(runs: Rollouts, setup: Setup, q0: np.ndarray, v0: np.ndarray) -> tuple[str, ...]:
-    """The advice of each run, with its loop as the cause where that explains why it diverged.
+    """The advice of each run; of the first that diverged with its loop as the cause, where that explains it.
 
-    Loops are linearised about the starts: once if all runs have one, and for some runs if they have their own.
+    Loops are linearised about the starts, which differ from run to run, as their parameters may.
 
     Args:
         runs: A batch.
@@ -55,12 +55,9 @@ def causes(runs: Rollouts, setup: Setup, q0: np.ndarray, v0: np.ndarray) -> tupl
     if setup.controller is None or not setup.controller.period_s or not len(diverged):
         return runs.advice
     earliest = diverged[np.argsort(runs.ended[diverged], kind="stable")]
-    judged = list(dict.fromkeys([int(diverged[0]), *earliest.tolist()]))[: _JUDGED if runs.params else 1]
-    about = {}
-    for run in judged:
+    for run in list(dict.fromkeys([int(diverged[0]), *earliest.tolist()]))[:_JUDGED]:
         own = setup_of(runs, setup, run)
         equation = StateEquation(own.plant, own.controller, own.integrator.canonical)
-        about[run] = own, tuple(unstable(own, equation, np.zeros(1), equation.start(q0[run], v0[run])[None]))
-    for run in judged if runs.params else diverged.tolist():
-        advice[run] = explained(runs.outcome(run), *about[run if runs.params else judged[0]]).advice
+        remarks = unstable(own, equation, np.zeros(1), equation.start(q0[run], v0[run])[None])
+        advice[run] = explained(runs.outcome(run), own, remarks).advice
     return tuple(advice)

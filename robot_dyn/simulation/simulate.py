@@ -113,7 +113,7 @@ def simulate(
         user_code=", ".join(named(part) for part, _ in undeclared(setup.plant, setup.controller)),
     )  # fmt: skip
     made = _trajectory(ran, equation, record, statistics, error)
-    asks = setup.estimate_error or not statistics.user_code  # code of the user's that is called only where told
+    asks = setup.estimate_error or not statistics.user_code  # the search calls undeclared parts 4000 times
     if made.leak and asks and record.outcome.ending is not Ending.STOPPED:
         why = cause(setup, equation, record, made.ledger.closes)
         made = replace(made, ledger=replace(made.ledger, cause=why))
