@@ -231,8 +231,6 @@ _HOME = {
     "work_precision": "accuracy.work_precision",
 }
 
-_FORMER = {"Memoryless": "Stateless"}
-
 __all__ = sorted(_HOME)  # pyright: ignore[reportUnsupportedDunderAll]
 
 
@@ -241,11 +239,6 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version
 
         return version("robot-dyn")
-    if name in _FORMER:
-        from robot_dyn.former import tell
-
-        tell(f"robot_dyn.{name}", _FORMER[name], up=2)
-        name = _FORMER[name]
     if name not in _HOME:
         raise AttributeError(f"module 'robot_dyn' has no attribute {name!r}")
     return getattr(import_module(f"robot_dyn.{_HOME[name]}"), name)

@@ -105,57 +105,6 @@ def test_a_step_that_was_not_given_is_one_millisecond_and_stands_in_the_way_of_n
     assert rd.simulate(replace(setup, integrator="DOP853")).statistics.method == "DOP853"
 
 
-def test_former_names_of_arguments_and_records() -> None:
-    setup = rd.Setup(PLANT, Q, V, **OPTIONS)
-    with pytest.warns(DeprecationWarning, match=r"setup of rollouts is now what") as told:
-        runs = rd.rollouts(setup=setup)
-    assert told[0].filename == __file__
-    np.testing.assert_array_equal(runs.q, rd.rollouts(setup).q)
-    with pytest.warns(DeprecationWarning, match=r"record 'tau' of rollouts is now 'u'") as told:
-        runs = rd.rollouts(setup, record=["tau"])
-    assert told[0].filename == __file__
-    with pytest.warns(DeprecationWarning, match=r"Rollouts.tau is now u"):
-        assert runs.tau is runs.u is not None
-    run = rd.simulate(setup)
-    with pytest.warns(DeprecationWarning, match=r"Trajectory.tau is now u"):
-        assert run.tau is run.u
-
-
-@pytest.mark.parametrize(
-    ("ask", "new", "names"),
-    [
-        (lambda: rd.quintic(Q, V, duration=2.0, start=0.5), rd.quintic(Q, V, 2.0, start_s=0.5), "duration_s start_s"),
-        (lambda: rd.via_points(times=[0, 1], points=[Q, V]), rd.via_points([0, 1], [Q, V]), "times_s"),
-        (
-            lambda: rd.line([0, 0, 0], [1, 0, 0], duration=2.0, start=0.5).position,
-            rd.line([0, 0, 0], [1, 0, 0], 2.0, start_s=0.5).position,
-            "duration_s start_s",
-        ),
-        (
-            lambda: rd.circle([0, 0, 0], 1.0, [0, 0, 1], period=2.0, ramp=0.3, start=0.5).position,
-            rd.circle([0, 0, 0], 1.0, [0, 0, 1], 2.0, ramp_s=0.3, start_s=0.5).position,
-            "period_s ramp_s start_s",
-        ),
-    ],
-)
-def test_former_names_of_times(ask, new, names: str) -> None:
-    with pytest.warns(DeprecationWarning) as told:
-        old = ask()
-    assert {str(each.message).split(" is now ")[1].split(";")[0] for each in told} == set(names.split())
-    assert {each.filename for each in told} == {__file__}
-    np.testing.assert_array_equal(old.breaks, new.breaks)
-    np.testing.assert_array_equal(old.coefficients, new.coefficients)
-
-
-def test_former_name_of_the_longest_step() -> None:
-    with pytest.warns(DeprecationWarning, match=r"max_step of Adaptive is now max_step_s") as told:
-        method = rd.Adaptive(max_step=0.1)  # type: ignore[call-arg]
-    assert told[0].filename == __file__
-    assert method == rd.Adaptive(max_step_s=0.1)
-    with pytest.warns(DeprecationWarning, match=r"Adaptive.max_step is now max_step_s"):
-        assert method.max_step == 0.1  # type: ignore[attr-defined]
-
-
 @pytest.mark.parametrize("dtype", [np.float32, np.dtype(np.float32), np.float64, np.dtype("f8")], ids=str)
 def test_types_of_numpy_are_taken_where_their_names_are(dtype) -> None:
     name = np.dtype(dtype).name

@@ -8,7 +8,7 @@ import json
 import os
 import tracemalloc
 import zipfile
-from dataclasses import asdict, fields, is_dataclass, replace
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,6 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.scene.starters import starter
 from robot_dyn.simulation import archive
-from robot_dyn.simulation.remarks import Kind, Remark
 from robot_dyn.simulation.run_file import RunFileError
 from robot_dyn.simulation.table import export_csv
 from robot_dyn.simulation.trajectory import Ending, Outcome
@@ -52,22 +51,6 @@ def test_a_run_comes_back_as_it_was(run, tmp_path) -> None:
     back = rd.load_run(rd.save_run(run, tmp_path / "run"))
     assert_same(replace(back, about=back.about | {"source": run.about["source"]}), run)
     assert back.summary == run.summary
-
-
-def test_a_file_of_the_format_before_is_read(run, tmp_path) -> None:
-    """Format 3 had `desired` and `u` under other names, the latter in remarks as well."""
-    remark = Remark(Kind.CHATTER, "hinge", "u", 0.1, 0.2, 0.1, 3.0, None, "chatters", "take a longer period")
-    run = replace(run, desired=run.q + 0.1, deviation=run.q - 0.1, remarks=(remark,))
-
-    def third(text: np.ndarray) -> np.ndarray:
-        return said(text, format=3, remarks=[asdict(replace(remark, quantity="tau"))])
-
-    names = {"desired": lambda _: None, "wanted": lambda _: run.desired, "u": lambda _: None, "tau": lambda _: run.u}
-    path = resaved(run, tmp_path / "a.npz", about=third, **names)
-    assert_same(replace(rd.load_run(path), about=run.about), run)
-    path = resaved(run, tmp_path / "b.npz", about=third)
-    with pytest.raises(RunFileError, match=r"'(desired|u)' is not known to the format of the file"):
-        rd.load_run(path)
 
 
 def test_a_run_file_needs_nothing_else(run, tmp_path) -> None:
@@ -179,7 +162,7 @@ def said(text: np.ndarray, **changes) -> np.ndarray:
         ("about", lambda _: None, "'about' is missing"),
         ("about", lambda text: np.array("[" * 100_000), "'about' is not the JSON"),
         ("about", lambda text: np.array([str(text)]), "'about' holds .*not one text"),
-        ("about", lambda text: said(text, format=2), "it has format 2, this version reads 4; simulate again"),
+        ("about", lambda text: said(text, format=3), "it has format 3, this version reads 4; simulate again"),
         ("about", lambda text: said(text, format="3"), "it has format '3'"),
         ("about", lambda text: said(text, format={"a": 3}), "it has format {'a': 3}"),
         ("wanted", lambda _: np.zeros((21, 2)), "'wanted' is not known to this version"),

@@ -48,7 +48,6 @@ def info(robot: Robot) -> Document:
         "gravity_acts": gravity_acts(robot),
         "joints": joints,
         "couplings": _couplings(robot),
-        "ties": _couplings(robot),  # the former name
         "locked": dict(robot.edits.lock),
         "links": list(robot.frame_names),
         "findings": list(robot.findings),

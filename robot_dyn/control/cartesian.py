@@ -11,7 +11,6 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn import former
 from robot_dyn.arithmetic import Array
 from robot_dyn.coefficients import coefficient
 from robot_dyn.control.orientation import orientation_error
@@ -76,7 +75,6 @@ class CartesianReference(Reference):
         return p, R, np.concatenate(V, -1), np.concatenate(V_rate, -1)
 
 
-@former.arguments(duration="duration_s", start="start_s")
 @np.errstate(all="ignore")  # what overflows is refused as not finite
 def line(
     p0: Any, p1: Any, duration_s: float, *, rotation: Any = None, rotation_end: Any = None, start_s: float = 0.0
@@ -109,7 +107,6 @@ def line(
     return CartesianReference(position, rotation, turn, quintic([0.0], [angle], duration_s, start_s=start_s))
 
 
-@former.arguments(period="period_s", ramp="ramp_s", start="start_s")
 @np.errstate(all="ignore")  # what overflows is refused as not finite
 def circle(
     centre: Any,

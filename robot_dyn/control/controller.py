@@ -13,7 +13,6 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from robot_dyn import former
 from robot_dyn.arithmetic import Array
 from robot_dyn.coefficients import JOINTS, check_coefficients, declared, with_values
 from robot_dyn.control.reference import Reference
@@ -58,12 +57,6 @@ class Controller(Value, ABC):
 
     outermost: ClassVar[bool] = False  # whether it may not be part of another controller
     period_s: float = 0.0
-
-    memory_size, memory_rate, next_memory = map(former.Attribute, ("state_size", "state_rate", "next_state"))
-
-    def __init_subclass__(cls) -> None:
-        super().__init_subclass__()
-        former.adopt(cls, {"memory_size": "state_size", "memory_rate": "state_rate", "next_memory": "next_state"})
 
     def __post_init__(self) -> None:
         check_coefficients(self, ControlError)
@@ -214,9 +207,6 @@ class Stateless(Controller):
 
     def state_rate(self, t: float, q: Array, v: Array, z: Array) -> Array:
         return z
-
-
-__getattr__ = former.module_names(globals(), Memoryless="Stateless")
 
 
 def check_model(model: Any) -> None:

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn import former, validate
+from robot_dyn import validate
 from robot_dyn.arithmetic import Array
 from robot_dyn.errors import ControlError, QueryError
 from robot_dyn.validate import choice, duration, times
@@ -129,7 +129,6 @@ def hold(q: Any) -> PiecewisePolynomial:
     return PiecewisePolynomial([0.0, 1.0], numbers("q", q, ("n",))[None, None])
 
 
-@former.arguments(duration="duration_s", start="start_s")
 @np.errstate(all="ignore")  # what overflows is refused as not finite
 def quintic(
     q0: Any,
@@ -171,7 +170,6 @@ def quintic(
     return PiecewisePolynomial([begin, begin + T], hermite(np.array([T]), ends[None]))
 
 
-@former.arguments(times="times_s")
 @np.errstate(all="ignore")  # what overflows is refused as not finite
 def via_points(
     times_s: Any, points: Any, *, kind: str = "quintic", v0: Any = 0.0, v1: Any = 0.0

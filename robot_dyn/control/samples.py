@@ -24,7 +24,7 @@ from robot_dyn.reading import read
 from robot_dyn.validate import instance
 
 MAX_BYTES = 2**28  # of a table
-_HEAD = re.compile(r"\s*(t|[qvau]|tau|power|energy|residual)(?:\s+(.*?))?(?:\s*\[[^]]*\])?\s*")
+_HEAD = re.compile(r"\s*(t|[qvau]|power|energy|residual)(?:\s+(.*?))?(?:\s*\[[^]]*\])?\s*")
 _GIVEN = "t", "q", "v", "a"
 _NAMES = "give names of joints, such as robot.joint_names"
 
@@ -70,7 +70,7 @@ class Samples(PiecewisePolynomial):
 
         Its first line names the columns: t, and of each joint q, and if given v and a, with the joint's name, as
         "t [s], q elbow [rad], v elbow [rad/s]". What stands in brackets is for readers: times are in [s], angles in
-        [rad], lengths in [m]. Columns of u (or tau, its former name), power, energy and residual are left out.
+        [rad], lengths in [m]. Columns of u, power, energy and residual are left out.
 
         Args:
             path: Of the file, at most 256 MiB.

@@ -15,7 +15,6 @@ from typing import Any, ClassVar, cast, final
 
 import numpy as np
 
-from robot_dyn import former
 from robot_dyn.arithmetic import Array
 from robot_dyn.errors import OverflowedError, QueryError, RobotDynError
 from robot_dyn.foreign import is_mistake
@@ -28,7 +27,6 @@ from robot_dyn.validate import choice, function, instance, number, numbers, rows
 
 EXPLICIT, STIFF, AUTO = "DOP853", "Rosenbrock", "auto"
 ADAPTIVE = (EXPLICIT, STIFF, AUTO)
-FORMER = MappingProxyType({"Radau": "Rosenbrock"})  # methods that were SciPy's
 LEAST_RTOL = 100 * np.finfo(float).eps  # SciPy's bound; below it rounding is taken for local error
 
 
@@ -83,7 +81,6 @@ class Solution:
 
 
 @final
-@former.fields(max_step="max_step_s")
 @dataclass(frozen=True)
 class Adaptive:
     """An integrator with step-size control and dense output, in float64.
@@ -127,9 +124,6 @@ class Adaptive:
         return replace(self, rtol=self.rtol * factor, atol=self.atol * factor, max_step_s=longest_s)
 
     def __post_init__(self) -> None:
-        if isinstance(self.method, str) and self.method in FORMER:
-            former.tell(f"the method {self.method}", FORMER[self.method], up=4)
-            object.__setattr__(self, "method", FORMER[self.method])
         choice("adaptive method", self.method, ADAPTIVE)
         values = {
             "rtol": number("rtol", self.rtol),

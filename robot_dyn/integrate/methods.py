@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import Any
 
 from robot_dyn.errors import QueryError, shown
-from robot_dyn.integrate.adaptive import ADAPTIVE, FORMER, Adaptive
+from robot_dyn.integrate.adaptive import ADAPTIVE, Adaptive
 from robot_dyn.integrate.explicit import EXPLICIT_EULER, MIDPOINT, RK4, SemiImplicitEuler, order_8
 from robot_dyn.integrate.gauss import Gauss
 from robot_dyn.integrate.implicit import SDIRK_3, LinearlyImplicitEuler
@@ -52,8 +52,6 @@ def method(name: str) -> Any:
     Raises:
         QueryError: If the name is unknown; gives the nearest names.
     """
-    if isinstance(name, str) and name in FORMER:
-        return Adaptive(name)
     return METHODS[choice("integration method", name, METHODS)]()
 
 

@@ -17,7 +17,6 @@ import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy import ndarray
 
-from robot_dyn import former
 from robot_dyn.errors import (
     DescriptionError,
     EditError,
@@ -194,8 +193,6 @@ class Robot(Dynamics, Parametrised):
     def couplings(self) -> Couplings:
         """How the joints of `model` follow q."""
         return self._built[1]
-
-    ties = former.Attribute("couplings")
 
     @cached_property
     def bodies(self) -> Bodies:

@@ -14,7 +14,6 @@ from typing import Any, Unpack, cast
 
 import numpy as np
 
-from robot_dyn import former
 from robot_dyn.coefficients import rebuilt
 from robot_dyn.compiled.parameters import CONTROLLER, link_parameters, names_of, parameters, with_parameters
 from robot_dyn.compiled.threads import thread_count
@@ -46,7 +45,6 @@ _WITHOUT_EFFECT = {
 }
 
 
-@former.arguments(setup="what")
 @takes_options
 def rollouts(
     what: Setup | Plant | Dynamics,
@@ -173,11 +171,7 @@ def _side_by_side(
 def _recorded(record: Any) -> tuple[str, ...]:
     """Names of what is to be kept."""
     instance("record", record, Iterable, f"give names of {', '.join(RECORDS)}")
-    recorded = tuple(record)
-    if any(isinstance(name, str) and name == "tau" for name in recorded):
-        former.tell("record 'tau' of rollouts", "'u'", up=4)
-        recorded = tuple("u" if isinstance(name, str) and name == "tau" else name for name in recorded)
-    return tuple(choice("record", name, RECORDS) for name in recorded)
+    return tuple(choice("record", name, RECORDS) for name in record)
 
 
 def _setup(what: Setup | Plant | Dynamics, q0: Any, options: Mapping[str, Any]) -> Setup:

@@ -10,7 +10,6 @@ from typing import Any, final, overload
 
 import numpy as np
 
-from robot_dyn import former
 from robot_dyn.errors import QueryError, escaped
 from robot_dyn.model.units import units
 from robot_dyn.simulation.observation import Observed
@@ -89,8 +88,6 @@ class Rollouts(Value):
 
     def __post_init__(self) -> None:
         read_only(self)
-
-    tau = former.Attribute("u")
 
     def __len__(self) -> int:
         return len(self.ended)

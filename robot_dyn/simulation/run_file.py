@@ -27,18 +27,12 @@ from robot_dyn.validate import integer
 
 FORMAT = 4
 ROLLOUTS_FORMAT = "rollouts 3"
-# The formats before, which are read as well, and what some members were called there.
-_BEFORE: Mapping[int | str, Mapping[int | str, Mapping[str, str]]] = {
-    FORMAT: {3: {"wanted": "desired", "tau": "u"}},
-    ROLLOUTS_FORMAT: {"rollouts 1": {"tau": "u"}, "rollouts 2": {}},
-}
 RUN = Kind("a run file", ".npz", b"PK\x03\x04")
 MAX_BYTES = 4 * 2**30  # of the arrays of a run that is read without being asked for more
 _MAX_TEXT = 2**28  # bytes of `about`, 4 a character; the largest URDF that loads has 2^24
 
 
 Run = TypeVar("Run", bound=Any)
-Part = TypeVar("Part")
 RunOf = TypeVar("RunOf", covariant=True)
 
 
@@ -76,9 +70,7 @@ def load_run(path: str | Path, *, max_bytes: int = MAX_BYTES) -> Trajectory:
     Raises:
         RunFileError: If it is missing, damaged, cut short, larger, of another format, or was changed.
     """
-    run = read_whole(path, max_bytes, FORMAT, MEMBERS, _checked)
-    of_u = [replace(each, quantity="u") if each.quantity == "tau" else each for each in run.remarks]  # its former name
-    return replace(run, remarks=tuple(of_u))
+    return read_whole(path, max_bytes, FORMAT, MEMBERS, _checked)
 
 
 def write_whole(run: Run, path: str | Path, form: int | str, checked: Checked[Run]) -> Path:
@@ -105,12 +97,11 @@ def read_whole(
             archive = Archive(stream)
             about, found = _about(archive)
             _check_format(found, form, path)
-            names = _BEFORE[form].get(found, {})
-            check_headers(_renamed(archive.headers, names), about, members)
+            check_headers(archive.headers, about, members)
             if archive.size > max_bytes:
                 held = f"{archive.size / 2**30:.3g} GiB, more than {max_bytes / 2**30:.3g} GiB"
                 raise RunFileError(f"{path}: holds {held}; if you trust it, raise max_bytes of the load")
-            arrays = _renamed(archive.arrays(), names)
+            arrays = archive.arrays()
             del arrays["about"]
             run = checked(arrays, about)
             return replace(run, about=unpacked(run.about, Path(path).parent))
@@ -130,24 +121,17 @@ def _about(archive: Archive) -> tuple[dict[str, Any], Any]:
 
 
 def _check_format(found: Any, form: int | str, path: Path) -> None:
-    """Refuse a format that is neither the one that is read nor one before it; names a file of the other kind."""
-    if found in (form, *_BEFORE[form]):
+    """Raise for a format other than the one that is read; names a file of the other kind."""
+    if found == form:
         return
-    if found in (ROLLOUTS_FORMAT, *_BEFORE[ROLLOUTS_FORMAT]):
+    if found == ROLLOUTS_FORMAT:
         raise RunFileError(
             f"{path}: is a file of rollouts, which are many runs; rd.load_rollouts reads it, and rd.save_run writes one"
             " of them, such as rd.load_rollouts(…)[0], to a run file"
         )
-    if found in (FORMAT, *_BEFORE[FORMAT]):
+    if found == FORMAT:
         raise RunFileError(f"{path}: is a file of one run, not of rollouts; rd.load_run reads it")
     raise ArchiveError(f"it has format {shorten(repr(found))}, this version reads {form!r}")
-
-
-def _renamed(members: Mapping[str, Part], names: Mapping[str, str]) -> dict[str, Part]:
-    """Members of a format before under the names of this one."""
-    if unknown := members.keys() & names.values():
-        raise ArchiveError(f"member {min(unknown)!r} is not known to the format of the file")
-    return {names.get(name, name): part for name, part in members.items()}
 
 
 def _checked(arrays: Arrays, about: dict[str, Any]) -> Trajectory:

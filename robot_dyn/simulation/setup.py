@@ -10,7 +10,6 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn import former
 from robot_dyn.arithmetic import Array, Ball
 from robot_dyn.control.control_law import ControlLaw
 from robot_dyn.control.controller import Controller
@@ -242,8 +241,6 @@ class Setup(Value):
             Segment(start, end, tick, count, first)
             for (start, tick), end, count, first in zip(starts, ends, counts, firsts, strict=True)
         )
-
-    stretches = former.Attribute("segments")
 
     @cached_property
     def _cuts(self) -> list[tuple[float, bool]]:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, Protocol, final, runtime_checkable
 
 import numpy as np
 
-from robot_dyn import former
 from robot_dyn.errors import QueryError, escaped, shown
 from robot_dyn.model.units import units
 from robot_dyn.simulation.error import ErrorEstimate
@@ -202,8 +201,6 @@ class Trajectory(Value):
 
     def __post_init__(self) -> None:
         read_only(self)
-
-    wanted, tau = map(former.Attribute, ("desired", "u"))
 
     @property
     def tracking_error(self) -> float | None:
