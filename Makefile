@@ -11,7 +11,7 @@ demo: .venv/installed
 test: .venv/installed
 	$(BIN)/python -m pytest -n auto --dist worksteal
 
-# what takes long: all hard cases and their report, docs/hard_cases.md; what tests mark as stress; error estimates on 600
+# what takes long: all hard cases, their figures in build/hard_cases; what tests mark as stress; error estimates on 600
 # random scenes. With a fixed seed and with that of the day, which each prints.
 stress: .venv/installed
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.hard --full --write --seed $$(date +%Y%m%d)

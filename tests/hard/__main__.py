@@ -1,4 +1,4 @@
-"""`python -m tests.hard --seed 20261122`: run all hard cases, and write docs/hard_cases.md and docs/hard_cases.json.
+"""`python -m tests.hard --seed 20261122 --write`: run all hard cases, and write the report to build/hard_cases.
 
 Exit code 1 if a figure is wrong without a word. With --family and --case, only those are run, and the report keeps the
 others as they were; without --full, the short cases.
@@ -18,9 +18,9 @@ from time import process_time
 from robot_dyn.errors import ModelWarning
 from tests.hard.case import Row
 from tests.hard.families import FAMILIES
-from tests.hard.report import Result, illustrate, write
+from tests.hard.report import Result, summarise, write
 
-DOCS = Path(__file__).parents[2] / "docs"
+BUILD = Path(__file__).parents[2] / "build" / "hard_cases"
 
 
 def run(task: tuple[str, int, int]) -> Result:
@@ -45,7 +45,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--full", action="store_true", help="the long cases too")
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--write", type=Path, nargs="?", const=DOCS, help="folder of the report")
+    parser.add_argument("--write", type=Path, nargs="?", const=BUILD, help="folder of the report")
     options = parser.parse_args()
     tasks = [
         (name, index, options.seed)
@@ -72,7 +72,7 @@ def main() -> int:
             if options.write:  # after each case, so that one that is stopped leaves those before it
                 write(result, options.write)
     if options.write:
-        illustrate(options.write)
+        summarise(options.write)
     count = Counter(row.verdict for result in results for row in result.rows)
     print(f"seed {options.seed}: {dict(count)}")
     return int(count["SILENT"] > 0)

@@ -1,4 +1,4 @@
-"""The report of hard cases: a page with a table for each family, and the same rows as JSON."""
+"""The report of hard cases: every figure as a page and as JSON, and the page that docs/ keeps of them."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from tests.hard.families import FAMILIES
 from tests.hard.figure import save
 
 PICTURE = "pictures/hard_cases.png"
+VERDICTS = "holds", "said", "SILENT"
 
 
 @final
@@ -40,8 +41,8 @@ class Result:
 
 
 def write(result: Result, folder: Path) -> None:
-    """Write a result into hard_cases.json and hard_cases.md; cases that were run before are kept as they were."""
-    path = folder / "hard_cases.json"
+    """Write a result into figures.json and figures.md; cases that were run before are kept as they were."""
+    path = folder / "figures.json"
     known = json.loads(path.read_text()) if path.exists() else {}
     known.setdefault(result.family, {})[result.case] = {
         "seed": result.seed,
@@ -55,12 +56,13 @@ def write(result: Result, folder: Path) -> None:
         if name in known
     }
     path.write_text(json.dumps(known, indent=1, ensure_ascii=False) + "\n")
+    (folder / "figures.md").write_text("\n".join(_every_figure(known)) + "\n")
+
+
+def summarise(folder: Path) -> None:
+    """Write the page and the picture of all figures in a folder, in the form that docs/ keeps."""
+    known = json.loads((folder / "figures.json").read_text())
     (folder / "hard_cases.md").write_text(page(known))
-
-
-def illustrate(folder: Path) -> None:
-    """Draw the figure of the report that is there."""
-    known = json.loads((folder / "hard_cases.json").read_text())
     save({FAMILIES[name].TITLE: each for name, each in rows(known).items()}, folder / PICTURE)
 
 
@@ -70,34 +72,52 @@ def rows(known: dict) -> dict[str, list[Row]]:
 
 
 def page(known: dict) -> str:
-    """The page of what hard_cases.json holds."""
-    return "\n".join(_lines(known)) + "\n"
+    """The page of families: the law of each, and how its figures are spread."""
+    return "\n".join(_families(known)) + "\n"
 
 
-def _lines(known: dict) -> Iterator[str]:
-    figures = rows(known)
-    ours = [row for those in figures.values() for row in those if row.ours]
-    count = Counter(row.verdict for row in ours)
+def _families(known: dict) -> Iterator[str]:
+    figures = {name: [row for row in those if row.ours] for name, those in rows(known).items()}
+    count = Counter(row.verdict for those in figures.values() for row in those)
     yield "# Hard cases"
     yield ""
     yield (
-        "Written by `python -m tests.hard --full --write`, which `make stress` runs; the same rows are in"
-        " `hard_cases.json`. Each figure is held to what is allowed, with the reason of it above its table. A figure"
-        " that does not hold and was said to be so (a refusal, a finding, the verdict of a run) counts as *said*; one"
-        " without a word as *SILENT*."
+        "Each figure is held to what is allowed, by the law of its family below. A figure that does not hold and was"
+        " said to be so (a refusal, a finding, the verdict of a run) counts as *said*; one without a word as *silent*."
+        " `make stress` runs all cases and writes every figure to `build/hard_cases/`."
     )
     yield ""
     yield (
-        f"{len(ours)} figures of robot_dyn: {count['holds']} hold, {count['said']} said, **{count['SILENT']} silent**."
+        f"{count.total()} figures of robot_dyn: {count['holds']} hold, {count['said']} said,"
+        f" **{count['SILENT']} silent**."
         f" {'; '.join(sorted({_environment(case) for of in known.values() for case in of.values()}))}."
     )
     yield ""
-    yield f"![Found over allowed, for each figure of each family]({PICTURE})"
+    yield "| family | cases | figures | hold | said | silent | largest found / allowed of those that hold |"
+    yield "|" + " --- |" * 7
     for name, those in figures.items():
+        number = Counter(row.verdict for row in those)
+        ratios = [row.found / row.allowed for row in those if row.holds and row.allowed > 0]
+        cells = [FAMILIES[name].TITLE, len(known[name]), len(those), *(number[each] for each in VERDICTS)]
+        yield "| " + " | ".join(map(str, [*cells, _number(max(ratios, default=0.0))])) + " |"
+    yield ""
+    yield f"![Found over allowed, for each figure of each family]({PICTURE})"
+    for name in known:
         yield ""
-        yield f"## {FAMILIES[name].TITLE}"
+        yield from _law(name)
+
+
+def _law(name: str) -> Iterator[str]:
+    yield f"## {FAMILIES[name].TITLE}"
+    yield ""
+    yield cleandoc(FAMILIES[name].__doc__ or "")
+
+
+def _every_figure(known: dict) -> Iterator[str]:
+    yield "# Figures of the hard cases"
+    for name, those in rows(known).items():
         yield ""
-        yield cleandoc(FAMILIES[name].__doc__ or "")
+        yield from _law(name)
         yield ""
         seeds = ", ".join(str(seed) for seed in sorted({case["seed"] for case in known[name].values()}))
         seconds = sum(case["seconds"] for case in known[name].values())
