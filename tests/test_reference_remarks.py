@@ -72,6 +72,22 @@ def test_a_joint_that_friction_holds_throughout_is_remarked(stiffness: float, ho
         assert "held by friction at every step: joint_2 at -0.2 rad" in run.summary
 
 
+def test_a_batch_tells_in_which_runs_a_joint_is_held_or_the_reference_jumps() -> None:
+    """Each run as `simulate` does: held up to kp = 10 N m/rad, as above; from elsewhere the reference jumps."""
+    still = ARM.with_(gravity=(0.0, 0.0, 0.0), lock={"joint_1": 0.3})
+    law = rd.PD(rd.quintic([-0.2], [0.3], 0.4), 9.0, 0.0)
+    setup = rd.Setup(rd.Plant(still, [rd.DryFriction(5.0)]), [-0.2], duration_s=0.6, controller=law)
+    starts, stiffness = np.array([[-0.2], [-0.2], [-0.1], [-0.35]]), np.array([9.0, 14.0, 9.5, 8.0])
+    runs = rd.rollouts(setup, starts, params={"kp": stiffness}, engine="interpreted")
+    said = {each.kind: each for each in runs.remarks if each.kind in (Kind.JUMPS, Kind.HELD)}
+    assert said[Kind.JUMPS].runs == (3, 2) and "joint_2 from -0.35 to -0.2 rad" in said[Kind.JUMPS].text
+    assert said[Kind.HELD].runs == (0, 2) and said[Kind.HELD].looked == 4
+    for i in range(4):
+        alone = rd.simulate(runs.setup_of(i), estimate_error=False, engine="interpreted").remarks
+        assert {each.kind for each in alone} >= {kind for kind in said if i in said[kind].runs}
+        assert [x for x in runs[i].remarks if x.kind in said] == [x for x in alone if x.kind in said]
+
+
 def test_the_summary_says_how_often_the_estimate_calls_code_of_the_user() -> None:
     """Each of its companions runs all of it again; built-in parts are not worth a line."""
     runs, calls = {}, [0]

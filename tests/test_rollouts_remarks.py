@@ -14,7 +14,7 @@ from robot_dyn.errors import QueryError
 from robot_dyn.simulation.remarks import Kind, lines
 from robot_dyn.simulation.table import export_csv
 
-COUNTED = (Kind.CHATTER, Kind.EFFORT_REACHED, Kind.STOP_REACHED, Kind.BEYOND)
+COUNTED = (Kind.CHATTER, Kind.EFFORT_REACHED, Kind.STOP_REACHED, Kind.BEYOND, Kind.JUMPS, Kind.HELD)
 CART = rd.load("cart_pole")  # 2 m, 5 m/s and 100 N are the limits of its slide
 Q, V, B = np.array([0.1, 0.3]), np.array([0.2, -0.4]), 6
 GOAL = rd.quintic(Q, np.array([1.9, 0.8]), 0.5)
@@ -147,7 +147,8 @@ def test_remarks_survive_files_and_slices(batch, tmp_path: Path) -> None:
             assert {key for key, remark in told(some).items() if i in remark.runs} == about == told(some[i]).keys()
         np.testing.assert_array_equal(some.tracking_error, runs.tracking_error[1:4])
         assert all(each.looked in (1, 3) for each in some.remarks)
-    assert [x.text for x in told(back[1:4]).values()] == [x.text for x in told(runs[1:4]).values()]
+    for x, y in zip(told(back[1:4]).values(), told(runs[1:4]).values(), strict=True):
+        assert x.text == y.text or x.text.endswith(", in another run")  # the reference is not in the file
     with pytest.raises(QueryError, match="runs that were read from a file have no setup"):
         back.setup_of(0)
 

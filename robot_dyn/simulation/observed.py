@@ -64,8 +64,14 @@ def remarks(
     )
     return (
         *of_steps(*of_run), *_coarse(setup, observer, t, samples, units), *_gaining(setup, t, power),
-        *creeping(setup, t, v, units), *jumps(setup, units), *held(setup, of.extremes[0], t, units),
+        *creeping(setup, t, v, units), *of_reference(setup, t, of.extremes[0], units),
     )  # fmt: skip
+
+
+def of_reference(setup: Setup, t: np.ndarray, extremes: np.ndarray, units: Units) -> Iterator[Remark]:
+    """Remarks on the reference of a run, with extremes (3, 2, n) of its steps and samples at times t (m,)."""
+    yield from (remark for remark, _ in jumps(setup, setup.q0[None], setup.v0[None], units))
+    yield from held(setup, extremes, t, units)
 
 
 def of_steps(

@@ -11,8 +11,9 @@ import numpy as np
 from robot_dyn.model.units import unit
 from robot_dyn.simulation.chatter import Episode
 from robot_dyn.simulation.observation import Observed
-from robot_dyn.simulation.observed import KINDS, Units, against, of_steps, units_of
+from robot_dyn.simulation.observed import KINDS, Units, against, of_reference, of_steps, units_of
 from robot_dyn.simulation.origin import joint_types
+from robot_dyn.simulation.reference_remarks import at_rest, held, jumps
 from robot_dyn.simulation.remarks import Kind, Remark
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.state_equation import StateEquation
@@ -22,6 +23,8 @@ from robot_dyn.values import Value, read_only
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.rollout_result import Rollouts
+
+OF_REFERENCES = Kind.JUMPS, Kind.HELD
 
 
 @final
@@ -53,7 +56,9 @@ def overview(runs: Rollouts) -> Overview:
     errors = tracking_errors(runs)
     remarks = () if runs.observed is None else tuple(counted(runs, runs.observed, remedy))
     worst = worst_of(runs, remarks, errors)
-    return Overview(worst, remarks if runs.setup is None else (*remarks, *_linearised(runs, worst)), errors)
+    if runs.setup is not None:
+        remarks = (*remarks, *_of_references(runs, runs.setup), *_linearised(runs, worst))
+    return Overview(worst, remarks, errors)
 
 
 def of_some(runs: Rollouts, numbers: range, whole: Overview) -> Overview:
@@ -63,6 +68,7 @@ def of_some(runs: Rollouts, numbers: range, whole: Overview) -> Overview:
     remarks: list[Remark] = []
     if runs.observed is not None:
         remarks += counted(runs, runs.observed, lambda _: lambda _: remedies[Kind.CHATTER])
+    remarks += _of_whole(whole, numbers)
     alone = (each for each in whole.remarks if each.looked == 1 != len(numbers) and each.runs[0] in numbers)
     remarks += (replace(each, runs=(numbers.index(each.runs[0]),)) for each in alone)
     return Overview(worst_of(runs, tuple(remarks), errors), tuple(remarks), errors)
@@ -75,7 +81,21 @@ def remarks_of(runs: Rollouts, run: int, setup: Setup | None, t: np.ndarray, q: 
     visits, episodes = runs.observed.visits_of(run), runs.observed.episodes_of(run)
     remedy = (lambda _: "") if setup is None else against(setup, t, q)
     instants = int(runs.observed.instants[run])
-    return tuple(of_steps(runs.joint_names, units(runs), visits, episodes, remedy, instants))
+    found = of_steps(runs.joint_names, units(runs), visits, episodes, remedy, instants)
+    if setup is not None:
+        found += of_reference(setup, t, runs.observed.extremes[run], units(runs))
+    elif runs.saved is not None:
+        found += (replace(each, runs=(), looked=0) for each in _of_whole(runs.saved, range(run, run + 1)))
+    return tuple(found)
+
+
+def _of_whole(whole: Overview, numbers: range) -> Iterator[Remark]:
+    """Remarks on the reference of some runs of a batch without their setup; the text may be of another of them."""
+    for each in whole.remarks:
+        of = tuple(numbers.index(run) for run in each.runs if run in numbers)
+        if of and each.kind in OF_REFERENCES:
+            other = "" if each.runs[0] in numbers else ", in another run"
+            yield replace(each, runs=of, looked=len(numbers), text=each.text + other)
 
 
 def units(runs: Rollouts) -> Units:
@@ -113,6 +133,23 @@ def counted(runs: Rollouts, of: Observed, remedy: Callable[[int], Callable[[Epis
             visits = {x: visit for x, visit in of.visits_of(worst).items() if (x.kind, x.row) == (kind, row)}
             (remark,) = of_steps(*named, visits, {}, remedy(worst), int(of.instants[worst]))
             yield _in_runs(remark, worst, some)
+
+
+def _of_references(runs: Rollouts, setup: Setup) -> Iterator[Remark]:
+    """Remarks on the reference, which all runs share: where it jumps from their starts, which joints friction holds."""
+    q0 = np.tile(setup.q0, (len(runs), 1)) if runs.q0 is None else runs.q0
+    v0 = np.tile(setup.v0, (len(runs), 1)) if runs.v0 is None else runs.v0
+    for remark, gaps in jumps(setup, q0, v0, units(runs)):
+        yield _in_runs(remark, int(gaps.argmax()), gaps > 0)
+    if runs.observed is None:
+        return
+    extremes, of = runs.observed.extremes, dict[str, list[tuple[int, Remark]]]()
+    for run in map(int, np.flatnonzero(at_rest(extremes).any(axis=1))):
+        for remark in held(runs.setup_of(run), extremes[run], runs.t[runs.t <= runs.ended[run]], units(runs)):
+            of.setdefault(remark.joint, []).append((run, remark))
+    for each in of.values():
+        worst, remark = max(each, key=lambda of_run: of_run[1].limit or 0.0)
+        yield _in_runs(remark, worst, np.isin(np.arange(len(runs)), [run for run, _ in each]))
 
 
 def _in_runs(remark: Remark, worst: int, some: np.ndarray) -> Remark:

@@ -18,33 +18,36 @@ _LOOKS = 2000  # at a reference
 Units = list[tuple[str, str, str]]
 
 
-def jumps(setup: Setup, units: Units) -> Iterator[Remark]:
+def jumps(setup: Setup, q0: np.ndarray, v0: np.ndarray, units: Units) -> Iterator[tuple[Remark, np.ndarray]]:
     """The joints whose reference does not begin where the joint is, or as fast as it moves there.
 
-    A reference rests before its first break. One that rests at all times is a set point, which may be anywhere.
+    A reference rests before its first break. One that rests at all times is a set point, which may be anywhere. Each
+    remark is on the run with the largest jump, beside the jumps of all runs, (B,), 0 where there is none.
 
     Args:
         setup: What ran.
+        q0: Positions at the start of each run, (B, n).
+        v0: Velocities there, (B, n).
         units: Of q, v and u of each joint.
     """
     reference = _joint_reference(setup)
     if reference is None or reference.start >= setup.duration_s:
         return
     q, v = _along(setup, reference)
-    t = max(0.0, reference.start)
-    later = t > 0
-    begin = reference.at(t)[:2]
-    before = (reference.at(0.0)[0], 0 * setup.v0) if later else (setup.q0, setup.v0)
-    moves = _moves(q)
+    t, names = max(0.0, reference.start), setup.plant.dynamics.joint_names
+    before = (q0, v0) if t == 0 else (np.broadcast_to(reference.at(0.0)[0], q0.shape), np.zeros_like(v0))
     sizes = np.ptp(q, axis=0), np.abs(v).max(axis=0)
-    for row, (quantity, size) in enumerate(zip("qv", sizes, strict=True)):
-        for i in np.flatnonzero(moves & (np.abs(begin[row] - before[row]) > _JUMP * size)):
-            name, (asked, at_start) = setup.plant.dynamics.joint_names[i], (float(x[row][i]) for x in (begin, before))
-            text = f"{quantity} of {name} from {at_start:.4g} to {asked:.4g} {units[i][row]} at {t:.4g} s"
+    for row, (quantity, begin, there, size) in enumerate(zip("qv", reference.at(t), before, sizes, strict=False)):
+        gaps = np.abs(begin - there)
+        gaps[:, ~_moves(q)] = 0.0
+        gaps[gaps <= _JUMP * size] = 0.0
+        for i in np.flatnonzero(gaps.any(axis=0)):
+            asked, at_start = float(begin[i]), float(there[gaps[:, i].argmax(), i])
+            text = f"{quantity} of {names[i]} from {at_start:.4g} to {asked:.4g} {units[i][row]} at {t:.4g} s"
             yield Remark(
-                Kind.JUMPS, name, quantity, t, 0.0, t, asked, at_start, text,
+                Kind.JUMPS, names[i], quantity, t, 0.0, t, asked, at_start, text,
                 "let it begin where and as fast as the joint does; rd.via_points(times_s, points) begins at rest",
-            )  # fmt: skip
+            ), gaps[:, i]  # fmt: skip
 
 
 def held(setup: Setup, extremes: np.ndarray, t: np.ndarray, units: Units) -> Iterator[Remark]:
@@ -65,8 +68,7 @@ def held(setup: Setup, extremes: np.ndarray, t: np.ndarray, units: Units) -> Ite
             rubs |= np.asarray(effect.friction(0 * setup.v0)) > 0
     path = reference.at(t)[0]
     asked, moves = np.ptp(path, axis=0), _moves(path)
-    rests = (extremes[0, 0] == extremes[0, 1]) & (extremes[1] == 0).all(axis=0)
-    for i in np.flatnonzero(rubs & rests & moves):
+    for i in np.flatnonzero(rubs & at_rest(extremes) & moves):
         name, (unit, _, of_u) = setup.plant.dynamics.joint_names[i], units[i]
         most = float(np.nan_to_num(np.abs(extremes[2, :, i])).max())
         text = f"{name} at {setup.q0[i]:.4g} {unit}, its reference moves by {asked[i]:.3g}, |u| up to {most:.3g} {of_u}"
@@ -74,6 +76,11 @@ def held(setup: Setup, extremes: np.ndarray, t: np.ndarray, units: Units) -> Ite
             Kind.HELD, name, "q", 0.0, float(t[-1]), 0.0, float(setup.q0[i]), float(asked[i]), text,
             "the control asks for less than friction holds: take larger gains, or less friction",
         )  # fmt: skip
+
+
+def at_rest(extremes: np.ndarray) -> np.ndarray:
+    """Of extremes over all steps (…, 3, 2, n), which joints did not move, (…, n)."""
+    return (extremes[..., 0, 0, :] == extremes[..., 0, 1, :]) & (extremes[..., 1, :, :] == 0).all(axis=-2)
 
 
 def _joint_reference(setup: Setup) -> PiecewisePolynomial | None:

@@ -94,7 +94,8 @@ def rollouts(
     Runs are watched at every step: `Rollouts.remarks` counts in how many of them actuation reverses at every tick, and
     in how many a limit or a stop is reached or passed. In lock step the actuation of a continuous controller is watched
     at samples and at least 200 instants, or every step if there are fewer; whether it reverses at every step is not.
-    The other remarks of `simulate` are made on single runs alone.
+    Likewise where the reference does not begin as the joint does, or moves a joint that friction holds. The other
+    remarks of `simulate` are made on single runs alone.
 
     Returns:
         The runs, in the order given. Ctrl-C ends them, and keeps what there is.

@@ -107,7 +107,7 @@ class Rollouts(Value):
         acceleration, the powers and energies, and the torque of a continuous controller without an integral. What
         neither tells is nan: work that was not recorded; the torque of other controllers; and all but what was
         recorded of runs that were read from a file. It has no error estimate, and of the remarks that `simulate` makes
-        those on limits, stops and chatter.
+        those on limits, stops, chatter and the reference.
 
         Raises:
             QueryError: If q or v was not recorded, a slice has no runs, or `run` is neither a whole number nor a slice.
@@ -161,7 +161,7 @@ class Rollouts(Value):
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
-        """What `simulate` remarks on the limits, stops and chatter of each run, one of each kind, joint and quantity.
+        """What `simulate` remarks on each run: limits, stops, chatter and the reference, by kind, joint and quantity.
 
         `Remark.runs` are the numbers of the runs that it is about: first the worst, whose values and text it has, then
         the others in their order. A sampled loop is linearised in one run alone, `worst`. Under continuous control in

@@ -90,7 +90,7 @@ def counted(runs: rd.Rollouts, remark: Remark) -> bool:
     """Whether a remark is one that is made on each run of a batch as well; an actuation may be seen at instants."""
     observed = runs.observed
     at_instants = remark.quantity == "u" and observed is not None and observed.instants.any()
-    return remark.kind in (*KINDS, Kind.CHATTER) and not at_instants
+    return remark.kind in (*KINDS, Kind.CHATTER, Kind.JUMPS, Kind.HELD) and not at_instants
 
 
 def pushed(setup: rd.Setup) -> list[rd.Trajectory]:

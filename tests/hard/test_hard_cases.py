@@ -42,7 +42,9 @@ def test_the_page_counts_the_figures_of_the_rows_and_its_picture_has_a_mark_for_
     summarise(tmp_path)
     known = json.loads((tmp_path / "figures.json").read_text())
     assert f"| {FAMILIES['chaos'].TITLE} | 1 | 2 | 1 | 1 | 0 | 0.75 |" in (tmp_path / "hard_cases.md").read_text()
-    assert sum(len(marks.get_offsets()) for marks in draw(rows(known)).axes[0].collections) == 4  # two of ours in each of two families
+    assert (
+        sum(len(marks.get_offsets()) for marks in draw(rows(known)).axes[0].collections) == 4
+    )  # two of ours in each of two families
 
 
 def test_the_documentation_states_the_law_of_each_family() -> None:
