@@ -55,6 +55,13 @@ def test_steps_that_err_alike_at_a_tenth_of_the_tolerance_are_halved(seed: int, 
     assert judged.ratio == pytest.approx(1.0, rel=0.05)  # 1 − 2⁻⁸, where rounding is no part of it
 
 
+def test_what_unstable_steps_make_of_rounding_is_no_error_of_shorter_ones() -> None:
+    """LuGre friction on a rail: steps three times as long blow up, those of the run are right to 3e-12 rad."""
+    judged = judge(68251469, 110)
+    assert not judged.misleads and judged.run.error.verdict is Verdict.ORDER, str(judged)
+    assert LEAST <= judged.ratio <= 10.0  # 2.7e7 where longer steps are believed
+
+
 def test_halved_steps_are_shortened_where_they_are_still_in_a_stop_that_the_run_has_left() -> None:
     """A stop of 1e9 N m/rad for 57 µs, and steps of 3 ms behind it: a companion leaves it a little later."""
     motion = stop(1e9)

@@ -221,6 +221,8 @@ def test_runs_are_numbered_as_lists_are() -> None:
         runs[2:2]
     with pytest.raises(QueryError, match="a whole number or a slice"):
         runs["first"]
+    with pytest.raises(QueryError, match="a whole number or a slice, got True"):
+        runs[True]
     with pytest.raises(QueryError, match="if q and v were recorded"):
         rd.rollouts(SETUP, starts(2), record=["q"])[0]
 

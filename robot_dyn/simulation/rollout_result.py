@@ -125,7 +125,7 @@ class Rollouts(Value):
             whole = None if self.saved is None else of_some(some, taken, self.saved)
             return replace(some, saved=whole)
         try:
-            number = range(len(self))[index(run)]
+            number = range(len(self))[index(None if isinstance(run, bool) else run)]  # type: ignore[arg-type]
         except TypeError:
             raise QueryError(f"runs are numbered: give a whole number or a slice, got {run!r}") from None
         except IndexError:
