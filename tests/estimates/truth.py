@@ -131,7 +131,11 @@ class Guards:
         turns = np.argwhere(v[:, :-1] * v[:, 1:] < 0)
         more = [brentq(lambda s, j=j: dense(s)[self.n + j], at[k], at[k + 1], xtol=1e-15) for j, k in turns]
         at = np.union1d(at, more)
-        left = sides[:, None] * (dense(at)[self.rows] - self.levels[:, None]) < -self.slack[:, None]
+        rates = np.abs(np.diff(states[self.rows])).max(axis=1) * len(_LOOKS) / h
+        slack = np.maximum(
+            self.slack, 4 * np.spacing(solver.t) * rates
+        )  # a root is known to a unit of time's last place
+        left = sides[:, None] * (dense(at)[self.rows] - self.levels[:, None]) < -slack[:, None]
         if not left.any():
             return None
         found = []
