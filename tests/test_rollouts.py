@@ -97,6 +97,20 @@ def test_a_run_that_diverges_leaves_the_others_as_they_are(method: str) -> None:
     assert "2 diverged" in runs.summary
 
 
+@pytest.mark.parametrize("engine", ["interpreted", "compiled"])
+def test_a_run_that_overflows_ends_at_the_step_at_which_simulate_ends_it(engine: str) -> None:
+    """Velocities square from step to step: from 1e100 to 1e308 it is one or two of them. Rounding moves no end."""
+    rng, h = np.random.default_rng(2), 0.02
+    q0, v0 = rng.normal(size=(12, 2)), 30.0 * rng.normal(size=(12, 2))
+    setup = rd.Setup(SETUP.plant, q0[0], v0[0], duration_s=40 * h, integrator="explicit_euler", step_s=h, engine=engine)
+    runs = rd.rollouts(replace(setup, engine="auto"), q0, v0)
+    wild = np.flatnonzero(runs.diverged)
+    assert len(set(np.rint(runs.ended[wild] / h))) > 2
+    for i in wild:
+        alone = rd.simulate(setup, q0=q0[i], v0=v0[i], estimate_error=False)
+        assert (alone.outcome.ending, alone.outcome.t) == (runs.outcome(i).ending, runs.outcome(i).t)
+
+
 def test_a_run_beyond_the_range_of_a_tile_is_done_by_itself() -> None:
     """A free joint that starts at 2e5 rad: the tile's sine is no longer exact there, the C library's is."""
     spinner = replace(SETUP, plant=rd.Plant(ARM), controller=None)

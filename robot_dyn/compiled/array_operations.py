@@ -8,7 +8,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 from llvmlite import ir
@@ -70,9 +70,13 @@ def divide(x: Array, s: Any) -> None:
     x /= s
 
 
-def add_sizes(x: Array, y: Array) -> None:
-    """X + |y| in place of x."""
-    x += np.abs(y)
+def sum_sizes(x: Array, out: Array) -> None:
+    """Σ |x_e| over the rows of x; sums in registers."""
+    for b in range(len(out)):
+        total = 0.0
+        for e in range(len(x)):
+            total += np.abs(x[e, b])
+        out[b] = total
 
 
 @emits
@@ -179,8 +183,59 @@ def multiplication(f: Function, node: ast.AST, x: ArrayValue, y: Value, out: Arr
     return NOTHING
 
 
-def _with_size(b: Any, x: Any, y: Any) -> Any:
-    return b.fadd(x, Vectors(b, F64, getattr(y.type, "count", 1)).intrinsic("fabs", y))
+@emits
+def _sum_sizes(f: Function, node: ast.AST, x: ArrayValue, out: ArrayValue) -> Value:
+    if not (x.kind.contiguous and out.kind.contiguous):
+        raise f.refused(node, "a sum over arrays that are not contiguous", "copy them first")
+    if f.silent:
+        return NOTHING
+    b, (rows, W) = f.builder, x.shape
+    for width, e in vectors.chunks(f, W, vectors.WIDTHS):
+        of = Vectors(b, F64, width)
+        with b.goto_entry_block():
+            total = b.alloca(of.type)
+        b.store(of.constant(0.0), total)
+        with vectors.steps(b, vectors.ZERO, rows.ir, 1) as k:
+            given = vectors.loaded(b, x.data, b.add(b.mul(k, W.ir), e), width, FLOAT)
+            b.store(b.fadd(b.load(total), of.intrinsic("fabs", given)), total)
+        vectors.stored(b, b.load(total), out.data, e, width, FLOAT)
+    return NOTHING
+
+
+@emits
+def limitation(f: Function, node: ast.AST, x: ArrayValue, limit: Value) -> Value:
+    """Whether all entries of an array are less than a limit."""
+    vectors.check(f, node, x, [])
+    if f.silent:
+        return Scalar(BOOL, None)
+    b, of = f.builder, x.kind.of
+    most, less = converted(f, scalar(f, limit, node), of, node), b.fcmp_ordered if of == FLOAT else b.icmp_signed
+    found = _Found(b)
+    for width, e in vectors.chunks(f, arrays.size(f, x), vectors.WIDTHS):
+        below = less("<", vectors.loaded(b, x.data, e, width, of), vectors.spread(b, most.ir, width, of))
+        found.add(b.not_(below), width)
+    return Scalar(BOOL, b.not_(found.value))
+
+
+@final
+class _Found:
+    """Whether one of the masks of a loop, of 8 entries at most, held for an entry."""
+
+    def __init__(self, b: Any) -> None:
+        self._builder = b
+        with b.goto_entry_block():
+            self._bits = b.alloca(I8)
+        b.store(ir.Constant(I8, 0), self._bits)
+
+    def add(self, mask: Any, width: int) -> None:
+        """Another mask."""
+        b, bits = self._builder, self._builder.bitcast(mask, ir.IntType(width))
+        b.store(b.or_(b.load(self._bits), bits if width == 8 else b.zext(bits, I8)), self._bits)
+
+    @property
+    def value(self) -> Any:
+        """The truth behind the loop."""
+        return self._builder.icmp_unsigned("!=", self._builder.load(self._bits), ir.Constant(I8, 0))
 
 
 @emits
@@ -193,9 +248,7 @@ def enclosure(
     if f.silent:
         return Scalar(BOOL, None)
     b, (least, most) = f.builder, (converted(f, scalar(f, each, node), FLOAT, node) for each in (least, most))
-    with b.goto_entry_block():
-        found = b.alloca(I8)
-    b.store(ir.Constant(I8, 0), found)
+    found = _Found(b)
     for width, e in vectors.chunks(f, arrays.size(f, x), vectors.WIDTHS):
         given, outside = vectors.loaded(b, x.data, e, width, FLOAT), []
         for bound, order, limit in ((low, "<", least), (high, ">", most)):
@@ -203,9 +256,8 @@ def enclosure(
             farther = b.select(b.fcmp_ordered(order, given, known), given, known)
             vectors.stored(b, farther, bound.data, e, width, FLOAT)
             outside.append(b.fcmp_ordered(order, given, vectors.spread(b, limit.ir, width, FLOAT)))
-        bits = b.bitcast(b.or_(*outside), ir.IntType(width))
-        b.store(b.or_(b.load(found), bits if width == 8 else b.zext(bits, I8)), found)
-    return Scalar(BOOL, b.icmp_unsigned("!=", b.load(found), ir.Constant(I8, 0)))
+        found.add(b.or_(*outside), width)
+    return Scalar(BOOL, found.value)
 
 
 subtraction = _in_place(lambda b, x, y: b.fsub(x, y))
@@ -214,6 +266,6 @@ OPERATIONS: Mapping[Any, Callable[..., Value]] = MappingProxyType(
         require: _require, part: _part, weighted_sum: _weighted_sum, np.multiply: multiplication,
         subtract_multiple: _in_place(lambda b, x, y, s: b.fsub(x, b.fmul(y, s))),
         subtract_product: _in_place(lambda b, x, y, z: b.fsub(x, b.fmul(y, z))),
-        divide: _in_place(lambda b, x, s: b.fdiv(x, s)), add_sizes: _in_place(_with_size),
+        divide: _in_place(lambda b, x, s: b.fdiv(x, s)), sum_sizes: _sum_sizes,
     }
 )  # fmt: skip

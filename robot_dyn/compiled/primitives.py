@@ -14,16 +14,17 @@ import numpy as np
 
 from robot_dyn.compiled.array_operations import (
     OPERATIONS,
-    add_sizes,
     copying,
     divide,
     enclosure,
     evaluation,
+    limitation,
     part,
     require,
     subtract_multiple,
     subtract_product,
     subtraction,
+    sum_sizes,
     weighted_sum,
 )  # fmt: skip
 from robot_dyn.integrate import primitives
@@ -52,10 +53,7 @@ def combination(x: Array, y: Array, h: Any, weights: Array, K: Array, count: int
 def sizes(x: Array, out: Array) -> None:
     """As of NumPy."""
     require(x.shape[1] == len(out), "a sum for other runs")
-    for b in range(len(out)):
-        out[b] = 0.0
-    for e in range(len(x)):
-        add_sizes(out, x[e])
+    sum_sizes(x, out)
 
 
 def norm(x: Array, y: Array, after: Array, rtol: float, atol: float) -> float:
@@ -208,8 +206,8 @@ INSTEAD: Mapping[Any, Callable[..., Any]] = MappingProxyType(
     {
         **OPERATIONS, primitives.evaluate: evaluation, primitives.copy: copying, primitives.subtract: subtraction,
         primitives.combination: combination, primitives.sizes: sizes, primitives.norm: norm,
-        primitives.enclose: enclosure, primitives.between: between, primitives.settle: settle,
-        primitives.factor: factor, primitives.solve: solve,
+        primitives.enclose: enclosure, primitives.below: limitation,
+        primitives.between: between, primitives.settle: settle, primitives.factor: factor, primitives.solve: solve,
         **{each: each for each in (larger, eliminate, take_off)},
     }
 )  # fmt: skip

@@ -12,8 +12,7 @@ from fractions import Fraction
 from functools import cache
 from typing import Any, NamedTuple, final
 
-import numpy as np
-
+from robot_dyn.aligned import aligned
 from robot_dyn.arithmetic import Arithmetic, Array
 from robot_dyn.errors import QueryError
 from robot_dyn.integrate.integrator import PlainMethod, RightSide, Stepper
@@ -66,7 +65,7 @@ class ExplicitRungeKutta(PlainMethod):
     def stepper(
         self, kind: Arithmetic, m: int, n: int, rows: int, runs: int = 1, widths: Array | None = None
     ) -> Stepper:
-        K = np.empty((len(self.tableau.b), rows, runs), kind.dtype)
+        K = aligned((len(self.tableau.b), rows, runs), kind.dtype)
         return Stepper(explicit_step, self.tableau.arrays(kind), Stages(K))
 
 
@@ -107,7 +106,7 @@ class SemiImplicitEuler(PlainMethod):
     def stepper(
         self, kind: Arithmetic, m: int, n: int, rows: int, runs: int = 1, widths: Array | None = None
     ) -> Stepper:
-        return Stepper(semi_implicit_step, Start(n, kind.array([1])), Stages(np.empty((1, rows, runs), kind.dtype)))
+        return Stepper(semi_implicit_step, Start(n, kind.array([1])), Stages(aligned((1, rows, runs), kind.dtype)))
 
 
 _HALF, _THIRD, _SIXTH = Fraction(1, 2), Fraction(1, 3), Fraction(1, 6)

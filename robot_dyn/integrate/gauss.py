@@ -14,6 +14,7 @@ from typing import Any, ClassVar, NamedTuple, final
 
 import numpy as np
 
+from robot_dyn.aligned import aligned
 from robot_dyn.arithmetic import Arithmetic, Array
 from robot_dyn.errors import OverflowedError, QueryError
 from robot_dyn.integrate.fixed_point import enclose_fixed_point, unit_roundoff
@@ -123,7 +124,7 @@ class Gauss(PlainMethod):
         self, kind: Arithmetic, m: int, n: int, rows: int, runs: int = 1, widths: Array | None = None
     ) -> Stepper:
         s = len(self.tableau.b)
-        K, Z, new = (np.empty(shape, kind.dtype) for shape in ((1, rows, runs), (s, m, runs), (s, m, runs)))
+        K, Z, new = (aligned(shape, kind.dtype) for shape in ((1, rows, runs), (s, m, runs), (s, m, runs)))
         stale, state = np.empty(runs, np.int64), np.empty(runs, np.int64)
         work = Increments(K, Z, new, np.empty((m, runs)), stale, state, float(unit_roundoff(K)))
         return Stepper(gauss_step, self.tableau.arrays(kind), work)

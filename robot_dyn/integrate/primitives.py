@@ -56,6 +56,11 @@ def sizes(x: Array, out: Array) -> None:
         out += np.abs(row)
 
 
+def below(x: Array, limit: Any) -> bool:
+    """Whether all entries of x (W,) are less than a limit; nan is not."""
+    return bool((x < limit).all())
+
+
 def enclose(low: Array, high: Array, x: Array, least: float, most: float) -> bool:
     """Let low and high (W,), neither nan, enclose x (W,); whether any of x is below `least` or above `most`.
 

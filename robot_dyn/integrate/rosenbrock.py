@@ -14,6 +14,7 @@ from typing import Any, ClassVar, NamedTuple, final
 
 import numpy as np
 
+from robot_dyn.aligned import aligned
 from robot_dyn.arithmetic import FLOAT64, Arithmetic, Array
 from robot_dyn.errors import QueryError
 from robot_dyn.integrate.integrator import IntegrationError, PlainMethod, RightSide, Stepper
@@ -232,8 +233,8 @@ class Rosenbrock(PlainMethod):
     def _work(self, kind: Arithmetic, m: int, rows: int, runs: int, bounded: int) -> Linear:
         s, dtype = len(self.table.m), kind.dtype
         shapes = (3, rows), (s, m), (m + 1, m), (m, m), (4, m), (1, bounded)
-        K, U, J, A, F, error = (np.zeros((*shape, runs), dtype) for shape in shapes)
-        known, zero, y = np.zeros((3, m, runs), dtype)
+        K, U, J, A, F, error = (aligned((*shape, runs), dtype) for shape in shapes)
+        known, zero, y = aligned((3, m, runs), dtype)
         exchanged = np.zeros((m, runs), np.int64)
         return Linear(K, K[2], U, J, A, exchanged, known, zero, np.full(1, np.nan), y, F, error)
 

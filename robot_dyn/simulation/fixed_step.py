@@ -13,6 +13,7 @@ from typing import cast, final
 
 import numpy as np
 
+from robot_dyn.aligned import aligned
 from robot_dyn.arithmetic import FLOAT64, Array
 from robot_dyn.errors import RobotDynError
 from robot_dyn.foreign import is_mistake
@@ -29,7 +30,7 @@ from robot_dyn.simulation.state_functions import interpreted, sample, system
 from robot_dyn.simulation.time_loop import WATCHED, Ended, Functions, Now, Records, Rules, Runs, acts, time_loop
 from robot_dyn.simulation.trajectory import Ending, Outcome
 from robot_dyn.simulation.transfers import Transfers
-from robot_dyn.simulation.watch import DivergedError, Watch, one_step
+from robot_dyn.simulation.watch import LARGEST, DivergedError, Watch, one_step, overflowed
 
 _DOUBTFUL = 1e6  # of Σ |y| in machine code, which does not see that M becomes singular
 
@@ -76,7 +77,7 @@ class FixedStep(Followed):
         self.stepper = method.stepper(FLOAT64, m, n, m + n, 1, equation.widths)
         self.advance = machine_code or time_loop(self.stepper.step)
         every, thin = self._shared(pace)
-        largest = _DOUBTFUL if self.compiled else inf
+        largest = _DOUBTFUL if self.compiled else LARGEST
         self.rules = rules_of(equation, True, largest, every, thin)
         rows = samples_at_most(setup, self.plan.counts) if pace == 1 else 1
         states = int((-(-self.plan.counts // every)).sum()) // thin + 2
@@ -174,7 +175,7 @@ class FixedStep(Followed):
         (step, coefficients, work), runs = self.stepper, self.runs
         arguments = functions, coefficients, t, h, runs.y, p, runs.own, runs.after, work, runs.lost
         self.watch.answer(t, self.y, lambda: step(*arguments))
-        if runs.lost[0] or not np.isfinite(runs.after).all():
+        if runs.lost[0] or overflowed(runs.after):
             raise self.watch.diverged(t, self.y, "a number overflowed")
         return runs.after[:, 0].copy()
 
@@ -228,8 +229,10 @@ def runs_of(equation: StateEquation, y: np.ndarray, own: np.ndarray, made: int, 
     held, states = equation.plant.dynamics.n if equation.sampled else 0, equation.state_size
     seed, run = (0, 0) if equation.controller is None else equation.controller.noise_key
     keys = np.array([np.full(W, seed, np.uint64), np.uint64(run) + numbers.astype(np.uint64)])
+    start, after = aligned((2, m, W))
+    start[...] = y
     return Runs(
-        np.array(y, order="C"), np.array(own, order="C"), np.empty((m, W)), np.empty((made, W)),
+        start, np.array(own, order="C"), after, np.empty((made, W)),
         np.empty((held + states, W)), np.empty((equation.plant.dynamics.n, W)), np.empty((2, W)), np.empty(W),
         np.zeros(W, np.int64), np.ones(W, np.int64), np.zeros(W, np.int64), np.zeros(W), np.zeros((m, W)),
         np.zeros(W), np.ones(W), np.zeros(W), keys,

@@ -13,6 +13,7 @@ from typing import NamedTuple, final
 
 import numpy as np
 
+from robot_dyn.aligned import aligned
 from robot_dyn.arithmetic import Array
 from robot_dyn.integrate.primitives import enclose
 from robot_dyn.simulation.chatter import Chatter, Episode, chatters_of, close_all, tick
@@ -58,20 +59,23 @@ def observations_of(start: Array, levels: Levels, tiles: int) -> list[Observatio
 
     def tiled(x: Array) -> Array:
         """(…, runs) as (tiles, …, W)."""
-        return np.ascontiguousarray(np.moveaxis(x.reshape(*x.shape[:-1], tiles, W), -2, 0))
+        made = aligned((tiles, *x.shape[:-1], W))
+        made[...] = np.moveaxis(x.reshape(*x.shape[:-1], tiles, W), -2, 0)
+        return made
 
     of = np.array([each.row for each in levels.levels], np.int64)
     sides = np.array([float(each.side) for each in levels.levels])
-    bounds, x, up = tiled(levels.bounds), tiled(start[of]), sides > 0
+    bounds, up = tiled(levels.bounds), sides > 0
     inner = np.tile([[-np.inf], [np.inf]], (tiles, 1, rows))
     np.fmax.at(inner[:, 0].T, of[~up], np.fmax.reduce(bounds[:, ~up], axis=2, initial=-np.inf).T)
     np.fmin.at(inner[:, 1].T, of[up], np.fmin.reduce(bounds[:, up], axis=2, initial=np.inf).T)
-    beyond = sides[:, None] * (x - bounds) > 0
+    low, high = (tiled(np.where(np.isnan(start), none, start)) for none in (np.inf, -np.inf))
     visits = np.full((tiles, 4, len(of), W), np.nan)
-    if beyond.any():
+    if (low < inner[:, 0, :, None]).any() or (high > inner[:, 1, :, None]).any():
+        x = tiled(start[of])
+        beyond = sides[:, None] * (x - bounds) > 0
         visits[:, :3] = np.where(beyond, 0.0, np.nan)[:, None]
         visits[:, 3] = np.where(beyond, x, np.nan)
-    low, high = (tiled(np.where(np.isnan(start), none, start)) for none in (np.inf, -np.inf))
     first, latest = np.searchsorted(of, np.arange(rows + 1)), np.zeros((tiles, 1))
     chatters = chatters_of(rows // 3, W, tiles)
     return [

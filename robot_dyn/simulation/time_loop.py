@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.integrate.primitives import copy, evaluate, sizes
+from robot_dyn.integrate.primitives import below, copy, evaluate, sizes
 from robot_dyn.simulation.observation import Observation, observe, observe_actuation, observe_motion
 from robot_dyn.simulation.philox import draw
 
@@ -310,9 +310,7 @@ def sample(
 def take(runs: Runs, rules: Rules, t: float) -> bool:
     """Take y⁺; whether a single run may go on. In lock step, end the runs whose y⁺ is not finite, or not found."""
     sizes(runs.after, runs.size)
-    ill = False
-    for b in range(len(runs.size)):
-        ill |= runs.lost[b] != 0 or not runs.size[b] < rules.largest
+    ill = not (below(runs.size, rules.largest) and below(runs.lost, 1))
     if ill and rules.alone:
         return False
     if ill:
@@ -366,6 +364,8 @@ def end(runs: Runs, b: int, t: float, why: int) -> None:
 
 def erase_ended(x: Array, runs: Runs) -> None:
     """Nan in x (r, W) for the runs that have ended."""
+    if below(runs.why, 1):
+        return
     for b in range(len(runs.alive)):
         if runs.alive[b] == 0:
             erase(x, b)

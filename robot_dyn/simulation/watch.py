@@ -16,6 +16,7 @@ from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.stiffness import fastest
 from robot_dyn.simulation.trajectory import diverged_advice
 
+LARGEST = 1e100  # of Σ |y|: beyond it products overflow
 _PACED = 2000  # steps between looks at the pace of an adaptive method
 _MOST_AHEAD = 1e7  # steps that such a run may have before it at the pace it has: about an hour
 _STEEP = 1e-3  # of q or v: an effect that bends within less makes a system stiff
@@ -32,11 +33,17 @@ class DivergedError(Exception):
 
 
 def one_step(method: Integrator, system: System, t: float, y: Array, h: float, watch: Watch) -> Array:
-    """The state after a step; DivergedError if there is none, or it is not finite."""
+    """The state after a step; DivergedError if there is none, or a number overflowed."""
     after = watch.answer(t, y, lambda: method.step(system, t, y, h))
-    if not np.isfinite(after).all():
+    if overflowed(after):
         raise watch.diverged(t, y, "a number overflowed")
     return after
+
+
+def overflowed(y: Array) -> bool:
+    """Whether Σ |y| has reached LARGEST, or is nan, as the time loop judges runs in lock step."""
+    with np.errstate(over="ignore"):
+        return not np.abs(y).sum() < LARGEST
 
 
 @final

@@ -66,6 +66,10 @@ def enclosed(low, high, x, least, most):
     return primitives.enclose(low, high, x, least, most)
 
 
+def limited(x, limit):
+    return primitives.below(x, limit)
+
+
 def normed(x, y, after, rtol, atol):
     return primitives.norm(x, y, after, rtol, atol)
 
@@ -135,6 +139,22 @@ def test_bounds(W: int) -> None:
             for limits in ((np.nextafter(-2.0, -3.0), 1.0), (-1.0, np.nextafter(2.0, 1.0))):
                 inside[at] = -2.0 if limits[1] == 1.0 else 2.0
                 three_ways(enclosed, None, low, high, inside, *limits)
+
+
+@RUNS
+def test_limits(W: int) -> None:
+    """All entries are less; one that is not, or is nan, or is the limit, is found at each place. Of integers, too."""
+    for length in (W, 2 * W + 5):
+        x, whole = np.random.default_rng(W).uniform(-1.0, 1.0, length), np.zeros(length, np.int64)
+        three_ways(limited, None, x, 1.0)
+        three_ways(limited, None, whole, 1)
+        assert primitives.below(x, 1.0) and primitives.below(whole, 1)
+        for at in {0, W // 2, W - 1, length - 1}:
+            for value in (1.0, np.nan, np.inf):
+                other = np.where(np.arange(length) == at, value, x)
+                assert not primitives.below(other, 1.0)
+                three_ways(limited, None, other, 1.0)
+            three_ways(limited, None, (np.arange(length) == at).astype(np.int64), 1)
 
 
 def test_norms() -> None:

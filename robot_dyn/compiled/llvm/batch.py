@@ -13,7 +13,7 @@ from llvmlite import ir
 from robot_dyn.compiled.llvm.lanes import F32
 from robot_dyn.compiled.llvm.one_state import Limits, distinct, judged, numbers
 from robot_dyn.compiled.llvm.rows import loaded, prefetch, store
-from robot_dyn.compiled.llvm.vectors import I64
+from robot_dyn.compiled.llvm.vectors import I64, align_stack
 from robot_dyn.compiled.llvm.writer import Writer
 from robot_dyn.compiled.program import Program
 
@@ -32,6 +32,7 @@ def batch_function(module: Any, name: str, program: Program, kind: Any, limits: 
     """
     pointers = [kind.as_pointer()] * (len(program.inputs) + 1)
     function = ir.Function(module, ir.FunctionType(I64, [*pointers, I64, I64]), name)
+    align_stack(function)
     *arrays, start, stop = function.args
     opening, loop, end = (function.append_basic_block(each) for each in ("opening", "loop", "end"))
     ir.IRBuilder(opening).branch(loop)

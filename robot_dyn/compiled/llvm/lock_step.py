@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from llvmlite import ir
 
 from robot_dyn.compiled.llvm.lanes import F64, wide
-from robot_dyn.compiled.llvm.vectors import I1, I64, Vectors
+from robot_dyn.compiled.llvm.vectors import I1, I64, Vectors, align_stack
 from robot_dyn.compiled.llvm.writer import Writer
 from robot_dyn.compiled.program import Program
 
@@ -103,6 +103,8 @@ def _write(
     own = {k: (row, False) for row, k in enumerate(rows)} | {k: (at, True) for k, at in shared.items()}
     any_angle = _any_angle(module, f"{name}_any_angle", inputs, body, runs, own)
     function = ir.Function(module, ir.FunctionType(ir.VoidType(), _ARGUMENTS), name)
+    if runs > 1:
+        align_stack(function)
     builder = ir.IRBuilder(function.append_basic_block())
     before, loop, end = builder.block, function.append_basic_block(), function.append_basic_block()
     builder.branch(loop)

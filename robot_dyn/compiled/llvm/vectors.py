@@ -11,6 +11,7 @@ from typing import Any, final
 
 from llvmlite import ir
 
+from robot_dyn.aligned import LINE
 from robot_dyn.compiled.llvm.lanes import F64, wide
 
 FLAGS = ("afn", "arcp", "contract", "nsz", "reassoc")  # of LLVM's fast-math flags, all but nnan and ninf
@@ -109,3 +110,9 @@ class Vectors:
         name = f"llvm.vector.reduce.fadd.v{self.count}f{8 * self.size}"
         made = self.builder.module.declare_intrinsic(name, fnty=shape)
         return self.builder.call(made, [ir.Constant(self.kind, 0.0), vector], fastmath=FLAGS)
+
+
+def align_stack(function: Any) -> None:
+    """Let the vectors that a function keeps on the stack begin at cache lines, wherever it is called from."""
+    function.attributes.add("nounwind")  # llvmlite writes no alignment where there is no other attribute
+    function.attributes.alignstack = LINE

@@ -37,6 +37,7 @@ from robot_dyn.simulation.size import check_batch
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.time_loop import Ended, Now, Records, Runs, Why
 from robot_dyn.simulation.trajectory import Ending, Outcome, Statistics, diverged_advice
+from robot_dyn.simulation.watch import LARGEST
 
 LANES = 64  # runs in a tile: with 8, 16 or 32 a step of RK4 took 1.5, 1.1 and 1.05 times as long
 _REASONS = {
@@ -46,7 +47,6 @@ _REASONS = {
     Why.NOT_FOUND: "the stages of a step are not found",
 }
 _INSTANTS = 200  # at least, or every step, at which an actuation that changes between ticks is observed
-_LARGEST = 1e100  # of Σ |y|: beyond it products overflow
 
 
 @final
@@ -163,7 +163,7 @@ class Batch:
             np.array(self.columns, np.int64), np.empty((len(self.out_y), 2), np.int64), self.out_y, self.made,
             np.empty((0, equation.size + 2)), np.empty((1 + 3 * n, 0)), self.observations[tile],
         )  # fmt: skip
-        rules = rules_of(equation, False, _LARGEST, base=own.start, apart=self.apart)
+        rules = rules_of(equation, False, LARGEST, base=own.start, apart=self.apart)
         work = stepper.work
         if self.thresholds is not None:
             positions = 0 if equation.canonical else n
