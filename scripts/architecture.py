@@ -1,12 +1,14 @@
 """The rooms of the package and which imports which, read from the sources and drawn: docs/pictures/architecture.png.
 
-A row of the figure is a layer of the import-linter contract in pyproject.toml, from the top downward.
+A row of the figure is a layer of the import-linter contract in pyproject.toml, from the top downward. The picture holds
+the imports as text, so that it can be compared with the sources.
 """
 
 from __future__ import annotations
 
 import argparse
 import ast
+import sys
 import tomllib
 from collections.abc import Iterator
 from io import BytesIO
@@ -17,6 +19,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
+from PIL import Image
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "robot_dyn"
@@ -34,10 +37,9 @@ ACROSS = {  # middles of the boxes, such that no arrow passes behind another box
 
 def layers() -> list[list[str]]:
     """Members of each layer of the first contract, from the top downward."""
-    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"][
-        "contracts"
-    ]
-    return [[name.strip().partition(".")[2] for name in layer.split("|")] for layer in contracts[0]["layers"]]
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    columns = project["tool"]["importlinter"]["contracts"][0]["layers"]
+    return [[name.strip().removeprefix("robot_dyn.") for name in layer.split("|")] for layer in columns]
 
 
 def is_room(name: str) -> bool:
@@ -149,9 +151,14 @@ def drawn(pairs: Imports) -> Figure:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="write no file: to see that it works")
+    parser.add_argument(
+        "--quick", action="store_true", help="write no file, and fail if the picture shows other imports"
+    )
     quick = parser.parse_args().quick
     pairs = imports()
     print(text(pairs))
     figure = drawn(pairs)
     FigureCanvasAgg(figure).print_png(BytesIO() if quick else PICTURE, metadata={"Description": text(pairs)})
+    with Image.open(PICTURE) as picture:
+        if picture.info["Description"] != text(pairs):
+            sys.exit(f"{PICTURE.relative_to(ROOT)} shows other imports: run python scripts/architecture.py")
