@@ -7,8 +7,8 @@ C_ij = ∫ ∂ṙ/∂v_i · d/dt(∂ṙ/∂v_j) dm. In the body's axes ∂ṙ/�
 
 a skew matrix: Ṁ = C + Cᵀ. [Echeandia, Wensing 2021, of which this is the factorisation in a body's own axes]
 
-Pinocchio's own Coriolis matrix works in the axes of the world; its error grows with the square of the distance from
-the world's origin. Here no distance occurs but that from a joint to the bodies it moves.
+Here no distance occurs but that from a joint to the bodies it moves. Pinocchio's own Coriolis matrix works in the axes
+of the world; it is taken where a bound of its rounding is small (`regrouped`).
 """
 
 from __future__ import annotations
@@ -20,10 +20,49 @@ import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy import ndarray
 
+from robot_dyn.model.couplings import Couplings
+from robot_dyn.model.regrouped import regrouped, rounding, slides
 from robot_dyn.spatial import bracket, first_moment, hat
 
 # ad_X is linear in X: its 36 entries, (6, 36)
 _AD = bracket(np.eye(6)).reshape(6, 36)
+
+MOST_ROUNDING = 1e-13  # ε of C in the axes of the world, in the units √M_ii of the joints
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Coriolis:
+    """C of all joints of a model, by Pinocchio where its rounding is bounded by 1e-13, otherwise by `Bodies`.
+
+    Attributes:
+        bodies: The bodies of the model, each in its own axes.
+        regrouped: The model that Pinocchio is asked for; None where the bound is more.
+        slides: Index and largest |q| of each prismatic joint for which the bound holds.
+        rounding: The bound ε of |δC_ij| ≤ ε Ω √(M_ii M_jj), see `regrouped`.
+    """
+
+    bodies: Bodies
+    regrouped: Any
+    slides: tuple[tuple[int, float], ...]
+    rounding: float
+
+    @classmethod
+    def of(cls, model: Any, couplings: Couplings) -> Coriolis:
+        """Of a model and how its joints follow the coordinates."""
+        with np.errstate(all="ignore"):  # of masses that overflow no bound is known
+            own = regrouped(model)
+            bound = rounding(model, own, couplings)
+        return cls(Bodies.of(model), own if bound <= MOST_ROUNDING else None, slides(model), bound)
+
+    def matrix(self, data: Any, q: ndarray, v: ndarray) -> ndarray:
+        """C of the Christoffel symbols at one state, (N, N)."""
+        if self.regrouped is None or (self.slides and self._beyond(q)):
+            return self.bodies.coriolis_matrix(data, q, v)
+        return pin.computeCoriolisMatrix(self.regrouped, data, q, v)
+
+    def _beyond(self, q: ndarray) -> bool:
+        return not all(abs(q.item(j)) <= most for j, most in self.slides)
 
 
 @final

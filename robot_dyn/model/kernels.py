@@ -1,6 +1,6 @@
-"""Kernels: calls of Pinocchio for one state of all joints, and how they are asked for a batch of coupled ones.
+"""Kernels: calls of Pinocchio for one state of all joints, and how they are asked for coupled ones and for a batch.
 
-x = reduce(kernel(S q + s₀, S v, …))  for each state of a batch
+x = reduce(kernel(S q + s₀, S v, …))  for each state
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy import ndarray
 
-from robot_dyn.model.coriolis import Bodies
+from robot_dyn.model.coriolis import Coriolis
 from robot_dyn.model.coriolis import jacobian_rate as rate_of
 from robot_dyn.model.couplings import Couplings
 from robot_dyn.model.dynamics import Axes
-from robot_dyn.spatial import block_diagonal, hat
+from robot_dyn.spatial import hat
 
-Kernel = Callable[..., Any]  # (model or Bodies, data, q, …) → a fresh array, or a number
+Kernel = Callable[..., Any]  # (model or Coriolis, data, q, …) → a fresh array, or a number
 
 
 class Scratch(threading.local):
@@ -35,14 +35,9 @@ def frozen(x: ndarray) -> ndarray:
     return x
 
 
-def coriolis_matrix(bodies: Bodies, data: Any, q: ndarray, v: ndarray) -> ndarray:
-    """C."""
-    return bodies.coriolis_matrix(data, q, v)
-
-
-def coriolis_transpose(bodies: Bodies, data: Any, q: ndarray, v: ndarray) -> ndarray:
+def coriolis_transpose(coriolis: Coriolis, data: Any, q: ndarray, v: ndarray) -> ndarray:
     """Cᵀ v."""
-    return v @ bodies.coriolis_matrix(data, q, v)
+    return v.dot(coriolis.matrix(data, q, v))
 
 
 def coriolis_torque(weightless: Any, data: Any, q: ndarray, v: ndarray) -> ndarray:
@@ -52,12 +47,12 @@ def coriolis_torque(weightless: Any, data: Any, q: ndarray, v: ndarray) -> ndarr
 
 def momentum(model: Any, data: Any, q: ndarray, v: ndarray) -> ndarray:
     """M v."""
-    return pin.crba(model, data, q) @ v
+    return pin.crba(model, data, q).dot(v)
 
 
 def kinetic_energy(model: Any, data: Any, q: ndarray, v: ndarray) -> float:
     """½ vᵀ M v; pin.computeKineticEnergy leaves out the armature of joints whose axis is not x, y or z."""
-    return v @ pin.crba(model, data, q) @ v / 2
+    return float(v.dot(pin.crba(model, data, q).dot(v))) / 2
 
 
 def regressor(model: Any, data: Any, q: ndarray, v: ndarray, a: ndarray) -> ndarray:
@@ -69,8 +64,8 @@ def placement(frame: int) -> Kernel:
     """Homogeneous matrix of a frame."""
 
     def kernel(model: Any, data: Any, q: ndarray) -> ndarray:
-        pin.framesForwardKinematics(model, data, q)
-        return data.oMf[frame].homogeneous
+        pin.forwardKinematics(model, data, q)
+        return pin.updateFramePlacement(model, data, frame).homogeneous
 
     return kernel
 
@@ -85,10 +80,7 @@ def jacobian(frame: int, axes: Axes) -> Kernel:
         if axes is Axes.WORLD:
             return pin.computeFrameJacobian(model, data, q, frame, pin.WORLD).reshape(6, -1)
         J = pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL).reshape(6, -1)
-        if axes is Axes.BODY:
-            return J
-        pin.framesForwardKinematics(model, data, q)
-        return _turned(data, frame, J)
+        return J if axes is Axes.BODY else _turned(_rotation(model, data, frame, q), J)
 
     return kernel
 
@@ -105,15 +97,20 @@ def jacobian_rate(frame: int, axes: Axes) -> Kernel:
         if axes is Axes.BODY:
             return rate
         # d/dt diag(R, R) = diag(R, R) diag(ω̂, ω̂)
-        pin.framesForwardKinematics(model, data, q)
-        return _turned(data, frame, rate + block_diagonal(hat(twist[3:])) @ J)
+        return _turned(_rotation(model, data, frame, q), rate + _turned(hat(twist[3:]), J))
 
     return kernel
 
 
-def _turned(data: Any, frame: int, J: ndarray) -> ndarray:
-    """diag(R, R) J, from a frame's axes to the base's."""
-    return block_diagonal(data.oMf[frame].rotation) @ J
+def _rotation(model: Any, data: Any, frame: int, q: ndarray) -> ndarray:
+    """R, from a frame's axes to the base's."""
+    pin.forwardKinematics(model, data, q)
+    return pin.updateFramePlacement(model, data, frame).rotation
+
+
+def _turned(R: ndarray, J: ndarray) -> ndarray:
+    """diag(R, R) J."""
+    return (R @ J.reshape(2, 3, -1)).reshape(6, -1)
 
 
 def by_state(

@@ -1,8 +1,8 @@
 """Robot: a URDF arm behind the Dynamics protocol, M(q) a + C(q, v) v + N(q) = τ, computed by Pinocchio.
 
 A thin layer over CRBA, RNEA and ABA [Featherstone 2008, ch. 5–7], and C by `coriolis`. One state of float64 goes
-straight to Pinocchio, after checks that cost a fraction of a microsecond; lists, batches and coupled joints take the
-general way, `answered`.
+straight to Pinocchio, after checks that cost a fraction of a microsecond, with coupled joints by `_coupled`; lists and
+batches take the general way, `answered`.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from robot_dyn.errors import (
 from robot_dyn.model import doctor, kernels, pinocchio_model
 from robot_dyn.model.batch import answered
 from robot_dyn.model.conditioning import LEAST_DIGITS, NearlySingular, nearly_singular
-from robot_dyn.model.coriolis import Bodies
+from robot_dyn.model.coriolis import Coriolis
 from robot_dyn.model.couplings import Couplings
 from robot_dyn.model.description import Description, check
 from robot_dyn.model.dynamics import Array, Axes, Dynamics, acceleration, entry
@@ -198,9 +198,9 @@ class Robot(Dynamics, Parametrised):
     ties = former.Attribute("couplings")
 
     @cached_property
-    def bodies(self) -> Bodies:
-        """The bodies of `model`, each in its own axes."""
-        return Bodies.of(self.model)
+    def coriolis(self) -> Coriolis:
+        """How C of `model` is computed, and the bound of its rounding."""
+        return Coriolis.of(self.model, self.couplings)
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -304,34 +304,26 @@ class Robot(Dynamics, Parametrised):
     def M(self, q: Array, *, errors: str = "raise") -> ndarray:
         if is_state(q, self._shape) and is_moderate(q):
             return pin.crba(self.model, self._scratch.data, q)
-        return self._ask("M", errors, pin.crba, self.couplings.matrix, q=q)
+        return self._ask("M", errors, pin.crba, self.couplings.matrix, self.model, q)
 
     def C(self, q: Array, v: Array, *, errors: str = "raise") -> ndarray:
         shape = self._shape
         if is_state(q, shape) and is_state(v, shape) and is_moderate(q) and is_moderate(v):
-            return kernels.coriolis_matrix(self.bodies, self._scratch.data, q, v)
-        return self._ask("C", errors, kernels.coriolis_matrix, self.couplings.matrix, self.bodies, q=q, v=v)
+            return self.coriolis.matrix(self._scratch.data, q, v)
+        return self._ask("C", errors, Coriolis.matrix, self.couplings.matrix, self.coriolis, q, v)
 
     def N(self, q: Array, *, errors: str = "raise") -> ndarray:
         if is_state(q, self._shape) and is_moderate(q):
             return pin.computeGeneralizedGravity(self.model, self._scratch.data, q)
-        return self._ask("N", errors, pin.computeGeneralizedGravity, self.couplings.torque, q=q)
+        return self._ask("N", errors, pin.computeGeneralizedGravity, self.couplings.torque, self.model, q)
 
     def coriolis_torque(self, q: Array, v: Array, *, errors: str = "raise") -> ndarray:
-        shape = self._shape
-        if is_state(q, shape) and is_state(v, shape) and is_moderate(q) and is_moderate(v):
-            return kernels.coriolis_torque(self._weightless, self._scratch.data, q, v)
-        return self._ask(
-            "coriolis_torque", errors, kernels.coriolis_torque, self.couplings.torque, self._weightless, q=q, v=v
-        )
+        kernel, reduce = kernels.coriolis_torque, self.couplings.torque
+        return self._ask("coriolis_torque", errors, kernel, reduce, self._weightless, q, v)
 
     def coriolis_transpose(self, q: Array, v: Array, *, errors: str = "raise") -> ndarray:
-        shape = self._shape
-        if is_state(q, shape) and is_state(v, shape) and is_moderate(q) and is_moderate(v):
-            return kernels.coriolis_transpose(self.bodies, self._scratch.data, q, v)
-        return self._ask(
-            "coriolis_transpose", errors, kernels.coriolis_transpose, self.couplings.torque, self.bodies, q=q, v=v
-        )
+        kernel, reduce = kernels.coriolis_transpose, self.couplings.torque
+        return self._ask("coriolis_transpose", errors, kernel, reduce, self.coriolis, q, v)
 
     def inverse_dynamics(self, q: Array, v: Array, a: Array, *, errors: str = "raise") -> ndarray:
         shape = self._shape
@@ -339,7 +331,7 @@ class Robot(Dynamics, Parametrised):
             tau = pin.rnea(self.model, self._scratch.data, q, v, a)
             if is_moderate(tau):  # NaN and inf, in any argument, show in tau
                 return tau
-        return self._ask("inverse_dynamics", errors, pin.rnea, self.couplings.torque, q=q, v=v, a=a)
+        return self._ask("inverse_dynamics", errors, pin.rnea, self.couplings.torque, self.model, q, v, a)
 
     def forward_dynamics(self, q: Array, v: Array, tau: Array, *, errors: str = "raise") -> ndarray:
         shape = self._shape if self._singular is None else None
@@ -350,13 +342,13 @@ class Robot(Dynamics, Parametrised):
         return self._forward_dynamics(errors, q, v, tau)
 
     def kinetic_energy(self, q: Array, v: Array, *, errors: str = "raise") -> Any:
-        return self._ask("kinetic_energy", errors, kernels.kinetic_energy, None, q=q, v=v)
+        return self._ask("kinetic_energy", errors, kernels.kinetic_energy, None, self.model, q, v)
 
     def potential_energy(self, q: Array, *, errors: str = "raise") -> Any:
-        return self._ask("potential_energy", errors, pin.computePotentialEnergy, None, q=q)
+        return self._ask("potential_energy", errors, pin.computePotentialEnergy, None, self.model, q)
 
     def momentum(self, q: Array, v: Array, *, errors: str = "raise") -> ndarray:
-        return self._ask("momentum", errors, kernels.momentum, self.couplings.torque, q=q, v=v)
+        return self._ask("momentum", errors, kernels.momentum, self.couplings.torque, self.model, q, v)
 
     @property
     def body_names(self) -> tuple[str, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
@@ -373,10 +365,7 @@ class Robot(Dynamics, Parametrised):
         return frozen(np.concatenate([self.model.inertias[i + 1].toDynamicParameters() for i in self._order]))
 
     def regressor(self, q: Array, v: Array, a: Array, *, errors: str = "raise") -> ndarray:
-        shape = self._shape
-        if is_state(q, shape) and is_state(v, shape) and is_state(a, shape) and all(map(is_moderate, (q, v, a))):
-            return kernels.regressor(self.model, self._scratch.data, q, v, a)
-        return self._ask("regressor", errors, kernels.regressor, self._of_bodies, q=q, v=v, a=a)
+        return self._ask("regressor", errors, kernels.regressor, self._of_bodies, self.model, q, v, a)
 
     def _of_bodies(self, Y: ndarray) -> ndarray:
         """The regressor of all joints, (..., N, 10 N) with bodies as in `model`, coupled and in the order of θ."""
@@ -384,19 +373,31 @@ class Robot(Dynamics, Parametrised):
         return self.couplings.rows(Y.reshape(*Y.shape[:-1], N, -1)[..., self._order, :].reshape(Y.shape))
 
     def placement(self, q: Array, frame: str, *, errors: str = "raise") -> ndarray:
-        return self._ask("placement", errors, kernels.placement(entry(self._frames, frame)), None, q=q)
+        return self._ask("placement", errors, self._kernel(kernels.placement, frame), None, self.model, q)
 
     def jacobian(
         self, q: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, errors: str = "raise"
     ) -> ndarray:
-        kernel = kernels.jacobian(entry(self._frames, frame), Axes.of(expressed_in))
-        return self._ask("jacobian", errors, kernel, self.couplings.columns, q=q)
+        kernel = self._kernel(kernels.jacobian, frame, expressed_in)
+        return self._ask("jacobian", errors, kernel, self.couplings.columns, self.model, q)
 
     def jacobian_rate(
         self, q: Array, v: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, errors: str = "raise"
     ) -> ndarray:
-        kernel = kernels.jacobian_rate(entry(self._frames, frame), Axes.of(expressed_in))
-        return self._ask("jacobian_rate", errors, kernel, self.couplings.columns, q=q, v=v)
+        kernel = self._kernel(kernels.jacobian_rate, frame, expressed_in)
+        return self._ask("jacobian_rate", errors, kernel, self.couplings.columns, self.model, q, v)
+
+    def _kernel(self, make: Callable[..., Kernel], frame: str, *axes: str) -> Kernel:
+        """The kernel of a frame, which is kept."""
+        try:
+            return self._kernels[make, frame, *axes]
+        except (KeyError, TypeError):  # or a name that is not a text
+            kernel = make(entry(self._frames, frame), *map(Axes.of, axes))
+            return self._kernels.setdefault((make, frame, *axes), kernel)
+
+    @cached_property
+    def _kernels(self) -> dict[tuple[Any, ...], Kernel]:
+        return {}
 
     @cached_property
     def _built(self) -> tuple[Any, Couplings, tuple[str, ...]]:
@@ -416,7 +417,12 @@ class Robot(Dynamics, Parametrised):
     @cached_property
     def _shape(self) -> tuple[int] | None:
         """Shape of a state that goes straight to Pinocchio; None if joints are coupled, or digits are looked at."""
-        return (self.n,) if self.couplings.trivial and self.least_digits is None else None
+        return self._one_state if self.couplings.trivial else None
+
+    @cached_property
+    def _one_state(self) -> tuple[int] | None:
+        """Shape of a state that is answered without `answered`; None if digits are looked at."""
+        return (self.n,) if self.least_digits is None else None
 
     @property
     def joint_without_inertia(self) -> str | None:
@@ -426,7 +432,7 @@ class Robot(Dynamics, Parametrised):
     @cached_property
     def _general_inertia(self) -> ndarray:
         """M at a configuration without symmetries."""
-        return self._equation(pin.crba, self.couplings.matrix)(np.linspace(0.3, 0.9, self.n))
+        return self._equation(pin.crba, self.couplings.matrix, self.model)(np.linspace(0.3, 0.9, self.n))
 
     @cached_property
     def _nearly_singular(self) -> NearlySingular | None:
@@ -452,13 +458,31 @@ class Robot(Dynamics, Parametrised):
         errors: str,
         kernel: Kernel,
         reduce: Callable[[Any], Any] | None,
-        of: Any = None,
-        **state: Array,
+        model: Any,
+        *state: Array,
     ) -> Any:
-        return self._answered(quantity, errors, self._equation(kernel, reduce, of), state)
+        shape = self._one_state
+        if errors.__class__ is str and errors == "raise":
+            for x in state:
+                if not (is_state(x, shape) and is_moderate(x)):
+                    break
+            else:
+                if self.couplings.trivial:
+                    return kernel(model, self._scratch.data, *state)
+                return self._coupled(kernel, reduce, model, *state)
+        named = dict(zip(ALL[quantity].arguments, state, strict=True))
+        return self._answered(quantity, errors, self._equation(kernel, reduce, model), named)
 
-    def _equation(self, kernel: Kernel, reduce: Callable[[Any], Any] | None, of: Any = None) -> Callable[..., ndarray]:
-        return kernels.by_state(kernel, reduce, self.model if of is None else of, self._scratch.data, self.couplings)
+    def _coupled(
+        self, kernel: Kernel, reduce: Callable[[Any], Any] | None, model: Any, q: ndarray, *rates: ndarray
+    ) -> Any:
+        """The answer at one state of coupled joints."""
+        couplings = self.couplings
+        answer = kernel(model, self._scratch.data, couplings.position(q), *map(couplings.velocity, rates))
+        return answer if reduce is None else reduce(answer)
+
+    def _equation(self, kernel: Kernel, reduce: Callable[[Any], Any] | None, model: Any) -> Callable[..., ndarray]:
+        return kernels.by_state(kernel, reduce, model, self._scratch.data, self.couplings)
 
     def _answered(self, quantity: str, errors: str, equation: Callable[..., ndarray], state: dict[str, Array]) -> Any:
         arrays = {name: shaped(name, x, self.joint_names) for name, x in state.items()}
@@ -474,9 +498,9 @@ class Robot(Dynamics, Parametrised):
         """Forward dynamics in general: coupled joints by factorising M, which also tells where M is singular."""
         if self._singular is not None:
             raise self._singular()
-        M = self._equation(pin.crba, self.couplings.matrix)
-        bias = self._equation(pin.nonLinearEffects, self.couplings.torque)
-        solved = self._equation(pin.aba, None)
+        M = self._equation(pin.crba, self.couplings.matrix, self.model)
+        bias = self._equation(pin.nonLinearEffects, self.couplings.torque, self.model)
+        solved = self._equation(pin.aba, None, self.model)
 
         def equation(q: ndarray, v: ndarray, tau: ndarray) -> ndarray:
             a = solved(q, v, tau) if self.couplings.trivial else acceleration(M(q), tau - bias(q, v), self.joint_names)
