@@ -57,12 +57,12 @@ class Coriolis:
 
     def matrix(self, data: Any, q: ndarray, v: ndarray) -> ndarray:
         """C of the Christoffel symbols at one state, (N, N)."""
-        if self.regrouped is None or (self.slides and self._beyond(q)):
+        if self.regrouped is None:
             return self.bodies.coriolis_matrix(data, q, v)
+        for j, most in self.slides:
+            if not abs(q.item(j)) <= most:
+                return self.bodies.coriolis_matrix(data, q, v)
         return pin.computeCoriolisMatrix(self.regrouped, data, q, v)
-
-    def _beyond(self, q: ndarray) -> bool:
-        return not all(abs(q.item(j)) <= most for j, most in self.slides)
 
 
 @final

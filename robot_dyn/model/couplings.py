@@ -114,15 +114,18 @@ class Couplings(Value):
 
     def torque(self, tau: Array) -> Array:
         """τ = Sᵀ τ_full, by virtual work."""
-        return tau if self.trivial else _times(tau, self.S)
+        return tau if self.trivial else tau.dot(self.S)
 
     def rows(self, A: Array) -> Array:
         """Sᵀ A, torques that are linear in the columns of A (..., N, m)."""
-        return A if self.trivial else _times(A.swapaxes(-1, -2), self.S).swapaxes(-1, -2)
+        return A if self.trivial else self.S.T @ A
 
     def matrix(self, A: Array) -> Array:
         """Sᵀ A S, for quadratic forms."""
-        return self.rows(self.columns(A))
+        if self.trivial:
+            return A
+        S = self.S  # of one state `dot` takes half the time of `@`
+        return S.T.dot(A).dot(S) if A.ndim == 2 else S.T @ A @ S
 
     def cube(self, A: Array) -> Array:
         """A with S applied to each of its last three axes, for ∂M/∂q."""
@@ -132,9 +135,6 @@ class Couplings(Value):
 
     def columns(self, J: Array) -> Array:
         """J S, for Jacobians."""
-        return J if self.trivial else _times(J, self.S)
-
-
-def _times(A: Array, S: Array) -> Array:
-    """A S; for one state `dot` takes a third of the time of `@`, for a batch of matrices more."""
-    return A.dot(S) if A.ndim < 3 else A @ S
+        if self.trivial:
+            return J
+        return J.dot(self.S) if J.ndim == 2 else J @ self.S

@@ -20,6 +20,7 @@ from robot_dyn.model.dynamics import Axes
 from robot_dyn.spatial import hat
 
 Kernel = Callable[..., Any]  # (model or Coriolis, data, q, …) → a fresh array, or a number
+Reduction = Callable[[Couplings, Any], Any]  # of answers of all joints, by virtual work
 
 
 class Scratch(threading.local):
@@ -40,11 +41,6 @@ def coriolis_transpose(coriolis: Coriolis, data: Any, q: ndarray, v: ndarray) ->
     return v.dot(coriolis.matrix(data, q, v))
 
 
-def coriolis_torque(weightless: Any, data: Any, q: ndarray, v: ndarray) -> ndarray:
-    """C v, by a model without gravity: less its gravity torque, the torque at a = 0 would keep the digits of N."""
-    return pin.rnea(weightless, data, q, v, np.zeros_like(v))
-
-
 def momentum(model: Any, data: Any, q: ndarray, v: ndarray) -> ndarray:
     """M v."""
     return pin.crba(model, data, q).dot(v)
@@ -57,7 +53,8 @@ def kinetic_energy(model: Any, data: Any, q: ndarray, v: ndarray) -> float:
 
 def regressor(model: Any, data: Any, q: ndarray, v: ndarray, a: ndarray) -> ndarray:
     """Regressor of the torques of all joints, its bodies as in the model; Pinocchio gives a flat one of one joint."""
-    return pin.computeJointTorqueRegressor(model, data, q, v, a).reshape(len(q), -1)
+    Y = pin.computeJointTorqueRegressor(model, data, q, v, a)
+    return Y if Y.ndim == 2 else Y.reshape(len(q), -1)
 
 
 def placement(frame: int) -> Kernel:
@@ -71,18 +68,20 @@ def placement(frame: int) -> Kernel:
 
 
 def jacobian(frame: int, axes: Axes) -> Kernel:
-    """Jacobian of a frame; Pinocchio gives a flat one if there is one joint.
+    """Jacobian of a frame.
 
     Turned from the body's axes to the world's here: Pinocchio's own would lose the digits of the distance to the base.
     """
+    reference = pin.WORLD if axes is Axes.WORLD else pin.LOCAL
 
     def kernel(model: Any, data: Any, q: ndarray) -> ndarray:
-        if axes is Axes.WORLD:
-            return pin.computeFrameJacobian(model, data, q, frame, pin.WORLD).reshape(6, -1)
-        J = pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL).reshape(6, -1)
-        return J if axes is Axes.BODY else _turned(_rotation(model, data, frame, q), J)
+        J = pin.computeFrameJacobian(model, data, q, frame, reference)
+        return J if J.ndim == 2 else J.reshape(6, 1)  # Pinocchio gives a flat one if there is one joint
 
-    return kernel
+    def aligned(model: Any, data: Any, q: ndarray) -> ndarray:
+        return _turned(_rotation(model, data, frame, q), kernel(model, data, q))
+
+    return aligned if axes is Axes.WORLD_ALIGNED else kernel
 
 
 def jacobian_rate(frame: int, axes: Axes) -> Kernel:
@@ -114,7 +113,7 @@ def _turned(R: ndarray, J: ndarray) -> ndarray:
 
 
 def by_state(
-    kernel: Kernel, reduce: Callable[[Any], Any] | None, model: Any, data: Any, couplings: Couplings
+    kernel: Kernel, reduce: Reduction | None, model: Any, data: Any, couplings: Couplings
 ) -> Callable[..., ndarray]:
     """The equation (q, …) → answers of a kernel, asked state by state of a batch, with the positions of all joints.
 
@@ -132,6 +131,6 @@ def by_state(
         rows = [np.broadcast_to(x, (*batch, x.shape[-1])).reshape(-1, x.shape[-1]) for x in full]
         answers = np.array([kernel(model, data, *row) for row in zip(*rows, strict=True)])
         answers = answers.reshape(batch + answers.shape[1:])
-        return answers if reduce is None else reduce(answers)
+        return answers if reduce is None else reduce(couplings, answers)
 
     return equation

@@ -1,16 +1,16 @@
 """Pinocchio's Coriolis matrix of a regrouped model, and a bound of its rounding.
 
 A point on the axis of a revolute joint moves with both bodies that the joint connects, so a point mass there may be
-counted with either of them [Khalil, Dombre 2002, ch. 9]; C does not depend on where a joint that is fixed to the base
-stands, nor on the axes of the base. Pinocchio adds up C in the axes of the world,
+counted with either of them [Khalil, Dombre 2002, ch. 9]; and C does not depend on where a joint that is fixed to the
+base stands. Pinocchio adds up in the axes of the world C_ij = Σ_b J_iᵀ (Y_b dJ_j/dt + B_b J_j), terms of the size of
 
-    C_ij = Σ_b J_iᵀ (Y_b dJ_j/dt + B_b J_j),   terms up to  T_ij Ω,   T_ij = Σ_b m_b r_ib r_jb + ‖I_b‖,   r_ib = D_i + D_b + |c_b|,
+    T_ij Ω,   T_ij = Σ_b m_b r_ib r_jb + ‖I_b‖,   r_ib = D_i + D_b + |c_b|
 
-with D the largest distance of a joint from the world's origin (r = 1 and no ‖I_b‖ of a prismatic joint) and Ω the sum
-of the joint speeds, those of prismatic joints over the largest D. A wrist of mass m and radius r loses digits by
-D²/r² so; after its mass is moved to its parents, by D/r. To a few roundings of the terms
+with D the largest distance of a joint from the origin and Ω the sum of the joint speeds; of a prismatic joint r is 1,
+‖I_b‖ does not count, and its speed is divided by the largest D. Where a wrist of mass m and radius r loses digits by
+(D/r)², it loses them by D/r after its mass is moved to its parents. To a few roundings of the terms
 
-    |δC_ij| ≤ ε Ω √(M_ii M_jj),   ε = u (8 n + max T_ij / √(least M_ii · least M_jj)).
+    |δC_ij| ≤ ε Ω √(M_ii M_jj),   ε = u (8 N + max T_ij / √(least M_ii · least M_jj))
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy import ndarray
+from numpy.linalg import norm
 
 from robot_dyn.model.couplings import Couplings
 from robot_dyn.model.urdf import UNBOUNDED
@@ -41,7 +42,7 @@ def regrouped(model: Any) -> Any:
         body, axis, parent = model.inertias[j].copy(), axes[j - 1, 3:], model.parents[j]
         on_axis = axis * (axis @ body.lever)
         offset = body.lever - on_axis
-        r = float(np.linalg.norm(offset))
+        r = float(norm(offset))
         if not (axis.any() and r < D[j] < inf):
             continue
         e, mass = offset / (r or 1.0), body.mass * r / D[j]
@@ -57,9 +58,21 @@ def regrouped(model: Any) -> Any:
 
 def joint_axes(model: Any) -> ndarray:
     """The twist of each joint in its own frame, (N, 6)."""
-    data, q = model.createData(), np.zeros(model.nq)
-    columns = [pin.computeJointJacobian(model, data, q, j + 1).reshape(6, -1)[:, j] for j in range(model.nv)]
-    return np.array(columns)
+    axes, q = np.empty((model.nv, 6)), np.zeros(model.nq)
+    for j in range(model.nv):
+        joint = model.joints[j + 1]
+        data = joint.createData()
+        joint.calc(data, q)
+        axes[j] = data.S.ravel()
+    return axes
+
+
+def moved(model: Any) -> ndarray:
+    """Whether a body (row) is moved by a joint (column), (N, N)."""
+    table = np.zeros((model.nv, model.nv), dtype=bool)
+    for b in range(model.nv):
+        table[b, [j - 1 for j in model.supports[b + 1] if j]] = True
+    return table
 
 
 def slides(model: Any) -> tuple[tuple[int, float], ...]:
@@ -73,38 +86,35 @@ def reach(model: Any) -> ndarray:
     """Largest distance D of each joint from the world's origin, within the limits of prismatic joints, (N + 1,)."""
     D, slide = np.zeros(model.njoints), dict(slides(model))
     for j in range(1, model.njoints):
-        D[j] = D[model.parents[j]] + np.linalg.norm(model.jointPlacements[j].translation) + slide.get(j - 1, 0.0)
+        D[j] = D[model.parents[j]] + norm(model.jointPlacements[j].translation) + slide.get(j - 1, 0.0)
     return D
 
 
 def least_inertia(model: Any, couplings: Couplings) -> ndarray:
-    """A number below M_ii at every q, (n,): of the first body its inertia about its joint, of later ones the least.
+    """A number below M_ii at every q, (n,): of a joint's own body the inertia about it, of later ones the least.
 
     The least is the smallest principal moment, or for a prismatic joint the mass. Bodies that several joints of one
     coordinate move may stand still, and count as 0.
     """
-    axes, total = joint_axes(model), model.armature @ couplings.S**2
-    for b in range(1, model.njoints):
-        above = np.array([j - 1 for j in model.supports[b] if j])
-        least = np.linalg.eigvalsh(model.inertias[b].inertia)[0]
-        inertia = np.where(axes[above, 3:].any(axis=1), least, model.inertias[b].mass)
-        inertia[-1] = axes[b - 1] @ model.inertias[b].matrix() @ axes[b - 1]
-        S = couplings.S[above]
-        total += np.where(np.count_nonzero(S, axis=0) == 1, inertia @ S**2, 0.0)
-    return total
+    axes, table, bodies, S = joint_axes(model), moved(model), model.inertias[1:], couplings.S
+    moment = [np.linalg.eigvalsh(body.inertia)[0] for body in bodies]
+    least = np.where(
+        axes[:, 3:].any(axis=1), np.array(moment)[:, None], np.array([body.mass for body in bodies])[:, None]
+    )
+    np.fill_diagonal(least, [axis @ body.matrix() @ axis for axis, body in zip(axes, bodies, strict=True)])
+    alone = table.astype(int) @ (S != 0) == 1
+    return model.armature @ S**2 + np.where(alone, (least * table) @ S**2, 0.0).sum(axis=0)
 
 
 def rounding(model: Any, regrouped: Any, couplings: Couplings) -> float:
     """ε of `regrouped`; inf if some joint may have no inertia, or a prismatic joint has no limits."""
-    least = least_inertia(model, couplings)
-    T, turning, D = np.zeros((model.nv, model.nv)), joint_axes(model)[:, 3:].any(axis=1), reach(regrouped)
+    least, D, table = least_inertia(model, couplings), reach(regrouped)[1:], moved(model)
     if not (np.all(least > 0) and np.isfinite(D).all()):
         return inf
-    for b in range(1, model.njoints):
-        above, body = np.array([j - 1 for j in model.supports[b] if j]), regrouped.inertias[b]
-        r = np.where(turning[above], D[above + 1] + D[b] + np.linalg.norm(body.lever), 1.0)
-        T[np.ix_(above, above)] += body.mass * np.outer(r, r)
-        T[np.ix_(above, above)] += np.linalg.norm(body.inertia) * np.outer(turning[above], turning[above])
-    S = np.abs(couplings.S)
+    turning, bodies = joint_axes(model)[:, 3:].any(axis=1), regrouped.inertias[1:]
+    mass, lever, size = np.array([(body.mass, norm(body.lever), norm(body.inertia)) for body in bodies]).T[..., None]
+    r = np.where(turning, D + D[:, None] + lever, 1.0) * table
+    turned, S = table & turning, np.abs(couplings.S)
+    T = r.T @ (mass * r) + turned.T @ (size * turned)
     ratio = (S.T @ T @ S) / np.sqrt(np.outer(least, least))
     return float(np.finfo(float).eps / 2 * (8 * model.nv + ratio.max()))
