@@ -73,19 +73,24 @@ class Bodies:
     Attributes:
         model: The `pinocchio.Model`; every joint has one degree of freedom.
         inertia: 𝓜, (n, 6, 6).
-        gyroscopic: The 36 entries of 𝓖 by the components of ω, (n, 36, 3).
+        wrench: 𝓜 [X, Y] + 𝓖(ω) X by the products of the 6 components of X and the 9 of (Y, ω), (n, 6, 54).
+        sums: Adds columns of the joints after each, and of all, (n, 2 n).
     """
 
     model: Any
     inertia: ndarray
-    gyroscopic: ndarray
+    wrench: ndarray
+    sums: ndarray
 
     @classmethod
     def of(cls, model: Any) -> Bodies:
         """The bodies of a model."""
         inertia = np.array([body.matrix() for body in model.inertias[1:]])
-        axes = np.eye(3)
-        return cls(model, inertia, np.array([[_gyroscopic(A, axis).ravel() for axis in axes] for A in inertia]).mT)
+        of_brackets = (inertia[:, None] @ bracket(np.eye(6))).swapaxes(1, 2)
+        of_spin = np.moveaxis([[_gyroscopic(each, axis) for axis in np.eye(3)] for each in inertia], 1, -1)
+        wrench = np.concatenate((of_brackets, of_spin), axis=-1).reshape(-1, 6, 54)
+        n = len(inertia)
+        return cls(model, inertia, wrench, np.hstack((np.tri(n, k=-1), np.ones((n, n)))))
 
     def jacobians(self, data: Any, q: ndarray) -> ndarray:
         """J_b of each body at its frame, in its axes, (n, 6, n); a column is 0 where the joint does not move it."""
@@ -94,10 +99,12 @@ class Bodies:
 
     def coriolis_matrix(self, data: Any, q: ndarray, v: ndarray) -> ndarray:
         """C of the Christoffel symbols at one state, (n, n)."""
-        J = self.jacobians(data, q)
-        rate, twist = jacobian_rate(J, v)
-        G = (self.gyroscopic @ twist[:, 3:, None]).reshape(self.inertia.shape)
-        return (J.mT @ (self.inertia @ rate + G @ J)).sum(axis=0)
+        J, n = self.jacobians(data, q), len(v)
+        rows = J.reshape(6 * n, n)
+        twists = (rows * v).dot(self.sums).reshape(n, 6, 2, n)
+        factors = np.concatenate((twists[:, :, 0], twists[:, 3:, 1]), axis=1)
+        products = (J[:, :, None] * factors[:, None]).reshape(n, 54, n)
+        return rows.T.dot((self.wrench @ products).reshape(6 * n, n))
 
 
 def jacobian_rate(J: ndarray, v: ndarray) -> tuple[ndarray, ndarray]:
