@@ -317,10 +317,14 @@ class Robot(Dynamics, Parametrised):
         return self._ask("N", errors, pin.computeGeneralizedGravity, Couplings.torque, self.model, q)
 
     def coriolis_torque(self, q: Array, v: Array, *, errors: str = "raise") -> ndarray:
-        model, kernel = self._weightless, pin.nonLinearEffects  # less N, that of `model` would keep the digits of N
+        if is_plain(q, self._shape) and is_plain(v, self._shape):
+            return pin.nonLinearEffects(self._weightless, self._scratch.data, q, v)
+        kernel, model = pin.nonLinearEffects, self._weightless  # less N, that of `model` would keep the digits of N
         return self._ask("coriolis_torque", errors, kernel, Couplings.torque, model, q, v)
 
     def coriolis_transpose(self, q: Array, v: Array, *, errors: str = "raise") -> ndarray:
+        if is_plain(q, self._shape) and is_plain(v, self._shape):
+            return v.dot(self.coriolis.matrix(self._scratch.data, q, v))
         kernel = kernels.coriolis_transpose
         return self._ask("coriolis_transpose", errors, kernel, Couplings.torque, self.coriolis, q, v)
 
@@ -341,12 +345,16 @@ class Robot(Dynamics, Parametrised):
         return self._forward_dynamics(errors, q, v, tau)
 
     def kinetic_energy(self, q: Array, v: Array, *, errors: str = "raise") -> Any:
+        if is_plain(q, self._shape) and is_plain(v, self._shape):
+            return kernels.kinetic_energy(self.model, self._scratch.data, q, v)
         return self._ask("kinetic_energy", errors, kernels.kinetic_energy, None, self.model, q, v)
 
     def potential_energy(self, q: Array, *, errors: str = "raise") -> Any:
         return self._ask("potential_energy", errors, pin.computePotentialEnergy, None, self.model, q)
 
     def momentum(self, q: Array, v: Array, *, errors: str = "raise") -> ndarray:
+        if is_plain(q, self._shape) and is_plain(v, self._shape):
+            return kernels.momentum(self.model, self._scratch.data, q, v)
         return self._ask("momentum", errors, kernels.momentum, Couplings.torque, self.model, q, v)
 
     @property
@@ -378,6 +386,8 @@ class Robot(Dynamics, Parametrised):
         self, q: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, errors: str = "raise"
     ) -> ndarray:
         kernel = self._kernel(kernels.jacobian, frame, expressed_in)
+        if is_plain(q, self._shape):
+            return kernel(self.model, self._scratch.data, q)
         return self._ask("jacobian", errors, kernel, Couplings.columns, self.model, q)
 
     def jacobian_rate(

@@ -38,10 +38,9 @@ def arms() -> dict[str, rd.Robot]:
 
 def table(*headings: str) -> None:
     """The head of a table; words to the left, numbers to the right."""
+    words = ("arm", "query", "bare calls", "C by", "what", "process")
     print("\n| " + " | ".join(headings) + " |")
-    print(
-        "|" + "|".join("---" if heading in ("arm", "query", "what", "process") else "--:" for heading in headings) + "|"
-    )
+    print("|" + "|".join("---" if heading in words else "--:" for heading in headings) + "|")
 
 
 def row(*cells: object) -> None:
