@@ -87,7 +87,7 @@ class Bodies:
         """The bodies of a model."""
         inertia = np.array([body.matrix() for body in model.inertias[1:]])
         of_brackets = (inertia[:, None] @ bracket(np.eye(6))).swapaxes(1, 2)
-        of_spin = np.moveaxis([[_gyroscopic(each, axis) for axis in np.eye(3)] for each in inertia], 1, -1)
+        of_spin = np.array([[_gyroscopic(each, axis) for axis in np.eye(3)] for each in inertia]).transpose(0, 2, 3, 1)
         wrench = np.concatenate((of_brackets, of_spin), axis=-1).reshape(-1, 6, 54)
         n = len(inertia)
         return cls(model, inertia, wrench, np.hstack((np.tri(n, k=-1), np.ones((n, n)))))

@@ -1,7 +1,7 @@
 """Pinocchio's Coriolis matrix of a regrouped model, and a bound of its rounding.
 
 A point on the axis of a revolute joint moves with both bodies that the joint connects, so a point mass there may be
-counted with either of them [Khalil, Dombre 2002, ch. 9]; and C does not depend on where a joint that is fixed to the
+counted with either of them [Gautier, Khalil 1990]; and C does not depend on where a joint that is fixed to the
 base stands. Pinocchio adds up in the axes of the world C_ij = Σ_b J_iᵀ (Y_b dJ_j/dt + B_b J_j), terms of the size of
 
     T_ij Ω,   T_ij = Σ_b m_b r_ib r_jb + ‖I_b‖,   r_ib = D_i + D_b + |c_b|
