@@ -90,7 +90,8 @@ def jacobian_rate(frame: int, axes: Axes) -> Kernel:
     def kernel(model: Any, data: Any, q: ndarray, v: ndarray) -> ndarray:
         if axes is Axes.WORLD:
             pin.computeJointJacobiansTimeVariation(model, data, q, v)
-            return pin.getFrameJacobianTimeVariation(model, data, frame, pin.WORLD).reshape(6, -1)
+            rate = pin.getFrameJacobianTimeVariation(model, data, frame, pin.WORLD)
+            return rate if rate.ndim == 2 else rate.reshape(6, 1)
         J = pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL).reshape(6, -1)
         rate, twist = rate_of(J, v)
         if axes is Axes.BODY:

@@ -372,6 +372,9 @@ class Robot(Dynamics, Parametrised):
         return frozen(np.concatenate([self.model.inertias[i + 1].toDynamicParameters() for i in self._order]))
 
     def regressor(self, q: Array, v: Array, a: Array, *, errors: str = "raise") -> ndarray:
+        shape = self._shape
+        if is_plain(q, shape) and is_plain(v, shape) and is_plain(a, shape):
+            return kernels.regressor(self.model, self._scratch.data, q, v, a)
         return self._ask("regressor", errors, kernels.regressor, self._of_bodies, self.model, q, v, a)
 
     def _of_bodies(self, couplings: Couplings, Y: ndarray) -> ndarray:

@@ -14,7 +14,7 @@ import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 import robot_dyn as rd
-from benchmarks.measure import BATCH, Effort, alternate, arms, row, table
+from benchmarks.measure import BATCH, Effort, alternate, arms, lowest, row, table
 from robot_dyn.model.quantity import ALL
 
 Sides = dict[str, tuple[str, Callable[[], object], Callable[[], object]]]  # what is called bare, and both calls
@@ -82,16 +82,20 @@ def both_sides(robot: rd.Robot, state: np.ndarray) -> Sides:
 
 
 def queries(effort: Effort) -> None:
-    """Every query of a Robot against the bare calls of Pinocchio, in shorter loops and more turns than others."""
-    table("arm", "query", "bare calls", "bare, µs", "Robot, µs", "over it, µs")
-    short = replace(effort, at_least=effort.at_least / 5, repeats=3 * effort.repeats)
+    """Every query of a Robot against the bare calls of Pinocchio."""
     subjects = arms() | {arm: rd.load(arm.lower()) for arm in ("Panda", "Z1", "Kinova")}
+    sides = {}
     for arm, robot in subjects.items():
         q, v, a = np.random.default_rng(1).normal(size=(3, robot.n))
-        sides = both_sides(robot, np.array([np.clip(q, robot.lower, robot.upper), v, a]))
-        for name, (text, bare, ours) in sides.items():
-            t = alternate({"bare": bare, "Robot": ours}, short)
-            row(arm, name, text, f"{t['bare']:.2f}", f"{t['Robot']:.2f}", f"{t['Robot'] - t['bare']:.2f}")
+        sides[arm] = both_sides(robot, np.array([np.clip(q, robot.lower, robot.upper), v, a]))
+    table("query", "bare calls", *(heading for arm in subjects for heading in (f"{arm}, µs", "over it")))
+    for name, (text, *_) in sides["UR5"].items():
+        cells = []
+        for arm in subjects:
+            _, bare, ours = sides[arm][name]
+            t = lowest({"bare": bare, "Robot": ours}, effort)
+            cells += [f"{t['bare']:.2f}", f"{t['Robot'] - t['bare']:.2f}"]
+        row(name, text, *cells)
     table("arm", "C by", "bound of Pinocchio's rounding")
     for arm, robot in subjects.items():
         way = "body axes" if robot.coriolis.regrouped is None else "Pinocchio"
