@@ -404,8 +404,9 @@ class Robot(Dynamics, Parametrised):
         try:
             return self._kernels[make, frame, axes]
         except (KeyError, TypeError):  # TypeError of what is not a name
-            kernel = make(entry(self._frames, frame), *map(Axes.of, axes))
-            return self._kernels.setdefault((make, frame, axes), kernel)
+            pass
+        kernel = make(entry(self._frames, frame), *map(Axes.of, axes))
+        return self._kernels.setdefault((make, frame, axes), kernel)
 
     @cached_property
     def _kernels(self) -> dict[tuple[Any, ...], Kernel]:
