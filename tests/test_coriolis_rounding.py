@@ -90,7 +90,7 @@ def test_rounding_is_below_its_bound_on_200_random_trees(tree: RandomTree, seed:
 
 @pytest.mark.filterwarnings("ignore::robot_dyn.ModelWarning")
 def test_a_model_that_is_not_regrouped_exceeds_the_bound() -> None:
-    """A light wheel at the end of a long arm: u D²/r² in place of u D/r; so the law above can tell."""
+    """The light wrist of a long arm loses u D²/r² in place of u D/r, so the law above can tell."""
     robot = rd.load("tiago_no_hand")
     assert excess(robot, robot.model, 1, 8) > 1
 
