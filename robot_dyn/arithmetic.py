@@ -270,11 +270,11 @@ def rounding(x: Array) -> str:
 def _lapack_solve(M: Array, b: Array) -> Array | None:
     """The same by LAPACK, for speed; None where a pivot is in doubt."""
     try:
-        pivots = np.diagonal(np.linalg.cholesky(M), axis1=-2, axis2=-1) ** 2
+        pivots = np.linalg.cholesky(M).diagonal(axis1=-2, axis2=-1) ** 2
     except np.linalg.LinAlgError:
         return None
     least = 4 * M.shape[-1] * np.finfo(np.float64).eps
-    if not np.all(pivots > least * np.diagonal(M, axis1=-2, axis2=-1)):
+    if not (pivots > least * M.diagonal(axis1=-2, axis2=-1)).all():
         return None
     return np.linalg.solve(M, b[..., None])[..., 0]
 

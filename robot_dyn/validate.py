@@ -171,6 +171,11 @@ def is_moderate(x: np.ndarray, most: float = 1e100) -> bool:
     return hypot(*x.tolist()) < most  # faster than any reduction of NumPy at this size, and never warns
 
 
+def is_plain(x: Any, shape: tuple[int] | None) -> bool:
+    """`is_state` and `is_moderate` in one call."""
+    return x.__class__ is np.ndarray and x.dtype is _F8 and x.shape == shape and hypot(*x.tolist()) < 1e100
+
+
 def joint_values(what: str, values: Any, joint_names: Sequence[str], arithmetic: Any = None) -> Any:
     """Finite numbers of each joint, shape (..., n), not copied; errors as of `shaped` and `converted`."""
     return converted(what, shaped(what, values, joint_names, arithmetic), joint_names, arithmetic)

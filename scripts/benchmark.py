@@ -51,6 +51,7 @@ def main() -> None:
     print(", ".join(f"{name} {value}" for name, value in environment().items()))
     if "queries" in what:
         queries.queries(effort)
+        queries.lagrangian(effort)
         queries.right_angles(effort)
         queries.startup(effort)
     if "compiled" in what:

@@ -49,8 +49,8 @@ def _one(robot: Robot, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarra
 
 def _by_position(robot: Robot, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
     """∂ID/∂q of all joints, (N, N)."""
-    data, inertia = robot.model.createData(), robot.bodies.inertia
-    J, earlier = robot.bodies.jacobians(data, q), np.tri(len(q), k=-1).T
+    data, inertia = robot.model.createData(), robot.coriolis.bodies.inertia
+    J, earlier = robot.coriolis.bodies.jacobians(data, q), np.tri(len(q), k=-1).T
     parts, base = J * v, _free_fall(robot, data, q)
     V, V_before = parts.sum(axis=-1), parts @ earlier
     own = J * a + columnwise_bracket(V_before, parts)

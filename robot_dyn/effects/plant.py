@@ -18,7 +18,7 @@ from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFricti
 from robot_dyn.effects.hold import Hold, held
 from robot_dyn.errors import EffectError, OverflowedError, QueryError, shown
 from robot_dyn.model.dynamics import Dynamics
-from robot_dyn.validate import check_batches, is_moderate, is_state, joint_values, number
+from robot_dyn.validate import check_batches, is_moderate, is_plain, joint_values, number
 
 
 @final
@@ -176,7 +176,7 @@ class Plant:
         return (self.dynamics.n,) if self._arithmetic == FLOAT64 else None
 
     def _is_plain(self, x: Any) -> bool:
-        return is_state(x, self._shape) and is_moderate(x)
+        return is_plain(x, self._shape)
 
     def _states(self, **given: Any) -> list[Array]:
         names = self.dynamics.joint_names

@@ -7,8 +7,8 @@ C_ij = ∫ ∂ṙ/∂v_i · d/dt(∂ṙ/∂v_j) dm. In the body's axes ∂ṙ/�
 
 a skew matrix: Ṁ = C + Cᵀ. [Echeandia, Wensing 2021, of which this is the factorisation in a body's own axes]
 
-Pinocchio's own Coriolis matrix works in the axes of the world; its error grows with the square of the distance from
-the world's origin. Here no distance occurs but that from a joint to the bodies it moves.
+Here no distance occurs but that from a joint to the bodies it moves. Pinocchio's own Coriolis matrix works in the axes
+of the world; it is taken where a bound of its rounding is small (`regrouped`).
 """
 
 from __future__ import annotations
@@ -20,10 +20,49 @@ import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy import ndarray
 
+from robot_dyn.model.couplings import Couplings
+from robot_dyn.model.regrouped import regrouped, rounding, slides
 from robot_dyn.spatial import bracket, first_moment, hat
 
 # ad_X is linear in X: its 36 entries, (6, 36)
 _AD = bracket(np.eye(6)).reshape(6, 36)
+
+MOST_ROUNDING = 1e-13  # ε of C in the axes of the world, in the units √M_ii of the joints
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Coriolis:
+    """C of all joints of a model, by Pinocchio where its rounding is bounded by 1e-13, otherwise by `Bodies`.
+
+    Attributes:
+        bodies: The bodies of the model, each in its own axes.
+        regrouped: The model that Pinocchio is asked for; None where the bound is more.
+        slides: Index and largest |q| of each prismatic joint for which the bound holds.
+        rounding: The bound ε of |δC_ij| ≤ ε Ω √(M_ii M_jj), see `regrouped`.
+    """
+
+    bodies: Bodies
+    regrouped: Any
+    slides: tuple[tuple[int, float], ...]
+    rounding: float
+
+    @classmethod
+    def of(cls, model: Any, couplings: Couplings) -> Coriolis:
+        """Of a model and how its joints follow the coordinates."""
+        with np.errstate(all="ignore"):  # of masses that overflow no bound is known
+            own = regrouped(model)
+            bound = rounding(model, own, couplings)
+        return cls(Bodies.of(model), own if bound <= MOST_ROUNDING else None, slides(model), bound)
+
+    def matrix(self, data: Any, q: ndarray, v: ndarray) -> ndarray:
+        """C of the Christoffel symbols at one state, (N, N)."""
+        if self.regrouped is None:
+            return self.bodies.coriolis_matrix(data, q, v)
+        for j, most in self.slides:
+            if not abs(q.item(j)) <= most:
+                return self.bodies.coriolis_matrix(data, q, v)
+        return pin.computeCoriolisMatrix(self.regrouped, data, q, v)
 
 
 @final
@@ -34,19 +73,24 @@ class Bodies:
     Attributes:
         model: The `pinocchio.Model`; every joint has one degree of freedom.
         inertia: 𝓜, (n, 6, 6).
-        gyroscopic: The 36 entries of 𝓖 by the components of ω, (n, 36, 3).
+        wrench: 𝓜 [X, Y] + 𝓖(ω) X by the products of the 6 components of X and the 9 of (Y, ω), (n, 6, 54).
+        sums: Adds columns of the joints after each, and of all, (n, 2 n).
     """
 
     model: Any
     inertia: ndarray
-    gyroscopic: ndarray
+    wrench: ndarray
+    sums: ndarray
 
     @classmethod
     def of(cls, model: Any) -> Bodies:
         """The bodies of a model."""
         inertia = np.array([body.matrix() for body in model.inertias[1:]])
-        axes = np.eye(3)
-        return cls(model, inertia, np.array([[_gyroscopic(A, axis).ravel() for axis in axes] for A in inertia]).mT)
+        of_brackets = (inertia[:, None] @ bracket(np.eye(6))).swapaxes(1, 2)
+        of_spin = np.array([[_gyroscopic(each, axis) for axis in np.eye(3)] for each in inertia]).transpose(0, 2, 3, 1)
+        wrench = np.concatenate((of_brackets, of_spin), axis=-1).reshape(-1, 6, 54)
+        n = len(inertia)
+        return cls(model, inertia, wrench, np.hstack((np.tri(n, k=-1), np.ones((n, n)))))
 
     def jacobians(self, data: Any, q: ndarray) -> ndarray:
         """J_b of each body at its frame, in its axes, (n, 6, n); a column is 0 where the joint does not move it."""
@@ -55,10 +99,12 @@ class Bodies:
 
     def coriolis_matrix(self, data: Any, q: ndarray, v: ndarray) -> ndarray:
         """C of the Christoffel symbols at one state, (n, n)."""
-        J = self.jacobians(data, q)
-        rate, twist = jacobian_rate(J, v)
-        G = (self.gyroscopic @ twist[:, 3:, None]).reshape(self.inertia.shape)
-        return (J.mT @ (self.inertia @ rate + G @ J)).sum(axis=0)
+        J, n = self.jacobians(data, q), len(v)
+        rows = J.reshape(6 * n, n)
+        twists = (rows * v).dot(self.sums).reshape(n, 6, 2, n)
+        factors = np.concatenate((twists[:, :, 0], twists[:, 3:, 1]), axis=1)
+        products = (J[:, :, None] * factors[:, None]).reshape(n, 54, n)
+        return rows.T.dot((self.wrench @ products).reshape(6 * n, n))
 
 
 def jacobian_rate(J: ndarray, v: ndarray) -> tuple[ndarray, ndarray]:

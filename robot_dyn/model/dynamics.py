@@ -314,10 +314,11 @@ def acceleration(M: Array, tau: Array, joint_names: tuple[str, ...]) -> Array:
     Raises:
         SingularError: If M is not positive definite; names the joint. UndecidedError if rounding hides whether it is.
     """
-    n = len(joint_names)
-    batch = np.broadcast_shapes(M.shape[:-2], tau.shape[:-1])
+    if M.shape[:-2] != tau.shape[:-1]:
+        batch = np.broadcast_shapes(M.shape[:-2], tau.shape[:-1])
+        M, tau = np.broadcast_to(M, (*batch, *M.shape[-2:])), np.broadcast_to(tau, (*batch, *tau.shape[-1:]))
     try:
-        return cholesky_solve(np.broadcast_to(M, (*batch, n, n)), np.broadcast_to(tau, (*batch, n)))
+        return cholesky_solve(M, tau)
     except NotPositiveDefiniteError as error:
         if M.dtype.kind == "f" and not np.isfinite(M).all():
             raise OverflowedError("q is so large that M overflows") from None

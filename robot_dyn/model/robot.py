@@ -1,8 +1,8 @@
 """Robot: a URDF arm behind the Dynamics protocol, M(q) a + C(q, v) v + N(q) = τ, computed by Pinocchio.
 
 A thin layer over CRBA, RNEA and ABA [Featherstone 2008, ch. 5–7], and C by `coriolis`. One state of float64 goes
-straight to Pinocchio, after checks that cost a fraction of a microsecond; lists, batches and coupled joints take the
-general way, `answered`.
+straight to Pinocchio, after checks that cost a fraction of a microsecond, with coupled joints by `_coupled`; lists and
+batches take the general way, `answered`.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from robot_dyn.errors import (
 from robot_dyn.model import doctor, kernels, pinocchio_model
 from robot_dyn.model.batch import answered
 from robot_dyn.model.conditioning import LEAST_DIGITS, NearlySingular, nearly_singular
-from robot_dyn.model.coriolis import Bodies
+from robot_dyn.model.coriolis import Coriolis
 from robot_dyn.model.couplings import Couplings
 from robot_dyn.model.description import Description, check
 from robot_dyn.model.dynamics import Array, Axes, Dynamics, acceleration, entry
@@ -38,10 +38,10 @@ from robot_dyn.model.edits import Changes, Edits
 from robot_dyn.model.gravity import gravity_acts, no_torque
 from robot_dyn.model.inertial_parameters import NAMES as PARAMETERS
 from robot_dyn.model.inertial_parameters import Parametrised, ordered
-from robot_dyn.model.kernels import Kernel, Scratch, frozen
+from robot_dyn.model.kernels import Kernel, Reduction, Scratch, frozen
 from robot_dyn.model.quantity import ALL, DOUBTFUL, MOST_DIGITS
 from robot_dyn.model.structure import structure
-from robot_dyn.validate import instance, is_moderate, is_state, number, shaped
+from robot_dyn.validate import instance, is_moderate, is_plain, is_state, number, shaped
 
 
 @final
@@ -195,9 +195,9 @@ class Robot(Dynamics, Parametrised):
         return self._built[1]
 
     @cached_property
-    def bodies(self) -> Bodies:
-        """The bodies of `model`, each in its own axes."""
-        return Bodies.of(self.model)
+    def coriolis(self) -> Coriolis:
+        """How C of `model` is computed, and the bound of its rounding."""
+        return Coriolis.of(self.model, self.couplings)
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -299,36 +299,31 @@ class Robot(Dynamics, Parametrised):
         return rng.uniform(np.maximum(lower, middle - half), np.minimum(upper, middle + half))
 
     def M(self, q: Array, *, errors: str = "raise") -> ndarray:
-        if is_state(q, self._shape) and is_moderate(q):
+        if is_plain(q, self._shape):
             return pin.crba(self.model, self._scratch.data, q)
-        return self._ask("M", errors, pin.crba, self.couplings.matrix, q=q)
+        return self._ask("M", errors, pin.crba, Couplings.matrix, self.model, q)
 
     def C(self, q: Array, v: Array, *, errors: str = "raise") -> ndarray:
-        shape = self._shape
-        if is_state(q, shape) and is_state(v, shape) and is_moderate(q) and is_moderate(v):
-            return kernels.coriolis_matrix(self.bodies, self._scratch.data, q, v)
-        return self._ask("C", errors, kernels.coriolis_matrix, self.couplings.matrix, self.bodies, q=q, v=v)
+        if is_plain(q, self._shape) and is_plain(v, self._shape):
+            return self.coriolis.matrix(self._scratch.data, q, v)
+        return self._ask("C", errors, Coriolis.matrix, Couplings.matrix, self.coriolis, q, v)
 
     def N(self, q: Array, *, errors: str = "raise") -> ndarray:
-        if is_state(q, self._shape) and is_moderate(q):
+        if is_plain(q, self._shape):
             return pin.computeGeneralizedGravity(self.model, self._scratch.data, q)
-        return self._ask("N", errors, pin.computeGeneralizedGravity, self.couplings.torque, q=q)
+        return self._ask("N", errors, pin.computeGeneralizedGravity, Couplings.torque, self.model, q)
 
     def coriolis_torque(self, q: Array, v: Array, *, errors: str = "raise") -> ndarray:
-        shape = self._shape
-        if is_state(q, shape) and is_state(v, shape) and is_moderate(q) and is_moderate(v):
-            return kernels.coriolis_torque(self._weightless, self._scratch.data, q, v)
-        return self._ask(
-            "coriolis_torque", errors, kernels.coriolis_torque, self.couplings.torque, self._weightless, q=q, v=v
-        )
+        if is_plain(q, self._shape) and is_plain(v, self._shape):
+            return pin.nonLinearEffects(self._weightless, self._scratch.data, q, v)
+        kernel, model = pin.nonLinearEffects, self._weightless  # less N, that of `model` would keep the digits of N
+        return self._ask("coriolis_torque", errors, kernel, Couplings.torque, model, q, v)
 
     def coriolis_transpose(self, q: Array, v: Array, *, errors: str = "raise") -> ndarray:
-        shape = self._shape
-        if is_state(q, shape) and is_state(v, shape) and is_moderate(q) and is_moderate(v):
-            return kernels.coriolis_transpose(self.bodies, self._scratch.data, q, v)
-        return self._ask(
-            "coriolis_transpose", errors, kernels.coriolis_transpose, self.couplings.torque, self.bodies, q=q, v=v
-        )
+        if is_plain(q, self._shape) and is_plain(v, self._shape):
+            return v.dot(self.coriolis.matrix(self._scratch.data, q, v))
+        kernel = kernels.coriolis_transpose
+        return self._ask("coriolis_transpose", errors, kernel, Couplings.torque, self.coriolis, q, v)
 
     def inverse_dynamics(self, q: Array, v: Array, a: Array, *, errors: str = "raise") -> ndarray:
         shape = self._shape
@@ -336,7 +331,7 @@ class Robot(Dynamics, Parametrised):
             tau = pin.rnea(self.model, self._scratch.data, q, v, a)
             if is_moderate(tau):  # NaN and inf, in any argument, show in tau
                 return tau
-        return self._ask("inverse_dynamics", errors, pin.rnea, self.couplings.torque, q=q, v=v, a=a)
+        return self._ask("inverse_dynamics", errors, pin.rnea, Couplings.torque, self.model, q, v, a)
 
     def forward_dynamics(self, q: Array, v: Array, tau: Array, *, errors: str = "raise") -> ndarray:
         shape = self._shape if self._singular is None else None
@@ -347,13 +342,17 @@ class Robot(Dynamics, Parametrised):
         return self._forward_dynamics(errors, q, v, tau)
 
     def kinetic_energy(self, q: Array, v: Array, *, errors: str = "raise") -> Any:
-        return self._ask("kinetic_energy", errors, kernels.kinetic_energy, None, q=q, v=v)
+        if is_plain(q, self._shape) and is_plain(v, self._shape):
+            return kernels.kinetic_energy(self.model, self._scratch.data, q, v)
+        return self._ask("kinetic_energy", errors, kernels.kinetic_energy, None, self.model, q, v)
 
     def potential_energy(self, q: Array, *, errors: str = "raise") -> Any:
-        return self._ask("potential_energy", errors, pin.computePotentialEnergy, None, q=q)
+        return self._ask("potential_energy", errors, pin.computePotentialEnergy, None, self.model, q)
 
     def momentum(self, q: Array, v: Array, *, errors: str = "raise") -> ndarray:
-        return self._ask("momentum", errors, kernels.momentum, self.couplings.torque, q=q, v=v)
+        if is_plain(q, self._shape) and is_plain(v, self._shape):
+            return kernels.momentum(self.model, self._scratch.data, q, v)
+        return self._ask("momentum", errors, kernels.momentum, Couplings.torque, self.model, q, v)
 
     @property
     def body_names(self) -> tuple[str, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
@@ -371,29 +370,44 @@ class Robot(Dynamics, Parametrised):
 
     def regressor(self, q: Array, v: Array, a: Array, *, errors: str = "raise") -> ndarray:
         shape = self._shape
-        if is_state(q, shape) and is_state(v, shape) and is_state(a, shape) and all(map(is_moderate, (q, v, a))):
+        if is_plain(q, shape) and is_plain(v, shape) and is_plain(a, shape):
             return kernels.regressor(self.model, self._scratch.data, q, v, a)
-        return self._ask("regressor", errors, kernels.regressor, self._of_bodies, q=q, v=v, a=a)
+        return self._ask("regressor", errors, kernels.regressor, self._of_bodies, self.model, q, v, a)
 
-    def _of_bodies(self, Y: ndarray) -> ndarray:
+    def _of_bodies(self, couplings: Couplings, Y: ndarray) -> ndarray:
         """The regressor of all joints, (..., N, 10 N) with bodies as in `model`, coupled and in the order of θ."""
         N = self.model.nv
-        return self.couplings.rows(Y.reshape(*Y.shape[:-1], N, -1)[..., self._order, :].reshape(Y.shape))
+        return couplings.rows(Y.reshape(*Y.shape[:-1], N, -1)[..., self._order, :].reshape(Y.shape))
 
     def placement(self, q: Array, frame: str, *, errors: str = "raise") -> ndarray:
-        return self._ask("placement", errors, kernels.placement(entry(self._frames, frame)), None, q=q)
+        return self._ask("placement", errors, self._kernel(kernels.placement, frame), None, self.model, q)
 
     def jacobian(
         self, q: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, errors: str = "raise"
     ) -> ndarray:
-        kernel = kernels.jacobian(entry(self._frames, frame), Axes.of(expressed_in))
-        return self._ask("jacobian", errors, kernel, self.couplings.columns, q=q)
+        kernel = self._kernel(kernels.jacobian, frame, expressed_in)
+        if is_plain(q, self._shape):
+            return kernel(self.model, self._scratch.data, q)
+        return self._ask("jacobian", errors, kernel, Couplings.columns, self.model, q)
 
     def jacobian_rate(
         self, q: Array, v: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, errors: str = "raise"
     ) -> ndarray:
-        kernel = kernels.jacobian_rate(entry(self._frames, frame), Axes.of(expressed_in))
-        return self._ask("jacobian_rate", errors, kernel, self.couplings.columns, q=q, v=v)
+        kernel = self._kernel(kernels.jacobian_rate, frame, expressed_in)
+        return self._ask("jacobian_rate", errors, kernel, Couplings.columns, self.model, q, v)
+
+    def _kernel(self, make: Callable[..., Kernel], frame: str, *axes: str) -> Kernel:
+        """The kernel of a frame, which is kept."""
+        try:
+            return self._kernels[make, frame, axes]
+        except (KeyError, TypeError):  # TypeError of what is not a name
+            pass
+        kernel = make(entry(self._frames, frame), *map(Axes.of, axes))
+        return self._kernels.setdefault((make, frame, axes), kernel)
+
+    @cached_property
+    def _kernels(self) -> dict[tuple[Any, ...], Kernel]:
+        return {}
 
     @cached_property
     def _built(self) -> tuple[Any, Couplings, tuple[str, ...]]:
@@ -413,7 +427,12 @@ class Robot(Dynamics, Parametrised):
     @cached_property
     def _shape(self) -> tuple[int] | None:
         """Shape of a state that goes straight to Pinocchio; None if joints are coupled, or digits are looked at."""
-        return (self.n,) if self.couplings.trivial and self.least_digits is None else None
+        return self._one_state if self.couplings.trivial else None
+
+    @cached_property
+    def _one_state(self) -> tuple[int] | None:
+        """Shape of a state that is answered without `answered`; None if digits are looked at."""
+        return (self.n,) if self.least_digits is None else None
 
     @property
     def joint_without_inertia(self) -> str | None:
@@ -423,7 +442,7 @@ class Robot(Dynamics, Parametrised):
     @cached_property
     def _general_inertia(self) -> ndarray:
         """M at a configuration without symmetries."""
-        return self._equation(pin.crba, self.couplings.matrix)(np.linspace(0.3, 0.9, self.n))
+        return self._equation(pin.crba, Couplings.matrix, self.model)(np.linspace(0.3, 0.9, self.n))
 
     @cached_property
     def _nearly_singular(self) -> NearlySingular | None:
@@ -444,18 +463,28 @@ class Robot(Dynamics, Parametrised):
         return None
 
     def _ask(
-        self,
-        quantity: str,
-        errors: str,
-        kernel: Kernel,
-        reduce: Callable[[Any], Any] | None,
-        of: Any = None,
-        **state: Array,
+        self, quantity: str, errors: str, kernel: Kernel, reduce: Reduction | None, model: Any, *state: Array
     ) -> Any:
-        return self._answered(quantity, errors, self._equation(kernel, reduce, of), state)
+        if errors.__class__ is str and errors == "raise":
+            shape = self._one_state
+            for x in state:
+                if not is_plain(x, shape):
+                    break
+            else:
+                if self._shape:
+                    return kernel(model, self._scratch.data, *state)
+                return self._coupled(kernel, reduce, model, *state)
+        named = dict(zip(ALL[quantity].arguments, state, strict=True))
+        return self._answered(quantity, errors, self._equation(kernel, reduce, model), named)
 
-    def _equation(self, kernel: Kernel, reduce: Callable[[Any], Any] | None, of: Any = None) -> Callable[..., ndarray]:
-        return kernels.by_state(kernel, reduce, self.model if of is None else of, self._scratch.data, self.couplings)
+    def _coupled(self, kernel: Kernel, reduce: Reduction | None, model: Any, q: ndarray, *rates: ndarray) -> Any:
+        """The answer at one state of coupled joints."""
+        couplings = self.couplings
+        answer = kernel(model, self._scratch.data, couplings.position(q), *map(couplings.velocity, rates))
+        return answer if reduce is None else reduce(couplings, answer)
+
+    def _equation(self, kernel: Kernel, reduce: Reduction | None, model: Any) -> Callable[..., ndarray]:
+        return kernels.by_state(kernel, reduce, model, self._scratch.data, self.couplings)
 
     def _answered(self, quantity: str, errors: str, equation: Callable[..., ndarray], state: dict[str, Array]) -> Any:
         arrays = {name: shaped(name, x, self.joint_names) for name, x in state.items()}
@@ -471,9 +500,15 @@ class Robot(Dynamics, Parametrised):
         """Forward dynamics in general: coupled joints by factorising M, which also tells where M is singular."""
         if self._singular is not None:
             raise self._singular()
-        M = self._equation(pin.crba, self.couplings.matrix)
-        bias = self._equation(pin.nonLinearEffects, self.couplings.torque)
-        solved = self._equation(pin.aba, None)
+        if not self._shape and all(is_plain(x, self._one_state) for x in (q, v, tau)):
+            inertia = self._coupled(pin.crba, Couplings.matrix, self.model, q)
+            bias = self._coupled(pin.nonLinearEffects, Couplings.torque, self.model, q, v)
+            a = acceleration(inertia, tau - bias, self.joint_names)
+            if is_moderate(a, DOUBTFUL):
+                return a
+        M = self._equation(pin.crba, Couplings.matrix, self.model)
+        bias = self._equation(pin.nonLinearEffects, Couplings.torque, self.model)
+        solved = self._equation(pin.aba, None, self.model)
 
         def equation(q: ndarray, v: ndarray, tau: ndarray) -> ndarray:
             a = solved(q, v, tau) if self.couplings.trivial else acceleration(M(q), tau - bias(q, v), self.joint_names)
