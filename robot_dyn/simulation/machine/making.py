@@ -116,7 +116,7 @@ def machine(
     made = _identified(equation, swept)
 
     def make() -> Equations:
-        described = None if made.objects else made.described
+        described = made.described if made.lasting else None
         programs = _programs(made.equation, made.known, kept, jacobian, nonsmooth, described)
         shared = _shared(made.equation, made.known, lanes, swept)
         return Equations(programs, lanes, made.equation.plant.dynamics.name, shared, changeable(made.equation))  # pyright: ignore
@@ -150,6 +150,7 @@ class _Identified(NamedTuple):
     known: tuple[Parameter, ...]
     described: tuple[Any, ...]
     objects: tuple[Any, ...]
+    lasting: bool
 
 
 def _identified(equation: StateEquation, swept: tuple[str, ...]) -> _Identified:
@@ -157,8 +158,8 @@ def _identified(equation: StateEquation, swept: tuple[str, ...]) -> _Identified:
     robot = _robot(plant.dynamics)
     own = equation if robot is plant.dynamics else replace(equation, plant=Plant(robot, plant.effects))
     known = parameters(robot, plant.effects, equation.controller, swept)
-    described, objects = structure(own)
-    return _Identified(own, known, (described, tuple(each.place for each in known)), objects)
+    described, objects, lasting = structure(own)
+    return _Identified(own, known, (described, tuple(each.place for each in known)), objects, lasting)
 
 
 def _with_loop(
@@ -223,7 +224,7 @@ def _programs(
         texts = payload.decode().split("\n\n")
         return {name: Program.read(text) for name, _, text in (each.partition("\n") for each in texts)}
     programs = _traced(equation, known, kept, jacobian, nonsmooth)
-    if store is not None:
+    if store is not None and structure(equation).described == described[0]:  # to trace it runs code that may change it
         text = "\n\n".join(f"{name}\n{program}" for name, program in programs.items())
         store.save(key, text.encode(), f"the equations of {equation.plant.dynamics.name}")  # pyright: ignore
     return programs
@@ -243,7 +244,7 @@ def _traced(
         robot, own = _robot(dynamics), tuple(each for each in known if each.part == part)
         if constants:  # what is kept tells robots apart but for the numbers that are inputs
             return SymbolicDynamics(robot)
-        (described, *_), _ = structure(StateEquation(Plant(robot), None))
+        described = structure(StateEquation(Plant(robot), None)).described
         inputs = tuple(each.place for each in own)
         return _symbols.get((), (described, inputs), lambda: SymbolicDynamics(robot, own))
 
