@@ -73,10 +73,10 @@ class _Reader:
 
     def text(self, value: Any) -> str:
         """What tells a value from all others, beside the texts of what is reached."""
-        kind = type(value)
+        kind: Any = type(value)
         if kind in _NUMBERS:
             return f"{kind.__name__} {value!r}"
-        if isinstance(value, np.ndarray | np.generic) and not value.dtype.hasobject and kind.__module__ == "numpy":
+        if issubclass(kind, np.ndarray | np.generic) and kind.__module__ == "numpy" and not value.dtype.hasobject:
             return f"{kind.__name__} {value.dtype.str} {value.shape} {value.tobytes().hex()}"
         if kind in (tuple, frozenset):
             items = map(self.text, value)
@@ -91,7 +91,7 @@ class _Reader:
             return self._number(value)
         if kind.__name__ == "_HAS_DEFAULT_FACTORY_CLASS":  # a default that is made by a function, in an __init__
             return kind.__name__
-        if isinstance(value, np.ufunc) and getattr(np, value.__name__, None) is value:
+        if kind is np.ufunc and getattr(np, value.__name__, None) is value:
             return f"numpy {value.__name__}"
         raise _UndefinedError
 

@@ -83,9 +83,16 @@ def machine_of(setup: Setup, equation: StateEquation, swept: tuple[str, ...] = (
 
 
 def _existing(setup: Setup, equation: StateEquation) -> Machine | None:
-    """The machine code that this process already has."""
-    making = sys.modules.get("robot_dyn.simulation.machine.making")  # imported by the first run that compiled
-    return None if making is None else making.existing(*_code(setup, equation), **_needs(setup))
+    """The machine code that this process has, or the store."""
+    code, needs = _code(setup, equation), _needs(setup)
+    if "robot_dyn.simulation.machine.making" not in sys.modules:  # which takes ten times as long to import
+        from robot_dyn.simulation.machine.programs import Traces, are_stored
+
+        if not are_stored(code[0], Traces(None, needs["jacobian"], needs["nonsmooth"])):
+            return None
+    from robot_dyn.simulation.machine.making import existing
+
+    return existing(*code, **needs)
 
 
 def _code(setup: Setup, equation: StateEquation) -> tuple[StateEquation, Any]:

@@ -14,8 +14,9 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.compiled.definition import definition
-from robot_dyn.simulation.machine import making
-from robot_dyn.simulation.machine.making import Recent, machine
+from robot_dyn.simulation.machine import making, programs
+from robot_dyn.simulation.machine.making import machine
+from robot_dyn.simulation.machine.recent import Recent
 from robot_dyn.simulation.machine.structure import structure
 from robot_dyn.simulation.state_equation import StateEquation
 from tests.compiled.test_kernel import Memory
@@ -276,17 +277,17 @@ def test_values_inside_of_parts_that_are_no_parameters_are_in_the_structure() ->
 
 def in_another_process(module: Any, store: Memory, monkeypatch: pytest.MonkeyPatch) -> str:
     """The rate of an arm with this effect, by the programs of the store if they are there."""
-    for name in ("_equations", "_symbols"):
-        monkeypatch.setattr(making, name, Recent())
-    monkeypatch.setattr(making, "default_store", lambda: store)
+    monkeypatch.setattr(making, "_equations", Recent())
+    monkeypatch.setattr(programs, "_symbols", Recent())
+    monkeypatch.setattr(programs, "default_store", lambda: store)
     made = machine(StateEquation(rd.Plant(ARM, [module.Drag()]), None), rd.method("rk4"))
     return str(made.equations.programs["rate"])
 
 
 def test_programs_of_user_defined_classes_are_restored_and_after_an_edit_they_are_not(monkeypatch) -> None:
     store, traces = Memory(), []
-    trace = making._traced
-    monkeypatch.setattr(making, "_traced", lambda *given: traces.append(given) or trace(*given))
+    trace = programs.traced
+    monkeypatch.setattr(programs, "traced", lambda *given: traces.append(given) or trace(*given))
     first = in_another_process(cell(CELL), store, monkeypatch)
     assert in_another_process(cell(CELL), store, monkeypatch) == first
     assert len(traces) == 1

@@ -78,10 +78,10 @@ class MachineFunction:
 
     def key(self, kinds: tuple[Kind, ...]) -> str:
         """Of its machine code in a store."""
-        types = [repr(each) for each in kinds]
-        return digest(
-            ["loop", str(self._passes), sources_of_the_translator(), *types, *identity(self.function, self._instead)]
-        )
+        return self._key(kinds, identity(self.function, self._instead))
+
+    def _key(self, kinds: tuple[Kind, ...], texts: list[str]) -> str:
+        return digest(["loop", str(self._passes), sources_of_the_translator(), *map(repr, kinds), *texts])
 
     def is_kept(self) -> bool:
         """Whether its machine code, for some types of arguments, is in memory or in the store."""
@@ -120,11 +120,12 @@ class MachineFunction:
             told = ir.Function(module, ir.FunctionType(TEXT, []), f"{prefix}result")
             ir.IRBuilder(told.append_basic_block()).ret(program.text(_written(result)))
 
-        key, store = self.key(kinds), self.store()
+        texts = identity(self.function, self._instead)
+        key, note, store = self._key(kinds, texts), self._key((), texts), self.store()
         call = machine_code.address("call", key, write, store, self.about, self._passes)
         told = machine_code.address("result", key, write, store, self.about, self._passes)
-        if store is not None and store.load(self.key(())) is None:
-            store.save(self.key(()), b"", f"{self.about} is there")
+        if store is not None and store.load(note) is None:
+            store.save(note, b"", f"{self.about} is there")
         text = ctypes.CFUNCTYPE(ctypes.c_char_p)(told)().decode()
         return _ENTRY(call), _read(text)
 

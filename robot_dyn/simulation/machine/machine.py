@@ -20,7 +20,7 @@ from robot_dyn.compiled.llvm import machine_code
 from robot_dyn.compiled.llvm.lock_step import write_function, write_step
 from robot_dyn.compiled.loops.call import MachineFunction
 from robot_dyn.compiled.parameters import CONTROLLER, ROBOT, Parameter, Part, joined, parameters
-from robot_dyn.compiled.program import Program
+from robot_dyn.compiled.program import Programs
 from robot_dyn.control.controller import Controller
 from robot_dyn.convex import PASSES
 from robot_dyn.effects.effect import Effect
@@ -60,7 +60,7 @@ class Equations:
         checked: States at which they were compared with the interpreted equation, by the loops that they ran in.
     """
 
-    programs: Mapping[str, Program]
+    programs: Programs
     runs: int
     name: str
     shared: Mapping[int, int] = field(default_factory=dict)
@@ -70,12 +70,16 @@ class Equations:
     @property
     def instructions(self) -> int:
         """Operations in all."""
-        return sum(len(program) for program in self.programs.values())
+        return self.programs.instructions
 
     @cached_property
     def _key(self) -> str:
-        texts = (f"{name} {program}" for name, program in self.programs.items())
-        return digest([sources_of_the_writer(), str(self.runs), str(sorted(self.shared.items())), *texts])
+        return digest([sources_of_the_writer(), str(self.runs), str(sorted(self.shared.items())), str(self.programs)])
+
+    def is_kept(self) -> bool:
+        """Whether its machine code is in the store."""
+        store = default_store()
+        return store is not None and store.load(self._key) is not None
 
     @cached_property
     def functions(self) -> Functions:
@@ -174,10 +178,12 @@ class Machine:
         """The functions as Python calls them."""
         return Functions(*(_callable(address) if address else 0 for address in self.equations.functions))
 
-    @property
-    def ready(self) -> bool:
-        """Whether it has been compiled, with its loop, and compared."""
-        return self.loop in self.equations.checked
+    def is_kept(self) -> bool:
+        """Whether its machine code is in this process or in the store, with its loop."""
+        if self.loop in self.equations.checked:
+            return True
+        kept = bool(self.equations.checked) or self.equations.is_kept()
+        return kept and (self.loop is None or self.loop.is_kept())
 
     def check(self, setup: Setup) -> None:
         """Hold the functions to the interpreted equations.
@@ -200,7 +206,7 @@ class Machine:
         rng, n, m = np.random.default_rng(20), self.equation.plant.dynamics.n, self.equation.size
         W = self.equations.runs
         plan, held = plan_of(setup), n * self.equation.sampled
-        made = {name: np.empty((len(program.outputs), W)) for name, program in self.equations.programs.items()}
+        made = {name: np.empty((self.equations.programs.results(name), W)) for name in self.equations.programs}
         swept = {each.name: np.tile(each.value.ravel(), (W, 1)) for each in self.known if each.name in self.swept}
         own = self.own(swept)
         for i, at in enumerate(states.t.tolist()):
@@ -247,7 +253,7 @@ class Machine:
         """y⁺, v⁺ and its places by a step of time stepping, run by run, beside what the equation gives."""
         n, m, W = self.equation.plant.dynamics.n, self.equation.size, y.shape[1]
         x = np.vstack([y, np.full((1, W), _LENGTH), np.zeros((n, W))])
-        out = np.empty((m + 2 * n + 1 + len(self.equations.programs["problem"].outputs), W))
+        out = np.empty((m + 2 * n + 1 + self.equations.programs.results("problem"), W))
         self.in_python.step(t, x, p, own, out)
         for lane in range(lanes):
             theirs = stepped(self.equation, t, x[:, lane], own[:n, lane] if self.equation.sampled else None)

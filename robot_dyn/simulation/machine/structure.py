@@ -98,23 +98,24 @@ class _Found:
 
     def of(self, value: Any) -> Any:
         """A value in hashable ones."""
-        if isinstance(value, Enum) and of_library(type(value)):
+        kind: Any = type(value)
+        if issubclass(kind, Enum) and of_library(kind):
             return value.name
-        if type(value) in _PLAIN:
-            return type(value).__name__, repr(value)  # -0.0 is another number than 0.0, and 1 than True
-        if type(value) in (tuple, list):
+        if kind in _PLAIN:
+            return kind.__name__, repr(value)  # -0.0 is another number than 0.0, and 1 than True
+        if kind in (tuple, list):
             return tuple(self.of(each) for each in value)
-        if (type(value) is np.ndarray and not value.dtype.hasobject) or isinstance(value, np.generic):
+        if issubclass(kind, np.generic) or (kind is np.ndarray and not value.dtype.hasobject):
             return value.dtype.str, value.shape, value.tobytes()
         robot = getattr(value, "robot", value)
-        if isinstance(robot, Robot) and isinstance(value, Dynamics) and of_library(type(value)):
+        if isinstance(robot, Robot) and of_library(kind) and _is_dynamics(value):
             edits = _of_edits(robot.edits) if id(value) in self.numbered else self.of(robot.edits)
-            return type(value).__name__, sha256(robot.description.xml).digest(), robot.joint_names, edits
+            return kind.__name__, sha256(robot.description.xml).digest(), robot.joint_names, edits
         if id(value) in self.numbered and _is_polynomial(value):
             return "polynomial", value.coefficients.shape[1:]
         if is_dataclass(value) and is_frozen(value):
             before = len(self.objects)
-            described = self._class(type(value)), *(self._of_field(value, name) for name in attributes(value))
+            described = self._class(kind), *(self._of_field(value, name) for name in attributes(value))
             if all(map(_weakly, self.objects[before:])):
                 return described
             del self.objects[before:]
@@ -131,10 +132,10 @@ class _Found:
 
     def _of_field(self, part: Any, name: str) -> Any:
         """A field of a part: of a parameter, whether it has a value, and the shape if it varies."""
-        value = getattr(part, name)
+        value: Any = getattr(part, name)
         if name in ("period_s", "seed", "run") and of_library(type(part)):  # noise is drawn outside of machine code
             return None
-        if isinstance(value, Payload) and isinstance(part, CarriedPayload):  # its numbers are those of the bodies
+        if type(value) is Payload and isinstance(part, CarriedPayload):  # its numbers are those of the bodies
             return "payload", value.frame
         if name in (known := declared(type(part))) and id(part) in self.numbered:
             return value is None or (None if known[name].of_joints else np.shape(value))
@@ -144,6 +145,10 @@ class _Found:
 def of_library(kind: type) -> bool:
     """Whether the version of this library tells the code of a class, in another process too."""
     return kind.__module__.startswith("robot_dyn.")
+
+
+def _is_dynamics(value: Any) -> bool:
+    return isinstance(value, Dynamics)
 
 
 def _is_polynomial(value: Any) -> bool:
