@@ -17,7 +17,6 @@ from robot_dyn.coefficients import value_at
 from robot_dyn.compiled.cache import default_store
 from robot_dyn.compiled.identity import digest, sources_of_the_writer
 from robot_dyn.compiled.llvm import machine_code
-from robot_dyn.compiled.llvm.lock_step import write_function, write_step
 from robot_dyn.compiled.loops.call import MachineFunction
 from robot_dyn.compiled.parameters import CONTROLLER, ROBOT, Parameter, Part, joined, parameters
 from robot_dyn.compiled.program import Programs
@@ -86,6 +85,8 @@ class Equations:
         """The addresses; compiled if they are not in the store."""
 
         def write(module: Any, prefix: str) -> None:
+            from robot_dyn.compiled.llvm.lock_step import write_function, write_step
+
             for name, program in self.programs.items():
                 if name == "problem":
                     three: Any = tuple(self.programs[each] for each in STEP)

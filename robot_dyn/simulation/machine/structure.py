@@ -19,7 +19,7 @@ from robot_dyn.compiled.definition import definition
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.effects.carried_payload import CarriedPayload
 from robot_dyn.model.dynamics import Dynamics
-from robot_dyn.model.edits import Edits, Payload
+from robot_dyn.model.edits import Edits
 from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.declarations import attributes, is_frozen
 from robot_dyn.simulation.state_equation import StateEquation
@@ -135,7 +135,7 @@ class _Found:
         value: Any = getattr(part, name)
         if name in ("period_s", "seed", "run") and of_library(type(part)):  # noise is drawn outside of machine code
             return None
-        if type(value) is Payload and isinstance(part, CarriedPayload):  # its numbers are those of the bodies
+        if name == "payload" and isinstance(part, CarriedPayload):  # its numbers are those of the bodies
             return "payload", value.frame
         if name in (known := declared(type(part))) and id(part) in self.numbered:
             return value is None or (None if known[name].of_joints else np.shape(value))
