@@ -1,7 +1,7 @@
 """The choice of the engine that runs a setup: machine code, or Python where compiling does not pay or cannot be.
 
 It is made by a count, about how often the equation of motion is evaluated: the same for a setup on every machine.
-Machine code that this process already has is used in any case.
+Machine code that this process already has, or the store, is used in any case.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import sys
 from math import inf
 from typing import TYPE_CHECKING, Any
 
+from robot_dyn.compiled.waiting import told
 from robot_dyn.errors import RobotDynError
 from robot_dyn.simulation.declarations import named, undeclared
 from robot_dyn.simulation.setup import Setup
@@ -18,10 +19,12 @@ from robot_dyn.simulation.state_equation import StateEquation
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.machine.machine import Machine
+    from robot_dyn.simulation.machine.programs import Traces
 
-# Interpreted, an evaluation takes some 0.1 ms: these take about as long as imports, trace and LLVM, 1 to 2 s. The time
-# loop takes as long as 20 000 evaluations more (RK4) to 90 000 (DOP853), once for a version of this library.
+# Interpreted, an evaluation takes some 0.1 ms: these take about as long as imports, trace and LLVM, 1 to 2 s; half of it
+# without the time loop, which is compiled once for a version of this library.
 _COMPILED = 20_000
+_WITHOUT_LOOP = _COMPILED / 2
 _GUESSED = 10  # evaluations in a step of an implicit method, beside those of its Jacobian
 _PER_SECOND, _PER_SEGMENT = 1000, 17  # evaluations of an adaptive method: for each second, at least for each segment
 
@@ -48,10 +51,11 @@ def choose(setup: Setup, equation: StateEquation, seen: float = 0) -> tuple[Mach
     try:
         made = _existing(setup, equation)
         if made is None:
-            if max(seen * _in_all(setup, equation.size), _evaluations(setup, equation.size)) < _COMPILED:
+            if not _is_worthwhile(setup, equation, seen):
                 return None, _interpreted(setup, "short: compiling does not pay")
-            made = machine_of(setup, equation)
-        made.check(setup)
+            made = _machine(setup, equation)
+        else:
+            made.check(setup)
         return made, _label(made)
     except (ImportError, RobotDynError) as error:
         return None, _interpreted(setup, str(error))
@@ -66,8 +70,9 @@ def most_interpreted(setup: Setup, equation: StateEquation, machine: Machine | N
 
 
 def _machine(setup: Setup, equation: StateEquation) -> Machine:
-    made = machine_of(setup, equation)
-    made.check(setup)
+    with told("compiling the equations of this run, once for its structure"):
+        made = machine_of(setup, equation)
+        made.check(setup)
     return made
 
 
@@ -84,15 +89,42 @@ def machine_of(setup: Setup, equation: StateEquation, swept: tuple[str, ...] = (
 
 def _existing(setup: Setup, equation: StateEquation) -> Machine | None:
     """The machine code that this process has, or the store."""
-    code, needs = _code(setup, equation), _needs(setup)
-    if "robot_dyn.simulation.machine.making" not in sys.modules:  # which takes ten times as long to import
-        from robot_dyn.simulation.machine.programs import Traces, are_stored
+    from robot_dyn.simulation.machine.programs import are_stored
 
-        if not are_stored(code[0], Traces(None, needs["jacobian"], needs["nonsmooth"])):
-            return None
+    (code, method), needs = _code(setup, equation), _needs(setup)
+    # What else is imported takes ten times as long as to ask.
+    if "robot_dyn.simulation.machine.making" not in sys.modules and not are_stored(code, _traces(setup)):
+        return None
     from robot_dyn.simulation.machine.making import existing
 
-    return existing(*code, **needs)
+    return existing(code, method, **needs)
+
+
+def _is_worthwhile(setup: Setup, equation: StateEquation, seen: float) -> bool:
+    """Whether compiling takes less than this run and those of its structure that were interpreted before it."""
+    from robot_dyn.simulation.machine.programs import interpreted
+
+    before = interpreted(_code(setup, equation)[0], _traces(setup))
+    count = before[0] + max(seen * _in_all(setup, equation.size), _evaluations(setup, equation.size))
+    if count >= _COMPILED or (count >= _WITHOUT_LOOP and _has_loop(setup)):
+        return True
+    before[0] = count
+    return False
+
+
+def _has_loop(setup: Setup) -> bool:
+    """Whether the time loop is in the store."""
+    from robot_dyn.simulation.machine.making import loop_of
+
+    method: Any = setup.integrator
+    return method.plain and loop_of(method, setup.finds_events).is_kept()
+
+
+def _traces(setup: Setup) -> Traces:
+    from robot_dyn.simulation.machine.programs import Traces
+
+    method: Any = setup.integrator
+    return Traces(None, method.needs_jacobian, method.nonsmooth)
 
 
 def _code(setup: Setup, equation: StateEquation) -> tuple[StateEquation, Any]:

@@ -20,6 +20,7 @@ from robot_dyn.compiled.loops.identity import identity, sources_of_the_translato
 from robot_dyn.compiled.loops.kinds import Kind, Number, Static, TupleKind, unpacked, words
 from robot_dyn.compiled.loops.packing import Packed, pack
 from robot_dyn.compiled.store import Store
+from robot_dyn.compiled.waiting import told
 from robot_dyn.errors import MachineCodeError
 
 _ENTRY = ctypes.CFUNCTYPE(ctypes.c_char_p, ctypes.c_void_p, ctypes.c_void_p)
@@ -101,7 +102,7 @@ class MachineFunction:
         if place in self._known:
             return self._known[place]
         began, known = perf_counter(), tuple(kinds)
-        with self._lock, interrupts_later():
+        with self._lock, interrupts_later(), told(f"compiling {self.about}, once for this version"):
             if known not in self._known:
                 self._known[known] = self._compiled(known)
             self._known[place] = self._known[known]

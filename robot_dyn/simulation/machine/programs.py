@@ -21,7 +21,7 @@ from robot_dyn.simulation.machine.recent import Recent
 from robot_dyn.simulation.machine.structure import of_library, structure
 from robot_dyn.simulation.state_equation import StateEquation
 
-_robots, _symbols = Recent(), Recent()
+_robots, _symbols, _interpreted = Recent(), Recent(), Recent()
 
 
 class Traces(NamedTuple):
@@ -111,6 +111,12 @@ def are_stored(equation: StateEquation, what: Traces) -> bool:
     return stored(identified(equation), what) is not None
 
 
+def interpreted(equation: StateEquation, what: Traces) -> list[float]:
+    """Where evaluations are counted that runs of this structure have taken without machine code."""
+    made = identified(equation)
+    return _interpreted.get(made.objects, (made.described, what), lambda: [0.0])
+
+
 def programs_of(made: Identified, what: Traces) -> Programs:
     """The programs of a state equation.
 
@@ -127,9 +133,7 @@ def programs_of(made: Identified, what: Traces) -> Programs:
 
 
 @interrupts_later()
-def traced(
-    equation: StateEquation, known: tuple[Parameter, ...], what: Traces, constants: bool = False
-) -> Programs:
+def traced(equation: StateEquation, known: tuple[Parameter, ...], what: Traces, constants: bool = False) -> Programs:
     """The programs of a state equation by a trace; arguments as of `Identified`, and whether numbers are constants."""
     from robot_dyn.compiled.from_casadi import program_of
     from robot_dyn.compiled.symbolic_dynamics import SymbolicDynamics
