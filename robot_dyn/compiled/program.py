@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum, auto
+from functools import cached_property
 from itertools import chain, takewhile
 from typing import final
 
@@ -153,7 +154,7 @@ class Programs(Mapping[str, Program]):
         """Number of results of a program."""
         return self._texts[name].rpartition("\noutputs")[2].count(" v")
 
-    @property
+    @cached_property
     def instructions(self) -> int:
         """Operations in all."""
         return sum(map(_instructions, self._texts.values()))

@@ -13,16 +13,16 @@ from typing import TYPE_CHECKING, Any
 from robot_dyn.compiled.waiting import told
 from robot_dyn.errors import RobotDynError
 from robot_dyn.simulation.declarations import named, undeclared
+from robot_dyn.simulation.machine.programs import Identified, Traces, identified, interpreted, stored
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import segments
 from robot_dyn.simulation.state_equation import StateEquation
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.machine.machine import Machine
-    from robot_dyn.simulation.machine.programs import Traces
 
-# Interpreted, an evaluation takes some 0.1 ms: these take about as long as imports, trace and LLVM, 1 to 2 s; half of it
-# without the time loop, which is compiled once for a version of this library.
+# Interpreted, an evaluation takes some 0.1 ms: these take about as long as imports, trace and LLVM, 1 to 2 s; half of
+# it without the time loop, which is compiled once for a version of this library.
 _COMPILED = 20_000
 _WITHOUT_LOOP = _COMPILED / 2
 _GUESSED = 10  # evaluations in a step of an implicit method, beside those of its Jacobian
@@ -43,21 +43,19 @@ def choose(setup: Setup, equation: StateEquation, seen: float = 0) -> tuple[Mach
     """
     if setup.engine == "interpreted":
         return None, _interpreted(setup)
-    if setup.engine == "compiled":
-        made = _machine(setup, equation)
-        return made, _label(made)
-    if parts := undeclared(setup.plant, setup.controller):  # they may do what a trace would lose
+    asked = setup.engine == "compiled"
+    if not asked and (parts := undeclared(setup.plant, setup.controller)):  # they may do what a trace would lose
         return None, _interpreted(setup, " ".join((named(parts[0][0]), parts[0][1])))
     try:
-        made = _existing(setup, equation)
-        if made is None:
-            if not _is_worthwhile(setup, equation, seen):
-                return None, _interpreted(setup, "short: compiling does not pay")
-            made = _machine(setup, equation)
-        else:
-            made.check(setup)
-        return made, _label(made)
+        made, what = identified(_code(setup, equation)), _traces(setup)
+        found = _existing(setup, made, what)
+        if found is None and not asked and not _is_worthwhile(setup, made, what, seen):
+            return None, _interpreted(setup, "short: compiling does not pay")
+        machine = _checked(setup, equation, found)
+        return machine, _label(machine)
     except (ImportError, RobotDynError) as error:
+        if asked:
+            raise
         return None, _interpreted(setup, str(error))
 
 
@@ -69,7 +67,11 @@ def most_interpreted(setup: Setup, equation: StateEquation, machine: Machine | N
     return _COMPILED / _in_all(setup, equation.size)
 
 
-def _machine(setup: Setup, equation: StateEquation) -> Machine:
+def _checked(setup: Setup, equation: StateEquation, found: Machine | None) -> Machine:
+    """The machine that was found, or another, once it has been compared."""
+    if found is not None:
+        found.check(setup)
+        return found
     with told("compiling the equations of this run, once for its structure"):
         made = machine_of(setup, equation)
         made.check(setup)
@@ -84,28 +86,24 @@ def machine_of(setup: Setup, equation: StateEquation, swept: tuple[str, ...] = (
     """
     from robot_dyn.simulation.machine.making import machine
 
-    return machine(*_code(setup, equation), swept=swept, **_needs(setup))
+    code, (_, jacobian, nonsmooth) = _code(setup, equation), _traces(setup)
+    return machine(code, _plain(setup), swept=swept, jacobian=jacobian, cuts=setup.finds_events, nonsmooth=nonsmooth)
 
 
-def _existing(setup: Setup, equation: StateEquation) -> Machine | None:
+def _existing(setup: Setup, made: Identified, what: Traces) -> Machine | None:
     """The machine code that this process has, or the store."""
-    from robot_dyn.simulation.machine.programs import are_stored
-
-    (code, method), needs = _code(setup, equation), _needs(setup)
     # What else is imported takes ten times as long as to ask.
-    if "robot_dyn.simulation.machine.making" not in sys.modules and not are_stored(code, _traces(setup)):
+    if "robot_dyn.simulation.machine.making" not in sys.modules and stored(made, what) is None:
         return None
     from robot_dyn.simulation.machine.making import existing
 
-    return existing(code, method, **needs)
+    return existing(made, what, _plain(setup), setup.finds_events)
 
 
-def _is_worthwhile(setup: Setup, equation: StateEquation, seen: float) -> bool:
+def _is_worthwhile(setup: Setup, made: Identified, what: Traces, seen: float) -> bool:
     """Whether compiling takes less than this run and those of its structure that were interpreted before it."""
-    from robot_dyn.simulation.machine.programs import interpreted
-
-    before = interpreted(_code(setup, equation)[0], _traces(setup))
-    count = before[0] + max(seen * _in_all(setup, equation.size), _evaluations(setup, equation.size))
+    before, size = interpreted(made, what), made.equation.size
+    count = before[0] + max(seen * _in_all(setup, size), _evaluations(setup, size))
     if count >= _COMPILED or (count >= _WITHOUT_LOOP and _has_loop(setup)):
         return True
     before[0] = count
@@ -116,26 +114,24 @@ def _has_loop(setup: Setup) -> bool:
     """Whether the time loop is in the store."""
     from robot_dyn.simulation.machine.making import loop_of
 
-    method: Any = setup.integrator
-    return method.plain and loop_of(method, setup.finds_events).is_kept()
+    method = _plain(setup)
+    return method is not None and loop_of(method, setup.finds_events).is_kept()
+
+
+def _code(setup: Setup, equation: StateEquation) -> StateEquation:
+    """The equation that is compiled."""
+    return equation if _traces(setup).nonsmooth else equation.in_a_mode
 
 
 def _traces(setup: Setup) -> Traces:
-    from robot_dyn.simulation.machine.programs import Traces
-
     method: Any = setup.integrator
     return Traces(None, method.needs_jacobian, method.nonsmooth)
 
 
-def _code(setup: Setup, equation: StateEquation) -> tuple[StateEquation, Any]:
-    """The equation that is compiled, and the method if its steps are."""
+def _plain(setup: Setup) -> Any:
+    """The method, if its steps are compiled."""
     method: Any = setup.integrator
-    return equation if method.nonsmooth else equation.in_a_mode, method if method.plain else None
-
-
-def _needs(setup: Setup) -> dict[str, Any]:
-    method: Any = setup.integrator
-    return {"jacobian": method.needs_jacobian, "cuts": setup.finds_events, "nonsmooth": method.nonsmooth}
+    return method if method.plain else None
 
 
 def _interpreted(setup: Setup, why: str = "") -> str:

@@ -9,6 +9,7 @@ import ctypes
 import threading
 from array import array
 from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 from time import perf_counter
 from typing import Any, final
 
@@ -87,7 +88,12 @@ class MachineFunction:
     def is_kept(self) -> bool:
         """Whether its machine code, for some types of arguments, is in memory or in the store."""
         store = self.store()
-        return bool(self._known) or (store is not None and store.load(self.key(())) is not None)
+        return bool(self._known) or (store is not None and store.load(self._asked) is not None)
+
+    @cached_property
+    def _asked(self) -> str:
+        """The key of the note that it is there; what is compiled goes by the code and the values of then."""
+        return self.key(())
 
     def entry(self, place: Any, kinds: Sequence[Kind]) -> tuple[Any, Kind]:
         """The function of words, and the type of its result.

@@ -68,6 +68,26 @@ def machine(
         TraceError: If a part of the equation cannot be compiled; names it, with the remedy.
     """
     made, what = identified(equation, swept), Traces(kept, jacobian, nonsmooth)
+    return _with_loop(made, _equations_of(made, what, lanes, swept), method, lanes, cuts, detects, swept)
+
+
+def existing(made: Identified, what: Traces, method: Integrator | None, cuts: bool) -> Machine | None:
+    """The machine of a single run if its code is in this process or in the store; or None.
+
+    Args:
+        made: Its state equation.
+        what: What is traced of it.
+        method: As of `machine`.
+        cuts: As of `machine`.
+    """
+    if _equations.known(made.objects, (made.described, 1, (), what)) is None and stored(made, what) is None:
+        return None
+    found = _with_loop(made, _equations_of(made, what), method, cuts=cuts)
+    return found if found.is_kept() else None
+
+
+def _equations_of(made: Identified, what: Traces, lanes: int = 1, swept: tuple[str, ...] = ()) -> Equations:
+    """The equations of a structure, from the latest ones if they are among them."""
 
     def make() -> Equations:
         shared, name = _shared(made.equation, made.known, lanes, swept), made.equation.plant.dynamics.name  # pyright: ignore
@@ -80,19 +100,7 @@ def machine(
             f"the run takes {equations.instructions} instructions, more than the {_MOST_INSTRUCTIONS} worth compiling;"
             " simulate it with engine='interpreted'"
         )
-    return _with_loop(made, equations, method, lanes, cuts, detects, swept)
-
-
-def existing(
-    equation: StateEquation, method: Integrator | None, *, jacobian: bool, cuts: bool, nonsmooth: bool
-) -> Machine | None:
-    """The machine of a single run, arguments as of `machine`, if its code is in this process or the store; or None."""
-    made, what = identified(equation), Traces(None, jacobian, nonsmooth)
-    known = _equations.known(made.objects, (made.described, 1, (), what))
-    if known is None and stored(made, what) is None:
-        return None
-    found = machine(equation, method, jacobian=jacobian, cuts=cuts, nonsmooth=nonsmooth)
-    return found if found.is_kept() else None
+    return equations
 
 
 def _with_loop(

@@ -106,14 +106,8 @@ def stored(made: Identified, what: Traces) -> Programs | None:
     return None if payload is None else Programs.read(payload.decode())
 
 
-def are_stored(equation: StateEquation, what: Traces) -> bool:
-    """Whether the programs of a state equation are in the store."""
-    return stored(identified(equation), what) is not None
-
-
-def interpreted(equation: StateEquation, what: Traces) -> list[float]:
-    """Where evaluations are counted that runs of this structure have taken without machine code."""
-    made = identified(equation)
+def interpreted(made: Identified, what: Traces) -> list[float]:
+    """Where evaluations are counted that runs of a structure have taken without machine code."""
     return _interpreted.get(made.objects, (made.described, what), lambda: [0.0])
 
 

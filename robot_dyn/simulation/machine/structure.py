@@ -16,6 +16,7 @@ import numpy as np
 
 from robot_dyn.coefficients import declared
 from robot_dyn.compiled.definition import definition
+from robot_dyn.control.controller import Controller
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.effects.carried_payload import CarriedPayload
 from robot_dyn.model.dynamics import Dynamics
@@ -43,7 +44,7 @@ class Structure(NamedTuple):
 
 def structure(equation: StateEquation) -> Structure:
     """The structure of a state equation."""
-    found = _Found(frozenset(map(id, _numbered(equation))))
+    found = _Found(frozenset(map(id, _numbered(equation))), equation.controller)
     described = tuple(found.of(each) for each in _parts(equation))
     controller = equation.controller
     period = None
@@ -69,13 +70,12 @@ def _parts(equation: StateEquation) -> tuple[Any, ...]:
 
 
 def _numbered(equation: StateEquation) -> Iterator[Any]:
-    """What has its numbers in the parameters, or in those of a segment."""
+    """What has its numbers in the parameters, or in those of a segment; beside the models of the controller."""
     yield equation.plant.dynamics
     yield from equation.plant.effects
     if (controller := equation.controller) is not None:
         yield controller
         yield from (each.part for each in controller.parts)
-        yield from controller.models.values()
         for reference in controller.references.values():
             yield reference
             yield from reference.polynomials.values()
@@ -88,11 +88,13 @@ class _Found:
 
     Attributes:
         numbered: Identities of what has its numbers elsewhere.
+        controller: Whose models have theirs elsewhere as well.
         objects: What stands in the descriptions by identity.
         lasting: Whether these have definitions.
     """
 
     numbered: frozenset[int] = frozenset()
+    controller: Controller | None = None
     objects: list[Any] = field(default_factory=list)
     lasting: bool = True
 
@@ -109,7 +111,7 @@ class _Found:
             return value.dtype.str, value.shape, value.tobytes()
         robot = getattr(value, "robot", value)
         if isinstance(robot, Robot) and of_library(kind) and _is_dynamics(value):
-            edits = _of_edits(robot.edits) if id(value) in self.numbered else self.of(robot.edits)
+            edits = _of_edits(robot.edits) if self._is_numbered(value) else self.of(robot.edits)
             return kind.__name__, sha256(robot.description.xml).digest(), robot.joint_names, edits
         if id(value) in self.numbered and _is_polynomial(value):
             return "polynomial", value.coefficients.shape[1:]
@@ -120,6 +122,10 @@ class _Found:
                 return described
             del self.objects[before:]
         return self._by_identity(value)
+
+    def _is_numbered(self, robot: Any) -> bool:
+        models = {} if id(robot) in self.numbered or self.controller is None else self.controller.models
+        return id(robot) in self.numbered or any(each is robot for each in models.values())
 
     def _class(self, kind: type) -> Any:
         return kind.__qualname__ if of_library(kind) else self._by_identity(kind)
