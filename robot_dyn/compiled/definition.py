@@ -37,7 +37,15 @@ _PURE_ROOMS = (
     "arithmetic", "coefficients", "control", "effects", "errors", "lagrange", "recursive", "spatial",
     "threshold", "values",
 )  # fmt: skip
-_OF_FILES = {"fromfile", "fromregex", "genfromtxt", "load", "loadtxt", "memmap"}  # of NumPy
+_IMPURE = {
+    "datetime64",
+    "fromfile",
+    "fromregex",
+    "genfromtxt",
+    "load",
+    "loadtxt",
+    "memmap",
+}  # of NumPy: files and times
 _SPECIAL = {"__call__", "__class__", "__delattr__", "__init__", "__len__", "__name__", "__post_init__", "__setattr__"}
 _FIELDS = "__dataclass_fields__"
 # In a class: what follows from the rest, and what gives no numbers.
@@ -119,6 +127,8 @@ class _Reader:
             }
         except ValueError:  # one has no value yet
             raise _UndefinedError from None
+        if function.__builtins__ is not vars(builtins):  # pyright: ignore
+            raise _UndefinedError
         defaults = self.text(function.__defaults__), self._items(function.__kwdefaults__ or {})
         names = {" ".join(path): _at(function.__globals__, path) for path in _globals(code)}
         words = _words(code), *defaults, self._items(closure), self._items(names), self._items(vars(function))
@@ -161,7 +171,7 @@ def _is_pure(value: Any) -> bool:
         return known and getattr(builtins, name, None) is value
     package, _, rest = module.partition(".")
     of_library = package == "robot_dyn" and rest.partition(".")[0] in _PURE_ROOMS
-    found: Any = sys.modules.get(module) if of_library or (module in _PURE and name not in _OF_FILES) else None
+    found: Any = sys.modules.get(module) if of_library or (module in _PURE and name not in _IMPURE) else None
     for each in name.split("."):
         found = getattr(found, each, None)
     return found is value

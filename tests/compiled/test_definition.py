@@ -194,6 +194,9 @@ UNDEFINED = {
     "a file": "def f(t, q, v): return np.loadtxt('gains') * v",
     "a file that is opened": "def f(t, q, v): return float(open('gains').read()) * v",
     "the time": "import time\ndef f(t, q, v): return time.time() * v",
+    "the time of NumPy": "def f(t, q, v): return np.datetime64('now').astype(float) * v",
+    "builtins of its own":
+        "g = dict(__builtins__={'abs': lambda x: 2.0})\nexec('def f(t, q, v): return abs(v)', g)\nf = g['f']",
     "the environment": "import os\ndef f(t, q, v): return float(os.environ['GAIN']) * v",
     "random numbers": "def f(t, q, v): return np.random.rand() * v",
     "a generator": "R = np.random.default_rng(1)\ndef f(t, q, v): return R.normal() * v",

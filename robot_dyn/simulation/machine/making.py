@@ -19,7 +19,8 @@ from robot_dyn.integrate.adaptive import STEPPERS
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.simulation.detection import detecting
 from robot_dyn.simulation.event_loop import event_loop
-from robot_dyn.simulation.machine.machine import Equations, Machine
+from robot_dyn.simulation.machine.equations import Equations
+from robot_dyn.simulation.machine.machine import Machine
 from robot_dyn.simulation.machine.programs import (
     Identified,
     Traces,
