@@ -129,11 +129,10 @@ class MachineFunction:
 
         texts = identity(self.function, self._instead)
         key, note, store = self._key(kinds, texts), self._key((), texts), self.store()
-        call = machine_code.address("call", key, write, store, self.about, self._passes)
-        told = machine_code.address("result", key, write, store, self.about, self._passes)
+        call, result = machine_code.addresses(("call", "result"), key, write, store, self.about, self._passes)
         if store is not None and store.load(note) is None:
             store.save(note, b"", f"{self.about} is there")
-        text = ctypes.CFUNCTYPE(ctypes.c_char_p)(told)().decode()
+        text = ctypes.CFUNCTYPE(ctypes.c_char_p)(result)().decode()
         return _ENTRY(call), _read(text)
 
 

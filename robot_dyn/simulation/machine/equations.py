@@ -68,8 +68,8 @@ class Equations:
                     shared = {} if name == "behind" else self.shared
                     write_function(module, f"{prefix}{name}", program, self.runs, shared)
 
-        def address(name: str) -> int:
-            return machine_code.address(name, self._key, write, default_store(), f"the state equation of {self.name}")
-
-        known = {*self.programs, *(["step"] if "problem" in self.programs else [])}
-        return Functions(*(address(name) if name in known else 0 for name in Functions._fields))
+        written = {*self.programs, *(["step"] if "problem" in self.programs else [])}
+        known = [name for name in Functions._fields if name in written]
+        about = f"the state equation of {self.name}"
+        made = machine_code.addresses(known, self._key, write, default_store(), about)
+        return Functions(**dict.fromkeys(Functions._fields, 0) | dict(zip(known, made, strict=True)))
