@@ -37,15 +37,8 @@ _PURE_ROOMS = (
     "arithmetic", "coefficients", "control", "effects", "errors", "lagrange", "recursive", "spatial",
     "threshold", "values",
 )  # fmt: skip
-_IMPURE = {
-    "datetime64",
-    "fromfile",
-    "fromregex",
-    "genfromtxt",
-    "load",
-    "loadtxt",
-    "memmap",
-}  # of NumPy: files and times
+# Those of NumPy that read a file or a clock.
+_IMPURE = {"datetime64", "fromfile", "fromregex", "genfromtxt", "load", "loadtxt", "memmap"}
 _SPECIAL = {"__call__", "__class__", "__delattr__", "__init__", "__len__", "__name__", "__post_init__", "__setattr__"}
 _FIELDS = "__dataclass_fields__"
 # In a class: what follows from the rest, and what gives no numbers.
@@ -132,7 +125,7 @@ class _Reader:
         defaults = self.text(function.__defaults__), self._items(function.__kwdefaults__ or {})
         names = {" ".join(path): _at(function.__globals__, path) for path in _globals(code)}
         words = _words(code), *defaults, self._items(closure), self._items(names), self._items(vars(function))
-        return f"function {words}"
+        return f"function {function.__qualname__} {words}"
 
     def _of_class(self, kind: type) -> str:
         if type(kind) not in (type, ABCMeta):

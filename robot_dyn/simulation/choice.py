@@ -92,12 +92,14 @@ def machine_of(setup: Setup, equation: StateEquation, swept: tuple[str, ...] = (
 
 def _existing(setup: Setup, made: Identified, what: Traces) -> Machine | None:
     """The machine code that this process has, or the store."""
-    # What else is imported takes ten times as long as to ask.
-    if "robot_dyn.simulation.machine.making" not in sys.modules and stored(made, what) is None:
-        return None
+    programs = None
+    if "robot_dyn.simulation.machine.making" not in sys.modules:  # to import it takes ten times as long as to ask
+        programs = stored(made, what)
+        if programs is None:
+            return None
     from robot_dyn.simulation.machine.making import existing
 
-    return existing(made, what, _plain(setup), setup.finds_events)
+    return existing(made, what, _plain(setup), setup.finds_events, programs)
 
 
 def _is_worthwhile(setup: Setup, made: Identified, what: Traces, seen: float) -> bool:

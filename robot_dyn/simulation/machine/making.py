@@ -12,6 +12,7 @@ from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.compiled.loops.call import MachineFunction
 from robot_dyn.compiled.loops.source import SubsetError
 from robot_dyn.compiled.parameters import Parameter, parameters
+from robot_dyn.compiled.program import Programs
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import TraceError
 from robot_dyn.integrate import hermite
@@ -72,7 +73,9 @@ def machine(
     return _with_loop(made, _equations_of(made, what, lanes, swept), method, lanes, cuts, detects, swept)
 
 
-def existing(made: Identified, what: Traces, method: Integrator | None, cuts: bool) -> Machine | None:
+def existing(
+    made: Identified, what: Traces, method: Integrator | None, cuts: bool, programs: Programs | None = None
+) -> Machine | None:
     """The machine of a single run if its code is in this process or in the store; or None.
 
     Args:
@@ -80,19 +83,24 @@ def existing(made: Identified, what: Traces, method: Integrator | None, cuts: bo
         what: What is traced of it.
         method: As of `machine`.
         cuts: As of `machine`.
+        programs: Those in the store, if they are known.
     """
-    if _equations.known(made.objects, (made.described, 1, (), what)) is None and stored(made, what) is None:
-        return None
-    found = _with_loop(made, _equations_of(made, what), method, cuts=cuts)
+    if _equations.known(made.objects, (made.described, 1, (), what)) is None:
+        programs = programs or stored(made, what)
+        if programs is None:
+            return None
+    found = _with_loop(made, _equations_of(made, what, programs=programs), method, cuts=cuts)
     return found if found.is_kept() else None
 
 
-def _equations_of(made: Identified, what: Traces, lanes: int = 1, swept: tuple[str, ...] = ()) -> Equations:
+def _equations_of(
+    made: Identified, what: Traces, lanes: int = 1, swept: tuple[str, ...] = (), programs: Programs | None = None
+) -> Equations:
     """The equations of a structure, from the latest ones if they are among them."""
 
     def make() -> Equations:
         shared, name = _shared(made.equation, made.known, lanes, swept), made.equation.plant.dynamics.name  # pyright: ignore
-        return Equations(programs_of(made, what), lanes, name, shared, changeable(made.equation))
+        return Equations(programs or programs_of(made, what), lanes, name, shared, changeable(made.equation))
 
     names = tuple(name for name in dict.fromkeys(each.name for each in made.known) if name in swept)
     equations = _equations.get(made.objects, (made.described, lanes, names, what), make)
