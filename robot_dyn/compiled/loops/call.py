@@ -108,9 +108,10 @@ class MachineFunction:
         if place in self._known:
             return self._known[place]
         began, known = perf_counter(), tuple(kinds)
-        with self._lock, interrupts_later(), told(f"compiling {self.about}, once for this version"):
+        with self._lock, interrupts_later():
             if known not in self._known:
-                self._known[known] = self._compiled(known)
+                with told(f"compiling {self.about}, once for this version"):
+                    self._known[known] = self._compiled(known)
             self._known[place] = self._known[known]
         _spent.seconds += perf_counter() - began
         return self._known[place]
@@ -124,8 +125,8 @@ class MachineFunction:
 
             program = Program(module, prefix, self._instead)
             result = program.entry(self.function, kinds, "call")  # pyright: ignore
-            told = ir.Function(module, ir.FunctionType(TEXT, []), f"{prefix}result")
-            ir.IRBuilder(told.append_basic_block()).ret(program.text(_written(result)))
+            of_result = ir.Function(module, ir.FunctionType(TEXT, []), f"{prefix}result")
+            ir.IRBuilder(of_result.append_basic_block()).ret(program.text(_written(result)))
 
         texts = identity(self.function, self._instead)
         key, note, store = self._key(kinds, texts), self._key((), texts), self.store()
