@@ -270,12 +270,36 @@ def test_what_is_changed_at_run_time_is_in_the_structure() -> None:
 def test_values_inside_of_parts_that_are_no_parameters_are_in_the_structure() -> None:
     """A coefficient of an effect is an input of machine code; that of a part of it is not, nor is −0 or 1 for 1.0."""
     module = cell(CELL)
-    inner = [module.Drag(then=each) for each in (rd.Spring(3.0), rd.Spring(5.0), rd.Payload("link2", 1.0))]
-    inner += [module.Drag(then=rd.Payload("link2", 2.0)), module.Drag(then=rd.hold([0.1, 0.2]))]
+    inner = [module.Drag(then=each) for each in (rd.Spring(3.0), rd.Spring(5.0), rd.Payload("tip", 1.0))]
+    inner += [module.Drag(then=rd.Payload("tip", 2.0)), module.Drag(then=rd.hold([0.1, 0.2]))]
     inner += [module.Drag(then=rd.hold([0.1, 0.3])), module.Drag(then=0.0), module.Drag(then=-0.0), module.Drag(then=0)]
     inner += [module.Drag(then=ARM), module.Drag(then=ARM.with_(gravity=(0.0, 0.0, -1.62)))]
     assert len({structure_of(each).described for each in inner}) == len(inner)
     assert structure_of(module.Drag(1.0)) == structure_of(module.Drag(2.0))
+
+
+def test_a_part_that_is_an_effect_and_stands_in_another_one_is_a_number_there() -> None:
+    """Its coefficient is an input as that of the effect, and a constant of the other one."""
+    module = cell(CELL)
+    made = []
+    for spring in (rd.Spring(3.0), rd.Spring(5.0)):
+        plants = rd.Plant(ARM, [spring]), rd.Plant(ARM, [spring, module.Drag(then=spring)])
+        made.append([structure(StateEquation(each, None)).described for each in plants])
+    assert made[0][0] == made[1][0]
+    assert made[0][1] != made[1][1]
+
+
+def test_numbers_that_a_controller_follows_and_knows_are_no_structure() -> None:
+    """Gains, references, payload and gravity of its model, in a loop as well; the masses of the model are."""
+    known = []
+    for x, scale in ((1.0, 1.0), (2.0, 1.0), (1.0, 1.1)):
+        model = ARM.with_(payload=rd.Payload("tip", x), gravity=(0.0, 0.0, -9.0 - x), mass_scale=scale)
+        inner = rd.ComputedTorque(model, rd.hold([x, 0.2]), 10.0 * x, x, period_s=0.01)
+        loop = rd.Loop(inner, velocity=[rd.LowPass(3.0 * x)])
+        known.append([structure(StateEquation(rd.Plant(ARM), each)).described for each in (inner, loop)])
+    assert known[0] == known[1]
+    assert known[0][0] != known[2][0]
+    assert known[0][1] != known[2][1]
 
 
 def in_another_process(module: Any, store: Memory, monkeypatch: pytest.MonkeyPatch) -> str:

@@ -6,7 +6,6 @@ and by its definition where it has one, which tells it in another process too.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field, is_dataclass
 from enum import Enum
 from hashlib import sha256
@@ -44,8 +43,8 @@ class Structure(NamedTuple):
 
 def structure(equation: StateEquation) -> Structure:
     """The structure of a state equation."""
-    found = _Found(frozenset(map(id, _numbered(equation))), equation.controller)
-    described = tuple(found.of(each) for each in _parts(equation))
+    found = _Found()
+    described = tuple(found.of_part(each) for each in _parts(equation))
     controller = equation.controller
     period = None
     if controller is not None:  # without states, a sampled controller is one whatever its period
@@ -59,7 +58,7 @@ def changeable(equation: StateEquation) -> tuple[str, ...]:
 
     def by_identity(part: Any) -> bool:
         found = _Found()
-        found.of(part)
+        found.of_part(part)
         return bool(found.objects)
 
     return tuple(getattr(each, "name", type(each).__name__) for each in _parts(equation) if by_identity(each))
@@ -69,16 +68,13 @@ def _parts(equation: StateEquation) -> tuple[Any, ...]:
     return equation.plant.dynamics, *equation.plant.effects, equation.controller, *equation.events
 
 
-def _numbered(equation: StateEquation) -> Iterator[Any]:
-    """What has its numbers in the parameters, or in those of a segment; beside the models of the controller."""
-    yield equation.plant.dynamics
-    yield from equation.plant.effects
-    if (controller := equation.controller) is not None:
-        yield controller
-        yield from (each.part for each in controller.parts)
-        for reference in controller.references.values():
-            yield reference
-            yield from reference.polynomials.values()
+def _numbered(part: Any) -> frozenset[str]:
+    """Paths in a part to what has its numbers in the parameters, or in those of a segment; beside models of the arm."""
+    if not isinstance(part, Controller):
+        return frozenset([""])
+    followed = part.references
+    pieces = (f"{name}.{attribute}" for name, each in followed.items() for attribute in each.polynomials if attribute)
+    return frozenset(["", *(each.path for each in part.parts), *followed, *pieces])
 
 
 @final
@@ -87,45 +83,49 @@ class _Found:
     """Descriptions of parts.
 
     Attributes:
-        numbered: Identities of what has its numbers elsewhere.
-        controller: Whose models have theirs elsewhere as well.
+        part: The one that is described.
+        numbered: Paths in it to what has its numbers elsewhere.
         objects: What stands in the descriptions by identity.
         lasting: Whether these have definitions.
     """
 
-    numbered: frozenset[int] = frozenset()
-    controller: Controller | None = None
+    part: Any = None
+    numbered: frozenset[str] = frozenset()
     objects: list[Any] = field(default_factory=list)
     lasting: bool = True
 
-    def of(self, value: Any) -> Any:
-        """A value in hashable ones."""
+    def of_part(self, part: Any) -> Any:
+        """A part in hashable values."""
+        self.part, self.numbered = part, _numbered(part)
+        return self._of(part, "")
+
+    def _of(self, value: Any, path: str) -> Any:
         kind: Any = type(value)
         if issubclass(kind, Enum) and of_library(kind):
             return value.name
         if kind in _PLAIN:
             return kind.__name__, repr(value)  # -0.0 is another number than 0.0, and 1 than True
         if kind in (tuple, list):
-            return tuple(self.of(each) for each in value)
+            return tuple(self._of(each, f"{path}.{i}") for i, each in enumerate(value))
         if issubclass(kind, np.generic) or (kind is np.ndarray and not value.dtype.hasobject):
             return value.dtype.str, value.shape, value.tobytes()
         robot = getattr(value, "robot", value)
         if isinstance(robot, Robot) and of_library(kind) and _is_dynamics(value):
-            edits = _of_edits(robot.edits) if self._is_numbered(value) else self.of(robot.edits)
+            edits = _of_edits(robot.edits) if self._is_model(path) else self._of(robot.edits, "edits")
             return kind.__name__, sha256(robot.description.xml).digest(), robot.joint_names, edits
-        if id(value) in self.numbered and _is_polynomial(value):
+        if path in self.numbered and _is_polynomial(value):
             return "polynomial", value.coefficients.shape[1:]
         if is_dataclass(value) and is_frozen(value):
             before = len(self.objects)
-            described = self._class(kind), *(self._of_field(value, name) for name in attributes(value))
+            described = self._class(kind), *(self._of_field(value, name, path) for name in attributes(value))
             if all(map(_weakly, self.objects[before:])):
                 return described
             del self.objects[before:]
         return self._by_identity(value)
 
-    def _is_numbered(self, robot: Any) -> bool:
-        models = {} if id(robot) in self.numbered or self.controller is None else self.controller.models
-        return id(robot) in self.numbered or any(each is robot for each in models.values())
+    def _is_model(self, path: str) -> bool:
+        """Whether the numbers of a robot are among the parameters."""
+        return path in self.numbered or (isinstance(self.part, Controller) and path in self.part.models)
 
     def _class(self, kind: type) -> Any:
         return kind.__qualname__ if of_library(kind) else self._by_identity(kind)
@@ -136,16 +136,16 @@ class _Found:
         self.lasting &= defined is not None
         return type(value).__name__, defined
 
-    def _of_field(self, part: Any, name: str) -> Any:
+    def _of_field(self, part: Any, name: str, path: str) -> Any:
         """A field of a part: of a parameter, whether it has a value, and the shape if it varies."""
         value: Any = getattr(part, name)
         if name in ("period_s", "seed", "run") and of_library(type(part)):  # noise is drawn outside of machine code
             return None
         if name == "payload" and isinstance(part, CarriedPayload):  # its numbers are those of the bodies
             return "payload", value.frame
-        if name in (known := declared(type(part))) and id(part) in self.numbered:
+        if name in (known := declared(type(part))) and path in self.numbered:
             return value is None or (None if known[name].of_joints else np.shape(value))
-        return self.of(value)
+        return self._of(value, f"{path}.{name}" if path else name)
 
 
 def of_library(kind: type) -> bool:
