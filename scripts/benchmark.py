@@ -1,9 +1,9 @@
 """Benchmarks, both sides in one run: medians over repeats that take turns. Only ratios of one run count.
 
-Subjects: queries (Robot over bare Pinocchio), compiled (against Pinocchio's C++), rollouts (against MuJoCo),
-parameters (numbers as inputs of machine code over constants), growth (cost against the number of joints), iftomm
-(problems A01 and A05 of the IFToMM library of multibody benchmarks), stiff (joints with stiff dampers and springs),
-sticking (time stepping of dry friction and stops against the event-driven limit, beside MuJoCo),
+Subjects: queries (Robot over bare Pinocchio), first (the first run of a process), compiled (against Pinocchio's C++),
+rollouts (against MuJoCo), parameters (numbers as inputs of machine code over constants), growth (cost against the
+number of joints), iftomm (problems A01 and A05 of the IFToMM library of multibody benchmarks), stiff (joints with stiff
+dampers and springs), sticking (time stepping of dry friction and stops against the event-driven limit, beside MuJoCo),
 precision (time against error, all methods beside SciPy, MuJoCo, Drake and heyoka), energy (of a long run), estimates
 (of errors, beside true ones), proofs (radius and time of proven runs). What accuracy costs in other scenes:
 work_precision.py.
@@ -17,6 +17,7 @@ from pathlib import Path
 from benchmarks import (
     energy,
     estimates,
+    first_run,
     growth,
     iftomm,
     kernels,
@@ -34,8 +35,8 @@ from robot_dyn.accuracy.environment import environment
 
 PICTURES = Path(__file__).parents[1] / "docs" / "pictures"
 SUBJECTS = (
-    "queries", "compiled", "rollouts", "parameters", "growth", "iftomm", "stiff", "sticking", "precision", "energy",
-    "estimates", "proofs",
+    "queries", "first", "compiled", "rollouts", "parameters", "growth", "iftomm", "stiff", "sticking", "precision",
+    "energy", "estimates", "proofs",
 )  # fmt: skip
 
 
@@ -54,6 +55,8 @@ def main() -> None:
         queries.lagrangian(effort)
         queries.right_angles(effort)
         queries.startup(effort)
+    if "first" in what:
+        first_run.first_run(effort)
     if "compiled" in what:
         kernels.kernels(effort)
         kernels.from_python(effort)

@@ -375,7 +375,8 @@ def test_auto_takes_the_machine_code_that_is_there_and_both_engines_agree_within
     assert np.abs(auto.q - interpreted.q).max() <= within
 
 
-def test_auto_has_machine_code_for_other_coefficients_and_none_for_another_structure() -> None:
+def test_auto_has_machine_code_for_other_coefficients_and_none_for_another_structure(monkeypatch) -> None:
+    monkeypatch.setenv("ROBOT_DYN_CACHE", "off")
     base = rd.Setup(rd.Plant(ARM, [rd.Spring(3.0)]), Q, V, 0.2, integrator="rk4", estimate_error=False)
     rd.simulate(base, engine="compiled")
     assert rd.simulate(replace(base, plant=rd.Plant(ARM, [rd.Spring(5.0)]))).statistics.engine == "compiled"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from dataclasses import dataclass, replace
@@ -216,13 +217,46 @@ def test_what_cannot_be_compiled_is_named() -> None:
         rd.Setup(rd.Plant(ARM), Q, engine="fast")
 
 
-def test_auto_compiles_where_it_pays() -> None:
+def test_auto_compiles_where_it_pays(monkeypatch: pytest.MonkeyPatch) -> None:
     """Evaluations times their cost: a second of motion is short, an hour is not."""
+    monkeypatch.setenv("ROBOT_DYN_CACHE", "off")
     setup = rd.Setup(rd.Plant(ARM.with_(mass_scale=1.01)), Q, duration_s=1.0, integrator="rk4")
     assert choose(setup, StateEquation(setup.plant, None))[1] == "interpreted (short: compiling does not pay)"
     long = replace(setup, duration_s=3600.0)
     machine, words = choose(long, StateEquation(setup.plant, None))
     assert machine is not None and words == "compiled"
+
+
+def test_auto_compiles_what_is_asked_for_again_as_often_as_compiling_takes(monkeypatch) -> None:
+    """Each run has 8000 evaluations; three of them as many as compiling takes, loop included."""
+    monkeypatch.setenv("ROBOT_DYN_CACHE", "off")
+    setup = rd.Setup(rd.Plant(ARM.with_(mass_scale=1.02)), Q, duration_s=1.0, integrator="rk4")
+    said = [choose(setup, StateEquation(setup.plant, None))[1] for _ in range(3)]
+    assert said[0] == "interpreted (short: compiling does not pay)"
+    assert said[2] == "compiled"
+
+
+SHORT = """
+import robot_dyn as rd, sys
+arm = rd.load("planar_2r")
+run = rd.simulate(arm, [0.4, -0.7], [0.3, 0.9], duration_s=0.2, integrator="rk4", engine=sys.argv[1])
+print(run.statistics.engine, *run.q[-1].tolist(), run.error.final, sep=";")
+"""
+
+
+def test_a_second_process_takes_the_machine_code_of_the_store_for_a_short_run(tmp_path) -> None:
+    """Which is within the estimates of what is interpreted before anything is there."""
+
+    def run(engine: str) -> tuple[str, np.ndarray, float]:
+        place, code = os.environ | {"ROBOT_DYN_CACHE": str(tmp_path / "store")}, [sys.executable, "-c", SHORT, engine]
+        said, *q, error = subprocess.run(code, check=True, env=place, capture_output=True, text=True).stdout.split(";")
+        return said, np.array(q, float), float(error)
+
+    before, made, after = run("auto"), run("compiled"), run("auto")
+    assert before[0] == "interpreted (short: compiling does not pay)"
+    assert [made[0], after[0]] == ["compiled", "compiled"]
+    assert np.array_equal(made[1], after[1])
+    assert np.abs(before[1] - after[1]).max() <= before[2] + after[2]
 
 
 def test_a_machine_that_disagrees_is_refused(monkeypatch) -> None:
@@ -242,13 +276,14 @@ def test_a_machine_that_disagrees_is_refused(monkeypatch) -> None:
         other.check(setup)
 
 
-def test_interpreted_runs_import_no_compiler() -> None:
+def test_interpreted_runs_import_no_compiler(tmp_path) -> None:
+    """Where no machine code is in the store."""
     code = (
         "import sys, robot_dyn as rd, numpy as np;"
         "rd.simulate(rd.Plant(rd.load('planar_2r')), q0=[0.1, 0.2], duration_s=0.05);"
         "assert not {'casadi', 'llvmlite'} & set(sys.modules), 'imported'"
     )
-    subprocess.run([sys.executable, "-c", code], check=True)
+    subprocess.run([sys.executable, "-c", code], check=True, env=os.environ | {"ROBOT_DYN_CACHE": str(tmp_path)})
 
 
 def test_symbols_are_a_dynamics_by_their_class() -> None:

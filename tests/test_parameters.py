@@ -12,7 +12,7 @@ from robot_dyn.arithmetic import eigh, tanh
 from robot_dyn.compiled.llvm import machine_code
 from robot_dyn.compiled.right_angles import completed
 from robot_dyn.errors import EffectError, QueryError, TraceError
-from robot_dyn.simulation.machine import making
+from robot_dyn.simulation.machine import programs
 
 ARM = rd.load("planar_2r")
 TIP = ARM.frame_names[-1]
@@ -53,7 +53,7 @@ def compiles_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
         raise AssertionError("something is compiled")
 
     monkeypatch.setenv("ROBOT_DYN_CACHE", "off")
-    monkeypatch.setattr(making, "_traced", refuse)
+    monkeypatch.setattr(programs, "traced", refuse)
     monkeypatch.setattr(machine_code, "object_file", refuse)
 
 

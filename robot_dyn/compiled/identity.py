@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import platform
+import re
 from collections.abc import Iterable
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
 _ROOT = Path(__file__).parents[1]
@@ -14,14 +15,17 @@ _ROOT = Path(__file__).parents[1]
 _ABOVE = {"accuracy", "cli", "doctor", "proof", "scene", "stress_test", "view"}
 
 
-def digest(identity: list[str]) -> str:
-    """The SHA-256 of what these texts, this processor and these versions determine; sources are among the texts."""
+def digest(identity: list[str], *, processor: bool = True) -> str:
+    """The SHA-256 of what these texts and versions determine, and the processor; sources are among the texts."""
+    versions = [f"{name} {version_of(name)}" for name in ("robot-dyn", "llvmlite", "casadi", "numpy")]
+    parts = [*identity, *versions, platform.python_version(), *(_processor() if processor else ())]
+    return hashlib.sha256("\0".join(f"{len(part)} {part}" for part in parts).encode()).hexdigest()
+
+
+def _processor() -> tuple[str, str]:
     import llvmlite.binding as llvm
 
-    versions = [f"{name} {version_of(name)}" for name in ("robot-dyn", "llvmlite", "casadi", "numpy")]
-    machine = [platform.python_version(), llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()]
-    parts = [*identity, *versions, *machine]
-    return hashlib.sha256("\0".join(f"{len(part)} {part}" for part in parts).encode()).hexdigest()
+    return llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
 
 
 @cache
@@ -56,6 +60,8 @@ def digest_of(folder: Path, paths: Iterable[Path]) -> str:
 def version_of(name: str) -> str:
     """The version of an installed distribution, or "unknown"."""
     try:
-        return version(name)
+        found = distribution(name)
     except PackageNotFoundError:  # run from its folder
         return "unknown"
+    head = re.search("^Version: (.*)$", found.read_text("METADATA") or "", re.MULTILINE)
+    return head[1] if head else found.version  # which takes a parser of mails

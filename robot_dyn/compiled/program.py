@@ -5,9 +5,11 @@ Values are numbered: those of the inputs one after the other, then the constants
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum, auto
-from itertools import chain
+from functools import cached_property
+from itertools import chain, takewhile
 from typing import final
 
 
@@ -116,7 +118,55 @@ class Program:
         return cls(inputs, tuple(constants), tuple(ops), _numbers(lines[-1].partition(" ")[2]))
 
 
+@final
+class Programs(Mapping[str, Program]):
+    """Programs by name; those that are read from a text are parsed when they are looked up."""
+
+    def __init__(self, programs: Mapping[str, Program]) -> None:
+        self._programs = dict(programs)
+        self._texts = {name: str(program) for name, program in programs.items()}
+
+    @classmethod
+    def read(cls, text: str) -> Programs:
+        """The programs of a text, as `str` gives it."""
+        made = cls({})
+        made._texts = {name: program for name, _, program in (each.partition("\n") for each in text.split("\n\n"))}
+        return made
+
+    def __str__(self) -> str:
+        return "\n\n".join(f"{name}\n{text}" for name, text in self._texts.items())
+
+    def __getitem__(self, name: str) -> Program:
+        if name not in self._programs:
+            self._programs[name] = Program.read(self._texts[name])
+        return self._programs[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._texts
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._texts)
+
+    def __len__(self) -> int:
+        return len(self._texts)
+
+    def results(self, name: str) -> int:
+        """Number of results of a program."""
+        return self._texts[name].rpartition("\noutputs")[2].count(" v")
+
+    @cached_property
+    def instructions(self) -> int:
+        """Operations in all."""
+        return sum(map(_instructions, self._texts.values()))
+
+
 _KINDS = {kind.name.lower(): kind for kind in Kind}
+
+
+def _instructions(text: str) -> int:
+    """Operations of a program: the lines between its constants, each a number alone, and its outputs."""
+    lines = text.split("\n")[1:-1]
+    return len(lines) - sum(1 for _ in takewhile(lambda line: " " not in line.partition(" = ")[2], lines))
 
 
 def _numbers(text: str) -> tuple[int, ...]:

@@ -1,7 +1,7 @@
 """The choice of the engine that runs a setup: machine code, or Python where compiling does not pay or cannot be.
 
 It is made by a count, about how often the equation of motion is evaluated: the same for a setup on every machine.
-Machine code that this process already has is used in any case.
+Machine code that this process already has, or the store, is used in any case.
 """
 
 from __future__ import annotations
@@ -10,8 +10,10 @@ import sys
 from math import inf
 from typing import TYPE_CHECKING, Any
 
+from robot_dyn.compiled.waiting import told
 from robot_dyn.errors import RobotDynError
 from robot_dyn.simulation.declarations import named, undeclared
+from robot_dyn.simulation.machine.programs import Identified, Traces, identified, interpreted, stored
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import segments
 from robot_dyn.simulation.state_equation import StateEquation
@@ -19,9 +21,10 @@ from robot_dyn.simulation.state_equation import StateEquation
 if TYPE_CHECKING:
     from robot_dyn.simulation.machine.machine import Machine
 
-# Interpreted, an evaluation takes some 0.1 ms: these take about as long as imports, trace and LLVM, 1 to 2 s. The time
-# loop takes as long as 20 000 evaluations more (RK4) to 90 000 (DOP853), once for a version of this library.
+# Interpreted, an evaluation takes some 0.1 ms: these take about as long as imports, trace and LLVM, 1 to 2 s; half of
+# it without the time loop, which is compiled once for a version of this library.
 _COMPILED = 20_000
+_WITHOUT_LOOP = _COMPILED / 2
 _GUESSED = 10  # evaluations in a step of an implicit method, beside those of its Jacobian
 _PER_SECOND, _PER_SEGMENT = 1000, 17  # evaluations of an adaptive method: for each second, at least for each segment
 
@@ -40,20 +43,19 @@ def choose(setup: Setup, equation: StateEquation, seen: float = 0) -> tuple[Mach
     """
     if setup.engine == "interpreted":
         return None, _interpreted(setup)
-    if setup.engine == "compiled":
-        made = _machine(setup, equation)
-        return made, _label(made)
-    if parts := undeclared(setup.plant, setup.controller):  # they may do what a trace would lose
+    asked = setup.engine == "compiled"
+    if not asked and (parts := undeclared(setup.plant, setup.controller)):  # they may do what a trace would lose
         return None, _interpreted(setup, " ".join((named(parts[0][0]), parts[0][1])))
     try:
-        made = _existing(setup, equation)
-        if made is None:
-            if max(seen * _in_all(setup, equation.size), _evaluations(setup, equation.size)) < _COMPILED:
-                return None, _interpreted(setup, "short: compiling does not pay")
-            made = machine_of(setup, equation)
-        made.check(setup)
-        return made, _label(made)
+        made, what = identified(_code(setup, equation)), _traces(setup)
+        found = _existing(setup, made, what)
+        if found is None and not asked and not _is_worthwhile(setup, made, what, seen):
+            return None, _interpreted(setup, "short: compiling does not pay")
+        machine = _checked(setup, equation, found)
+        return machine, _label(machine)
     except (ImportError, RobotDynError) as error:
+        if asked:
+            raise
         return None, _interpreted(setup, str(error))
 
 
@@ -65,9 +67,14 @@ def most_interpreted(setup: Setup, equation: StateEquation, machine: Machine | N
     return _COMPILED / _in_all(setup, equation.size)
 
 
-def _machine(setup: Setup, equation: StateEquation) -> Machine:
-    made = machine_of(setup, equation)
-    made.check(setup)
+def _checked(setup: Setup, equation: StateEquation, found: Machine | None) -> Machine:
+    """The machine that was found, or another, once it has been compared."""
+    if found is not None:
+        found.check(setup)
+        return found
+    with told("compiling the equations of this run, once for its structure"):
+        made = machine_of(setup, equation)
+        made.check(setup)
     return made
 
 
@@ -79,24 +86,54 @@ def machine_of(setup: Setup, equation: StateEquation, swept: tuple[str, ...] = (
     """
     from robot_dyn.simulation.machine.making import machine
 
-    return machine(*_code(setup, equation), swept=swept, **_needs(setup))
+    code, (_, jacobian, nonsmooth) = _code(setup, equation), _traces(setup)
+    return machine(code, _plain(setup), swept=swept, jacobian=jacobian, cuts=setup.finds_events, nonsmooth=nonsmooth)
 
 
-def _existing(setup: Setup, equation: StateEquation) -> Machine | None:
-    """The machine code that this process already has."""
-    making = sys.modules.get("robot_dyn.simulation.machine.making")  # imported by the first run that compiled
-    return None if making is None else making.existing(*_code(setup, equation), **_needs(setup))
+def _existing(setup: Setup, made: Identified, what: Traces) -> Machine | None:
+    """The machine code that this process has, or the store."""
+    programs = None
+    if "robot_dyn.simulation.machine.making" not in sys.modules:  # to import it takes ten times as long as to ask
+        programs = stored(made, what)
+        if programs is None:
+            return None
+    from robot_dyn.simulation.machine.making import existing
+
+    return existing(made, what, _plain(setup), setup.finds_events, programs)
 
 
-def _code(setup: Setup, equation: StateEquation) -> tuple[StateEquation, Any]:
-    """The equation that is compiled, and the method if its steps are."""
+def _is_worthwhile(setup: Setup, made: Identified, what: Traces, seen: float) -> bool:
+    """Whether compiling takes less than this run and those of its structure that were interpreted before it."""
+    before, size = interpreted(made, what), made.equation.size
+    count = before[0] + max(seen * _in_all(setup, size), _evaluations(setup, size))
+    if count >= _COMPILED or (count >= _WITHOUT_LOOP and _has_loop(setup)):
+        return True
+    before[0] = count
+    return False
+
+
+def _has_loop(setup: Setup) -> bool:
+    """Whether the time loop is in the store."""
+    from robot_dyn.simulation.machine.making import loop_of
+
+    method = _plain(setup)
+    return method is not None and loop_of(method, setup.finds_events).is_kept()
+
+
+def _code(setup: Setup, equation: StateEquation) -> StateEquation:
+    """The equation that is compiled."""
+    return equation if _traces(setup).nonsmooth else equation.in_a_mode
+
+
+def _traces(setup: Setup) -> Traces:
     method: Any = setup.integrator
-    return equation if method.nonsmooth else equation.in_a_mode, method if method.plain else None
+    return Traces(None, method.needs_jacobian, method.nonsmooth)
 
 
-def _needs(setup: Setup) -> dict[str, Any]:
+def _plain(setup: Setup) -> Any:
+    """The method, if its steps are compiled."""
     method: Any = setup.integrator
-    return {"jacobian": method.needs_jacobian, "cuts": setup.finds_events, "nonsmooth": method.nonsmooth}
+    return method if method.plain else None
 
 
 def _interpreted(setup: Setup, why: str = "") -> str:

@@ -9,7 +9,7 @@ import pytest
 from robot_dyn.compiled.from_casadi import OperationError, instructions, program_of
 from robot_dyn.compiled.kernel import Kernel
 from robot_dyn.compiled.llvm import machine_code
-from robot_dyn.compiled.program import Kind, Op
+from robot_dyn.compiled.program import Kind, Op, Program, Programs
 from robot_dyn.compiled.status import Status
 
 
@@ -88,6 +88,26 @@ def test_a_program_is_a_value() -> None:
     assert str(one).splitlines() == [
         "inputs 2", "v2 = 0.3", "v3 v4 = sine_cosine v0", "v5 = multiply v2 v3", "v6 = add v5 v1", "outputs v6",
     ]  # fmt: skip
+
+
+def test_programs_that_are_read_are_those_that_were_written_and_their_sizes_need_no_parse(monkeypatch) -> None:
+    """With constants that are negative, infinite and tiny; without any; without results."""
+    x = ca.SX.sym("x", 2)
+    results = {
+        "sample": None,
+        "sum": x[0] + x[1],
+        "constants": ca.vertcat(-0.5, x[0] * 1e-300, ca.inf),
+        "none": ca.SX(),
+    }
+    made = {name: program_of(sample() if y is None else ca.Function("f", [x], [y])) for name, y in results.items()}
+    written = Programs(made)
+    read = Programs.read(str(written))
+    monkeypatch.setattr(Program, "read", None)
+    assert {name: read.results(name) for name in read} == {name: len(each.outputs) for name, each in made.items()}
+    assert read.instructions == sum(map(len, made.values())) == written.instructions
+    assert "sum" in read and "rate" not in read
+    monkeypatch.undo()
+    assert dict(read) == made == dict(written)
 
 
 def test_sine_and_cosine_of_one_angle_are_one_instruction() -> None:

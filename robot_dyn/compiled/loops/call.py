@@ -9,6 +9,7 @@ import ctypes
 import threading
 from array import array
 from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 from time import perf_counter
 from typing import Any, final
 
@@ -20,6 +21,7 @@ from robot_dyn.compiled.loops.identity import identity, sources_of_the_translato
 from robot_dyn.compiled.loops.kinds import Kind, Number, Static, TupleKind, unpacked, words
 from robot_dyn.compiled.loops.packing import Packed, pack
 from robot_dyn.compiled.store import Store
+from robot_dyn.compiled.waiting import told
 from robot_dyn.errors import MachineCodeError
 
 _ENTRY = ctypes.CFUNCTYPE(ctypes.c_char_p, ctypes.c_void_p, ctypes.c_void_p)
@@ -78,15 +80,20 @@ class MachineFunction:
 
     def key(self, kinds: tuple[Kind, ...]) -> str:
         """Of its machine code in a store."""
-        types = [repr(each) for each in kinds]
-        return digest(
-            ["loop", str(self._passes), sources_of_the_translator(), *types, *identity(self.function, self._instead)]
-        )
+        return self._key(kinds, identity(self.function, self._instead))
+
+    def _key(self, kinds: tuple[Kind, ...], texts: list[str]) -> str:
+        return digest(["loop", str(self._passes), sources_of_the_translator(), *map(repr, kinds), *texts])
 
     def is_kept(self) -> bool:
         """Whether its machine code, for some types of arguments, is in memory or in the store."""
         store = self.store()
-        return bool(self._known) or (store is not None and store.load(self.key(())) is not None)
+        return bool(self._known) or (store is not None and store.load(self._asked) is not None)
+
+    @cached_property
+    def _asked(self) -> str:
+        """The key of the note that it is there; what is compiled goes by the code and the values of then."""
+        return self.key(())
 
     def entry(self, place: Any, kinds: Sequence[Kind]) -> tuple[Any, Kind]:
         """The function of words, and the type of its result.
@@ -103,7 +110,8 @@ class MachineFunction:
         began, known = perf_counter(), tuple(kinds)
         with self._lock, interrupts_later():
             if known not in self._known:
-                self._known[known] = self._compiled(known)
+                with told(f"compiling {self.about}, once for this version"):
+                    self._known[known] = self._compiled(known)
             self._known[place] = self._known[known]
         _spent.seconds += perf_counter() - began
         return self._known[place]
@@ -117,15 +125,15 @@ class MachineFunction:
 
             program = Program(module, prefix, self._instead)
             result = program.entry(self.function, kinds, "call")  # pyright: ignore
-            told = ir.Function(module, ir.FunctionType(TEXT, []), f"{prefix}result")
-            ir.IRBuilder(told.append_basic_block()).ret(program.text(_written(result)))
+            of_result = ir.Function(module, ir.FunctionType(TEXT, []), f"{prefix}result")
+            ir.IRBuilder(of_result.append_basic_block()).ret(program.text(_written(result)))
 
-        key, store = self.key(kinds), self.store()
-        call = machine_code.address("call", key, write, store, self.about, self._passes)
-        told = machine_code.address("result", key, write, store, self.about, self._passes)
-        if store is not None and store.load(self.key(())) is None:
-            store.save(self.key(()), b"", f"{self.about} is there")
-        text = ctypes.CFUNCTYPE(ctypes.c_char_p)(told)().decode()
+        texts = identity(self.function, self._instead)
+        key, note, store = self._key(kinds, texts), self._key((), texts), self.store()
+        call, result = machine_code.addresses(("call", "result"), key, write, store, self.about, self._passes)
+        if store is not None and store.load(note) is None:
+            store.save(note, b"", f"{self.about} is there")
+        text = ctypes.CFUNCTYPE(ctypes.c_char_p)(result)().decode()
         return _ENTRY(call), _read(text)
 
 

@@ -7,25 +7,20 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, final
 
 import numpy as np
 
 from robot_dyn.coefficients import value_at
-from robot_dyn.compiled.cache import default_store
-from robot_dyn.compiled.identity import digest, sources_of_the_writer
-from robot_dyn.compiled.llvm import machine_code
-from robot_dyn.compiled.llvm.lock_step import write_function, write_step
 from robot_dyn.compiled.loops.call import MachineFunction
 from robot_dyn.compiled.parameters import CONTROLLER, ROBOT, Parameter, Part, joined, parameters
-from robot_dyn.compiled.program import Program
 from robot_dyn.control.controller import Controller
-from robot_dyn.convex import PASSES
 from robot_dyn.effects.effect import Effect
 from robot_dyn.errors import RobotDynError
 from robot_dyn.foreign import because
+from robot_dyn.simulation.machine.equations import STEP, Equations
 from robot_dyn.simulation.machine.jacobian_check import DIFFERENCES, by_differences
 from robot_dyn.simulation.machine.states import States, random_states, some, states_of
 from robot_dyn.simulation.moreau_jean import stepped
@@ -38,63 +33,11 @@ from robot_dyn.simulation.time_loop import Functions
 _LANES = 4  # runs in lock step that are compared
 _AGREES = 1e-13
 _LENGTH = 1e-3  # [s], of a step that is compared
-STEP = "problem", "newton", "behind"  # programs of one function; the last is one by itself, too
 _FUNCTION = ctypes.CFUNCTYPE(None, ctypes.c_double, *[ctypes.c_void_p] * 4)
 
 
 class MachineError(RobotDynError):
     """Machine code that does not agree with the interpreted equations; nothing of it is used."""
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Equations:
-    """The functions of a state equation, as programs and machine code.
-
-    Attributes:
-        programs: rate, energy and sample, tick where there is one, and jacobian where a method needs it.
-        runs: W.
-        name: What moves, for people.
-        shared: As of `write_function`.
-        changeable: Names of the parts whose code may be another at the next run, or do what a trace does not see.
-        checked: States at which they were compared with the interpreted equation, by the loops that they ran in.
-    """
-
-    programs: Mapping[str, Program]
-    runs: int
-    name: str
-    shared: Mapping[int, int] = field(default_factory=dict)
-    changeable: tuple[str, ...] = ()
-    checked: dict[Any, States] = field(default_factory=dict, repr=False)
-
-    @property
-    def instructions(self) -> int:
-        """Operations in all."""
-        return sum(len(program) for program in self.programs.values())
-
-    @cached_property
-    def _key(self) -> str:
-        texts = (f"{name} {program}" for name, program in self.programs.items())
-        return digest([sources_of_the_writer(), str(self.runs), str(sorted(self.shared.items())), *texts])
-
-    @cached_property
-    def functions(self) -> Functions:
-        """The addresses; compiled if they are not in the store."""
-
-        def write(module: Any, prefix: str) -> None:
-            for name, program in self.programs.items():
-                if name == "problem":
-                    three: Any = tuple(self.programs[each] for each in STEP)
-                    write_step(module, f"{prefix}step", three, self.runs, self.shared, PASSES)
-                elif name != "newton":
-                    shared = {} if name == "behind" else self.shared
-                    write_function(module, f"{prefix}{name}", program, self.runs, shared)
-
-        def address(name: str) -> int:
-            return machine_code.address(name, self._key, write, default_store(), f"the state equation of {self.name}")
-
-        known = {*self.programs, *(["step"] if "problem" in self.programs else [])}
-        return Functions(*(address(name) if name in known else 0 for name in Functions._fields))
 
 
 @final
@@ -174,10 +117,12 @@ class Machine:
         """The functions as Python calls them."""
         return Functions(*(_callable(address) if address else 0 for address in self.equations.functions))
 
-    @property
-    def ready(self) -> bool:
-        """Whether it has been compiled, with its loop, and compared."""
-        return self.loop in self.equations.checked
+    def is_kept(self) -> bool:
+        """Whether its machine code is in this process or in the store, with its loop."""
+        if self.loop in self.equations.checked:
+            return True
+        kept = bool(self.equations.checked) or self.equations.is_kept()
+        return kept and (self.loop is None or self.loop.is_kept())
 
     def check(self, setup: Setup) -> None:
         """Hold the functions to the interpreted equations.
@@ -200,7 +145,7 @@ class Machine:
         rng, n, m = np.random.default_rng(20), self.equation.plant.dynamics.n, self.equation.size
         W = self.equations.runs
         plan, held = plan_of(setup), n * self.equation.sampled
-        made = {name: np.empty((len(program.outputs), W)) for name, program in self.equations.programs.items()}
+        made = {name: np.empty((self.equations.programs.results(name), W)) for name in self.equations.programs}
         swept = {each.name: np.tile(each.value.ravel(), (W, 1)) for each in self.known if each.name in self.swept}
         own = self.own(swept)
         for i, at in enumerate(states.t.tolist()):
@@ -247,7 +192,7 @@ class Machine:
         """y⁺, v⁺ and its places by a step of time stepping, run by run, beside what the equation gives."""
         n, m, W = self.equation.plant.dynamics.n, self.equation.size, y.shape[1]
         x = np.vstack([y, np.full((1, W), _LENGTH), np.zeros((n, W))])
-        out = np.empty((m + 2 * n + 1 + len(self.equations.programs["problem"].outputs), W))
+        out = np.empty((m + 2 * n + 1 + self.equations.programs.results("problem"), W))
         self.in_python.step(t, x, p, own, out)
         for lane in range(lanes):
             theirs = stepped(self.equation, t, x[:, lane], own[:n, lane] if self.equation.sampled else None)
