@@ -1,6 +1,6 @@
 """What rests and what slides from now on: the acceleration of least constraint, and the mode that follows from it.
 
-    a = argmin ½ (a − M⁻¹ load)ᵀ M (a − M⁻¹ load) + Σ fᵢ |aᵢ|   over the joints at rest, those at a stop on its free side
+    a = argmin ½ (a − M⁻¹ load)ᵀ M (a − M⁻¹ load) + Σ fᵢ |aᵢ|   over joints at rest, at stops on the free side
 
 Where friction of rest is above that of sliding, joints break away one by one, the one of most energy first, and the
 others are solved again; one that would move the other way then is taken back, and rests on. Plain functions of arrays,
@@ -57,12 +57,14 @@ def settle(
     Args:
         M: Mass matrix, (n, n).
         load: All torques but those of rest, less C v and ∂V/∂q, (n,).
-        least, most: What may act on a joint at rest, (n,).
+        least: The least that may act on a joint at rest, (n,).
+        most: The most, (n,).
         slides: Friction where sliding begins, (n,).
         v: Velocity, (n,).
         forced: The direction of joints at rest that are known to break away, (n,); becomes that of all that do.
         a: Where the acceleration goes, (n,).
-        held, direction: Where the mode goes, (n,).
+        held: Where the mode goes: 1 for each joint that is held, (n,).
+        direction: The same: 1 or −1 for each joint that slides or is about to, (n,).
         room: Room to work.
     """
     for i in range(len(v)):
@@ -136,7 +138,7 @@ def weigh(M: Array, load: Array, room: Settling) -> None:
 
 
 def broken_away(M: Array, slides: Array, forced: Array, a: Array, room: Settling) -> bool:
-    """Let the joint of most energy break away of those that move though they slide less easily; whether there is one."""
+    """Let one joint break away: that of most energy of those that move and slide less easily; whether there is one."""
     which, most = -1, -1.0
     for i in range(len(a)):
         known = forced[i] != 0.0 or room.back[i] != 0.0

@@ -6,7 +6,6 @@ that within a step the right-hand side is smooth.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 from math import inf
@@ -15,6 +14,7 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.arithmetic import Array
+from robot_dyn.convex import not_found
 from robot_dyn.errors import NotFiniteError, OverflowedError, RobotDynError
 from robot_dyn.foreign import is_mistake
 from robot_dyn.integrate import hermite
@@ -24,7 +24,9 @@ from robot_dyn.simulation.event import Occurrence
 from robot_dyn.simulation.event_loop import Kept, Times, event_loop
 from robot_dyn.simulation.fixed_step import rules_of, runs_of
 from robot_dyn.simulation.followed import Followed
-from robot_dyn.simulation.modes import Guard
+from robot_dyn.simulation.holding import Holding, Places, part, write_mode
+from robot_dyn.simulation.mode_change import change, end_mode, without_modes
+from robot_dyn.simulation.modes import ACCUMULATED, NOTHING_HELD, Modes
 from robot_dyn.simulation.observation import NOTHING
 from robot_dyn.simulation.observer import Observer
 from robot_dyn.simulation.plan import plan_of
@@ -46,7 +48,6 @@ from robot_dyn.threshold import Threshold
 _SAMPLES = 1000  # of a run without a record period
 _COMPARED = 1000  # times at which a run is compared with runs of other tolerances
 _CHATTER, _BRIEF = 20, 1e-9  # events of one threshold, in that part of the run
-_ACCUMULATED = 1000  # changes of the mode, in that part of the run: no motion that ends them is left between
 _CHUNK = 1024  # ends of steps for which there is room at first
 
 Advance = Callable[..., int]
@@ -97,6 +98,7 @@ class EventRun(Followed):
         transfers: What it carries.
         made: Gives the functions of a state equation, for the loop, and their parameters (P,).
         mesh: Where steps end, (k,), before error control ends them; None for error control alone.
+        places: Where own numbers have the mode.
         samples: Whether samples are kept.
         machine_code: The loop of the method as machine code; then the functions are, too.
         on_progress: Called with the time reached, at each step or some ten times a second.
@@ -111,13 +113,13 @@ class EventRun(Followed):
 
     def __init__(
         self, watch: Watch, transfers: Transfers, made: Made, mesh: np.ndarray | None,
-        machine_code: Advance | None = None,
+        places: Places, machine_code: Advance | None = None,
         on_progress: Callable[[float], object] | None = None, observer: Observer | None = None,
         in_python: Functions | None = None, samples: bool = True, most: float = inf,
         thresholds: bool = True, chooses: bool = False,
     ) -> None:  # fmt: skip
         setup, equation, self.most, self._look = watch.setup, watch.equation, most, FIRST_LOOK if chooses else 0
-        self._chooses, self._changes = chooses, deque[float](maxlen=_ACCUMULATED)  # times of changes of the mode
+        self._chooses = chooses
         self.watch, self.transfers, self.plan, self.in_python = watch, transfers, plan_of(setup), in_python
         self.setup, self.equation, self.made, self.samples = setup, equation, made, samples
         self.on_progress, self.observer, self.compiled = on_progress, observer, machine_code is not None
@@ -125,15 +127,22 @@ class EventRun(Followed):
         held = n if equation.sampled else 0
         self.start = equation.start(setup.q0, setup.v0)
         self.stepper, self.control = _method(setup, equation)
-        self.switching = Switching(equation)
-        if not thresholds:
-            self.switching = Switching(equation, self.switching.quantities)
         self.functions, parameters = made(equation)
         own = np.concatenate([np.full(held, np.nan), parameters])[:, None]
+        self._bodies = self.functions.bodies
+        modes = None
+        if equation.impulses:
+            modes = Modes(equation, own.copy(), places, setup.duration_s, setup.integrator.needs_jacobian)
+            modes.start(self.start)
+        self.switching = Switching(equation, modes=modes)
+        if not thresholds:
+            self.switching = Switching(equation, self.switching.quantities, modes)
         self.runs = runs_of(equation, self.start[:, None], own, m + n + 2)
         self.runs.energy[0], self.runs.scale[0] = self.watch.energy, self.watch.scale
         of = self.stepper
-        self.advance = machine_code or event_loop(of.begin, of.step, of.error, of.accept, of.dense)
+        self.advance = machine_code or event_loop(
+            of.begin, of.step, of.error, of.accept, of.dense, without_modes if modes is None else end_mode
+        )
         self.rules = rules_of(equation, True, inf)
         self.times = _times(setup, mesh, samples)
         compared = self.times.compared
@@ -144,8 +153,6 @@ class EventRun(Followed):
             np.empty(rows), np.empty((rows, m, 1)), np.empty((rows, m + n + 2, 1)), np.empty(states),
             np.empty((states, m)), np.empty(_CHUNK), np.empty((_CHUNK, m)), *shown,
         )  # fmt: skip
-        if self.switching.modes is not None:
-            self.switching.modes.start(self.start)
         events = self.functions.events if self.compiled else self.switching.function
         self.switches = self.switching.at(0.0, self.start, len(of.work.F), events, own[:n, 0] if held else None)
         self.events: list[Occurrence] = []
@@ -207,7 +214,9 @@ class EventRun(Followed):
 
     def _advance(self) -> Ended:
         arguments = self.functions, self.plan, self.runs, self.kept, self.times, self.rules
-        made = self.stepper.coefficients, self.stepper.work, self.switches
+        modes = self.switching.modes
+        holding = NOTHING_HELD if modes is None else modes.holding
+        made = self.stepper.coefficients, self.stepper.work, self.switches, holding
         try:
             return Ended(self.advance(*arguments, *made, self.now, self.control, self.stop))
         except RobotDynError as error:
@@ -216,6 +225,13 @@ class EventRun(Followed):
             if not self.setup.integrator.controls_error:
                 self._step_in_words()
             raise DivergedError(self.time, f"{error}, at t = {self.time}") from None
+        finally:
+            self._tell()
+
+    def _tell(self) -> None:
+        """Keep what happened where modes ended, in words."""
+        if (modes := self.switching.modes) is not None and (happened := modes.happened()):
+            self.events = sorted([*self.events, *happened], key=lambda each: each.t)
 
     def _step_in_words(self) -> None:
         """A step of a method of fixed step that was not found: DivergedError with the words for it."""
@@ -238,8 +254,10 @@ class EventRun(Followed):
         where = f"at t = {t}, max |y| = {np.abs(y).max():.3g}: y grows without bound, or tolerances are too tight"
         if ended is Ended.EVENT:
             self._event(t, y)
+        elif ended in (Ended.CHANGED, Ended.ACCUMULATED, Ended.UNSETTLED):
+            self._end_mode(ended, t, y)
         elif ended is Ended.TRANSFER:
-            self._transfer(int(self.now[Now.SEGMENT]), y)
+            self._transfer(int(self.now[Now.SEGMENT]))
         elif ended is Ended.TICK:
             s = int(self.now[Now.SEGMENT])
             y, held = self.watch.tick(float(self.plan.starts[s]), y)
@@ -271,8 +289,10 @@ class EventRun(Followed):
         """Let the functions be those of the sides that the switching functions are on."""
         switching = self.switching
         if switching.thresholds or switching.dropped or switching.modes is not None or self.transfers.any:
-            self.functions, parameters = self.made(switching.on(self.switches.sides))
-            self.runs.own[self.rules.held :, 0] = parameters
+            functions, parameters = self.made(switching.on(self.switches.sides))
+            self.functions, self.runs.own[self.rules.held :, 0] = functions._replace(bodies=self._bodies), parameters
+        if switching.modes is not None:
+            write_mode(switching.modes.holding, self.runs.own)
         if not self.compiled:
             self.functions = self._lenient(self.functions)
 
@@ -303,42 +323,52 @@ class EventRun(Followed):
         held = self.runs.own[: self.rules.held, 0] if self.rules.held else None
         self._watch_anew(last.t, held)
 
-    def _end_mode(self, t: float, y: np.ndarray, guard: Guard) -> None:
-        """Go on in another mode, from the state behind the event."""
-        modes, held = self.switching.modes, self.runs.own[: self.rules.held, 0] if self.rules.held else None
+    def _end_mode(self, ended: Ended, t: float, y: np.ndarray) -> None:
+        """Behind the end of a mode: what the loop leaves to be done, or cannot do."""
+        modes = self.switching.modes
         assert modes is not None
-        self.runs.y[:, 0], happened = modes.after(t, y, held, guard)
-        self.events = sorted([*self.events, *happened], key=lambda each: each.t)
-        self._changes.append(t)
-        if len(self._changes) == _ACCUMULATED and t - self._changes[0] <= _BRIEF * self.setup.duration_s:
-            self._accumulated(t, y, self.equation.plant.dynamics.joint_names[modes.joint(guard.joint)])
-        self._watch_anew(t, held)
-        if self.setup.integrator.needs_jacobian:
-            self.control[At.NEXT] = 0.0
+        if ended is Ended.UNSETTLED:
+            room = modes.holding.room
+            raise not_found(room.whole, room.load)
+        if ended is Ended.ACCUMULATED:
+            guard = int(self.now[Now.EVENT]) - self.switches.thresholds
+            self._accumulated(t, y, modes.holding, modes.joint(guard))
+        self._watch_anew(t, self.runs.own[: self.rules.held, 0] if self.rules.held else None)
         self._change_mode()
 
-    def _transfer(self, s: int, y: np.ndarray) -> None:
+    def _transfer(self, s: int) -> None:
         """Go on with what is carried from the start of a segment on."""
         t, held = float(self.plan.starts[s]), self.runs.own[: self.rules.held, 0] if self.rules.held else None
-        y, happened = self.transfers.over(t, y)
+        self.runs.y[:, 0], happened = self.transfers.over(t, self.y)
         self.equation = self.watch.equation = self.transfers.equation
-        self.switching = self.switching.of(self.equation)
-        if (modes := self.switching.modes) is not None:
-            modes.of.part(y)
-            y, more = modes.after(t, y, held, None)
-            happened += more
-        self.runs.y[:, 0] = y
         self.events += happened
+        functions, parameters = self.made(self.equation)
+        self._bodies = functions.bodies
+        if (modes := self.switching.modes) is not None:
+            own = np.concatenate([np.full(self.rules.held, np.nan), parameters])[:, None]
+            modes = modes.of(self.equation, own)
+            self._settle(modes, t, self.plan.parameters[s])
+        self.switching = Switching(self.equation, self.switching.dropped, modes)
+        self._tell()
         self.plan.transfers[s] = 0
         self._watch_anew(t, held)
         if self.setup.integrator.needs_jacobian:
             self.control[At.NEXT] = 0.0
         self._change_mode()
 
-    def _accumulated(self, t: float, y: np.ndarray, joint: str) -> None:
+    def _settle(self, modes: Modes, t: float, p: Array) -> None:
+        """The mode behind a jump of the state."""
+        holding, y = modes.holding, self.runs.y
+        part(holding.laws, y)
+        with np.errstate(all="ignore"):
+            found = change(interpreted(self.equation, self.watch), t, y, p, self.runs.own, holding, -1)
+        if not found:
+            raise not_found(holding.room.whole, holding.room.load)
+
+    def _accumulated(self, t: float, y: np.ndarray, holding: Holding, joint: str) -> None:
         """AccumulationError if another method may make the run, else DivergedError."""
-        first = self._changes[0]
-        what = f"{_ACCUMULATED} changes of what holds joints in {t - first:.1e} s, the last of joint {joint!r}"
+        first = float(holding.changes[holding.changed[0] % ACCUMULATED])
+        what = f"{ACCUMULATED} changes of what holds joints in {t - first:.1e} s, the last of joint {joint!r}"
         motion = self.equation.equation_of_motion
         alone = motion.payloads or motion.drives  # which time stepping does not take
         if alone or not self._chooses:
@@ -361,10 +391,7 @@ class EventRun(Followed):
         """Keep an event, and go on behind it; TerminalEvent ends the run."""
         index, E = int(self.now[Now.EVENT]), len(self.switching.thresholds)
         side = float(self.switches.sides[index])
-        index, guard = self.switching.place(index)
-        if guard is not None:
-            self._end_mode(t, y, guard)
-            return
+        index = self.switching.number(index)
         if index < E:
             self.events.append(self.switching.occurrence(index, t, y, side))
             if self.setup.integrator.needs_jacobian:
