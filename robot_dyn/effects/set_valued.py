@@ -75,7 +75,7 @@ class SetValued(Dissipative):
 
     @abstractmethod
     def at_rest(self, q: np.ndarray) -> Interval:
-        """What it may exert on joints whose velocity is 0, at q."""
+        """What it may exert on joints whose velocity is 0, at q; the same at all q but for stops."""
 
 
 def settled(

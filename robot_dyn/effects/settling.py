@@ -45,7 +45,7 @@ class Settling(NamedTuple):
 
 def settling(n: int) -> Settling:
     """Room for n joints."""
-    return Settling(*np.zeros((9, n)), np.zeros((n + 1, n)))
+    return Settling._make([*np.zeros((9, n)), np.zeros((n + 1, n))])
 
 
 def settle(

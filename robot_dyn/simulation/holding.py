@@ -40,7 +40,8 @@ class Laws(NamedTuple):
         rows, speeds, impulses: Entries of y: its position, its velocity, and the impulse of its reaction, (N,).
         motors, works: Those of each gap: θ̇, and the work of its effect, (N − n,).
         inertia: B of each motor, (N − n,).
-        breakaway, sliding: Friction of rest, and where sliding begins, (N,).
+        least, most: What may act where the velocity is 0, away from stops, (N,).
+        sliding: Friction where sliding begins, (N,).
         rubs: Whether it may stick where its velocity is 0, (N,).
         lower, upper, restitution: Stops, ∓inf for none, and e, (S, N).
         lowest, highest: Where a stop is touched, to rounding, (S, N).
@@ -55,7 +56,8 @@ class Laws(NamedTuple):
     motors: Array
     works: Array
     inertia: Array
-    breakaway: Array
+    least: Array
+    most: Array
     sliding: Array
     rubs: Array
     lower: Array
@@ -169,7 +171,7 @@ def snap(laws: Laws, y: Array, first: int, end: int) -> None:
 def intervals(laws: Laws, y: Array, least: Array, most: Array) -> None:
     """Write what may act on coordinates whose velocity is 0."""
     for i in range(len(laws.rows)):
-        least[i], most[i] = -laws.breakaway[i], laws.breakaway[i]
+        least[i], most[i] = laws.least[i], laws.most[i]
         for s in range(len(laws.lower)):
             side = touched(laws, s, y, i)
             if side > 0.0:

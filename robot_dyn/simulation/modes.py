@@ -12,7 +12,7 @@ from robot_dyn.effects.effect import Conservative
 from robot_dyn.effects.rigid_backlash import RigidBacklash
 from robot_dyn.effects.rigid_stops import RigidStops, touching
 from robot_dyn.effects.set_valued import Mode
-from robot_dyn.effects.settling import Settling, settling
+from robot_dyn.effects.settling import settling
 from robot_dyn.simulation.event import Occurrence
 from robot_dyn.simulation.holding import Holding, Laws, Places, Room, What
 from robot_dyn.simulation.mode_change import REACTIONS, at_once, start, width
@@ -112,7 +112,7 @@ class Modes:
 def laws_of(equation: StateEquation) -> Laws:
     """The laws of what may hold the joints of a state equation."""
     n, motion = equation.plant.dynamics.n, equation.equation_of_motion
-    works = [each for each in equation.plant.forces if not isinstance(each, Conservative)]
+    works: list[Any] = [each for each in equation.plant.forces if not isinstance(each, Conservative)]
     first_work, of_states = equation.size - len(equation.sources) + 1, 2 * n + equation.state_size
     gaps = [_gaps(motion.effects[k], n, of_states + place.start, first_work + works.index(motion.effects[k]))
             for k, place in motion.states.items() if isinstance(motion.effects[k], RigidBacklash)]  # fmt: skip
@@ -120,8 +120,8 @@ def laws_of(equation: StateEquation) -> Laws:
     joints, delta, speed, motors, impulse, work, inertia, level, e = made
     others = [each for each in motion.set_valued if not isinstance(each, RigidStops)]
     stops = [each for each in motion.set_valued if isinstance(each, RigidStops)]
-    no_gap, end = np.zeros(len(joints)), 2 * n + equation.states
-    breakaway = sum((each.at_rest(np.zeros(n)).most for each in others), start=np.zeros(n))
+    intervals = [each.at_rest(np.zeros(n)) for each in others]
+    least, most = (sum((each[k] for each in intervals), start=np.zeros(n)) for k in (0, 1))
     sliding = sum((each.sliding(np.zeros(n)) for each in motion.set_valued), start=np.zeros(n))
     known = [[each.lower, each.upper, each.restitution] for each in stops] or [[-np.inf, np.inf, 0.0]] * bool(gaps)
     of_joints = np.array([[np.broadcast_to(x, n) for x in each] for each in known], float).reshape(-1, 3, n)
@@ -129,14 +129,16 @@ def laws_of(equation: StateEquation) -> Laws:
     lower, upper, restitution = np.ascontiguousarray(np.concatenate([of_joints, of_gaps], axis=2).swapaxes(0, 1))
     works_of_stops = [first_work + works.index(each) for each in stops] or [-1] * bool(gaps)
 
-    def whole(of_joints: np.ndarray, of_gaps: np.ndarray) -> np.ndarray:
+    def rows(of_joints: np.ndarray, of_gaps: np.ndarray) -> np.ndarray:
         return np.concatenate([of_joints, of_gaps.astype(np.int64)])
 
-    i = np.arange(n)
+    def wide(of_joints: np.ndarray) -> np.ndarray:
+        return np.concatenate([of_joints, np.zeros(len(joints), of_joints.dtype)])
+
+    i, end = np.arange(n), 2 * n + equation.states
     return Laws(
-        n, whole(i, joints), whole(i, delta), whole(n + i, speed), whole(end - n + i, impulse),
-        motors.astype(np.int64), work.astype(np.int64), inertia, np.concatenate([breakaway, no_gap]),
-        np.concatenate([sliding, no_gap]), np.concatenate([breakaway > 0, no_gap > 0]), lower, upper, restitution,
+        n, rows(i, joints), rows(i, delta), rows(n + i, speed), rows(end - n + i, impulse), motors.astype(np.int64),
+        work.astype(np.int64), inertia, *map(wide, (least, most, sliding, most > 0)), lower, upper, restitution,
         touching(lower, -1), touching(upper, 1), np.array(works_of_stops, np.int64),
     )  # fmt: skip
 
@@ -174,9 +176,9 @@ def alone(n: int, first: int) -> Places:
     return Places(*(np.array([first + k * n]) for k in range(3)))
 
 
-_NONE, _NO_ROWS, _ROWS = np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 0))
+_NONE, _ROWS, _TABLE = np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 0))
 NOTHING_HELD = Holding(  # of an equation without anything that may hold joints
-    Laws(0, *[_NO_ROWS] * 6, *[_NONE] * 3, np.zeros(0, bool), *[_ROWS] * 5, _NO_ROWS), Places(*[_NO_ROWS] * 3),
-    *[_NONE] * 3, _ROWS, 0, _NONE, _ROWS, _NO_ROWS, _NONE, _NO_ROWS, 0.0, False, _ROWS, _NO_ROWS,
-    Room(*[_ROWS] * 4, *[_NONE] * 15, Settling(*[_NONE] * 9, _ROWS)),
+    Laws._make([0, *[_ROWS] * 6, *[_NONE] * 4, np.zeros(0, bool), *[_TABLE] * 5, _ROWS]), Places._make([_ROWS] * 3),
+    _NONE, _NONE, _NONE, _TABLE, 0, _NONE, _TABLE, _ROWS, _NONE, _ROWS, 0.0, False, _TABLE, _ROWS,
+    Room._make([*[_TABLE] * 4, *[_NONE] * 15, settling(0)]),
 )  # fmt: skip
