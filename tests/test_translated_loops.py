@@ -119,6 +119,45 @@ def test_modes_of_dry_friction_and_rigid_stops_give_the_same_bits() -> None:
     assert_same_bits((ours.runs, ours.stepper.work, ours.control), (theirs.runs, theirs.stepper.work, theirs.control))
 
 
+HELD = [rd.DryFriction([0.4, 0.2], [0.7, 0.3]), rd.RigidStops([-0.8, -1.2], [0.7, 1.0], [0.5, 0.8])]
+GEAR = [rd.RigidBacklash([0.02, 0.0], 0.003, 8.0, 0.4), *HELD]
+SOFT = [*HELD, *rd.joint_stops([-0.75, -9.0], [0.6, 9.0], 900.0, 4.0), BODY]
+
+
+@pytest.mark.parametrize(
+    ("name", "what", "controller"),
+    [
+        ("DOP853", GEAR, CONTINUOUS),
+        ("DOP853", SOFT, SAMPLED),
+        ("rk4", GEAR, SAMPLED),
+        ("rosenbrock_5", HELD, CONTINUOUS),
+    ],
+    ids=["a gear", "soft stops and a payload", "a gear, sampled", "stiff"],
+)
+def test_all_that_ends_a_mode_gives_the_same_bits(name: str, what: list[Any], controller: rd.Controller) -> None:
+    """Impacts and the bounces behind them, jumps over thresholds of other effects, a payload, and the events told."""
+    events = [rd.Event(lambda t, q, v: v[0] - 0.3, name="speed")]
+    ours, theirs = both(setup(what, name, duration_s=1.0, controller=controller, events=events))
+    assert ours.events == theirs.events
+    assert sum("strikes" in each.name for each in ours.events) > 2
+    assert_same_bits((ours.runs, ours.stepper.work, ours.control), (theirs.runs, theirs.stepper.work, theirs.control))
+    assert_same_bits(ours.switches._replace(functions=0), theirs.switches._replace(functions=0))
+    assert_same_bits(ours.switching.modes.holding, theirs.switching.modes.holding, (".happened",))  # as told last
+
+
+def test_the_end_of_a_mode_is_no_end_of_a_call_of_machine_code() -> None:
+    """Hundreds of impacts, of sticking and of sliding: the loop returns for progress and for room alone."""
+    made = setup(HELD, "DOP853", duration_s=6.0, controller=rd.PD(rd.hold([1.4, -1.9]), [60.0, 30.0], [0.1, 0.1]))
+    equation = StateEquation(made.plant, made.controller)
+    run, calls = prepared(made, equation, choose(made, equation)[0]), []
+    inner = run.advance
+    run.advance = lambda *given: calls.append(inner(*given)) or calls[-1]
+    events = len(run.record().events)
+    assert events > 100
+    assert len(calls) <= 4 + events // 20
+    assert set(calls) <= {Ended.PAUSED, Ended.DONE}
+
+
 @pytest.mark.parametrize(("name", "controller"), [*((name, SAMPLED) for name in PLAIN), ("rk4", CONTINUOUS)])
 def test_lanes_in_lock_step_give_the_same_bits(name: str, controller: rd.Controller) -> None:
     """64 runs, of which some diverge, with ticks or with instants at every third step, and samples; 100 steps."""
