@@ -347,7 +347,7 @@ class EventRun(Followed):
         if (modes := self.switching.modes) is not None:
             own = np.concatenate([np.full(self.rules.held, np.nan), parameters])[:, None]
             modes = modes.of(self.equation, own)
-            self._settle(modes, t, self.plan.parameters[s])
+            self._settle(modes, self.in_python or functions, t, self.plan.parameters[s])
         self.switching = Switching(self.equation, self.switching.dropped, modes)
         self._tell()
         self.plan.transfers[s] = 0
@@ -356,12 +356,12 @@ class EventRun(Followed):
             self.control[At.NEXT] = 0.0
         self._change_mode()
 
-    def _settle(self, modes: Modes, t: float, p: Array) -> None:
+    def _settle(self, modes: Modes, functions: Functions, t: float, p: Array) -> None:
         """The mode behind a jump of the state."""
         holding, y = modes.holding, self.runs.y
         part(holding.laws, y)
         with np.errstate(all="ignore"):
-            found = change(interpreted(self.equation, self.watch), t, y, p, self.runs.own, holding, -1)
+            found = change(functions, t, y, p, self.runs.own, holding, -1)
         if not found:
             raise not_found(holding.room.whole, holding.room.load)
 
