@@ -217,7 +217,7 @@ def driven_panda(integrator: rd.Integrator | rd.Adaptive | str, **options) -> rd
 
 
 def test_a_joint_breaks_away_in_machine_code_as_in_python() -> None:
-    """Machine code has the right angles of a file in full, Pinocchio 1e-11 of the loads beside it: one alone decides."""
+    """Machine code has the right angles of a file in full, Pinocchio 1e-11 of the loads beside it: one decides."""
     plant = rd.Plant(rd.load("ur5"), [rd.DryFriction(2.0)])
     compiled, interpreted = (
         rd.simulate(plant, [0.3, -0.9, 0.8, -0.2, 0.4, 0.1], duration_s=0.25, engine=engine, estimate_error=False)

@@ -26,7 +26,7 @@ from robot_dyn.simulation.fixed_step import rules_of, runs_of
 from robot_dyn.simulation.followed import Followed
 from robot_dyn.simulation.holding import Holding, Places, part, write_mode
 from robot_dyn.simulation.mode_change import change, end_mode, without_modes
-from robot_dyn.simulation.modes import ACCUMULATED, NOTHING_HELD, Modes
+from robot_dyn.simulation.modes import NOTHING_HELD, Modes
 from robot_dyn.simulation.observation import NOTHING
 from robot_dyn.simulation.observer import Observer
 from robot_dyn.simulation.plan import plan_of
@@ -48,6 +48,7 @@ from robot_dyn.threshold import Threshold
 _SAMPLES = 1000  # of a run without a record period
 _COMPARED = 1000  # times at which a run is compared with runs of other tolerances
 _CHATTER, _BRIEF = 20, 1e-9  # events of one threshold, in that part of the run
+_ACCUMULATED = 1000  # changes of the mode, in that part of the run: no motion that ends them is left between
 _CHUNK = 1024  # ends of steps for which there is room at first
 
 Advance = Callable[..., int]
@@ -132,7 +133,8 @@ class EventRun(Followed):
         self._bodies = self.functions.bodies
         modes = None
         if equation.impulses:
-            modes = Modes(equation, own.copy(), places, setup.duration_s, setup.integrator.needs_jacobian)
+            limit = _ACCUMULATED, _BRIEF * setup.duration_s
+            modes = Modes(equation, own.copy(), places, limit, setup.integrator.needs_jacobian)
             modes.start(self.start)
         self.switching = Switching(equation, modes=modes)
         if not thresholds:
@@ -288,7 +290,7 @@ class EventRun(Followed):
     def _change_mode(self) -> None:
         """Let the functions be those of the sides that the switching functions are on."""
         switching = self.switching
-        if switching.thresholds or switching.dropped or switching.modes is not None or self.transfers.any:
+        if switching.thresholds or switching.dropped or self.transfers.any:
             functions, parameters = self.made(switching.on(self.switches.sides))
             self.functions, self.runs.own[self.rules.held :, 0] = functions._replace(bodies=self._bodies), parameters
         if switching.modes is not None:
@@ -367,8 +369,8 @@ class EventRun(Followed):
 
     def _accumulated(self, t: float, y: np.ndarray, holding: Holding, joint: str) -> None:
         """AccumulationError if another method may make the run, else DivergedError."""
-        first = float(holding.changes[holding.changed[0] % ACCUMULATED])
-        what = f"{ACCUMULATED} changes of what holds joints in {t - first:.1e} s, the last of joint {joint!r}"
+        first = float(holding.changes[holding.changed[0] % _ACCUMULATED])
+        what = f"{_ACCUMULATED} changes of what holds joints in {t - first:.1e} s, the last of joint {joint!r}"
         motion = self.equation.equation_of_motion
         alone = motion.payloads or motion.drives  # which time stepping does not take
         if alone or not self._chooses:

@@ -18,12 +18,14 @@ from robot_dyn.simulation.holding import Holding, Laws, Places, Room, What
 from robot_dyn.simulation.mode_change import REACTIONS, at_once, start, width
 from robot_dyn.simulation.state_equation import StateEquation
 
-ACCUMULATED = 1000  # changes of the mode, in that part of a run: no motion that ends them is left between
-_BRIEF = 1e-9
 _IMPACTS = 64  # that are remembered
 _HAPPENED = 64  # rows of what happened, beside those of one event
 _STOP = {-1: "lower stop", 1: "upper stop"}
 _END = {-1: "backward end", 1: "forward end"}
+_SAID = {
+    What.STRIKES: "strikes {}", What.RESTS_AT_LAST: "comes to rest at {}", What.STICKS: "sticks",
+    What.RESTS: "rests at {}", What.SLIDES: "slides", What.LEAVES: "leaves {}", What.REVERSES: "reverses",
+}  # fmt: skip
 _MODE = "held", "_direction", "_contact"  # coefficients of effects
 
 
@@ -35,7 +37,7 @@ class Modes:
         equation: Its state equation, of effects without a mode.
         own: Own numbers of it in which nothing is held, (O, 1).
         places: Where they have the mode.
-        duration: Of the run, in [s].
+        limit: How many changes of the mode are too many in how long, in [s].
         restarts: Whether the first step behind an event is to be found anew.
 
     Attributes:
@@ -43,7 +45,7 @@ class Modes:
     """
 
     def __init__(
-        self, equation: StateEquation, own: np.ndarray, places: Places, duration: float, restarts: bool
+        self, equation: StateEquation, own: np.ndarray, places: Places, limit: tuple[int, float], restarts: bool
     ) -> None:
         self.equation = equation
         laws = laws_of(equation)
@@ -52,8 +54,8 @@ class Modes:
         rows = np.zeros((_HAPPENED + at_once(laws), 5 + 2 * n))
         self.holding = Holding(
             laws, places, held, direction, np.zeros(n), own, n * equation.sampled, np.zeros(_IMPACTS),
-            np.zeros((_IMPACTS, N)), np.zeros(1, np.int64), np.zeros(ACCUMULATED), np.zeros(1, np.int64),
-            _BRIEF * duration, restarts, rows, np.zeros(1, np.int64), _room(equation, N, n),
+            np.zeros((_IMPACTS, N)), np.zeros(1, np.int64), np.zeros(limit[0]), np.zeros(1, np.int64),
+            limit[1], restarts, rows, np.zeros(1, np.int64), _room(equation, N, n),
         )  # fmt: skip
 
     def start(self, y: np.ndarray) -> None:
@@ -97,15 +99,10 @@ class Modes:
 
     def _occurrence(self, row: Sequence[float]) -> Occurrence:
         n, (t, i, what, side, direction, *state) = self.holding.laws.n, row
-        joint, place = self._joint(int(i)), ""
+        joint, end = self._joint(int(i)), ""
         if side:
-            place = f"its {_STOP[int(side)]}" if i < n else f"the {_END[int(side)]} of its backlash"
-        said = {
-            What.STRIKES: f"strikes {place}", What.RESTS_AT_LAST: f"comes to rest at {place}", What.STICKS: "sticks",
-            What.RESTS: f"rests at {place}", What.SLIDES: "slides", What.LEAVES: f"leaves {place}",
-            What.REVERSES: "reverses",
-        }  # fmt: skip
-        name = f"{joint} {said[What(int(what))]}"
+            end = f"its {_STOP[int(side)]}" if i < n else f"the {_END[int(side)]} of its backlash"
+        name = f"{joint} {_SAID[int(what)].format(end)}"
         return Occurrence(t, name, int(direction), tuple(state[:n]), tuple(state[n:]), joint)
 
 
