@@ -21,6 +21,7 @@ from robot_dyn.integrate import hermite
 from robot_dyn.integrate.adaptive import STEPPERS
 from robot_dyn.integrate.step_control import At, ControlledStepper, control_of
 from robot_dyn.simulation.event import Occurrence
+from robot_dyn.simulation.event_log import CHATTER, What, event_log, remember_time
 from robot_dyn.simulation.event_loop import Kept, Times, event_loop
 from robot_dyn.simulation.fixed_step import rules_of, runs_of
 from robot_dyn.simulation.followed import Followed
@@ -34,6 +35,7 @@ from robot_dyn.simulation.record import MOST_SHARED, Path, Record
 from robot_dyn.simulation.remarks import Kind, Remark
 from robot_dyn.simulation.schedule import nodes
 from robot_dyn.simulation.setup import STEP_S, Setup
+from robot_dyn.simulation.sides import keep_numbers, sides_of
 from robot_dyn.simulation.size import samples as most_samples
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.state_functions import interpreted, system
@@ -47,7 +49,7 @@ from robot_dyn.threshold import Threshold
 
 _SAMPLES = 1000  # of a run without a record period
 _COMPARED = 1000  # times at which a run is compared with runs of other tolerances
-_CHATTER, _BRIEF = 20, 1e-9  # events of one threshold, in that part of the run
+_BRIEF = 1e-9  # of a run: events of one threshold in that part of it chatter
 _ACCUMULATED = 1000  # changes of the mode, in that part of the run: no motion that ends them is left between
 _CHUNK = 1024  # ends of steps for which there is room at first
 
@@ -134,7 +136,7 @@ class EventRun(Followed):
         modes = None
         if equation.impulses:
             limit = _ACCUMULATED, _BRIEF * setup.duration_s
-            modes = Modes(equation, own.copy(), places, limit, setup.integrator.needs_jacobian)
+            modes = Modes(equation, own.copy(), places, limit)
             modes.start(self.start)
         self.switching = Switching(equation, modes=modes)
         if not thresholds:
@@ -158,6 +160,8 @@ class EventRun(Followed):
         events = self.functions.events if self.compiled else self.switching.function
         self.switches = self.switching.at(0.0, self.start, len(of.work.F), events, own[:n, 0] if held else None)
         self.events: list[Occurrence] = []
+        self.log = event_log(n, 0, _BRIEF * setup.duration_s) if modes is None else modes.log
+        self._know_no_sides()
         self.beyond = inf
         self.met: RobotDynError | None = None
         self._change_mode()
@@ -218,7 +222,7 @@ class EventRun(Followed):
         arguments = self.functions, self.plan, self.runs, self.kept, self.times, self.rules
         modes = self.switching.modes
         holding = NOTHING_HELD if modes is None else modes.holding
-        made = self.stepper.coefficients, self.stepper.work, self.switches, holding
+        made = self.stepper.coefficients, self.stepper.work, self.switches, self.sides, holding
         try:
             return Ended(self.advance(*arguments, *made, self.now, self.control, self.stop))
         except RobotDynError as error:
@@ -231,9 +235,25 @@ class EventRun(Followed):
             self._tell()
 
     def _tell(self) -> None:
-        """Keep what happened where modes ended, in words."""
-        if (modes := self.switching.modes) is not None and (happened := modes.happened()):
+        """Keep what happened in the loop, in words."""
+        count, self.log.filled[0] = int(self.log.filled[0]), 0
+        if count:
+            happened = [self._occurrence(row) for row in self.log.rows[:count].tolist()]
             self.events = sorted([*self.events, *happened], key=lambda each: each.t)
+
+    def _keep(self, *happened: Occurrence) -> None:
+        """Keep events that Python sees."""
+        self.events += happened
+        for each in happened:
+            remember_time(self.log, each.t)
+
+    def _occurrence(self, row: list[float]) -> Occurrence:
+        if self.switching.modes is not None and row[2] != What.PASSES:
+            return self.switching.modes.occurrence(row)
+        t, number, _, side, _, *state = row
+        y = np.zeros(self.equation.size)
+        y[: len(state)] = state
+        return self.switching.occurrence(int(number), t, y, side)
 
     def _step_in_words(self) -> None:
         """A step of a method of fixed step that was not found: DivergedError with the words for it."""
@@ -293,10 +313,19 @@ class EventRun(Followed):
         if switching.thresholds or switching.dropped or self.transfers.any:
             functions, parameters = self.made(switching.on(self.switches.sides))
             self.functions, self.runs.own[self.rules.held :, 0] = functions._replace(bodies=self._bodies), parameters
+            if self.in_python is not None:  # else functions change with the sides
+                keep_numbers(self.sides, switching.sides(self.switches), parameters)
         if switching.modes is not None:
             write_mode(switching.modes.holding, self.runs.own)
         if not self.compiled:
             self.functions = self._lenient(self.functions)
+
+    def _know_no_sides(self) -> None:
+        """Room for the numbers on sides of the thresholds."""
+        count, own = len(self.switching.thresholds), len(self.runs.own) - self.rules.held
+        asked = np.array([[each.direction, each.terminal] for each in self.setup.events], float).reshape(-1, 2)
+        restarts = self.setup.integrator.needs_jacobian
+        self.sides = sides_of(count, own, asked[:, 0].copy(), asked[:, 1] > 0, restarts, self.log)
 
     def _lenient(self, functions: Functions) -> Functions:
         """The functions in Python, with a rate that is nan where a trial step goes too far: a shorter one is tried."""
@@ -312,9 +341,9 @@ class EventRun(Followed):
 
     def _chatters(self) -> bool:
         """Whether the latest events were all of one threshold, in next to no time."""
-        latest = self.events[-_CHATTER:]
+        latest = self.events[-CHATTER:]
         brief = latest[-1].t - latest[0].t <= _BRIEF * self.setup.duration_s
-        return len(latest) == _CHATTER and brief and len({each.joint for each in latest} - {""}) == 1
+        return len(latest) == CHATTER and brief and len({each.joint for each in latest} - {""}) == 1
 
     def _drop(self, each: Threshold) -> None:
         """Look for the thresholds of a joint no longer, where steps would never get on."""
@@ -322,6 +351,7 @@ class EventRun(Followed):
         self.events.append(replace(last, name=f"{last.name} chatters, and is no longer looked for"))
         dropped = self.switching.dropped | {(each.joint, each.of_actuation)}
         self.switching = Switching(self.equation, dropped, self.switching.modes)
+        self._know_no_sides()
         held = self.runs.own[: self.rules.held, 0] if self.rules.held else None
         self._watch_anew(last.t, held)
 
@@ -343,7 +373,7 @@ class EventRun(Followed):
         t, held = float(self.plan.starts[s]), self.runs.own[: self.rules.held, 0] if self.rules.held else None
         self.runs.y[:, 0], happened = self.transfers.over(t, self.y)
         self.equation = self.watch.equation = self.transfers.equation
-        self.events += happened
+        self._keep(*happened)
         functions, parameters = self.made(self.equation)
         self._bodies = functions.bodies
         if (modes := self.switching.modes) is not None:
@@ -351,6 +381,7 @@ class EventRun(Followed):
             modes = modes.of(self.equation, own)
             self._settle(modes, self.in_python or functions, t, self.plan.parameters[s])
         self.switching = Switching(self.equation, self.switching.dropped, modes)
+        self._know_no_sides()
         self._tell()
         self.plan.transfers[s] = 0
         self._watch_anew(t, held)
@@ -395,7 +426,7 @@ class EventRun(Followed):
         side = float(self.switches.sides[index])
         index = self.switching.number(index)
         if index < E:
-            self.events.append(self.switching.occurrence(index, t, y, side))
+            self._keep(self.switching.occurrence(index, t, y, side))
             if self.setup.integrator.needs_jacobian:
                 self.control[At.NEXT] = 0.0  # an L-stable step damps what is fast: to start with, it must be resolved
             if self._chatters():
@@ -404,7 +435,7 @@ class EventRun(Followed):
             return
         event = self.setup.events[index - E]
         if event.direction in (0, int(side)):
-            self.events.append(self.switching.occurrence(index, t, y, side))
+            self._keep(self.switching.occurrence(index, t, y, side))
             if event.terminal and self.samples:
                 raise TerminalEvent(t, event.name)
             if event.terminal:  # a companion goes on, past the states of the run at which they are compared

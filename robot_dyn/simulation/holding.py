@@ -9,7 +9,6 @@ E picks the joints of the motors. The ends of a gap are stops of δ. [As of `eff
 
 from __future__ import annotations
 
-from enum import IntEnum
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,18 +16,7 @@ import numpy as np
 from robot_dyn.arithmetic import Array
 from robot_dyn.effects.settling import Settling
 from robot_dyn.integrate.primitives import evaluate
-
-
-class What(IntEnum):
-    """What happens to a coordinate."""
-
-    STRIKES = 0  # a stop
-    RESTS_AT_LAST = 1  # at a stop, behind bounces
-    STICKS = 2
-    RESTS = 3  # at a stop
-    SLIDES = 4
-    LEAVES = 5  # a stop
-    REVERSES = 6
+from robot_dyn.simulation.event_log import EventLog
 
 
 class Laws(NamedTuple):
@@ -129,8 +117,7 @@ class Holding(NamedTuple):
         impacts, strikes, latest: Times of the latest impacts, which coordinates struck, (I,) and (I, N); their number.
         changes, changed: Times of the latest changes of the mode, (C,), and the number of all changes, (1,).
         brief: The time in which C changes are too many.
-        restarts: Whether the first step behind an event is to be found anew.
-        happened, filled: What happened, as of `note`, (R, 5 + 2n), and how many rows are filled, (1,).
+        log: What happened.
         room: Room to work.
     """
 
@@ -147,9 +134,7 @@ class Holding(NamedTuple):
     changes: Array
     changed: Array
     brief: float
-    restarts: bool
-    happened: Array
-    filled: Array
+    log: EventLog
     room: Room
 
 
@@ -243,12 +228,3 @@ def write_mode(of: Holding, own: Array) -> None:
             own[first + i, 0] = of.direction[i]
         for first in of.places.contact:
             own[first + i, 0] = of.contact[i]
-
-
-def note(of: Holding, t: float, y: Array, i: int, what: int, side: float, direction: float) -> None:
-    """Keep what happened to a coordinate: t, i, `What`, the side of the stop, the direction, q and v."""
-    row, n = of.happened[of.filled[0]], of.laws.n
-    row[0], row[1], row[2], row[3], row[4] = t, float(i), float(what), side, direction
-    for j in range(2 * n):
-        row[5 + j] = y[j, 0]
-    of.filled[0] += 1

@@ -16,7 +16,8 @@ import numpy as np
 from robot_dyn.arithmetic import Array
 from robot_dyn.effects.settling import Settling, least_value, settle
 from robot_dyn.integrate.primitives import copy
-from robot_dyn.simulation.holding import Holding, Laws, What, bodies, intervals, note, take, touched
+from robot_dyn.simulation.event_log import What, note
+from robot_dyn.simulation.holding import Holding, Laws, bodies, intervals, take, touched
 
 _ACCUMULATED = 1e-6  # [s] for all impacts that are still to come: what ends there has no effect beyond its square
 _CROWDED = 20  # impacts within that time: they go on for ever, whatever the restitution
@@ -42,7 +43,8 @@ def strike(f: Any, t: float, y: Array, p: Array, of: Holding, s: int) -> bool:
     for i in range(len(laws.rows)):
         if room.side[i] * room.v[i] > 0.0:
             rests, side = room.ended[i] < np.inf, room.side[i]
-            note(of, t + room.ended[i] if rests else t, y, i, What.RESTS_AT_LAST if rests else What.STRIKES, side, side)
+            when = t + room.ended[i] if rests else t
+            note(of.log, when, y, i, What.RESTS_AT_LAST if rests else What.STRIKES, side, side)
             room.struck[laws.joints[i]] = 1.0
     return True
 

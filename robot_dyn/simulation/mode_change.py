@@ -22,18 +22,8 @@ from robot_dyn.arithmetic import Array
 from robot_dyn.effects.settling import settle
 from robot_dyn.integrate.primitives import copy
 from robot_dyn.simulation.crossings import ROUNDING, Switches, same_sides
-from robot_dyn.simulation.holding import (
-    Holding,
-    Laws,
-    What,
-    bodies,
-    intervals,
-    move_motors,
-    note,
-    snap,
-    touched,
-    write_mode,
-)
+from robot_dyn.simulation.event_log import What, note
+from robot_dyn.simulation.holding import Holding, Laws, bodies, intervals, move_motors, snap, touched, write_mode
 from robot_dyn.simulation.impacts import strike
 from robot_dyn.simulation.time_loop import Ended, Runs
 
@@ -63,7 +53,7 @@ def end_mode(
     guards(of, runs.y, switches)
     if not same_sides(t, runs.y, p, runs.own, switches):
         return Ended.CHANGED
-    return Ended.DONE if of.filled[0] + at_once(of.laws) <= len(of.happened) else Ended.PAUSED
+    return Ended.DONE if of.log.filled[0] <= of.log.room else Ended.PAUSED
 
 
 def without_modes(
@@ -146,12 +136,12 @@ def note_change(of: Holding, t: float, y: Array, i: int) -> None:
             side = touched(laws, s, y, i)
     was, held, before, direction = room.was_held[i], of.held[i], room.was_direction[i], of.direction[i]
     if held != 0.0 and was == 0.0:
-        note(of, t, y, i, What.RESTS if side != 0.0 else What.STICKS, side, 0.0)
+        note(of.log, t, y, i, What.RESTS if side != 0.0 else What.STICKS, side, 0.0)
     elif was != 0.0 and held == 0.0:
         leaves = side == -direction and side != 0.0
-        note(of, t, y, i, What.LEAVES if leaves else What.SLIDES, side, direction)
+        note(of.log, t, y, i, What.LEAVES if leaves else What.SLIDES, side, direction)
     elif before * direction < 0.0 and y[laws.speeds[i], 0] == 0.0 and laws.rubs[i]:
-        note(of, t, y, i, What.REVERSES, side, direction)
+        note(of.log, t, y, i, What.REVERSES, side, direction)
 
 
 def accumulates(of: Holding, t: float) -> bool:

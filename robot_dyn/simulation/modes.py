@@ -14,12 +14,12 @@ from robot_dyn.effects.rigid_stops import RigidStops, touching
 from robot_dyn.effects.set_valued import Mode
 from robot_dyn.effects.settling import settling
 from robot_dyn.simulation.event import Occurrence
-from robot_dyn.simulation.holding import Holding, Laws, Places, Room, What
+from robot_dyn.simulation.event_log import What, event_log
+from robot_dyn.simulation.holding import Holding, Laws, Places, Room
 from robot_dyn.simulation.mode_change import REACTIONS, at_once, start, width
 from robot_dyn.simulation.state_equation import StateEquation
 
 _IMPACTS = 64  # that are remembered
-_HAPPENED = 64  # rows of what happened, beside those of one event
 _STOP = {-1: "lower stop", 1: "upper stop"}
 _END = {-1: "backward end", 1: "forward end"}
 _SAID = {
@@ -38,24 +38,24 @@ class Modes:
         own: Own numbers of it in which nothing is held, (O, 1).
         places: Where they have the mode.
         limit: How many changes of the mode are too many in how long, in [s].
-        restarts: Whether the first step behind an event is to be found anew.
 
     Attributes:
         holding: The mode, as numbers.
+        log: What happened.
     """
 
     def __init__(
-        self, equation: StateEquation, own: np.ndarray, places: Places, limit: tuple[int, float], restarts: bool
+        self, equation: StateEquation, own: np.ndarray, places: Places, limit: tuple[int, float]
     ) -> None:
         self.equation = equation
         laws = laws_of(equation)
         n, N = laws.n, len(laws.rows)
         held, direction = np.zeros((2, N))
-        rows = np.zeros((_HAPPENED + at_once(laws), 5 + 2 * n))
+        self.log = event_log(n, at_once(laws), limit[1])
         self.holding = Holding(
             laws, places, held, direction, np.zeros(n), own, n * equation.sampled, np.zeros(_IMPACTS),
             np.zeros((_IMPACTS, N)), np.zeros(1, np.int64), np.zeros(limit[0]), np.zeros(1, np.int64),
-            limit[1], restarts, rows, np.zeros(1, np.int64), _room(equation, N, n),
+            limit[1], self.log, _room(equation, N, n),
         )  # fmt: skip
 
     def start(self, y: np.ndarray) -> None:
@@ -65,7 +65,7 @@ class Modes:
     def of(self, equation: StateEquation, own: np.ndarray) -> Modes:
         """The same of the equation with other bodies, and own numbers of it."""
         made = object.__new__(Modes)
-        made.equation, made.holding = equation, self.holding._replace(own=own)
+        made.equation, made.log, made.holding = equation, self.log, self.holding._replace(own=own)
         return made
 
     @property
@@ -91,13 +91,8 @@ class Modes:
     def _joint(self, i: int) -> str:
         return self.equation.plant.dynamics.joint_names[self.holding.laws.joints[i]]
 
-    def happened(self) -> list[Occurrence]:
-        """What happened since the last call, in words."""
-        of = self.holding
-        count, of.filled[0] = int(of.filled[0]), 0
-        return [self._occurrence(row) for row in of.happened[:count].tolist()]
-
-    def _occurrence(self, row: Sequence[float]) -> Occurrence:
+    def occurrence(self, row: Sequence[float]) -> Occurrence:
+        """What happened, in words, as of a row of the log."""
         n, (t, i, what, side, direction, *state) = self.holding.laws.n, row
         joint, end = self._joint(int(i)), ""
         if side:
@@ -176,6 +171,6 @@ def alone(n: int, first: int) -> Places:
 _NONE, _ROWS, _TABLE = np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 0))
 NOTHING_HELD = Holding(  # of an equation without anything that may hold joints
     Laws._make([0, *[_ROWS] * 6, *[_NONE] * 4, np.zeros(0, bool), *[_TABLE] * 5, _ROWS]), Places._make([_ROWS] * 3),
-    _NONE, _NONE, _NONE, _TABLE, 0, _NONE, _TABLE, _ROWS, _NONE, _ROWS, 0.0, False, _TABLE, _ROWS,
+    _NONE, _NONE, _NONE, _TABLE, 0, _NONE, _TABLE, _ROWS, _NONE, _ROWS, 0.0, event_log(0, 0, 0.0),
     Room._make([*[_TABLE] * 4, *[_NONE] * 15, settling(0)]),
 )  # fmt: skip

@@ -168,6 +168,11 @@ class Switching:
         """The number of a switching function among thresholds and events asked for."""
         return index - (self.guards if index >= self.coordinates else 0)
 
+    def sides(self, switches: Switches) -> np.ndarray:
+        """The sides of the thresholds, (T,)."""
+        E = self.coordinates
+        return np.concatenate([switches.sides[:E], switches.sides[E + self.guards :][: len(self.thresholds) - E]])
+
     def occurrence(self, index: int, t: float, y: np.ndarray, side: float) -> Occurrence:
         """The event of the threshold, or of the function asked for, of this number; its sign is now `side`."""
         q, v, joint = *self.equation.state(y)[:2], ""
