@@ -35,38 +35,15 @@ class Modes:
 
     Args:
         equation: Its state equation, of effects without a mode.
-        own: Own numbers of it in which nothing is held, (O, 1).
-        places: Where they have the mode.
-        limit: How many changes of the mode are too many in how long, in [s].
-
-    Attributes:
         holding: The mode, as numbers.
-        log: What happened.
     """
 
-    def __init__(
-        self, equation: StateEquation, own: np.ndarray, places: Places, limit: tuple[int, float]
-    ) -> None:
-        self.equation = equation
-        laws = laws_of(equation)
-        n, N = laws.n, len(laws.rows)
-        held, direction = np.zeros((2, N))
-        self.log = event_log(n, at_once(laws), limit[1])
-        self.holding = Holding(
-            laws, places, held, direction, np.zeros(n), own, n * equation.sampled, np.zeros(_IMPACTS),
-            np.zeros((_IMPACTS, N)), np.zeros(1, np.int64), np.zeros(limit[0]), np.zeros(1, np.int64),
-            limit[1], self.log, _room(equation, N, n),
-        )  # fmt: skip
+    def __init__(self, equation: StateEquation, holding: Holding) -> None:
+        self.equation, self.holding = equation, holding
 
     def start(self, y: np.ndarray) -> None:
         """The mode at the start: all that may be held is, until the reactions are known."""
         start(self.holding, y[:, None].copy())
-
-    def of(self, equation: StateEquation, own: np.ndarray) -> Modes:
-        """The same of the equation with other bodies, and own numbers of it."""
-        made = object.__new__(Modes)
-        made.equation, made.log, made.holding = equation, self.log, self.holding._replace(own=own)
-        return made
 
     @property
     def mode(self) -> Mode:
@@ -97,8 +74,30 @@ class Modes:
         joint, end = self._joint(int(i)), ""
         if side:
             end = f"its {_STOP[int(side)]}" if i < n else f"the {_END[int(side)]} of its backlash"
-        name = f"{joint} {_SAID[int(what)].format(end)}"
+        name = f"{joint} {_SAID[What(int(what))].format(end)}"
         return Occurrence(t, name, int(direction), tuple(state[:n]), tuple(state[n:]), joint)
+
+
+def modes_of(equation: StateEquation, own: np.ndarray, places: Places, most: int, brief: float) -> Modes:
+    """The modes of a state equation of effects without a mode; nothing is held yet.
+
+    Args:
+        equation: The state equation.
+        own: Own numbers of it in which nothing is held, (O, 1).
+        places: Where they have the mode.
+        most: Changes of the mode that are too many in a brief time.
+        brief: That time, in [s].
+    """
+    laws = laws_of(equation)
+    n, N = laws.n, len(laws.rows)
+    held, direction = np.zeros((2, N))
+    none, changed = np.zeros((2, 1), np.int64)
+    holding = Holding(
+        laws, places, held, direction, np.zeros(n), own, n * equation.sampled, np.zeros(_IMPACTS),
+        np.zeros((_IMPACTS, N)), none, np.zeros(most), changed, brief, event_log(n, at_once(laws), brief),
+        _room(equation, N, n),
+    )  # fmt: skip
+    return Modes(equation, holding)
 
 
 def laws_of(equation: StateEquation) -> Laws:
@@ -115,10 +114,7 @@ def laws_of(equation: StateEquation) -> Laws:
     intervals = [each.at_rest(np.zeros(n)) for each in others]
     least, most = (sum((each[k] for each in intervals), start=np.zeros(n)) for k in (0, 1))
     sliding = sum((each.sliding(np.zeros(n)) for each in motion.set_valued), start=np.zeros(n))
-    known = [[each.lower, each.upper, each.restitution] for each in stops] or [[-np.inf, np.inf, 0.0]] * bool(gaps)
-    of_joints = np.array([[np.broadcast_to(x, n) for x in each] for each in known], float).reshape(-1, 3, n)
-    of_gaps = np.broadcast_to(np.array([-level, level, e]), (len(known), 3, len(joints)))
-    lower, upper, restitution = np.ascontiguousarray(np.concatenate([of_joints, of_gaps], axis=2).swapaxes(0, 1))
+    lower, upper, restitution = _stops(stops, n, level, e)
     works_of_stops = [first_work + works.index(each) for each in stops] or [-1] * bool(gaps)
 
     def rows(of_joints: np.ndarray, of_gaps: np.ndarray) -> np.ndarray:
@@ -130,9 +126,18 @@ def laws_of(equation: StateEquation) -> Laws:
     i, end = np.arange(n), 2 * n + equation.states
     return Laws(
         n, rows(i, joints), rows(i, delta), rows(n + i, speed), rows(end - n + i, impulse), motors.astype(np.int64),
-        work.astype(np.int64), inertia, *map(wide, (least, most, sliding, most > 0)), lower, upper, restitution,
-        touching(lower, -1), touching(upper, 1), np.array(works_of_stops, np.int64),
+        work.astype(np.int64), inertia, wide(least), wide(most), wide(sliding), wide(most > 0), lower, upper,
+        restitution, touching(lower, -1), touching(upper, 1), np.array(works_of_stops, np.int64),
     )  # fmt: skip
+
+
+def _stops(stops: Sequence[RigidStops], n: int, level: np.ndarray, e: np.ndarray) -> np.ndarray:
+    """Lower and upper stops and e of each effect, with the ends of gaps, (3, S, N)."""
+    known: list[Any] = [[each.lower, each.upper, each.restitution] for each in stops]
+    known = known or [[-np.inf, np.inf, 0.0]] * (len(level) > 0)
+    of_joints = np.array([[np.broadcast_to(x, n) for x in each] for each in known], float).reshape(-1, 3, n)
+    of_gaps = np.broadcast_to(np.array([-level, level, e]), (len(known), 3, len(level)))
+    return np.ascontiguousarray(np.concatenate([of_joints, of_gaps], axis=2).swapaxes(0, 1))
 
 
 def _gaps(effect: Any, n: int, at: int, work: int) -> tuple[Any, ...]:
