@@ -64,7 +64,7 @@ def settle(
         forced: The direction of joints at rest that are known to break away, (n,); becomes that of all that do.
         a: Where the acceleration goes, (n,).
         held: Where the mode goes: 1 for each joint that is held, (n,).
-        direction: The same: 1 or −1 for each joint that slides or is about to, (n,).
+        direction: Where its direction goes: 1 or −1 for each joint that slides or is about to, (n,).
         room: Room to work.
     """
     for i in range(len(v)):

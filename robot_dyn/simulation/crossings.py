@@ -191,9 +191,8 @@ def same_sides(t: float, y: Array, p: Array, own: Array, switches: Switches) -> 
             return False
     if has_functions(switches):
         evaluate(switches.functions, t, y, p, own, switches.then)
-        own_first = len(switches.rows) - switches.asked
         for g in range(len(switches.exact), len(switches.rows)):
-            if g >= own_first:
+            if g >= len(switches.rows) - switches.asked:
                 switches.sides[g] = np.sign(gap(switches, g))
             elif not switches.sides[g] * gap(switches, g) > 0.0:
                 return False

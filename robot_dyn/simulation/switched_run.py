@@ -126,7 +126,7 @@ class SwitchedRun(Followed):
             functions, parameters = self.made(switching.on(self.switches.sides))
             self.functions, self.runs.own[self.rules.held :, 0] = functions._replace(bodies=self.bodies), parameters
             if self.in_python is not None:  # else functions change with the sides
-                keep_numbers(self.sides, switching.sides(self.switches), parameters)
+                keep_numbers(self.sides, switching.of_thresholds(self.switches.sides), parameters)
         if switching.modes is not None:
             write_mode(switching.modes.holding, self.runs.own)
         if not self.compiled:

@@ -145,8 +145,7 @@ class Switching:
 
     def on(self, sides: np.ndarray) -> StateEquation:
         """The state equation with each threshold on its side, in the mode that is known; smooth there."""
-        E, mode = self.coordinates, None if self.modes is None else self.modes.mode
-        sides = np.concatenate([sides[:E], sides[E + self.guards :][: len(self.thresholds) - E]])
+        mode, sides = None if self.modes is None else self.modes.mode, self.of_thresholds(sides)
         key = sides.tobytes() + (b"" if mode is None else np.concatenate([x for x in mode if x is not None]).tobytes())
         if key not in self._known:
             of: dict[tuple[int | None, Threshold], int] = {
@@ -168,10 +167,10 @@ class Switching:
         """The number of a switching function among thresholds and events asked for."""
         return index - (self.guards if index >= self.coordinates else 0)
 
-    def sides(self, switches: Switches) -> np.ndarray:
-        """The sides of the thresholds, (T,)."""
+    def of_thresholds(self, sides: np.ndarray) -> np.ndarray:
+        """The sides of the thresholds, (T,), of those of all switching functions."""
         E = self.coordinates
-        return np.concatenate([switches.sides[:E], switches.sides[E + self.guards :][: len(self.thresholds) - E]])
+        return np.concatenate([sides[:E], sides[E + self.guards :][: len(self.thresholds) - E]])
 
     def occurrence(self, index: int, t: float, y: np.ndarray, side: float) -> Occurrence:
         """The event of the threshold, or of the function asked for, of this number; its sign is now `side`."""
