@@ -29,6 +29,7 @@ from robot_dyn.simulation.prepared import prepared
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.time_loop import Ended, Now, Records, time_loop
+from tests.estimates.scenes import arms
 
 ARM = rd.load("planar_2r")
 PLAIN = [name for name in FIXED_STEP if method(name).plain]
@@ -145,6 +146,21 @@ def test_all_that_ends_a_mode_gives_the_same_bits(name: str, what: list[Any], co
     assert_same_bits(
         ours.switching.modes.holding, theirs.switching.modes.holding, (".log.rows",)
     )  # since the last return
+
+
+def test_a_loop_is_compiled_once_for_arms_of_any_number_of_joints() -> None:
+    """One joint or two, one threshold or four: no array has a type of its own."""
+    made = [setup([*HELD, *rd.joint_stops([-0.5, -0.9], [0.6, 0.8], 900.0)], "rk4", step_s=0.01)]
+    rail = rd.Plant(arms()["rail"], [rd.RigidStops(0.0, 5.0), *rd.joint_stops([0.1], [9.0], 900.0)])
+    made.append(replace(made[0], plant=rail, q0=[0.3], v0=[0.0]))
+    loops = []
+    for each in made:
+        equation = StateEquation(each.plant, None)
+        code, _ = choose(each, equation)
+        assert code is not None
+        prepared(each, equation, code).record()
+        loops.append((code.loop, {id(entry) for entry in code.loop._known.values()}))
+    assert loops[0] == loops[1]
 
 
 def test_the_end_of_a_mode_is_no_end_of_a_call_of_machine_code() -> None:

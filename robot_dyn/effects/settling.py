@@ -28,7 +28,7 @@ class Settling(NamedTuple):
         friction: What holds it there, (n,).
         back: 1 for each joint that broke away and was taken back, (n,).
         size: Of what cancels in its acceleration, (n,).
-        L: For the active set, (n + 1, n).
+        L: For the active set, (n + 1, n); wider for n = 1, since machine code has a type for arrays of one column.
     """
 
     p: Array
@@ -45,7 +45,7 @@ class Settling(NamedTuple):
 
 def settling(n: int) -> Settling:
     """Room for n joints."""
-    return Settling._make([*np.zeros((9, n)), np.zeros((n + 1, n))])
+    return Settling._make([*np.zeros((9, n)), np.zeros((n + 1, max(n, 2)))])
 
 
 def settle(

@@ -22,6 +22,8 @@ from robot_dyn.simulation.event_log import EventLog
 class Laws(NamedTuple):
     """The laws of N coordinates, n of them joints, the others gaps; S effects have stops. Ends of gaps are in each.
 
+    Tables have two columns for N = 1, since machine code has a type for arrays of one column; so have those of `Room`.
+
     Attributes:
         n: Number of joints.
         joints: The joint of each coordinate, (N,).

@@ -39,7 +39,7 @@ def strike(f: Any, t: float, y: Array, p: Array, of: Holding, s: int) -> bool:
         return False
     of_gaps = take(laws, y, room.after)
     if laws.works_of_stops[s] >= 0:
-        y[laws.works_of_stops[s], 0] += work(room.M, room.v, room.after) - of_gaps
+        y[laws.works_of_stops[s], 0] += work(laws.n, room.M, room.v, room.after) - of_gaps
     for i in range(len(laws.rows)):
         if room.side[i] * room.v[i] > 0.0:
             rests, side = room.ended[i] < np.inf, room.side[i]
@@ -49,11 +49,11 @@ def strike(f: Any, t: float, y: Array, p: Array, of: Holding, s: int) -> bool:
     return True
 
 
-def work(M: Array, before: Array, after: Array) -> float:
-    """The change of the kinetic energy, (v⁺ + v)ᵀ M (v⁺ − v) / 2."""
+def work(n: int, M: Array, before: Array, after: Array) -> float:
+    """The change of the kinetic energy of n joints, (v⁺ + v)ᵀ M (v⁺ − v) / 2."""
     total = 0.0
-    for i in range(len(M)):
-        for j in range(len(M)):
+    for i in range(n):
+        for j in range(n):
             total += (after[i] + before[i]) * M[i, j] * (after[j] - before[j])
     return total / 2
 
@@ -125,7 +125,8 @@ def remember(of: Holding, t: float) -> None:
     for k in range(first, of.latest[0]):
         if t - of.impacts[k] < _ACCUMULATED:
             of.impacts[count] = of.impacts[k]
-            copy(of.strikes[count], of.strikes[k])
+            for i in range(len(room.v)):
+                of.strikes[count, i] = of.strikes[k, i]
             count += 1
     of.impacts[count] = t
     for i in range(len(room.v)):

@@ -94,7 +94,7 @@ def modes_of(equation: StateEquation, own: np.ndarray, places: Places, most: int
     none, changed = np.zeros((2, 1), np.int64)
     holding = Holding(
         laws, places, held, direction, np.zeros(n), own, n * equation.sampled, np.zeros(_IMPACTS),
-        np.zeros((_IMPACTS, N)), none, np.zeros(most), changed, brief, event_log(n, at_once(laws), brief),
+        np.zeros((_IMPACTS, max(N, 2))), none, np.zeros(most), changed, brief, event_log(n, at_once(laws), brief),
         _room(equation, N, n),
     )  # fmt: skip
     return Modes(equation, holding)
@@ -132,12 +132,13 @@ def laws_of(equation: StateEquation) -> Laws:
 
 
 def _stops(stops: Sequence[RigidStops], n: int, level: np.ndarray, e: np.ndarray) -> np.ndarray:
-    """Lower and upper stops and e of each effect, with the ends of gaps, (3, S, N)."""
+    """Lower and upper stops and e of each effect, with the ends of gaps, (3, S, N), and two columns at least."""
     known: list[Any] = [[each.lower, each.upper, each.restitution] for each in stops]
     known = known or [[-np.inf, np.inf, 0.0]] * (len(level) > 0)
     of_joints = np.array([[np.broadcast_to(x, n) for x in each] for each in known], float).reshape(-1, 3, n)
     of_gaps = np.broadcast_to(np.array([-level, level, e]), (len(known), 3, len(level)))
-    return np.ascontiguousarray(np.concatenate([of_joints, of_gaps], axis=2).swapaxes(0, 1))
+    unused = np.zeros((len(known), 3, max(0, 2 - n - len(level))))
+    return np.ascontiguousarray(np.concatenate([of_joints, of_gaps, unused], axis=2).swapaxes(0, 1))
 
 
 def _gaps(effect: Any, n: int, at: int, work: int) -> tuple[Any, ...]:
@@ -152,9 +153,9 @@ def _gaps(effect: Any, n: int, at: int, work: int) -> tuple[Any, ...]:
 def _room(equation: StateEquation, N: int, n: int) -> Room:
     side, v, first, after, ended, least, most, forced, a, held, direction, was_held, was_direction = np.zeros((13, N))
     return Room(
-        np.zeros((n * n + n + N - n, 1)), np.zeros((equation.size, 1)), np.zeros((n, n)), np.zeros((N, N)),
-        np.zeros(N), side, v, first, after, ended, least, most, forced, a, held, direction, was_held, was_direction,
-        np.zeros(n), settling(N),
+        np.zeros((n * n + n + N - n, 1)), np.zeros((equation.size, 1)), np.zeros((n, max(n, 2))),
+        np.zeros((N, max(N, 2))), np.zeros(N), side, v, first, after, ended, least, most, forced, a, held, direction,
+        was_held, was_direction, np.zeros(n), settling(N),
     )  # fmt: skip
 
 
@@ -170,7 +171,7 @@ def places(known: Sequence[Parameter], first: int) -> Places:
 
 def alone(n: int, first: int) -> Places:
     """Where own numbers are the mode and nothing else, behind so many others: held, direction and contact, (3n,)."""
-    return Places(*(np.array([first + k * n]) for k in range(3)))
+    return Places(*(np.array([first + k * n], np.int64) for k in range(3)))
 
 
 _NONE, _ROWS, _TABLE = np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 0))

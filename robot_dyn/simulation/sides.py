@@ -22,8 +22,8 @@ class Sides(NamedTuple):
     """What runs on each side of the thresholds.
 
     Attributes:
-        sides: Those that are known, as of `Switches` without guards and events asked for, (K, T).
-        own: Own numbers of the run on them, behind the actuation in zero-order hold, (K, P).
+        sides: Those that are known, as of `Switches` without guards and events asked for, (T, K).
+        own: Own numbers of the run on them, behind the actuation in zero-order hold, (P, K).
         known: How many are filled, (1,); 0 where functions of Python change with the sides.
         directions: Of the events asked for, (G,).
         terminal: Whether they end the run, (G,).
@@ -45,7 +45,7 @@ def sides_of(
 ) -> Sides:  # fmt: skip
     """None known yet."""
     return Sides(
-        np.zeros((_KNOWN, thresholds)), np.zeros((_KNOWN, parameters)), np.zeros(1, np.int64), directions, terminal,
+        np.zeros((thresholds, _KNOWN)), np.zeros((parameters, _KNOWN)), np.zeros(1, np.int64), directions, terminal,
         restarts, log,
     )  # fmt: skip
 
@@ -56,7 +56,7 @@ def goes_on(t: float, runs: Runs, switches: Switches, of: Sides, holding: Holdin
     side, log = switches.sides[event], of.log
     if log.filled[0] >= log.room:
         return False
-    asked = number - of.sides.shape[1]
+    asked = number - len(of.sides)
     if asked >= 0:
         counts = of.directions[asked] * side >= 0.0
         if of.terminal[asked] and counts:
@@ -74,12 +74,12 @@ def take_numbers(runs: Runs, switches: Switches, of: Sides, holding: Holding, he
     """Take the numbers of the sides that the thresholds are on; whether they are known."""
     for k in range(of.known[0]):
         same = True
-        for e in range(of.sides.shape[1]):
+        for e in range(len(of.sides)):
             at = e if e < switches.thresholds else e + switches.guards
-            same = same and of.sides[k, e] == switches.sides[at]
+            same = same and of.sides[e, k] == switches.sides[at]
         if same:
-            for i in range(of.own.shape[1]):
-                runs.own[held + i, 0] = of.own[k, i]
+            for i in range(len(of.own)):
+                runs.own[held + i, 0] = of.own[i, k]
             write_mode(holding, runs.own)
             return True
     return False
@@ -88,6 +88,6 @@ def take_numbers(runs: Runs, switches: Switches, of: Sides, holding: Holding, he
 def keep_numbers(of: Sides, sides: np.ndarray, parameters: np.ndarray) -> None:
     """Keep the numbers on sides that were not known; once there is no room, Python is asked each time."""
     k = int(of.known[0])
-    if k < len(of.sides) and not (of.sides[:k] == sides).all(axis=1).any():
-        of.sides[k], of.own[k] = sides, parameters
+    if k < _KNOWN and not (sides == of.sides[:, :k].T).all(axis=1).any():
+        of.sides[:, k], of.own[:, k] = sides, parameters
         of.known[0] += 1

@@ -173,7 +173,7 @@ class SwitchedRun(Followed):
         assert modes is not None
         if ended is Ended.UNSETTLED:
             room = modes.holding.room
-            raise not_found(room.whole, room.load)
+            raise not_found(room.whole[:, : len(room.load)], room.load)
         if ended is Ended.ACCUMULATED:
             guard = int(self.now[Now.EVENT]) - self.switches.thresholds
             self._accumulated(t, y, modes.holding, modes.joint(guard))
@@ -208,7 +208,7 @@ class SwitchedRun(Followed):
         with np.errstate(all="ignore"):
             found = change(functions, t, y, p, self.runs.own, holding, -1)
         if not found:
-            raise not_found(holding.room.whole, holding.room.load)
+            raise not_found(holding.room.whole[:, : len(holding.room.load)], holding.room.load)
 
     def _accumulated(self, t: float, y: np.ndarray, holding: Holding, joint: str) -> None:
         """AccumulationError if another method may make the run, else DivergedError."""
