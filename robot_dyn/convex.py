@@ -50,7 +50,12 @@ def minimum(M: np.ndarray, p: np.ndarray, f: np.ndarray, lower: np.ndarray, uppe
             return x
     except NotPositiveDefiniteError:
         pass
-    raise RobotDynError(f"no minimum was found for M = {M.tolist()} and p = {p.tolist()}: give finite numbers")
+    raise not_found(M, p)
+
+
+def not_found(M: np.ndarray, p: np.ndarray) -> RobotDynError:
+    """The error of a problem without a minimum."""
+    return RobotDynError(f"no minimum was found for M = {M.tolist()} and p = {p.tolist()}: give finite numbers")
 
 
 def residual(M: np.ndarray, p: np.ndarray, f: np.ndarray, lower: np.ndarray, upper: np.ndarray, x: np.ndarray) -> float:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -46,6 +47,41 @@ def test_without_loss_energy_stays_over_a_thousand_impacts() -> None:
     energy = run.ledger.kinetic + run.ledger.potential
     assert len(run.events) in (999, 1000, 1001)
     assert np.abs(energy / energy[0] - 1).max() <= 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class OneWay(rd.Dissipative):
+    """A damper of motion upwards alone: its formula changes where v = 0."""
+
+    up: Any = field(metadata=rd.coefficient("N m s/rad", symbol="b", least=0))
+    down: Any = field(default=0.0, metadata=rd.coefficient("N m s/rad", symbol="b₋", least=0))
+
+    def torque(self, dynamics: Any, t: float, q: Any, v: Any) -> Any:
+        return -self.up * np.maximum(v, 0.0) - self.down * np.minimum(v, 0.0)
+
+    def thresholds(self, n: int) -> tuple[rd.Threshold, ...]:
+        return (rd.Threshold(0, 0.0, "damper", "taken along", "left", of_velocity=True),)
+
+    def beyond(self, n: int, sides: Any) -> OneWay:
+        ((_, side),) = sides.items()
+        b = self.up if side > 0 else self.down
+        return replace(self, up=b, down=b)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_an_impact_may_throw_a_velocity_over_the_threshold_of_another_effect(engine: str) -> None:
+    """Down freely from h, up against b v: v₁ = e √(2 g h), at rest after t = ln(1 + b v₁/g)/b, (v₁ − g t)/b up."""
+    h, b, e = 0.8, 3.1, 0.9
+    plant = rd.Plant(RAIL, [OneWay(b), rd.RigidStops(0.0, np.inf, e)])
+    run = rd.simulate(plant, [h], duration_s=1.0, engine=engine, **OPTIONS)
+    first, top, second = run.events[:3]
+    v = e * np.sqrt(2 * G * h)
+    up = np.log(1 + b * v / G) / b
+    height = (v - G * up) / b
+    assert first.v[0] == pytest.approx(v, rel=1e-12)
+    assert top.t - first.t == pytest.approx(up, rel=1e-11)
+    assert top.q[0] == pytest.approx(height, rel=1e-11)
+    assert second.t - top.t == pytest.approx(np.sqrt(2 * height / G), rel=1e-11)
 
 
 def panda_between_stops() -> tuple[rd.Plant, list[float], list[float], float]:

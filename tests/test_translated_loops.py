@@ -29,6 +29,7 @@ from robot_dyn.simulation.prepared import prepared
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.time_loop import Ended, Now, Records, time_loop
+from tests.estimates.scenes import arms
 
 ARM = rd.load("planar_2r")
 PLAIN = [name for name in FIXED_STEP if method(name).plain]
@@ -117,6 +118,62 @@ def test_modes_of_dry_friction_and_rigid_stops_give_the_same_bits() -> None:
     ours, theirs = both(setup(effects, "DOP853", duration_s=2.0))
     assert len(ours.events) == len(theirs.events) > 5
     assert_same_bits((ours.runs, ours.stepper.work, ours.control), (theirs.runs, theirs.stepper.work, theirs.control))
+
+
+HELD = [rd.DryFriction([0.4, 0.2], [0.7, 0.3]), rd.RigidStops([-0.8, -1.2], [0.7, 1.0], [0.5, 0.8])]
+GEAR = [rd.RigidBacklash([0.02, 0.0], 0.003, 8.0, 0.4), *HELD]
+SOFT = [*HELD, *rd.joint_stops([-0.75, -9.0], [0.6, 9.0], 900.0, 4.0), BODY]
+
+
+@pytest.mark.parametrize(
+    ("name", "what", "controller"),
+    [
+        ("DOP853", GEAR, CONTINUOUS),
+        ("DOP853", SOFT, SAMPLED),
+        ("rk4", GEAR, SAMPLED),
+        ("rosenbrock_5", HELD, CONTINUOUS),
+    ],
+    ids=["a gear", "soft stops and a payload", "a gear, sampled", "stiff"],
+)
+def test_all_that_ends_a_mode_gives_the_same_bits(name: str, what: list[Any], controller: rd.Controller) -> None:
+    """Impacts and the bounces behind them, jumps over thresholds of other effects, a payload, and the events told."""
+    events = [rd.Event(lambda t, q, v: v[0] - 0.3, name="speed")]
+    ours, theirs = both(setup(what, name, duration_s=1.0, controller=controller, events=events))
+    assert ours.events == theirs.events
+    assert sum("strikes" in each.name for each in ours.events) > 2
+    assert_same_bits((ours.runs, ours.stepper.work, ours.control), (theirs.runs, theirs.stepper.work, theirs.control))
+    assert_same_bits(ours.switches._replace(functions=0), theirs.switches._replace(functions=0))
+    assert_same_bits(
+        ours.switching.modes.holding, theirs.switching.modes.holding, (".log.rows",)
+    )  # since the last return
+
+
+def test_a_loop_is_compiled_once_for_arms_of_any_number_of_joints() -> None:
+    """One joint or two, one threshold or four: no array has a type of its own."""
+    made = [setup([*HELD, *rd.joint_stops([-0.5, -0.9], [0.6, 0.8], 900.0)], "rk4", step_s=0.01)]
+    rail = rd.Plant(arms()["rail"], [rd.RigidStops(0.0, 5.0), *rd.joint_stops([0.1], [9.0], 900.0)])
+    made.append(replace(made[0], plant=rail, q0=[0.3], v0=[0.0]))
+    loops = []
+    for each in made:
+        equation = StateEquation(each.plant, None)
+        code, _ = choose(each, equation)
+        assert code is not None
+        prepared(each, equation, code).record()
+        loops.append((code.loop, {id(entry) for entry in code.loop._known.values()}))
+    assert loops[0] == loops[1]
+
+
+def test_the_end_of_a_mode_is_no_end_of_a_call_of_machine_code() -> None:
+    """Hundreds of impacts, of sticking and of sliding: the loop returns for progress and for room alone."""
+    made = setup(HELD, "DOP853", duration_s=6.0, controller=rd.PD(rd.hold([1.4, -1.9]), [60.0, 30.0], [0.1, 0.1]))
+    equation = StateEquation(made.plant, made.controller)
+    run, calls = prepared(made, equation, choose(made, equation)[0]), []
+    inner = run.advance
+    run.advance = lambda *given: calls.append(inner(*given)) or calls[-1]
+    events = len(run.record().events)
+    assert events > 100
+    assert len(calls) <= 4 + events // 20
+    assert set(calls) <= {Ended.PAUSED, Ended.DONE}
 
 
 @pytest.mark.parametrize(("name", "controller"), [*((name, SAMPLED) for name in PLAIN), ("rk4", CONTINUOUS)])

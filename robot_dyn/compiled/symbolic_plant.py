@@ -227,6 +227,9 @@ class _TracedDrive(_StatefulForce, Drive):
 class _TracedSetValuedDrive(_TracedDrive, _TracedSetValued):
     """A drive with a mode."""
 
+    def drag(self, n: int, z: Array) -> Array:
+        return self.inner.drag(n, z)
+
 
 class _StatefulBound(_States, _TracedBound):
     """A bound with states."""

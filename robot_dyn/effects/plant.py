@@ -16,6 +16,7 @@ from robot_dyn.effects.effect import Bound, Conservative, Effect, Force, Statefu
 from robot_dyn.effects.equation_of_motion import EquationOfMotion
 from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFriction
 from robot_dyn.effects.hold import Hold, held
+from robot_dyn.effects.set_valued import Mode, SetValued
 from robot_dyn.errors import EffectError, OverflowedError, QueryError, shown
 from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.validate import check_batches, is_moderate, is_plain, joint_values, number
@@ -194,6 +195,12 @@ def carrying(plant: Plant, carried: Sequence[bool]) -> Plant:
     of = {each: known(each, taken) for each, taken in zip(payloads, carried, strict=True)}
     effects = [of[each] if isinstance(each, CarriedPayload) else each for each in plant.effects]
     return Plant(robot_with(plant.dynamics, payloads, carried), effects)
+
+
+def in_mode(plant: Plant, mode: Mode) -> Plant:
+    """The plant in a mode of what may hold its joints."""
+    effects = [each.in_mode(mode) if isinstance(each, SetValued) else each for each in plant.effects]
+    return Plant(plant.dynamics, effects)
 
 
 def stated_friction(dynamics: Any) -> tuple[Effect, ...]:

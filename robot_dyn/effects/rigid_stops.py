@@ -71,8 +71,8 @@ class RigidStops(SetValued):
 
     def touched(self, q: np.ndarray) -> np.ndarray:
         """−1 for each joint at its lower stop, to rounding, or beyond it, 1 at the upper one, 0 elsewhere, (n,)."""
-        lower, upper = self._levels(q)
-        return np.where(q <= lower + _near(lower), -1, np.where(q >= upper - _near(upper), 1, 0))
+        lower, upper = (touching(level, side) for level, side in zip(self._levels(q), (-1, 1), strict=True))
+        return np.where(q <= lower, -1, np.where(q >= upper, 1, 0))
 
     def beyond_by(self, q: np.ndarray) -> np.ndarray:
         """How far each joint is beyond a stop, more than by rounding, (n,); 0 for the others."""
@@ -88,6 +88,11 @@ class RigidStops(SetValued):
 
     def _levels(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return np.broadcast_to(self.lower, q.shape), np.broadcast_to(self.upper, q.shape)
+
+
+def touching(level: np.ndarray, side: int) -> np.ndarray:
+    """Where stops at these levels, on one side, are touched to rounding."""
+    return level - side * _near(level)
 
 
 def _near(level: np.ndarray) -> np.ndarray:

@@ -16,11 +16,10 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.convex import minimum
+from robot_dyn.convex import not_found
 from robot_dyn.effects.effect import Dissipative
+from robot_dyn.effects.settling import settle, settling
 from robot_dyn.threshold import smooth
-
-_ROUNDING = 1e-12  # of the accelerations that add up
 
 
 class Interval(NamedTuple):
@@ -76,7 +75,7 @@ class SetValued(Dissipative):
 
     @abstractmethod
     def at_rest(self, q: np.ndarray) -> Interval:
-        """What it may exert on joints whose velocity is 0, at q."""
+        """What it may exert on joints whose velocity is 0, at q; the same at all q but for stops."""
 
 
 def settled(
@@ -89,8 +88,7 @@ def settled(
 ) -> tuple[np.ndarray, Mode]:
     """The acceleration of least constraint, (n,), and the mode from there on; joints that stay at rest have exactly 0.
 
-    Where friction of rest is above that of sliding, joints break away one by one, the one of most energy first, and the
-    others are solved again; one that would move the other way then is taken back, and rests on.
+    As of `settling`.
 
     Args:
         effects: What may hold joints.
@@ -100,34 +98,15 @@ def settled(
         v: Velocity, (n,).
         forced: The direction of joints at rest that are known to break away.
     """
-    forced, zero = dict(forced or {}), np.zeros_like(v)
+    n, zero = len(v), np.zeros_like(v)
     intervals = [each.at_rest(q) for each in effects]
     least, most = (sum((each[k] for each in intervals), start=zero) for k in (0, 1))
-    rests = (v == 0) & ((least < 0) | (most > 0))
-    friction = np.where(rests, np.where(np.isfinite(most), most, -least), 0.0)
-    lower, upper = np.where(rests & (most == np.inf), 0.0, -np.inf), np.where(rests & (least == -np.inf), 0.0, np.inf)
     slides = sum((each.sliding(zero) for each in effects), start=zero)
-    size = np.abs(np.linalg.inv(M)) @ (np.abs(load) + friction)  # of what cancels in a joint that just breaks away
-    held_on = set[int]()  # that broke away, and would move the other way now that another one slides
-    while True:  # each joint breaks away once, and is taken back once, at most
-        p, f = load.copy(), friction.copy()
-        for i, direction in forced.items():
-            p[i], f[i] = load[i] - slides[i] * direction, 0.0
-        a = minimum(M, p, f, lower, upper)
-        if back := [
-            i for i, direction in forced.items() if a[i] * direction < -_ROUNDING * (np.abs(a).max() + size[i])
-        ]:
-            held_on |= set(back)
-            forced = {i: direction for i, direction in forced.items() if i not in held_on}
-            continue
-        broken = rests & (a != 0) & (slides < friction)
-        broken[[*forced, *held_on]] = False
-        if not broken.any():
-            break
-        first = int(np.argmax(np.where(broken, np.abs(a) * np.sqrt(np.diag(M)), -1.0)))
-        forced[first] = int(np.sign(a[first]))
-    held = rests & (a == 0)
-    direction = np.where(v != 0, np.sign(v), np.sign(a) * rests)
-    for i, way in forced.items():  # its load has just reached what held it: it may be 0 yet
-        held[i], direction[i] = False, way
-    return a, Mode(held.astype(float), direction)
+    a, held, direction, let_go = np.zeros((4, n))
+    for i, way in (forced or {}).items():
+        let_go[i] = way
+    with np.errstate(all="ignore"):
+        found = settle(M, load, least, most, slides, v, let_go, a, held, direction, settling(n))
+    if not found:
+        raise not_found(M, load)
+    return a, Mode(held, direction)

@@ -117,7 +117,10 @@ def _has_loop(setup: Setup) -> bool:
     from robot_dyn.simulation.machine.making import loop_of
 
     method = _plain(setup)
-    return method is not None and loop_of(method, setup.finds_events).is_kept()
+    return (
+        method is not None
+        and loop_of(method, setup.finds_events, holds=bool(setup.plant.equation_of_motion.set_valued)).is_kept()
+    )
 
 
 def _code(setup: Setup, equation: StateEquation) -> StateEquation:

@@ -25,11 +25,15 @@ _NEAR = 1e-4  # of a step: for the slope of a switching function that is no coor
 class Switches(NamedTuple):
     """Switching functions: E coordinates of y, or rates of these, that pass a level, and G functions that pass one.
 
+    The coordinates are first those of thresholds, then the guards of the mode, of which some are active.
+
     Attributes:
         rows: Entry of y, and then of the values of the functions, (E + G,).
         levels: Its level, (E + G,).
         sides: 1 where it is not below its level, −1 where it is not above, (E + G,).
         rates: Whether each of the first is the rate of that entry, (E,).
+        active: Whether each of the first is looked at, (E,).
+        thresholds, guards: Number of the thresholds of coordinates, and of guards.
         zeroed: Entries of y that are set to 0 after each step: of those only the rates matter.
         functions: Gives the F values, as of `evaluate`.
         asked: Number of the last functions that are looked at in each step, as the user's own.
@@ -43,6 +47,9 @@ class Switches(NamedTuple):
     levels: Array
     sides: Array
     rates: Array
+    active: Array
+    thresholds: int
+    guards: int
     zeroed: Array
     functions: Any
     asked: int
@@ -59,6 +66,8 @@ def approaches(y: Array, after: Array, h: float, before: Array, last: Array, rul
     """Whether a coordinate may pass its level in a step. Rates are always looked at."""
     n = 0 if rules.canonical else rules.n  # p' is no acceleration
     for e in range(len(switches.exact)):
+        if not switches.active[e]:
+            continue
         if switches.rates[e]:
             return True
         row = switches.rows[e]
@@ -102,6 +111,8 @@ def first_event(
     """The switching function that changes sign first within a step, and θ; −1 without any."""
     event, first, b, own = -1, NONE, switches.b, runs.own
     for e in range(len(switches.exact)):
+        if not switches.active[e]:
+            continue
         row, side, d = switches.rows[e], switches.sides[e], len(b) - switches.rates[e]
         if switches.rates[e]:
             rate_coefficients(F, row, h, b)
@@ -168,6 +179,24 @@ def settle_sides(switches: Switches) -> None:
     for g in range(len(switches.exact), len(switches.rows)):
         if switches.sides[g] == 0.0:
             switches.sides[g] = np.sign(gap(switches, g))
+
+
+def same_sides(t: float, y: Array, p: Array, own: Array, switches: Switches) -> bool:
+    """Whether all that has a threshold is on its side of it still, behind a jump; takes the sides of other functions.
+
+    False where something lies on its level: where it goes from there is not known here.
+    """
+    for e in range(switches.thresholds):
+        if not switches.sides[e] * (y[switches.rows[e], 0] - switches.levels[e]) > 0.0:
+            return False
+    if has_functions(switches):
+        evaluate(switches.functions, t, y, p, own, switches.then)
+        for g in range(len(switches.exact), len(switches.rows)):
+            if g >= len(switches.rows) - switches.asked:
+                switches.sides[g] = np.sign(gap(switches, g))
+            elif not switches.sides[g] * gap(switches, g) > 0.0:
+                return False
+    return True
 
 
 def correction(

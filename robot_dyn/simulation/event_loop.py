@@ -21,7 +21,9 @@ from robot_dyn.integrate.primitives import between, copy, evaluate
 from robot_dyn.integrate.step_control import At, chosen_step, finite, first_step, shortened
 from robot_dyn.simulation.crossings import Switches, approaches, correction, first_event, nears, remember, settle_sides
 from robot_dyn.simulation.detection import FASTEST
+from robot_dyn.simulation.holding import Holding
 from robot_dyn.simulation.observation import Observation
+from robot_dyn.simulation.sides import Sides, goes_on
 from robot_dyn.simulation.time_loop import Ended, Functions, Now, Plan, Rules, Runs, act, acts, conserve, show
 
 _EARLY = 1e-9  # of a period: a sample at the end of a segment belongs to the next one
@@ -73,12 +75,12 @@ class Times(NamedTuple):
 
 def event_loop(
     begin: Callable[..., int], step: Callable[..., int], error: Callable[..., float], accept: Callable[..., int],
-    dense: Callable[..., int],
+    dense: Callable[..., int], end_mode: Callable[..., int],
 ) -> Callable[..., int]:  # fmt: skip
-    """The time loop of the functions of a method; see `ControlledStepper`.
+    """The time loop of the functions of a method, see `ControlledStepper`, and of the end of a mode, as of `end_mode`.
 
-    advance(functions, plan, runs, kept, times, rules, coefficients, work, switches, now, control, stop) → Ended, with
-    `control` as of `control_of`; `stop[0]` other than 0 ends it.
+    advance(functions, plan, runs, kept, times, rules, coefficients, work, switches, sides, holding, now, control,
+    stop) → Ended, with `control` as of `control_of`; `stop[0]` other than 0 ends it.
     """
     choose = chosen_step(step, error)
 
@@ -111,7 +113,7 @@ def event_loop(
 
     def advance(
         f: Functions, plan: Plan, runs: Runs, kept: Kept, times: Times, rules: Rules, c: Any, work: Any,
-        switches: Switches, now: Array, control: Array, stop: Array,
+        switches: Switches, sides: Sides, holding: Holding, now: Array, control: Array, stop: Array,
     ) -> int:  # fmt: skip
         last = len(plan.counts) - 1
         own, y, after = runs.own, runs.y, runs.after
@@ -185,7 +187,18 @@ def event_loop(
                 if event >= 0:
                     now[Now.EVENT] = event
                     now[Now.STEP] = 1
-                    return Ended.EVENT
+                    guard = event - switches.thresholds
+                    if sides.restarts and event < len(switches.rows) - switches.asked:
+                        control[At.NEXT] = 0.0
+                    if 0 <= guard < switches.guards:
+                        ended = end_mode(f, t1, runs, p, switches, holding, guard)
+                        if ended != Ended.DONE:
+                            return ended
+                    elif not goes_on(t1, runs, switches, sides, holding, event, rules.held):
+                        return Ended.EVENT
+                    if now[Now.BUDGET] <= 0 or stop[0] != 0:
+                        return Ended.PAUSED
+                    break
                 settle_sides(switches)
                 if not rules.canonical and fast(y, rules.n):
                     return Ended.FAST
@@ -193,6 +206,8 @@ def event_loop(
                     return Ended.GAINS
                 if now[Now.BUDGET] <= 0 or stop[0] != 0:
                     return Ended.PAUSED
+            if now[Now.STEP] == 1:  # behind an event
+                continue
             now[Now.SEGMENT] += 1
             now[Now.STEP] = 0
         return Ended.DONE

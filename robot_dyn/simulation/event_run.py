@@ -6,51 +6,48 @@ that within a step the right-hand side is smooth.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
-from dataclasses import replace
 from math import inf
 from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
-from robot_dyn.errors import NotFiniteError, OverflowedError, RobotDynError
+from robot_dyn.errors import RobotDynError
 from robot_dyn.foreign import is_mistake
 from robot_dyn.integrate import hermite
 from robot_dyn.integrate.adaptive import STEPPERS
 from robot_dyn.integrate.step_control import At, ControlledStepper, control_of
 from robot_dyn.simulation.event import Occurrence
+from robot_dyn.simulation.event_log import event_log
 from robot_dyn.simulation.event_loop import Kept, Times, event_loop
 from robot_dyn.simulation.fixed_step import rules_of, runs_of
-from robot_dyn.simulation.followed import Followed
-from robot_dyn.simulation.modes import Guard
+from robot_dyn.simulation.holding import Places
+from robot_dyn.simulation.mode_change import end_mode, without_modes
+from robot_dyn.simulation.modes import NOTHING_HELD, modes_of
 from robot_dyn.simulation.observation import NOTHING
 from robot_dyn.simulation.observer import Observer
 from robot_dyn.simulation.plan import plan_of
 from robot_dyn.simulation.record import MOST_SHARED, Path, Record
-from robot_dyn.simulation.remarks import Kind, Remark
 from robot_dyn.simulation.schedule import nodes
-from robot_dyn.simulation.setup import STEP_S, Setup
+from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import samples as most_samples
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.state_functions import interpreted, system
 from robot_dyn.simulation.stiffness import FIRST_LOOK, changes_over
+from robot_dyn.simulation.switched_run import Made, SwitchedRun, TerminalEvent
 from robot_dyn.simulation.switching import Switching
 from robot_dyn.simulation.time_loop import Ended, Functions, Now
 from robot_dyn.simulation.trajectory import Ending, Outcome
 from robot_dyn.simulation.transfers import Transfers
 from robot_dyn.simulation.watch import DivergedError, Watch, one_step
-from robot_dyn.threshold import Threshold
 
 _SAMPLES = 1000  # of a run without a record period
 _COMPARED = 1000  # times at which a run is compared with runs of other tolerances
-_CHATTER, _BRIEF = 20, 1e-9  # events of one threshold, in that part of the run
+_BRIEF = 1e-9  # of a run: events of one threshold in that part of it chatter
 _ACCUMULATED = 1000  # changes of the mode, in that part of the run: no motion that ends them is left between
 _CHUNK = 1024  # ends of steps for which there is room at first
 
 Advance = Callable[..., int]
-Made = Callable[[StateEquation], tuple[Functions, np.ndarray]]
 
 
 def _on(times: np.ndarray, path: Path) -> Path:
@@ -68,28 +65,8 @@ class TooLongError(Exception):
         self.evaluations = evaluations
 
 
-class AccumulationError(Exception):
-    """Internal: a run whose events accumulate, which time stepping is to make.
-
-    Attributes:
-        remark: Why.
-    """
-
-    def __init__(self, remark: Remark) -> None:
-        super().__init__(remark.text)
-        self.remark = remark
-
-
-class TerminalEvent(Exception):  # noqa: N818
-    """Internal: an event that ends the run, at `t`."""
-
-    def __init__(self, t: float, name: str) -> None:
-        super().__init__(name)
-        self.t = t
-
-
 @final
-class EventRun(Followed):
+class EventRun(SwitchedRun):
     """A run on its way.
 
     Args:
@@ -97,6 +74,7 @@ class EventRun(Followed):
         transfers: What it carries.
         made: Gives the functions of a state equation, for the loop, and their parameters (P,).
         mesh: Where steps end, (k,), before error control ends them; None for error control alone.
+        places: Where own numbers have the mode.
         samples: Whether samples are kept.
         machine_code: The loop of the method as machine code; then the functions are, too.
         on_progress: Called with the time reached, at each step or some ten times a second.
@@ -111,13 +89,13 @@ class EventRun(Followed):
 
     def __init__(
         self, watch: Watch, transfers: Transfers, made: Made, mesh: np.ndarray | None,
-        machine_code: Advance | None = None,
+        places: Places, machine_code: Advance | None = None,
         on_progress: Callable[[float], object] | None = None, observer: Observer | None = None,
         in_python: Functions | None = None, samples: bool = True, most: float = inf,
         thresholds: bool = True, chooses: bool = False,
     ) -> None:  # fmt: skip
         setup, equation, self.most, self._look = watch.setup, watch.equation, most, FIRST_LOOK if chooses else 0
-        self._chooses, self._changes = chooses, deque[float](maxlen=_ACCUMULATED)  # times of changes of the mode
+        self.chooses = chooses
         self.watch, self.transfers, self.plan, self.in_python = watch, transfers, plan_of(setup), in_python
         self.setup, self.equation, self.made, self.samples = setup, equation, made, samples
         self.on_progress, self.observer, self.compiled = on_progress, observer, machine_code is not None
@@ -125,15 +103,22 @@ class EventRun(Followed):
         held = n if equation.sampled else 0
         self.start = equation.start(setup.q0, setup.v0)
         self.stepper, self.control = _method(setup, equation)
-        self.switching = Switching(equation)
-        if not thresholds:
-            self.switching = Switching(equation, self.switching.quantities)
         self.functions, parameters = made(equation)
         own = np.concatenate([np.full(held, np.nan), parameters])[:, None]
+        self.bodies = self.functions.bodies
+        modes = None
+        if equation.impulses:
+            modes = modes_of(equation, own.copy(), places, _ACCUMULATED, _BRIEF * setup.duration_s)
+            modes.start(self.start)
+        self.switching = Switching(equation, modes=modes)
+        if not thresholds:
+            self.switching = Switching(equation, self.switching.quantities, modes)
         self.runs = runs_of(equation, self.start[:, None], own, m + n + 2)
         self.runs.energy[0], self.runs.scale[0] = self.watch.energy, self.watch.scale
         of = self.stepper
-        self.advance = machine_code or event_loop(of.begin, of.step, of.error, of.accept, of.dense)
+        self.advance = machine_code or event_loop(
+            of.begin, of.step, of.error, of.accept, of.dense, without_modes if modes is None else end_mode
+        )
         self.rules = rules_of(equation, True, inf)
         self.times = _times(setup, mesh, samples)
         compared = self.times.compared
@@ -144,13 +129,11 @@ class EventRun(Followed):
             np.empty(rows), np.empty((rows, m, 1)), np.empty((rows, m + n + 2, 1)), np.empty(states),
             np.empty((states, m)), np.empty(_CHUNK), np.empty((_CHUNK, m)), *shown,
         )  # fmt: skip
-        if self.switching.modes is not None:
-            self.switching.modes.start(self.start)
         events = self.functions.events if self.compiled else self.switching.function
         self.switches = self.switching.at(0.0, self.start, len(of.work.F), events, own[:n, 0] if held else None)
         self.events: list[Occurrence] = []
-        self.beyond = inf
-        self.met: RobotDynError | None = None
+        self.log = event_log(n, 0, _BRIEF * setup.duration_s) if modes is None else modes.holding.log
+        self._forget_sides()
         self._change_mode()
         self.now, self.stop = np.zeros(len(Now), np.int64), np.zeros(1, np.int64)
 
@@ -158,11 +141,6 @@ class EventRun(Followed):
     def time(self) -> float:
         """The time reached, in [s]."""
         return float(self.times.reached[0])
-
-    @property
-    def y(self) -> np.ndarray:
-        """The state reached."""
-        return self.runs.y[:, 0].copy()
 
     def record(self) -> Record:
         """Run to the end, however the run ends."""
@@ -207,7 +185,9 @@ class EventRun(Followed):
 
     def _advance(self) -> Ended:
         arguments = self.functions, self.plan, self.runs, self.kept, self.times, self.rules
-        made = self.stepper.coefficients, self.stepper.work, self.switches
+        modes = self.switching.modes
+        holding = NOTHING_HELD if modes is None else modes.holding
+        made = self.stepper.coefficients, self.stepper.work, self.switches, self.sides, holding
         try:
             return Ended(self.advance(*arguments, *made, self.now, self.control, self.stop))
         except RobotDynError as error:
@@ -216,6 +196,8 @@ class EventRun(Followed):
             if not self.setup.integrator.controls_error:
                 self._step_in_words()
             raise DivergedError(self.time, f"{error}, at t = {self.time}") from None
+        finally:
+            self._tell()
 
     def _step_in_words(self) -> None:
         """A step of a method of fixed step that was not found: DivergedError with the words for it."""
@@ -238,8 +220,10 @@ class EventRun(Followed):
         where = f"at t = {t}, max |y| = {np.abs(y).max():.3g}: y grows without bound, or tolerances are too tight"
         if ended is Ended.EVENT:
             self._event(t, y)
+        elif ended in (Ended.CHANGED, Ended.ACCUMULATED, Ended.UNSETTLED):
+            self._end_mode(ended, t, y)
         elif ended is Ended.TRANSFER:
-            self._transfer(int(self.now[Now.SEGMENT]), y)
+            self._transfer(int(self.now[Now.SEGMENT]))
         elif ended is Ended.TICK:
             s = int(self.now[Now.SEGMENT])
             y, held = self.watch.tick(float(self.plan.starts[s]), y)
@@ -266,120 +250,6 @@ class EventRun(Followed):
             self.kept.t[row], self.kept.y[row] = t, self.runs.y
             functions.sample(t, self.runs.y, self.plan.parameters[s], self.runs.own, self.kept.made[row])
             self.now[Now.ROW] += 1
-
-    def _change_mode(self) -> None:
-        """Let the functions be those of the sides that the switching functions are on."""
-        switching = self.switching
-        if switching.thresholds or switching.dropped or switching.modes is not None or self.transfers.any:
-            self.functions, parameters = self.made(switching.on(self.switches.sides))
-            self.runs.own[self.rules.held :, 0] = parameters
-        if not self.compiled:
-            self.functions = self._lenient(self.functions)
-
-    def _lenient(self, functions: Functions) -> Functions:
-        """The functions in Python, with a rate that is nan where a trial step goes too far: a shorter one is tried."""
-
-        def rate(t: float, y: Array, p: Array, own: Array, out: Array) -> None:
-            try:
-                functions.rate(t, y, p, own, out)
-            except (OverflowedError, NotFiniteError) as error:
-                self.met, out[...] = error, np.nan
-
-        made: Any = functions._replace(rate=rate)
-        return made
-
-    def _chatters(self) -> bool:
-        """Whether the latest events were all of one threshold, in next to no time."""
-        latest = self.events[-_CHATTER:]
-        brief = latest[-1].t - latest[0].t <= _BRIEF * self.setup.duration_s
-        return len(latest) == _CHATTER and brief and len({each.joint for each in latest} - {""}) == 1
-
-    def _drop(self, each: Threshold) -> None:
-        """Look for the thresholds of a joint no longer, where steps would never get on."""
-        last = self.events[-1]
-        self.events.append(replace(last, name=f"{last.name} chatters, and is no longer looked for"))
-        dropped = self.switching.dropped | {(each.joint, each.of_actuation)}
-        self.switching = Switching(self.equation, dropped, self.switching.modes)
-        held = self.runs.own[: self.rules.held, 0] if self.rules.held else None
-        self._watch_anew(last.t, held)
-
-    def _end_mode(self, t: float, y: np.ndarray, guard: Guard) -> None:
-        """Go on in another mode, from the state behind the event."""
-        modes, held = self.switching.modes, self.runs.own[: self.rules.held, 0] if self.rules.held else None
-        assert modes is not None
-        self.runs.y[:, 0], happened = modes.after(t, y, held, guard)
-        self.events = sorted([*self.events, *happened], key=lambda each: each.t)
-        self._changes.append(t)
-        if len(self._changes) == _ACCUMULATED and t - self._changes[0] <= _BRIEF * self.setup.duration_s:
-            self._accumulated(t, y, self.equation.plant.dynamics.joint_names[modes.joint(guard.joint)])
-        self._watch_anew(t, held)
-        if self.setup.integrator.needs_jacobian:
-            self.control[At.NEXT] = 0.0
-        self._change_mode()
-
-    def _transfer(self, s: int, y: np.ndarray) -> None:
-        """Go on with what is carried from the start of a segment on."""
-        t, held = float(self.plan.starts[s]), self.runs.own[: self.rules.held, 0] if self.rules.held else None
-        y, happened = self.transfers.over(t, y)
-        self.equation = self.watch.equation = self.transfers.equation
-        self.switching = self.switching.of(self.equation)
-        if (modes := self.switching.modes) is not None:
-            modes.of.part(y)
-            y, more = modes.after(t, y, held, None)
-            happened += more
-        self.runs.y[:, 0] = y
-        self.events += happened
-        self.plan.transfers[s] = 0
-        self._watch_anew(t, held)
-        if self.setup.integrator.needs_jacobian:
-            self.control[At.NEXT] = 0.0
-        self._change_mode()
-
-    def _accumulated(self, t: float, y: np.ndarray, joint: str) -> None:
-        """AccumulationError if another method may make the run, else DivergedError."""
-        first = self._changes[0]
-        what = f"{_ACCUMULATED} changes of what holds joints in {t - first:.1e} s, the last of joint {joint!r}"
-        motion = self.equation.equation_of_motion
-        alone = motion.payloads or motion.drives  # which time stepping does not take
-        if alone or not self._chooses:
-            remedy = "soft stops and regularised friction" if alone else "integrator='time_stepping' and a step_s"
-            raise DivergedError(t, f"events accumulate at t = {t}: {what}; take {remedy}")
-        velocity = float(np.abs(y[self.rules.n : 2 * self.rules.n]).max())
-        remedy = f"made by time stepping with steps of {STEP_S} s, without an estimate of its error"
-        raise AccumulationError(
-            Remark(
-                Kind.ACCUMULATE, joint, "v", first, t - first, t, velocity, None, f"{what}, at t = {t:.6g} s", remedy
-            )
-        )
-
-    def _watch_anew(self, t: float, held: Array | None) -> None:
-        """The switching functions of the state reached."""
-        degree, functions = len(self.switches.b) - 1, self.switches.functions
-        self.switches = self.switching.at(t, self.y, degree, functions, held)
-
-    def _event(self, t: float, y: np.ndarray) -> None:
-        """Keep an event, and go on behind it; TerminalEvent ends the run."""
-        index, E = int(self.now[Now.EVENT]), len(self.switching.thresholds)
-        side = float(self.switches.sides[index])
-        index, guard = self.switching.place(index)
-        if guard is not None:
-            self._end_mode(t, y, guard)
-            return
-        if index < E:
-            self.events.append(self.switching.occurrence(index, t, y, side))
-            if self.setup.integrator.needs_jacobian:
-                self.control[At.NEXT] = 0.0  # an L-stable step damps what is fast: to start with, it must be resolved
-            if self._chatters():
-                self._drop(self.switching.thresholds[index])
-            self._change_mode()
-            return
-        event = self.setup.events[index - E]
-        if event.direction in (0, int(side)):
-            self.events.append(self.switching.occurrence(index, t, y, side))
-            if event.terminal and self.samples:
-                raise TerminalEvent(t, event.name)
-            if event.terminal:  # a companion goes on, past the states of the run at which they are compared
-                self.beyond = min(self.beyond, t)
 
     def _record(self, outcome: Outcome) -> Record:
         kept = self.kept

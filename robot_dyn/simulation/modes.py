@@ -1,51 +1,32 @@
-"""The modes of a run with dry friction or rigid stops: what ends a mode, and the state and the mode behind it.
-
-    impact        v⁺ = argmin ½ |v⁺ − v|²_M over v⁺ᵢ ≥ −eᵢ vᵢ at each stop that is struck or touched
-    acceleration  that of least constraint, of the joints at rest; one that broke away moves the way it was let go
-
-A joint that slides stops where v = 0, one that is held breaks away where the reaction λ leaves its interval. Impacts
-that follow each other ever faster end where the sum of their intervals says, in one impulse that takes what velocity
-their joint has left; what other joints do in that time is followed.
-[Moreau 1988; Glocker 2001; Acary, Brogliato, Numerical Methods for Nonsmooth Dynamical Systems, 2008, ch. 8]
-"""
+"""The modes of a run with dry friction or rigid stops: the numbers that the loop has of them, and words for events."""
 
 from __future__ import annotations
 
-from typing import NamedTuple, final
+from collections.abc import Sequence
+from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
-from robot_dyn.convex import minimum
+from robot_dyn.compiled.parameters import Parameter
 from robot_dyn.effects.effect import Conservative
-from robot_dyn.effects.rigid_stops import RigidStops
-from robot_dyn.effects.set_valued import Mode, settled
+from robot_dyn.effects.rigid_backlash import RigidBacklash
+from robot_dyn.effects.rigid_stops import RigidStops, touching
+from robot_dyn.effects.set_valued import Mode
+from robot_dyn.effects.settling import settling
 from robot_dyn.simulation.event import Occurrence
-from robot_dyn.simulation.gaps import Coordinates, end_of_gap
+from robot_dyn.simulation.event_log import What, event_log
+from robot_dyn.simulation.holding import Holding, Laws, Places, Room
+from robot_dyn.simulation.mode_change import REACTIONS, at_once, start, width
 from robot_dyn.simulation.state_equation import StateEquation
 
-_ACCUMULATED = 1e-6  # [s] for all impacts that are still to come: what ends there has no effect beyond its square
-_CROWDED = 20  # impacts within that time: they go on for ever, whatever the restitution
-_STILL = 1e-14  # [rad/s] or [m/s]: joints this slow stop together with the one that stops
+_IMPACTS = 64  # that are remembered
 _STOP = {-1: "lower stop", 1: "upper stop"}
-
-
-class Guard(NamedTuple):
-    """A quantity that ends a mode where it passes a level.
-
-    Attributes:
-        joint: Its index among the coordinates: joints, then motors in a backlash.
-        row: Entry of y, the rate of which it is if `rate`.
-        level: The level, in the unit of q, v or λ.
-        side: 1 where it must stay above, −1 where it must stay below.
-        rate: Whether it is a reaction, the rate of an impulse.
-    """
-
-    joint: int
-    row: int
-    level: float
-    side: int
-    rate: bool
+_END = {-1: "backward end", 1: "forward end"}
+_SAID = {
+    What.STRIKES: "strikes {}", What.RESTS_AT_LAST: "comes to rest at {}", What.STICKS: "sticks",
+    What.RESTS: "rests at {}", What.SLIDES: "slides", What.LEAVES: "leaves {}", What.REVERSES: "reverses",
+}  # fmt: skip
+_MODE = "held", "_direction", "_contact"  # coefficients of effects
 
 
 @final
@@ -54,241 +35,148 @@ class Modes:
 
     Args:
         equation: Its state equation, of effects without a mode.
-
-    Attributes:
-        whole: What is held now, and which way the others slide, of all coordinates.
+        holding: The mode, as numbers.
     """
 
-    def __init__(self, equation: StateEquation) -> None:
-        self.equation, self.effects = equation, equation.equation_of_motion.set_valued
-        self.stops = tuple(each for each in self.effects if isinstance(each, RigidStops))
-        self._n = n = equation.plant.dynamics.n
-        self.of = Coordinates(equation)
-        self.laws, self.impulses = self.of.widened(self.effects), self.of.impulses
-        self.whole = Mode(np.zeros(len(self.of.joints)), np.zeros(len(self.of.joints)))
-        self._impacts: list[tuple[float, Array]] = []  # times of the latest, and the coordinates that struck
-        rubs = (each.at_rest(np.zeros(n)).most > 0 for each in self.effects if not isinstance(each, RigidStops))
-        self._rubs = self.of.wide(sum(rubs, start=np.zeros(n, bool)), False)  # what may stick where its velocity is 0
+    def __init__(self, equation: StateEquation, holding: Holding) -> None:
+        self.equation, self.holding = equation, holding
 
     def start(self, y: np.ndarray) -> None:
         """The mode at the start: all that may be held is, until the reactions are known."""
-        x, v = y[self.of.rows], y[self.of.speeds]
-        least, most = self._intervals(x)
-        held = (v == 0) & ((least < 0) | (most > 0))
-        self.whole = Mode(held.astype(float), np.sign(v), self.of.contact(held, y.copy()))
+        start(self.holding, y[:, None].copy())
 
     @property
     def mode(self) -> Mode:
         """The mode of the joints."""
-        n, whole = self._n, self.whole
-        return Mode(whole.held[:n], whole.direction[:n], whole.contact)
-
-    def follow(self, before: Modes) -> None:
-        """Go on from the mode of the same effects on other bodies."""
-        self.whole, self._impacts = before.whole, before._impacts
+        of, n = self.holding, self.holding.laws.n
+        contact = of.contact.copy() if len(of.laws.motors) else None
+        return Mode(of.held[:n].copy(), of.direction[:n].copy(), contact)
 
     @property
-    def key(self) -> bytes:
-        """The mode in bytes."""
-        contact = b"" if self.whole.contact is None else self.whole.contact.tobytes()
-        return self.whole.held.tobytes() + self.whole.direction.tobytes() + contact
+    def guards(self) -> tuple[np.ndarray, np.ndarray]:
+        """The entry of y of each guard, and whether it is its rate, (K,)."""
+        laws = self.holding.laws
+        stops = [laws.rows] * (width(laws) - REACTIONS - 1)
+        rows = np.column_stack([laws.impulses, laws.impulses, laws.speeds, *stops])
+        return rows.ravel(), np.tile(np.arange(width(laws)) < REACTIONS, len(laws.rows))
 
-    def joint(self, coordinate: int) -> int:
-        """The joint of a coordinate."""
-        return int(self.of.joints[coordinate])
+    def joint(self, guard: int) -> str:
+        """The joint of a guard, by name."""
+        laws = self.holding.laws
+        return self._joint(guard // width(laws))
 
-    def _intervals(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        known = [each.at_rest(x) for each in self.laws]
-        return sum(each.least for each in known), sum(each.most for each in known)  # pyright: ignore[reportReturnType]
+    def _joint(self, i: int) -> str:
+        return self.equation.plant.dynamics.joint_names[self.holding.laws.joints[i]]
 
-    def guards(self, y: np.ndarray) -> list[Guard]:
-        """What ends the mode at a state y."""
-        n, of, made = self._n, self.of, []
-        x, v, whole = y[of.rows], y[of.speeds], self.whole
-        least, most = self._intervals(x)
-        for i, (row, speed) in enumerate(zip(of.rows.tolist(), of.speeds.tolist(), strict=True)):
-            if whole.held[i]:
-                levels = ((float(least[i]), 1), (float(most[i]), -1))
-                made += [Guard(i, int(of.impulses[i]), at, side, True) for at, side in levels if np.isfinite(at)]
-                continue
-            if whole.direction[i] and (self._rubs[i] or v[i] == 0):
-                made.append(Guard(i, speed, 0.0, int(whole.direction[i]), False))
-            ends = [(stops.lower, stops.upper) for stops in self.stops] if i < n else [(-of.level, of.level)]
-            for both in ends:
-                for level, side in zip(both, (1, -1), strict=True):
-                    position = float(np.broadcast_to(level, n)[i] if i < n else level[i - n])
-                    leaves = x[i] == position and v[i] == 0  # then its velocity is watched until it turns
-                    if np.isfinite(position) and not leaves:
-                        made.append(Guard(i, row, position, side, False))
-        return made
-
-    def after(
-        self, t: float, y: np.ndarray, held: Array | None, guard: Guard | None
-    ) -> tuple[np.ndarray, list[Occurrence]]:
-        """The state behind an event, in a mode of its own from there on, and what happened.
-
-        Args:
-            t: Time, in [s].
-            y: The state at the event.
-            held: The actuation in zero-order hold.
-            guard: What passed its level; None at the start of a run.
-        """
-        y, n, of, happened = y.copy(), self._n, self.of, []
-        q, v = y[:n], y[n : 2 * n]
-        for stops in self.stops:
-            q[:] = stops.snapped(q)
-        v[(np.abs(v) <= _STILL) & self._rubs[:n]] = 0.0
-        forced: dict[int, int] = {}
-        if guard is not None and guard.rate:
-            forced[guard.joint] = guard.side
-        elif guard is not None:
-            y[guard.row] = guard.level
-        of.snap(y)
-        y[self.impulses] = 0.0
-        before, M = self.whole, self.equation.plant.M(q)
-        for stops in self.stops or (None,) * bool(of.gaps):
-            side = of.wide(np.zeros(n, int) if stops is None else stops.touched(q), of.ends(y[of.rows]))
-            if (side * y[of.speeds] > 0).any():
-                happened += self._struck(t, y, held, M, stops, side)
-        forced = {i: way for i, way in forced.items() if y[of.speeds[i]] == 0}  # the impact may have thrown it back
-        found = settled(self.laws, *self._bodies(t, y, held, M), y[of.rows], y[of.speeds], forced)[1]
-        self.whole = found._replace(contact=of.contact(found.held, y))
-        struck = {each.joint for each in happened}
-        names = self.equation.plant.dynamics.joint_names
-        others = [i for i, joint in enumerate(of.joints) if names[joint] not in struck]
-        return y, happened + [each for i in others if (each := self._changed(i, before, t, y))]
-
-    def _struck(
-        self, t: float, y: np.ndarray, held: Array | None, M: np.ndarray, stops: RigidStops | None, side: np.ndarray
-    ) -> list[Occurrence]:
-        """The impact, with those that end behind it, its work in y."""
-        n, of = self._n, self.of
-        start, speeds = y.copy(), y[of.speeds]
-        strike = np.flatnonzero(side * speeds > 0)
-        e = of.wide(np.broadcast_to(0.0 if stops is None else stops.restitution, n).astype(float), of.restitution)
-        whole = self._bodies(t, y, held, M)[0]
-        self._impacts = [each for each in self._impacts if t - each[0] < _ACCUMULATED] + [(t, strike)]
-        v = _impact(whole, speeds, side, e, np.zeros(len(e), bool))
-        after, ended = self._ended(t, y, held, M, v, side, e)
-        of_gaps = of.take(y, after)
-        if stops is not None:
-            v, before = y[n : 2 * n], start[n : 2 * n]
-            y[self._work(stops)] += (v + before) @ M @ (v - before) / 2 - of_gaps
-        rests = ended < np.inf
-        return [
-            self._occurrence(
-                i, f"{'comes to rest at' if rests[i] else 'strikes'} {self._place(i, int(side[i]))}",
-                t + (float(ended[i]) if rests[i] else 0.0), y, int(side[i]),
-            )
-            for i in strike.tolist()
-        ]  # fmt: skip
-
-    def _ended(
-        self, t: float, y: np.ndarray, held: Array | None, M: np.ndarray, v: np.ndarray, side: np.ndarray, e: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """The velocity (N,) behind the bounces that follow an impact, and in how long each of their joints rests, (N,).
-
-        inf for joints that go on. The stop of a joint pushes that joint alone: its bounces together are one impulse
-        that takes the velocity it has behind the impact. It is not known where another joint strikes in their time.
-        """
-        of, y, after, ended = self.of, y.copy(), v, np.full(len(e), np.inf)
-        crowded = len(self._impacts) >= _CROWDED  # as several stops in turn
-        while True:  # each joint once, since those at rest do not return
-            of.take(y, after)
-            whole, load = self._bodies(t, y, held, M)
-            a = settled(self.laws, whole, load, y[of.rows], y[of.speeds])[0]
-            if crowded and (turns := self._in_turn(after, a, side) & (ended == np.inf)).any():
-                ended[turns] = 0.0
-                after = _impact(whole, v, side, e, ended < np.inf)
-                continue
-            left, meets = _lasts(after, a, side, 0 * e if crowded else e), self._meets(y, a)
-            first = int(np.argmin(left))  # the others are kicked by its bounces, and then loaded with it at rest
-            meets[first] = np.inf
-            if not left[first] < _ACCUMULATED or (left[first] > meets.min() and not crowded):
-                return after, ended
-            ended[first] = left[first]
-            after = _impact(whole, v, side, e, ended < np.inf)
-
-    def _in_turn(self, v: np.ndarray, a: np.ndarray, side: np.ndarray) -> np.ndarray:
-        """Which coordinates throw each other at their stops, faster and faster, (N,): all of them end with v = 0."""
-        strikes = np.bincount(np.concatenate([each for _, each in self._impacts]), minlength=len(v))
-        return (strikes > 1) & (side != 0) & (np.abs(v) < _ACCUMULATED * np.abs(a).max())
-
-    def _meets(self, y: np.ndarray, a: np.ndarray) -> np.ndarray:
-        """In how long each coordinate meets a stop or an end of its gap, at accelerations that stay, (N,)."""
-        n, of = self._n, self.of
-        x, v, meets = y[of.rows], y[of.speeds], np.full(len(a), np.inf)
-        known = [(each.lower, each.upper) for each in self.stops] or [(-np.inf, np.inf)]
-        for each in known:
-            lower, upper = (np.broadcast_to(level, n).astype(float) for level in each)
-            meets = np.fmin(meets, _falls(x - of.wide(lower, -of.level), v, a))
-            meets = np.fmin(meets, _falls(of.wide(upper, of.level) - x, -v, -a))
-        return meets
-
-    def _place(self, i: int, side: int) -> str:
-        """What a coordinate touches, in words."""
-        return f"its {_STOP[side]}" if i < self._n else end_of_gap(side)
-
-    def _work(self, stops: RigidStops) -> int:
-        """The entry of y that is the work of stops."""
-        works = [each for each in self.equation.plant.forces if not isinstance(each, Conservative)]
-        first = self.equation.size - len(self.equation.sources) + 1
-        return first + next(i for i, each in enumerate(works) if each is stops)
-
-    def _bodies(self, t: float, y: np.ndarray, held: Array | None, M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The mass matrix of all coordinates, and all torques but the reactions, less C v and ∂V/∂q."""
-        equation, motion = self.equation, self.equation.equation_of_motion
-        q, v, z, _ = equation.state(y)
-        u = equation.actuation(t, q, v, z, held)
-        total = sum(motion.torques(t, q, v, z=z[equation.state_size :]), start=motion.on_joints(u))
-        return self.of.bodies(M, total - equation.plant.dynamics.inverse_dynamics(q, v, 0 * v), u, y)
-
-    def _changed(self, i: int, before: Mode, t: float, y: np.ndarray) -> Occurrence | None:
-        """What the change of the mode is for a coordinate, in words."""
-        if i < self._n:
-            touched = next((int(side) for each in self.stops if (side := each.touched(y[: self._n])[i])), 0)
-        else:
-            touched = int(self.of.ends(y[self.of.rows])[i - self._n])
-        was, held = before.held[i], self.whole.held[i]
-        way, direction = before.direction[i], self.whole.direction[i]
-        if held and not was:
-            return self._occurrence(i, f"rests at {self._place(i, touched)}" if touched else "sticks", t, y, 0)
-        if was and not held:
-            word = f"leaves {self._place(i, touched)}" if touched == -direction and touched else "slides"
-            return self._occurrence(i, word, t, y, int(direction))
-        if way * direction < 0 and y[self.of.speeds[i]] == 0 and self._rubs[i]:
-            return self._occurrence(i, "reverses", t, y, int(direction))
-        return None
-
-    def _occurrence(self, i: int, what: str, t: float, y: np.ndarray, direction: int) -> Occurrence:
-        n, joint = self._n, self.equation.plant.dynamics.joint_names[self.joint(i)]
-        return Occurrence(t, f"{joint} {what}", direction, tuple(y[:n].tolist()), tuple(y[n : 2 * n].tolist()), joint)
+    def occurrence(self, row: Sequence[float]) -> Occurrence:
+        """What happened, in words, as of a row of the log."""
+        n, (t, i, what, side, direction, *state) = self.holding.laws.n, row
+        joint, end = self._joint(int(i)), ""
+        if side:
+            end = f"its {_STOP[int(side)]}" if i < n else f"the {_END[int(side)]} of its backlash"
+        name = f"{joint} {_SAID[What(int(what))].format(end)}"
+        return Occurrence(t, name, int(direction), tuple(state[:n]), tuple(state[n:]), joint)
 
 
-def _lasts(v: np.ndarray, a: np.ndarray, side: np.ndarray, e: np.ndarray) -> np.ndarray:
-    """How long the bounces of each joint that leaves its stop at v still take, Σ 2 eᵏ |v| / |a|; inf for the others."""
-    returns = (side * a > 0) & (side * v < 0) & (e < 1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(returns, 2 * np.abs(v) / (np.abs(a) * (1 - e)), np.inf)
+def modes_of(equation: StateEquation, own: np.ndarray, places: Places, most: int, brief: float) -> Modes:
+    """The modes of a state equation of effects without a mode; nothing is held yet.
 
-
-def _falls(d: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
-    """The time t > 0 at which d + v t + a t²/2 first vanishes, d ≥ 0, for each; nan where it never does, or rests."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        root = np.sqrt(v * v - 2 * a * d)
-        return np.where(v > 0, np.where(a < 0, (v + root) / -a, np.nan), 2 * d / (root - v))
-
-
-def _impact(M: np.ndarray, v: np.ndarray, side: np.ndarray, e: np.ndarray, still: np.ndarray) -> np.ndarray:
-    """The velocity behind an impact at the stops on those sides; friction is finite, and takes no part.
-
-    Joints that are to be still have 0: a projection in the norm of M, which adds no energy.
+    Args:
+        equation: The state equation.
+        own: Own numbers of it in which nothing is held, (O, 1).
+        places: Where they have the mode.
+        most: Changes of the mode that are too many in a brief time.
+        brief: That time, in [s].
     """
-    n = len(v)
-    bound = np.where(still, -v, -(1 + e) * v)
-    meets = side * v >= 0
-    lower = np.where((side < 0) & meets | still, bound, -np.inf)
-    upper = np.where((side > 0) & meets | still, bound, np.inf)
-    change = minimum(M, np.zeros(n), np.zeros(n), lower, upper)
-    after = np.where((change == bound) & (side != 0) & meets, -e * v, v + change)
-    return np.where(still, 0.0, after)
+    laws = laws_of(equation)
+    n, N = laws.n, len(laws.rows)
+    held, direction = np.zeros((2, N))
+    none, changed = np.zeros((2, 1), np.int64)
+    holding = Holding(
+        laws, places, held, direction, np.zeros(n), own, n * equation.sampled, np.zeros(_IMPACTS),
+        np.zeros((_IMPACTS, max(N, 2))), none, np.zeros(most), changed, brief, event_log(n, at_once(laws), brief),
+        _room(equation, N, n),
+    )  # fmt: skip
+    return Modes(equation, holding)
+
+
+def laws_of(equation: StateEquation) -> Laws:
+    """The laws of what may hold the joints of a state equation."""
+    n, motion = equation.plant.dynamics.n, equation.equation_of_motion
+    works: list[Any] = [each for each in equation.plant.forces if not isinstance(each, Conservative)]
+    first_work, of_states = equation.size - len(equation.sources) + 1, 2 * n + equation.state_size
+    gaps = [_gaps(motion.effects[k], n, of_states + place.start, first_work + works.index(motion.effects[k]))
+            for k, place in motion.states.items() if isinstance(motion.effects[k], RigidBacklash)]  # fmt: skip
+    made = [np.concatenate(each) for each in zip(*gaps, strict=True)] if gaps else [np.zeros(0)] * 9
+    joints, delta, speed, motors, impulse, work, inertia, level, e = made
+    others = [each for each in motion.set_valued if not isinstance(each, RigidStops)]
+    stops = [each for each in motion.set_valued if isinstance(each, RigidStops)]
+    intervals = [each.at_rest(np.zeros(n)) for each in others]
+    least, most = (sum((each[k] for each in intervals), start=np.zeros(n)) for k in (0, 1))
+    sliding = sum((each.sliding(np.zeros(n)) for each in motion.set_valued), start=np.zeros(n))
+    lower, upper, restitution = _stops(stops, n, level, e)
+    works_of_stops = [first_work + works.index(each) for each in stops] or [-1] * bool(gaps)
+
+    def rows(of_joints: np.ndarray, of_gaps: np.ndarray) -> np.ndarray:
+        return np.concatenate([of_joints, of_gaps.astype(np.int64)])
+
+    def wide(of_joints: np.ndarray) -> np.ndarray:
+        return np.concatenate([of_joints, np.zeros(len(joints), of_joints.dtype)])
+
+    i, end = np.arange(n), 2 * n + equation.states
+    return Laws(
+        n, rows(i, joints), rows(i, delta), rows(n + i, speed), rows(end - n + i, impulse), motors.astype(np.int64),
+        work.astype(np.int64), inertia, wide(least), wide(most), wide(sliding), wide(most > 0), lower, upper,
+        restitution, touching(lower, -1), touching(upper, 1), np.array(works_of_stops, np.int64),
+    )  # fmt: skip
+
+
+def _stops(stops: Sequence[RigidStops], n: int, level: np.ndarray, e: np.ndarray) -> np.ndarray:
+    """Lower and upper stops and e of each effect, with the ends of gaps, (3, S, N), and two columns at least."""
+    known: list[Any] = [[each.lower, each.upper, each.restitution] for each in stops]
+    known = known or [[-np.inf, np.inf, 0.0]] * (len(level) > 0)
+    of_joints = np.array([[np.broadcast_to(x, n) for x in each] for each in known], float).reshape(-1, 3, n)
+    of_gaps = np.broadcast_to(np.array([-level, level, e]), (len(known), 3, len(level)))
+    unused = np.zeros((len(known), 3, max(0, 2 - n - len(level))))
+    return np.ascontiguousarray(np.concatenate([of_joints, of_gaps, unused], axis=2).swapaxes(0, 1))
+
+
+def _gaps(effect: Any, n: int, at: int, work: int) -> tuple[Any, ...]:
+    """Of each gap: joint, entries of y for δ, δ̇, θ̇, the impulse and the work; B, β and e."""
+    joints = np.array(effect.driven(n))
+    k = len(joints)
+    numbers = [effect.reflected(n), effect.of("gap", n), effect.of("restitution", n)]
+    rows = [at + i * k + np.arange(k) for i in range(4)]
+    return joints, *rows, np.full(k, work), *(np.asarray(each, float) for each in numbers)
+
+
+def _room(equation: StateEquation, N: int, n: int) -> Room:
+    side, v, first, after, ended, least, most, forced, a, held, direction, was_held, was_direction = np.zeros((13, N))
+    return Room(
+        np.zeros((n * n + n + N - n, 1)), np.zeros((equation.size, 1)), np.zeros((n, max(n, 2))),
+        np.zeros((N, max(N, 2))), np.zeros(N), side, v, first, after, ended, least, most, forced, a, held, direction,
+        was_held, was_direction, np.zeros(n), settling(N),
+    )  # fmt: skip
+
+
+def places(known: Sequence[Parameter], first: int) -> Places:
+    """Where parameters have the mode, behind so many other own numbers."""
+    at: dict[str, list[int]] = {name: [] for name in _MODE}
+    for each in known:
+        if each.key in at and each.part[0] == "effect":
+            at[each.key].append(first)
+        first += each.size
+    return Places(*(np.array(each, np.int64) for each in at.values()))
+
+
+def alone(n: int, first: int) -> Places:
+    """Where own numbers are the mode and nothing else, behind so many others: held, direction and contact, (3n,)."""
+    return Places(*(np.array([first + k * n], np.int64) for k in range(3)))
+
+
+_NONE, _ROWS, _TABLE = np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 0))
+NOTHING_HELD = Holding(  # of an equation without anything that may hold joints
+    Laws._make([0, *[_ROWS] * 6, *[_NONE] * 4, np.zeros(0, bool), *[_TABLE] * 5, _ROWS]), Places._make([_ROWS] * 3),
+    _NONE, _NONE, _NONE, _TABLE, 0, _NONE, _TABLE, _ROWS, _NONE, _ROWS, 0.0, event_log(0, 0, 0.0),
+    Room._make([*[_TABLE] * 4, *[_NONE] * 15, settling(0)]),
+)  # fmt: skip

@@ -14,11 +14,12 @@ import numpy as np
 
 from robot_dyn.simulation.event_run import EventRun
 from robot_dyn.simulation.fixed_step import FixedStep
+from robot_dyn.simulation.modes import alone, places
 from robot_dyn.simulation.observer import Observer
 from robot_dyn.simulation.schedule import mesh
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.state_equation import StateEquation
-from robot_dyn.simulation.state_functions import interpreted
+from robot_dyn.simulation.state_functions import in_modes, interpreted
 from robot_dyn.simulation.time_loop import Functions
 from robot_dyn.simulation.transfers import Transfers
 from robot_dyn.simulation.watch import Watch
@@ -57,6 +58,8 @@ def prepared(
     watch = Watch(setup, transfers.equation)
 
     def made(of: StateEquation) -> tuple[Functions, np.ndarray]:
+        if machine is None and of.impulses and setup.finds_events:
+            return in_modes(of, watch), np.zeros(3 * of.plant.dynamics.n)
         if machine is None:
             return interpreted(of, watch), np.zeros(0)
         functions = machine.in_python if machine.loop is None else machine.equations.functions
@@ -67,7 +70,10 @@ def prepared(
         ends = pace if isinstance(pace, np.ndarray) else None
         if not setup.integrator.controls_error:
             ends = mesh(setup.segments, cast(Fraction, pace))
+        first = equation.plant.dynamics.n * equation.sampled
+        of_mode = alone(equation.plant.dynamics.n, first) if machine is None else places(machine.known, first)
         return EventRun(
-            watch, transfers, made, ends, loop, on_progress, observer, in_python, samples, most, thresholds, chooses
+            watch, transfers, made, ends, of_mode, loop, on_progress, observer, in_python, samples, most, thresholds,
+            chooses,
         )  # fmt: skip
     return FixedStep(watch, transfers, made, cast(Fraction, pace), loop, on_progress, observer)

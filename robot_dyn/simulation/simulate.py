@@ -26,7 +26,7 @@ from robot_dyn.simulation.declarations import named, undeclared
 from robot_dyn.simulation.divergence import explained
 from robot_dyn.simulation.error import ErrorEstimate, no_estimate
 from robot_dyn.simulation.estimate import estimate
-from robot_dyn.simulation.event_run import AccumulationError, TooLongError
+from robot_dyn.simulation.event_run import TooLongError
 from robot_dyn.simulation.imbalance import cause
 from robot_dyn.simulation.loads import at_stop, frame_of, wrenches
 from robot_dyn.simulation.observed import observer_of, remarks
@@ -41,6 +41,7 @@ from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import check_record
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.stiffness import StiffError, bounded_by_stability
+from robot_dyn.simulation.switched_run import AccumulationError
 from robot_dyn.simulation.tracking import deviation_of
 from robot_dyn.simulation.trajectory import Ending, Outcome, Statistics, Trajectory
 from robot_dyn.simulation.unstable_loop import unstable

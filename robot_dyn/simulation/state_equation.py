@@ -20,8 +20,8 @@ from robot_dyn.arithmetic import Array
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.effect import Bound, Conservative, Stateful
 from robot_dyn.effects.equation_of_motion import EquationOfMotion
-from robot_dyn.effects.plant import Plant, carrying
-from robot_dyn.effects.set_valued import Mode, SetValued
+from robot_dyn.effects.plant import Plant, carrying, in_mode
+from robot_dyn.effects.set_valued import Mode
 from robot_dyn.errors import RobotDynError
 from robot_dyn.foreign import call
 from robot_dyn.model.dynamics import acceleration
@@ -97,10 +97,7 @@ class StateEquation:
             return replace(self, plant=carrying(self.plant, [True] * len(payloads))).in_a_mode
         if not self.impulses:
             return self
-        n = self.plant.dynamics.n
-        mode = Mode(np.zeros(n), np.zeros(n))
-        effects = [x.in_mode(mode) if isinstance(x, SetValued) else x for x in self.plant.effects]
-        return replace(self, plant=Plant(self.plant.dynamics, effects))
+        return replace(self, plant=in_mode(self.plant, Mode(*np.zeros((2, self.plant.dynamics.n)))))
 
     @property
     def size(self) -> int:

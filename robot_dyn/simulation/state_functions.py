@@ -1,19 +1,24 @@
 """The state equation as functions for a time loop, (t, y, p, own, out), of one interpreted run.
 
 rate: y' and u    tick: u, in zero-order hold from then on, and the next states of the controller    energy: K and V
-sample: y', u, K and V    jacobian: as of `RightSide`, by differences
+sample: y', u, K and V    jacobian: as of `RightSide`, by differences    bodies: as of `bodies`
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from robot_dyn.arithmetic import Array
+from robot_dyn.effects.plant import in_mode
+from robot_dyn.effects.set_valued import Mode
 from robot_dyn.errors import RobotDynError
 from robot_dyn.integrate.integrator import System
 from robot_dyn.integrate.primitives import evaluate
+from robot_dyn.simulation.bodies import bodies
 from robot_dyn.simulation.moreau_jean import behind, stepped
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.time_loop import Functions
@@ -56,8 +61,34 @@ def interpreted(equation: StateEquation, watch: Watch) -> Functions:
     def of_behind(t: float, x: Array, p: Array, found: Array, out: Array) -> None:
         out[:, 0] = behind(equation, x[:, 0], found[:, 0])
 
-    functions = Functions(rate, tick, energy, sampled, jacobian, 0, step, of_behind)
+    def of_bodies(t: float, y: Array, p: Array, own: Array, out: Array) -> None:
+        held = own[:n, 0].copy() if equation.sampled else None
+        out[:, 0] = bodies(equation, min(max(t, p[0]), p[1]), _state(y), held)
+
+    functions = Functions(rate, tick, energy, sampled, jacobian, 0, step, of_behind, bodies=of_bodies)
     return functions
+
+
+def in_modes(equation: StateEquation, watch: Watch) -> Functions:
+    """The same in the mode that the last 3n own numbers are: held, direction and contact."""
+    known: dict[bytes, Functions] = {}
+
+    def of(own: Array) -> Functions:
+        numbers = own[len(own) - 3 * equation.plant.dynamics.n :, 0]
+        key = numbers.tobytes()
+        if key not in known:
+            mode = Mode(*numbers.copy().reshape(3, -1))
+            known[key] = interpreted(replace(equation, plant=in_mode(equation.plant, mode)), watch)
+        return known[key]
+
+    def forwarded(name: str) -> Callable[..., None]:
+        def function(t: float, y: Array, p: Array, own: Array, out: Array) -> None:
+            getattr(of(own), name)(t, y, p, own, out)
+
+        return function
+
+    names = "rate", "tick", "energy", "sample", "jacobian", "bodies"
+    return Functions(**{name: forwarded(name) for name in names})
 
 
 def sample(equation: StateEquation, t: float, y: Array, held: Array | None, out: Array) -> None:

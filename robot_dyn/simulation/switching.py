@@ -9,13 +9,13 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.effects.effect import Effect
-from robot_dyn.effects.plant import Plant
-from robot_dyn.effects.set_valued import SetValued
+from robot_dyn.effects.plant import Plant, in_mode
 from robot_dyn.errors import EffectError
 from robot_dyn.integrate.bernstein import room
 from robot_dyn.simulation.crossings import ROUNDING, Switches
 from robot_dyn.simulation.event import Occurrence
-from robot_dyn.simulation.modes import Guard, Modes
+from robot_dyn.simulation.mode_change import guards
+from robot_dyn.simulation.modes import Modes
 from robot_dyn.simulation.state_equation import CONTROLLER, StateEquation
 from robot_dyn.threshold import Threshold
 
@@ -29,12 +29,11 @@ class Switching:
     Args:
         equation: The state equation, of parts that switch by themselves, and with events asked for.
         dropped: What is no longer looked at: there the parts switch by themselves.
-        modes: What is held now; nothing yet unless given.
+        modes: What is held; None where nothing may hold a joint.
 
     Attributes:
         thresholds: Those of coordinates, each once, and then those of the actuation, part by part.
-        modes: What joints may be held by; None where nothing may hold one.
-        guards: What ends the mode, as of the last call of `at`: its switching functions come between the two.
+        guards: Number of the guards of the modes: these switching functions come between the two.
     """
 
     def __init__(
@@ -53,16 +52,8 @@ class Switching:
         self.coordinates = len(coordinates)
         self.thresholds: tuple[Threshold, ...] = tuple(each for _, each in (*coordinates, *actuation))
         self._parts: tuple[int | None, ...] = tuple(k for k, _ in (*coordinates, *actuation))
-        self.modes = (modes or Modes(equation)) if equation.impulses else None
-        self.guards: list[Guard] = []
+        self.modes, self.guards = modes, 0 if modes is None else len(modes.guards[0])
         self._known: dict[bytes, StateEquation] = {}
-
-    def of(self, equation: StateEquation) -> Switching:
-        """The same of the equation with other bodies, in the mode that is known."""
-        modes = None if self.modes is None else Modes(equation)
-        if modes is not None and self.modes is not None:
-            modes.follow(self.modes)
-        return Switching(equation, self.dropped, modes)
 
     @property
     def quantities(self) -> frozenset[Quantity]:
@@ -92,7 +83,8 @@ class Switching:
     def at(self, t: float, y: np.ndarray, degree: int, functions: object, held: Array | None) -> Switches:
         """The switching functions, on their sides of a state y at t and of the mode, for dense output of a degree."""
         n, E, G = self._n, self.coordinates, len(self.events)
-        self.guards = guards = self.modes.guards(y) if self.modes is not None else []
+        of_guards, reactions = (np.zeros(0), np.zeros(0)) if self.modes is None else self.modes.guards
+        K = len(of_guards)
         rows, actuation = np.split(self.rows, [E])
         levels = self.levels
         gaps = y[rows] - levels[:E]
@@ -105,17 +97,20 @@ class Switching:
         gaps = values[actuation] - levels[E:]
         sides = np.concatenate([sides, np.where(gaps == 0, -np.sign(levels[E:]), np.sign(gaps))])  # a limit is reached
         sides = np.append(sides, np.sign(values[first:]))  # 0 where y is a root: the next step tells
-        rows = np.concatenate([rows, [each.row for each in guards], actuation, first + np.arange(G)]).astype(np.int64)
-        levels = np.insert(np.append(levels, np.zeros(G)), E, [each.level for each in guards])
-        sides = np.insert(sides, E, [each.side for each in guards])
-        exact = ROUNDING * np.maximum(1.0, np.abs(levels[: E + len(guards)]))
-        slack = np.maximum(exact, [each.slack for each in self.thresholds[:E]] + [0.0] * len(guards))
-        rates = np.array([False] * E + [each.rate for each in guards], bool)
-        zeroed = np.zeros(0, np.int64) if self.modes is None else self.modes.impulses
-        return Switches(
-            rows, levels, sides, rates, zeroed, functions, G, np.zeros((len(values), 1)), values,
+        rows = np.concatenate([rows, of_guards, actuation, first + np.arange(G)]).astype(np.int64)
+        levels = np.insert(np.append(levels, np.zeros(G)), E, np.zeros(K))
+        sides = np.insert(sides, E, np.ones(K))
+        exact = ROUNDING * np.maximum(1.0, np.abs(levels[: E + K]))
+        slack = np.maximum(exact, [each.slack for each in self.thresholds[:E]] + [0.0] * K)
+        rates, active = np.append(np.zeros(E, bool), reactions > 0), np.arange(E + K) < E
+        zeroed = np.zeros(0, np.int64) if self.modes is None else self.modes.holding.laws.impulses
+        made = Switches(
+            rows, levels, sides, rates, active, E, K, zeroed, functions, G, np.zeros((len(values), 1)), values,
             np.zeros(len(values)), exact, slack, np.zeros(degree + 1), room(degree),
         )  # fmt: skip
+        if self.modes is not None:
+            guards(self.modes.holding, y[:, None].copy(), made)
+        return made
 
     def _row(self, part: int | None, each: Threshold) -> int:
         """The entry of y that passes a threshold."""
@@ -150,9 +145,8 @@ class Switching:
 
     def on(self, sides: np.ndarray) -> StateEquation:
         """The state equation with each threshold on its side, in the mode that is known; smooth there."""
-        E, mode = self.coordinates, None if self.modes is None else self.modes.mode
-        sides = np.concatenate([sides[:E], sides[E + len(self.guards) :][: len(self.thresholds) - E]])
-        key = sides.tobytes() + (b"" if self.modes is None else self.modes.key)
+        mode, sides = None if self.modes is None else self.modes.mode, self.of_thresholds(sides)
+        key = sides.tobytes() + (b"" if mode is None else np.concatenate([x for x in mode if x is not None]).tobytes())
         if key not in self._known:
             of: dict[tuple[int | None, Threshold], int] = {
                 (part, each): int(side) for part, each, side in zip(self._parts, self.thresholds, sides, strict=False)
@@ -162,20 +156,21 @@ class Switching:
             effects: list[Effect] = [
                 effect.beyond(n, at[k]) if at[k] else effect for k, effect in enumerate(equation.plant.effects)
             ]
-            if mode is not None:
-                effects = [x.in_mode(mode) if isinstance(x, SetValued) else x for x in effects]
-            controller = equation.controller
+            plant, controller = Plant(equation.plant.dynamics, effects), equation.controller
             if controller is not None and at.get(CONTROLLER):
                 controller = controller.beyond(at[CONTROLLER])
-            self._known[key] = replace(equation, plant=Plant(equation.plant.dynamics, effects), controller=controller)
+            plant = plant if mode is None else in_mode(plant, mode)
+            self._known[key] = replace(equation, plant=plant, controller=controller)
         return self._known[key]
 
-    def place(self, index: int) -> tuple[int, Guard | None]:
-        """The number of a switching function among thresholds and events asked for, or the guard that it is."""
-        k = index - self.coordinates
-        if 0 <= k < len(self.guards):
-            return -1, self.guards[k]
-        return index - (len(self.guards) if k >= 0 else 0), None
+    def number(self, index: int) -> int:
+        """The number of a switching function among thresholds and events asked for."""
+        return index - (self.guards if index >= self.coordinates else 0)
+
+    def of_thresholds(self, sides: np.ndarray) -> np.ndarray:
+        """The sides of the thresholds, (T,), of those of all switching functions."""
+        E = self.coordinates
+        return np.concatenate([sides[:E], sides[E + self.guards :][: len(self.thresholds) - E]])
 
     def occurrence(self, index: int, t: float, y: np.ndarray, side: float) -> Occurrence:
         """The event of the threshold, or of the function asked for, of this number; its sign is now `side`."""

@@ -35,6 +35,9 @@ class Ended(IntEnum):
     FAST = 7  # a joint moves without bound; y is the state after the step
     EVENT = 8  # y is the state at it
     TRANSFER = 9  # a payload is picked up or dropped; y is the state before it
+    CHANGED = 10  # the mode, and with it the side of a threshold; y is the state behind it
+    ACCUMULATED = 11  # changes of the mode, in next to no time
+    UNSETTLED = 12  # the state and the mode behind an event were not found
 
 
 class Why(IntEnum):
@@ -79,6 +82,7 @@ class Functions(NamedTuple):
         events: Values of the events.
         step, behind: As of `RightSide`.
         actuation: u, of runs in lock step in which it changes between ticks.
+        bodies: Mass matrix and loads, where something may hold joints: as of `bodies`.
     """
 
     rate: Any
@@ -90,6 +94,7 @@ class Functions(NamedTuple):
     step: Any = 0
     behind: Any = 0
     actuation: Any = 0
+    bodies: Any = 0
 
 
 class Plan(NamedTuple):

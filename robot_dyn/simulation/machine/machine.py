@@ -20,6 +20,7 @@ from robot_dyn.control.controller import Controller
 from robot_dyn.effects.effect import Effect
 from robot_dyn.errors import RobotDynError
 from robot_dyn.foreign import because
+from robot_dyn.simulation.bodies import bodies
 from robot_dyn.simulation.machine.equations import STEP, Equations
 from robot_dyn.simulation.machine.jacobian_check import DIFFERENCES, by_differences
 from robot_dyn.simulation.machine.states import States, random_states, some, states_of
@@ -233,6 +234,9 @@ class Machine:
             q, v, z, _ = self.equation.state(y)
             demands = self.equation.demands(t, q, v, z, held, self.equation.limited)
             yield ours["events"], np.array([*np.ravel(demands), *self.equation.switching(t, q, v)], dtype=float)
+        if "bodies" in ours:
+            made = ours["bodies"], bodies(self.equation, t, y, held)
+            yield from zip(*(np.split(each, [n * n]) for each in made), strict=True)
         if "tick" in ours:
             after, command = self.equation.tick(t, y)
             yield ours["tick"][:n], np.asarray(command)

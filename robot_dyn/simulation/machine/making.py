@@ -33,6 +33,7 @@ from robot_dyn.simulation.machine.programs import (
 )
 from robot_dyn.simulation.machine.recent import Recent
 from robot_dyn.simulation.machine.structure import changeable
+from robot_dyn.simulation.mode_change import end_mode, without_modes
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.time_loop import time_loop
 
@@ -174,16 +175,17 @@ def _loop(
         if lanes > 1:
             raise refused
         return refused
-    return loop_of(method, cuts, detects)
+    return loop_of(method, cuts, detects, bool(equation.impulses))
 
 
-def loop_of(method: Any, cuts: bool, detects: bool = False) -> MachineFunction:
+def loop_of(method: Any, cuts: bool, detects: bool = False, holds: bool = False) -> MachineFunction:
     """The time loop of a method whose steps are plain; its `is_kept` tells whether it costs milliseconds or a second.
 
     Args:
         method: An `Integrator` or `Adaptive`.
         cuts: Whether steps are chosen, or cut at events.
         detects: As of `machine`.
+        holds: Whether something may hold joints.
     """
     from robot_dyn.simulation.machine.loop import loop
 
@@ -191,4 +193,5 @@ def loop_of(method: Any, cuts: bool, detects: bool = False) -> MachineFunction:
         step = method.stepper(FLOAT64, 1, 0, 1).step
         return loop(time_loop, detecting(step) if detects else step, works=method.nonsmooth)
     made = STEPPERS[method.method](1, 1, 1) if method.controls_error else hermite.stepper(method, 1, 0, 1, None)
-    return loop(event_loop, made.begin, made.step, made.error, made.accept, made.dense)
+    of_modes = end_mode if holds else without_modes
+    return loop(event_loop, made.begin, made.step, made.error, made.accept, made.dense, of_modes)

@@ -1,6 +1,7 @@
 """The state equation in symbols: the lines of `StateEquation` traced to functions of (t, y, p, own).
 
     rate = (y', u),   tick = (u, z⁺),   energy = (K, V),   sample = what is kept beside the state
+    bodies = (M, loads), where something may hold joints
     in lock step rate = y', and actuation = u where it changes between ticks
     jacobian = (∂y'/∂y₁, …, ∂y'/∂y_m, ∂y'/∂t)
 
@@ -23,6 +24,7 @@ from robot_dyn.compiled.symbolic_dynamics import SymbolicDynamics
 from robot_dyn.compiled.symbolic_plant import Piece, symbolic_controller, symbolic_plant, whichever_way, wide
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.foreign import call
+from robot_dyn.simulation.bodies import bodies as bodies_of
 from robot_dyn.simulation.event import Event
 from robot_dyn.simulation.moreau_jean import behind, problem, solution
 from robot_dyn.simulation.plan import BOUNDS, lengths, polynomials
@@ -76,6 +78,8 @@ def trace(
         )
         if not single and (not equation.sampled or equation.equation_of_motion.bounds_at_all_times):
             made["actuation"] = parts["u"]
+        if single and equation.impulses and not nonsmooth:
+            made["bodies"] = bodies_of(symbolic, time, state, held_here)
         if equation.events or equation.limited:
             demands = symbolic.demands(time, q, v, z, held_here, equation.limited)
             values = [wide(each, n) for each in demands] + [_value(each, time, q, v) for each in equation.events]
