@@ -19,10 +19,12 @@ from robot_dyn.errors import NotFiniteError, OverflowedError, RobotDynError
 from robot_dyn.foreign import is_mistake
 from robot_dyn.integrate import hermite
 from robot_dyn.integrate.adaptive import STEPPERS
+from robot_dyn.integrate.bernstein import room
 from robot_dyn.integrate.step_control import At, ControlledStepper, control_of
+from robot_dyn.simulation.crossings import Switches
 from robot_dyn.simulation.event import Occurrence
 from robot_dyn.simulation.event_loop import Kept, Times, event_loop
-from robot_dyn.simulation.fixed_step import rules_of, runs_of
+from robot_dyn.simulation.fixed_step import rules_alone, runs_of
 from robot_dyn.simulation.followed import Followed
 from robot_dyn.simulation.modes import Guard
 from robot_dyn.simulation.observation import NOTHING
@@ -42,6 +44,7 @@ from robot_dyn.simulation.trajectory import Ending, Outcome
 from robot_dyn.simulation.transfers import Transfers
 from robot_dyn.simulation.watch import DivergedError, Watch, one_step
 from robot_dyn.threshold import Threshold
+from robot_dyn.values import copied
 
 _SAMPLES = 1000  # of a run without a record period
 _COMPARED = 1000  # times at which a run is compared with runs of other tolerances
@@ -134,7 +137,7 @@ class EventRun(Followed):
         self.runs.energy[0], self.runs.scale[0] = self.watch.energy, self.watch.scale
         of = self.stepper
         self.advance = machine_code or event_loop(of.begin, of.step, of.error, of.accept, of.dense)
-        self.rules = rules_of(equation, True, inf)
+        self.rules = setup.kept(rules_alone)
         self.times = _times(setup, mesh, samples)
         compared = self.times.compared
         S, rows = len(self.plan.counts), int(most_samples(setup)) + 2 if samples else 0
@@ -146,8 +149,12 @@ class EventRun(Followed):
         )  # fmt: skip
         if self.switching.modes is not None:
             self.switching.modes.start(self.start)
-        events = self.functions.events if self.compiled else self.switching.function
-        self.switches = self.switching.at(0.0, self.start, len(of.work.F), events, own[:n, 0] if held else None)
+        events, degree = self.functions.events if self.compiled else self.switching.function, len(of.work.F)
+        if thresholds and self.switching.modes is None and not transfers.any:
+            known = copied(setup.kept(_switches))
+            self.switches = known._replace(functions=events, b=np.zeros(degree + 1), stack=room(degree))
+        else:
+            self.switches = self.switching.at(0.0, self.start, degree, events, own[:n, 0] if held else None)
         self.events: list[Occurrence] = []
         self.beyond = inf
         self.met: RobotDynError | None = None
@@ -398,6 +405,13 @@ class EventRun(Followed):
             int(self.now[Now.STEPS]), int(self.now[Now.EVALUATIONS]), float(self.runs.peak[0]), tuple(self.events),
             ends,
         )  # fmt: skip
+
+
+def _switches(setup: Setup) -> Switches:
+    """The switching functions at the start, where nothing is held or carried."""
+    equation = setup.equation
+    held = np.full(equation.plant.dynamics.n, np.nan) if equation.sampled else None
+    return Switching(equation).at(0.0, equation.start(setup.q0, setup.v0), 0, None, held)
 
 
 def _method(setup: Setup, equation: StateEquation) -> tuple[ControlledStepper, np.ndarray]:

@@ -69,7 +69,7 @@ def setup_of(caller: str, what: Setup | Plant | Dynamics, options: Mapping[str, 
             raise QueryError(no_step(method.name))
         options = {"step_s": None, **options}  # that of the setup was given for another method
     if isinstance(what, Setup):
-        return replace(what, **options) if options else what
+        return replace(what, **options) if options else what.current()
     plant = what if isinstance(what, Plant) else Plant(what)
     if "q0" not in options:
         raise QueryError(f"{caller}: give q0, the position at the start, ({plant.dynamics.n},)")

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field
+from copy import copy
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from math import inf
-from typing import Any, final
+from typing import Any, TypeVar, final
 
 import numpy as np
 
@@ -21,7 +23,7 @@ from robot_dyn.foreign import call
 from robot_dyn.integrate.adaptive import AUTO, Adaptive
 from robot_dyn.integrate.methods import as_method
 from robot_dyn.simulation.asked import asked
-from robot_dyn.simulation.declarations import undeclared
+from robot_dyn.simulation.declarations import is_value, undeclared
 from robot_dyn.simulation.event import Event
 from robot_dyn.simulation.schedule import LEAST_STEPS, ON_STEP, Segment, cuts, near, nodes, steps_on
 from robot_dyn.simulation.size import check_segments
@@ -34,11 +36,13 @@ ENGINES = ("auto", "interpreted", "compiled")
 STEP_S = 1e-3  # of a method of fixed step, unless given
 _LONGEST_STEP_S, _LEAST_STEPS = 0.01, 200  # where a part does not declare where it switches
 
+Made = TypeVar("Made")
+
 
 @final
 @dataclass(frozen=True, eq=False)
 class Setup(Value):
-    """All that a run depends on.
+    """All that a run depends on; what follows from it alone is computed once, and kept with it.
 
     Attributes:
         plant: What moves.
@@ -222,6 +226,40 @@ class Setup(Value):
         if controller.task_frame is not None:
             plant.placement(self.q0, controller.task_frame)  # so that an unknown link is told now
 
+    def __getstate__(self) -> Any:
+        state, frozen = super().__getstate__()
+        return {each.name: state[each.name] for each in fields(self)}, frozen
+
+    @cached_property
+    def known(self) -> dict[Any, Any]:
+        """What follows from the setup alone, by the functions that compute it; neither copied nor pickled."""
+        return {}
+
+    def kept(self, compute: Callable[[Setup], Made]) -> Made:
+        """What a function of the setup returns; it is called once, and must not depend on anything else."""
+        if compute not in self.known:
+            self.known[compute] = compute(self)
+        return self.known[compute]
+
+    @cached_property
+    def is_value(self) -> bool:
+        """Whether nothing can change what follows from it: it has no part whose code or attributes are the user's."""
+        return all(map(is_value, (self.plant, self.controller, self.integrator, self.events)))
+
+    def current(self) -> Setup:
+        """The setup as its parts are now: itself, or a copy without what was kept if parts may have changed since."""
+        return self if self.is_value else copy(self)
+
+    @cached_property
+    def equation(self) -> StateEquation:
+        """Its state equation."""
+        return StateEquation(self.plant, self.controller, self.integrator.canonical, self.events)
+
+    @cached_property
+    def undeclared(self) -> tuple[tuple[Any, str], ...]:
+        """Its parts that do not declare what they must, each with what to declare."""
+        return undeclared(self.plant, self.controller)
+
     @cached_property
     def segments(self) -> tuple[Segment, ...]:
         """The run cut at the ticks of the controller, the breaks of its reference and the switches of effects.
@@ -262,8 +300,7 @@ class Setup(Value):
         """Whether steps end where effects and the controller switch, and at events asked for."""
         if self.integrator.controls_error or self.integrator.nonsmooth:
             return not self.integrator.nonsmooth
-        equation = StateEquation(self.plant, self.controller, self.integrator.canonical, self.events)
-        return equation.switches and self.steps <= MOST_CUT
+        return self.equation.switches and self.steps <= MOST_CUT
 
     @property
     def samples_on_steps(self) -> bool:
@@ -296,7 +333,7 @@ class Setup(Value):
         no stage meets. A fixed step is the user's.
         """
         longest = min(_LONGEST_STEP_S, self.duration_s / _LEAST_STEPS)
-        return longest if undeclared(self.plant, self.controller) else inf
+        return longest if self.undeclared else inf
 
 
 def check_stops(plant: Plant, q0: Array, of: str = "q0") -> None:

@@ -7,43 +7,32 @@ steps end at ticks, at the switches of effects, and at the end. A run keeps all 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, replace
 from math import inf
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
-
-import numpy as np
 
 from robot_dyn.effects.plant import Plant
 from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, STIFF
 from robot_dyn.integrate.time_stepping import TimeStepping
 from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.simulation.accuracy import run_to
-from robot_dyn.simulation.acting import acting
 from robot_dyn.simulation.choice import choose, most_interpreted
-from robot_dyn.simulation.damped_task import damped
-from robot_dyn.simulation.declarations import named, undeclared
-from robot_dyn.simulation.divergence import explained
-from robot_dyn.simulation.error import ErrorEstimate, no_estimate
+from robot_dyn.simulation.declarations import named
+from robot_dyn.simulation.error import no_estimate
 from robot_dyn.simulation.estimate import estimate
 from robot_dyn.simulation.event_run import AccumulationError, TooLongError
-from robot_dyn.simulation.imbalance import cause
-from robot_dyn.simulation.loads import at_stop, frame_of, wrenches
-from robot_dyn.simulation.observed import observer_of, remarks
+from robot_dyn.simulation.observed import observer_of
 from robot_dyn.simulation.observer import Observer
 from robot_dyn.simulation.options import Options, setup_of, starts, takes_options
-from robot_dyn.simulation.origin import edits_of_machine_code, origin
 from robot_dyn.simulation.prepared import prepared
 from robot_dyn.simulation.record import Record
 from robot_dyn.simulation.remarks import Remark
-from robot_dyn.simulation.samples import columns, ledger
+from robot_dyn.simulation.results import Results
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import check_record
-from robot_dyn.simulation.state_equation import StateEquation
-from robot_dyn.simulation.stiffness import StiffError, bounded_by_stability
-from robot_dyn.simulation.tracking import deviation_of
+from robot_dyn.simulation.stiffness import StiffError
 from robot_dyn.simulation.trajectory import Ending, Outcome, Statistics, Trajectory
-from robot_dyn.simulation.unstable_loop import unstable
 from robot_dyn.validate import function
 
 if TYPE_CHECKING:
@@ -80,17 +69,16 @@ def simulate(
     if setup.accuracy is not None:
         pilot = replace(setup, accuracy=None)
         return run_to(pilot, setup.accuracy, lambda each: simulate(each, on_progress=on_progress))
-    equation = StateEquation(setup.plant, setup.controller, setup.integrator.canonical, setup.events)
-    check_record(setup, equation)
+    check_record(setup, setup.equation)
     began = perf_counter()
-    ran = _by_choice(setup, equation, on_progress)
+    ran = _by_choice(setup, on_progress)
     setup, record, finished = ran.setup, ran.record, perf_counter()
     error, spent, companions = None, 0, 0
     at_the_end = None if on_progress is None else lambda _: on_progress(record.outcome.t)
 
     def companion(pace: Any, of: Setup) -> Record:
         nonlocal spent, companions
-        made = prepared(of, equation, ran.machine, pace, at_the_end, samples=False).record()
+        made = prepared(of, setup.equation, ran.machine, pace, at_the_end, samples=False).record()
         if made.outcome.ending is Ending.STOPPED:
             raise KeyboardInterrupt
         spent, companions = spent + made.evaluations, companions + 1
@@ -98,7 +86,7 @@ def simulate(
 
     if setup.estimate_error and record.outcome.ending is not Ending.STOPPED:
         try:
-            error = estimate(setup, equation, record, companion)
+            error = estimate(setup, setup.equation, record, companion)
         except KeyboardInterrupt:
             error = no_estimate("it was interrupted")
             if record.outcome.ending is Ending.FINISHED:
@@ -110,14 +98,13 @@ def simulate(
         EXPLICIT if setup.integrator.name == AUTO else setup.integrator.name, step, record.steps, record.evaluations,
         finished - ran.ready, 0.0 if error is None else estimated - finished, ran.engine, ran.ready - began,
         companion_evaluations=spent, companion_runs=companions,
-        user_code=", ".join(named(part) for part, _ in undeclared(setup.plant, setup.controller)),
+        user_code=", ".join(named(part) for part, _ in setup.undeclared),
     )  # fmt: skip
-    made = _trajectory(ran, equation, record, statistics, error)
-    asks = setup.estimate_error or not statistics.user_code  # the search calls undeclared parts 4000 times
-    if made.leak and asks and record.outcome.ending is not Ending.STOPPED:
-        why = cause(setup, equation, record, made.ledger.closes)
-        made = replace(made, ledger=replace(made.ledger, cause=why))
-    return replace(made, statistics=replace(statistics, samples_s=perf_counter() - estimated))
+    results = Results(setup, record, ran.observer, error, dict(setup.about), ran.machine is not None, ran.said)
+    if setup.is_value and record.outcome.ending is Ending.FINISHED:
+        return Trajectory.of(results, statistics=statistics)
+    read = {each.name: getattr(results, each.name) for each in fields(Trajectory) if each.name != "statistics"}
+    return Trajectory(statistics=replace(statistics, samples_s=perf_counter() - estimated), **read)
 
 
 class _Ran(NamedTuple):
@@ -141,20 +128,21 @@ class _Ran(NamedTuple):
     said: tuple[Remark, ...]
 
 
-def _by_choice(setup: Setup, equation: StateEquation, on_progress: Callable[[float], object] | None) -> _Ran:
+def _by_choice(setup: Setup, on_progress: Callable[[float], object] | None) -> _Ran:
     """The run of a setup: begun again where another engine, or another method, turns out to be the one for it."""
     seen, said, chooses = 0, (), setup.integrator.name == AUTO
     while True:
-        machine, engine = choose(setup, equation, seen)
+        machine, engine = _chosen(setup, seen)
         ready = perf_counter()
-        observer = observer_of(setup, equation)
-        most = inf if seen else most_interpreted(setup, equation, machine)  # else what cannot compile would never end
+        observer = observer_of(setup)
+        most = inf if seen else most_interpreted(setup, setup.equation, machine)  # else what cannot compile never ends
         try:
             run = prepared(
-                setup, equation, machine, on_progress=on_progress, observer=observer, most=most, chooses=chooses
+                setup, setup.equation, machine, on_progress=on_progress, observer=observer, most=most, chooses=chooses
             )
             before = _spent_on_loops(machine)
             record = run.record()
+            observer.end()
             return _Ran(setup, machine, engine, observer, record, ready + _spent_on_loops(machine) - before, said)
         except TooLongError as found:
             seen = found.evaluations
@@ -165,6 +153,14 @@ def _by_choice(setup: Setup, equation: StateEquation, on_progress: Callable[[flo
             setup, chooses, said = replace(setup, integrator=TimeStepping()), False, (*said, found.remark)
 
 
+def _chosen(setup: Setup, seen: float) -> tuple[Machine | None, str]:
+    """As of `choose`; machine code is chosen once."""
+    found = setup.known.get(choose) or choose(setup, setup.equation, seen)
+    if found[0] is not None:
+        setup.known[choose] = found
+    return found
+
+
 def _spent_on_loops(machine: Machine | None) -> float:
     """On the clock of what is compiled in the first call of a loop, which is no time of the run."""
     if machine is None:
@@ -172,36 +168,3 @@ def _spent_on_loops(machine: Machine | None) -> float:
     from robot_dyn.compiled.loops.call import spent_on_loops
 
     return spent_on_loops()
-
-
-def _trajectory(
-    ran: _Ran, equation: StateEquation, record: Record, statistics: Statistics, error: ErrorEstimate | None
-) -> Trajectory:
-    """The samples with what follows from them."""
-    setup, observed = ran.setup, ran.observer.close()
-    edits = {} if ran.machine is None else edits_of_machine_code(setup)
-    t = record.t
-    q, v, a, u, _, P, _ = columns(equation, t, record.y, record.made)
-    desired, deviation = deviation_of(setup, t, q)
-    power = dict(zip(equation.sources, P.T, strict=True))
-    plant = setup.plant
-    names, about = plant.dynamics.joint_names, frame_of(setup) | origin(plant.dynamics) | edits | setup.about
-    of_control = _of_control(setup, equation, record)
-    outcome = explained(record.outcome, setup, of_control)
-    return Trajectory(
-        names, t, q, v, a, u, power, ledger(equation, record), desired, deviation, outcome, statistics, error,
-        about, wrenches(plant, t, q), at_stop(plant, q),
-        (
-            *remarks(setup, ran.observer, observed, t, np.hstack([q, v, u]), power), *ran.said,
-            *bounded_by_stability(setup, equation, record), *of_control,
-        ),
-        observed.extremes[0], acting(setup),
-        equation.controller_states(record.y), record.events, equation.effect_states(record.y),
-    )  # fmt: skip
-
-
-def _of_control(setup: Setup, equation: StateEquation, record: Record) -> tuple[Remark, ...]:
-    """What is said of the controller; one that was interrupted is not asked again."""
-    if record.outcome.ending is Ending.STOPPED:
-        return ()
-    return (*unstable(setup, equation, record.t, record.y), *damped(setup, record))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import StrEnum
 from math import inf
+from types import NoneType
 from typing import TYPE_CHECKING, Any, Protocol, final, runtime_checkable
 
 import numpy as np
@@ -18,7 +19,7 @@ from robot_dyn.simulation.ledger import Ledger, largest
 from robot_dyn.simulation.remarks import Remark
 from robot_dyn.simulation.remarks import lines as said
 from robot_dyn.simulation.tracking import root_mean_square
-from robot_dyn.values import Value, read_only
+from robot_dyn.values import Derived, read_only
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.setup import Setup
@@ -85,7 +86,7 @@ class Statistics:
         companions_s: Time of the error estimate.
         engine: Which loop ran, and why if another was possible.
         compile_s: Time before the run, for the choice of the loop and for compiling it.
-        samples_s: Time after it, for what follows from the states of its samples.
+        samples_s: Time after it, for what follows from the states of its samples; 0 where that waits until it is read.
         companion_evaluations: Evaluations of the error estimate.
         companion_runs: Companion runs of the error estimate.
         user_code: Parts of the setup that are code of the user's, by name; each run calls them.
@@ -146,8 +147,11 @@ class Accuracy:
 
 @final
 @dataclass(frozen=True, eq=False)
-class Trajectory(Value):
+class Trajectory(Derived):
     """Samples of a run, m of them; arrays are (m,) or (m, n).
+
+    What follows from the states of a run of `simulate` is computed when it is first read; where parts are the user's
+    own code, or the run did not finish, `simulate` computes it.
 
     Attributes:
         joint_names: Of the n joints.
@@ -188,17 +192,17 @@ class Trajectory(Value):
     deviation: np.ndarray | None
     outcome: Outcome
     statistics: Statistics
-    error: ErrorEstimate | None = None
+    error: ErrorEstimate | None = field(default_factory=NoneType)
     about: dict[str, str] = field(default_factory=dict, repr=False)
     wrenches: dict[str, np.ndarray] = field(default_factory=dict)
-    at_stop: np.ndarray | None = None
-    remarks: tuple[Remark, ...] = ()
-    extremes: np.ndarray | None = None
-    acting: tuple[str, ...] | None = None
-    controller_states: np.ndarray | None = None
-    events: tuple[Occurrence, ...] = ()
+    at_stop: np.ndarray | None = field(default_factory=NoneType)
+    remarks: tuple[Remark, ...] = field(default_factory=tuple)
+    extremes: np.ndarray | None = field(default_factory=NoneType)
+    acting: tuple[str, ...] | None = field(default_factory=NoneType)
+    controller_states: np.ndarray | None = field(default_factory=NoneType)
+    events: tuple[Occurrence, ...] = field(default_factory=tuple)
     effect_states: dict[str, np.ndarray] = field(default_factory=dict)
-    accuracy: Accuracy | None = None
+    accuracy: Accuracy | None = field(default_factory=NoneType)
 
     def __post_init__(self) -> None:
         read_only(self)
@@ -213,16 +217,7 @@ class Trajectory(Value):
     @property
     def leak(self) -> str:
         """Why the energy ledger casts doubt on the run; empty if it does not."""
-        ledger = self.ledger
-        if ledger.closes:
-            if ledger.rounded or self.error is None or not self.error.resolved_until > 0:
-                return ""
-            span = float(np.ptp(self.q, axis=0).max())
-            if not span > 0 or ledger.closure <= _CONTRADICTS * max(self.error.final / span, _ROUNDING):
-                return ""
-            why = ledger.cause or "do not trust the estimate, take a smaller step"
-            return f"it does not close as the estimated error of q says: {why}"
-        return f"it does not close: {ledger.cause or 'simulate it by itself with its error estimate, which tells why'}"
+        return leak(self.ledger, self.error, self.q)
 
     def proven_digits(self, proof: Theorem) -> float:
         """Decimal digits of q that a theorem confirms: −log₁₀ of the largest possible error, in [rad] or [m].
@@ -287,6 +282,19 @@ class Trajectory(Value):
             "time: " + ", ".join(f"{name} {spent:.2g} s" for name, spent in parts if spent >= _NOTICED or name == "run")
         )
         return "\n".join(map(escaped, lines))
+
+
+def leak(ledger: Ledger, error: ErrorEstimate | None, q: np.ndarray) -> str:
+    """As of `Trajectory.leak`, from the ledger, the estimated error and the samples q (m, n) of a run."""
+    if not ledger.closes:
+        return f"it does not close: {ledger.cause or 'simulate it by itself with its error estimate, which tells why'}"
+    if ledger.rounded or error is None or not error.resolved_until > 0:
+        return ""
+    span = float(np.ptp(q, axis=0).max())
+    if not span > 0 or ledger.closure <= _CONTRADICTS * max(error.final / span, _ROUNDING):
+        return ""
+    why = ledger.cause or "do not trust the estimate, take a smaller step"
+    return f"it does not close as the estimated error of q says: {why}"
 
 
 def _told(events: tuple[Occurrence, ...]) -> str:

@@ -1,0 +1,167 @@
+"""What follows from the record of a run: samples, energy ledger, deviation, loads, remarks; each when it is read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import final
+
+import numpy as np
+
+from robot_dyn.simulation.acting import acting
+from robot_dyn.simulation.damped_task import damped
+from robot_dyn.simulation.divergence import explained
+from robot_dyn.simulation.error import ErrorEstimate
+from robot_dyn.simulation.event import Occurrence
+from robot_dyn.simulation.imbalance import cause
+from robot_dyn.simulation.ledger import Ledger
+from robot_dyn.simulation.loads import at_stop, frame_of, wrenches
+from robot_dyn.simulation.observation import Observed
+from robot_dyn.simulation.observed import remarks
+from robot_dyn.simulation.observer import Observer
+from robot_dyn.simulation.origin import edits_of_machine_code, origin
+from robot_dyn.simulation.record import Record
+from robot_dyn.simulation.remarks import Remark
+from robot_dyn.simulation.samples import columns, ledger
+from robot_dyn.simulation.setup import Setup
+from robot_dyn.simulation.stiffness import bounded_by_stability
+from robot_dyn.simulation.tracking import deviation_of
+from robot_dyn.simulation.trajectory import Accuracy, Ending, Outcome, leak
+from robot_dyn.simulation.unstable_loop import unstable
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Results:
+    """The attributes of a `Trajectory` but for its statistics, from the record of a run and values that do not change.
+
+    Attributes:
+        setup: What ran, of the method that made the run.
+        record: What it left behind.
+        observer: What saw it, at its end.
+        error: Its estimated error.
+        own: Texts of the user's.
+        compiled: Whether machine code ran.
+        before: Remarks on runs before it.
+    """
+
+    setup: Setup
+    record: Record
+    observer: Observer
+    error: ErrorEstimate | None
+    own: dict[str, str]
+    compiled: bool
+    before: tuple[Remark, ...]
+
+    accuracy: Accuracy | None = None
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        return self.setup.plant.dynamics.joint_names
+
+    @property
+    def t(self) -> np.ndarray:
+        return self.record.t
+
+    @cached_property
+    def _columns(self) -> tuple[np.ndarray, ...]:
+        return columns(self.setup.equation, self.record.t, self.record.y, self.record.made)
+
+    @property
+    def q(self) -> np.ndarray:
+        return self._columns[0]
+
+    @property
+    def v(self) -> np.ndarray:
+        return self._columns[1]
+
+    @property
+    def a(self) -> np.ndarray:
+        return self._columns[2]
+
+    @property
+    def u(self) -> np.ndarray:
+        return self._columns[3]
+
+    @property
+    def power(self) -> dict[str, np.ndarray]:
+        return dict(zip(self.setup.equation.sources, self._columns[5].T, strict=True))
+
+    @cached_property
+    def ledger(self) -> Ledger:
+        """With the cause where it does not close, as far as undeclared parts may be asked 4000 times for it."""
+        made, equation = ledger(self.setup.equation, self.record), self.setup.equation
+        asks = self.setup.estimate_error or not self.setup.undeclared
+        if asks and self.record.outcome.ending is not Ending.STOPPED and leak(made, self.error, self.q):
+            return replace(made, cause=cause(self.setup, equation, self.record, made.closes))
+        return made
+
+    @cached_property
+    def _tracking(self) -> tuple[np.ndarray | None, np.ndarray | None]:
+        return deviation_of(self.setup, self.t, self.q)
+
+    @property
+    def desired(self) -> np.ndarray | None:
+        return self._tracking[0]
+
+    @property
+    def deviation(self) -> np.ndarray | None:
+        return self._tracking[1]
+
+    @property
+    def outcome(self) -> Outcome:
+        outcome = self.record.outcome
+        return explained(outcome, self.setup, self._of_control) if outcome.ending is Ending.DIVERGED else outcome
+
+    @property
+    def about(self) -> dict[str, str]:
+        edits = edits_of_machine_code(self.setup) if self.compiled else {}
+        return frame_of(self.setup) | origin(self.setup.plant.dynamics) | edits | self.own
+
+    @property
+    def wrenches(self) -> dict[str, np.ndarray]:
+        return wrenches(self.setup.plant, self.t, self.q)
+
+    @property
+    def at_stop(self) -> np.ndarray | None:
+        return at_stop(self.setup.plant, self.q)
+
+    @cached_property
+    def _observed(self) -> Observed:
+        return self.observer.close()
+
+    @property
+    def extremes(self) -> np.ndarray:
+        return self._observed.extremes[0]
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        observed, samples = self._observed, np.hstack([self.q, self.v, self.u])
+        return (
+            *remarks(self.setup, self.observer, observed, self.t, samples, self.power), *self.before,
+            *bounded_by_stability(self.setup, self.setup.equation, self.record), *self._of_control,
+        )  # fmt: skip
+
+    @cached_property
+    def _of_control(self) -> tuple[Remark, ...]:
+        """What is said of the controller; one that was interrupted is not asked again."""
+        if self.record.outcome.ending is Ending.STOPPED:
+            return ()
+        equation, record = self.setup.equation, self.record
+        return (*unstable(self.setup, equation, record.t, record.y), *damped(self.setup, record))
+
+    @property
+    def acting(self) -> tuple[str, ...]:
+        return acting(self.setup)
+
+    @property
+    def controller_states(self) -> np.ndarray | None:
+        return self.setup.equation.controller_states(self.record.y)
+
+    @property
+    def effect_states(self) -> dict[str, np.ndarray]:
+        return self.setup.equation.effect_states(self.record.y)
+
+    @property
+    def events(self) -> tuple[Occurrence, ...]:
+        return self.record.events
