@@ -121,7 +121,9 @@ def _by_refinement(
     """
     assert run.ends is not None
     ends = np.append(0.0, run.ends)
-    halves = np.setdiff1d(np.append(ends[1:], (ends[1:] + ends[:-1]) / 2), [each.t for each in run.events])
+    halves = np.unique(np.append(ends[1:], (ends[1:] + ends[:-1]) / 2))
+    if run.events:
+        halves = np.setdiff1d(halves, [each.t for each in run.events], assume_unique=True)
     tight = None
     if estimated.kink < np.inf and method.rtol / 10 > LEAST_RTOL:
         tight = companion(Fraction(1), _tolerant(setup, method, 0.1)).shared
@@ -147,9 +149,8 @@ def _pushed(setup: Setup) -> Setup:
     """The setup from a start that differs by rounding: its run tells what the motion makes of rounding."""
     sign = np.where(np.arange(len(setup.q0)) % 2, -1.0, 1.0)
     unit = PUSH * np.finfo(float).eps
-    return replace(
-        setup, q0=setup.q0 + sign * unit * (1 + np.abs(setup.q0)), v0=setup.v0 + unit * (1 + np.abs(setup.v0))
-    )
+    q0, v0 = setup.q0 + sign * unit * (1 + np.abs(setup.q0)), setup.v0 + unit * (1 + np.abs(setup.v0))
+    return with_values(setup, {"q0": q0, "v0": v0})
 
 
 def _turn(equation: StateEquation, walked: Path) -> float:

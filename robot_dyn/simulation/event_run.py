@@ -150,7 +150,7 @@ class EventRun(Followed):
         if self.switching.modes is not None:
             self.switching.modes.start(self.start)
         events, degree = self.functions.events if self.compiled else self.switching.function, len(of.work.F)
-        if thresholds and self.switching.modes is None and not transfers.any:
+        if thresholds and self.switching.modes is None and not (transfers.any or setup.events):
             known = copied(setup.kept(_switches))
             self.switches = known._replace(functions=events, b=np.zeros(degree + 1), stack=room(degree))
         else:
@@ -408,7 +408,7 @@ class EventRun(Followed):
 
 
 def _switches(setup: Setup) -> Switches:
-    """The switching functions at the start, where nothing is held or carried."""
+    """The switching functions at the start, where nothing is held or carried and no event is asked for."""
     equation = setup.equation
     held = np.full(equation.plant.dynamics.n, np.nan) if equation.sampled else None
     return Switching(equation).at(0.0, equation.start(setup.q0, setup.v0), 0, None, held)

@@ -243,8 +243,8 @@ class Setup(Value):
 
     @cached_property
     def is_value(self) -> bool:
-        """Whether nothing can change what follows from it: it has no part whose code or attributes are the user's."""
-        return all(map(is_value, (self.plant, self.controller, self.integrator, self.events)))
+        """Whether no part but its events is the user's own code, or may change: what follows from it stays as it is."""
+        return all(map(is_value, (self.plant, self.controller, self.integrator)))
 
     def current(self) -> Setup:
         """The setup as its parts are now: itself, or a copy without what was kept if parts may have changed since."""

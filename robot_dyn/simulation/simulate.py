@@ -154,9 +154,9 @@ def _by_choice(setup: Setup, on_progress: Callable[[float], object] | None) -> _
 
 
 def _chosen(setup: Setup, seen: float) -> tuple[Machine | None, str]:
-    """As of `choose`; machine code is chosen once."""
+    """As of `choose`, which chooses machine code once; that of events is compared with them before each run."""
     found = setup.known.get(choose) or choose(setup, setup.equation, seen)
-    if found[0] is not None:
+    if found[0] is not None and not setup.events:
         setup.known[choose] = found
     return found
 
