@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import fields
+from functools import cached_property
 from threading import RLock
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import numpy as np
+
+Result = TypeVar("Result")
 
 
 class Value:
@@ -22,6 +26,21 @@ class Value:
         for name in frozen:
             for array in _arrays(values[name]):
                 array.setflags(write=False)
+
+
+class Keeping:
+    """An immutable value that keeps what functions compute from it."""
+
+    @cached_property
+    def known(self) -> dict[Any, Any]:
+        """What was computed, by the functions."""
+        return {}
+
+    def kept(self, compute: Callable[[Any], Result]) -> Result:
+        """What a function of the value alone returns; it is called once."""
+        if compute not in self.known:
+            self.known[compute] = compute(self)
+        return self.known[compute]
 
 
 class Derived(Value):

@@ -128,7 +128,8 @@ class EventRun(Followed):
         held = n if equation.sampled else 0
         self.start = equation.start(setup.q0, setup.v0)
         self.stepper, self.control = _method(setup, equation)
-        self.switching = Switching(equation)
+        alone = thresholds and not (equation.impulses or transfers.any)
+        self.switching = setup.kept(_switching) if alone else Switching(equation)
         if not thresholds:
             self.switching = Switching(equation, self.switching.quantities)
         self.functions, parameters = made(equation)
@@ -150,7 +151,7 @@ class EventRun(Followed):
         if self.switching.modes is not None:
             self.switching.modes.start(self.start)
         events, degree = self.functions.events if self.compiled else self.switching.function, len(of.work.F)
-        if thresholds and self.switching.modes is None and not (transfers.any or setup.events):
+        if alone and not setup.events:
             known = copied(setup.kept(_switches))
             self.switches = known._replace(functions=events, b=np.zeros(degree + 1), stack=room(degree))
         else:
@@ -407,11 +408,16 @@ class EventRun(Followed):
         )  # fmt: skip
 
 
+def _switching(setup: Setup) -> Switching:
+    """Where the equation of a setup switches, in which nothing is held or carried."""
+    return Switching(setup.equation)
+
+
 def _switches(setup: Setup) -> Switches:
-    """The switching functions at the start, where nothing is held or carried and no event is asked for."""
+    """Its switching functions at the start, if no event is asked for."""
     equation = setup.equation
     held = np.full(equation.plant.dynamics.n, np.nan) if equation.sampled else None
-    return Switching(equation).at(0.0, equation.start(setup.q0, setup.v0), 0, None, held)
+    return setup.kept(_switching).at(0.0, equation.start(setup.q0, setup.v0), 0, None, held)
 
 
 def _method(setup: Setup, equation: StateEquation) -> tuple[ControlledStepper, np.ndarray]:

@@ -60,7 +60,7 @@ def prepared(
         if machine is None:
             return interpreted(of, watch), np.zeros(0)
         functions = machine.in_python if machine.loop is None else machine.equations.functions
-        return functions, machine.parameters if of is equation else machine.of(of)
+        return functions, machine.parameters if of is equation else of.kept(machine.of)
 
     loop, in_python = (None, None) if machine is None else (machine.advance(), machine.in_python)
     if setup.finds_events:

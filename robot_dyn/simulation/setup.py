@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from math import inf
-from typing import Any, TypeVar, final
+from typing import Any, final
 
 import numpy as np
 
@@ -29,20 +28,18 @@ from robot_dyn.simulation.schedule import LEAST_STEPS, ON_STEP, Segment, cuts, n
 from robot_dyn.simulation.size import check_segments
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.validate import choice, duration, instance, integer, one_state, returned, truth
-from robot_dyn.values import Value
+from robot_dyn.values import Keeping, Value
 
 MOST_CUT = 200_000  # steps of a run of fixed step that is cut at events
 ENGINES = ("auto", "interpreted", "compiled")
 STEP_S = 1e-3  # of a method of fixed step, unless given
 _LONGEST_STEP_S, _LEAST_STEPS = 0.01, 200  # where a part does not declare where it switches
 
-Made = TypeVar("Made")
-
 
 @final
 @dataclass(frozen=True, eq=False)
-class Setup(Value):
-    """All that a run depends on; what follows from it alone is computed once, and kept with it.
+class Setup(Value, Keeping):
+    """All that a run depends on; what follows from it alone is computed once and kept with it, and not copied.
 
     Attributes:
         plant: What moves.
@@ -229,17 +226,6 @@ class Setup(Value):
     def __getstate__(self) -> Any:
         state, frozen = super().__getstate__()
         return {each.name: state[each.name] for each in fields(self)}, frozen
-
-    @cached_property
-    def known(self) -> dict[Any, Any]:
-        """What follows from the setup alone, by the functions that compute it; neither copied nor pickled."""
-        return {}
-
-    def kept(self, compute: Callable[[Setup], Made]) -> Made:
-        """What a function of the setup returns; it is called once, and must not depend on anything else."""
-        if compute not in self.known:
-            self.known[compute] = compute(self)
-        return self.known[compute]
 
     @cached_property
     def is_value(self) -> bool:

@@ -19,6 +19,7 @@ from robot_dyn.simulation.modes import Guard, Modes
 from robot_dyn.simulation.state_equation import CONTROLLER, StateEquation
 from robot_dyn.threshold import Threshold
 
+_MOST = 256  # equations that are kept, of as many modes
 Quantity = tuple[int, bool]  # a joint, and whether it is its actuation that passes a level
 
 
@@ -154,6 +155,8 @@ class Switching:
         sides = np.concatenate([sides[:E], sides[E + len(self.guards) :][: len(self.thresholds) - E]])
         key = sides.tobytes() + (b"" if self.modes is None else self.modes.key)
         if key not in self._known:
+            if len(self._known) >= _MOST:
+                self._known.clear()
             of: dict[tuple[int | None, Threshold], int] = {
                 (part, each): int(side) for part, each, side in zip(self._parts, self.thresholds, sides, strict=False)
             }
