@@ -40,6 +40,7 @@ _EARLY = 10  # steps of a method that chooses them: by then an error that is not
 _GAIN = 1.1  # in the time resolved, that a shorter step must bring
 _FAR_TURN = 1.0  # [rad] in a step: beyond, longer steps may meet the same angles
 _BLIND_TURN = np.pi  # [rad] in a step: beyond, shorter ones may, too
+_FAR_PUSH = 1000 * PUSH  # of what a short step adds to q, rounding may lose all until v has grown
 
 Companion = Callable[[Any, Setup], Record]  # of a factor of the steps, or of a mesh
 
@@ -92,12 +93,13 @@ def _by_steps(
         made = magnified.from_longer_steps(paths, method.order)
         if made.resolved_until >= estimated.path.t[-1] and not estimated.doubts(made, paths, method.order):
             return made
-        known = estimated.path.t < estimated.lost_at(paths[COARSE[1]])  # later it tells nothing of what rounding does
-        estimated = replace(estimated, floor=np.where(known, magnified.floor, estimated.floor))
     half = companion(FINE[0], setup).shared
     if made.resolved_until > 0 and estimated.lost_at(half) < _GAIN * made.resolved_until:
         return made  # chaos: no step of practical length resolves it
-    magnified = _with_rounding(estimated, companion(Fraction(1), _pushed(setup)).shared, estimated.path)
+    magnified = estimated
+    for units in (PUSH, _FAR_PUSH):
+        pushed = companion(Fraction(1), _pushed(setup, units)).shared
+        magnified = _with_rounding(magnified, pushed, estimated.path, units)
     shorter = magnified.from_shorter_steps({FINE[0]: half, FINE[1]: companion(FINE[1], setup).shared}, method.order)
     return shorter if shorter.resolved_until >= made.resolved_until else made
 
@@ -133,9 +135,9 @@ def _by_refinement(
     return estimated.from_refinement(halved, tight)
 
 
-def _with_rounding(estimated: Estimated, pushed: Path, of: Path) -> Estimated:
+def _with_rounding(estimated: Estimated, pushed: Path, of: Path, units: float = PUSH) -> Estimated:
     """With what the motion makes of rounding as the floor, seen on a companion and another one that was pushed."""
-    rounds = carried(of, differences(of, pushed, estimated.n), estimated.n)
+    rounds = carried(of, differences(of, pushed, estimated.n) * (PUSH / units), estimated.n)
     rows = np.searchsorted(of.key[:-1], estimated.path.key)
     return replace(estimated, floor=np.fmax(estimated.floor, np.append(rounds, rounds[-1])[rows]))
 
@@ -145,10 +147,10 @@ def _tolerant(setup: Setup, method: Adaptive, factor: float) -> Setup:
     return with_values(setup, {"integrator": method})  # all else was checked
 
 
-def _pushed(setup: Setup) -> Setup:
-    """The setup from a start that differs by rounding: its run tells what the motion makes of rounding."""
+def _pushed(setup: Setup, units: float = PUSH) -> Setup:
+    """The setup from a start that differs by units of rounding: its run tells what the motion makes of rounding."""
     sign = np.where(np.arange(len(setup.q0)) % 2, -1.0, 1.0)
-    unit = PUSH * np.finfo(float).eps
+    unit = units * np.finfo(float).eps
     q0, v0 = setup.q0 + sign * unit * (1 + np.abs(setup.q0)), setup.v0 + unit * (1 + np.abs(setup.v0))
     return with_values(setup, {"q0": q0, "v0": v0})
 
