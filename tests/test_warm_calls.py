@@ -182,7 +182,7 @@ def test_a_second_call_computes_nothing_that_depends_on_the_setup_alone(name: st
 class Driven(rd.Stateless):
     """A controller whose gain may be set, and so may change between two calls."""
 
-    n = 2
+    n = 2  # pyright: ignore[reportAssignmentType, reportIncompatibleMethodOverride]
 
     def __init__(self) -> None:
         self.gain = 1.0
@@ -228,7 +228,7 @@ def test_nothing_waits_of_a_run_with_parts_of_the_users_own() -> None:
         def state_size(self, n):
             return 1
 
-        def torque(self, dynamics, t, q, v, z):
+        def torque(self, dynamics, t, q, v, z):  # pyright: ignore[reportIncompatibleMethodOverride]
             return -v
 
         def state_rate(self, dynamics, t, q, v, u, z):

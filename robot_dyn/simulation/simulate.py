@@ -19,7 +19,7 @@ from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.simulation.accuracy import run_to
 from robot_dyn.simulation.choice import choose, most_interpreted
 from robot_dyn.simulation.declarations import named
-from robot_dyn.simulation.error import no_estimate
+from robot_dyn.simulation.error import ErrorEstimate, no_estimate
 from robot_dyn.simulation.estimate import estimate
 from robot_dyn.simulation.event_run import AccumulationError, TooLongError
 from robot_dyn.simulation.observed import observer_of
@@ -72,26 +72,8 @@ def simulate(
     check_record(setup, setup.equation)
     began = perf_counter()
     ran = _by_choice(setup, on_progress)
-    setup, record, finished = ran.setup, ran.record, perf_counter()
-    error, spent, companions = None, 0, 0
-    at_the_end = None if on_progress is None else lambda _: on_progress(record.outcome.t)
-
-    def companion(pace: Any, of: Setup) -> Record:
-        nonlocal spent, companions
-        made = prepared(of, setup.equation, ran.machine, pace, at_the_end, samples=False).record()
-        if made.outcome.ending is Ending.STOPPED:
-            raise KeyboardInterrupt
-        spent, companions = spent + made.evaluations, companions + 1
-        return made
-
-    if setup.estimate_error and record.outcome.ending is not Ending.STOPPED:
-        try:
-            error = estimate(setup, setup.equation, record, companion)
-        except KeyboardInterrupt:
-            error = no_estimate("it was interrupted")
-            if record.outcome.ending is Ending.FINISHED:
-                outcome = Outcome(Ending.STOPPED, record.outcome.t, "interrupted after the run, in its error estimate")
-                record = replace(record, outcome=outcome)
+    finished, setup = perf_counter(), ran.setup
+    record, error, spent, companions = _with_estimate(ran, on_progress)
     estimated = perf_counter()
     step = 0.0 if setup.integrator.controls_error else record.outcome.t / max(record.steps, 1)
     statistics = Statistics(
@@ -147,10 +129,17 @@ def _by_choice(setup: Setup, on_progress: Callable[[float], object] | None) -> _
         except TooLongError as found:
             seen = found.evaluations
         except StiffError as found:
-            stiff = replace(setup.integrator, method=STIFF)
-            setup, chooses, said = replace(setup, integrator=stiff), False, (found.remark,)
+            setup, chooses, said = setup.kept(_stiff), False, (found.remark,)
         except AccumulationError as found:
-            setup, chooses, said = replace(setup, integrator=TimeStepping()), False, (*said, found.remark)
+            setup, chooses, said = setup.kept(_nonsmooth), False, (*said, found.remark)
+
+
+def _stiff(setup: Setup) -> Setup:
+    return replace(setup, integrator=replace(setup.integrator, method=STIFF))
+
+
+def _nonsmooth(setup: Setup) -> Setup:
+    return replace(setup, integrator=TimeStepping())
 
 
 def _chosen(setup: Setup, seen: float) -> tuple[Machine | None, str]:
@@ -159,6 +148,36 @@ def _chosen(setup: Setup, seen: float) -> tuple[Machine | None, str]:
     if found[0] is not None and not setup.events:
         setup.known[choose] = found
     return found
+
+
+def _with_estimate(
+    ran: _Ran, on_progress: Callable[[float], object] | None
+) -> tuple[Record, ErrorEstimate | None, int, int]:
+    """The record of a run, stopped if its estimate is; its estimated error, with evaluations and number of companions.
+
+    None where no error is estimated.
+    """
+    setup, record, spent, companions = ran.setup, ran.record, 0, 0
+    if not setup.estimate_error or record.outcome.ending is Ending.STOPPED:
+        return record, None, 0, 0
+    at_the_end = None if on_progress is None else lambda _: on_progress(record.outcome.t)
+
+    def companion(pace: Any, of: Setup) -> Record:
+        nonlocal spent, companions
+        made = prepared(of, setup.equation, ran.machine, pace, at_the_end, samples=False).record()
+        if made.outcome.ending is Ending.STOPPED:
+            raise KeyboardInterrupt
+        spent, companions = spent + made.evaluations, companions + 1
+        return made
+
+    try:
+        error = estimate(setup, setup.equation, record, companion)
+    except KeyboardInterrupt:
+        error = no_estimate("it was interrupted")
+        if record.outcome.ending is Ending.FINISHED:
+            why = "interrupted after the run, in its error estimate"
+            record = replace(record, outcome=Outcome(Ending.STOPPED, record.outcome.t, why))
+    return record, error, spent, companions
 
 
 def _spent_on_loops(machine: Machine | None) -> float:
