@@ -83,21 +83,19 @@ class Estimated:
         error = np.maximum(largest, gaps[1] / (1 - 3.0 ** -np.where(self._smooth(seen), order, 1)))
         return self._judged(error, error, seen)
 
-    def from_refinement(self, halved: Path, tight: Path | None) -> ErrorEstimate:
+    def from_refinement(self, near: np.ndarray, tight: Path | None) -> ErrorEstimate:
         """The estimate of a method that chooses its steps.
 
         Args:
-            halved: The companion of half as long steps: |q_h − q_{h/2}| = |e(h)| (1 − 2⁻ᵖ).
-            tight: That of a tenth of the tolerance, where something may switch unseen.
+            near: Differences from the companion of half as long steps, |q_h − q_{h/2}| = |e(h)| (1 − 2⁻ᵖ).
+            tight: The companion of a tenth of the tolerance, where something may switch unseen.
         """
-        near = differences(self.path, halved, self.n)
         bound = near if tight is None else np.fmax(near, differences(self.path, tight, self.n))
         seen = np.ones(len(near), bool)
         return self._judged(np.where(self._smooth(seen), near, bound), bound, seen)
 
-    def begins_as_rounding(self, companion: Path, until: float) -> bool:
-        """Whether a companion of other steps is apart by rounding alone up to a time, in [s], and by more later."""
-        gap = differences(self.path, companion, self.n)
+    def begins_as_rounding(self, gap: np.ndarray, until: float) -> bool:
+        """Whether differences from other steps are rounding alone up to a time, in [s], and more later."""
         last = min(int(np.searchsorted(self.path.t, until)), len(gap) - 1)
         size = 1 + float(np.abs(self.path.y[: last + 1, : self.n]).max())
         return bool(gap[last] < _UNITS * np.finfo(float).eps * size and np.any(gap > self.floor))

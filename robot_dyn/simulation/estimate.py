@@ -130,9 +130,10 @@ def _by_refinement(
     if estimated.kink < np.inf and method.rtol / 10 > LEAST_RTOL:
         tight = companion(Fraction(1), _tolerant(setup, method, 0.1)).shared
     halved = companion(halves, setup).shared
-    if estimated.begins_as_rounding(halved, ends[min(_EARLY, len(ends) - 1)]):
+    gap = differences(estimated.path, halved, estimated.n)
+    if estimated.begins_as_rounding(gap, ends[min(_EARLY, len(ends) - 1)]):
         estimated = _with_rounding(estimated, companion(halves, _pushed(setup)).shared, halved)
-    return estimated.from_refinement(halved, tight)
+    return estimated.from_refinement(gap, tight)
 
 
 def _with_rounding(estimated: Estimated, pushed: Path, of: Path, units: float = PUSH) -> Estimated:
