@@ -243,6 +243,22 @@ def test_nothing_waits_of_a_run_with_parts_of_the_users_own() -> None:
         rd.simulate(rd.Plant(ARM, [Stores()]), Q, V, duration_s=0.05, integrator="DOP853", estimate_error=False)
 
 
+def test_a_robot_that_warns_warns_in_each_run_and_in_none_of_what_is_read() -> None:
+    arm = ARM.warn_below(15.9)  # of the 16 of a float: the start has fewer
+    control = rd.PD(PLAN, 10.0, 1.0, period_s=0.01)
+    changes: dict[str, Any] = {"plant": rd.Plant(arm), "controller": control, "estimate_error": False}
+    counts = []
+    with pytest.warns(rd.PrecisionWarning):  # so do the checks of the setup, and of its machine code
+        setup = replace(setups()["sampled, rk4"], **changes)
+        rd.simulate(setup)
+    for _ in range(2):
+        with pytest.warns(rd.PrecisionWarning) as told:
+            run = rd.simulate(setup)
+        counts.append(len(told))
+        _ = run.summary  # warnings are errors here
+    assert counts[0] == counts[1] > 5
+
+
 def test_nothing_waits_of_a_run_that_did_not_finish() -> None:
     plant = rd.Plant(ARM, [rd.ViscousFriction(1e4)])
     run = rd.simulate(plant, Q, V, duration_s=0.1, integrator="rk4", engine="interpreted", estimate_error=False)
