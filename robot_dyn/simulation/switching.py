@@ -19,7 +19,7 @@ from robot_dyn.simulation.modes import Guard, Modes
 from robot_dyn.simulation.state_equation import CONTROLLER, StateEquation
 from robot_dyn.threshold import Threshold
 
-_MOST = 256  # equations that are kept, of as many modes
+_MOST = 256  # equations that are kept, each of the sides of all thresholds
 Quantity = tuple[int, bool]  # a joint, and whether it is its actuation that passes a level
 
 
@@ -155,8 +155,6 @@ class Switching:
         sides = np.concatenate([sides[:E], sides[E + len(self.guards) :][: len(self.thresholds) - E]])
         key = sides.tobytes() + (b"" if self.modes is None else self.modes.key)
         if key not in self._known:
-            if len(self._known) >= _MOST:
-                self._known.clear()
             of: dict[tuple[int | None, Threshold], int] = {
                 (part, each): int(side) for part, each, side in zip(self._parts, self.thresholds, sides, strict=False)
             }
@@ -170,7 +168,10 @@ class Switching:
             controller = equation.controller
             if controller is not None and at.get(CONTROLLER):
                 controller = controller.beyond(at[CONTROLLER])
-            self._known[key] = replace(equation, plant=Plant(equation.plant.dynamics, effects), controller=controller)
+            made = replace(equation, plant=Plant(equation.plant.dynamics, effects), controller=controller)
+            if len(self._known) >= _MOST:
+                return made
+            self._known[key] = made
         return self._known[key]
 
     def place(self, index: int) -> tuple[int, Guard | None]:
