@@ -59,15 +59,17 @@ class Derived(Value):
     if not TYPE_CHECKING:  # what is no field is an error to a type checker
 
         def __getattr__(self, name: str) -> Any:
-            if name not in self.__dataclass_fields__ or "_source" not in vars(self):
+            held = vars(self)
+            if name in self.__dataclass_fields__ and (known := held.get("_source")) is not None:
+                source, lock = known
+                with lock:
+                    if name not in held:
+                        held[name] = _frozen(getattr(source, name))
+                if self.__dataclass_fields__.keys() <= held.keys():
+                    held.pop("_source", None)  # nothing more is read from it
+            if name not in held:  # another thread may have read it, and the last one, by now
                 raise AttributeError(f"{type(self).__name__!r} has no attribute {name!r}", name=name, obj=self)
-            source, lock = vars(self)["_source"]
-            with lock:
-                if name not in vars(self):
-                    vars(self)[name] = _frozen(getattr(source, name))
-            if self.__dataclass_fields__.keys() <= vars(self).keys():
-                vars(self).pop("_source", None)  # nothing more is read from it
-            return vars(self)[name]
+            return held[name]
 
     def __getstate__(self) -> Any:
         for each in fields(self):  # pyright: ignore[reportArgumentType]

@@ -134,6 +134,20 @@ def test_runs_of_one_setup_do_not_share_what_they_change(name: str) -> None:
             assert_same_run(run, first)
 
 
+def test_threads_that_read_one_run_read_the_same() -> None:
+    """What is summed up at the end, such as chatter, is so once."""
+    setup, rng = setups()["sampled, rk4"], np.random.default_rng(5)
+    reference = at_once(setup)
+    for _ in range(5):
+        run = rd.simulate(setup)
+        with ThreadPoolExecutor(4) as pool:
+            names = [name for _ in range(4) for name in rng.permutation(NAMES).tolist()]
+            read = list(pool.map(lambda name, run=run: getattr(run, name), names))
+        for name, value in zip(names, read, strict=True):
+            assert value is getattr(run, name)
+        assert_same_run(run, reference)
+
+
 def calls(function: Callable[[], object]) -> Counter[str]:
     """How often each function was called, by its name; those of C together."""
     found: Counter[str] = Counter()
