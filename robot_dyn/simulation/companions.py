@@ -119,14 +119,14 @@ class Estimated:
         """The estimate up to where nothing is known, with its verdict."""
         t, error = self.path.t, np.maximum(error, self.floor)
         bad = np.flatnonzero(np.isnan(bound) | (np.maximum(bound, self.floor) > self.meaningless))
-        last = int(bad[0]) - 1 if len(bad) else len(t) - 1
-        rounded = len(bad) and self.floor[bad[0]] > self.meaningless
-        why = f"{ROUNDED if rounded else 'runs with other steps differ by more than'} {self._limit}"
+        last, note = len(t) - 1, ""
+        if len(bad):
+            last, rounded = int(bad[0]) - 1, self.floor[bad[0]] > self.meaningless
+            note = f"{ROUNDED if rounded else 'runs with other steps differ by more than'} {self._limit}"
         if last < 1 < len(t):
-            return no_estimate(why)
+            return no_estimate(note)
         rows = np.arange(last + 1) if last < _ROWS else np.unique(np.linspace(0, last, _ROWS).astype(int))
         verdict = Verdict.ORDER if self._smooth(seen)[last] else Verdict.BOUND
-        note = "" if last == len(t) - 1 else why
         return ErrorEstimate(t[rows], np.maximum.accumulate(error)[rows], float(t[last]), note, verdict)
 
 
