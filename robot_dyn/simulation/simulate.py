@@ -75,18 +75,18 @@ def simulate(
     finished, setup = perf_counter(), ran.setup
     record, error, spent, companions = _with_estimate(ran, on_progress)
     estimated = perf_counter()
-    step = 0.0 if setup.integrator.controls_error else record.outcome.t / max(record.steps, 1)
-    statistics = Statistics(
-        EXPLICIT if setup.integrator.name == AUTO else setup.integrator.name, step, record.steps, record.evaluations,
-        finished - ran.ready, 0.0 if error is None else estimated - finished, ran.engine, ran.ready - began,
-        companion_evaluations=spent, companion_runs=companions,
-        user_code=", ".join(named(part) for part, _ in setup.undeclared),
-    )  # fmt: skip
     results = Results(setup, record, ran.observer, error, dict(setup.about), ran.machine is not None, ran.said)
-    if setup.is_value and record.outcome.ending is Ending.FINISHED:
-        return Trajectory.of(results, statistics=statistics)
-    read = {each.name: getattr(results, each.name) for each in fields(Trajectory) if each.name != "statistics"}
-    return Trajectory(statistics=replace(statistics, samples_s=perf_counter() - estimated), **read)
+    waits = setup.is_value and record.outcome.ending is Ending.FINISHED
+    names = () if waits else (each.name for each in fields(Trajectory) if each.name != "statistics")
+    read = {name: getattr(results, name) for name in names}
+    statistics = Statistics(
+        EXPLICIT if setup.integrator.name == AUTO else setup.integrator.name,
+        0.0 if setup.integrator.controls_error else record.outcome.t / max(record.steps, 1),
+        record.steps, record.evaluations, finished - ran.ready, 0.0 if error is None else estimated - finished,
+        ran.engine, ran.ready - began, perf_counter() - estimated, spent, companions,
+        ", ".join(named(part) for part, _ in setup.undeclared),
+    )  # fmt: skip
+    return Trajectory.of(results, statistics=statistics) if waits else Trajectory(statistics=statistics, **read)
 
 
 class _Ran(NamedTuple):

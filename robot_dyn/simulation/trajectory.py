@@ -82,7 +82,7 @@ class Statistics:
         companions_s: Time of the error estimate.
         engine: Which loop ran, and why if another was possible.
         compile_s: Time before the run, for the choice of the loop and for compiling it.
-        samples_s: Time after it, for what follows from the states of its samples; 0 where that waits until it is read.
+        samples_s: Time after it, for what follows from the states of its samples and does not wait until it is read.
         companion_evaluations: Evaluations of the error estimate.
         companion_runs: Companion runs of the error estimate.
         user_code: Parts of the setup that are code of the user's, by name; each run calls them.
