@@ -43,6 +43,7 @@ class Results:
         own: Texts of the user's.
         compiled: Whether machine code ran.
         before: Remarks on runs before it.
+        accuracy: None, as none was asked for.
     """
 
     setup: Setup
@@ -52,15 +53,16 @@ class Results:
     own: dict[str, str]
     compiled: bool
     before: tuple[Remark, ...]
-
     accuracy: Accuracy | None = None
 
     @property
     def joint_names(self) -> tuple[str, ...]:
+        """Of the n joints."""
         return self.setup.plant.dynamics.joint_names
 
     @property
     def t(self) -> np.ndarray:
+        """Times of the samples, (m,)."""
         return self.record.t
 
     @cached_property
@@ -69,29 +71,34 @@ class Results:
 
     @property
     def q(self) -> np.ndarray:
+        """Positions there, (m, n)."""
         return self._columns[0]
 
     @property
     def v(self) -> np.ndarray:
+        """Velocities there, (m, n)."""
         return self._columns[1]
 
     @property
     def a(self) -> np.ndarray:
+        """Accelerations there, (m, n)."""
         return self._columns[2]
 
     @property
     def u(self) -> np.ndarray:
+        """Actuation there, (m, n)."""
         return self._columns[3]
 
     @property
     def power(self) -> dict[str, np.ndarray]:
+        """Of each source, (m,), by name."""
         return dict(zip(self.setup.equation.sources, self._columns[5].T, strict=True))
 
     @cached_property
     def ledger(self) -> Ledger:
-        """With the cause where it does not close, as far as undeclared parts may be asked 4000 times for it."""
+        """Energy and work; with the cause where it does not close, unless undeclared parts are not to be asked."""
         made, equation = ledger(self.setup.equation, self.record), self.setup.equation
-        asks = self.setup.estimate_error or not self.setup.undeclared
+        asks = self.setup.estimate_error or not self.setup.undeclared  # the search calls these 4000 times
         if asks and self.record.outcome.ending is not Ending.STOPPED and leak(made, self.error, self.q):
             return replace(made, cause=cause(self.setup, equation, self.record, made.closes))
         return made
@@ -102,28 +109,34 @@ class Results:
 
     @property
     def desired(self) -> np.ndarray | None:
+        """Positions of a joint reference, (m, n)."""
         return self._tracking[0]
 
     @property
     def deviation(self) -> np.ndarray | None:
+        """From the reference."""
         return self._tracking[1]
 
     @property
     def outcome(self) -> Outcome:
+        """How it ended; if it diverged, with its loop as the reason where that explains it."""
         outcome = self.record.outcome
         return explained(outcome, self.setup, self._of_control) if outcome.ending is Ending.DIVERGED else outcome
 
     @property
     def about(self) -> dict[str, str]:
+        """Texts: where it comes from, what machine code changed, and the user's."""
         edits = edits_of_machine_code(self.setup) if self.compiled else {}
         return frame_of(self.setup) | origin(self.setup.plant.dynamics) | edits | self.own
 
     @property
     def wrenches(self) -> dict[str, np.ndarray]:
+        """External wrench by link."""
         return wrenches(self.setup.plant, self.t, self.q)
 
     @property
     def at_stop(self) -> np.ndarray | None:
+        """Whether each joint is at or beyond a stop, (m, n)."""
         return at_stop(self.setup.plant, self.q)
 
     @cached_property
@@ -132,10 +145,12 @@ class Results:
 
     @property
     def extremes(self) -> np.ndarray:
+        """Of q, v and u over all steps, (3, 2, n)."""
         return self._observed.extremes[0]
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
+        """On what was observed, on runs before it, on its steps and on its control."""
         observed, samples = self._observed, np.hstack([self.q, self.v, self.u])
         return (
             *remarks(self.setup, self.observer, observed, self.t, samples, self.power), *self.before,
@@ -152,16 +167,20 @@ class Results:
 
     @property
     def acting(self) -> tuple[str, ...]:
+        """What acted, in words."""
         return acting(self.setup)
 
     @property
     def controller_states(self) -> np.ndarray | None:
+        """Of the controller at the samples."""
         return self.setup.equation.controller_states(self.record.y)
 
     @property
     def effect_states(self) -> dict[str, np.ndarray]:
+        """Of each effect with states at the samples."""
         return self.setup.equation.effect_states(self.record.y)
 
     @property
     def events(self) -> tuple[Occurrence, ...]:
+        """That occurred."""
         return self.record.events
