@@ -5,6 +5,7 @@ Nothing is kept of parts that may change between two calls, and nothing of their
 
 from __future__ import annotations
 
+import gc
 import pickle
 import sys
 from collections import Counter
@@ -20,7 +21,9 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
+from robot_dyn.simulation.machine.machine import Machine
 from robot_dyn.simulation.remarks import Kind
+from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.trajectory import Ending, Trajectory
 
 ARM = rd.load("planar_2r")
@@ -146,6 +149,23 @@ def test_threads_that_read_one_run_read_the_same() -> None:
         for name, value in zip(names, read, strict=True):
             assert value is getattr(run, name)
         assert_same_run(run, reference)
+
+
+@pytest.mark.parametrize("events", [(), (rd.Event(lambda t, q, v: q[0] - 0.35),)])
+def test_what_is_kept_does_not_grow_with_the_runs(events: tuple[rd.Event, ...]) -> None:
+    """Also where machine code is chosen anew for each run, as it is with events, and the mode changes in it."""
+    setup = replace(setups()["computed torque"], events=events, estimate_error=False)
+
+    def held() -> int:
+        gc.collect()
+        return sum(isinstance(each, Machine | StateEquation) for each in gc.get_objects())
+
+    for _ in range(2):
+        assert rd.simulate(setup).events
+    before = held()
+    for _ in range(4):
+        rd.simulate(setup)
+    assert held() == before
 
 
 def calls(function: Callable[[], object]) -> Counter[str]:
