@@ -1,11 +1,16 @@
-"""Values that hold arrays: these are read-only, in copies of the value as well."""
+"""Values that hold arrays, read-only in copies too; and values whose parts are computed when they are read."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import fields
-from typing import Any
+from functools import cached_property
+from threading import RLock
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import numpy as np
+
+Result = TypeVar("Result")
 
 
 class Value:
@@ -23,17 +28,75 @@ class Value:
                 array.setflags(write=False)
 
 
+class Keeping:
+    """An immutable value that keeps what functions compute from it."""
+
+    @cached_property
+    def known(self) -> dict[Any, Any]:
+        """What was computed, by the functions."""
+        return {}
+
+    def kept(self, compute: Callable[[Any], Result]) -> Result:
+        """What a function of the value alone returns; it is called once."""
+        if compute not in self.known:
+            self.known[compute] = compute(self)
+        return self.known[compute]
+
+
+class Derived(Value):
+    """A frozen dataclass that may be made from a source: each field is read from it when it is first asked for.
+
+    A field that may be read later has no default but by a factory: a default of the class would hide it.
+    """
+
+    @classmethod
+    def of(cls, source: Any, **known: Any) -> Self:
+        """One whose fields are the attributes of the same name of a source, but for those that are given."""
+        made = object.__new__(cls)
+        vars(made).update({name: _frozen(x) for name, x in known.items()}, _source=(source, RLock()))
+        return made
+
+    if not TYPE_CHECKING:  # what is no field is an error to a type checker
+
+        def __getattr__(self, name: str) -> Any:
+            held = vars(self)
+            if name in self.__dataclass_fields__ and (known := held.get("_source")) is not None:
+                source, lock = known
+                with lock:
+                    if name not in held:
+                        held[name] = _frozen(getattr(source, name))
+                if self.__dataclass_fields__.keys() <= held.keys():
+                    held.pop("_source", None)  # nothing more is read from it
+            if name not in held:  # another thread may have read it, and the last one, by now
+                raise AttributeError(f"{type(self).__name__!r} has no attribute {name!r}", name=name, obj=self)
+            return held[name]
+
+    def __getstate__(self) -> Any:
+        for each in fields(self):  # pyright: ignore[reportArgumentType]
+            getattr(self, each.name)
+        return super().__getstate__()
+
+
+def copied(x: Any) -> Any:
+    """A value of arrays in tuples, with arrays of its own."""
+    if isinstance(x, tuple):
+        made = [copied(each) for each in x]
+        return type(x)(*made) if hasattr(x, "_fields") else tuple(made)
+    return x.copy() if isinstance(x, np.ndarray) else x
+
+
 def read_only(value: Any) -> None:
     """Replace the arrays of a frozen dataclass, and of dictionaries in it, by read-only views; nothing is copied."""
     for field in fields(value):
         x = getattr(value, field.name)
-        if isinstance(x, dict):
-            object.__setattr__(value, field.name, {key: _view(entry) for key, entry in x.items()})
-        elif isinstance(x, np.ndarray):
-            object.__setattr__(value, field.name, _view(x))
+        if isinstance(x, dict | np.ndarray):
+            object.__setattr__(value, field.name, _frozen(x))
 
 
-def _view(x: Any) -> Any:
+def _frozen(x: Any) -> Any:
+    """A read-only view of an array, and of those in a dictionary; any other value itself."""
+    if isinstance(x, dict):
+        return {key: _frozen(entry) for key, entry in x.items()}
     if isinstance(x, np.ndarray):
         x = x.view()
         x.setflags(write=False)

@@ -11,6 +11,8 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.cli import report
 from robot_dyn.simulation import observer as observers
+from robot_dyn.simulation.levels import NO_LEVELS
+from robot_dyn.simulation.observation import observation_of
 from robot_dyn.simulation.observer import CHUNK, Observer
 from robot_dyn.simulation.remarks import Kind, lines
 from robot_dyn.view.document import document
@@ -232,7 +234,10 @@ def test_an_effect_declared_dissipative_that_does_work_is_said(joint, damping: f
 def test_memory_does_not_grow_with_the_run() -> None:
     """300 000 steps: extremes to the bit, windows in order, their number bounded."""
     rng = np.random.default_rng(3)
-    observer, x = Observer(np.zeros(6)), np.cumsum(rng.normal(size=(6, 300_000)), axis=1)
+    observer, x = (
+        Observer(observation_of(np.zeros((6, 1)), NO_LEVELS)),
+        np.cumsum(rng.normal(size=(6, 300_000)), axis=1),
+    )
     for first in range(0, x.shape[1], CHUNK):
         part = x[:, first : first + CHUNK]
         observer.filled = part.shape[1]

@@ -23,7 +23,8 @@ from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.choice import choose
 from robot_dyn.simulation.prepared import prepared
 from robot_dyn.simulation.samples import ledger
-from robot_dyn.simulation.setup import MOST_CUT, Setup
+from robot_dyn.simulation.setup import Setup
+from robot_dyn.simulation.size import MOST_CUT
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.trajectory import Ending
 

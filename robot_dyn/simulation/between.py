@@ -16,7 +16,7 @@ from robot_dyn.control.controller import Controller
 from robot_dyn.effects.effect import Force
 from robot_dyn.errors import RobotDynError
 from robot_dyn.foreign import call
-from robot_dyn.simulation.declarations import named, undeclared
+from robot_dyn.simulation.declarations import named
 from robot_dyn.simulation.record import Path, Record
 from robot_dyn.simulation.schedule import LEAST_STEPS
 from robot_dyn.simulation.setup import Setup
@@ -49,7 +49,7 @@ def stepped_over(setup: Setup, equation: StateEquation, path: Path, error: float
     q, v = path.y[:, : equation.plant.dynamics.n], equation.velocities(path.y)
     effects = () if setup.finds_events else setup.plant.effects
     found = [_crossed(equation, effect, path, q, v, error) for effect in effects]
-    found += [_code(equation, part, path, q, v, error) for part, _ in undeclared(setup.plant, setup.controller)]
+    found += [_code(equation, part, path, q, v, error) for part, _ in setup.undeclared]
     return min((each for each in found if each is not None), key=lambda each: each.t, default=None)
 
 

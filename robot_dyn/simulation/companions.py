@@ -83,21 +83,19 @@ class Estimated:
         error = np.maximum(largest, gaps[1] / (1 - 3.0 ** -np.where(self._smooth(seen), order, 1)))
         return self._judged(error, error, seen)
 
-    def from_refinement(self, halved: Path, tight: Path | None) -> ErrorEstimate:
+    def from_refinement(self, near: np.ndarray, tight: Path | None) -> ErrorEstimate:
         """The estimate of a method that chooses its steps.
 
         Args:
-            halved: The companion of half as long steps: |q_h − q_{h/2}| = |e(h)| (1 − 2⁻ᵖ).
-            tight: That of a tenth of the tolerance, where something may switch unseen.
+            near: Differences from the companion of half as long steps, |q_h − q_{h/2}| = |e(h)| (1 − 2⁻ᵖ).
+            tight: The companion of a tenth of the tolerance, where something may switch unseen.
         """
-        near = differences(self.path, halved, self.n)
         bound = near if tight is None else np.fmax(near, differences(self.path, tight, self.n))
         seen = np.ones(len(near), bool)
         return self._judged(np.where(self._smooth(seen), near, bound), bound, seen)
 
-    def begins_as_rounding(self, companion: Path, until: float) -> bool:
-        """Whether a companion of other steps is apart by rounding alone up to a time, in [s], and by more later."""
-        gap = differences(self.path, companion, self.n)
+    def begins_as_rounding(self, gap: np.ndarray, until: float) -> bool:
+        """Whether differences from other steps are rounding alone up to a time, in [s], and more later."""
         last = min(int(np.searchsorted(self.path.t, until)), len(gap) - 1)
         size = 1 + float(np.abs(self.path.y[: last + 1, : self.n]).max())
         return bool(gap[last] < _UNITS * np.finfo(float).eps * size and np.any(gap > self.floor))
@@ -121,32 +119,39 @@ class Estimated:
         """The estimate up to where nothing is known, with its verdict."""
         t, error = self.path.t, np.maximum(error, self.floor)
         bad = np.flatnonzero(np.isnan(bound) | (np.maximum(bound, self.floor) > self.meaningless))
-        last = int(bad[0]) - 1 if len(bad) else len(t) - 1
-        rounded = len(bad) and self.floor[bad[0]] > self.meaningless
-        why = f"{ROUNDED if rounded else 'runs with other steps differ by more than'} {self._limit}"
+        last, note = len(t) - 1, ""
+        if len(bad):
+            last, rounded = int(bad[0]) - 1, self.floor[bad[0]] > self.meaningless
+            note = f"{ROUNDED if rounded else 'runs with other steps differ by more than'} {self._limit}"
         if last < 1 < len(t):
-            return no_estimate(why)
-        rows = np.unique(np.linspace(0, last, min(last + 1, _ROWS)).astype(int))
+            return no_estimate(note)
+        rows = np.arange(last + 1) if last < _ROWS else np.unique(np.linspace(0, last, _ROWS).astype(int))
         verdict = Verdict.ORDER if self._smooth(seen)[last] else Verdict.BOUND
-        note = "" if last == len(t) - 1 else why
         return ErrorEstimate(t[rows], np.maximum.accumulate(error)[rows], float(t[last]), note, verdict)
 
 
 def differences(run: Path, companion: Path, n: int) -> np.ndarray:
     """Largest |q − q_companion| over the joints up to each state of the run; nan after the companion's end."""
+    if np.array_equal(run.key, companion.key):
+        return np.maximum.accumulate(_largest(run.y[:, :n] - companion.y[:, :n]))
     _, here, there = np.intersect1d(run.key, companion.key, assume_unique=True, return_indices=True)
     if not len(here):
         return np.full(len(run.t), np.nan)
-    gap = np.maximum.accumulate(np.abs(run.y[here, :n] - companion.y[there, :n]).max(axis=1))
+    gap = np.maximum.accumulate(_largest(run.y[here, :n] - companion.y[there, :n]))
     following = np.searchsorted(here, np.arange(len(run.t)))  # between two common states the later one counts
     result = gap[np.minimum(following, len(gap) - 1)]
     result[run.key > companion.key[-1]] = np.nan
     return result
 
 
+def _largest(x: np.ndarray) -> np.ndarray:
+    """The largest |x| of each row; by columns, as there are few of them."""
+    return np.abs(np.ascontiguousarray(x.T)).max(axis=0)
+
+
 def rounding(run: Path, n: int) -> np.ndarray:
     """Error that rounding of q in every step may leave, up to each state, where nothing magnifies it."""
-    size = np.maximum.accumulate(np.abs(run.y[:, :n]).max(axis=1))
+    size = np.maximum.accumulate(_largest(run.y[:, :n]))
     return np.finfo(float).eps * np.maximum(ROUNDING, run.key) * (1 + size)
 
 
@@ -155,7 +160,7 @@ def carried(run: Path, pushed: np.ndarray, n: int) -> np.ndarray:
 
     G(t) √Σ_k (u_k / G(t_k))²,    G what the motion has made of a push at the start, over that push
     """
-    u = np.finfo(float).eps * (1 + np.maximum.accumulate(np.abs(run.y[:, :n]).max(axis=1)))
+    u = np.finfo(float).eps * (1 + np.maximum.accumulate(_largest(run.y[:, :n])))
     growth = np.fmax(pushed / (PUSH * np.finfo(float).eps), 1.0)
     walk = np.sqrt(np.cumsum(np.diff(run.key, prepend=run.key[0]) * (u / growth) ** 2))
     return np.fmax(pushed, growth * walk)

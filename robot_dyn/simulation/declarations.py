@@ -12,7 +12,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
+from enum import Enum
+from numbers import Number
 from typing import Any
+
+import numpy as np
 
 from robot_dyn.coefficients import cached
 from robot_dyn.control.block import Block
@@ -44,6 +48,25 @@ def named(part: Any) -> str:
 def is_frozen(part: Any) -> bool:
     """Whether all its attributes are fields of a frozen dataclass; what follows from these may be cached."""
     return next(_not_frozen(part), None) is None
+
+
+def is_value(part: Any) -> bool:
+    """Whether nothing can change what a part is: a value of this library, as is all that it holds.
+
+    A robot whose queries warn is none: they are to warn in each run.
+    """
+    if isinstance(part, tuple):
+        return all(map(is_value, part))
+    if isinstance(part, np.ndarray):
+        return not part.flags.writeable and (part.dtype != object or all(map(is_value, part.flat)))
+    if part is None or isinstance(part, Number | str | bytes | Enum):
+        return True
+    if not type(part).__module__.startswith("robot_dyn.") or not is_frozen(part):
+        return False
+    if isinstance(part, Robot):
+        return part.least_digits is None
+    caches = {each.name for each in fields(part) if not each.compare}
+    return all(is_value(getattr(part, x)) for x in attributes(part) if x not in caches)
 
 
 def _missing(part: Any) -> str:

@@ -123,14 +123,17 @@ def _by_refinement(
     """
     assert run.ends is not None
     ends = np.append(0.0, run.ends)
-    halves = np.setdiff1d(np.append(ends[1:], (ends[1:] + ends[:-1]) / 2), [each.t for each in run.events])
+    halves = np.unique(np.append(ends[1:], (ends[1:] + ends[:-1]) / 2))
+    if run.events:
+        halves = np.setdiff1d(halves, [each.t for each in run.events], assume_unique=True)
     tight = None
     if estimated.kink < np.inf and method.rtol / 10 > LEAST_RTOL:
         tight = companion(Fraction(1), _tolerant(setup, method, 0.1)).shared
     halved = companion(halves, setup).shared
-    if estimated.begins_as_rounding(halved, ends[min(_EARLY, len(ends) - 1)]):
+    gap = differences(estimated.path, halved, estimated.n)
+    if estimated.begins_as_rounding(gap, ends[min(_EARLY, len(ends) - 1)]):
         estimated = _with_rounding(estimated, companion(halves, _pushed(setup)).shared, halved)
-    return estimated.from_refinement(halved, tight)
+    return estimated.from_refinement(gap, tight)
 
 
 def _with_rounding(estimated: Estimated, pushed: Path, of: Path, units: float = PUSH) -> Estimated:
@@ -149,9 +152,8 @@ def _pushed(setup: Setup, units: float = PUSH) -> Setup:
     """The setup from a start that differs by units of rounding: its run tells what the motion makes of rounding."""
     sign = np.where(np.arange(len(setup.q0)) % 2, -1.0, 1.0)
     unit = units * np.finfo(float).eps
-    return replace(
-        setup, q0=setup.q0 + sign * unit * (1 + np.abs(setup.q0)), v0=setup.v0 + unit * (1 + np.abs(setup.v0))
-    )
+    q0, v0 = setup.q0 + sign * unit * (1 + np.abs(setup.q0)), setup.v0 + unit * (1 + np.abs(setup.v0))
+    return with_values(setup, {"q0": q0, "v0": v0})
 
 
 def _turn(equation: StateEquation, walked: Path) -> float:

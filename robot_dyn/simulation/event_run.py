@@ -16,11 +16,13 @@ from robot_dyn.errors import RobotDynError
 from robot_dyn.foreign import is_mistake
 from robot_dyn.integrate import hermite
 from robot_dyn.integrate.adaptive import STEPPERS
+from robot_dyn.integrate.bernstein import room
 from robot_dyn.integrate.step_control import At, ControlledStepper, control_of
+from robot_dyn.simulation.crossings import Switches
 from robot_dyn.simulation.event import Occurrence
 from robot_dyn.simulation.event_log import event_log
 from robot_dyn.simulation.event_loop import Kept, Times, event_loop
-from robot_dyn.simulation.fixed_step import rules_of, runs_of
+from robot_dyn.simulation.fixed_step import rules_alone, runs_of
 from robot_dyn.simulation.holding import Places
 from robot_dyn.simulation.mode_change import end_mode, without_modes
 from robot_dyn.simulation.modes import NOTHING_HELD, modes_of
@@ -40,6 +42,7 @@ from robot_dyn.simulation.time_loop import Ended, Functions, Now
 from robot_dyn.simulation.trajectory import Ending, Outcome
 from robot_dyn.simulation.transfers import Transfers
 from robot_dyn.simulation.watch import DivergedError, Watch, one_step
+from robot_dyn.values import copied
 
 _SAMPLES = 1000  # of a run without a record period
 _COMPARED = 1000  # times at which a run is compared with runs of other tolerances
@@ -110,7 +113,8 @@ class EventRun(SwitchedRun):
         if equation.impulses:
             modes = modes_of(equation, own.copy(), places, _ACCUMULATED, _BRIEF * setup.duration_s)
             modes.start(self.start)
-        self.switching = Switching(equation, modes=modes)
+        alone = thresholds and modes is None and not transfers.any
+        self.switching = setup.kept(_switching) if alone else Switching(equation, modes=modes)
         if not thresholds:
             self.switching = Switching(equation, self.switching.quantities, modes)
         self.runs = runs_of(equation, self.start[:, None], own, m + n + 2)
@@ -119,7 +123,7 @@ class EventRun(SwitchedRun):
         self.advance = machine_code or event_loop(
             of.begin, of.step, of.error, of.accept, of.dense, without_modes if modes is None else end_mode
         )
-        self.rules = rules_of(equation, True, inf)
+        self.rules = setup.kept(rules_alone)
         self.times = _times(setup, mesh, samples)
         compared = self.times.compared
         S, rows = len(self.plan.counts), int(most_samples(setup)) + 2 if samples else 0
@@ -129,8 +133,12 @@ class EventRun(SwitchedRun):
             np.empty(rows), np.empty((rows, m, 1)), np.empty((rows, m + n + 2, 1)), np.empty(states),
             np.empty((states, m)), np.empty(_CHUNK), np.empty((_CHUNK, m)), *shown,
         )  # fmt: skip
-        events = self.functions.events if self.compiled else self.switching.function
-        self.switches = self.switching.at(0.0, self.start, len(of.work.F), events, own[:n, 0] if held else None)
+        events, degree = self.functions.events if self.compiled else self.switching.function, len(of.work.F)
+        if alone and not setup.events:
+            known = copied(setup.kept(_switches))
+            self.switches = known._replace(functions=events, b=np.zeros(degree + 1), stack=room(degree))
+        else:
+            self.switches = self.switching.at(0.0, self.start, degree, events, own[:n, 0] if held else None)
         self.events: list[Occurrence] = []
         self.log = event_log(n, 0, _BRIEF * setup.duration_s) if modes is None else modes.holding.log
         self._forget_sides()
@@ -268,6 +276,18 @@ class EventRun(SwitchedRun):
             int(self.now[Now.STEPS]), int(self.now[Now.EVALUATIONS]), float(self.runs.peak[0]), tuple(self.events),
             ends,
         )  # fmt: skip
+
+
+def _switching(setup: Setup) -> Switching:
+    """Where the equation of a setup switches, in which nothing is held or carried."""
+    return Switching(setup.equation)
+
+
+def _switches(setup: Setup) -> Switches:
+    """Its switching functions at the start, if no event is asked for."""
+    equation = setup.equation
+    held = np.full(equation.plant.dynamics.n, np.nan) if equation.sampled else None
+    return setup.kept(_switching).at(0.0, equation.start(setup.q0, setup.v0), 0, None, held)
 
 
 def _method(setup: Setup, equation: StateEquation) -> tuple[ControlledStepper, np.ndarray]:

@@ -78,7 +78,7 @@ class FixedStep(Followed):
         self.advance = machine_code or time_loop(self.stepper.step)
         every, thin = self._shared(pace)
         largest = _DOUBTFUL if self.compiled else LARGEST
-        self.rules = rules_of(equation, True, largest, every, thin)
+        self.rules = setup.kept(rules_alone)._replace(largest=largest, every=every, thin=thin)
         rows = samples_at_most(setup, self.plan.counts) if pace == 1 else 1
         states = int((-(-self.plan.counts // every)).sum()) // thin + 2
         shown = (np.empty((1 + 3 * n, 0)), NOTHING) if observer is None else (observer.columns, observer.observation)
@@ -209,6 +209,11 @@ class FixedStep(Followed):
             outcome, self._times(kept.place[:rows]), kept.y[:rows, :, 0], kept.made[:rows, :, 0], path, path,
             int(self.now[Now.STEPS]), int(self.now[Now.EVALUATIONS]), float(self.runs.peak[0]), tuple(self.events),
         )  # fmt: skip
+
+
+def rules_alone(setup: Setup) -> Rules:
+    """The rules of the loop of a run by itself, which shares no states."""
+    return rules_of(setup.equation, True, inf)
 
 
 def rules_of(

@@ -15,12 +15,12 @@ from robot_dyn.model.units import unit
 from robot_dyn.simulation.chatter import Episode
 from robot_dyn.simulation.creep import creeping
 from robot_dyn.simulation.levels import Level, Levels, levels
-from robot_dyn.simulation.observation import Observed, Visit
+from robot_dyn.simulation.observation import Observation, Observed, Visit, observation_of
 from robot_dyn.simulation.observer import Observer
 from robot_dyn.simulation.reference_remarks import held, jumps
 from robot_dyn.simulation.remarks import Kind, Remark
 from robot_dyn.simulation.setup import Setup
-from robot_dyn.simulation.state_equation import StateEquation
+from robot_dyn.values import copied
 
 Units = list[tuple[str, str, str]]  # of q, v and u of each joint
 QUANTITIES = ("q", "v", "u")
@@ -29,15 +29,26 @@ _HIDDEN = 0.1  # of the range of a quantity: what the samples beside a window le
 _ROUNDING = 1e-9  # of a quantity: a smaller range is noise
 
 
-def observer_of(setup: Setup, equation: StateEquation, of: Levels | None = None) -> Observer:
+def observer_of(setup: Setup, of: Levels | None = None) -> Observer:
     """An observer of a run that has not begun, for its levels unless others are given."""
-    u = np.full(len(setup.q0), np.nan)
+    if of is not None:
+        return Observer(_observation(setup, of), of, setup.equation.canonical)
+    of, start = setup.kept(_beginning)
+    return Observer(copied(start), of, setup.equation.canonical)
+
+
+def _beginning(setup: Setup) -> tuple[Levels, Observation]:
+    of = levels(setup.plant.dynamics, setup.plant.effects, setup.controller)
+    return of, _observation(setup, of)
+
+
+def _observation(setup: Setup, of: Levels) -> Observation:
+    """Of the start; nan for what u is not known before the first tick."""
+    equation, u = setup.equation, np.full(len(setup.q0), np.nan)
     if not equation.sampled:
         with suppress(RobotDynError):  # the run will tell
             u = equation.actuation(0.0, setup.q0, setup.v0, np.zeros(equation.states), None)
-    start = np.concatenate([setup.q0, setup.v0, u])
-    of = of or levels(setup.plant.dynamics, setup.plant.effects, setup.controller)
-    return Observer(start, of, equation.canonical)
+    return observation_of(np.concatenate([setup.q0, setup.v0, u])[:, None], of)
 
 
 def remarks(

@@ -12,11 +12,12 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.simulation.levels import NO_LEVELS, Levels
-from robot_dyn.simulation.observation import Observed, observation_of, observe, observed
+from robot_dyn.simulation.observation import Observation, Observed, observe, observed
 
 CHUNK = 16384  # columns looked at together: with fewer, the calls of NumPy cost more than what they do
 _PAD = 8  # so that the rows of a column lie in different sets of the processor's cache
 _WINDOW = 64  # columns whose extremes are kept as one, at first
+_FEW = 1000  # columns that may wait until it is asked what was observed
 _WINDOWS = 256  # at most so many are kept: beyond, two become one, and the next are twice as wide
 
 
@@ -25,7 +26,7 @@ class Observer:
     """What is seen of a run so far.
 
     Args:
-        start: q, v, u at 0 s, (3n,); nan where u is not known before the first tick.
+        start: The observation before the first step, which it goes on with.
         levels: To be looked out for.
         canonical: As below.
 
@@ -37,11 +38,11 @@ class Observer:
         canonical: Whether steps are in (q, p).
     """
 
-    def __init__(self, start: Array, levels: Levels = NO_LEVELS, canonical: bool = False) -> None:
-        self.n, self.canonical = len(start) // 3, canonical
+    def __init__(self, start: Observation, levels: Levels = NO_LEVELS, canonical: bool = False) -> None:
+        self.n, self.canonical = len(start.low) // 3, canonical
         self.columns, self.filled, self._chunk = np.empty((1 + 3 * self.n, CHUNK + _PAD)), 0, CHUNK
         self.seen = np.zeros(2 * self.n)
-        self.observation, self._levels = observation_of(start[:, None], levels), levels
+        self.observation, self._levels = start, levels
         self._edges, self._width = np.zeros(1), _WINDOW
         self._low, self._high = (np.empty((0, 3 * self.n)) for _ in range(2))
 
@@ -69,6 +70,11 @@ class Observer:
         with np.errstate(all="ignore"):
             self._windows(self.columns[0, : self.filled], self.columns[1:, : self.filled])
         self.filled = 0
+
+    def end(self) -> None:
+        """No step follows: look at the last ones, or if these are few keep them, without the room that was left."""
+        self.look(end=self.filled > _FEW)
+        self.columns = self.columns[:, : self.filled].copy()
 
     def close(self) -> Observed:
         """Look at the last steps; what was observed."""

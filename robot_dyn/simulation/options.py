@@ -61,6 +61,8 @@ def setup_of(caller: str, what: Setup | Plant | Dynamics, options: Mapping[str, 
     Raises:
         QueryError: If an option is unknown, or q0 is missing.
     """
+    if isinstance(what, Setup) and not options:
+        return what.current()
     known = {each.name for each in fields(Setup)} if isinstance(what, Setup) else {"q0", "v0", *Options.__annotations__}
     for name in options.keys() - known:
         raise QueryError(f"{caller}: no option {name!r}; {nearest(name, known)}")
@@ -69,7 +71,7 @@ def setup_of(caller: str, what: Setup | Plant | Dynamics, options: Mapping[str, 
             raise QueryError(no_step(method.name))
         options = {"step_s": None, **options}  # that of the setup was given for another method
     if isinstance(what, Setup):
-        return replace(what, **options) if options else what
+        return replace(what, **options)
     plant = what if isinstance(what, Plant) else Plant(what)
     if "q0" not in options:
         raise QueryError(f"{caller}: give q0, the position at the start, ({plant.dynamics.n},)")

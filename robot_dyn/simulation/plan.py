@@ -16,11 +16,19 @@ from robot_dyn.simulation.schedule import paced
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.time_loop import Plan
 
+_MOST_KEPT = 1000  # segments: to compute more of them takes little of the time of their run, and to keep them memory
 BOUNDS = 2  # numbers of p before the reference: time is kept between them, so that switches act as between them
 
 
 def plan_of(setup: Setup, pace: Fraction = Fraction(1)) -> Plan:
-    """The segments of a setup, with steps `pace` times as long, and its end."""
+    """The segments of a setup, with steps `pace` times as long, and its end, for one run, which changes it."""
+    if pace != 1 or len(setup.segments) > _MOST_KEPT:
+        return _plan(setup, pace)
+    plan = setup.kept(_plan)
+    return plan._replace(ticks=plan.ticks.copy(), transfers=plan.transfers.copy())
+
+
+def _plan(setup: Setup, pace: Fraction = Fraction(1)) -> Plan:
     segments = paced(setup.segments, pace)
     counts = np.array([each.steps for each in segments])
     starts, ends = (np.array([getattr(each, name) for each in segments]) for name in ("start", "end"))

@@ -63,7 +63,7 @@ def prepared(
         if machine is None:
             return interpreted(of, watch), np.zeros(0)
         functions = machine.in_python if machine.loop is None else machine.equations.functions
-        return functions, machine.parameters if of is equation else machine.of(of)
+        return functions, machine.parameters if of is equation else _numbers(machine, of)
 
     loop, in_python = (None, None) if machine is None else (machine.advance(), machine.in_python)
     if setup.finds_events:
@@ -77,3 +77,11 @@ def prepared(
             chooses,
         )  # fmt: skip
     return FixedStep(watch, transfers, made, cast(Fraction, pace), loop, on_progress, observer)
+
+
+def _numbers(machine: Machine, equation: StateEquation) -> np.ndarray:
+    """The parameters of machine code for an equation of other numbers, which keeps those of the latest machine."""
+    latest = equation.known.get(_numbers)
+    if latest is None or latest[0] is not machine:
+        latest = equation.known[_numbers] = machine, machine.of(equation)
+    return latest[1]

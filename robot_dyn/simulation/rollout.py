@@ -24,6 +24,7 @@ from robot_dyn.integrate.adaptive import AUTO, EXPLICIT
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.model.edits import Edits
+from robot_dyn.simulation.checks import check_stops
 from robot_dyn.simulation.divergence import causes
 from robot_dyn.simulation.loads import frame_of
 from robot_dyn.simulation.machine.batch import LANES, Batch
@@ -33,7 +34,7 @@ from robot_dyn.simulation.machine.thresholds import Thresholds, thresholds
 from robot_dyn.simulation.options import Options, setup_of, takes_options
 from robot_dyn.simulation.origin import edits_of_machine_code
 from robot_dyn.simulation.rollout_result import Rollouts
-from robot_dyn.simulation.setup import Setup, check_stops
+from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import MOST_BYTES
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.validate import choice, instance, integer, joint_values, numbers, truth

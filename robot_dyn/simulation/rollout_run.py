@@ -55,12 +55,25 @@ def trajectory(runs: Rollouts, run: int) -> Trajectory:
     steps, evaluations = int(runs.steps[run]), int(runs.evaluations[run])
     about = runs.about | {"run": f"{run} of {len(runs)}"}
     return Trajectory(
-        runs.joint_names, t, q, v, a, u, dict(zip(runs.sources, power.T, strict=True)),
-        Ledger(energy[:, 0], energy[:, 1], work), desired, deviation, runs.outcome(run),
-        replace(runs.statistics, steps=steps, evaluations=evaluations), None, about, loads, stops,
-        acting=acts, remarks=remarks_of(runs, run, setup, t, q),
+        joint_names=runs.joint_names,
+        t=t,
+        q=q,
+        v=v,
+        a=a,
+        u=u,
+        power=dict(zip(runs.sources, power.T, strict=True)),
+        ledger=Ledger(energy[:, 0], energy[:, 1], work),
+        desired=desired,
+        deviation=deviation,
+        outcome=runs.outcome(run),
+        statistics=replace(runs.statistics, steps=steps, evaluations=evaluations),
+        about=about,
+        wrenches=loads,
+        at_stop=stops,
+        acting=acts,
+        remarks=remarks_of(runs, run, setup, t, q),
         extremes=None if runs.observed is None else runs.observed.extremes[run],
-    )  # fmt: skip
+    )
 
 
 def setup_of(runs: Rollouts, setup: Setup, run: int) -> Setup:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
-from dataclasses import dataclass, field
+from copy import copy
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from math import inf
 from typing import Any, final
@@ -14,21 +14,19 @@ from robot_dyn.arithmetic import Array, Ball
 from robot_dyn.control.control_law import ControlLaw
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.plant import Plant
-from robot_dyn.effects.rigid_stops import RigidStops
-from robot_dyn.errors import ControlError, EffectError, OverflowedError, QueryError, shown
-from robot_dyn.foreign import call
+from robot_dyn.errors import QueryError, shown
 from robot_dyn.integrate.adaptive import AUTO, Adaptive
 from robot_dyn.integrate.methods import as_method
 from robot_dyn.simulation.asked import asked
-from robot_dyn.simulation.declarations import undeclared
+from robot_dyn.simulation.checks import check_model, check_parts
+from robot_dyn.simulation.declarations import is_value, undeclared
 from robot_dyn.simulation.event import Event
 from robot_dyn.simulation.schedule import LEAST_STEPS, ON_STEP, Segment, cuts, near, nodes, steps_on
-from robot_dyn.simulation.size import check_segments
+from robot_dyn.simulation.size import MOST_CUT, check_segments
 from robot_dyn.simulation.state_equation import StateEquation
-from robot_dyn.validate import choice, duration, instance, integer, one_state, returned, truth
-from robot_dyn.values import Value
+from robot_dyn.validate import choice, duration, instance, integer, one_state, truth
+from robot_dyn.values import Keeping, Value
 
-MOST_CUT = 200_000  # steps of a run of fixed step that is cut at events
 ENGINES = ("auto", "interpreted", "compiled")
 STEP_S = 1e-3  # of a method of fixed step, unless given
 _LONGEST_STEP_S, _LEAST_STEPS = 0.01, 200  # where a part does not declare where it switches
@@ -36,8 +34,8 @@ _LONGEST_STEP_S, _LEAST_STEPS = 0.01, 200  # where a part does not declare where
 
 @final
 @dataclass(frozen=True, eq=False)
-class Setup(Value):
-    """All that a run depends on.
+class Setup(Value, Keeping):
+    """All that a run depends on; what follows from it alone is computed once and kept with it, and not copied.
 
     Attributes:
         plant: What moves.
@@ -104,23 +102,9 @@ class Setup(Value):
         choice("engine", self.engine, ENGINES)
         object.__setattr__(self, "events", _events(self.events))
         object.__setattr__(self, "controller", _controller(self.controller, len(names)))
-        self._check_model()
+        check_model(self)
         check_segments(self)
-        if self.events and not self.finds_events:
-            raise QueryError(
-                f"events: steps of {self.integrator.name} are not cut; take integrator='DOP853'"
-                if self.integrator.nonsmooth
-                else f"events: runs of more than {MOST_CUT} steps of {self.integrator.name} are not cut; take longer"
-                " steps, or integrator='DOP853'"
-            )
-        self._check_set_valued()
-        self._check_payloads()
-        self._check_drives()
-        self._check_torques()
-        self._check_events()
-        self.plant.actuation(np.zeros(len(names)))
-        with suppress(OverflowedError):  # a start so far out is the outcome of a run
-            self.plant.forward_dynamics(0.0, self.q0, self.v0, np.zeros(len(names)))  # a singular M is told at once
+        check_parts(self)
 
     def _check_accuracy(self) -> None:
         """That an accuracy is one, and that nothing else chooses method or tolerance."""
@@ -130,96 +114,28 @@ class Setup(Value):
         if not self.estimate_error:
             raise QueryError("accuracy: is held to the error estimate; leave out estimate_error=False")
 
-    def _check_set_valued(self) -> None:
-        """That steps can end where joints are held and let go, and that the start is not beyond a rigid stop."""
-        effects = self.plant.equation_of_motion.set_valued
-        method: Any = self.integrator
-        for fails, why in (
-            (method.canonical, "integrates momenta"),
-            (not method.controls_error and method.order < 2, "is of order 1, too low to find where"),
-            (not self.finds_events, f"takes more than {MOST_CUT} steps"),
-        ):
-            if effects and fails and not method.nonsmooth:
-                raise QueryError(
-                    f"{effects[0].name}: steps must end where it holds a joint or lets it go, and {method.name} {why};"
-                    " take integrator='DOP853', or 'time_stepping' with a step_s"
-                )
-        if method.nonsmooth and (other := [x for x in effects if not (x.rubs or x.stops)]):
-            raise QueryError(f"{other[0].name}: has no law for {method.name}; take integrator='DOP853'")
-        check_stops(self.plant, self.q0)
+    def __getstate__(self) -> Any:
+        state, frozen = super().__getstate__()
+        return {each.name: state[each.name] for each in fields(self)}, frozen
 
-    def _check_payloads(self) -> None:
-        """That the state is one of velocities where payloads come and go."""
-        if self.plant.equation_of_motion.payloads and self.integrator.canonical:
-            raise QueryError(
-                f"carried_payload: what is picked up or dropped changes momenta, which {self.integrator.name}"
-                " integrates; take integrator='DOP853'"
-            )
-        if self.plant.equation_of_motion.payloads and self.integrator.nonsmooth:
-            raise QueryError(
-                f"carried_payload: steps of {self.integrator.name} do not end where it comes and goes; take"
-                " integrator='DOP853'"
-            )
+    @cached_property
+    def is_value(self) -> bool:
+        """Whether no part but its events is the user's own code, or may change: what follows from it stays as it is."""
+        return all(map(is_value, (self.plant, self.controller, self.integrator)))
 
-    def _check_drives(self) -> None:
-        """That the method integrates motors with the joints that they drive."""
-        for drive in self.plant.equation_of_motion.drives.values():
-            if self.integrator.nonsmooth:
-                raise QueryError(
-                    f"{drive.name}: {self.integrator.name} takes no motors of a drive; take integrator='DOP853'"
-                )
+    def current(self) -> Setup:
+        """The setup as its parts are now: itself, or a copy without what was kept if parts may have changed since."""
+        return self if self.is_value else copy(self)
 
-    def _check_torques(self) -> None:
-        """That what the controller and each effect return at the start is one number for each joint."""
-        dynamics, controller = self.plant.dynamics, self.controller
-        with np.errstate(all="ignore"):
-            torques = self.plant.equation_of_motion.torques(0.0, self.q0, self.v0)
-            for force, torque in zip(self.plant.forces, torques, strict=True):
-                returned(f"{type(force).__name__}.torque", torque, dynamics.n, error=EffectError)
-                if any(each.of_actuation for each in force.thresholds(dynamics.n)):
-                    raise EffectError(f"{force.name}: thresholds of the actuation are for bounds")
-            equation = self.plant.equation_of_motion
-            u, z = np.zeros(dynamics.n), np.zeros(equation.state_size)
-            u, reached = equation.applied(u, z)
-            names = (type(self.plant.effects[k]).__name__ for k in equation.states)
-            rates = equation.state_rates(0.0, self.q0, self.v0, u, reached, z)
-            for name, (place, rate) in zip(names, rates, strict=True):
-                returned(f"{name}.state_rate", rate, place.stop - place.start, "state", error=EffectError)
-        if controller is None:
-            return
-        with np.errstate(all="ignore"), suppress(OverflowedError):  # of its model: the outcome of a run
-            start = 0.0, self.q0, self.v0, np.zeros(controller.state_size)
-            torque = call(controller.torque, *start)
-            returned(f"{controller.name}.torque", torque, dynamics.n, error=ControlError)
-            if controller.state_size:
-                after = controller.next_state if controller.period_s else controller.state_rate
-                made = f"{controller.name}.{after.__name__}"
-                returned(made, call(after, *start), controller.state_size, "state", error=ControlError)
+    @cached_property
+    def equation(self) -> StateEquation:
+        """Its state equation."""
+        return StateEquation(self.plant, self.controller, self.integrator.canonical, self.events)
 
-    def _check_events(self) -> None:
-        """That what each event returns at the start is a number."""
-        for event in self.events:
-            value = call(event.function, 0.0, self.q0, self.v0)
-            if np.ndim(value) or not isinstance(value, int | float | np.number) or not np.isfinite(value):
-                raise QueryError(f"event {event.name!r}: its function must return a finite number, got {shown(value)}")
-
-    def _check_model(self) -> None:
-        """That the controller means the joints and links of the plant; a file with other names all over may fit too."""
-        plant, controller = self.plant.dynamics, self.controller
-        if controller is None:
-            return
-        for model in controller.models.values():
-            pairs = tuple(zip(model.joint_names, plant.joint_names, strict=False))
-            if not any(own in plant.joint_names for own, _ in pairs):
-                continue
-            for own, name in pairs:
-                if own != name:
-                    raise QueryError(
-                        f"the controller's model has the joint {own!r} where the plant has {name!r}; lock the same"
-                        " joints of both"
-                    )
-        if controller.task_frame is not None:
-            plant.placement(self.q0, controller.task_frame)  # so that an unknown link is told now
+    @cached_property
+    def undeclared(self) -> tuple[tuple[Any, str], ...]:
+        """Its parts that do not declare what they must, each with what to declare."""
+        return undeclared(self.plant, self.controller)
 
     @cached_property
     def segments(self) -> tuple[Segment, ...]:
@@ -259,8 +175,7 @@ class Setup(Value):
         """Whether steps end where effects and the controller switch, and at events asked for."""
         if self.integrator.controls_error or self.integrator.nonsmooth:
             return not self.integrator.nonsmooth
-        equation = StateEquation(self.plant, self.controller, self.integrator.canonical, self.events)
-        return equation.switches and self.steps <= MOST_CUT
+        return self.equation.switches and self.steps <= MOST_CUT
 
     @property
     def samples_on_steps(self) -> bool:
@@ -293,20 +208,7 @@ class Setup(Value):
         no stage meets. A fixed step is the user's.
         """
         longest = min(_LONGEST_STEP_S, self.duration_s / _LEAST_STEPS)
-        return longest if undeclared(self.plant, self.controller) else inf
-
-
-def check_stops(plant: Plant, q0: Array, of: str = "q0") -> None:
-    """That a start is not beyond a rigid stop.
-
-    Raises:
-        QueryError: If it is; names the joint, and by `of` the start.
-    """
-    for each in plant.effects:
-        if isinstance(each, RigidStops) and (depth := each.beyond_by(q0)).any():
-            i = int(np.argmax(depth))
-            name, which = plant.dynamics.joint_names[i], "lower" if each.touched(q0)[i] < 0 else "upper"
-            raise QueryError(f"{of}: {name!r} is {depth[i]:.3g} beyond its {which} stop; start between the stops")
+        return longest if self.undeclared else inf
 
 
 def no_step(name: str) -> str:

@@ -7,44 +7,33 @@ steps end at ticks, at the switches of effects, and at the end. A run keeps all 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, replace
 from math import inf
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
-
-import numpy as np
 
 from robot_dyn.effects.plant import Plant
 from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, STIFF
 from robot_dyn.integrate.time_stepping import TimeStepping
 from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.simulation.accuracy import run_to
-from robot_dyn.simulation.acting import acting
 from robot_dyn.simulation.choice import choose, most_interpreted
-from robot_dyn.simulation.damped_task import damped
-from robot_dyn.simulation.declarations import named, undeclared
-from robot_dyn.simulation.divergence import explained
+from robot_dyn.simulation.declarations import named
 from robot_dyn.simulation.error import ErrorEstimate, no_estimate
 from robot_dyn.simulation.estimate import estimate
 from robot_dyn.simulation.event_run import TooLongError
-from robot_dyn.simulation.imbalance import cause
-from robot_dyn.simulation.loads import at_stop, frame_of, wrenches
-from robot_dyn.simulation.observed import observer_of, remarks
+from robot_dyn.simulation.observed import observer_of
 from robot_dyn.simulation.observer import Observer
 from robot_dyn.simulation.options import Options, setup_of, starts, takes_options
-from robot_dyn.simulation.origin import edits_of_machine_code, origin
 from robot_dyn.simulation.prepared import prepared
 from robot_dyn.simulation.record import Record
 from robot_dyn.simulation.remarks import Remark
-from robot_dyn.simulation.samples import columns, ledger
+from robot_dyn.simulation.results import Results
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.size import check_record
-from robot_dyn.simulation.state_equation import StateEquation
-from robot_dyn.simulation.stiffness import StiffError, bounded_by_stability
+from robot_dyn.simulation.stiffness import StiffError
 from robot_dyn.simulation.switched_run import AccumulationError
-from robot_dyn.simulation.tracking import deviation_of
 from robot_dyn.simulation.trajectory import Ending, Outcome, Statistics, Trajectory
-from robot_dyn.simulation.unstable_loop import unstable
 from robot_dyn.validate import function
 
 if TYPE_CHECKING:
@@ -81,44 +70,24 @@ def simulate(
     if setup.accuracy is not None:
         pilot = replace(setup, accuracy=None)
         return run_to(pilot, setup.accuracy, lambda each: simulate(each, on_progress=on_progress))
-    equation = StateEquation(setup.plant, setup.controller, setup.integrator.canonical, setup.events)
-    check_record(setup, equation)
+    check_record(setup, setup.equation)
     began = perf_counter()
-    ran = _by_choice(setup, equation, on_progress)
-    setup, record, finished = ran.setup, ran.record, perf_counter()
-    error, spent, companions = None, 0, 0
-    at_the_end = None if on_progress is None else lambda _: on_progress(record.outcome.t)
-
-    def companion(pace: Any, of: Setup) -> Record:
-        nonlocal spent, companions
-        made = prepared(of, equation, ran.machine, pace, at_the_end, samples=False).record()
-        if made.outcome.ending is Ending.STOPPED:
-            raise KeyboardInterrupt
-        spent, companions = spent + made.evaluations, companions + 1
-        return made
-
-    if setup.estimate_error and record.outcome.ending is not Ending.STOPPED:
-        try:
-            error = estimate(setup, equation, record, companion)
-        except KeyboardInterrupt:
-            error = no_estimate("it was interrupted")
-            if record.outcome.ending is Ending.FINISHED:
-                outcome = Outcome(Ending.STOPPED, record.outcome.t, "interrupted after the run, in its error estimate")
-                record = replace(record, outcome=outcome)
+    ran = _by_choice(setup, on_progress)
+    finished, setup = perf_counter(), ran.setup
+    record, error, spent, companions = _with_estimate(ran, on_progress)
     estimated = perf_counter()
-    step = 0.0 if setup.integrator.controls_error else record.outcome.t / max(record.steps, 1)
+    results = Results(setup, record, ran.observer, error, dict(setup.about), ran.machine is not None, ran.said)
+    waits = setup.is_value and record.outcome.ending is Ending.FINISHED
+    names = () if waits else (each.name for each in fields(Trajectory) if each.name != "statistics")
+    read = {name: getattr(results, name) for name in names}
     statistics = Statistics(
-        EXPLICIT if setup.integrator.name == AUTO else setup.integrator.name, step, record.steps, record.evaluations,
-        finished - ran.ready, 0.0 if error is None else estimated - finished, ran.engine, ran.ready - began,
-        companion_evaluations=spent, companion_runs=companions,
-        user_code=", ".join(named(part) for part, _ in undeclared(setup.plant, setup.controller)),
+        EXPLICIT if setup.integrator.name == AUTO else setup.integrator.name,
+        0.0 if setup.integrator.controls_error else record.outcome.t / max(record.steps, 1),
+        record.steps, record.evaluations, finished - ran.ready, 0.0 if error is None else estimated - finished,
+        ran.engine, ran.ready - began, perf_counter() - estimated, spent, companions,
+        ", ".join(named(part) for part, _ in setup.undeclared),
     )  # fmt: skip
-    made = _trajectory(ran, equation, record, statistics, error)
-    asks = setup.estimate_error or not statistics.user_code  # the search calls undeclared parts 4000 times
-    if made.leak and asks and record.outcome.ending is not Ending.STOPPED:
-        why = cause(setup, equation, record, made.ledger.closes)
-        made = replace(made, ledger=replace(made.ledger, cause=why))
-    return replace(made, statistics=replace(statistics, samples_s=perf_counter() - estimated))
+    return Trajectory.of(results, statistics=statistics) if waits else Trajectory(statistics=statistics, **read)
 
 
 class _Ran(NamedTuple):
@@ -142,28 +111,74 @@ class _Ran(NamedTuple):
     said: tuple[Remark, ...]
 
 
-def _by_choice(setup: Setup, equation: StateEquation, on_progress: Callable[[float], object] | None) -> _Ran:
+def _by_choice(setup: Setup, on_progress: Callable[[float], object] | None) -> _Ran:
     """The run of a setup: begun again where another engine, or another method, turns out to be the one for it."""
     seen, said, chooses = 0, (), setup.integrator.name == AUTO
     while True:
-        machine, engine = choose(setup, equation, seen)
+        machine, engine = _chosen(setup, seen)
         ready = perf_counter()
-        observer = observer_of(setup, equation)
-        most = inf if seen else most_interpreted(setup, equation, machine)  # else what cannot compile would never end
+        observer = observer_of(setup)
+        most = inf if seen else most_interpreted(setup, setup.equation, machine)  # else what cannot compile never ends
         try:
             run = prepared(
-                setup, equation, machine, on_progress=on_progress, observer=observer, most=most, chooses=chooses
+                setup, setup.equation, machine, on_progress=on_progress, observer=observer, most=most, chooses=chooses
             )
             before = _spent_on_loops(machine)
             record = run.record()
+            observer.end()
             return _Ran(setup, machine, engine, observer, record, ready + _spent_on_loops(machine) - before, said)
         except TooLongError as found:
             seen = found.evaluations
         except StiffError as found:
-            stiff = replace(setup.integrator, method=STIFF)
-            setup, chooses, said = replace(setup, integrator=stiff), False, (found.remark,)
+            setup, chooses, said = setup.kept(_stiff), False, (found.remark,)
         except AccumulationError as found:
-            setup, chooses, said = replace(setup, integrator=TimeStepping()), False, (*said, found.remark)
+            setup, chooses, said = setup.kept(_nonsmooth), False, (*said, found.remark)
+
+
+def _stiff(setup: Setup) -> Setup:
+    return replace(setup, integrator=replace(setup.integrator, method=STIFF))
+
+
+def _nonsmooth(setup: Setup) -> Setup:
+    return replace(setup, integrator=TimeStepping())
+
+
+def _chosen(setup: Setup, seen: float) -> tuple[Machine | None, str]:
+    """As of `choose`, which chooses machine code once; that of events is compared with them before each run."""
+    found = setup.known.get(choose) or choose(setup, setup.equation, seen)
+    if found[0] is not None and not setup.events:
+        setup.known[choose] = found
+    return found
+
+
+def _with_estimate(
+    ran: _Ran, on_progress: Callable[[float], object] | None
+) -> tuple[Record, ErrorEstimate | None, int, int]:
+    """The record of a run, stopped if its estimate is; its estimated error, with evaluations and number of companions.
+
+    None where no error is estimated.
+    """
+    setup, record, spent, companions = ran.setup, ran.record, 0, 0
+    if not setup.estimate_error or record.outcome.ending is Ending.STOPPED:
+        return record, None, 0, 0
+    at_the_end = None if on_progress is None else lambda _: on_progress(record.outcome.t)
+
+    def companion(pace: Any, of: Setup) -> Record:
+        nonlocal spent, companions
+        made = prepared(of, setup.equation, ran.machine, pace, at_the_end, samples=False).record()
+        if made.outcome.ending is Ending.STOPPED:
+            raise KeyboardInterrupt
+        spent, companions = spent + made.evaluations, companions + 1
+        return made
+
+    try:
+        error = estimate(setup, setup.equation, record, companion)
+    except KeyboardInterrupt:
+        error = no_estimate("it was interrupted")
+        if record.outcome.ending is Ending.FINISHED:
+            why = "interrupted after the run, in its error estimate"
+            record = replace(record, outcome=Outcome(Ending.STOPPED, record.outcome.t, why))
+    return record, error, spent, companions
 
 
 def _spent_on_loops(machine: Machine | None) -> float:
@@ -173,36 +188,3 @@ def _spent_on_loops(machine: Machine | None) -> float:
     from robot_dyn.compiled.loops.call import spent_on_loops
 
     return spent_on_loops()
-
-
-def _trajectory(
-    ran: _Ran, equation: StateEquation, record: Record, statistics: Statistics, error: ErrorEstimate | None
-) -> Trajectory:
-    """The samples with what follows from them."""
-    setup, observed = ran.setup, ran.observer.close()
-    edits = {} if ran.machine is None else edits_of_machine_code(setup)
-    t = record.t
-    q, v, a, u, _, P, _ = columns(equation, t, record.y, record.made)
-    desired, deviation = deviation_of(setup, t, q)
-    power = dict(zip(equation.sources, P.T, strict=True))
-    plant = setup.plant
-    names, about = plant.dynamics.joint_names, frame_of(setup) | origin(plant.dynamics) | edits | setup.about
-    of_control = _of_control(setup, equation, record)
-    outcome = explained(record.outcome, setup, of_control)
-    return Trajectory(
-        names, t, q, v, a, u, power, ledger(equation, record), desired, deviation, outcome, statistics, error,
-        about, wrenches(plant, t, q), at_stop(plant, q),
-        (
-            *remarks(setup, ran.observer, observed, t, np.hstack([q, v, u]), power), *ran.said,
-            *bounded_by_stability(setup, equation, record), *of_control,
-        ),
-        observed.extremes[0], acting(setup),
-        equation.controller_states(record.y), record.events, equation.effect_states(record.y),
-    )  # fmt: skip
-
-
-def _of_control(setup: Setup, equation: StateEquation, record: Record) -> tuple[Remark, ...]:
-    """What is said of the controller; one that was interrupted is not asked again."""
-    if record.outcome.ending is Ending.STOPPED:
-        return ()
-    return (*unstable(setup, equation, record.t, record.y), *damped(setup, record))

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 MOST_BYTES = 8 * 2**30  # of all that is recorded, unless said
 LONGEST_S = LEAST_EXACT / float_info.epsilon  # up to there floats tell the times of a run
+MOST_CUT = 200_000  # steps of a run of fixed step that is cut at events
 MOST_STEPS = 1e11  # about a day of the fastest machine code
 _SEGMENT_BYTES, _SEGMENT_BYTES_PER_JOINT = 500, 100  # by estimate; the second is a quintic at its start and along it
 

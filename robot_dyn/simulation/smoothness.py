@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from robot_dyn.control.block import Block
-from robot_dyn.simulation.declarations import named, undeclared
+from robot_dyn.simulation.declarations import named
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.record import Path
@@ -41,7 +41,7 @@ def first_kink(setup: Setup, equation: StateEquation, path: Path) -> Kink:
         equation: Its state equation.
         path: Its states, step by step.
     """
-    if parts := undeclared(setup.plant, setup.controller):
+    if parts := setup.undeclared:
         shortest = setup.duration_s / LOOKS
         return 0.0, f"{named(parts[0][0])} {parts[0][1]}; what is shorter than {shortest:.1g} s is not seen"
     if setup.controller is not None and any(rounds(each.part) for each in setup.controller.parts):

@@ -26,6 +26,7 @@ from robot_dyn.errors import RobotDynError
 from robot_dyn.foreign import call
 from robot_dyn.model.dynamics import acceleration
 from robot_dyn.simulation.event import Event
+from robot_dyn.values import Keeping
 
 CONTROL = "control"
 PICK_UP = "pick_up"  # the work of impacts where payloads at rest are picked up
@@ -34,7 +35,7 @@ CONTROLLER = -1  # among the parts that switch, beside the numbers of the effect
 
 @final
 @dataclass(frozen=True)
-class StateEquation:
+class StateEquation(Keeping):
     """The state equation of a plant under a controller.
 
     Attributes:

@@ -19,6 +19,7 @@ from robot_dyn.simulation.modes import Modes
 from robot_dyn.simulation.state_equation import CONTROLLER, StateEquation
 from robot_dyn.threshold import Threshold
 
+_MOST = 256  # equations that are kept, each of the sides of all thresholds
 Quantity = tuple[int, bool]  # a joint, and whether it is its actuation that passes a level
 
 
@@ -160,7 +161,10 @@ class Switching:
             if controller is not None and at.get(CONTROLLER):
                 controller = controller.beyond(at[CONTROLLER])
             plant = plant if mode is None else in_mode(plant, mode)
-            self._known[key] = replace(equation, plant=plant, controller=controller)
+            made = replace(equation, plant=plant, controller=controller)
+            if len(self._known) >= _MOST:
+                return made
+            self._known[key] = made
         return self._known[key]
 
     def number(self, index: int) -> int:

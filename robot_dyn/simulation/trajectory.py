@@ -5,19 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import StrEnum
 from math import inf
+from types import NoneType
 from typing import TYPE_CHECKING, Any, Protocol, final, runtime_checkable
 
 import numpy as np
 
-from robot_dyn.errors import QueryError, escaped, shown
-from robot_dyn.model.units import units
+from robot_dyn.errors import QueryError, shown
 from robot_dyn.simulation.error import ErrorEstimate
 from robot_dyn.simulation.event import Occurrence
-from robot_dyn.simulation.ledger import Ledger, largest
+from robot_dyn.simulation.ledger import Ledger
 from robot_dyn.simulation.remarks import Remark
-from robot_dyn.simulation.remarks import lines as said
 from robot_dyn.simulation.tracking import root_mean_square
-from robot_dyn.values import Value, read_only
+from robot_dyn.values import Derived, read_only
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.setup import Setup
@@ -25,8 +24,6 @@ if TYPE_CHECKING:
 # Residuals, as parts of the energy exchanged. Over 150 random scenes they were at most 10 times the estimated error of
 # q, as a part of the motion; one that is far larger contradicts the estimate.
 _CONTRADICTS, _ROUNDING = 100.0, 1e-12
-_TOLD = 3  # events in a summary
-_NOTICED = 0.01  # [s]: shorter times are not worth a word
 
 
 class Ending(StrEnum):
@@ -84,7 +81,7 @@ class Statistics:
         companions_s: Time of the error estimate.
         engine: Which loop ran, and why if another was possible.
         compile_s: Time before the run, for the choice of the loop and for compiling it.
-        samples_s: Time after it, for what follows from the states of its samples.
+        samples_s: Time after it, for what follows from the states of its samples and does not wait until it is read.
         companion_evaluations: Evaluations of the error estimate.
         companion_runs: Companion runs of the error estimate.
         user_code: Parts of the setup that are code of the user's, by name; each run calls them.
@@ -145,8 +142,11 @@ class Accuracy:
 
 @final
 @dataclass(frozen=True, eq=False)
-class Trajectory(Value):
+class Trajectory(Derived):
     """Samples of a run, m of them; arrays are (m,) or (m, n).
+
+    What follows from the states of a run of `simulate` is computed when it is first read; where parts are the user's
+    own code, or the run did not finish, `simulate` computes it.
 
     Attributes:
         joint_names: Of the n joints.
@@ -187,17 +187,17 @@ class Trajectory(Value):
     deviation: np.ndarray | None
     outcome: Outcome
     statistics: Statistics
-    error: ErrorEstimate | None = None
+    error: ErrorEstimate | None = field(default_factory=NoneType)
     about: dict[str, str] = field(default_factory=dict, repr=False)
     wrenches: dict[str, np.ndarray] = field(default_factory=dict)
-    at_stop: np.ndarray | None = None
-    remarks: tuple[Remark, ...] = ()
-    extremes: np.ndarray | None = None
-    acting: tuple[str, ...] | None = None
-    controller_states: np.ndarray | None = None
-    events: tuple[Occurrence, ...] = ()
+    at_stop: np.ndarray | None = field(default_factory=NoneType)
+    remarks: tuple[Remark, ...] = field(default_factory=tuple)
+    extremes: np.ndarray | None = field(default_factory=NoneType)
+    acting: tuple[str, ...] | None = field(default_factory=NoneType)
+    controller_states: np.ndarray | None = field(default_factory=NoneType)
+    events: tuple[Occurrence, ...] = field(default_factory=tuple)
     effect_states: dict[str, np.ndarray] = field(default_factory=dict)
-    accuracy: Accuracy | None = None
+    accuracy: Accuracy | None = field(default_factory=NoneType)
 
     def __post_init__(self) -> None:
         read_only(self)
@@ -210,16 +210,7 @@ class Trajectory(Value):
     @property
     def leak(self) -> str:
         """Why the energy ledger casts doubt on the run; empty if it does not."""
-        ledger = self.ledger
-        if ledger.closes:
-            if ledger.rounded or self.error is None or not self.error.resolved_until > 0:
-                return ""
-            span = float(np.ptp(self.q, axis=0).max())
-            if not span > 0 or ledger.closure <= _CONTRADICTS * max(self.error.final / span, _ROUNDING):
-                return ""
-            why = ledger.cause or "do not trust the estimate, take a smaller step"
-            return f"it does not close as the estimated error of q says: {why}"
-        return f"it does not close: {ledger.cause or 'simulate it by itself with its error estimate, which tells why'}"
+        return leak(self.ledger, self.error, self.q)
 
     def proven_digits(self, proof: Theorem) -> float:
         """Decimal digits of q that a theorem confirms: −log₁₀ of the largest possible error, in [rad] or [m].
@@ -239,58 +230,21 @@ class Trajectory(Value):
         return proof.digits_of(self.t, self.q)
 
     @property
-    def _not_estimated(self) -> str:
-        """That its error was not estimated, and why."""
-        if self.outcome.ending is Ending.STOPPED:
-            return "not estimated (the run was stopped)"
-        return f"not estimated ({'a run of rollouts' if 'run' in self.about else 'estimate_error is False'})"
-
-    @property
     def summary(self) -> str:
         """A few lines: outcome, what acted, ledger, error, tracking, cost."""
-        from robot_dyn.simulation.origin import joint_types
+        from robot_dyn.simulation.summary import summary
 
-        s, ledger, unit = self.statistics, self.ledger, units("q", joint_types(self))
-        opening = f"{self.outcome.ending} at t = {self.outcome.t:g} s, {len(self.t)} samples"
-        residual = f"residual {largest(np.abs(ledger.residual)):.2e} J, {ledger.closure:.1e} of the energy exchanged"
-        lines = [
-            opening + _after(self.outcome.advice),
-            *([] if self.acting is None else [f"effects: {', '.join(self.acting) or 'none'}"]),
-            *([f"right angles, in machine code: {self.about['right_angles']}"] if "right_angles" in self.about else []),
-            f"energy ledger: {residual}" + _after(self.leak) if ledger.known else "energy ledger: was not recorded",
-            f"error of q [{unit}]: {self.error or self._not_estimated}",
-        ]
-        lines += [] if self.accuracy is None else [f"accuracy: {self.accuracy}"]
-        lines += ["between samples: not watched"] if self.extremes is None else []
-        lines += [f"events: {_told(self.events)}"] if self.events else []
-        lines += [line for line in said(self.remarks) if line != self.outcome.advice]
-        if self.tracking_error is not None:
-            what = "the frame [m]" if self.desired is None else f"q [{unit}]"
-            lines.append(f"tracking error of {what}: {self.tracking_error:.3e} rms")
-        step = f"step {s.step_s:.4g} s, " if s.step_s else ""
-        lines.append(f"{s.method}: {step}{s.steps} steps, {s.evaluations} evaluations, {s.engine}")
-        if s.user_code and s.companion_runs:
-            lines.append(
-                f"error estimate: {s.companion_evaluations} evaluations in {s.companion_runs} companion runs, which"
-                f" call {s.user_code} as well; estimate_error=False leaves them out"
-            )
-        parts = (
-            ("compile", s.compile_s),
-            ("run", s.wall_s),
-            ("error estimate", s.companions_s),
-            ("samples", s.samples_s),
-        )
-        lines.append(
-            "time: " + ", ".join(f"{name} {spent:.2g} s" for name, spent in parts if spent >= _NOTICED or name == "run")
-        )
-        return "\n".join(map(escaped, lines))
+        return summary(self)
 
 
-def _told(events: tuple[Occurrence, ...]) -> str:
-    """The first events in words."""
-    words = [f"{each.name} at {each.t:.4g} s" for each in events[:_TOLD]]
-    return ", ".join(words) + (f", and {len(events) - _TOLD} more" if len(events) > _TOLD else "")
-
-
-def _after(text: str) -> str:
-    return f"; {text}" if text else ""
+def leak(ledger: Ledger, error: ErrorEstimate | None, q: np.ndarray) -> str:
+    """As of `Trajectory.leak`, from the ledger, the estimated error and the samples q (m, n) of a run."""
+    if not ledger.closes:
+        return f"it does not close: {ledger.cause or 'simulate it by itself with its error estimate, which tells why'}"
+    if ledger.rounded or error is None or not error.resolved_until > 0:
+        return ""
+    span = float(np.ptp(q, axis=0).max())
+    if not span > 0 or ledger.closure <= _CONTRADICTS * max(error.final / span, _ROUNDING):
+        return ""
+    why = ledger.cause or "do not trust the estimate, take a smaller step"
+    return f"it does not close as the estimated error of q says: {why}"

@@ -15,6 +15,7 @@ from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.stiffness import fastest
 from robot_dyn.simulation.trajectory import diverged_advice
+from robot_dyn.simulation.transfers import Transfers
 
 LARGEST = 1e100  # of Σ |y|: beyond it products overflow
 _PACED = 2000  # steps between looks at the pace of an adaptive method
@@ -46,13 +47,20 @@ def overflowed(y: Array) -> bool:
         return not np.abs(y).sum() < LARGEST
 
 
+def _start(setup: Setup) -> tuple[float, float]:
+    """Kinetic and potential energy at the start."""
+    energies = Transfers(setup.equation).equation.energies
+    K, V = (float(x[0]) for x in energies(np.zeros(1), setup.q0[None], setup.v0[None]))
+    return K, V
+
+
 @final
 class Watch:
     """Tells when energy grows without a source: the ledger's residual exceeds all there was and came a thousandfold."""
 
     def __init__(self, setup: Setup, equation: StateEquation) -> None:
         self.setup, self.equation = setup, equation
-        K, V = (float(x[0]) for x in equation.energies(np.zeros(1), setup.q0[None], setup.v0[None]))
+        K, V = setup.kept(_start)
         self.energy, self.scale = K + V, 1.0 + abs(K) + abs(V)
         self.paced, self.looked = 0.0, 0  # time and steps at the last look at the pace
 

@@ -107,7 +107,7 @@ class OneByOne:
         if self.stop[0]:
             return
         setup, equation, machine = self._of(i)
-        observer = observer_of(setup, equation, self.levels.of_runs([i]))
+        observer = observer_of(setup, self.levels.of_runs([i]))
         run = prepared(setup, equation, machine, observer=observer)
         run.stop = self.stop
         self.made[i] = self._kept(equation, run.record(), observer.observation)

@@ -12,7 +12,8 @@ from robot_dyn.coefficients import with_values
 from robot_dyn.compiled.parameters import CONTROLLER, Part, joined, parameters, rows, split
 from robot_dyn.effects.plant import Plant
 from robot_dyn.simulation.detection import LockStep, lock_step
-from robot_dyn.simulation.setup import MOST_CUT, Setup
+from robot_dyn.simulation.setup import Setup
+from robot_dyn.simulation.size import MOST_CUT
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.switching import Switching
 
