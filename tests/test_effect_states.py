@@ -22,9 +22,7 @@ ARM = rd.load("planar_2r")
 Q = np.array([0.1, 0.2])
 FRICTION = rd.LuGreFriction(120.0, [1.0, 0.8], 0.8, [1.0, 0.5], 1.5, 0.1)
 BOTH = pytest.mark.parametrize("engine", ["interpreted", "compiled"])
-SLOW_INTERPRETED = pytest.mark.parametrize(
-    "engine", [pytest.param("interpreted", marks=pytest.mark.stress), "compiled"]
-)
+SLOW_INTERPRETED = pytest.mark.parametrize("engine", [pytest.param("interpreted", marks=pytest.mark.long), "compiled"])
 
 
 @dataclass(frozen=True, eq=False)

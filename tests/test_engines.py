@@ -23,6 +23,7 @@ from robot_dyn.simulation.choice import choose
 from robot_dyn.simulation.machine.machine import MachineError
 from robot_dyn.simulation.machine.traced import SymbolicDynamics
 from robot_dyn.simulation.state_equation import StateEquation
+from tests.long import long
 
 ARM = rd.load("planar_2r")
 UR5 = completed(rd.load("ur5"))[0]  # its file states right angles with too few digits
@@ -106,7 +107,7 @@ def test_each_effect_acts_alike(name: str) -> None:
         np.testing.assert_allclose(ours.wrenches[link], wrench, atol=1e-11)
 
 
-@pytest.mark.parametrize("method", ["rk4", "gauss_4"])
+@pytest.mark.parametrize("method", ["rk4", *long(["gauss_4"])])
 def test_six_joints_under_all_at_once(method: str) -> None:
     q = np.array([0.3, -0.6, 0.4, -1.2, 0.5, 1.1])
     effects = [rd.ViscousFriction(0.5), rd.EffortLimit("urdf"), rd.ExternalWrench("tool0", [5, 3, 1, 0.1, 0.2, 0.3])]

@@ -12,7 +12,7 @@ import pytest
 from tests.fuzz.campaign import CASES, FUZZERS, MANY, run
 
 
-@pytest.mark.parametrize("cases", [CASES, pytest.param(MANY, marks=pytest.mark.stress)])
+@pytest.mark.parametrize("cases", [CASES, pytest.param(MANY, marks=pytest.mark.long)])
 @pytest.mark.parametrize("name", FUZZERS)
 def test_no_mutant_raises_a_foreign_exception_or_hangs(name: str, cases: int, tmp_path: Path) -> None:
     counts, findings = run(name, cases, 0, tmp_path)

@@ -94,7 +94,7 @@ def test_the_truth_is_inside_and_two_radii_off_is_outside(name: str, until_s: fl
         assert made.contains(middle_s, *truth(arm(name), middle_s, count, 10)[:2])
 
 
-@pytest.mark.stress
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "until_s", "count"), [("pendulum", 1.0, 6), ("planar_2r", 1.0, 30), ("ur5", 0.1, 3), ("panda", 0.05, 2)]
 )
@@ -474,7 +474,7 @@ def test_a_reference_may_pass_from_one_polynomial_to_another() -> None:
     assert run.proven_digits(made) > 11
 
 
-@pytest.mark.stress
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "count"), [("pendulum", 8), ("planar_2r", 8), ("ur5", 8), ("panda", 6)])
 def test_random_starts_are_proven_to_twelve_digits(name: str, count: int) -> None:
     """To 1 s, and 0.1 s of the six and seven joints; 28 of these 30 are the least, and all were."""
@@ -487,7 +487,7 @@ def test_random_starts_are_proven_to_twelve_digits(name: str, count: int) -> Non
     assert not failed
 
 
-@pytest.mark.stress
+@pytest.mark.long
 def test_a_small_box_of_a_six_axis_arm() -> None:
     made = proof(arm("ur5"), 0.1, 100, width_q=1e-6)
     assert made.proven and 1e-6 < made.radius_q.max() < 1e-5

@@ -7,11 +7,15 @@ import re
 import shlex
 import subprocess
 import sys
+from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
 from tests.browser import chromium
+from tests.command import said
+from tests.long import long
 from tests.printed import check_prints
 
 ROOT = Path(__file__).parents[1]
@@ -54,21 +58,39 @@ def test_no_block_of_the_readme_says_no_more_than_true() -> None:
     assert not re.findall(r"# → .*\b(?:True|False)\b", README)
 
 
-def test_commands_of_the_readme_run(tmp_path) -> None:
+def in_a_process(*command: str) -> str:
+    return run(*command, folder=Path.cwd())
+
+
+def quickly_here(*command: str) -> str:
+    """With small sizes, in this process."""
+    small = {"--samples": "100", "--budget": "0.2"}
+    return said(*(small.get(before, word) for before, word in pairwise(command)))
+
+
+@pytest.mark.parametrize("start", [quickly_here, *long([in_a_process])])
+def test_commands_of_the_readme_run(start: Callable[..., str], tmp_path: Path, monkeypatch) -> None:
     """One after the other in one folder, as they are read; `> file` keeps what is printed."""
+    monkeypatch.chdir(tmp_path)
     for command in COMMANDS:
         line, _, file = command.partition(" > ")
-        said = run(*shlex.split(line), folder=tmp_path)
-        assert said
+        printed = start(*shlex.split(line))
+        assert printed
         if file:
-            (tmp_path / file).write_text(said, encoding="utf-8")
+            (tmp_path / file).write_text(printed, encoding="utf-8")
 
 
-@pytest.mark.parametrize("script", sorted((ROOT / "scripts").glob("*.py")), ids=lambda path: path.name)
-def test_script_runs_quickly(script: Path) -> None:
+SCRIPTS = [[path.name] for path in sorted((ROOT / "scripts").glob("*.py")) if path.name != "benchmark.py"]
+
+
+@pytest.mark.parametrize(
+    "command", [["benchmark.py", "growth", "precision"], *SCRIPTS, *long([["benchmark.py"]])], ids=" ".join
+)
+def test_script_runs_quickly(command: list[str]) -> None:
+    script = ROOT / "scripts" / command[0]
     if "chromium" in script.read_text(encoding="utf-8"):
         chromium()
-    assert run(sys.executable, str(script), "--quick")
+    assert run(sys.executable, str(script), *command[1:], "--quick")
 
 
 def test_make_targets_of_the_readme_exist() -> None:
