@@ -39,14 +39,15 @@ def test_no_estimate_misleads_where_something_switches(index: int) -> None:
     assert not judged.misleads, str(judged)
 
 
-def test_estimates_of_smooth_runs_are_within_a_factor_of_three() -> None:
+@pytest.mark.parametrize(("indices", "least", "most"), [(SMOOTH[:3], 2, 0), *long([(SMOOTH, 6, 1)])])
+def test_estimates_of_smooth_runs_are_within_a_factor_of_three(indices: list[int], least: int, most: int) -> None:
     """None misleads, and all usable ones but one are between 0.3 and 3 of the error; `make stress` asks 95 % of 600."""
-    judged = [judge(SEED, index) for index in SMOOTH]
+    judged = [judge(SEED, index) for index in indices]
     assert not [str(each) for each in judged if each.misleads]
     usable = [each for each in judged if each.usable]
-    assert len(usable) > 5
+    assert len(usable) >= least
     outside = [str(each) for each in usable if each.run.error.note or not LEAST <= each.ratio <= MOST]
-    assert len(outside) <= 1, outside
+    assert len(outside) <= most, outside
 
 
 @pytest.mark.parametrize(("seed", "index"), [(1, 292), *long([(1, 460), (7, 239)])])
