@@ -151,22 +151,24 @@ def test_a_loop_that_no_period_makes_stable_says_so() -> None:
 
 def test_a_step_that_is_short_enough_is_told_with_its_error() -> None:
     plant = rd.Plant(rd.load("planar_2r"), [rd.ViscousFriction(60.0)])
-    fine = rd.advise(plant, [0.4, -0.7], integrator="rk4", step_s=1e-4, duration_s=0.2)
+    fine = rd.advise(plant, [0.4, -0.7], integrator="rk4", step_s=1e-4, duration_s=0.05)
     assert fine.stable
     assert f"error of q to expect: {fine.run.error}" in fine.text
-    coarse = rd.advise(plant, [0.4, -0.7], integrator="rk4", step_s=1e-2, duration_s=0.2)
+    coarse = rd.advise(plant, [0.4, -0.7], integrator="rk4", step_s=1e-2, duration_s=0.05)
     assert coarse.limits == fine.limits
     assert not coarse.stable
     assert "step 0.01 s: unstable; rk4 is stable up to" in coarse.text
     assert rd.simulate(plant, [0.4, -0.7], integrator="rk4", step_s=1e-2, duration_s=0.2).outcome.ending == "diverged"
-    chosen = rd.advise(plant, [0.4, -0.7], duration_s=0.2)
+    chosen = rd.advise(plant, [0.4, -0.7], duration_s=0.05)
     assert chosen.stable
     assert "auto chooses its steps" in chosen.text
 
 
 def test_the_command_prints_it_and_its_exit_code_tells(tmp_path: Path) -> None:
     scene = tmp_path / "scene.toml"
-    text = 'robot = "planar_2r"\nduration_s = 0.1\nmethod = "rk4"\nstep_s = {}\n[[effect]]\nkind = "viscous_friction"\n'
+    text = (
+        'robot = "planar_2r"\nduration_s = 0.05\nmethod = "rk4"\nstep_s = {}\n[[effect]]\nkind = "viscous_friction"\n'
+    )
     scene.write_text(text.format("1e-2") + "damping_N_m_s_per_rad = 60.0\n")
     result = run("advise", scene)
     assert (result.returncode, result.stderr) == (1, "")
