@@ -8,6 +8,9 @@ BIN := .venv/bin
 demo: .venv/installed
 	$(BIN)/robot-dyn demo --force
 
+# the many processes that tests start share their byte code
+test test-long: export PYTHONDONTWRITEBYTECODE :=
+
 test: .venv/installed
 	$(BIN)/python -m pytest -n auto --dist worksteal
 

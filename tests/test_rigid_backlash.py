@@ -137,6 +137,7 @@ def test_an_arm_with_backlash_dry_friction_and_stops_closes_its_ledger_in_both_e
     assert np.diff(lost).max() < 1e-10
 
 
+@pytest.mark.long  # against closed forms to 1e-12 above
 def test_errors_fall_with_the_tolerance() -> None:
     """A 2R with two backlashes under continuous control, 77 events, against 1e-13: of the order of the tolerance."""
     best = arm_run("interpreted", tolerance=1e-13, period=0.0)

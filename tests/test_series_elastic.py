@@ -28,7 +28,7 @@ def slide(effect: rd.SeriesElastic, engine: str = "interpreted", **options) -> r
 
 
 @pytest.mark.parametrize(
-    "method", [TIGHT, "gauss_6", *long([rd.Adaptive("Rosenbrock", 1e-11, 1e-13), "order_8"])], ids=str
+    "method", [TIGHT, *long(["gauss_6", rd.Adaptive("Rosenbrock", 1e-11, 1e-13), "order_8"])], ids=str
 )
 @BOTH
 def test_two_masses_and_a_spring_move_by_the_matrix_exponential(method, engine: str) -> None:

@@ -210,7 +210,7 @@ def ticking(step: int = 1) -> Callable[[], float]:
     return lambda: float(next(clock))
 
 
-@pytest.mark.parametrize("looks", [1, 100, 1000])
+@pytest.mark.parametrize("looks", [1, 100, *long([1000])])
 def test_what_there_is_no_time_for_is_named_and_nothing_else_is_missing(looks: int) -> None:
     """Each method of fixed step is a limit or a name, and so are gain, speed and payload."""
     result = short_stress(rd.load("planar_2r"), looks, 2)
