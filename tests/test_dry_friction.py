@@ -221,6 +221,7 @@ def names(run: rd.Trajectory) -> list[str]:
     return [each.name for each in run.events]
 
 
+@pytest.mark.long
 def test_an_arm_of_seven_joints_sticks_and_slides_to_eleven_digits() -> None:
     """Errors of at most ten times the tolerance."""
     exact, *others = (
@@ -238,7 +239,7 @@ def exactly_driven_panda() -> rd.Trajectory:
     return driven_panda(rd.Adaptive(rtol=1e-13, atol=1e-13), record_period_s=2.0)
 
 
-@pytest.mark.parametrize(("method", "coarsest", "order"), [("rk4", 64, 3.5), *long([("order_8", 32, 5.0)])])
+@pytest.mark.parametrize(("method", "coarsest", "order"), long([("rk4", 64, 3.5), ("order_8", 32, 5.0)]))
 def test_fixed_steps_keep_their_order_on_an_arm_of_seven_joints(method: str, coarsest: int, order: float) -> None:
     """Mean slope over four halvings from 1/16 s or 1/32 s, where the events are already those of the exact motion."""
     exact = exactly_driven_panda()

@@ -115,6 +115,7 @@ def test_a_2r_with_one_elastic_joint_is_that_of_equations_written_out(engine: st
     assert np.abs(run.ledger.residual).max() < 1e-10
 
 
+@pytest.mark.long
 def test_stiff_springs_are_the_armature_of_gear_and_rotor() -> None:
     """The distance from M + n² J falls as 1/k: tenfold for a tenfold stiffness, within a tenth."""
     control = rd.PD(rd.quintic(Q, [0.6, 0.4], 0.5), 100.0, 20.0)
