@@ -3,19 +3,25 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test stress check lock clean
+.PHONY: demo test test-long stress check lock clean
 
 demo: .venv/installed
 	$(BIN)/robot-dyn demo --force
 
+# the many processes that tests start share their byte code
+test test-long: export PYTHONDONTWRITEBYTECODE :=
+
 test: .venv/installed
 	$(BIN)/python -m pytest -n auto --dist worksteal
 
-# what takes long: all hard cases, their figures in build/hard_cases; what tests mark as stress; error estimates on 600
-# random scenes. With a fixed seed and with that of the day, which each prints.
+# the cases that tests mark as long: the whole catalog, all methods, more seeds
+test-long: .venv/installed
+	$(BIN)/python -m pytest -n auto --dist worksteal -m long
+
+# hours: all hard cases and their figures in build/hard_cases; error estimates on 600 random scenes. With a fixed seed and
+# with that of the day, which each prints.
 stress: .venv/installed
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.hard --full --write --seed $$(date +%Y%m%d)
-	$(BIN)/python -m pytest -n auto --dist worksteal -m stress --ignore tests/hard
 	$(BIN)/python -m tests.estimates --scenes 600 --seed 1
 	$(BIN)/python -m tests.estimates --scenes 600 --seed $$(date +%Y%m%d)
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import atexit
 import os
-import shutil
 import signal
-import tempfile
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -24,9 +22,8 @@ settings.load_profile("robot_dyn")
 # much CPU time.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-if "ROBOT_DYN_CACHE" not in os.environ:  # kernels of a test run are its own; workers inherit the folder
-    os.environ["ROBOT_DYN_CACHE"] = tempfile.mkdtemp(prefix="robot_dyn-kernels-")
-    atexit.register(shutil.rmtree, os.environ["ROBOT_DYN_CACHE"], ignore_errors=True)
+# Machine code of test runs is kept apart from the user's; workers, commands and the next run share it.
+os.environ.setdefault("ROBOT_DYN_CACHE", str(Path(__file__).parents[1] / ".pytest_cache" / "machine_code"))
 
 
 @pytest.fixture(autouse=True)

@@ -15,12 +15,13 @@ from robot_dyn.simulation.accuracy import AccuracyError
 from tests.estimates.asked import FAMILIES, answer, asked_scene
 from tests.estimates.held import meet
 from tests.estimates.truth import truth
+from tests.long import long
 
 ARM = rd.load("planar_2r")
 START = np.array([0.4, -0.7])
 
 
-@pytest.mark.parametrize("index", [0, 21, 2, 3, 4], ids=FAMILIES)
+@pytest.mark.parametrize("index", [0, *long([21, 2]), 3, *long([4])], ids=FAMILIES)
 def test_the_error_is_at_most_what_is_asked(index: int) -> None:
     """Against SciPy on equations written out in tests/estimates, near rounding."""
     scene, asked = asked_scene(1, index)
@@ -32,7 +33,7 @@ def test_the_error_is_at_most_what_is_asked(index: int) -> None:
     assert np.abs(run.q - truth(setup, run.t)).max() <= asked
 
 
-@pytest.mark.parametrize("index", [0, 1, 6, 9])
+@pytest.mark.parametrize("index", [6, *long([0, 1, 9])])
 def test_the_error_is_at_most_what_is_asked_where_joints_stick_and_strike(index: int) -> None:
     """Of random dry friction and rigid stops; more of them by `python -m tests.estimates --held`."""
     found = meet(1, index)
@@ -40,7 +41,7 @@ def test_the_error_is_at_most_what_is_asked_where_joints_stick_and_strike(index:
     assert found.estimated <= found.asked
 
 
-@pytest.mark.parametrize("index", range(4), ids=["pendulum", "planar_2r", "ur5", "panda"])
+@pytest.mark.parametrize("index", [*long([0, 1]), 2, *long([3])], ids=["pendulum", "planar_2r", "ur5", "panda"])
 def test_a_request_is_met_and_not_refused_at_an_estimate_below_it(index: int) -> None:
     """The short form of `python -m tests.estimates --requests 400`, against SciPy over `pin.aba`."""
     found = answer(20261123, index)
@@ -81,7 +82,7 @@ def test_a_tolerance_is_not_the_error() -> None:
     assert f"accuracy: asked 1.0e-10, estimated {of[1e-10].estimated:.1e} at rtol" in runs[1e-10].summary
 
 
-@pytest.mark.parametrize("index", [1, 36])
+@pytest.mark.parametrize("index", [1, *long([36])])
 def test_a_trial_step_that_goes_too_far_does_not_end_a_run(index: int) -> None:
     """Interpreted, into stiff stops at a loose tolerance: stages that overflow are those of steps that are refused."""
     scene, asked = asked_scene(20261126, index)

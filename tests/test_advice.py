@@ -16,6 +16,7 @@ from robot_dyn.simulation.stability import longest_step
 from tests.command import run
 from tests.estimates.advised import blow_up, limited
 from tests.estimates.scenes import RAIL
+from tests.long import long
 from tests.loops import growth
 
 BLOCK = rd.Robot.from_text(RAIL)  # 1 kg
@@ -46,7 +47,7 @@ def test_an_oscillation_bounds_some_methods_only() -> None:
         assert longest_step(rd.method("explicit_euler"), J, 1) * 20 == pytest.approx(2 * ratio, rel=2e-3, abs=2.1e-6)
 
 
-@pytest.mark.parametrize("ki", [0.0, 900.0])
+@pytest.mark.parametrize("ki", [*long([0.0]), 900.0])
 def test_the_period_of_a_loop_about_a_block_is_that_of_its_discrete_matrix(ki: float) -> None:
     """A mass under PID in zero-order hold, q and v in closed form between ticks."""
     kp, kd = 100.0, 20.0
@@ -89,7 +90,9 @@ def test_runs_blow_up_where_the_limit_says() -> None:
     assert 1 / 1.5 < limit / blow_up(scene, limit) < 1.5
 
 
-@pytest.mark.parametrize("late", [(0.0, 0.0), (0.0, 0.5), (1.0, 0.5), (0.4, 1.3), (2.0, 1.0)])
+@pytest.mark.parametrize(
+    "late", [(0.4, 1.3), *long(pytest.param(each) for each in [(0.0, 0.0), (0.0, 0.5), (1.0, 0.5), (2.0, 1.0)])]
+)
 @pytest.mark.parametrize("name", ["kinova", "xarm7"])
 def test_the_period_of_a_loop_with_delays_is_that_of_its_exact_map(name: str, late: tuple[float, float]) -> None:
     """To 1e-3, to which limits are bisected."""
@@ -148,22 +151,24 @@ def test_a_loop_that_no_period_makes_stable_says_so() -> None:
 
 def test_a_step_that_is_short_enough_is_told_with_its_error() -> None:
     plant = rd.Plant(rd.load("planar_2r"), [rd.ViscousFriction(60.0)])
-    fine = rd.advise(plant, [0.4, -0.7], integrator="rk4", step_s=1e-4, duration_s=0.2)
+    fine = rd.advise(plant, [0.4, -0.7], integrator="rk4", step_s=1e-4, duration_s=0.05)
     assert fine.stable
     assert f"error of q to expect: {fine.run.error}" in fine.text
-    coarse = rd.advise(plant, [0.4, -0.7], integrator="rk4", step_s=1e-2, duration_s=0.2)
+    coarse = rd.advise(plant, [0.4, -0.7], integrator="rk4", step_s=1e-2, duration_s=0.05)
     assert coarse.limits == fine.limits
     assert not coarse.stable
     assert "step 0.01 s: unstable; rk4 is stable up to" in coarse.text
     assert rd.simulate(plant, [0.4, -0.7], integrator="rk4", step_s=1e-2, duration_s=0.2).outcome.ending == "diverged"
-    chosen = rd.advise(plant, [0.4, -0.7], duration_s=0.2)
+    chosen = rd.advise(plant, [0.4, -0.7], duration_s=0.05)
     assert chosen.stable
     assert "auto chooses its steps" in chosen.text
 
 
 def test_the_command_prints_it_and_its_exit_code_tells(tmp_path: Path) -> None:
     scene = tmp_path / "scene.toml"
-    text = 'robot = "planar_2r"\nduration_s = 0.1\nmethod = "rk4"\nstep_s = {}\n[[effect]]\nkind = "viscous_friction"\n'
+    text = (
+        'robot = "planar_2r"\nduration_s = 0.05\nmethod = "rk4"\nstep_s = {}\n[[effect]]\nkind = "viscous_friction"\n'
+    )
     scene.write_text(text.format("1e-2") + "damping_N_m_s_per_rad = 60.0\n")
     result = run("advise", scene)
     assert (result.returncode, result.stderr) == (1, "")
@@ -178,7 +183,7 @@ def test_the_command_prints_it_and_its_exit_code_tells(tmp_path: Path) -> None:
     assert made["fastest"]["source"] == "viscous_friction"
 
 
-@pytest.mark.parametrize("k", [1e5, 1e9])
+@pytest.mark.parametrize("k", [*long([1e5]), 1e9])
 def test_a_stop_that_samples_miss_bounds_the_step(k: float) -> None:
     """On a stop ω = √(k / I), for half a period only; RK4 is stable up to h ω = √8 there."""
     bar = rd.load("pendulum").with_(gravity=(0.0, 0.0, 0.0))

@@ -14,6 +14,7 @@ import pytest
 
 import robot_dyn as rd
 from tests.command import MAIN, refusal, run, said, spawn
+from tests.long import long
 
 COMMANDS = ("list", "info", "query", "compare", "demo")
 
@@ -136,7 +137,9 @@ def test_head_takes_the_first_line():
 
 @pytest.mark.skipif(os.name != "posix", reason="/dev/full and descriptors of POSIX")
 @pytest.mark.parametrize("redirection", ["> /dev/full", ">&-"])
-@pytest.mark.parametrize("args", ["list", "info pendulum", "query pendulum --json", "--help", "scene pendulum"])
+@pytest.mark.parametrize(
+    "args", ["list", *long(["info pendulum", "query pendulum --json", "--help", "scene pendulum"])]
+)
 def test_output_that_cannot_be_written_is_an_error_of_one_line(args: str, redirection: str):
     command = f'"{sys.executable}" -c "{MAIN}" {args} {redirection}'
     done = subprocess.run(["bash", "-c", command], capture_output=True, encoding="utf-8", timeout=30)
@@ -145,7 +148,7 @@ def test_output_that_cannot_be_written_is_an_error_of_one_line(args: str, redire
 
 
 @pytest.mark.skipif(os.name != "posix", reason="/dev/full and descriptors of POSIX")
-@pytest.mark.parametrize("redirection", ["2> /dev/full", "2>&-", ">&- 2>&-", "<&- >&- 2>&-"])
+@pytest.mark.parametrize("redirection", ["2> /dev/full", *long(["2>&-", ">&- 2>&-", "<&- >&- 2>&-"])])
 def test_an_error_that_cannot_be_told_has_its_exit_code(redirection: str):
     command = f'"{sys.executable}" -c "{MAIN}" info ur6 {redirection}'
     assert subprocess.run(["bash", "-c", command], capture_output=True, timeout=30).returncode == 2
@@ -159,7 +162,7 @@ def test_a_closed_stream_is_not_replaced_by_a_file_that_is_opened_later(tmp_path
     assert spawn(tmp_path / "x", code=code).returncode > 2
 
 
-@pytest.mark.parametrize("encoding", ["ascii", "cp1252", "utf-16"])
+@pytest.mark.parametrize("encoding", ["ascii", *long(["cp1252", "utf-16"])])
 @pytest.mark.parametrize(
     ("args", "code", "shown"),
     [

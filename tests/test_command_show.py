@@ -24,6 +24,7 @@ def file(tmp_path_factory) -> Path:
     return rd.save_run(swing, tmp_path_factory.mktemp("run") / "run.npz")
 
 
+@pytest.mark.long
 def test_the_demo_ends_with_a_replay_a_plot_and_a_run(tmp_path, browser) -> None:
     """It shows arm and cross-check, then names four files that are there; the page opens with the network off.
 

@@ -166,8 +166,8 @@ main()
 
 
 def test_ctrl_c_ends_a_run_and_keeps_it(scene, tmp_path) -> None:
-    text = starter("ur5_circle").replace("3.0", "3000.0", 1).replace("duration_s", 'method = "rk4"\nduration_s', 1)
-    scene.write_text(text + "turns = 1000.0\n")  # it would run for hours
+    text = 'robot = "planar_2r"\nduration_s = 9000.0\nmethod = "rk4"\nstep_s = 1e-3\nengine = "interpreted"\n'
+    scene.write_text(text + "[start]\nq = [0.4, -0.7]\n")  # it would run for many minutes
     output = tmp_path / "run.npz"
     with started("simulate", scene, "-o", output, code=WATCHED) as process:
         assert process.stderr is not None

@@ -13,6 +13,7 @@ from robot_dyn.accuracy.compare import compare, random_state
 from robot_dyn.errors import DescriptionError, ModelWarning, QueryError
 from robot_dyn.lagrange.manipulator import Lagrangian
 from robot_dyn.model.linkage import Linkage
+from tests.long import robots
 
 REFUSED = {"alex_psyonic_hands", "hector", "iris_simple", "ur3_empty"}  # a mimic of nothing; nothing moves; no link
 
@@ -23,7 +24,7 @@ def quiet(name: str) -> rd.Robot:
         return rd.load(name)
 
 
-@pytest.mark.parametrize("name", [name for name in rd.list_robots() if name not in REFUSED])
+@pytest.mark.parametrize("name", robots(without=REFUSED))
 def test_the_roads_agree_on(name: str) -> None:
     """1e-12 on the scale of the terms added; forward dynamics max(1e-12, 8 n u κ) in the norm of M."""
     result = compare(quiet(name), samples=2, seed=3)

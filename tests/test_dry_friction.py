@@ -11,6 +11,7 @@ import robot_dyn as rd
 from robot_dyn.effects.set_valued import settled
 from robot_dyn.errors import EffectError, SingularError
 from tests.estimates.scenes import arms
+from tests.long import long
 
 ENGINES = ["interpreted", "compiled"]
 RAIL = arms()["rail"]  # 1 kg on a vertical rail
@@ -62,7 +63,7 @@ def test_a_sliding_block_stops_when_and_where_it_must(engine: str, v0: float, g:
     assert run.ledger.work["dry_friction"][-1] == pytest.approx(-f * abs(run.q[-1, 0] - 0.1), rel=1e-12)
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", ["compiled", *long(["interpreted"])])
 def test_stick_slip_has_the_period_of_its_closed_form(engine: str) -> None:
     """A spring k drawn at speed V, f_s of rest and f_k of sliding.
 
@@ -233,6 +234,7 @@ def names(run: rd.Trajectory) -> list[str]:
     return [each.name for each in run.events]
 
 
+@pytest.mark.long
 def test_an_arm_of_seven_joints_sticks_and_slides_to_eleven_digits() -> None:
     """Errors of at most ten times the tolerance."""
     exact, *others = (
@@ -250,7 +252,7 @@ def exactly_driven_panda() -> rd.Trajectory:
     return driven_panda(rd.Adaptive(rtol=1e-13, atol=1e-13), record_period_s=2.0)
 
 
-@pytest.mark.parametrize(("method", "coarsest", "order"), [("order_8", 32, 5.0), ("rk4", 64, 3.5)])
+@pytest.mark.parametrize(("method", "coarsest", "order"), long([("rk4", 64, 3.5), ("order_8", 32, 5.0)]))
 def test_fixed_steps_keep_their_order_on_an_arm_of_seven_joints(method: str, coarsest: int, order: float) -> None:
     """Mean slope over four halvings from 1/16 s or 1/32 s, where the events are already those of the exact motion."""
     exact = exactly_driven_panda()

@@ -9,6 +9,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.errors import EffectError
+from tests.long import long
 
 MASS = 0.7
 SLIDER = rd.Robot.from_text(
@@ -22,9 +23,7 @@ ARM = rd.load("planar_2r")
 Q = np.array([0.1, 0.2])
 FRICTION = rd.LuGreFriction(120.0, [1.0, 0.8], 0.8, [1.0, 0.5], 1.5, 0.1)
 BOTH = pytest.mark.parametrize("engine", ["interpreted", "compiled"])
-SLOW_INTERPRETED = pytest.mark.parametrize(
-    "engine", [pytest.param("interpreted", marks=pytest.mark.stress), "compiled"]
-)
+SLOW_INTERPRETED = pytest.mark.parametrize("engine", [pytest.param("interpreted", marks=pytest.mark.long), "compiled"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,8 +122,13 @@ def setup(engine: str, period: float = 0.0, **options) -> rd.Setup:
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("method", ["rk4", "gauss_4", "semi_implicit_euler", "rosenbrock_5"])
-@pytest.mark.parametrize("period", [0.0, 0.005])
+REST = [(name, period) for name in ("semi_implicit_euler", "rosenbrock_5") for period in (0.0, 0.005)]
+
+
+@pytest.mark.parametrize(
+    ("method", "period"),
+    [("rk4", 0.0), ("gauss_4", 0.005), *long([("rk4", 0.005), ("gauss_4", 0.0), *REST])],
+)
 def test_both_engines_make_the_same_run_of_effects_with_states(method: str, period: float) -> None:
     """Beside controller states, in (q, v) and in (q, p); 100 steps leave some 1e-10 of rounding in stiff ones."""
     options = {"integrator": method, "duration_s": 0.1}

@@ -19,6 +19,7 @@ from tests.estimates.scenes import FAMILIES, arms
 from tests.estimates.switching import scene_of_all
 from tests.estimates.truth import truth
 from tests.hard.stiff_motion import stop
+from tests.long import long
 
 RAIL = arms()["rail"].with_(gravity=(0.0, 0.0, 0.0))
 TOSS = arms()["rail"]
@@ -28,26 +29,28 @@ READY = np.array([0.3, 0.6, -0.4, -1.2, 0.5, 1.1, 0.2])
 
 
 SMOOTH = [index for index in range(SCENES) if FAMILIES[index % len(FAMILIES)] == "smooth"]
+SWITCHED = sorted(set(range(SCENES)) - set(SMOOTH))
 
 
-@pytest.mark.parametrize("index", sorted(set(range(SCENES)) - set(SMOOTH)))
+@pytest.mark.parametrize("index", [*SWITCHED[:4], *long(SWITCHED[4:])])
 def test_no_estimate_misleads_where_something_switches(index: int) -> None:
     """Against SciPy near rounding: an estimate that nothing warns of is at least 0.3 of the error."""
     judged = judge(SEED, index)
     assert not judged.misleads, str(judged)
 
 
-def test_estimates_of_smooth_runs_are_within_a_factor_of_three() -> None:
+@pytest.mark.parametrize(("indices", "least", "most"), [(SMOOTH[:3], 2, 0), *long([(SMOOTH, 6, 1)])])
+def test_estimates_of_smooth_runs_are_within_a_factor_of_three(indices: list[int], least: int, most: int) -> None:
     """None misleads, and all usable ones but one are between 0.3 and 3 of the error; `make stress` asks 95 % of 600."""
-    judged = [judge(SEED, index) for index in SMOOTH]
+    judged = [judge(SEED, index) for index in indices]
     assert not [str(each) for each in judged if each.misleads]
     usable = [each for each in judged if each.usable]
-    assert len(usable) > 5
+    assert len(usable) >= least
     outside = [str(each) for each in usable if each.run.error.note or not LEAST <= each.ratio <= MOST]
-    assert len(outside) <= 1, outside
+    assert len(outside) <= most, outside
 
 
-@pytest.mark.parametrize(("seed", "index"), [(1, 292), (1, 460), (7, 239)])
+@pytest.mark.parametrize(("seed", "index"), [(1, 292), *long([(1, 460), (7, 239)])])
 def test_steps_that_err_alike_at_a_tenth_of_the_tolerance_are_halved(seed: int, index: int) -> None:
     """Sampled control, whose every period is one step of DOP853 at any of the tolerances; a rail that force pushes."""
     judged = judge(seed, index)
@@ -106,7 +109,7 @@ def test_a_graze_of_a_stop_is_not_stepped_over() -> None:
     assert LEAST * error < run.error.final
 
 
-@pytest.mark.parametrize(("gap", "stiffness", "step"), [(0.5, 1e3, 0.02), (0.5, 1e4, 0.01), (0.1, 1e3, 0.01)])
+@pytest.mark.parametrize(("gap", "stiffness", "step"), [(0.5, 1e4, 0.01), *long([(0.5, 1e3, 0.02), (0.1, 1e3, 0.01)])])
 def test_long_steps_that_miss_the_order_speak_of_no_run_that_has_it(gap: float, stiffness: float, step: float) -> None:
     """In a stop, ω h = 0.3 to 1 of order 8: steps of 2, 3 and 5 h err without order, by up to 8000 times too much."""
     run = toss(gap, stiffness, integrator="order_8", step_s=step, engine="interpreted")
@@ -125,7 +128,7 @@ def test_a_switch_in_the_last_step_ends_the_estimate() -> None:
     assert exact > 1e3 * run.error.final
 
 
-@pytest.mark.parametrize(("seed", "index"), [(31, 32), (31, 46), (41, 3)])
+@pytest.mark.parametrize(("seed", "index"), [(31, 32), *long([(31, 46), (41, 3)])])
 def test_an_order_that_is_seen_is_that_of_the_run(seed: int, index: int) -> None:
     """A swing, bristles and stops whose longer steps show another order for a while, or magnify rounding."""
     judged = judge(seed, index, scene_of_all)
@@ -135,7 +138,7 @@ def test_an_order_that_is_seen_is_that_of_the_run(seed: int, index: int) -> None
 
 
 @pytest.mark.parametrize(
-    "method", [rd.Adaptive(), rd.Adaptive(rtol=1e-6, atol=1e-8), rd.method("rk4"), rd.method("gauss_4")]
+    "method", [rd.Adaptive(), *long([rd.Adaptive(rtol=1e-6, atol=1e-8), rd.method("rk4"), rd.method("gauss_4")])]
 )
 def test_random_grazes_are_met_or_told(method) -> None:
     rng, met = np.random.default_rng(105), 0
@@ -219,7 +222,7 @@ def test_a_usable_run_with_stiff_friction_is_bounded_not_refused() -> None:
     assert LEAST * error < run.error.final < 1e-3
 
 
-@pytest.mark.parametrize("far", [1e9, 1e13, 1e16])
+@pytest.mark.parametrize("far", [1e13, *long([1e9, 1e16])])
 def test_rounding_of_a_far_position_is_in_the_estimate(far: float) -> None:
     """Q += h v loses what is below half a unit of q's last place, in every step and every companion run alike."""
     run = rd.simulate(rd.Plant(RAIL), q0=[far], v0=[0.7], duration_s=1.0, integrator=rd.method("semi_implicit_euler"))
@@ -311,7 +314,7 @@ class Pulse(Active):
 
 
 @pytest.mark.parametrize(
-    "method", [rd.method("rk4"), rd.method("gauss_6"), rd.method("semi_implicit_euler"), rd.Adaptive()]
+    "method", [rd.method("rk4"), rd.Adaptive(), *long([rd.method("gauss_6"), rd.method("semi_implicit_euler")])]
 )
 def test_code_that_acts_between_steps_is_looked_at_there(method) -> None:
     """A pulse of 1 ms inside steps of 10 ms, at no node: no method sees it."""

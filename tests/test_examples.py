@@ -86,6 +86,7 @@ def test_planar_arm_rests_at_its_target_only_without_gravity() -> None:
     assert [float(x) for x in error.split()] == pytest.approx([float(x) for x in weight.split()], abs=1e-7)
 
 
+@pytest.mark.long
 def test_computed_torque_beats_independent_joints_and_the_integral_leaves_nothing() -> None:
     text = output("panda_computed_torque", runs=4)
     pd, pid, gravity, computed = (row(name, text) for name in ("PD", "PID", "PD + gravity", "computed torque"))
@@ -96,6 +97,7 @@ def test_computed_torque_beats_independent_joints_and_the_integral_leaves_nothin
     assert pid[last] < pd[last] / 100
 
 
+@pytest.mark.long
 def test_the_table_of_the_readme_is_what_the_example_prints() -> None:
     """Two digits, the last one by one at most."""
     text = output("panda_computed_torque", runs=4)
@@ -107,6 +109,7 @@ def test_the_table_of_the_readme_is_what_the_example_prints() -> None:
             assert abs(float(x) - y) <= 1.5 * 10 ** (np.floor(np.log10(y)) - 1), (label, x, y)
 
 
+@pytest.mark.long
 def test_circle_is_round_with_the_exact_model_and_nearly_so_with_a_wrong_one() -> None:
     """1e-9 of a radius of 0.1 m is what `rd.circle` promises; the integration adds 1e-12 m."""
     text = output("ur5_circle", runs=2)
@@ -114,6 +117,7 @@ def test_circle_is_round_with_the_exact_model_and_nearly_so_with_a_wrong_one() -
     assert 1e-4 < number("radius error, model 20 % too heavy:", text) < 4e-3
 
 
+@pytest.mark.long
 def test_payload_costs_either_controller_and_computed_torque_less() -> None:
     text = output("panda_payload", runs=4)
     for name in ("feed-forward", "computed torque"):

@@ -1,4 +1,4 @@
-"""Mutants of each kind of input, and many more in `make stress`: accepted or refused, never other exceptions or a hang.
+"""Mutants of each kind of input, many more in `make test-long`: accepted or refused, never other exceptions or a hang.
 
 More by hand: python -m tests.fuzz scenes --cases 20000; ROBOT_DYN_FUZZ_CASES sets how many there are here.
 """
@@ -10,9 +10,10 @@ from pathlib import Path
 import pytest
 
 from tests.fuzz.campaign import CASES, FUZZERS, MANY, run
+from tests.long import long
 
 
-@pytest.mark.parametrize("cases", [CASES, pytest.param(MANY, marks=pytest.mark.stress)])
+@pytest.mark.parametrize("cases", [CASES, *long([MANY])])
 @pytest.mark.parametrize("name", FUZZERS)
 def test_no_mutant_raises_a_foreign_exception_or_hangs(name: str, cases: int, tmp_path: Path) -> None:
     counts, findings = run(name, cases, 0, tmp_path)

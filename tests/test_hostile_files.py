@@ -82,7 +82,14 @@ def test_table_is_wide() -> None:
     assert len({kind.id for kind in TABLE}) == len(TABLE)
 
 
-@pytest.mark.parametrize("kind", TABLE, ids=[kind.id for kind in TABLE])
+LARGE = {
+    "250 joints that move, in a chain", "250 joints, each following the one before",
+    "250 joints that move, on one link", "400 000 links", "500 000 elements",
+}  # fmt: skip
+CASES = [pytest.param(kind, id=kind.id, marks=[pytest.mark.long] if kind.id in LARGE else []) for kind in TABLE]
+
+
+@pytest.mark.parametrize("kind", CASES)
 def test_hostile_file_is_refused_by_name_in_bounded_time(kind: Kind, server: Any, tmp_path: Path) -> None:
     path = kind.make(tmp_path / "robot.urdf")
     report = load_in_child(server, path)

@@ -16,6 +16,7 @@ from robot_dyn.integrate.gauss import Gauss
 from robot_dyn.integrate.implicit import SDIRK_3
 from robot_dyn.integrate.integrator import IntegrationError, Integrator, System
 from robot_dyn.integrate.methods import method
+from tests.long import long
 from tests.test_integrate import ALL, OSCILLATOR, PENDULUM, RNG, STIFF, name_of, oscillator, pendulum
 
 
@@ -54,7 +55,7 @@ def test_explicit_euler_gains_energy_by_1_plus_h2_a_step() -> None:
         assert float(gain.rad()) < 1e-50
 
 
-@pytest.mark.parametrize("order", [2, 4, 6])
+@pytest.mark.parametrize("order", [4, *long([2, 6])])
 def test_gauss_keeps_a_quadratic_invariant_to_rounding(order: int) -> None:
     """q² + p² over 2000 steps: a rounding of u = 1.1e-16 each, that adds up to √n u if without sign, n u if with.
 

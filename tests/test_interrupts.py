@@ -14,6 +14,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.compiled.interrupts import interrupts_later
+from tests.long import long
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 
@@ -53,12 +54,17 @@ def interrupted(delays: list[float], *args: str | Path, code: str = READY) -> It
             yield child.returncode, out, err
 
 
-@pytest.mark.parametrize(("method", "estimate"), [("DOP853", "true"), ("Rosenbrock", "false")])
-def test_a_run_may_be_interrupted_at_any_moment(method: str, estimate: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("method", "estimate", "delays"),
+    [("DOP853", "true", DELAYS[2::4]), *long([("DOP853", "true", DELAYS[::4]), ("Rosenbrock", "false", DELAYS[1::2])])],
+)
+def test_a_run_may_be_interrupted_at_any_moment(
+    method: str, estimate: str, delays: list[float], tmp_path: Path
+) -> None:
     """While it imports, reads, runs: it would take minutes by itself."""
     scene = tmp_path / "scene.toml"
     scene.write_text(SCENE.format(method=method, estimate=estimate))
-    for code, out, err in interrupted(DELAYS[method == "Rosenbrock" :: 2], "simulate", scene):
+    for code, out, err in interrupted(delays, "simulate", scene):
         assert code == 130, (out, err)
         assert err == "robot-dyn: interrupted\n"
         assert out == "" or out.startswith("stopped at t = ")

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -10,6 +13,7 @@ import robot_dyn as rd
 from robot_dyn.accuracy.compare import random_state
 from robot_dyn.lagrange.magnitude import magnitudes
 from robot_dyn.lagrange.scale import unit_diagonal_condition
+from tests.long import long
 from tests.random_trees import RandomTree, trees
 
 U = np.finfo(float).eps / 2
@@ -22,16 +26,28 @@ def state_of(robot: rd.Robot, seed: int) -> list[np.ndarray]:
     return [state[name] for name in ("q", "v", "a")]
 
 
-@settings(max_examples=80)
-@given(trees(), SEEDS)
+def law(few: int, many: int) -> Callable[[Callable[[RandomTree, int], None]], Callable[[int], None]]:
+    """A law that is held on a few random trees and seeds, and, as a long test, on many."""
+
+    def over(check: Callable[[RandomTree, int], None]) -> Callable[[int], None]:
+        @pytest.mark.parametrize("examples", [few, *long([many])])
+        def test(examples: int) -> None:
+            settings(max_examples=examples)(given(trees(), SEEDS)(check))()
+
+        test.__doc__ = check.__doc__
+        return test
+
+    return over
+
+
+@law(12, 80)
 def test_the_roads_agree(tree: RandomTree, seed: int) -> None:
     """All quantities within 1e-12 of the terms added into them; forward dynamics within 8 n u κ."""
     result = rd.compare(tree.robot, samples=2, seed=seed)
     assert result.ok, result.worst
 
 
-@settings(max_examples=40)
-@given(trees(), SEEDS)
+@law(8, 40)
 def test_mass_matrix_is_symmetric_positive_definite(tree: RandomTree, seed: int) -> None:
     """Both roads. Symmetric to rounding (u on the scale of the entry); least eigenvalue of D M D above its rounding."""
     robot = tree.robot
@@ -44,8 +60,7 @@ def test_mass_matrix_is_symmetric_positive_definite(tree: RandomTree, seed: int)
         assert unit_diagonal_condition(M) < 1e14
 
 
-@settings(max_examples=40)
-@given(trees(), SEEDS)
+@law(8, 40)
 def test_rate_of_mass_matrix_is_coriolis_plus_its_transpose(tree: RandomTree, seed: int) -> None:
     """Ṁ = C + Cᵀ with Ṁ from the exact ∂M/∂q, and C of either road; u · terms, so 1e-13 of them."""
     robot = tree.robot
@@ -58,8 +73,7 @@ def test_rate_of_mass_matrix_is_coriolis_plus_its_transpose(tree: RandomTree, se
         assert np.all(np.abs(C + C.T - rate) <= 1e-13 * (scale + scale.T))
 
 
-@settings(max_examples=40)
-@given(trees(), SEEDS)
+@law(8, 40)
 def test_derivative_of_mass_matrix_is_that_of_differences(tree: RandomTree, seed: int) -> None:
     """∂M/∂q against central differences of Pinocchio's M: error O(h²) and u/h, h = 1e-5 allows 1e-8 of the terms."""
     robot = tree.robot
@@ -72,8 +86,7 @@ def test_derivative_of_mass_matrix_is_that_of_differences(tree: RandomTree, seed
     assert np.all(np.abs(own.mass_matrix_derivative(q) - differences) <= allowed)
 
 
-@settings(max_examples=40)
-@given(trees(), SEEDS)
+@law(8, 40)
 def test_momentum_is_the_derivative_of_kinetic_energy(tree: RandomTree, seed: int) -> None:
     """∂K/∂v = M v: K is quadratic in v, so the central difference with h = 1 is exact but for rounding.
 
@@ -90,8 +103,7 @@ def test_momentum_is_the_derivative_of_kinetic_energy(tree: RandomTree, seed: in
         assert np.all(np.abs(slope - engine.momentum(q, v)) <= allowed)
 
 
-@settings(max_examples=40)
-@given(trees(), SEEDS)
+@law(8, 40)
 def test_power_of_gravity_is_the_loss_of_potential_energy(tree: RandomTree, seed: int) -> None:
     """−N·v = −dV/dt. Central difference in longdouble, h = 1e-6: O(h²) = 1e-12 and u V/h = 1e-13 of the terms."""
     robot = tree.robot
@@ -104,8 +116,7 @@ def test_power_of_gravity_is_the_loss_of_potential_energy(tree: RandomTree, seed
         assert abs(engine.N(q) @ v - rate) <= 1e-12 * speed**3 * (size.V + size.N.sum())
 
 
-@settings(max_examples=40)
-@given(trees(), SEEDS)
+@law(8, 40)
 def test_kinetic_energy_gains_the_power_of_the_joints_and_gravity(tree: RandomTree, seed: int) -> None:
     """d/dt ½ vᵀ M v = vᵀ (τ − N) along any motion: vᵀ (M a + ½ Ṁ v) = vᵀ (ID − N); C's skew part does no work."""
     robot = tree.robot
@@ -117,8 +128,7 @@ def test_kinetic_energy_gains_the_power_of_the_joints_and_gravity(tree: RandomTr
     assert abs(rate - power) <= 1e-12 * terms
 
 
-@settings(max_examples=40)
-@given(trees(), SEEDS)
+@law(8, 40)
 def test_jacobian_maps_joint_rates_to_the_motion_of_a_frame(tree: RandomTree, seed: int) -> None:
     """ṗ of the placement by central difference, h = 1e-6, is the linear part of J v: O(h²) and u/h, so 1e-8."""
     robot = tree.robot
@@ -129,8 +139,7 @@ def test_jacobian_maps_joint_rates_to_the_motion_of_a_frame(tree: RandomTree, se
     assert np.all(np.abs(robot.jacobian(q, frame)[:3] @ v - rate) <= 1e-8 * (1 + terms) * (1 + np.abs(v).sum()) ** 2)
 
 
-@settings(max_examples=40)
-@given(trees(), SEEDS)
+@law(8, 40)
 def test_magnitudes_bound_their_quantities(tree: RandomTree, seed: int) -> None:
     """No sum exceeds the sum of the sizes of its terms; 1e-12 for rounding where the bound is attained."""
     robot = tree.robot

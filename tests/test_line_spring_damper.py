@@ -10,6 +10,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.errors import EffectError
 from robot_dyn.simulation.trajectory import Ending
+from tests.long import long
 
 TREE = rd.load("skew_tree")
 K, C, LENGTH = 320.0, 7.0, 0.45
@@ -95,26 +96,32 @@ def test_two_masses_move_as_the_damped_oscillator() -> None:
         assert np.abs(run.ledger.residual).max() < 1e-11
 
 
-@BOTH
-def test_it_compiles_in_runs_and_rollouts_with_every_number_an_input(effect: rd.LineSpringDamper) -> None:
-    """The engines agree to rounding over 100 steps; a run of rollouts is that of the effect with its value."""
+NUMBERS = {
+    "stiffness": np.array([100.0, 400.0]), "damping": np.array([2.0, 9.0]), "length": np.array([0.2, 0.9]),
+    "point": np.array([[0.1, 0.2, 0.3], [-0.3, 0.1, 0.2]]),
+    "other_point": np.array([[0.8, 0.2, 0.3], [0.6, 0.1, 1]]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("effect", "names"),
+    [(BETWEEN, [*NUMBERS]), *long([*((BETWEEN, [name]) for name in NUMBERS), (TO_WORLD, ["other_point"])])],
+)
+def test_it_compiles_in_runs_and_rollouts_with_every_number_an_input(
+    effect: rd.LineSpringDamper, names: list[str]
+) -> None:
+    """The engines agree to rounding over 100 steps; a run of rollouts is that of the effect with its values."""
     q, v = state()
-    numbers = {
-        "stiffness": np.array([100.0, 400.0]), "damping": np.array([2.0, 9.0]), "length": np.array([0.2, 0.9]),
-        "point": np.array([[0.1, 0.2, 0.3], [-0.3, 0.1, 0.2]]),
-        "other_point": np.array([[0.8, 0.2, 0.3], [0.6, 0.1, 1]]),
-    }  # fmt: skip
 
     def setup(effect: rd.LineSpringDamper, engine: str) -> rd.Setup:
         plant = rd.Plant(TREE, [effect])
         return rd.Setup(plant, q, v, 0.05, None, rd.method("rk4"), 1e-3, 0.01, False, engine=engine)
 
-    for name, values in numbers.items() if effect is BETWEEN else [("other_point", numbers["other_point"])]:
-        runs = rd.rollouts(setup(effect, "auto"), params={f"line_spring_damper.{name}": values})
-        for k, value in enumerate(values):
-            alone = rd.simulate(setup(replace(effect, **{name: value}), "interpreted"))
-            np.testing.assert_allclose(runs.q[k], alone.q, atol=1e-12)
-        assert np.abs(runs.q[1] - runs.q[0]).max() > 1e-6
+    runs = rd.rollouts(setup(effect, "auto"), params={f"line_spring_damper.{name}": NUMBERS[name] for name in names})
+    for k in range(2):
+        alone = rd.simulate(setup(replace(effect, **{name: NUMBERS[name][k] for name in names}), "interpreted"))
+        np.testing.assert_allclose(runs.q[k], alone.q, atol=1e-12)
+    assert np.abs(runs.q[1] - runs.q[0]).max() > 1e-6
 
 
 def test_of_two_the_numbers_differ_from_run_to_run_under_their_numbers() -> None:

@@ -13,6 +13,7 @@ from robot_dyn.compiled.llvm import machine_code
 from robot_dyn.compiled.right_angles import completed
 from robot_dyn.errors import EffectError, QueryError, TraceError
 from robot_dyn.simulation.machine import programs
+from tests.long import long
 
 ARM = rd.load("planar_2r")
 TIP = ARM.frame_names[-1]
@@ -91,16 +92,20 @@ def plant_with(effect: rd.Active) -> rd.Plant:
 @pytest.mark.parametrize(
     ("name", "values"),
     [
-        ("gravity", np.array([[0.0, 0.0, -9.0], [0.4, 0.1, -3.0]])),
-        ("model.gravity", np.array([[0.0, 0.0, -9.0], [0.4, 0.1, -3.0]])),
-        (f"payload_com:{TIP}", np.array([[0.1, 0.0, 0.05], [-0.05, 0.02, 0.1]])),
         (f"model.payload_mass:{TIP}", np.array([0.1, 2.5])),
-        ("armature", np.array([[0.1, 0.02], [0.3, 0.15]])),
-        ("model.mass_scale", np.array([0.7, 1.3])),
-        ("joint_stops.upper", np.array([[0.45, 0.2], [0.5, 1.0]])),
         ("external_wrench.wrench", np.array([[1.0, 2, 3, 0.4, 0.5, 0.6], [3.0, 1, -2, 0.1, 0.2, 0.9]])),
-        ("effort_limit.limit", np.array([2.0, 11.0])),
         ("kp", np.array([[30.0, 20.0], [70.0, 80.0]])),
+        *long(
+            [
+                ("gravity", np.array([[0.0, 0.0, -9.0], [0.4, 0.1, -3.0]])),
+                ("model.gravity", np.array([[0.0, 0.0, -9.0], [0.4, 0.1, -3.0]])),
+                (f"payload_com:{TIP}", np.array([[0.1, 0.0, 0.05], [-0.05, 0.02, 0.1]])),
+                ("armature", np.array([[0.1, 0.02], [0.3, 0.15]])),
+                ("model.mass_scale", np.array([0.7, 1.3])),
+                ("joint_stops.upper", np.array([[0.45, 0.2], [0.5, 1.0]])),
+                ("effort_limit.limit", np.array([2.0, 11.0])),
+            ]
+        ),
     ],
 )
 def test_every_number_is_a_sweep_parameter(name: str, values: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -218,7 +223,7 @@ UR5 = completed(rd.load("ur5"))[0]
 START = np.array([0.3, -0.9, 1.2, -0.6, 0.8, 0.2])
 
 
-@pytest.mark.parametrize("turn", ["free", "kept", "turning"])
+@pytest.mark.parametrize("turn", ["free", *long(["kept", "turning"])])
 def test_operational_space_is_compiled(turn: str) -> None:
     """With the orientation free, kept and turning by 2 rad; the eigenvectors are those of another method."""
     g = UR5.placement(START, "tool0")

@@ -35,6 +35,7 @@ from robot_dyn.proof.prove import _precision
 from robot_dyn.proof.straight_line import straight_line
 from robot_dyn.proof.tape import Tape
 from tests.extrapolation import BITS, motion
+from tests.long import long
 
 FINGERS = {"panda_finger_joint1": 0.0}
 GENERAL_Q = ["0.31", "-0.42", "0.53", "-0.64", "0.75", "-0.86", "0.97"]
@@ -76,7 +77,7 @@ def holds(made: rd.Proof, t: float, q: Any, v: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "until_s", "count"), [("pendulum", 0.25, 1), ("planar_2r", 0.0625, 1), ("ur5", 0.0625, 1)]
+    ("name", "until_s", "count"), [("pendulum", 0.25, 1), ("planar_2r", 0.0625, 1), *long([("ur5", 0.0625, 1)])]
 )
 def test_the_truth_is_inside_and_two_radii_off_is_outside(name: str, until_s: float, count: int) -> None:
     """By the closed form in balls of 240 bits, extrapolated: that shares neither tape nor method with the proof.
@@ -94,7 +95,7 @@ def test_the_truth_is_inside_and_two_radii_off_is_outside(name: str, until_s: fl
         assert made.contains(middle_s, *truth(arm(name), middle_s, count, 10)[:2])
 
 
-@pytest.mark.stress
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "until_s", "count"), [("pendulum", 1.0, 6), ("planar_2r", 1.0, 30), ("ur5", 0.1, 3), ("panda", 0.05, 2)]
 )
@@ -212,6 +213,13 @@ def test_nothing_that_is_not_finite_passes_as_a_bound() -> None:
             inverse.contraction(matrix(M))
     with pytest.raises(NotProvenError, match="singular"):
         Inverse.of([arb(1), arb(2), arb(2), arb(4)])
+
+
+def test_a_velocity_beyond_a_float64_proves_nothing_and_warns_of_nothing() -> None:
+    setup = rd.Setup(rd.Plant(arm("cart_pole")), [0.3, -0.4], duration_s=0.001)
+    made = rd.prove(setup, v0=[0.7, 10**390], budget_s=1.0)
+    assert made.until_s == 0.0
+    assert made.why_not == "the Jacobian is not finite"
 
 
 def test_solutions_of_all_matrices_of_balls_are_bounded() -> None:
@@ -474,7 +482,7 @@ def test_a_reference_may_pass_from_one_polynomial_to_another() -> None:
     assert run.proven_digits(made) > 11
 
 
-@pytest.mark.stress
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "count"), [("pendulum", 8), ("planar_2r", 8), ("ur5", 8), ("panda", 6)])
 def test_random_starts_are_proven_to_twelve_digits(name: str, count: int) -> None:
     """To 1 s, and 0.1 s of the six and seven joints; 28 of these 30 are the least, and all were."""
@@ -487,7 +495,7 @@ def test_random_starts_are_proven_to_twelve_digits(name: str, count: int) -> Non
     assert not failed
 
 
-@pytest.mark.stress
+@pytest.mark.long
 def test_a_small_box_of_a_six_axis_arm() -> None:
     made = proof(arm("ur5"), 0.1, 100, width_q=1e-6)
     assert made.proven and 1e-6 < made.radius_q.max() < 1e-5

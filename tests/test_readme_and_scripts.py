@@ -7,11 +7,15 @@ import re
 import shlex
 import subprocess
 import sys
+from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
+from tests import command as here
 from tests.browser import chromium
+from tests.long import long
 from tests.printed import check_prints
 
 ROOT = Path(__file__).parents[1]
@@ -54,23 +58,47 @@ def test_no_block_of_the_readme_says_no_more_than_true() -> None:
     assert not re.findall(r"# → .*\b(?:True|False)\b", README)
 
 
-def test_commands_of_the_readme_run(tmp_path) -> None:
+def in_a_process(*command: str) -> str:
+    return run(*command, folder=Path.cwd())
+
+
+def with_few_samples_here(*command: str) -> str:
+    """In this process."""
+    done = here.run(*("100" if before == "--samples" else word for before, word in pairwise(command)))
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+UNTIMED = [each for each in COMMANDS if "--budget" not in each]  # what measures for seconds has tests of its own
+
+
+@pytest.mark.parametrize(
+    ("commands", "start"), [(UNTIMED, with_few_samples_here), *long([(COMMANDS, in_a_process)])], ids=["few", "all"]
+)
+def test_commands_of_the_readme_run(
+    commands: list[str], start: Callable[..., str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """One after the other in one folder, as they are read; `> file` keeps what is printed."""
-    for command in COMMANDS:
+    monkeypatch.chdir(tmp_path)
+    for command in commands:
         line, _, file = command.partition(" > ")
-        said = run(*shlex.split(line), folder=tmp_path)
-        assert said
+        printed = start(*shlex.split(line))
+        assert printed
         if file:
-            (tmp_path / file).write_text(said, encoding="utf-8")
+            (tmp_path / file).write_text(printed, encoding="utf-8")
 
 
-@pytest.mark.parametrize("script", sorted((ROOT / "scripts").glob("*.py")), ids=lambda path: path.name)
-def test_script_runs_quickly(script: Path) -> None:
+SCRIPTS = [[path.name] for path in sorted((ROOT / "scripts").glob("*.py")) if path.name != "benchmark.py"]
+
+
+@pytest.mark.parametrize("command", [["benchmark.py", "energy"], *SCRIPTS, *long([["benchmark.py"]])], ids=" ".join)
+def test_script_runs_quickly(command: list[str]) -> None:
+    script = ROOT / "scripts" / command[0]
     if "chromium" in script.read_text(encoding="utf-8"):
         chromium()
-    assert run(sys.executable, str(script), "--quick")
+    assert run(sys.executable, str(script), *command[1:], "--quick")
 
 
 def test_make_targets_of_the_readme_exist() -> None:
-    targets = set(re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(), flags=re.MULTILINE))
-    assert set(re.findall(r"\bmake (\w+)", README)) <= targets
+    targets = set(re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(), flags=re.MULTILINE))
+    assert set(re.findall(r"\bmake ([\w-]+)", README)) <= targets

@@ -18,6 +18,7 @@ from robot_dyn.errors import RobotDynError
 from robot_dyn.lagrange.magnitude import magnitudes
 from robot_dyn.lagrange.scale import diagonal_scale, floored, mass_norm, scaled, solved_tolerance
 from tests.hard.other_engines import installed
+from tests.long import robots
 
 TOLERANCE = 1e-12  # of the terms added; MuJoCo's minimum of diagonals and Pinocchio's rounding leave 1e-13
 REFUSED = {"inertia_impossible", "mass_missing", "inertia_missing", "inertia_zero"}  # by MuJoCo, which asks for bodies
@@ -54,7 +55,7 @@ def differences(robot: rd.Robot, other: Any) -> float:
 
 
 @pytest.mark.filterwarnings("ignore::robot_dyn.ModelWarning")
-@pytest.mark.parametrize("name", rd.list_robots())
+@pytest.mark.parametrize("name", robots())
 @pytest.mark.parametrize(("program", "engine"), ENGINES, ids=[each[0].split()[0] for each in ENGINES])
 def test_another_engine_has_the_same_equations(program: str, engine: Callable[[rd.Robot], Any], name: str) -> None:
     robot = loaded(name)

@@ -13,6 +13,7 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 import robot_dyn as rd
 from robot_dyn.model.catalog import find, resolve
 from tests.browser import opened
+from tests.long import long
 
 
 def box_of_link(arm: rd.Robot, link: str, q: np.ndarray, source: Path) -> np.ndarray | None:
@@ -41,7 +42,7 @@ def box_of_link(arm: rd.Robot, link: str, q: np.ndarray, source: Path) -> np.nda
     return np.array([np.vstack(points).min(axis=0), np.vstack(points).max(axis=0)]) if points else None
 
 
-@pytest.mark.parametrize("name, least", [("ur5", 7), ("panda", 10), ("kinova", 9), ("twodofs", 1)])
+@pytest.mark.parametrize("name, least", [("ur5", 7), *long([("panda", 10), ("kinova", 9), ("twodofs", 1)])])
 def test_each_link_fills_the_box_that_trimesh_gives(browser, tmp_path, name: str, least: int) -> None:
     """Single precision of coordinates and placements in a scene of about 1 m: 2e-6."""
     arm, source = rd.load(name), find(name)

@@ -11,12 +11,13 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.simulation.remarks import Kind
 from tests.estimates.scenes import RAIL
+from tests.long import long
 from tests.short_loops import Arm, ShortLoop, judge
 
 BLOCK = rd.Robot.from_text(RAIL)  # 1 kg
 
 
-@pytest.mark.parametrize(("seed", "index"), [(28, 4), (28, 9), (2026, 97)])
+@pytest.mark.parametrize(("seed", "index"), [(28, 9), *long([(28, 4), (2026, 97)])])
 def test_a_loop_is_stable_up_to_where_the_radius_of_a_period_passes_1(seed: int, index: int) -> None:
     """Slides, an arm and a filter, in runs of a few periods; `python -m tests.short_loops` judges a hundred."""
     judged = judge(seed, index)

@@ -11,6 +11,7 @@ from robot_dyn.scene.effects import kinds
 from robot_dyn.scene.explain import explain
 from robot_dyn.scene.scene import parse_scene, read_both
 from robot_dyn.scene.starters import starter, starters
+from tests.long import long
 
 SCENE = """
 robot = "planar_2r"
@@ -147,7 +148,7 @@ def test_effect_of_a_scene_is_that_of_python(write, kind: str) -> None:
     np.testing.assert_array_equal(plant.forward_dynamics(0.05, q, v, u), expected)
 
 
-@pytest.mark.parametrize("kind", ["pd", "pid", "pd_gravity", "feed_forward", "computed_torque"])
+@pytest.mark.parametrize("kind", ["pid", "computed_torque", *long(["pd", "pd_gravity", "feed_forward"])])
 def test_every_joint_controller_follows_its_plan(write, kind: str) -> None:
     """In zero gravity all end within 5 % of the way; the gains are those of the frequency."""
     text = SCENE.replace("0.1", "1.0", 1) + PD.replace('"pd"', f'"{kind}"')

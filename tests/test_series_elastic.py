@@ -11,6 +11,7 @@ from scipy.linalg import expm
 
 import robot_dyn as rd
 from robot_dyn.errors import EffectError, QueryError
+from tests.long import long
 from tests.test_effect_states import MASS, SLIDER, Ramp
 
 ARM = rd.load("planar_2r")
@@ -26,7 +27,9 @@ def slide(effect: rd.SeriesElastic, engine: str = "interpreted", **options) -> r
     return rd.simulate(rd.Plant(SLIDER, [effect]), [0.2], [0.5], engine=engine, **options)
 
 
-@pytest.mark.parametrize("method", [TIGHT, rd.Adaptive("Rosenbrock", 1e-11, 1e-13), "order_8", "gauss_6"], ids=str)
+@pytest.mark.parametrize(
+    "method", [TIGHT, *long(["gauss_6", rd.Adaptive("Rosenbrock", 1e-11, 1e-13), "order_8"])], ids=str
+)
 @BOTH
 def test_two_masses_and_a_spring_move_by_the_matrix_exponential(method, engine: str) -> None:
     """q, q̇, δ, θ̇ under a constant force on the motor; dense output of Rosenbrock, of order 4, leaves 1e-10."""
@@ -112,6 +115,7 @@ def test_a_2r_with_one_elastic_joint_is_that_of_equations_written_out(engine: st
     assert np.abs(run.ledger.residual).max() < 1e-10
 
 
+@pytest.mark.long
 def test_stiff_springs_are_the_armature_of_gear_and_rotor() -> None:
     """The distance from M + n² J falls as 1/k: tenfold for a tenfold stiffness, within a tenth."""
     control = rd.PD(rd.quintic(Q, [0.6, 0.4], 0.5), 100.0, 20.0)
@@ -128,7 +132,7 @@ def test_stiff_springs_are_the_armature_of_gear_and_rotor() -> None:
     assert far[0] / far[1] == pytest.approx(10, rel=0.1)
 
 
-@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("side", [*long([1]), -1])
 @BOTH
 def test_beyond_the_gap_of_a_backlash_the_spring_turns_what_moved_freely_within_it(side: int, engine: str) -> None:
     """Pushed by F from the middle of the gap, δ is periodic, and m q + B θ the parabola of F; 1e-11.
@@ -165,7 +169,7 @@ def test_beyond_the_gap_of_a_backlash_the_spring_turns_what_moved_freely_within_
     assert np.abs(run.ledger.residual).max() < 1e-11
 
 
-@pytest.mark.parametrize("period", [0.0, 0.005])
+@pytest.mark.parametrize("period", [*long([0.0]), 0.005])
 def test_both_engines_and_rollouts_make_the_same_run(period: float) -> None:
     """A stiffness of each run, with backlash; beside an actuator lag and an effort limit, the second joint direct."""
     drive = rd.SeriesElastic([200.0, 0.0], 0.02, 6.0, 0.5, 0.2, 1e-3)

@@ -10,6 +10,7 @@ from robot_dyn.view.document import document
 from robot_dyn.view.scenery import scenery, upright
 from tests.browser import opened
 from tests.command import run, said
+from tests.long import long
 
 G = 9.80665
 
@@ -62,7 +63,7 @@ def test_gravity_is_said_and_so_is_its_absence() -> None:
         assert "without torque on any joint" in labels(arm.with_(gravity=(0, 2.0, 0)))
 
 
-@pytest.mark.parametrize("gravity", [(0.0, 0.0, -G), (4.0, 1.0, 3.0)])
+@pytest.mark.parametrize("gravity", [*long([pytest.param((0.0, 0.0, -G))]), (4.0, 1.0, 3.0)])
 def test_what_falls_goes_down_on_the_screen(browser, tmp_path, gravity) -> None:
     """The base is turned, and all links with it; the arrow points down, and the camera stands upright."""
     arm = rd.load("planar_2r").with_(gravity=gravity)
@@ -120,7 +121,7 @@ ODD = {  # what a page must survive: sizes, and names in any script
 }
 
 
-@pytest.mark.parametrize("case", ODD)
+@pytest.mark.parametrize("case", ["names", *long(["tiny", "huge"])])
 def test_odd_robots_are_seen(browser, tmp_path, case: str) -> None:
     """With the robot hidden the picture differs, as it does for an arm of 1 m; nothing is complained of."""
     size, name = ODD[case]

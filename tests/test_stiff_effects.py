@@ -12,6 +12,7 @@ from robot_dyn.integrate.integrator import System
 from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.state_functions import interpreted, system
 from robot_dyn.simulation.watch import Watch
+from tests.long import long
 
 ARM = rd.load("planar_2r")
 START = {"q0": [0.4, -0.7], "v0": [0.3, 0.5], "engine": "interpreted", "estimate_error": False}
@@ -73,10 +74,7 @@ def test_rosenbrock_bounces_off_a_stop_whatever_its_stiffness(stiffness: float) 
 @pytest.mark.parametrize(
     ("method", "verdict"),
     [
-        (
-            rd.Adaptive(),
-            "is stiff; take Rosenbrock, softer effects",
-        ),
+        *long([(rd.Adaptive(), "is stiff; take Rosenbrock, softer effects")]),
         (rd.method("sdirk_3"), "does not converge.*take a smaller step, or Rosenbrock"),
     ],
     ids=["DOP853", "sdirk_3"],

@@ -33,11 +33,12 @@ from robot_dyn.stress_test.worst import FASTEST, pd_gains, worst, worst_configur
 from tests.command import refusal, run
 from tests.hostile.kinds import AXIS, LIMIT
 from tests.hostile.kinds import arm as altered
+from tests.long import long
 from tests.short_stress import short_stress
 from tests.test_command_documents import promised
 
 MORE = ("planar_2r", "cart_pole", "mimic_chain", "ur5")
-ARMS = ["pendulum", *(pytest.param(each, marks=pytest.mark.stress) for each in MORE)]
+ARMS = ["pendulum", *(pytest.param(each, marks=pytest.mark.long) for each in MORE)]
 FOREVER = 1e9  # [s]: what is found is not to depend on the load of the machine
 
 
@@ -141,12 +142,12 @@ def test_runs_of_all_families_are_judged_and_say_what_is_true() -> None:
     assert sum(isfinite(each.true) for each in found) >= len(FAMILIES) - 2
 
 
-@pytest.mark.parametrize("name", ARMS)
-def test_lines_to_paste_repeat_what_was_found(name: str) -> None:
+@pytest.mark.parametrize(("name", "most"), [("pendulum", 2), *long((name, 99) for name in ("pendulum", *MORE))])
+def test_lines_to_paste_repeat_what_was_found(name: str, most: int) -> None:
     """The last line that each prints has the figure, in the digits that are shown."""
     result = made(name)
     by_quantity = {(each.what, each.joint): each for each in result.worst}  # one road of each
-    for each in (*by_quantity.values(), *result.limits, *result.runs):
+    for each in (*[*by_quantity.values()][:most], *result.limits[-most:], *result.runs[:most]):
         python = result.python(each)
         if not python or (each in result.limits and each.of == "step" and each.what != "rk4"):
             continue
@@ -209,7 +210,7 @@ def ticking(step: int = 1) -> Callable[[], float]:
     return lambda: float(next(clock))
 
 
-@pytest.mark.parametrize("looks", [1, 100, 1000])
+@pytest.mark.parametrize("looks", [1, 100, *long([1000])])
 def test_what_there_is_no_time_for_is_named_and_nothing_else_is_missing(looks: int) -> None:
     """Each method of fixed step is a limit or a name, and so are gain, speed and payload."""
     result = short_stress(rd.load("planar_2r"), looks, 2)

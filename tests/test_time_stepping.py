@@ -12,6 +12,7 @@ from robot_dyn.integrate.integrator import RightSide
 from robot_dyn.integrate.primitives import copy
 from robot_dyn.integrate.time_stepping import TimeStepping, problem_rows
 from tests.estimates.scenes import arms
+from tests.long import long
 from tests.test_convex import problem
 
 ENGINES = ["interpreted", "compiled"]
@@ -163,7 +164,7 @@ HELD = {
 }
 
 
-@pytest.mark.parametrize(("name", "sampled"), [*((name, False) for name in HELD), ("all", True)])
+@pytest.mark.parametrize(("name", "sampled"), [*long((name, False) for name in HELD), ("all", True)])
 def test_rollouts_are_the_runs_of_simulate(name: str, sampled: bool) -> None:
     """In both engines and in lanes, with equal events: they differ by rounding that the motion has magnified."""
     rng = np.random.default_rng(7)

@@ -15,6 +15,7 @@ from robot_dyn.control.controller import ControlError
 from robot_dyn.errors import EffectError, QueryError, SceneError
 from robot_dyn.simulation.machine.machine import MachineError
 from robot_dyn.simulation.table import export_csv
+from tests.long import long
 
 ARM = rd.load("planar_2r")
 Q, V = np.array([0.4, -0.7]), np.array([0.3, 0.9])
@@ -235,7 +236,7 @@ def test_a_function_that_is_no_controller_is_refused(law, said: str) -> None:
         rd.Setup(rd.Plant(ARM), Q, controller=rd.PD)  # a class is not a function of (t, q, v)
 
 
-@pytest.mark.parametrize("engine", ["interpreted", "compiled"])
+@pytest.mark.parametrize("engine", [*long(["interpreted"]), "compiled"])
 @pytest.mark.parametrize("period_s", [0.0, 0.01])
 @pytest.mark.parametrize("canonical", [False, True])
 def test_recorded_controller_states_obey_their_equation(
@@ -292,7 +293,7 @@ SCENE = 'robot = "planar_2r"\nduration_s = 0.1\n[start]\nq = [0.4, -0.7]\nv = [0
 
 @pytest.mark.parametrize(
     ("keys", "c"),
-    [("c = 2", 2.0), ("c = [2.0, 3]", np.array([2.0, 3.0])), ("c = {joint_2 = 3.0}", np.array([0.0, 3.0]))],
+    [*long([("c = 2", 2.0), ("c = [2.0, 3]", np.array([2.0, 3.0]))]), ("c = {joint_2 = 3.0}", np.array([0.0, 3.0]))],
 )
 def test_a_scene_names_effects_that_its_reader_names(keys: str, c: Any, tmp_path) -> None:
     path = tmp_path / "scene.toml"

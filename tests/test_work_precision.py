@@ -27,6 +27,7 @@ from robot_dyn.errors import QueryError
 from robot_dyn.integrate.explicit import ExplicitRungeKutta
 from robot_dyn.integrate.tableau import ButcherTableau
 from robot_dyn.simulation.seconds import in_words
+from tests.long import long
 
 UNTIL_DONE = Limit(math.inf)
 
@@ -53,7 +54,7 @@ def ladder(candidate: Candidate, truth: Reference, first: int, last: int) -> Lad
 
 @pytest.mark.parametrize(
     ("name", "first", "last"),
-    [("explicit_euler", 3, 6), ("midpoint", 1, 4), ("rk4", 0, 3), ("gauss_4", 0, 3), ("rosenbrock_5", 0, 4)],
+    [("rk4", 0, 3), *long([("explicit_euler", 3, 6), ("midpoint", 1, 4), ("gauss_4", 0, 3), ("rosenbrock_5", 0, 4)])],
 )
 def test_measured_orders_are_those_of_the_methods(smooth, name: str, first: int, last: int) -> None:
     """Slope = p + O(h).
@@ -134,7 +135,7 @@ def test_an_accuracy_of_the_setup_is_not_used() -> None:
 
 def test_a_motion_without_reference_is_refused() -> None:
     with pytest.raises(HorizonError, match=r"no run of 0\.3 s ends by DOP853 or Rosenbrock"):
-        rd.work_precision(replace(swing(), controller=lambda t, q, v: 1e9 * v))
+        rd.work_precision(replace(swing(), controller=lambda t, q, v: v * (np.nan if t > 0.1 else 1.0)))
 
 
 def points(*errors: float, believed: bool = True, each_s: float = 1e-3) -> tuple[Point, ...]:

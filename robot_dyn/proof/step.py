@@ -143,9 +143,10 @@ def _weights(tape: Tape, time: Ball, p: Polynomial, inverse: Inverse) -> tuple[l
     A[n:] = [[abs(float(J[i, j].mid())) for j in range(2 * n)] for i in range(n)]
     x = np.ones(2 * n)
     shift = max(float(np.sqrt(np.abs(A[n:, :n]).max())), float(A[n:, n:].max()), 1e-3)
-    for _ in range(_SWEEPS):
-        x = A @ x + shift * x
-        x = np.maximum(x / x.max(), 1e-9)
+    with np.errstate(over="ignore", invalid="ignore"):  # the Jacobian may be beyond a float64
+        for _ in range(_SWEEPS):
+            x = A @ x + shift * x
+            x = np.maximum(x / x.max(), 1e-9)
     if not np.isfinite(x).all():
         raise NotProvenError("the Jacobian is not finite")
     w = [arb(float(each)) for each in x]

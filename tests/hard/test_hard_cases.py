@@ -1,4 +1,4 @@
-"""Every hard case of every family: within what is allowed, or said to be beyond it; the long ones by `make stress`."""
+"""Hard cases of every family: within what is allowed, or said to be beyond it; `make stress` runs the full ones too."""
 
 from __future__ import annotations
 
@@ -16,10 +16,16 @@ from tests.hard.report import Result, rows, summarise, write
 
 SEED = 1
 ROOT = Path(__file__).parents[2]
+SOME = {  # one of each family
+    "spatial, 7 joints", "q of 100000 rad", "double pendulum, rk4, 20000 steps", "damper of 1e+06 N m s/rad",
+    "planar_2r, smooth, scenes 0 to 2", "ur5's elbow 0.1 m beyond", "planar_2r, PID in saturation",
+    "double pendulum, rk4", "planar_2r", "double_pendulum", "turning and sliding", "stopped",
+}  # fmt: skip
 ALL = [
-    pytest.param(case, id=f"{name}: {case.name}", marks=[pytest.mark.stress] if case.full else [])
+    pytest.param(case, id=f"{name}: {case.name}", marks=[] if case.name in SOME else [pytest.mark.long])
     for name, family in FAMILIES.items()
     for case in family.CASES
+    if not case.full
 ]
 
 
@@ -51,6 +57,12 @@ def test_the_documentation_states_the_law_of_each_family() -> None:
     text = (ROOT / "docs" / "hard_cases.md").read_text()
     for name, family in FAMILIES.items():
         assert f"## {family.TITLE}\n\n{cleandoc(family.__doc__)}\n" in text, name
+
+
+def test_some_case_of_each_family_is_not_long() -> None:
+    short = [(name, case.name) for name, family in FAMILIES.items() for case in family.CASES if not case.full]
+    assert {name for name, case in short if case in SOME} == FAMILIES.keys()
+    assert {case for _, case in short} >= SOME
 
 
 def test_the_files_are_those_that_the_script_makes() -> None:
