@@ -11,14 +11,12 @@ if TYPE_CHECKING:
     from robot_dyn.accuracy.advisor import Advice as Advice
     from robot_dyn.accuracy.advisor import advise as advise
     from robot_dyn.accuracy.certificate import Certificate as Certificate
-    from robot_dyn.accuracy.certificate_diagram import save_certificate as save_certificate
     from robot_dyn.accuracy.certify import certify as certify
     from robot_dyn.accuracy.compare import Comparison as Comparison
     from robot_dyn.accuracy.compare import compare as compare
     from robot_dyn.accuracy.cost import Cost as Cost
     from robot_dyn.accuracy.cost import cost as cost
-    from robot_dyn.accuracy.cost_diagram import save_cost as save_cost
-    from robot_dyn.accuracy.diagram import save_work_precision as save_work_precision
+    from robot_dyn.accuracy.save import save_result as save_result
     from robot_dyn.accuracy.work_precision import WorkPrecision as WorkPrecision
     from robot_dyn.accuracy.work_precision import work_precision as work_precision
     from robot_dyn.arithmetic import Ball as Ball
@@ -214,15 +212,13 @@ _HOME = {
     "read_scene": "scene.scene",
     "replay": "view.replay",
     "rollouts": "simulation.rollout",
-    "save_certificate": "accuracy.certificate_diagram",
-    "save_cost": "accuracy.cost_diagram",
     "save_plot": "view.plots",
     "save_replay": "view.replay",
+    "save_result": "accuracy.save",
     "save_rollouts": "simulation.rollouts_file",
     "save_run": "simulation.run_file",
     "save_show": "view.replay",
     "save_stress": "stress_test.page",
-    "save_work_precision": "accuracy.diagram",
     "show": "view.replay",
     "simulate": "simulation.simulate",
     "stress": "stress_test.stress",

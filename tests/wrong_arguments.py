@@ -230,9 +230,7 @@ def examples(folder: Path) -> dict[str, Example]:
              "on_progress": lambda part, what: None},
         ),
         "Certificate.of": (certified.of, {"quantity": "M", "road": "Pinocchio"}),
-        "save_certificate": (
-            rd.save_certificate, {"result": certified, "path": folder / "digits.csv", "theme": "dark"},
-        ),
+        "save_result": (rd.save_result, {"result": certified, "path": folder / "digits.csv", "theme": "dark"}),
         "stress": (
             rd.stress,
             {"robot": robot, "samples": 100, "runs": 0, "seed": 3, "budget_s": 1e-3,
@@ -323,9 +321,6 @@ def examples(folder: Path) -> dict[str, Example]:
             {"robot": robot, "path": folder / "still", "q": q, "package_dirs": [folder], "inertia": False},
         ),
         "show": (rd.show, {"robot": robot, "q": q, "package_dirs": [folder], "inertia": False, "port": free_port()}),
-        "save_work_precision": (
-            rd.save_work_precision, {"result": measured, "path": folder / "diagram.csv", "theme": "dark"},
-        ),
         "simulate": (rd.simulate, {"what": plant, "on_progress": lambda t: None, "q0": q, "duration_s": 0.01}),
         "task_dynamics": (
             rd.task_dynamics,
@@ -337,9 +332,8 @@ def examples(folder: Path) -> dict[str, Example]:
             rd.cost,
             {"what": setup, "q0": q, "v0": v, "budget_s": 1e-9, "repeats": 1, "on_progress": print_nothing},
         ),
-        "save_cost": (rd.save_cost, {"result": priced, "path": folder / "cost.csv", "theme": "dark"}),
         "WorkPrecision.digits": (measured.digits, {"error": 1e-6}),
-        "WorkPrecision.sentence": (measured.sentence, {"digits": 6}),
+        "WorkPrecision.sentence_of": (measured.sentence_of, {"digits": 6}),
         "work_precision": (
             rd.work_precision,
             {"what": replace(setup, engine="interpreted"), "q0": q, "v0": v, "duration_s": 0.01, "methods": ["rk4"],

@@ -47,6 +47,14 @@ Xacro = Annotated[
         help="Expand a xacro file, which runs its expressions; may be repeated; '' for no argument.",
     ),
 ]
+Plot = Annotated[
+    str | None, typer.Option("-o", "--output", metavar="PLOT.png", help="Draw it, as a .png, .svg or .pdf.")
+]
+Csv = Annotated[str | None, typer.Option("--csv", metavar="TABLE.csv", help="Write its rows as a table.")]
+Dark = Annotated[bool, typer.Option("--dark", help="Draw for dark screens.")]
+Budget = Annotated[float, typer.Option(metavar="SECONDS", help="Time to spend, compiling not counted.")]
+Repeats = Annotated[int, typer.Option(min=1, help="How often each is timed at most, while the budget lasts.")]
+Scene = Annotated[str, typer.Argument(metavar="SCENE.toml", help="A scene file; `robot-dyn scene` prints some.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace files that are there already.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, as documented in docs/json.md.")]
 

@@ -68,7 +68,7 @@ def demo(
 
 def _price(swing: rd.Setup) -> Iterator[str]:
     """What digits of a free swing cost, here and now."""
-    from robot_dyn.cli import prices
+    from robot_dyn.cli import studies
 
     yield ""
     yield f"What 1e-8 rad takes here: {swing.duration_s:g} s of the same arm, swinging freely"
@@ -78,7 +78,7 @@ def _price(swing: rd.Setup) -> Iterator[str]:
     except RobotDynError as error:
         yield f"left out: {error}"
         return
-    yield from prices.programs(result, _ERROR)
+    yield from studies.programs(result, _ERROR)
     if result.interrupted:
         raise typer.Exit(130)
     yield "  all methods: robot-dyn accuracy; each effect and algorithm: robot-dyn cost"
