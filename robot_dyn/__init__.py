@@ -105,7 +105,6 @@ if TYPE_CHECKING:
     from robot_dyn.simulation.simulate import simulate as simulate
     from robot_dyn.simulation.table import export_csv as export_csv
     from robot_dyn.simulation.trajectory import Trajectory as Trajectory
-    from robot_dyn.stress_test.page import save_stress as save_stress
     from robot_dyn.stress_test.result import Stress as Stress
     from robot_dyn.stress_test.stress import stress as stress
     from robot_dyn.threshold import Threshold as Threshold
@@ -218,7 +217,6 @@ _HOME = {
     "save_rollouts": "simulation.rollouts_file",
     "save_run": "simulation.run_file",
     "save_show": "view.replay",
-    "save_stress": "stress_test.page",
     "show": "view.replay",
     "simulate": "simulation.simulate",
     "stress": "stress_test.stress",

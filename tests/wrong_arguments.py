@@ -18,7 +18,6 @@ from robot_dyn.control.controller import Controller
 from robot_dyn.effects.effect import Bound, Conservative, Drive, Effect, Force, Stateful
 from robot_dyn.integrate.integrator import System
 from tests.queries import ARGUMENTS, FRAMED
-from tests.short_stress import short_stress
 
 Example = tuple[Callable[..., Any], dict[str, Any]]
 NAN, INF = float("nan"), float("inf")
@@ -92,7 +91,6 @@ def examples(folder: Path) -> dict[str, Example]:
     q, v, u = np.array([0.3, -0.4]), np.array([0.7, 1.1]), np.array([1.3, 0.9])
     friction, hold = rd.ViscousFriction(0.1), rd.hold(q)
     certified = rd.certify(robot, samples=100, repeats=1)
-    stressed = short_stress(robot)
     plant, own = rd.Plant(robot, [friction]), rd.Lagrangian(robot)
     setup = rd.Setup(plant, q, duration_s=0.01, integrator="rk4")
     run, several = rd.simulate(setup), rd.rollouts(setup, np.tile(q, (2, 1)))
@@ -236,8 +234,6 @@ def examples(folder: Path) -> dict[str, Example]:
             {"robot": robot, "samples": 100, "runs": 0, "seed": 3, "budget_s": 1e-3,
              "on_progress": lambda spent, what: None},
         ),
-        "Stress.python": (stressed.python, {"finding": stressed.worst[0]}),
-        "save_stress": (rd.save_stress, {"result": stressed, "path": folder / "stress.html"}),
         "check": (rd.check, {"name_or_path": "planar_2r", "package_dirs": [folder], "density": 1000.0, "units": True}),
         "circle": (
             rd.circle,

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _LETTERS = 9.5  # of a heading, in an inch
-_TOP, _LINE, _LEFT = 0.15, 0.22, 0.16  # [inch]: above the heading, of its lines, and beside it
+_TOP, _LEFT, _LINE, _CAPTION = 0.15, 0.16, 0.22, 0.43  # [inch]: above and beside the heading, of its lines, below
 
 Colours = Mapping[str, Any]
 
@@ -28,7 +28,7 @@ def sheet(width: float, height: float, sentence: str, caption: str, colours: Col
 
     figure = Figure(figsize=(width, height), facecolor=colours["paper"])
     said, left = fill(sentence, int(_LETTERS * width)), _LEFT / width
-    below = 2 * _TOP + _LINE * (1 + said.count("\n"))
+    below = _CAPTION + _LINE * said.count("\n")
     figure.text(left, 1 - _TOP / height, lines(said), fontsize=12, weight="bold", va="top", **ink(colours))
     figure.text(left, 1 - below / height, lines(caption), fontsize=8.5, va="top", linespacing=1.4, **ink(colours))
     return figure

@@ -13,15 +13,17 @@ from robot_dyn.accuracy.ladder import Ladder
 from robot_dyn.accuracy.work_precision import WorkPrecision
 from robot_dyn.cli.terminal import table
 from robot_dyn.simulation.seconds import in_words
+from robot_dyn.stress_test.finding import Judged, Limit, Worst
+from robot_dyn.stress_test.result import Stress
 
 _DIGITS = (3, 6, 9)
 _OWN = "robot_dyn"
 _DECIMALS = "decimals of the file as float64"
 
 
-def lines(result: Certificate | Cost | WorkPrecision) -> Iterator[Any]:
+def lines(result: Certificate | Cost | Stress | WorkPrecision) -> Iterator[Any]:
     """Texts of one line each, and tables."""
-    of = {Certificate: _certificate, Cost: _cost, WorkPrecision: _work_precision}
+    of = {Certificate: _certificate, Cost: _cost, Stress: _stress, WorkPrecision: _work_precision}
     yield result.sentence
     yield ""
     yield from of[type(result)](result)
@@ -145,6 +147,39 @@ def _beyond(result: WorkPrecision) -> Iterator[Any]:
     yield "energy: largest residual, as a part of the energy exchanged" + (
         f"; there and back: |q − q₀| in {result.unit} of a run that turns round at the end" if returns else ""
     )
+
+
+def _stress(result: Stress) -> Iterator[Any]:
+    """What it fails at, and a line for each finding."""
+    yield from (f"FAILURE: {each}" for each in result.failures)
+    of_worst = ("quantity", "joint", "typical", "worst random", "searched", "at few digits", "note")
+    of_limits = ("of", "what", "joint", "limit", "at 0.98", "at 1.02", "")
+    of_runs = ("run", "duration", "estimated", "true", "known to", "says", "")
+    for title, headings, rows in (
+        ("worst configurations", of_worst, map(_worst_row, result.worst)),
+        ("limits", of_limits, map(_limit_row, result.limits)),
+        ("random runs: errors of q in rad or m", of_runs, map(_run_row, result.runs)),
+    ):
+        if known := list(rows):
+            yield from (title, table(headings, known, words=headings, wrap=True), "")
+    yield from (f"not looked at for lack of time: {each}" for each in result.out_of_time)
+
+
+def _worst_row(each: Worst) -> tuple[str, ...]:
+    searched = f"{each.searched:.4g}" + ("" if each.found else " (none worse)")
+    least = f"{each.minimal:.4g} {each.unit}".rstrip()
+    return each.what, each.joint, f"{each.typical:.4g}", f"{each.random:.4g}", searched, least, each.note
+
+
+def _limit_row(each: Limit) -> tuple[str, ...]:
+    limit = f"{each.value:.4g} {each.unit}" if isfinite(each.value) else "none"
+    verdict = {True: "confirmed", False: "REFUTED", None: ""}[each.confirmed]
+    return each.of, each.what, each.joint, limit, each.within, each.beyond, verdict
+
+
+def _run_row(each: Judged) -> tuple[str, ...]:
+    errors = (f"{x:.4g}" if isfinite(x) else "–" for x in (each.estimated, each.true, each.unsure))
+    return each.what, f"{each.duration_s:g} s", *errors, each.said, "MISLEADS" if each.misleads else ""
 
 
 def programs(result: WorkPrecision, error: float) -> Iterator[str]:

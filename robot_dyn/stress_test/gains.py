@@ -20,7 +20,6 @@ from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.stability import Stability
 from robot_dyn.stress_test.confirm import BEYOND, WITHIN, pushed, told
 from robot_dyn.stress_test.finding import Limit
-from robot_dyn.stress_test.lines import expression
 from robot_dyn.stress_test.work import Work
 
 PERIOD_S = 1e-3
@@ -49,7 +48,7 @@ def gain_limit(setup: Setup, seed: int, work: Work) -> Limit | None:
     low = work.do("largest gain", lambda deadline: _largest(of, deadline))
     if low is None or not 0 < low < inf:
         within = f"stable up to ω = {_RANGE[1]:g} rad/s" if low else f"unstable from ω = {_RANGE[0]:g} rad/s on"
-        return None if low is None else Limit("gain", _WHAT, "", low, "rad/s", within, "", None, "")
+        return None if low is None else Limit("gain", _WHAT, "", low, "rad/s", within, "", None)
     return work.do("largest gain, judged", lambda deadline: _judged(of, low, inertia, seed, deadline))
 
 
@@ -82,18 +81,13 @@ def _judged(of: Callable[[float], Setup], low: float, inertia: np.ndarray, seed:
     at, y = both[0].q0, np.concatenate([both[0].q0, both[0].v0])
     loop = linearised(both[1].plant, both[1].controller, 0.0, y)
     start = pushed(both[0], loop.matrix(PERIOD_S), seed)
-    python = (
-        f"m = {expression(inertia)}\nq = {expression(at)}\nfor omega in ({WITHIN * low!r}, {BEYOND * low!r}):\n"
-        f"    law = rd.PDGravity(robot, rd.hold(q), np.array(m) * omega**2, 2 * np.array(m) * omega, {PERIOD_S!r})\n"
-        f"    setup = {expression(replace(start, controller=None))}\n    run = rd.simulate(setup, controller=law)\n"
-        "    print(run.outcome.ending, abs(run.q[-1] - q).max(), rd.advise(setup, controller=law).longest_period_s)\n"
-    )
+    setups = tuple(replace(each, q0=start.q0, v0=start.v0) for each in both)
     try:
         periods = [advice_about(each, at_rest).longest_period_s for each in both]
-        within, beyond = (told(replace(each, q0=start.q0, v0=start.v0), at, deadline) for each in both)
+        within, beyond = (told(each, at, deadline) for each in setups)
     except RobotDynError as error:
-        return Limit("gain", _WHAT, "", low, "rad/s", f"not run: {error}", "", None, python)
+        return Limit("gain", _WHAT, "", low, "rad/s", f"not run: {error}", "", None, {"q": at.tolist()}, setups)
     agrees = periods[0] >= PERIOD_S > periods[1]
     said = beyond.words + f"; THE ADVISOR TAKES IT FOR STABLE UP TO {periods[1]:.3g} s" * (not agrees)
     confirmed = agrees and within.stays and beyond.leaves(within)
-    return Limit("gain", _WHAT, "", low, "rad/s", within.words, said, confirmed, python)
+    return Limit("gain", _WHAT, "", low, "rad/s", within.words, said, confirmed, {"q": at.tolist()}, setups)

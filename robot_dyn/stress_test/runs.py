@@ -21,7 +21,6 @@ from robot_dyn.simulation.simulate import simulate
 from robot_dyn.simulation.trajectory import Ending, Trajectory
 from robot_dyn.stress_test.confirm import LEAST, says
 from robot_dyn.stress_test.finding import Judged
-from robot_dyn.stress_test.lines import expression
 from robot_dyn.stress_test.scenes import scenes
 from robot_dyn.stress_test.shrink import shrunk
 from robot_dyn.stress_test.work import Work
@@ -57,7 +56,7 @@ def judged(setup: Setup, what: str, deadline: Deadline) -> Judged:
     said = says(run) if run.outcome.ending is Ending.FINISHED else f"{run.outcome.ending} at {run.outcome.t:.3g} s"
     error = run.error
     if error is None or run.outcome.ending is not Ending.FINISHED or not error.resolved_until:
-        return Judged(what, setup.duration_s, np.nan, np.nan, np.nan, said, False, _lines(setup))
+        return Judged(what, setup.duration_s, np.nan, np.nan, np.nan, said, False, setup)
     sure = replace(setup, step_s=None, estimate_error=False, integrator=_BETTER[0])
     better = [simulate(replace(sure, integrator=each), on_progress=deadline.check) for each in _BETTER]
     known = run.t <= error.resolved_until
@@ -69,20 +68,12 @@ def judged(setup: Setup, what: str, deadline: Deadline) -> Judged:
     unsure = float(np.abs(better[1].q - better[0].q)[known].max())
     floor = _ROUNDING * (1 + float(np.abs(run.q).max())) + unsure
     misleads = not says_more(run) and max(error.final, floor) < LEAST * max(true, floor)
-    return Judged(what, setup.duration_s, error.final, true, unsure, said or str(error), misleads, _lines(setup))
+    return Judged(what, setup.duration_s, error.final, true, unsure, said or str(error), misleads, setup)
 
 
 def says_more(run: Trajectory) -> bool:
     """Whether something but the estimate warns."""
     return bool(run.error is not None and run.error.note) or "does not close" in run.summary
-
-
-def _lines(setup: Setup) -> str:
-    return (
-        f"setup = {expression(setup)}\nrun = rd.simulate(setup)\nbetter = rd.simulate(setup, integrator="
-        f"{expression(_BETTER[0])}, estimate_error=False)\nprint(run.error)\n"
-        "print(abs(run.q - better.q).max())\n"
-    )
 
 
 def shrunk_run(setup: Setup, found: Judged, name: str, work: Work) -> Judged:
