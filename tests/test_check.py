@@ -152,7 +152,7 @@ def test_the_command_tells_fixes_and_exits(tmp_path: Path, monkeypatch: pytest.M
     fixed = run("check", "arm.urdf", "--fix", "--json")
     (document,) = json.loads(fixed.stdout)["files"]
     assert document["written"] == "arm.fixed.urdf"
-    assert document["findings"][0]["changes"] == ["<orgin> is now <origin>"]
+    assert document["findings"][0]["changes"][0]["text"] == "<orgin> is now <origin>"
     assert run("check", "arm.fixed.urdf").returncode == 0
     again = run("check", "arm.urdf", "--fix")
     assert again.returncode == 2

@@ -36,7 +36,6 @@ def test_info():
         assert joint.keys() == names(keys["joints"])
         assert joint["kind"] in ("revolute", "continuous", "prismatic")
     assert [coupling.keys() for coupling in panda["couplings"]] == [names(keys["couplings"])]
-    assert panda["ties"] == panda["couplings"]  # the former name
 
 
 def test_query():
