@@ -7,7 +7,7 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 from robot_dyn.errors import RobotDynError
-from robot_dyn.view.figure import drawable
+from robot_dyn.view.figure import drawable, framed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -36,12 +36,7 @@ def sheet(width: float, height: float, sentence: str, caption: str, colours: Col
 
 def styled(axes: Any, colours: Colours, x: str, title: str, y: str = "") -> None:
     """Axes in the colours of a theme, with their title and labels."""
-    axes.set_facecolor(colours["paper"])
-    axes.grid(color=colours["grid"], linewidth=0.5)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.spines[["bottom", "left"]].set_color(colours["ink"])
-    axes.tick_params(which="both", colors=colours["ink"], labelsize=8)
+    framed(axes, colours, 8)
     axes.set_title(title, loc="left", fontsize=9, **ink(colours))
     axes.set_xlabel(x, fontsize=8.5, labelpad=1, **ink(colours))
     axes.set_ylabel(y, fontsize=8.5, **ink(colours))

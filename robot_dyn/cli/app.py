@@ -88,22 +88,14 @@ def progress(items: Iterable[str], description: str) -> Iterator[str]:
 
 
 @contextmanager
-def bar(duration_s: float) -> Iterator[Callable[[float], object]]:
-    """A progress bar on stderr while a person watches; what it gives is called with the time reached."""
+def bar(total: float) -> Iterator[Callable[..., object]]:
+    """A progress bar on stderr while a person watches.
+
+    What it gives is called with what is done of the total, and with the name of what is being done.
+    """
     from rich.console import Console
     from rich.progress import Progress
 
     with Progress(console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty()) as progress:
-        task = progress.add_task("simulating", total=duration_s)
-        yield lambda t: progress.update(task, completed=t)
-
-
-@contextmanager
-def spending(budget_s: float) -> Iterator[Callable[[float, str], object]]:
-    """The same for a budget of time; what it gives is called with the time spent, and with what is being done."""
-    from rich.console import Console
-    from rich.progress import Progress
-
-    with Progress(console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty()) as progress:
-        task = progress.add_task("starting", total=budget_s)
-        yield lambda spent, what: progress.update(task, completed=spent, description=what)
+        task = progress.add_task("starting", total=total)
+        yield lambda done, what="simulating": progress.update(task, completed=done, description=what)

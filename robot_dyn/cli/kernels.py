@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import asdict
 from datetime import datetime
 from typing import Any
 
@@ -38,11 +37,11 @@ def formulation_table(answer: Document) -> Iterator[Any]:
 
 def cache(store: Store | None, removed: int) -> Document:
     """The kernels kept on disk; `folder` is null where there is no cache."""
-    kernels = [asdict(entry) for entry in store.entries()] if store else []
+    kernels = list(store.entries()) if store else []
     return {
         "folder": str(store.folder) if store else None,
         "removed": removed,
-        "bytes": sum(each["size"] for each in kernels),
+        "bytes": sum(each.size for each in kernels),
         "kernels": kernels,
     }
 
@@ -57,8 +56,8 @@ def cache_tables(answer: Document) -> Iterator[Any]:
     if answer["kernels"]:
         rows = []
         for each in answer["kernels"]:
-            used = datetime.fromtimestamp(each["used"]).strftime("%Y-%m-%d %H:%M")
-            rows.append([each["key"][:12], each["about"], f"{each['size'] / 1024:.0f}", used])
+            used = datetime.fromtimestamp(each.used).strftime("%Y-%m-%d %H:%M")
+            rows.append([each.key[:12], each.about, f"{each.size / 1024:.0f}", used])
         yield table(("kernel", "about", "KiB", "last used"), rows, words=("kernel", "about", "last used"))
     count = len(answer["kernels"])
     yield f"{count} kernel{'' if count == 1 else 's'}, {answer['bytes'] / 2**20:.1f} MiB in {answer['folder']}"

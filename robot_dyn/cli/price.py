@@ -10,21 +10,7 @@ import typer
 
 import robot_dyn as rd
 from robot_dyn.cli import arguments, completion
-from robot_dyn.cli.app import (
-    Budget,
-    Csv,
-    Dark,
-    Force,
-    Json,
-    Lock,
-    Name,
-    PackageDir,
-    Plot,
-    Repeats,
-    Scene,
-    app,
-    spending,
-)
+from robot_dyn.cli.app import Budget, Csv, Dark, Force, Json, Lock, Name, PackageDir, Plot, Repeats, Scene, app, bar
 from robot_dyn.cli.outcome import give, outputs
 from robot_dyn.cli.terminal import say, say_json
 from robot_dyn.errors import QueryError
@@ -62,7 +48,7 @@ def accuracy(
     """Show what each digit of a motion costs in time, by method and program. Ctrl-C ends it and keeps its runs."""
     paths = outputs(rd.WorkPrecision, output, csv, [what] if os.path.isfile(what) else [], force)
     setup = _setup(what, q, v, duration, lock, package_dir)
-    with spending(budget) as spent:
+    with bar(budget) as spent:
         result = rd.work_precision(
             setup, methods=method, peers=peers, budget_s=budget, repeats=repeats, on_progress=spent
         )
@@ -83,7 +69,7 @@ def cost(
     """Count and time effects, control and terms of a scene, on and off, and algorithms beside each other."""
     paths = outputs(rd.Cost, output, csv, [scene], force)
     setup = rd.read_scene(scene)
-    with spending(budget) as spent:
+    with bar(budget) as spent:
         result = rd.cost(setup, budget_s=budget, repeats=repeats, on_progress=spent)
     give(result, paths, as_json, dark)
 
@@ -111,7 +97,7 @@ def certify(
     arm = arguments.load(robot, lock, package_dir)
     given = {"q": q, "v": v, "a": a, "tau": tau}
     state = {key: arguments.vector(f"--{key}", x, arm.joint_names) for key, x in given.items() if x is not None}
-    with spending(1.0) as done:
+    with bar(1.0) as done:
         result = rd.certify(arm, **state, samples=samples, seed=seed, repeats=repeats, on_progress=done)
     give(result, paths, as_json, dark)
 

@@ -9,7 +9,7 @@ import typer
 
 import robot_dyn as rd
 from robot_dyn.cli import arguments
-from robot_dyn.cli.app import Force, Json, Lock, Name, PackageDir, Xacro, app, spending
+from robot_dyn.cli.app import Force, Json, Lock, Name, PackageDir, Xacro, app, bar
 from robot_dyn.cli.outcome import give
 
 
@@ -42,7 +42,7 @@ def stress(
     inputs = [robot] if os.path.isfile(robot) else []
     paths = [arguments.output(output, JSON, ResultError, inputs, force)] if output else []
     arm = arguments.load(robot, lock, package_dir, xacro)
-    with spending(budget) as spent:
+    with bar(budget) as spent:
         result = rd.stress(arm, samples=samples, runs=runs, seed=seed, budget_s=budget, on_progress=spent)
     give(result, paths, as_json)
     if not result.ok:

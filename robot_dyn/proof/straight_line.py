@@ -1,11 +1,12 @@
-"""Programs as Python functions of balls, or of truncated power series of balls: one line for each instruction.
+"""Programs as functions of balls, or of truncated power series of balls: one operation for each instruction.
 
-Values are numbered, so no text of a file can reach the code. [Johansson 2017]
+[Johansson 2017]
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from operator import add, methodcaller, mul, neg, sub, truediv
 from typing import Any
 
 from flint import arb
@@ -15,19 +16,25 @@ from robot_dyn.errors import ProofError
 
 Function = Callable[..., Sequence[Any]]
 
-_LINES = {
-    Kind.ADD: "{0} + {1}",
-    Kind.SUBTRACT: "{0} - {1}",
-    Kind.MULTIPLY: "{0} * {1}",
-    Kind.DIVIDE: "{0} / {1}",
-    Kind.NEGATE: "-{0}",
-    Kind.SQUARE: "{0} * {0}",
-    Kind.TWICE: "{0} + {0}",
-    Kind.RECIPROCAL: "1 / {0}",
-    Kind.SQUARE_ROOT: "{0}.sqrt()",
-    Kind.EXPONENTIAL: "{0}.exp()",
-    Kind.SINE_COSINE: "{0}.sin_cos()",
-    Kind.HYPERBOLIC_TANGENT: "tanh({0})",
+
+def _tanh(x: Any) -> Any:
+    """Tanh x = 1 − 2 / (1 + e²ˣ), of a series; of a ball its own."""
+    return x.tanh() if hasattr(x, "tanh") else 1 - 2 / (1 + (x + x).exp())
+
+
+_OPERATIONS: dict[Kind, Callable[..., Any]] = {
+    Kind.ADD: add,
+    Kind.SUBTRACT: sub,
+    Kind.MULTIPLY: mul,
+    Kind.DIVIDE: truediv,
+    Kind.NEGATE: neg,
+    Kind.SQUARE: lambda x: x * x,
+    Kind.TWICE: lambda x: x + x,
+    Kind.RECIPROCAL: lambda x: 1 / x,
+    Kind.SQUARE_ROOT: methodcaller("sqrt"),
+    Kind.EXPONENTIAL: methodcaller("exp"),
+    Kind.SINE_COSINE: methodcaller("sin_cos"),
+    Kind.HYPERBOLIC_TANGENT: _tanh,
 }
 _MOST = 16.0  # of a constant that CasADi makes: exact halves, far from a rounded decimal
 
@@ -41,31 +48,21 @@ def straight_line(program: Program) -> Function:
     for x in program.constants:
         if not (abs(x) <= _MOST and float(2 * x).is_integer()):
             raise ProofError(f"the trace folded a constant in float64, {x!r}: no theorem could say which number it is")
-    first, count = sum(program.inputs), len(program.constants)
-    lines = ["def function(x, tanh, constants):"]
-    if first:
-        lines.append(f" {_list(range(first))} = x")
-    if count:
-        lines.append(f" {_list(range(first, first + count))} = constants")
     for op in program.ops:
-        if op.kind not in _LINES:
+        if op.kind not in _OPERATIONS:
             raise ProofError(f"{op.kind.name.lower()} is not analytic: no theorem is proven across it")
-        lines.append(f" {_list(op.made).rstrip(',')} = {_LINES[op.kind].format(*(f'v{i}' for i in op.of))}")
-    lines.append(f" return {_list(program.outputs)}")
-    scope: dict[str, Any] = {}
-    exec("\n".join(lines), scope)  # of numbers only
-    function = scope["function"]
+    steps = [(_OPERATIONS[op.kind], op.made, op.of) for op in program.ops]
+    size = sum(program.inputs) + len(program.constants) + sum(len(op.made) for op in program.ops)
 
     def of_inputs(x: Sequence[Any]) -> Sequence[Any]:
-        return function(x, _tanh, [arb(each) for each in program.constants])
+        values = [*x, *map(arb, program.constants)]
+        values += [None] * (size - len(values))
+        for operation, made, of in steps:
+            result = operation(*[values[i] for i in of])
+            if len(made) == 1:
+                values[made[0]] = result
+            else:
+                values[made[0]], values[made[1]] = result
+        return [values[i] for i in program.outputs]
 
     return of_inputs
-
-
-def _tanh(x: Any) -> Any:
-    """Tanh x = 1 − 2 / (1 + e²ˣ), of a series; of a ball its own."""
-    return x.tanh() if hasattr(x, "tanh") else 1 - 2 / (1 + (x + x).exp())
-
-
-def _list(values: Sequence[int] | range) -> str:
-    return ", ".join(f"v{i}" for i in values) + ("," if len(values) == 1 else "")
