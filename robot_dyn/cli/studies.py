@@ -114,7 +114,7 @@ def _work_precision(result: WorkPrecision) -> Iterator[Any]:
         )
     columns = [digits for digits in _DIGITS if 10.0**-digits >= of.error]
     headings = ("method", "order", "measured", *(f"{digits} digits" for digits in columns), "least error", "in")
-    yield table(headings, _ladder_rows(result, columns))
+    yield table(headings, _ladder_rows(result, columns), words=headings[:1])
     yield "times of the loop alone, medians of runs that take turns; * the least; ( ) extrapolated by the order"
     if result.beyond:
         yield from _beyond(result)
@@ -143,7 +143,7 @@ def _beyond(result: WorkPrecision) -> Iterator[Any]:
     for each in result.beyond:
         back = "—" if each.returned is None else f"{each.returned:.1e}"
         rows.append([each.name, f"{each.setting:.3g}", f"{each.energy:.1e}", *[back] * returns])
-    yield table(("method", "setting", "energy", *["there and back"] * returns), rows)
+    yield table(("method", "setting", "energy", *["there and back"] * returns), rows, words=("method",))
     yield "energy: largest residual, as a part of the energy exchanged" + (
         f"; there and back: |q − q₀| in {result.unit} of a run that turns round at the end" if returns else ""
     )
@@ -152,6 +152,7 @@ def _beyond(result: WorkPrecision) -> Iterator[Any]:
 def _stress(result: Stress) -> Iterator[Any]:
     """What it fails at, and a line for each finding."""
     yield from (f"FAILURE: {each}" for each in result.failures)
+    yield from [""] * bool(result.failures)
     of_worst = ("quantity", "joint", "typical", "worst random", "searched", "at few digits", "note")
     of_limits = ("of", "what", "joint", "limit", "at 0.98", "at 1.02", "")
     of_runs = ("run", "duration", "estimated", "true", "known to", "says", "")

@@ -52,9 +52,7 @@ def say(*renderables: Any) -> None:
         put(f"{escaped(each)}\n") if isinstance(each, str) else _guarded(lambda each=each: console.print(each))
 
 
-def table(
-    headings: Sequence[str], rows: Iterable[Sequence[str]], words: Collection[str] = ("method",), wrap: bool = False
-) -> Any:
+def table(headings: Sequence[str], rows: Iterable[Sequence[str]], words: Collection[str], wrap: bool = False) -> Any:
     """A table for `say`; columns under the headings `words` begin at the left, the others hold numbers."""
     from rich.table import Table
 
