@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.accuracy.deadline import NEVER, Deadline
+from robot_dyn.accuracy.budget import Budget
 from robot_dyn.accuracy.worst_state import random_states
 from robot_dyn.cli.studies import lines
 from robot_dyn.integrate.methods import FIXED_STEP
@@ -117,9 +117,9 @@ def test_an_estimate_that_is_too_small_misleads_and_shrinks_to_a_start_of_few_di
         rd.Plant(robot), [0.7312, -0.4321], [0.5111, 0.7222], 0.2, integrator="midpoint", step_s=2e-3,
         record_period_s=0.02,
     )  # fmt: skip
-    found = runs.judged(setup, "swing", NEVER)
+    found = runs.judged(setup, "swing", Budget())
     assert found.misleads and found.estimated < 0.3 * found.true
-    assert runs.judged(replace(setup, integrator="order_8"), "swing", NEVER).misleads is False  # rounding
+    assert runs.judged(replace(setup, integrator="order_8"), "swing", Budget()).misleads is False  # rounding
     small = runs.shrunk_run(setup, found, "shrinking", Work())
     start = [*small.setup.q0.tolist(), *small.setup.v0.tolist()]
     assert small.misleads and sum(map(len, map(repr, start))) < len("0.7312-0.43210.51110.7222")
@@ -246,7 +246,7 @@ def test_with_time_enough_what_is_found_depends_on_no_clock() -> None:
     """By one that stands still, and by one that is 1000 s further at each look."""
     robot, found = rd.load("planar_2r"), []
     for clock in (ticking(1000), lambda: 0.0):
-        rng, work = np.random.default_rng(5), Work(Deadline(1e12, clock), 1e11)
+        rng, work = np.random.default_rng(5), Work(Budget(1e12, clock=clock), 1e11)
         states = random_states(robot, 100, rng)
         worst = list(worst_configurations(robot, states, rng, pd_gains(robot, states), work))
         told = [f"{each} {each.setup}" for each in runs.judged_runs(robot, states, 2, rng, work)]
@@ -259,7 +259,7 @@ def test_a_run_ends_at_its_deadline_and_so_do_the_companions_of_its_error_estima
     """They take more steps than the run: the clock stops them beyond its 100 steps, and before their end."""
     setup = rd.Setup(rd.Plant(rd.load("pendulum")), [0.4], duration_s=0.1, integrator="rk4", engine="interpreted")
     for most, done in ((50, False), (150, False), (1e6, True)):
-        work = Work(Deadline(most, ticking()))
+        work = Work(Budget(most, clock=ticking()))
         run = work.do("run", lambda until: rd.simulate(setup, on_progress=until.check))
         assert (run is not None) == done and work.out_of_time == ([] if done else ["run"])
 
@@ -267,14 +267,14 @@ def test_a_run_ends_at_its_deadline_and_so_do_the_companions_of_its_error_estima
 def test_shrinking_that_has_no_time_keeps_the_failure(monkeypatch) -> None:
     """It is told as it was found."""
 
-    def judged(setup: rd.Setup, what: str, deadline: Deadline) -> Judged:
+    def judged(setup: rd.Setup, what: str, budget: Budget) -> Judged:
         while True:
-            deadline.check()
+            budget.check()
 
     monkeypatch.setattr(runs, "judged", judged)
     setup = rd.Setup(rd.Plant(rd.load("pendulum")), [0.7312], duration_s=0.1)
     found = Judged("swing", 0.1, 1e-9, 1.0, 0.0, "", True, setup)
-    work = Work(Deadline(3, ticking()))
+    work = Work(Budget(4, clock=ticking()))
     assert runs.shrunk_run(setup, found, "shrinking of run 1", work) is found
     assert work.out_of_time == ["shrinking of run 1"]
 
@@ -297,7 +297,7 @@ def test_a_run_that_leaves_an_equilibrium_is_seen_to_say_so() -> None:
     robot = rd.load("pendulum")
     law = rd.PDGravity(robot, rd.hold([0.4]), 133.0, 13.3)
     setup = rd.Setup(rd.Plant(robot), [0.4 + 1e-6], duration_s=2.0, controller=law, integrator="midpoint", step_s=0.11)
-    told = confirm.told(setup, np.array([0.4]), NEVER, True)
+    told = confirm.told(setup, np.array([0.4]), Budget(), True)
     assert told.growth > 30 and not told.misleads  # it says so
 
 

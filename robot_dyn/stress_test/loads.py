@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from robot_dyn.accuracy.deadline import Deadline
+from robot_dyn.accuracy.budget import Budget
 from robot_dyn.accuracy.road import asked
 from robot_dyn.accuracy.worst_state import Batch
 from robot_dyn.control.computed_torque import PDGravity
@@ -124,14 +124,14 @@ def payload_limit(
 
 
 def _judged_payload(
-    robot: Robot, state: State, payload: Payload, joint: str, gains: Gains | None, deadline: Deadline
+    robot: Robot, state: State, payload: Payload, joint: str, gains: Gains | None, budget: Budget
 ) -> Limit:
     """Whether the arm holds the payload on both sides of the limit."""
     q, frame, most = state["q"], payload.frame, payload.mass
     loads = [robot.with_(payload=Payload(frame, part * most)) for part in (WITHIN, BEYOND)]
     setups = () if gains is None else tuple(_held_by_pd(each, q, gains) for each in loads)
     (holds, within), (too_heavy, beyond) = (
-        _holds(loaded, q, setup, deadline) for loaded, setup in zip(loads, setups or (None, None), strict=True)
+        _holds(loaded, q, setup, budget) for loaded, setup in zip(loads, setups or (None, None), strict=True)
     )
     what, confirmed = f"gravity torque of a payload at {frame}", holds and not too_heavy
     return Limit("payload", what, joint, most, "kg", within, beyond, confirmed, listed(state), setups)
@@ -155,14 +155,14 @@ def _tip(robot: Robot, states: Batch) -> str:
     return max(robot.frame_names, key=torque)
 
 
-def _holds(loaded: Robot, q: np.ndarray, setup: Setup | None, deadline: Deadline) -> tuple[bool, str]:
+def _holds(loaded: Robot, q: np.ndarray, setup: Setup | None, budget: Budget) -> tuple[bool, str]:
     """Whether an arm holds what it is loaded with, by the own road and by a run; and in words."""
     part = float((np.abs(Lagrangian(loaded).N(q)) / efforts(loaded)).max())
     said = f"{part:.3f} of the effort limit"
     if setup is None:
         return part < 1, said
     try:
-        run = simulate(setup, on_progress=deadline.check)
+        run = simulate(setup, on_progress=budget.check)
     except RobotDynError as error:
         return part < 1, f"{said}; not run: {error}"
     reached = any(each.kind is Kind.EFFORT_REACHED for each in run.remarks)

@@ -10,8 +10,8 @@ from math import log10
 
 import numpy as np
 
+from robot_dyn.accuracy.budget import Budget
 from robot_dyn.accuracy.counting import Counting, Found
-from robot_dyn.accuracy.deadline import Deadline
 from robot_dyn.accuracy.digits import digits_of
 from robot_dyn.accuracy.road import Road, roads
 from robot_dyn.accuracy.worst_state import Batch
@@ -47,7 +47,7 @@ def lost_digits(robot: Robot, states: Batch, rng: np.random.Generator, work: Wor
 def _lost(counting: Counting, road: Road, quantity: Quantity, work: Work) -> Worst | None:
     """What one road loses; None for lack of time."""
     name = f"digits lost in {quantity.name} by {road.name}"
-    made = work.do(name, lambda deadline: _counted(counting, road, quantity, deadline))
+    made = work.do(name, lambda budget: _counted(counting, road, quantity, budget))
     if made is None:
         return None
     lost = _OF_FLOAT64 - made.searched
@@ -67,12 +67,12 @@ def _lost(counting: Counting, road: Road, quantity: Quantity, work: Work) -> Wor
     return Worst(what, "", "digits", typical, random, max(lost, minimal), minimal, listed(state), note)
 
 
-def _counted(counting: Counting, road: Road, quantity: Quantity, deadline: Deadline) -> Found:
+def _counted(counting: Counting, road: Road, quantity: Quantity, budget: Budget) -> Found:
     """The fewest digits of some searches."""
-    made = counting.count(road, quantity, deadline.check)
+    made = counting.count(road, quantity, budget.check)
     for _ in range(_ROUNDS - 1):
         if made.searched < made.random:
             break
-        again = counting.count(road, quantity, deadline.check)
+        again = counting.count(road, quantity, budget.check)
         made = again if again.searched < made.searched else made
     return made

@@ -13,7 +13,7 @@ from math import isfinite
 import numpy as np
 
 from robot_dyn.accuracy.advisor import Advice, advice_about, at_rest
-from robot_dyn.accuracy.deadline import Deadline
+from robot_dyn.accuracy.budget import Budget
 from robot_dyn.control.computed_torque import PDGravity
 from robot_dyn.control.reference import hold
 from robot_dyn.effects.friction import ViscousFriction
@@ -72,25 +72,25 @@ def _linearised(setup: Setup) -> tuple[Advice, np.ndarray]:
     return advice_about(setup, at_rest), jacobian(loop, t, y, None)
 
 
-def _judged(setup: Setup, name: str, advice: Advice, J: np.ndarray, seed: int, deadline: Deadline) -> Limit:
+def _judged(setup: Setup, name: str, advice: Advice, J: np.ndarray, seed: int, budget: Budget) -> Limit:
     """The limit of a method."""
     limit, joint, n = advice.limits[name], advice.fastest.joint, len(setup.q0)
     try:
         unstable = isfinite(limit) and not _iterates(name)
         matrix = step_map(method(name), J, n)(BEYOND * limit) if unstable else J
         start = pushed(replace(setup, integrator=name), matrix, seed)
-        return _confirmed(start, setup.q0, name, limit, joint, deadline)
+        return _confirmed(start, setup.q0, name, limit, joint, budget)
     except RobotDynError as error:
         return Limit("step", name, joint, limit, "s", f"not run: {error}", "", None)
 
 
-def _confirmed(setup: Setup, at: np.ndarray, name: str, limit: float, joint: str, deadline: Deadline) -> Limit:
+def _confirmed(setup: Setup, at: np.ndarray, name: str, limit: float, joint: str, budget: Budget) -> Limit:
     """The limit of a method, with runs at both sides of it, or with steps as long as are judged if it has none."""
     where = {"q": at.tolist()}
     if not isfinite(limit):
         longest = setup.duration_s / _PARTS
         longest_steps = replace(setup, step_s=longest)
-        run = told(longest_steps, at, deadline, True)
+        run = told(longest_steps, at, budget, True)
         told_of = f"step {longest:.3g} s: {run.words}"
         holds = run.stays or (_iterates(name) and not isfinite(run.growth))
         return Limit("step", name, "", limit, "s", told_of, "", holds and not run.misleads, where, (longest_steps,))
@@ -98,7 +98,7 @@ def _confirmed(setup: Setup, at: np.ndarray, name: str, limit: float, joint: str
     if iterates:  # every step is stable, and where its stages are not found, about there, the run says so
         setup, what = replace(setup, duration_s=_STEPS * limit), f"{name}, about where its stages are not found"
     setups = tuple(replace(setup, step_s=part * limit) for part in (WITHIN, BEYOND))
-    within, beyond = told(setups[0], at, deadline), told(setups[1], at, deadline, not iterates)
+    within, beyond = told(setups[0], at, budget), told(setups[1], at, budget, not iterates)
     confirmed = within.stays and beyond.leaves(within) and not beyond.misleads
     if iterates:
         grew = any(not each.stays and isfinite(each.growth) for each in (within, beyond))

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.accuracy.deadline import Deadline
+from robot_dyn.accuracy.budget import Budget
 from robot_dyn.accuracy.environment import environment
 from robot_dyn.accuracy.worst_state import random_states
 from robot_dyn.model.robot import Robot
@@ -69,9 +69,8 @@ def stressed(
     samples = integer("samples", samples, least=_LEAST_SAMPLES, most=_MOST_SAMPLES)
     runs, seed = integer("runs", runs, most=_MOST_RUNS), integer("seed", seed, most=2**128 - 1)
     seconds = number("budget_s", budget_s, above=0)
-    told = function("on_progress", on_progress, "(spent, what)") or (lambda spent, what: None)
-    deadline = Deadline(clock=clock).within(seconds)
-    work = Work(deadline, seconds / _PIECES, lambda name: told(seconds - max(deadline.left, 0.0), name))
+    budget = Budget(seconds, function("on_progress", on_progress, "(spent, what)"), clock)
+    work = Work(budget, seconds / _PIECES)
     robot, found, interrupted = robot.warn_below(None), list[Found](), False
     try:
         for each in _found(robot, samples, runs, seed, work):
@@ -85,7 +84,7 @@ def stressed(
 
     return Stress(
         robot.name, robot.joint_names, of(Worst), of(Limit), of(Judged), (*_unlimited(robot), *work.left_out),
-        tuple(work.out_of_time), environment(), samples, seed, seconds - deadline.left, interrupted,
+        tuple(work.out_of_time), environment(), samples, seed, budget.spent, interrupted,
     )  # fmt: skip
 
 

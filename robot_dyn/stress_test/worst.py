@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from robot_dyn.accuracy.deadline import Deadline
+from robot_dyn.accuracy.budget import Budget
 from robot_dyn.accuracy.road import asked
 from robot_dyn.accuracy.worst_state import Batch, Search
 from robot_dyn.control.independent_joint import gains_from
@@ -58,7 +58,7 @@ def worst(
         name: Of the measure.
         needed_for: As of `Work.do`.
     """
-    found = work.do(name, lambda deadline: searched(states, rng, arguments, measure, deadline), needed_for)
+    found = work.do(name, lambda budget: searched(states, rng, arguments, measure, budget), needed_for)
     if found is None:
         return None
     sizes, state = found
@@ -70,7 +70,7 @@ def worst(
 
 
 def searched(
-    states: Batch, rng: np.random.Generator, arguments: tuple[str, ...], measure: Measure, deadline: Deadline
+    states: Batch, rng: np.random.Generator, arguments: tuple[str, ...], measure: Measure, budget: Budget
 ) -> tuple[Sizes, State]:
     """Typical, random and searched size of a measure, and the state."""
     known = measure(states)
@@ -78,7 +78,7 @@ def searched(
         raise OverflowedError("it has a finite value at none of the random states")
     random, found, best = float(np.nanmax(known)), -np.inf, states
     for _ in range(_ROUNDS):
-        at, size = Search(states, rng).worst(_timed(measure, deadline), known, arguments)
+        at, size = Search(states, rng).worst(_timed(measure, budget), known, arguments)
         if size > found:
             best, found = at, size
         if found > random:
@@ -87,21 +87,21 @@ def searched(
     return sizes, {name: best[name][0] for name in arguments}
 
 
-def _timed(measure: Measure, deadline: Deadline) -> Measure:
+def _timed(measure: Measure, budget: Budget) -> Measure:
     """A measure that asks first whether there is time."""
 
     def made(batch: Batch) -> np.ndarray:
-        deadline.check()
+        budget.check()
         return measure(batch)
 
     return made
 
 
 def shrunk_state(
-    state: State, states: Batch, measure: Measure, least: float, deadline: Deadline, most: int = 400
+    state: State, states: Batch, measure: Measure, least: float, budget: Budget, most: int = 400
 ) -> tuple[State, float]:
     """A state of few digits, within the range of random ones, at which a measure is at least so much; and how much."""
-    measure = _timed(measure, deadline)
+    measure = _timed(measure, budget)
     names, n = tuple(state), len(next(iter(state.values())))
     low = np.concatenate([states[name].min(axis=0) for name in names])
     high = np.concatenate([states[name].max(axis=0) for name in names])
