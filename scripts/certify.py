@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import robot_dyn as rd
-from robot_dyn.cli.certificates import certificate
+from robot_dyn.result import plain
 
 MOST_JOINTS = 12
 ROADS = (
@@ -85,7 +85,7 @@ if __name__ == "__main__":
         if name in documents:
             continue
         made = rd.certify(rd.load(name), samples=100, repeats=1) if options.quick else rd.certify(rd.load(name))
-        documents[name] = {"name": name} | certificate(made)
+        documents[name] = {"name": name} | plain(made)
         if options.keep:
             with options.keep.open("a") as file:
                 file.write(json.dumps(documents[name]) + "\n")

@@ -10,7 +10,7 @@ import tempfile
 from pathlib import Path
 
 import robot_dyn as rd
-from robot_dyn.cli.prices import cost_rows
+from robot_dyn.cli.studies import cost_rows
 from robot_dyn.scene.starters import starter
 
 PICTURES = Path(__file__).parents[1] / "docs" / "pictures"
@@ -38,4 +38,4 @@ if __name__ == "__main__":
     print("\n".join(f"left out: {each}" for each in result.left_out))
     print(", ".join(f"{key} {value}" for key, value in result.environment.items()))
     if not options.quick:
-        rd.save_cost(result, PICTURES / f"cost_{name}.png")
+        rd.save_result(result, PICTURES / f"cost_{name}.png")

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.cli.prices import work_precision_tables
+from robot_dyn.cli.studies import lines
 from robot_dyn.cli.terminal import say
 from robot_dyn.scene.starters import starter
 
@@ -44,9 +44,9 @@ if __name__ == "__main__":
     if unknown := set(options.scenes) - set(SCENES):
         parser.error(f"no scene {', '.join(sorted(unknown))}; there are {', '.join(SCENES)}")
     if options.quick:
-        say(*work_precision_tables(rd.work_precision(setup("pendulum"), methods=["DOP853", "rk4"], budget_s=2.0)))
+        say(*lines(rd.work_precision(setup("pendulum"), methods=["DOP853", "rk4"], budget_s=2.0)))
     for each in () if options.quick else options.scenes:
         print(f"\n## {each}\n", flush=True)
         result = rd.work_precision(setup(each), budget_s=options.budget)
-        say(*work_precision_tables(result))
-        rd.save_work_precision(result, PICTURES / f"accuracy_{each}.png")
+        say(*lines(result))
+        rd.save_result(result, PICTURES / f"accuracy_{each}.png")

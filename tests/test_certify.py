@@ -37,12 +37,12 @@ def road(robot: rd.Robot, name: str) -> Road:
 def test_each_road_has_the_digits_of_its_numbers(made: Certificate) -> None:
     """Rounding is 6e-8, 1.1e-16 and 5e-20; what two joints compute takes less than 3 digits."""
     whole = {"float32": 7.2, "longdouble": 19.3}
-    for each in made.held:
+    for each in made.digits:
         most = 20.0 if each.road.startswith("balls") else whole.get(each.road.removeprefix("Lagrangian, "), 15.95)
         assert most - 3 < each.searched <= each.random <= each.typical <= min(most + 1.5, 20), each
         assert each.given is not None and most - 2 < each.given <= 20
-    assert {each.quantity for each in made.held} == QUANTITIES.keys()
-    assert {each.road for each in made.held} == {
+    assert {each.quantity for each in made.digits} == QUANTITIES.keys()
+    assert {each.road for each in made.digits} == {
         "Pinocchio", "Lagrangian, float32", "Lagrangian, float64", "Lagrangian, longdouble", "articulated body",
         "machine code", "balls, 128 bits",
     }  # fmt: skip
@@ -157,14 +157,14 @@ def test_a_joint_without_inertia_is_named_and_the_rest_is_counted() -> None:
 def test_coupled_joints_and_joints_that_slide_are_counted(name: str, left_out: tuple[str, ...]) -> None:
     found = rd.certify(rd.load(name), **QUICK)
     assert found.left_out == left_out
-    assert min(each.searched for each in found.held if "float32" not in each.road) > 12
+    assert min(each.searched for each in found.digits if "float32" not in each.road) > 12
 
 
 def test_the_same_seed_counts_the_same(made: Certificate) -> None:
     again = rd.certify(rd.load("planar_2r"), **GIVEN, **QUICK)
     other = rd.certify(rd.load("planar_2r"), seed=1, **QUICK)
-    assert [each.searched for each in again.held] == [each.searched for each in made.held]
-    assert [each.searched for each in other.held] != [each.searched for each in made.held]
+    assert [each.searched for each in again.digits] == [each.searched for each in made.digits]
+    assert [each.searched for each in other.digits] != [each.searched for each in made.digits]
 
 
 def test_ctrl_c_keeps_what_was_counted() -> None:
@@ -185,12 +185,12 @@ def test_what_was_not_counted_is_told(made: Certificate) -> None:
 
 
 def test_files_hold_what_was_counted(made: Certificate, tmp_path) -> None:
-    path = rd.save_certificate(made, tmp_path / "digits.csv")
+    path = rd.save_result(made, tmp_path / "digits.csv")
     with path.open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    assert len(rows) == len(made.held) + len(made.decimals)
-    assert [float(row["searched"]) for row in rows[: len(made.held)]] == [each.searched for each in made.held]
-    assert rd.save_certificate(made, tmp_path / "digits", theme="dark").read_bytes().startswith(b"\x89PNG")
+    assert len(rows) == len(made.digits) + len(made.decimals)
+    assert [float(row["searched"]) for row in rows[: len(made.digits)]] == [each.searched for each in made.digits]
+    assert rd.save_result(made, tmp_path / "digits", theme="dark").read_bytes().startswith(b"\x89PNG")
 
 
 def test_the_diagram_has_a_panel_for_each_quantity(made: Certificate) -> None:
@@ -199,7 +199,7 @@ def test_the_diagram_has_a_panel_for_each_quantity(made: Certificate) -> None:
     assert titles == ["M", "C", "N", "inverse dynamics", "forward dynamics"]
     for axes, quantity in zip(figure.axes, made.quantities, strict=True):
         drawn = {(x, y) for line in axes.lines for x, y in zip(line.get_xdata(), line.get_ydata(), strict=True)}
-        for each in made.held:
+        for each in made.digits:
             if each.quantity == quantity:
                 assert {(1e6 * each.time_s, y) for y in (each.typical, each.random, each.searched)} <= drawn
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import struct
 import warnings
 from pathlib import Path
@@ -16,6 +17,7 @@ from robot_dyn.doctor.finding import Severity
 from robot_dyn.errors import QueryError
 from tests.broken_files import BROKEN, LINKS, SOUND
 from tests.command import run
+from tests.test_command_documents import PROMISE
 
 Q = np.array([0.3, -0.7, 1.1])
 
@@ -152,7 +154,10 @@ def test_the_command_tells_fixes_and_exits(tmp_path: Path, monkeypatch: pytest.M
     fixed = run("check", "arm.urdf", "--fix", "--json")
     (document,) = json.loads(fixed.stdout)["files"]
     assert document["written"] == "arm.fixed.urdf"
-    assert document["findings"][0]["changes"] == ["<orgin> is now <origin>"]
+    (change,) = document["findings"][0]["changes"]
+    assert change["text"] == "<orgin> is now <origin>"
+    promised = set(re.findall(r"`(\w+)`", PROMISE.split("## `robot-dyn check")[1].split("\n## ")[0]))
+    assert {*document, *document["findings"][0], *change} <= promised
     assert run("check", "arm.fixed.urdf").returncode == 0
     again = run("check", "arm.urdf", "--fix")
     assert again.returncode == 2

@@ -45,13 +45,12 @@ def test_document_has_the_keys_that_are_promised(scene) -> None:
     section = DOCUMENT.split("## `robot-dyn accuracy")[1].split("\n## ")[0]
     rows = [line.split("|")[1] for line in section.splitlines() if line.startswith("| `")]
     promised = {key for row in rows for key in re.findall(r"`(\w+)`", row)}
-    ladder = made["ladders"][0]
-    assert promised == {*made, *(f"{key}" for key in made["reference"]), *ladder, *ladder["points"][0]}
+    assert promised == {*made, *made["reference"], *made["ladders"][0], *made["rows"][0]}
 
 
 def test_a_robot_swings_freely_from_the_start_that_is_given() -> None:
     made = document("accuracy", "pendulum", "--q", "0.5", "--duration", "0.2", *FEW[:2], *FEW[4:])
-    assert (made["robot"], made["horizon_s"], made["unit"]) == ("pendulum", 0.2, "rad")
+    assert (made["robot"], made["reference"]["horizon_s"], made["unit"]) == ("pendulum", 0.2, "rad")
     assert {each["engine"] for each in made["ladders"]} == {"compiled", "interpreted"}
 
 

@@ -17,10 +17,10 @@ from robot_dyn.accuracy import step_cost
 from robot_dyn.accuracy.alternative import Alternative, Pair, Version, Way, in_turns
 from robot_dyn.accuracy.budget import Budget
 from robot_dyn.accuracy.query_cost import QueryCost
-from robot_dyn.cli import prices
 from robot_dyn.compiled.from_casadi import program_of
 from robot_dyn.compiled.parameters import parameters
 from robot_dyn.errors import QueryError, RobotDynError
+from robot_dyn.result import json_text
 from robot_dyn.scene.starters import starter
 from robot_dyn.simulation.machine.making import machine, machine_of_constants
 from robot_dyn.simulation.state_equation import StateEquation
@@ -219,7 +219,7 @@ def test_ratios_are_of_the_same_turn_and_a_difference_lost_in_them_is_not_told()
 
 def test_json_csv_and_figure_hold_the_alternatives(tmp_path) -> None:
     result = rd.cost(setup(FRICTION, controller=CONTROLLERS["sampled"]), budget_s=0.5, repeats=2)
-    read = json.loads(json.dumps(prices.cost(result), allow_nan=False))
+    read = json.loads(json_text(result))
     kept = [
         Alternative(
             x["group"],
@@ -236,10 +236,10 @@ def test_json_csv_and_figure_hold_the_alternatives(tmp_path) -> None:
     assert tuple(kept) == result.alternatives
     assert read["sentence"] == result.sentence and read["parts"] == result.parts
     assert kept[0].time_ratio is not None
-    with open(rd.save_cost(result, tmp_path / "table.csv"), encoding="utf-8") as file:
+    with open(rd.save_result(result, tmp_path / "table.csv"), encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [int(row["first_instructions"]) for row in rows] == [each.first.instructions for each in kept]
-    assert rd.save_cost(result, tmp_path / "plot", theme="dark").read_bytes().startswith(b"\x89PNG")
+    assert rd.save_result(result, tmp_path / "plot", theme="dark").read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize(

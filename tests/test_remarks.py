@@ -10,6 +10,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.cli import report
+from robot_dyn.result import json_text
 from robot_dyn.simulation import observer as observers
 from robot_dyn.simulation.levels import NO_LEVELS
 from robot_dyn.simulation.observation import observation_of
@@ -263,7 +264,7 @@ def test_remarks_are_said_wherever_a_run_is_shown(joint, tmp_path) -> None:
     title = " ".join(text.get_text() for text in rd.plot(run, "torques").texts)
     assert all(line in title for line in said)
     assert document((run,), (), None, False)["remarks"] == said
-    told = json.loads(json.dumps(report.run(run)))
+    told = json.loads(json_text(report.run(run)))
     assert [each["text"] for each in told["remarks"]] == [remark.text for remark in run.remarks]
     assert told["extremes"]["u"] == {"least": [-LIMIT], "largest": [LIMIT]}
     back = rd.load_run(rd.save_run(run, tmp_path / "run"))

@@ -24,7 +24,7 @@ CLASSES = {name for name in rd.__all__ if isclass(thing := getattr(rd, name)) an
 NO_VALUES = {"Dynamics", "ModelWarning", "PrecisionWarning", "RobotDynError"}  # for types, warned of or raised
 HELD = {  # of values that are made by functions, or held by others
     "CartesianReference", "Compiled", "CompiledPlant", "Couplings", "Edits", "ErrorEstimate", "ExplicitRungeKutta",
-    "Gauss", "Ledger", "Loading", "Outcome", "SinglyDiagonallyImplicit", "Statistics", "TaskDynamics", "Worst",
+    "Gauss", "Ledger", "Outcome", "SinglyDiagonallyImplicit", "Statistics", "TaskDynamics", "Worst",
 }  # fmt: skip
 NAMES = sorted(CLASSES - NO_VALUES | HELD)
 
@@ -68,7 +68,6 @@ def values() -> dict[str, Any]:
         rd.prove(rd.Setup(plant, Q), 0.01), rd.advise(setup), rd.Cost("arm", (), (), (), {}, 1.0, 1.0),
         rd.certify(rd.load("pendulum"), samples=100, repeats=1), rd.check("pendulum"),
         (stressed := short_stress(rd.load("pendulum"))), stressed.worst[0],
-        stressed.loading,
     ]  # fmt: skip
     named: dict[str, Any] = {type(each).__name__: each for each in made}
     return named | {"Compiled": rd.Compiled(ARM), "CompiledPlant": rd.Compiled(plant)}

@@ -22,10 +22,10 @@ from robot_dyn.accuracy.ladder import Ladder, Point
 from robot_dyn.accuracy.measured import Rung, Walk, measured
 from robot_dyn.accuracy.peers import found
 from robot_dyn.accuracy.reference_run import HorizonError, Reference, reference
-from robot_dyn.cli import prices
 from robot_dyn.errors import QueryError
 from robot_dyn.integrate.explicit import ExplicitRungeKutta
 from robot_dyn.integrate.tableau import ButcherTableau
+from robot_dyn.result import json_text
 from robot_dyn.simulation.seconds import in_words
 from tests.long import long
 
@@ -206,11 +206,11 @@ def test_an_error_that_finer_runs_exceed_again_was_not_reached() -> None:
 def test_the_sentence_marks_what_is_extrapolated() -> None:
     fast, slow = of("DOP853", points(1e-3, 1e-5, 1e-7, 1e-9)), of("explicit_euler", points(1e-2, 5e-3, 2.5e-3), order=1)
     peer = of("Other RK", points(1e-4, 1e-6, 1e-8, each_s=0.5), engine="")
-    said = invented(fast, slow, peer).sentence()
+    said = invented(fast, slow, peer).sentence
     assert said == "6 digits of q over 1 s: DOP853 2.8 ms; Other RK 1 s; explicit_euler would take 10 s (extrapolated)"
     quick = of("Other RK", points(1e-4, 1e-6, 1e-8), engine="")
-    assert invented(fast, quick).sentence() == "6 digits of q over 1 s: Other RK 2 ms; DOP853 2.8 ms"
-    assert invented(slow).sentence(3) == "3 digits of q were reached by no run"
+    assert invented(fast, quick).sentence == "6 digits of q over 1 s: Other RK 2 ms; DOP853 2.8 ms"
+    assert invented(slow).sentence_of(3) == "3 digits of q were reached by no run"
     assert in_words(0.00031) == "310 µs" and in_words(7200.0) == "2 h"
 
 
@@ -261,18 +261,17 @@ def test_a_program_that_cannot_be_imported_is_left_out(monkeypatch) -> None:
 
 def test_json_and_csv_hold_the_runs(tmp_path) -> None:
     result = rd.work_precision(swing(0.1), methods=["rk4", "DOP853"], repeats=1)
-    text = json.dumps(prices.work_precision(result), allow_nan=False)
-    read = json.loads(text)
-    kept = [Point(**{k: x for k, x in p.items() if k != "on_front"}) for e in read["ladders"] for p in e["points"]]
+    read = json.loads(json_text(result))
+    kept = [Point(**{key: x for key, x in row.items() if key in Point.__annotations__}) for row in read["rows"]]
     assert kept == [p for each in result.ladders for p in each.points]
-    assert read["sentence"] == result.sentence() and read["reference"]["error"] == result.reference.error
-    with open(rd.save_work_precision(result, tmp_path / "runs.csv"), encoding="utf-8") as file:
+    assert read["sentence"] == result.sentence and read["reference"]["error"] == result.reference.error
+    with open(rd.save_result(result, tmp_path / "runs.csv"), encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [float(row["error"]) for row in rows] == [p.error for p in kept]
     assert [int(row["evaluations"]) for row in rows] == [p.evaluations for p in kept]
-    marked = [p["on_front"] for each in read["ladders"] for p in each["points"]]
+    marked = [row["on_front"] for row in read["rows"]]
     assert [row["on_front"] == "True" for row in rows] == marked and any(marked)
-    assert rd.save_work_precision(result, tmp_path / "plot").read_bytes().startswith(b"\x89PNG")
+    assert rd.save_result(result, tmp_path / "plot").read_bytes().startswith(b"\x89PNG")
 
 
 def test_evaluations_are_counted_exactly() -> None:

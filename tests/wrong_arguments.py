@@ -18,7 +18,6 @@ from robot_dyn.control.controller import Controller
 from robot_dyn.effects.effect import Bound, Conservative, Drive, Effect, Force, Stateful
 from robot_dyn.integrate.integrator import System
 from tests.queries import ARGUMENTS, FRAMED
-from tests.short_stress import short_stress
 
 Example = tuple[Callable[..., Any], dict[str, Any]]
 NAN, INF = float("nan"), float("inf")
@@ -92,7 +91,6 @@ def examples(folder: Path) -> dict[str, Example]:
     q, v, u = np.array([0.3, -0.4]), np.array([0.7, 1.1]), np.array([1.3, 0.9])
     friction, hold = rd.ViscousFriction(0.1), rd.hold(q)
     certified = rd.certify(robot, samples=100, repeats=1)
-    stressed = short_stress(robot)
     plant, own = rd.Plant(robot, [friction]), rd.Lagrangian(robot)
     setup = rd.Setup(plant, q, duration_s=0.01, integrator="rk4")
     run, several = rd.simulate(setup), rd.rollouts(setup, np.tile(q, (2, 1)))
@@ -230,16 +228,12 @@ def examples(folder: Path) -> dict[str, Example]:
              "on_progress": lambda part, what: None},
         ),
         "Certificate.of": (certified.of, {"quantity": "M", "road": "Pinocchio"}),
-        "save_certificate": (
-            rd.save_certificate, {"result": certified, "path": folder / "digits.csv", "theme": "dark"},
-        ),
+        "save_result": (rd.save_result, {"result": certified, "path": folder / "digits.csv", "theme": "dark"}),
         "stress": (
             rd.stress,
             {"robot": robot, "samples": 100, "runs": 0, "seed": 3, "budget_s": 1e-3,
              "on_progress": lambda spent, what: None},
         ),
-        "Stress.python": (stressed.python, {"finding": stressed.worst[0]}),
-        "save_stress": (rd.save_stress, {"result": stressed, "path": folder / "stress.html"}),
         "check": (rd.check, {"name_or_path": "planar_2r", "package_dirs": [folder], "density": 1000.0, "units": True}),
         "circle": (
             rd.circle,
@@ -323,9 +317,6 @@ def examples(folder: Path) -> dict[str, Example]:
             {"robot": robot, "path": folder / "still", "q": q, "package_dirs": [folder], "inertia": False},
         ),
         "show": (rd.show, {"robot": robot, "q": q, "package_dirs": [folder], "inertia": False, "port": free_port()}),
-        "save_work_precision": (
-            rd.save_work_precision, {"result": measured, "path": folder / "diagram.csv", "theme": "dark"},
-        ),
         "simulate": (rd.simulate, {"what": plant, "on_progress": lambda t: None, "q0": q, "duration_s": 0.01}),
         "task_dynamics": (
             rd.task_dynamics,
@@ -337,9 +328,8 @@ def examples(folder: Path) -> dict[str, Example]:
             rd.cost,
             {"what": setup, "q0": q, "v0": v, "budget_s": 1e-9, "repeats": 1, "on_progress": print_nothing},
         ),
-        "save_cost": (rd.save_cost, {"result": priced, "path": folder / "cost.csv", "theme": "dark"}),
         "WorkPrecision.digits": (measured.digits, {"error": 1e-6}),
-        "WorkPrecision.sentence": (measured.sentence, {"digits": 6}),
+        "WorkPrecision.sentence_of": (measured.sentence_of, {"digits": 6}),
         "work_precision": (
             rd.work_precision,
             {"what": replace(setup, engine="interpreted"), "q0": q, "v0": v, "duration_s": 0.01, "methods": ["rk4"],

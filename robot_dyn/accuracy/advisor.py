@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import exp, inf, isfinite
 from typing import Any, Unpack, final
 
@@ -21,6 +21,8 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import QueryError, RobotDynError, escaped
 from robot_dyn.integrate.methods import FIXED_STEP, method
 from robot_dyn.model.dynamics import Dynamics
+from robot_dyn.result import UNREPORTED, reported
+from robot_dyn.simulation.error import Verdict
 from robot_dyn.simulation.options import Options, setup_of, starts, takes_options
 from robot_dyn.simulation.sampled_loop import linearised, remedy
 from robot_dyn.simulation.setup import Setup
@@ -81,18 +83,28 @@ class Advice:
     period_growth: float = 1.0
     grows_anyway: float = 0.0
     growth: float = 1.0
-    run: Trajectory | None = None
+    run: Trajectory | None = field(default=None, metadata=UNREPORTED)
 
-    @property
+    @reported
     def stable(self) -> bool:
         """Whether the step is within its limit, and deviations do not grow at the period."""
         return self.step_s <= self.limits.get(self.method, inf) and self.at_period is not Stability.UNSTABLE
 
-    @property
+    @reported
     def text(self) -> str:
         """A line for each thing: the step, the period, growth over the run, the error, the fastest motion."""
         parts = [self._of_step(), *self._of_period(), *self._of_growth(), self._of_error()]
         return "\n".join(map(escaped, [*parts, f"{self.fastest}, at {self.at:.3g} s"]))
+
+    @reported
+    def error(self) -> float | None:
+        """Estimated error of q at the end of the run; None without one."""
+        return None if self.run is None or self.run.error is None else self.run.error.final
+
+    @reported
+    def error_verdict(self) -> Verdict | None:
+        """What it rests on."""
+        return None if self.run is None or self.run.error is None else self.run.error.verdict
 
     def _of_step(self) -> str:
         limit = self.limits.get(self.method, inf)

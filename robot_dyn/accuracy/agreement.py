@@ -9,6 +9,7 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.lagrange.scale import floored, scaled
+from robot_dyn.result import UNREPORTED, reported
 
 
 @final
@@ -33,7 +34,7 @@ class Agreement:
     own: float
     state: dict[str, list[float]] = field(hash=False)
 
-    @property
+    @reported
     def ok(self) -> bool:
         """Whether the error is within the tolerance."""
         return bool(self.error <= self.tolerance)
@@ -60,13 +61,18 @@ class Comparison:
     robot: str
     n: int
     samples: int
-    agreements: tuple[Agreement, ...]
+    agreements: tuple[Agreement, ...] = field(metadata=UNREPORTED)
     notes: tuple[str, ...]
 
-    @property
+    @reported
     def ok(self) -> bool:
         """Whether both agree on every quantity."""
         return all(agreement.ok for agreement in self.agreements)
+
+    @reported
+    def quantities(self) -> dict[str, Agreement]:
+        """The agreements by the names of their quantities."""
+        return {each.quantity: each for each in self.agreements}
 
     @property
     def worst(self) -> Agreement:

@@ -13,6 +13,7 @@ import numpy as np
 
 from robot_dyn.accuracy.budget import Budget
 from robot_dyn.errors import RobotDynError
+from robot_dyn.result import reported
 
 _QUARTILES = (25, 50, 75)
 
@@ -62,7 +63,7 @@ class Alternative:
     time_ratio_spread: float | None = None
     time_between_s: float | None = None
 
-    @property
+    @reported
     def instructions_ratio(self) -> float:
         """Instructions of the first by those of the second; inf if that has none."""
         return self.first.instructions / self.second.instructions if self.second.instructions else float("inf")

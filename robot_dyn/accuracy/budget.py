@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from math import inf
 from time import perf_counter
 from typing import final
 
@@ -19,16 +20,20 @@ class Budget:
     Args:
         seconds: In [s].
         on_progress: Called with the time spent, in [s], and with what is being run.
+        clock: Gives the time, in [s].
     """
 
-    def __init__(self, seconds: float, on_progress: Callable[[float, str], object] | None = None) -> None:
-        self.seconds, self._on_progress = seconds, on_progress
-        self._began, self._apart = perf_counter(), 0.0
+    def __init__(
+        self, seconds: float = inf, on_progress: Callable[[float, str], object] | None = None,
+        clock: Callable[[], float] = perf_counter,
+    ) -> None:  # fmt: skip
+        self.seconds, self._on_progress, self._clock = seconds, on_progress, clock
+        self._began, self._apart = clock(), 0.0
 
     @property
     def spent(self) -> float:
         """In [s]."""
-        return perf_counter() - self._began - self._apart
+        return self._clock() - self._began - self._apart
 
     @property
     def left(self) -> float:
@@ -43,11 +48,20 @@ class Budget:
     @contextmanager
     def apart(self) -> Iterator[None]:
         """What is done inside does not count."""
-        began = perf_counter()
+        began = self._clock()
         try:
             yield
         finally:
-            self._apart += perf_counter() - began
+            self._apart += self._clock() - began
+
+    def within(self, seconds: float) -> Budget:
+        """What is left of it, and no more than so many seconds."""
+        return Budget(min(seconds, self.left), clock=self._clock)
+
+    def check(self, t: float = 0.0) -> None:
+        """Go on, or OvertimeError if it is over; to be given to a run as its `on_progress`."""
+        if self.left <= 0:
+            raise OvertimeError
 
 
 @final

@@ -147,9 +147,6 @@ def own(setup: Setup, made: Any, engine: str, events: bool = True) -> Candidate:
     if made.controls_error:
         order = ORDERS.get(made.name)
 
-        def tolerances() -> Iterator[float]:
-            yield from (10.0**-k for k in range(_LOOSEST, _TIGHTEST + 1))
-
         def tight(rtol: float, limit: Limit) -> Run:
             changed = replace(setup, integrator=replace(made, rtol=rtol, atol=ATOL * rtol), engine=engine)
             return timed(changed, limit, events)
@@ -171,6 +168,11 @@ def own(setup: Setup, made: Any, engine: str, events: bool = True) -> Candidate:
         return timed(replace(setup, integrator=made, step_s=step, engine=engine), limit, events)
 
     return Candidate(made.name, engine, events, made.order, "step", steps, short, warm)
+
+
+def tolerances() -> Iterator[float]:
+    """Relative tolerances, a tenth of the one before each."""
+    yield from (10.0**-k for k in range(_LOOSEST, _TIGHTEST + 1))
 
 
 def step_ladder(period_s: float, order: int) -> Iterator[float]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from math import log10
-from typing import final
+from typing import Any, ClassVar, final
 
 from robot_dyn.errors import QueryError
+from robot_dyn.result import Result, reported
 from robot_dyn.simulation.seconds import in_words
 from robot_dyn.validate import choice
 
@@ -69,13 +70,13 @@ class Condition:
 
 @final
 @dataclass(frozen=True, eq=False)
-class Certificate:
+class Certificate(Result):
     """True digits of a robot's dynamics.
 
     Attributes:
         robot: Its name.
         joints: Their names.
-        held: Of each quantity by each road.
+        digits: Of each quantity by each road.
         decimals: By quantity, digits that the float64 nearest to the decimals of the file leave, at the worst state.
         right_angles: By quantity, digits of the file that machine code leaves where it writes right angles out in full.
         condition: Of M.
@@ -86,9 +87,12 @@ class Certificate:
         interrupted: Whether it was ended by the user.
     """
 
+    columns: ClassVar[tuple[str, ...]] = (
+        "quantity", "road", "given", "typical", "samples", "random", "searched", "time_s", "repeats",
+    )  # fmt: skip
     robot: str
     joints: tuple[str, ...]
-    held: tuple[Held, ...]
+    digits: tuple[Held, ...]
     decimals: dict[str, float]
     right_angles: dict[str, float]
     condition: Condition
@@ -106,32 +110,38 @@ class Certificate:
         """
         choice("quantity", quantity, self.quantities)
         choice("road", road, self.roads)
-        for each in self.held:
+        for each in self.digits:
             if (each.quantity, each.road) == (quantity, road):
                 return each
-        raise QueryError(f"{road!r} does not answer {quantity}; look at the quantities of each road in held")
+        raise QueryError(f"{road!r} does not answer {quantity}; look at the quantities of each road in digits")
 
     @property
+    def rows(self) -> Iterator[Mapping[str, Any]]:
+        yield from map(vars, self.digits)
+        for quantity, digits in self.decimals.items():
+            yield {"quantity": quantity, "road": "decimals of the file as float64", "searched": digits}
+
+    @reported
     def lost(self) -> dict[str, float]:
         """By road, digits of inverse dynamics less those of forward dynamics, at the worst states."""
-        found = {(each.quantity, each.road): each.searched for each in self.held if each.samples > 1}
+        found = {(each.quantity, each.road): each.searched for each in self.digits if each.samples > 1}
         pairs = ((road, ("inverse_dynamics", road), ("forward_dynamics", road)) for road in self.roads)
         return {road: found[one] - found[two] for road, one, two in pairs if one in found and two in found}
 
     @property
     def quantities(self) -> tuple[str, ...]:
         """That were looked at."""
-        return tuple(dict.fromkeys(each.quantity for each in self.held))
+        return tuple(dict.fromkeys(each.quantity for each in self.digits))
 
     @property
     def roads(self) -> tuple[str, ...]:
         """That were looked at."""
-        return tuple(dict.fromkeys(each.road for each in self.held))
+        return tuple(dict.fromkeys(each.road for each in self.digits))
 
-    @property
+    @reported
     def sentence(self) -> str:
         """The digits of forward dynamics, or of what else there is, in a sentence."""
-        if not self.held:
+        if not self.digits:
             return "no digits were counted"
         quantity = self.quantities[-1]
         parts = [
@@ -141,4 +151,4 @@ class Certificate:
         return f"digits of {quantity} at the worst state found: {'; '.join(parts)}"
 
     def _of(self, quantity: str) -> Iterator[Held]:
-        return (each for each in self.held if each.quantity == quantity)
+        return (each for each in self.digits if each.quantity == quantity)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any, final
+from typing import Any, ClassVar, final
 
 from robot_dyn.accuracy import step_cost
-from robot_dyn.accuracy.alternative import Alternative, Pair, in_turns
+from robot_dyn.accuracy.alternative import Alternative, Pair, Version, in_turns
 from robot_dyn.accuracy.budget import Budget
 from robot_dyn.accuracy.environment import environment
 from robot_dyn.accuracy.query_cost import QueryCost
@@ -15,6 +15,7 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import RobotDynError
 from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.model.robot import Robot
+from robot_dyn.result import Result, reported
 from robot_dyn.simulation.acting import acting
 from robot_dyn.simulation.options import setup_of, starts
 from robot_dyn.simulation.seconds import in_words
@@ -26,11 +27,11 @@ _MOST_REPEATS = 1000
 
 @final
 @dataclass(frozen=True, eq=False)
-class Cost:
+class Cost(Result):
     """What the parts of a setup, and ways to its equations, cost.
 
     Attributes:
-        name: Of the robot.
+        robot: Its name.
         acting: What acts, in words.
         alternatives: Two of each kind beside each other.
         left_out: What was left out, and why.
@@ -40,7 +41,11 @@ class Cost:
         interrupted: Whether it was ended by the user.
     """
 
-    name: str
+    columns: ClassVar[tuple[str, ...]] = (
+        "group", "what", "per", *(f"{of}_{key}" for of in ("first", "second") for key in Version.__annotations__),
+        "instructions_ratio", "time_ratio", "time_ratio_spread", "time_between_s",
+    )  # fmt: skip
+    robot: str
     acting: tuple[str, ...]
     alternatives: tuple[Alternative, ...]
     left_out: tuple[str, ...]
@@ -59,18 +64,27 @@ class Cost:
         return known[choice("cost of", what, known)]
 
     @property
+    def rows(self) -> Iterator[Mapping[str, Any]]:
+        for each in self.alternatives:
+            versions = {"first": each.first, "second": each.second}
+            yield {
+                **vars(each), "instructions_ratio": each.instructions_ratio,
+                **{f"{of}_{key}": x for of, version in versions.items() for key, x in vars(version).items()},
+            }  # fmt: skip
+
+    @reported
     def parts(self) -> dict[str, int]:
         """Instructions in a step that each part of the setup adds to the others, by name."""
         parts = [each for each in self.alternatives if each.group == "parts" and each.what != step_cost.EVERYTHING]
         return {each.what: each.first.instructions - each.second.instructions for each in parts}
 
-    @property
+    @reported
     def shared(self) -> int:
         """Instructions in a step of all parts, less the sum of `parts`: negative where several count the same ones."""
         whole = [each for each in self.alternatives if each.what == step_cost.EVERYTHING]
         return sum(each.first.instructions - each.second.instructions for each in whole) - sum(self.parts.values())
 
-    @property
+    @reported
     def sentence(self) -> str:
         """What a step costs and what of it the parts are, in a sentence."""
         whole = next((each for each in self.alternatives if each.what == step_cost.EVERYTHING), None)

@@ -2,87 +2,36 @@
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import Mapping
-from pathlib import Path
-from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
-from robot_dyn import files
 from robot_dyn.accuracy.alternative import Alternative
 from robot_dyn.accuracy.cost import Cost
-from robot_dyn.accuracy.diagram import DiagramError, drawable_lines, styled, written
+from robot_dyn.accuracy.sheet import Colours, ResultError, lines, sheet, styled
 from robot_dyn.accuracy.step_cost import EVERYTHING
 from robot_dyn.simulation.seconds import in_words
-from robot_dyn.validate import instance
 from robot_dyn.view.figure import THEMES
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-TABLE = files.Kind("a table of costs", ".csv", b"group,what")
-_COLUMNS = (
-    "group", "what", "per", "first", "first_instructions", "first_time_s", "first_spread_s", "first_repeats", "second",
-    "second_instructions", "second_time_s", "second_spread_s", "second_repeats", "instructions_ratio", "time_ratio",
-    "time_ratio_spread", "time_between_s",
-)  # fmt: skip
-_WIDTH, _HEIGHT, _ROW, _SENTENCE = 13.0, 2.3, 0.42, 118  # [inch], and letters of a line
+_WIDTH, _HEIGHT, _ROW = 13.0, 2.3, 0.42  # [inch]
 _BAR = 0.36
 _TICKS = (0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500)
-
-
-def save_cost(result: Cost, path: str | Path, *, theme: str = "light") -> Path:
-    """Write the figure as PNG, SVG or PDF, or a CSV table, by the suffix of `path`; .png if it has none.
-
-    Another file of that kind under that name is replaced; any other is not.
-
-    Args:
-        result: Of `cost`.
-        path: Where to.
-        theme: For "light" or "dark" paper.
-
-    Raises:
-        QueryError: If an argument is wrong.
-        DiagramError: If it cannot be written, or there is nothing to draw.
-    """
-    instance("result", result, Cost, "give that of rd.cost")
-    return written(path, theme, TABLE, lambda: table(result), lambda: draw(result, theme))
-
-
-def table(result: Cost) -> str:
-    """The alternatives as CSV, a row each; empty where nothing was timed."""
-    text = io.StringIO()
-    writer = csv.writer(text)
-    writer.writerow(_COLUMNS)
-    for each in result.alternatives:
-        versions = (each.first, each.second)
-        cells = [x for of in versions for x in (of.name, of.instructions, of.time_s, of.spread_s, of.repeats)]
-        writer.writerow([each.group, each.what, each.per, *cells, each.instructions_ratio, each.time_ratio,
-             each.time_ratio_spread, each.time_between_s])  # fmt: skip
-    return text.getvalue()
 
 
 def draw(result: Cost, theme: str = "light") -> Figure:
     """The figure.
 
     Raises:
-        DiagramError: If nothing was counted.
+        ResultError: If nothing was counted.
     """
-    from matplotlib.figure import Figure
-
     if not result.alternatives:
-        raise DiagramError("nothing was counted, so there is nothing to draw; look at left_out")
+        raise ResultError("nothing was counted, so there is nothing to draw; look at left_out")
     colours = THEMES[theme]
     parts = _parts(result)
     others = [each for each in result.alternatives if each.group != "parts"]
     height = _HEIGHT + _ROW * max(len(parts), len(others))
-    figure = Figure(figsize=(_WIDTH, height), facecolor=colours["paper"])
-    ink = {"color": colours["ink"], "parse_math": False}
-    said = fill(result.sentence, _SENTENCE)
-    figure.text(0.012, 1 - 0.12 / height, drawable_lines(said), fontsize=12, weight="bold", va="top", **ink)
-    below = 1 - (0.2 + 0.22 * (1 + said.count("\n"))) / height
-    figure.text(0.012, below, drawable_lines(_caption(result)), fontsize=8.5, va="top", **ink)
+    figure = sheet(_WIDTH, height, result.sentence, _caption(result), colours)
     grid = figure.add_gridspec(
         1, 2, left=0.125, right=0.975, top=1 - 1.3 / height, bottom=0.55 / height, wspace=0.55, width_ratios=(1, 1.15)
     )
@@ -97,7 +46,7 @@ def _caption(result: Cost) -> str:
     versions = result.environment
     programs = ", ".join(f"{k} {x}" for k, x in versions.items() if k in ("robot-dyn", "pin", "llvmlite", "casadi"))
     return (
-        f"{result.name}: {', '.join(result.acting) or 'no effects'}. Times of the processor: medians over turns."
+        f"{result.robot}: {', '.join(result.acting) or 'no effects'}. Times of the processor: medians over turns."
         f" {programs}; {versions.get('processor', '')}."
     )
 
@@ -115,7 +64,7 @@ def _parts(result: Cost) -> list[tuple[str, int, float | None]]:
     return made + ([("of several", result.shared, None)] if result.shared else [])
 
 
-def _draw_parts(axes: Any, parts: list[tuple[str, int, float | None]], colours: Mapping[str, Any]) -> None:
+def _draw_parts(axes: Any, parts: list[tuple[str, int, float | None]], colours: Colours) -> None:
     styled(axes, colours, "instructions", "A step of RK4, by part: with it less without it")
     whole = sum(count for _, count, _ in parts) or 1
     places = range(len(parts))
@@ -128,7 +77,7 @@ def _draw_parts(axes: Any, parts: list[tuple[str, int, float | None]], colours: 
     axes.set_xlim(min(0, *(count for _, count, _ in parts)), 1.45 * max(count for _, count, _ in parts) or 1)
 
 
-def _draw_ratios(axes: Any, others: list[Alternative], colours: Mapping[str, Any]) -> None:
+def _draw_ratios(axes: Any, others: list[Alternative], colours: Colours) -> None:
     from matplotlib.ticker import NullFormatter
 
     styled(axes, colours, "ratio, first / second", "Alternatives: instructions in blue, time in orange")
@@ -149,9 +98,9 @@ def _draw_ratios(axes: Any, others: list[Alternative], colours: Mapping[str, Any
     axes.set_xlim(min(0.7, *(x / 1.2 for x in known)), 1.6 * max(2.0, *known))
 
 
-def _named(axes: Any, names: list[str], colours: Mapping[str, Any]) -> None:
+def _named(axes: Any, names: list[str], colours: Colours) -> None:
     """Rows from above, by name."""
-    axes.set_yticks(range(len(names)), [drawable_lines(name) for name in names])
+    axes.set_yticks(range(len(names)), [lines(name) for name in names])
     axes.tick_params(axis="y", length=0)
     for label in axes.get_yticklabels():
         label.set(color=colours["ink"], fontsize=8, parse_math=False)

@@ -2,31 +2,19 @@
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import Callable, Mapping
-from pathlib import Path
-from textwrap import fill
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robot_dyn import files
 from robot_dyn.accuracy.ladder import INTERPRETED, Ladder, Point
+from robot_dyn.accuracy.sheet import Colours, ResultError, legend, sheet, styled
 from robot_dyn.accuracy.work_precision import WorkPrecision
-from robot_dyn.errors import RobotDynError
-from robot_dyn.validate import choice, instance
-from robot_dyn.view.figure import THEMES, drawable
-from robot_dyn.view.plots import PICTURES
+from robot_dyn.view.figure import THEMES
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-TABLE = files.Kind("a table of a work-precision diagram", ".csv", b"method,engine")
-_COLUMNS = (
-    "method", "engine", "events", "by", "setting", "steps", "evaluations", "error", "energy", "time_s", "repeats",
-    "believed", "on_front",
-)  # fmt: skip
 _LOOK = {  # colour of the theme and marker, by family: explicit, Gauss, for stiff systems, those that choose steps
     "DOP853": (0, "o"), "Rosenbrock": (3, "o"), "order_8": (6, "s"), "rk4": (1, "D"), "midpoint": (5, "<"),
     "explicit_euler": (5, "^"), "semi_implicit_euler": (5, "v"), "gauss_2": (2, "<"), "gauss_4": (2, ">"),
@@ -37,85 +25,21 @@ _PEERS = {
     "Drake runge_kutta3": "P", "heyoka, Taylor": "*",
 }  # fmt: skip
 _MOST_ERROR = 3.0  # [rad] or [m]: larger ones are lost, and not drawn
-_WIDTH, _HEIGHT, _SENTENCE = 13.0, 8.0, 118  # [inch], and letters of a line
-
-
-class DiagramError(RobotDynError):
-    """A diagram that cannot be written."""
-
-
-def save_work_precision(result: WorkPrecision, path: str | Path, *, theme: str = "light") -> Path:
-    """Write the diagram as PNG, SVG or PDF, or its runs as a CSV table, by the suffix of `path`; .png if it has none.
-
-    Another file of that kind under that name is replaced; any other is not.
-
-    Args:
-        result: Of `work_precision`.
-        path: Where to.
-        theme: For "light" or "dark" paper.
-
-    Raises:
-        QueryError: If an argument is wrong.
-        DiagramError: If it cannot be written, or there is nothing to draw.
-    """
-    instance("result", result, WorkPrecision, "give that of rd.work_precision")
-    return written(path, theme, TABLE, lambda: table(result), lambda: draw(result, theme))
-
-
-def written(
-    path: str | Path, theme: str, kind: files.Kind, text: Callable[[], str], figure: Callable[[], Figure]
-) -> Path:
-    """Write a figure, or a table of that kind, by the suffix; errors as of `save_work_precision`."""
-    choice("theme", theme, THEMES)
-    path = files.target(path, (*PICTURES, kind), DiagramError)
-    stream = io.BytesIO()
-    if path.suffix.lower() == kind.suffix:
-        stream.write(text().encode())
-    else:
-        figure().savefig(stream, format=path.suffix[1:].lower(), dpi=120)
-    return files.save(path, lambda file: file.write(stream.getvalue()), DiagramError)
-
-
-def table(result: WorkPrecision) -> str:
-    """The runs as CSV, a row each."""
-    text, front = io.StringIO(), {id(point) for _, point in result.front}
-    writer = csv.writer(text)
-    writer.writerow(_COLUMNS)
-    for each in result.ladders:
-        for p in each.points:
-            writer.writerow(
-                [each.method, each.engine, each.events, each.by, p.setting, p.steps, p.evaluations, p.error, p.energy,
-                 p.time_s, p.repeats, p.believed, id(p) in front]
-            )  # fmt: skip
-    return text.getvalue()
+_WIDTH, _HEIGHT = 13.0, 8.0  # [inch]
 
 
 def draw(result: WorkPrecision, theme: str = "light") -> Figure:
     """The diagram.
 
     Raises:
-        DiagramError: If no run ended.
+        ResultError: If no run ended.
     """
-    from matplotlib.figure import Figure
-
     colours = THEMES[theme]
     if not any(np.isfinite(p.error) for each in result.ladders for p in each.points):
-        raise DiagramError("no run ended, so there is nothing to draw; look at left_out")
-    figure = Figure(figsize=(_WIDTH, _HEIGHT), facecolor=colours["paper"])
+        raise ResultError("no run ended, so there is nothing to draw; look at left_out")
+    figure = sheet(_WIDTH, _HEIGHT, result.sentence, _caption(result), colours)
     grid = figure.add_gridspec(
         3, 2, width_ratios=(2.1, 1), left=0.065, right=0.985, top=0.845, bottom=0.195, hspace=0.62, wspace=0.17
-    )
-    ink = {"color": colours["ink"], "parse_math": False}
-    said = fill(result.sentence(), _SENTENCE)
-    figure.text(0.012, 0.975, drawable_lines(said), fontsize=12.5, weight="bold", va="top", **ink)
-    figure.text(
-        0.012,
-        0.945 - 0.027 * said.count("\n"),
-        drawable_lines(_caption(result)),
-        fontsize=8.5,
-        va="top",
-        linespacing=1.4,
-        **ink,
     )
     first = [each for each in result.ladders if each.events and (each.peer or each.engine != INTERPRETED)]
     first = first if any(not each.peer for each in first) else list(result.ladders)
@@ -139,7 +63,7 @@ def draw(result: WorkPrecision, theme: str = "light") -> Figure:
     _axes(small[1], result, colours, "error of q", "Energy residual, as a part of what was exchanged")
     for each in own:
         _curve(small[1], each, colours, lambda p: p.error, lambda p: p.energy, 0.6)
-    small[1].set_ylabel("residual", fontsize=8, **ink)
+    small[1].set_ylabel("residual")
     small[1].set_xlim(_MOST_ERROR, result.reference.error / 3)
     words = "Error over time, interpreted [ms]" if slow else "Error over steps"
     _axes(small[2], result, colours, "time [ms]" if slow else "steps", words)
@@ -149,11 +73,6 @@ def draw(result: WorkPrecision, theme: str = "light") -> Figure:
         axes.set_ylim(result.reference.error / 10, _MOST_ERROR)
         _believed(axes, result, colours, words=False)
     return figure
-
-
-def drawable_lines(text: str) -> str:
-    """Lines of which no sign is missing in the fonts of a figure."""
-    return "\n".join(map(drawable, text.split("\n")))
 
 
 def _ms(p: Point) -> float:
@@ -172,8 +91,8 @@ def _caption(result: WorkPrecision) -> str:
         f"{k} {x}" for k, x in versions.items() if k in ("robot-dyn", "pin", "mujoco", "drake", "heyoka")
     )
     return (
-        f"{result.name}: {', '.join(result.acting) or 'no effects'}; {of.horizon_s:g} s{cut}.  Error: largest"
-        f" |q − q_ref| over joints and {len(of.t) - 1} records, in {result.unit}.\n"
+        f"{result.robot}: {', '.join(result.acting) or 'no effects'}; {of.horizon_s:g} s{cut}.  Error: largest"
+        f" |q − q_ref| over joints and {of.records} records, in {result.unit}.\n"
         f"Reference: {of.methods[0]}, {of.error:.0e} {result.unit} from {of.methods[1]}: no error below that is"
         f" believed.  {programs}; {versions['processor']}."
     )
@@ -183,31 +102,17 @@ def _shown(ladder: Ladder) -> list[Point]:
     return [p for p in ladder.points if p.error < _MOST_ERROR]
 
 
-def _axes(axes: Any, result: WorkPrecision, colours: Mapping[str, Any], x: str, title: str) -> None:
+def _axes(axes: Any, result: WorkPrecision, colours: Colours, x: str, title: str) -> None:
     from matplotlib.ticker import NullFormatter
 
     axes.set(xscale="log", yscale="log")
     axes.xaxis.set_minor_formatter(NullFormatter())
     axes.yaxis.set_minor_formatter(NullFormatter())
-    styled(axes, colours, x, title)
-    axes.set_ylabel(f"error of q [{result.unit}]", fontsize=8.5, color=colours["ink"], parse_math=False)
-
-
-def styled(axes: Any, colours: Mapping[str, Any], x: str, title: str) -> None:
-    """Axes in the colours of a theme."""
-    ink = {"color": colours["ink"], "parse_math": False}
-    axes.set_facecolor(colours["paper"])
-    axes.grid(color=colours["grid"], linewidth=0.5)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.spines[["bottom", "left"]].set_color(colours["ink"])
-    axes.tick_params(which="both", colors=colours["ink"], labelsize=8)
-    axes.set_title(title, loc="left", fontsize=9, **ink)
-    axes.set_xlabel(x, fontsize=8.5, labelpad=1, **ink)
+    styled(axes, colours, x, title, f"error of q [{result.unit}]")
 
 
 def _curve(
-    axes: Any, ladder: Ladder, colours: Mapping[str, Any], x: Callable[[Point], Any], y: Callable[[Point], float],
+    axes: Any, ladder: Ladder, colours: Colours, x: Callable[[Point], Any], y: Callable[[Point], float],
     size: float, dashed: bool = False,
 ) -> None:  # fmt: skip
     """The runs of a ladder; those that are not believed are hollow."""
@@ -225,14 +130,14 @@ def _curve(
         axes.scatter([xs[k] for k in at], [ys[k] for k in at], **shape, **faced)
 
 
-def _look(ladder: Ladder, colours: Mapping[str, Any]) -> tuple[str, str]:
+def _look(ladder: Ladder, colours: Colours) -> tuple[str, str]:
     if ladder.peer:
         return colours["ink"], _PEERS.get(ladder.method, ".")
     hue, marker = _LOOK.get(ladder.method, (4, "."))
     return colours["lines"][hue], marker
 
 
-def _front(axes: Any, result: WorkPrecision, colours: Mapping[str, Any]) -> None:
+def _front(axes: Any, result: WorkPrecision, colours: Colours) -> None:
     front = [(1e3 * p.time_s, p.error) for _, p in result.front if p.error < _MOST_ERROR]
     if front:
         x, y = zip(*front, strict=True)
@@ -244,7 +149,7 @@ def _limits(axes: Any, result: WorkPrecision, times: list[float]) -> None:
     axes.set_ylim(result.reference.error / 10, _MOST_ERROR)
 
 
-def _believed(axes: Any, result: WorkPrecision, colours: Mapping[str, Any], words: bool) -> None:
+def _believed(axes: Any, result: WorkPrecision, colours: Colours, words: bool) -> None:
     """The error of the reference as a line, and what lies below it."""
     error = result.reference.error
     axes.axhline(error, color=colours["ink"], linewidth=0.9, linestyle=(0, (6, 3)))
@@ -254,7 +159,7 @@ def _believed(axes: Any, result: WorkPrecision, colours: Mapping[str, Any], word
         axes.annotate(f"error of the reference, {error:.0e}: not believed below ", **at, color=colours["ink"])
 
 
-def _legend(figure: Any, first: list[Ladder], without: list[Ladder], colours: Mapping[str, Any]) -> None:
+def _legend(figure: Any, first: list[Ladder], without: list[Ladder], colours: Colours) -> None:
     from matplotlib.lines import Line2D
 
     handles = []
@@ -269,10 +174,4 @@ def _legend(figure: Any, first: list[Ladder], without: list[Ladder], colours: Ma
     handles.append(Line2D([], [], color=colours["grid"], linewidth=9, label="no run beats these (Pareto front)"))
     if without:
         handles.append(Line2D([], [], color=colours["ink"], linestyle=":", label="dotted: the same without events"))
-    style = {"ncols": 4, "frameon": False, "fontsize": 8.5, "loc": "lower left", "bbox_to_anchor": (0.03, 0.005)}
-    legend = figure.legend(
-        handles=handles, **style, title="measured order (nominal); hollow: not believed", alignment="left"
-    )
-    legend.get_title().set(color=colours["ink"], fontsize=8.5)
-    for label in legend.get_texts():
-        label.set(color=colours["ink"], parse_math=False)
+    legend(figure, handles, colours, "measured order (nominal); hollow: not believed")

@@ -6,13 +6,15 @@ Where steps are small enough, error ∝ h^p, so that log error against log steps
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from math import isfinite
 from statistics import median
 from typing import final
 
 import numpy as np
+
+from robot_dyn.result import UNREPORTED, reported
 
 COMPILED, INTERPRETED = "compiled", "interpreted"
 _RESOLVED = 0.1  # [rad] or [m]: runs with larger errors show no order
@@ -77,11 +79,11 @@ class Ladder:
     events: bool
     order: int | None
     by: str
-    points: tuple[Point, ...]
+    points: tuple[Point, ...] = field(metadata=UNREPORTED)
     ended: str
-    floor: float
+    floor: float = field(metadata=UNREPORTED)
 
-    @property
+    @reported
     def name(self) -> str:
         """Of the method, with what sets it apart."""
         return ladder_name(self.method, self.engine, self.events)
@@ -91,7 +93,7 @@ class Ladder:
         """Whether it is another program's."""
         return not self.engine
 
-    @property
+    @reported
     def measured_order(self) -> float | None:
         """Median slope of log error against log steps between neighbours; None if too few runs show it.
 

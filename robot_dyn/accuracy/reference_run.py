@@ -6,7 +6,7 @@ Their distance is the error of the reference. Where they part, as in chaotic mot
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import final
 
 import numpy as np
@@ -17,6 +17,7 @@ from robot_dyn.accuracy.ladder import COMPILED, INTERPRETED
 from robot_dyn.errors import QueryError, RobotDynError
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.integrate.methods import method
+from robot_dyn.result import UNREPORTED, reported
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.values import Value, read_only
 
@@ -55,8 +56,8 @@ class Reference(Value):
         lost_s: Time at which the latter differed by 0.1 rad or m, in [s]; None if they did not.
     """
 
-    t: np.ndarray
-    q: np.ndarray
+    t: np.ndarray = field(metadata=UNREPORTED)
+    q: np.ndarray = field(metadata=UNREPORTED)
     error: float
     methods: tuple[str, str]
     horizon_s: float
@@ -65,6 +66,11 @@ class Reference(Value):
 
     def __post_init__(self) -> None:
         read_only(self)
+
+    @reported
+    def records(self) -> int:
+        """Number of times at which errors are looked at."""
+        return len(self.t) - 1
 
     def distance(self, run: Run) -> float:
         """Largest |q − q_ref| of a run over joints and records; inf if it diverged."""

@@ -5,10 +5,10 @@ error = max over joints and records of |q − q_ref|
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import floor, isfinite, log10
-from typing import Any, final
+from typing import Any, ClassVar, final
 
 from robot_dyn.accuracy.beyond import Beyond, beyond
 from robot_dyn.accuracy.budget import Budget
@@ -24,6 +24,7 @@ from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, STIFF
 from robot_dyn.integrate.methods import METHODS, as_method
 from robot_dyn.model.dynamics import Dynamics
 from robot_dyn.model.units import units
+from robot_dyn.result import Result, reported
 from robot_dyn.simulation.acting import acting
 from robot_dyn.simulation.choice import choose
 from robot_dyn.simulation.options import setup_of, starts
@@ -41,11 +42,11 @@ _SAID = ("rk4", "rk4 (without events)", "explicit_euler")
 
 @final
 @dataclass(frozen=True, eq=False)
-class WorkPrecision:
+class WorkPrecision(Result):
     """Error against work of the methods for one motion.
 
     Attributes:
-        name: Of the robot.
+        robot: Its name.
         acting: What acts, in words.
         unit: Of errors, "rad", "m" or both.
         duration_s: That was asked for, in [s].
@@ -59,7 +60,11 @@ class WorkPrecision:
         beyond: Of chaotic motion, energy and the way back over all of the duration, by method; else nothing.
     """
 
-    name: str
+    columns: ClassVar[tuple[str, ...]] = (
+        "method", "engine", "events", "by", "setting", "steps", "evaluations", "error", "energy", "time_s", "repeats",
+        "believed", "on_front",
+    )  # fmt: skip
+    robot: str
     acting: tuple[str, ...]
     unit: str
     duration_s: float
@@ -85,6 +90,13 @@ class WorkPrecision:
                 front.append((ladder, point))
         return tuple(front)
 
+    @reported
+    def rows(self) -> list[Mapping[str, Any]]:
+        """The runs, one after the other: what their ladder is, what was measured, and whether no other one beats it."""
+        front = {id(point) for _, point in self.front}
+        known = [vars(each) | vars(p) | {"on_front": id(p) in front} for each in self.ladders for p in each.points]
+        return [{key: run[key] for key in self.columns} for run in known]
+
     def digits(self, error: float) -> list[tuple[Ladder, Price]]:
         """What an error costs by each method that can tell, in time, the cheapest first.
 
@@ -98,20 +110,22 @@ class WorkPrecision:
         prices = [(ladder, price) for ladder in self.ladders if (price := ladder.price(error)) is not None]
         return sorted(prices, key=lambda each: each[1].value)
 
-    def sentence(self, digits: int | None = None) -> str:
+    @reported
+    def sentence(self) -> str:
+        """What 6 digits cost, or as many as were reached, in a sentence."""
+        best = min((p.error for ladder in self.ladders for p in ladder.points if p.believed), default=1.0)
+        return self.sentence_of(min(_ASKED, floor(-log10(max(best, self.reference.error)))))
+
+    def sentence_of(self, digits: int) -> str:
         """What so many digits cost, in a sentence.
 
         Args:
-            digits: Errors of at most 10^−digits; 6, or as many as were reached, unless given.
+            digits: Errors of at most 10^−digits.
 
         Raises:
             QueryError: If it is not a whole number from 0 to 20.
         """
-        if digits is not None:
-            integer("digits", digits, most=_MOST_DIGITS)
-        if digits is None:
-            best = min((p.error for ladder in self.ladders for p in ladder.points if p.believed), default=1.0)
-            digits = min(_ASKED, floor(-log10(max(best, self.reference.error))))
+        digits = integer("digits", digits, most=_MOST_DIGITS)
         prices = self.digits(10.0**-digits)
         measured = [each for each in prices if not each[1].extrapolated]
         if not measured:

@@ -47,6 +47,14 @@ Xacro = Annotated[
         help="Expand a xacro file, which runs its expressions; may be repeated; '' for no argument.",
     ),
 ]
+Plot = Annotated[
+    str | None, typer.Option("-o", "--output", metavar="PLOT.png", help="Draw it, as a .png, .svg or .pdf.")
+]
+Csv = Annotated[str | None, typer.Option("--csv", metavar="TABLE.csv", help="Write its rows as a table.")]
+Dark = Annotated[bool, typer.Option("--dark", help="Draw for dark screens.")]
+Budget = Annotated[float, typer.Option(metavar="SECONDS", help="Time to spend, compiling not counted.")]
+Repeats = Annotated[int, typer.Option(min=1, help="How often each is timed at most, while the budget lasts.")]
+Scene = Annotated[str, typer.Argument(metavar="SCENE.toml", help="A scene file; `robot-dyn scene` prints some.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace files that are there already.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, as documented in docs/json.md.")]
 
@@ -80,22 +88,14 @@ def progress(items: Iterable[str], description: str) -> Iterator[str]:
 
 
 @contextmanager
-def bar(duration_s: float) -> Iterator[Callable[[float], object]]:
-    """A progress bar on stderr while a person watches; what it gives is called with the time reached."""
+def bar(total: float) -> Iterator[Callable[..., object]]:
+    """A progress bar on stderr while a person watches.
+
+    What it gives is called with what is done of the total, and with the name of what is being done.
+    """
     from rich.console import Console
     from rich.progress import Progress
 
     with Progress(console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty()) as progress:
-        task = progress.add_task("simulating", total=duration_s)
-        yield lambda t: progress.update(task, completed=t)
-
-
-@contextmanager
-def spending(budget_s: float) -> Iterator[Callable[[float, str], object]]:
-    """The same for a budget of time; what it gives is called with the time spent, and with what is being done."""
-    from rich.console import Console
-    from rich.progress import Progress
-
-    with Progress(console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty()) as progress:
-        task = progress.add_task("starting", total=budget_s)
-        yield lambda spent, what: progress.update(task, completed=spent, description=what)
+        task = progress.add_task("starting", total=total)
+        yield lambda done, what="simulating": progress.update(task, completed=done, description=what)

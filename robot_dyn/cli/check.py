@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -46,6 +47,8 @@ def check(
     as_json: Json = False,
 ) -> None:
     """Check URDF files: inertias, units, limits, names, shapes; exit code 1 if there are errors in one."""
+    from robot_dyn.result import plain
+
     for option, given in (("--density", density is not None), ("--units", units)):
         if given and not fix:
             raise QueryError(f"{option} is for --fix, which writes the changes; add it, or leave {option} out")
@@ -61,8 +64,11 @@ def check(
         if fix and each.repaired is not None:
             text, to = each.repaired, targets[file]
             written[file] = str(save(to, lambda stream, text=text: stream.write(text), RepairError))
-    documents = [_document(file, each, written.get(file)) for file, each in zip(files, made, strict=True)]
-    say_json({"files": documents}) if as_json else say(*(line for each in documents for line in _lines(each)))
+    checked = [(file, each, written.get(file)) for file, each in zip(files, made, strict=True)]
+    if as_json:
+        say_json({"files": [{"file": file, "written": to} | plain(each) for file, each, to in checked]})
+    else:
+        say(*(line for each in checked for line in _lines(*each)))
     if fix and not as_json:
         for file in files:
             if file not in written:
@@ -76,33 +82,17 @@ def _target(file: str, force: bool) -> Path:
     return arguments.output(f"{stem}.fixed.urdf", _URDF, RepairError, [file] if Path(file).is_file() else [], force)
 
 
-def _document(file: str, made: Checkup, written: str | None) -> dict[str, Any]:
-    findings = [
-        {
-            "severity": each.severity.value,
-            "kind": each.kind,
-            "where": each.where,
-            "what": each.what,
-            "remedy": each.remedy,
-            "line": each.line,
-            "changes": [change.text for change in each.changes],
-            "supposed": each.supposed,
-        }
-        for each in made.findings
-    ]
-    return {"file": file, "loads": made.loads, "ok": made.ok, "findings": findings, "written": written}
-
-
-def _lines(document: dict[str, Any]) -> Iterator[str]:
+def _lines(file: str, made: Checkup, written: str | None) -> Iterator[str]:
     """A file, its findings, and what was written."""
-    findings = document["findings"]
-    counts = {word: sum(each["severity"] == word for each in findings) for word in ("error", "warning", "note")}
-    said = [f"{count} {word}{'s' * (count > 1)}" for word, count in counts.items() if count]
-    yield f"{document['file']}: {', '.join(said) or 'nothing found'}{'' if document['loads'] else '; it does not load'}"
-    for each in findings:
-        line = f" (line {each['line']})" if each["line"] else ""
-        by = "[--fix --units]" if each["supposed"] else "[--fix]"
-        fixed = f" {by}" if each["changes"] and (each["supposed"] or document["written"] is None) else ""
-        yield f"  {each['severity']}: {each['where']}{line}: {each['what']}; {each['remedy']}{fixed}"
-    if document["written"]:
-        yield f"  written to {document['written']}"
+    from robot_dyn.doctor.finding import Severity
+
+    counts = Counter(each.severity for each in made.findings)
+    said = [f"{counts[each]} {each.value}{'s' * (counts[each] > 1)}" for each in Severity if counts[each]]
+    yield f"{file}: {', '.join(said) or 'nothing found'}{'' if made.loads else '; it does not load'}"
+    for each in made.findings:
+        line = f" (line {each.line})" if each.line else ""
+        by = "[--fix --units]" if each.supposed else "[--fix]"
+        fixed = f" {by}" if each.changes and (each.supposed or written is None) else ""
+        yield f"  {each.severity.value}: {each.where}{line}: {each.what}; {each.remedy}{fixed}"
+    if written:
+        yield f"  written to {written}"

@@ -10,7 +10,7 @@ import typer
 
 import robot_dyn as rd
 from robot_dyn.cli import arguments
-from robot_dyn.cli.app import Force, app, spending
+from robot_dyn.cli.app import Force, app, bar
 from robot_dyn.cli.terminal import say
 from robot_dyn.errors import QueryError, RobotDynError
 
@@ -68,17 +68,17 @@ def demo(
 
 def _price(swing: rd.Setup) -> Iterator[str]:
     """What digits of a free swing cost, here and now."""
-    from robot_dyn.cli import prices
+    from robot_dyn.cli import studies
 
     yield ""
     yield f"What 1e-8 rad takes here: {swing.duration_s:g} s of the same arm, swinging freely"
     try:
-        with spending(_BUDGET_S) as spent:
+        with bar(_BUDGET_S) as spent:
             result = rd.work_precision(swing, methods=[_METHOD], budget_s=_BUDGET_S, repeats=5, on_progress=spent)
     except RobotDynError as error:
         yield f"left out: {error}"
         return
-    yield from prices.programs(result, _ERROR)
+    yield from studies.programs(result, _ERROR)
     if result.interrupted:
         raise typer.Exit(130)
     yield "  all methods: robot-dyn accuracy; each effect and algorithm: robot-dyn cost"

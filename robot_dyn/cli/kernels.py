@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import asdict
 from datetime import datetime
 from typing import Any
 
-from rich.table import Table
-
+from robot_dyn.cli.terminal import table
 from robot_dyn.compiled.cache import Store
 from robot_dyn.compiled.dynamics import CompiledDynamics
 from robot_dyn.compiled.trace import QUANTITIES
@@ -26,24 +24,24 @@ def formulations(robot: Robot) -> Document:
 
 def formulation_table(answer: Document) -> Iterator[Any]:
     """That answer as a table."""
-    table = Table(box=None, pad_edge=False, header_style="bold", title="compiled", title_justify="left")
-    for heading in ("quantity", "served by", "instructions", "others"):
-        table.add_column(heading, justify="right" if heading == "instructions" else "left")
+    rows = []
     for name, row in answer.items():
         counts = dict(row["instructions"])
         own = counts.pop(row["served_by"], None)
         others = ", ".join(f"{road} {count}" for road, count in counts.items())
-        table.add_row(name, row["served_by"], "" if own is None else str(own), others)
-    yield table
+        rows.append([name, row["served_by"], "" if own is None else str(own), others])
+    yield "compiled"
+    headings = ("quantity", "served by", "instructions", "others")
+    yield table(headings, rows, words=("quantity", "served by", "others"), wrap=True)
 
 
 def cache(store: Store | None, removed: int) -> Document:
     """The kernels kept on disk; `folder` is null where there is no cache."""
-    kernels = [asdict(entry) for entry in store.entries()] if store else []
+    kernels = list(store.entries()) if store else []
     return {
         "folder": str(store.folder) if store else None,
         "removed": removed,
-        "bytes": sum(each["size"] for each in kernels),
+        "bytes": sum(each.size for each in kernels),
         "kernels": kernels,
     }
 
@@ -56,12 +54,10 @@ def cache_tables(answer: Document) -> Iterator[Any]:
     if answer["removed"]:
         yield f"removed: {answer['removed']} kernels"
     if answer["kernels"]:
-        table = Table(box=None, pad_edge=False, header_style="bold")
-        for heading in ("kernel", "about", "KiB", "last used"):
-            table.add_column(heading, justify="right" if heading == "KiB" else "left", no_wrap=True)
+        rows = []
         for each in answer["kernels"]:
-            used = datetime.fromtimestamp(each["used"]).strftime("%Y-%m-%d %H:%M")
-            table.add_row(each["key"][:12], each["about"], f"{each['size'] / 1024:.0f}", used)
-        yield table
+            used = datetime.fromtimestamp(each.used).strftime("%Y-%m-%d %H:%M")
+            rows.append([each.key[:12], each.about, f"{each.size / 1024:.0f}", used])
+        yield table(("kernel", "about", "KiB", "last used"), rows, words=("kernel", "about", "last used"))
     count = len(answer["kernels"])
     yield f"{count} kernel{'' if count == 1 else 's'}, {answer['bytes'] / 2**20:.1f} MiB in {answer['folder']}"

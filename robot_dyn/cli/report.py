@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict
 from math import isfinite
 from typing import Any, cast
 
 import numpy as np
-from rich.table import Table
 
 from robot_dyn.accuracy.compare import Comparison, compare
+from robot_dyn.cli.terminal import table
 from robot_dyn.coefficients import declared, with_values
 from robot_dyn.effects.effect import Force
 from robot_dyn.effects.hold import Hold
@@ -28,7 +27,7 @@ from robot_dyn.simulation.trajectory import Trajectory
 from robot_dyn.validate import joint_values
 
 Document = dict[str, Any]
-_WORDS = {"joint", "kind", "from", "quantity", "robot", "where"}  # columns of words; the others hold numbers
+_WORDS = ("quantity", "robot", "where")
 
 
 def info(robot: Robot) -> Document:
@@ -36,7 +35,7 @@ def info(robot: Robot) -> Document:
     columns = ("lower", "upper", "effort_limit", "velocity_limit", "damping", "friction", "armature")
     values = np.column_stack([getattr(robot, column) for column in columns])
     joints = [
-        {"name": name, "kind": kind} | {key: _finite(x) for key, x in zip(columns, row, strict=True)}
+        {"name": name, "kind": kind} | dict(zip(columns, row, strict=True))
         for name, kind, row in zip(robot.joint_names, robot.joint_types, values, strict=True)
     ]
     return {
@@ -44,13 +43,13 @@ def info(robot: Robot) -> Document:
         "source": robot.description.source,
         "n": robot.n,
         "total_mass": robot.total_mass,
-        "gravity": list(robot.edits.gravity),
+        "gravity": robot.edits.gravity,
         "gravity_acts": gravity_acts(robot),
         "joints": joints,
         "couplings": _couplings(robot),
         "locked": dict(robot.edits.lock),
-        "links": list(robot.frame_names),
-        "findings": list(robot.findings),
+        "links": robot.frame_names,
+        "findings": robot.findings,
     }
 
 
@@ -64,22 +63,19 @@ def query(plant: Plant, q: np.ndarray, v: np.ndarray, a: np.ndarray, tau: np.nda
         tau = plant.actuation(joint_values("tau", tau, robot.joint_names))
         a, held = plant.forward_dynamics(0.0, q, v, tau), plant.held(0.0, q, v, tau)
     torques = plant.equation_of_motion.torques(0.0, q, v, q.shape)
-    acting = {name: torque.tolist() for name, torque in zip(_names(plant), torques, strict=True)}
+    acting = dict(zip(_names(plant), torques, strict=True))
     state = {"q": q, "v": v, "a": a, "tau": tau}
     terms = {each.name: each.ask(plant, state | {"t": 0.0}) for each in (M, C, PLANT["N"])}
     return {
         "robot": robot.name,
-        "gravity": list(robot.edits.gravity),
+        "gravity": robot.edits.gravity,
         "gravity_acts": gravity_acts(robot),
-        "joints": list(robot.joint_names),
-        "types": list(robot.joint_types),
-        **{name: array.tolist() for name, array in (state | terms).items()},
+        "joints": robot.joint_names,
+        "types": robot.joint_types,
+        **state,
+        **terms,
         "effects": acting,
-        "held": [
-            {"joint": each.joint, "by": list(each.by)}
-            | {key: _finite(getattr(each, key)) for key in ("load", "least", "most", "margin")}
-            for each in held
-        ],
+        "held": held,
     }
 
 
@@ -126,53 +122,33 @@ def _at(force: Force, i: int) -> Force:
 
 def comparison(results: Sequence[tuple[str, Comparison]], refused: dict[str, str]) -> Document:
     """Comparisons by name, and what was refused."""
-    robots = {
-        name: {
-            "ok": result.ok,
-            "samples": result.samples,
-            "notes": list(result.notes),
-            "quantities": {
-                each.quantity: {
-                    "ok": each.ok,
-                    "error": _finite(each.error),
-                    "tolerance": each.tolerance,
-                    "entry": each.entry,
-                    "pinocchio": _finite(each.pinocchio),
-                    "own": _finite(each.own),
-                    "state": each.state,
-                }
-                for each in result.agreements
-            },
-        }
-        for name, result in results
-    }
-    return {"ok": all(result.ok for _, result in results), "robots": robots, "refused": refused}
+    return {"ok": all(result.ok for _, result in results), "robots": dict(results), "refused": refused}
 
 
 def run(trajectory: Trajectory) -> Document:
     """How a run ended, what it took and how far to trust it; samples are in its run file."""
     error, outcome = trajectory.error, trajectory.outcome
     return {
-        "ending": str(outcome.ending),
+        "ending": outcome.ending,
         "t": outcome.t,
         "advice": outcome.advice,
         "samples": len(trajectory.t),
-        "acting": trajectory.acting and list(trajectory.acting),
-        "joints": list(trajectory.joint_names),
-        "q": [_finite(x) for x in trajectory.q[-1].tolist()],
-        "v": [_finite(x) for x in trajectory.v[-1].tolist()],
-        "work": {name: _finite(float(work[-1])) for name, work in trajectory.ledger.work.items()},
-        "ledger_residual": _finite(largest(np.abs(trajectory.ledger.residual))),
-        "ledger_closure": _finite(trajectory.ledger.closure),
-        "error": None if error is None else _finite(error.final),
+        "acting": trajectory.acting,
+        "joints": trajectory.joint_names,
+        "q": trajectory.q[-1],
+        "v": trajectory.v[-1],
+        "work": {name: work[-1] for name, work in trajectory.ledger.work.items()},
+        "ledger_residual": largest(np.abs(trajectory.ledger.residual)),
+        "ledger_closure": trajectory.ledger.closure,
+        "error": None if error is None else error.final,
         "error_resolved_until": None if error is None else error.resolved_until,
-        "error_verdict": None if error is None else str(error.verdict),
+        "error_verdict": None if error is None else error.verdict,
         "error_note": None if error is None else error.note or error.reason,
         "tracking_error": trajectory.tracking_error,
-        "accuracy": None if trajectory.accuracy is None else asdict(trajectory.accuracy),
-        "remarks": [asdict(remark) for remark in trajectory.remarks],
+        "accuracy": trajectory.accuracy,
+        "remarks": trajectory.remarks,
         "extremes": _extremes(trajectory),
-        "statistics": asdict(trajectory.statistics),
+        "statistics": trajectory.statistics,
     }
 
 
@@ -181,7 +157,7 @@ def _extremes(trajectory: Trajectory) -> Document | None:
     if trajectory.extremes is None:
         return None
     return {
-        name: {"least": [_finite(x) for x in least], "largest": [_finite(x) for x in largest]}
+        name: {"least": least, "largest": largest}
         for name, (least, largest) in zip(("q", "v", "u"), trajectory.extremes, strict=True)
     }
 
@@ -196,11 +172,10 @@ def info_tables(robot: Robot) -> Iterator[Any]:
     yield document["source"]
     if not document["gravity_acts"]:
         yield no_torque(robot.edits.gravity)
-    table = _table("joint", "kind", "lower", "upper", "effort", "velocity", "damping", "dry friction", "armature")
-    for joint in document["joints"]:
-        name, kind, *numbers = joint.values()
-        table.add_row(name, kind, *("—" if x is None else f"{x:.4g}" for x in numbers))
-    yield table
+    headings = ("joint", "kind", "lower", "upper", "effort", "velocity", "damping", "dry friction", "armature")
+    stated = (list(joint.values()) for joint in document["joints"])
+    rows = [[name, kind, *(_stated(x, 4) for x in limits)] for name, kind, *limits in stated]
+    yield table(headings, rows, words=headings[:2])
     yield "units: rad and N m for a joint that turns, m and N for one that slides; — is not stated"
     for each in document["couplings"]:
         yield f"coupled: {each['joint']} = {each['multiplier']:g} · {each['source']} + {each['offset']:g}"
@@ -238,26 +213,22 @@ def _held_table(answer: Document) -> Iterator[Any]:
         return
     yield ""
     yield f"held at rest [{units('tau', answer['types'])}]:"
-    table = _table("joint", "from", "load", "slides below", "slides above", "margin")
-    for each in answer["held"]:
-        numbers = ("—" if each[key] is None else f"{each[key]:.6g}" for key in ("load", "least", "most", "margin"))
-        table.add_row(each["joint"], ", ".join(each["by"]), *numbers)
-    yield table
+    headings = ("joint", "from", "load", "slides below", "slides above", "margin")
+    rows = ([x.joint, ", ".join(x.by), *map(_stated, (x.load, x.least, x.most, x.margin))] for x in answer["held"])
+    yield table(headings, rows, words=headings[:2])
 
 
 def _why_tables(why: Document) -> Iterator[Any]:
     yield ""
     yield f"why {why['joint']} needs {why['tau']:.6g} {why['unit']}:"
-    table = _table("from", "inertia", "Coriolis", "gravity", "effect", "sum")
     rows = [(s["source"], s["inertia"], s["coriolis"], s["gravity"], 0.0) for s in why["shares"]]
     named = {effect: ", ".join((effect, *numbers)) for effect, numbers in why["coefficients"].items()}
     rows += [(named[effect], 0.0, 0.0, 0.0, torque) for effect, torque in why["effects"].items()]
     rows += [("dry friction and stops, at rest", 0.0, 0.0, 0.0, why["at_rest"])] if why["at_rest"] else []
     inertia, coriolis, gravity, effect = (sum(column) for column in list(zip(*rows, strict=True))[1:])
     rows.append(("sum", inertia, coriolis, gravity, effect))
-    for source, *terms in rows:
-        table.add_row(source, *(f"{x:.6g}" for x in [*terms, sum(terms)]))
-    yield table
+    cells = ([source, *(f"{x:.6g}" for x in [*terms, sum(terms)])] for source, *terms in rows)
+    yield table(("from", "inertia", "Coriolis", "gravity", "effect", "sum"), cells, words=("from",))
 
 
 def comparison_tables(results: Sequence[tuple[str, Comparison]], refused: dict[str, str]) -> Iterator[Any]:
@@ -265,19 +236,18 @@ def comparison_tables(results: Sequence[tuple[str, Comparison]], refused: dict[s
     if len(results) == 1:
         ((_, result),) = results
         yield f"{result.robot}: Pinocchio and the own Lagrangian at {result.samples} random states"
-        table = _table("quantity", "worst error", "allowed", "where", "Pinocchio", "own")
-        for each in result.agreements:
-            values = f"{each.pinocchio:.16g}", f"{each.own:.16g}"
-            table.add_row(each.quantity, _mark(each.ok, each.error), f"{each.tolerance:.1e}", each.entry, *values)
-        yield table
+        rows = [
+            [x.quantity, _mark(x.ok, x.error), f"{x.tolerance:.1e}", x.entry, f"{x.pinocchio:.16g}", f"{x.own:.16g}"]
+            for x in result.agreements
+        ]
+        yield table(("quantity", "worst error", "allowed", "where", "Pinocchio", "own"), rows, words=_WORDS)
         yield from result.notes
     else:
-        table = _table("robot", "n", "worst error", "allowed", "quantity", "where")
-        for name, result in results:
-            worst = result.worst
-            error, allowed = _mark(result.ok, worst.error), f"{worst.tolerance:.1e}"
-            table.add_row(name, str(result.n), error, allowed, worst.quantity, worst.entry)
-        yield table
+        rows = [
+            [name, str(of.n), _mark(of.ok, x.error), f"{x.tolerance:.1e}", x.quantity, x.entry]
+            for name, of, x in ((name, result, result.worst) for name, result in results)
+        ]
+        yield table(("robot", "n", "worst error", "allowed", "quantity", "where"), rows, words=_WORDS)
         notes = ((name, note) for name, result in results for note in result.notes)
         yield from (f"{name}: {note}" for name, note in notes if "forward" in note or "yourdfpy" in note)
         yield from (f"{name} refused: {why}" for name, why in refused.items())
@@ -317,9 +287,9 @@ def _couplings(robot: Robot) -> list[Document]:
     ]
 
 
-def _finite(x: float) -> float | None:
-    """JSON has no infinity: what is unlimited is null."""
-    return float(x) if isfinite(x) else None
+def _stated(x: float, digits: int = 6) -> str:
+    """A number, unless it is unlimited."""
+    return f"{x:.{digits}g}" if isfinite(x) else "—"
 
 
 def _mark(ok: bool, error: float) -> str:
@@ -328,10 +298,3 @@ def _mark(ok: bool, error: float) -> str:
 
 def _row(numbers: Sequence[float]) -> str:
     return " ".join(f"{x:10.5g}" for x in numbers)
-
-
-def _table(*headings: str) -> Table:
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for heading in headings:
-        table.add_column(heading, no_wrap=True, justify="left" if heading in _WORDS else "right")
-    return table

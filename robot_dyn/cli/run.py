@@ -9,13 +9,13 @@ import typer
 
 import robot_dyn as rd
 from robot_dyn.cli import arguments, completion
-from robot_dyn.cli.app import Force, Json, app, bar
+from robot_dyn.cli.app import Force, Json, Scene, app, bar
 from robot_dyn.cli.terminal import put, say, say_json, tell
 
 
 @app.command()
 def simulate(
-    scene: Annotated[str, typer.Argument(metavar="SCENE.toml", help="A scene file; `robot-dyn scene` prints some.")],
+    scene: Scene,
     output: Annotated[
         str | None, typer.Option("-o", "--output", metavar="RUN.npz", help="Write the run to a file.")
     ] = None,
@@ -51,7 +51,7 @@ def simulate(
 
 
 @app.command()
-def explain(scene: Annotated[str, typer.Argument(metavar="SCENE.toml", help="A scene file.")]) -> None:
+def explain(scene: Scene) -> None:
     """Say what a scene integrates: each term, what is not simulated, and where every number came from."""
     from robot_dyn.scene.explain import explain as lines
     from robot_dyn.scene.scene import read_both

@@ -6,6 +6,7 @@ import json
 import os
 import re
 import sys
+from collections.abc import Collection, Iterable, Sequence
 from typing import Any
 
 from robot_dyn.errors import RobotDynError, escaped
@@ -51,15 +52,28 @@ def say(*renderables: Any) -> None:
         put(f"{escaped(each)}\n") if isinstance(each, str) else _guarded(lambda each=each: console.print(each))
 
 
+def table(headings: Sequence[str], rows: Iterable[Sequence[str]], words: Collection[str], wrap: bool = False) -> Any:
+    """A table for `say`; columns under the headings `words` begin at the left, the others hold numbers."""
+    from rich.table import Table
+
+    made = Table(box=None, pad_edge=False, header_style="bold")
+    for heading in headings:
+        made.add_column(heading, no_wrap=not wrap, justify="left" if heading in words else "right")
+    for row in rows:
+        made.add_row(*row)
+    return made
+
+
 def put(text: str) -> None:
     """Write a text that ends its own lines; errors as of `say`."""
     _guarded(lambda: (sys.stdout.write(text), sys.stdout.flush()))
 
 
 def say_json(value: Any) -> None:
-    """Print a document as JSON; errors as of `say`."""
-    text = json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False)
-    put(re.sub(r"[^\n\x20-\x7e]", lambda match: _json_escaped(match[0]), text) + "\n")
+    """Print a document or a result as JSON; errors as of `say`."""
+    from robot_dyn.result import json_text
+
+    put(re.sub(r"[^\n\x20-\x7e]", lambda match: _json_escaped(match[0]), json_text(value)))
 
 
 def tell(text: str) -> None:

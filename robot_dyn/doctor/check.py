@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import final
 
@@ -17,6 +17,7 @@ from robot_dyn.errors import DescriptionError
 from robot_dyn.model import catalog, description
 from robot_dyn.model.packages import searched
 from robot_dyn.model.robot import Robot
+from robot_dyn.result import UNREPORTED, reported
 from robot_dyn.validate import truth
 
 _OF_TEXT = (
@@ -42,9 +43,9 @@ class Checkup:
     source: str
     loads: bool
     findings: tuple[Finding, ...]
-    repaired: bytes | None
+    repaired: bytes | None = field(metadata=UNREPORTED)
 
-    @property
+    @reported
     def ok(self) -> bool:
         """Whether there is no error among the findings."""
         return not any(each.severity is Severity.ERROR for each in self.findings)

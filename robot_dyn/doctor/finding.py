@@ -7,6 +7,7 @@ from enum import Enum
 from typing import Any, final
 
 from robot_dyn.errors import shorten
+from robot_dyn.result import UNREPORTED
 
 
 class Severity(Enum):
@@ -34,7 +35,7 @@ class Change:
         text: What it is, in words.
     """
 
-    element: Any
+    element: Any = field(metadata=UNREPORTED)
     key: str
     value: str
     renames: str = ""

@@ -13,6 +13,7 @@ from typing import final
 import numpy as np
 
 from robot_dyn.effects.equation_of_motion import EquationOfMotion
+from robot_dyn.result import reported
 
 
 @final
@@ -33,7 +34,7 @@ class Hold:
     least: float
     most: float
 
-    @property
+    @reported
     def margin(self) -> float:
         """How much the load may change, either way, before the joint breaks away, in [N m] or [N]; not negative."""
         return max(min(self.load - self.least, self.most - self.load), 0.0)

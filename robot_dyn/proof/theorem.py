@@ -16,6 +16,7 @@ from robot_dyn.errors import QueryError, escaped
 from robot_dyn.proof.node import Node, on_the_way
 from robot_dyn.proof.packed import Packed, unpacked
 from robot_dyn.proof.start import numbers_of
+from robot_dyn.result import UNREPORTED, reported
 from robot_dyn.validate import number, numbers
 from robot_dyn.values import Value
 
@@ -43,25 +44,30 @@ class Proof(Value):
     """
 
     robot: str
-    joint_names: tuple[str, ...]
+    joint_names: tuple[str, ...] = field(metadata=UNREPORTED)
     asked_s: float
     until_s: float
     why_not: str
     bits: int
     assumed: tuple[str, ...]
-    nodes: tuple[Node, ...] = field(repr=False)
+    nodes: tuple[Node, ...] = field(repr=False, metadata=UNREPORTED)
 
-    @property
+    @reported
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joints, by which `q` and `v` are ordered."""
+        return self.joint_names
+
+    @reported
     def proven(self) -> bool:
         """Whether it reaches the time that was asked for."""
         return not self.why_not
 
-    @property
+    @reported
     def radius_q(self) -> np.ndarray:
         """Upper bounds of the radii of q at the end, (n,), in [rad] or [m]."""
         return _radii(self.nodes[-1].q)
 
-    @property
+    @reported
     def radius_v(self) -> np.ndarray:
         """Those of v, in [rad/s] or [m/s]."""
         return _radii(self.nodes[-1].v)
@@ -141,13 +147,22 @@ class Proof(Value):
                     most = max(most, *(_far(ball, x) for ball, x in zip(at(time)[0], row, strict=True)))
         return _digits(most)
 
-    @property
-    def decimals(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """The balls of q and of v at the end, as decimals with a radius that hold them."""
-        q, v = (tuple(map(_told, known)) for known in (self.nodes[-1].q, self.nodes[-1].v))
-        return q, v
+    @reported
+    def q(self) -> tuple[str, ...]:
+        """The balls of q at the end, as decimals with a radius that hold them."""
+        return tuple(map(_told, self.nodes[-1].q))
 
-    @property
+    @reported
+    def v(self) -> tuple[str, ...]:
+        """Those of v."""
+        return tuple(map(_told, self.nodes[-1].v))
+
+    @reported
+    def steps(self) -> int:
+        """Number of steps that are proven."""
+        return len(self.nodes) - 1
+
+    @reported
     def trusted(self) -> tuple[str, ...]:
         """What the theorem rests on."""
         return TRUSTED
@@ -156,12 +171,12 @@ class Proof(Value):
     def summary(self) -> str:
         """The theorem in words."""
         lines = [f"{self.robot}: " + self._claim]
-        rows = zip(self.joint_names, *self.decimals, strict=True)
+        rows = zip(self.joint_names, self.q, self.v, strict=True)
         lines += [f"  {name}: q = {q}, v = {v}" for name, q, v in rows]
         if self.why_not:
             lines.append(f"Not proven beyond t = {self.until_s!r} s, because {self.why_not}.")
         lines += ["Which numbers are meant:", *(f"  {each}" for each in self.assumed)]
-        lines += [f"Trusted: {'; '.join(self.trusted)}.", f"{len(self.nodes) - 1} steps, balls of {self.bits} bits"]
+        lines += [f"Trusted: {'; '.join(self.trusted)}.", f"{self.steps} steps, balls of {self.bits} bits"]
         return "\n".join(map(escaped, lines))
 
     @property

@@ -10,7 +10,7 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.accuracy.deadline import Deadline
+from robot_dyn.accuracy.budget import Budget
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.simulate import simulate
 from robot_dyn.simulation.trajectory import Ending, Trajectory
@@ -67,19 +67,19 @@ class Told:
         return self.growth > LEFT * max(within.growth, 1.0)
 
 
-def told(setup: Setup, at: np.ndarray, deadline: Deadline, numerical: bool = False) -> Told:
+def told(setup: Setup, at: np.ndarray, budget: Budget, numerical: bool = False) -> Told:
     """Run a setup and look how far it goes from an equilibrium.
 
     Args:
         setup: From near the equilibrium.
         at: The equilibrium, (n,).
-        deadline: Of the run.
+        budget: Of the run.
         numerical: Whether only errors of the method can make it go, so that its error estimate is looked at.
 
     Raises:
-        OvertimeError: If the deadline passes.
+        OvertimeError: If the budget ends.
     """
-    run = simulate(replace(setup, estimate_error=numerical), on_progress=deadline.check)
+    run = simulate(replace(setup, estimate_error=numerical), on_progress=budget.check)
     units = np.sqrt(np.diagonal(setup.plant.dynamics.M(at)))
     with np.errstate(over="ignore"):  # a run that diverged may be off by inf
         off = np.linalg.norm((run.q - at) * units, axis=1)

@@ -1,9 +1,12 @@
-"""What a stress test finds: worst configurations, limits, and runs that were judged; each with lines that repeat it."""
+"""What a stress test finds: worst configurations, limits, and runs that were judged; each with what repeats it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from typing import final
+
+from robot_dyn.result import UNREPORTED, reported
+from robot_dyn.simulation.setup import Setup
 
 
 @final
@@ -21,8 +24,6 @@ class Worst:
         minimal: At `state`, at least 0.9 of that.
         state: A state of few digits and few entries that are not zero, q, v, a, tau by name.
         note: More about it, in words.
-        python: Lines that repeat it, after those that load the robot.
-        command: Words of a command that does; empty if there is none.
     """
 
     what: str
@@ -34,10 +35,8 @@ class Worst:
     minimal: float
     state: dict[str, list[float]] = field(hash=False)
     note: str
-    python: str
-    command: str
 
-    @property
+    @reported
     def found(self) -> bool:
         """Whether the search found a worse state than the random ones."""
         return self.searched > self.random
@@ -57,7 +56,8 @@ class Limit:
         within: What came at 0.98 of it, in words.
         beyond: What came at 1.02 of it, in words.
         confirmed: Whether both came as predicted; None if there is nothing to confirm.
-        python: Lines that repeat it, after those that load the robot.
+        state: Where it was looked for, q and v by name.
+        setups: Of the runs that confirm it, at 0.98 and at 1.02 of it; nothing without runs.
     """
 
     of: str
@@ -68,7 +68,8 @@ class Limit:
     within: str
     beyond: str
     confirmed: bool | None
-    python: str
+    state: dict[str, list[float]] = field(default_factory=dict, hash=False)
+    setups: tuple[Setup, ...] = field(default=(), hash=False, repr=False, metadata=UNREPORTED)
 
 
 @final
@@ -84,7 +85,7 @@ class Judged:
         unsure: How far two better runs are apart there.
         said: What the run says of its error, or how it ended.
         misleads: Whether nothing warns, and the estimate is below 0.3 of the true error.
-        python: Lines that repeat it, after those that load the robot.
+        setup: Of the run.
     """
 
     what: str
@@ -94,4 +95,4 @@ class Judged:
     unsure: float
     said: str
     misleads: bool
-    python: str
+    setup: Setup = field(hash=False, repr=False, metadata=UNREPORTED)

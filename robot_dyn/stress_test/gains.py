@@ -12,7 +12,7 @@ from math import inf, sqrt
 import numpy as np
 
 from robot_dyn.accuracy.advisor import advice_about, at_rest
-from robot_dyn.accuracy.deadline import Deadline
+from robot_dyn.accuracy.budget import Budget
 from robot_dyn.control.computed_torque import PDGravity
 from robot_dyn.errors import RobotDynError
 from robot_dyn.simulation.sampled_loop import linearised
@@ -20,7 +20,6 @@ from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.stability import Stability
 from robot_dyn.stress_test.confirm import BEYOND, WITHIN, pushed, told
 from robot_dyn.stress_test.finding import Limit
-from robot_dyn.stress_test.lines import expression
 from robot_dyn.stress_test.work import Work
 
 PERIOD_S = 1e-3
@@ -46,18 +45,18 @@ def gain_limit(setup: Setup, seed: int, work: Work) -> Limit | None:
         made = PDGravity(law.model, law.reference, inertia * omega**2, 2 * inertia * omega, PERIOD_S)
         return replace(setup, controller=made)
 
-    low = work.do("largest gain", lambda deadline: _largest(of, deadline))
+    low = work.do("largest gain", lambda budget: _largest(of, budget))
     if low is None or not 0 < low < inf:
         within = f"stable up to ω = {_RANGE[1]:g} rad/s" if low else f"unstable from ω = {_RANGE[0]:g} rad/s on"
-        return None if low is None else Limit("gain", _WHAT, "", low, "rad/s", within, "", None, "")
-    return work.do("largest gain, judged", lambda deadline: _judged(of, low, inertia, seed, deadline))
+        return None if low is None else Limit("gain", _WHAT, "", low, "rad/s", within, "", None)
+    return work.do("largest gain, judged", lambda budget: _judged(of, low, inertia, seed, budget))
 
 
-def _largest(of: Callable[[float], Setup], deadline: Deadline) -> float:
+def _largest(of: Callable[[float], Setup], budget: Budget) -> float:
     """The limit, by bisection; inf or 0 if there is none."""
 
     def stable(omega: float) -> bool:
-        deadline.check()
+        budget.check()
         at = of(omega)
         y = np.concatenate([at.q0, np.zeros(len(at.q0))])
         try:
@@ -76,24 +75,19 @@ def _largest(of: Callable[[float], Setup], deadline: Deadline) -> float:
     return low
 
 
-def _judged(of: Callable[[float], Setup], low: float, inertia: np.ndarray, seed: int, deadline: Deadline) -> Limit:
+def _judged(of: Callable[[float], Setup], low: float, inertia: np.ndarray, seed: int, budget: Budget) -> Limit:
     """What advisor and runs say on both sides of the limit."""
     both = [of(part * low) for part in (WITHIN, BEYOND)]
     at, y = both[0].q0, np.concatenate([both[0].q0, both[0].v0])
     loop = linearised(both[1].plant, both[1].controller, 0.0, y)
     start = pushed(both[0], loop.matrix(PERIOD_S), seed)
-    python = (
-        f"m = {expression(inertia)}\nq = {expression(at)}\nfor omega in ({WITHIN * low!r}, {BEYOND * low!r}):\n"
-        f"    law = rd.PDGravity(robot, rd.hold(q), np.array(m) * omega**2, 2 * np.array(m) * omega, {PERIOD_S!r})\n"
-        f"    setup = {expression(replace(start, controller=None))}\n    run = rd.simulate(setup, controller=law)\n"
-        "    print(run.outcome.ending, abs(run.q[-1] - q).max(), rd.advise(setup, controller=law).longest_period_s)\n"
-    )
+    setups = tuple(replace(each, q0=start.q0, v0=start.v0) for each in both)
     try:
         periods = [advice_about(each, at_rest).longest_period_s for each in both]
-        within, beyond = (told(replace(each, q0=start.q0, v0=start.v0), at, deadline) for each in both)
+        within, beyond = (told(each, at, budget) for each in setups)
     except RobotDynError as error:
-        return Limit("gain", _WHAT, "", low, "rad/s", f"not run: {error}", "", None, python)
+        return Limit("gain", _WHAT, "", low, "rad/s", f"not run: {error}", "", None, {"q": at.tolist()}, setups)
     agrees = periods[0] >= PERIOD_S > periods[1]
     said = beyond.words + f"; THE ADVISOR TAKES IT FOR STABLE UP TO {periods[1]:.3g} s" * (not agrees)
     confirmed = agrees and within.stays and beyond.leaves(within)
-    return Limit("gain", _WHAT, "", low, "rad/s", within.words, said, confirmed, python)
+    return Limit("gain", _WHAT, "", low, "rad/s", within.words, said, confirmed, {"q": at.tolist()}, setups)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from robot_dyn.accuracy.deadline import Deadline
+from robot_dyn.accuracy.budget import Budget
 from robot_dyn.accuracy.road import asked
 from robot_dyn.accuracy.worst_state import Batch
 from robot_dyn.control.computed_torque import PDGravity
@@ -23,12 +23,12 @@ from robot_dyn.model.edits import Payload
 from robot_dyn.model.quantity import CORIOLIS_TORQUE, N
 from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.remarks import Kind
+from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.simulate import simulate
 from robot_dyn.stress_test.confirm import BEYOND, WITHIN
 from robot_dyn.stress_test.finding import Limit
-from robot_dyn.stress_test.lines import assigned, expression
 from robot_dyn.stress_test.work import Work
-from robot_dyn.stress_test.worst import Gains, State, worst
+from robot_dyn.stress_test.worst import Gains, State, listed, worst
 
 _LOOKS = 50  # states at which the tip is looked for
 _HOLD_S = 0.05  # of a run that holds a payload
@@ -64,7 +64,7 @@ def speed_limit(robot: Robot, states: Batch, rng: np.random.Generator, work: Wor
         return None
     (sizes, state), none = found, "it has no torque on any joint with a limit"
     if not sizes["minimal"] > 1e-12:
-        return Limit("speed", what, "", np.inf, "times", none, "", None, "")
+        return Limit("speed", what, "", np.inf, "times", none, "", None)
     q, v, limit = state["q"], direction(state["v"]), float(sizes["minimal"]) ** -0.5
     return work.do("speed, judged", lambda _: _judged_speed(robot, q, v, limit, what))
 
@@ -74,14 +74,11 @@ def _judged_speed(robot: Robot, q: np.ndarray, v: np.ndarray, limit: float, what
     own, effort = Lagrangian(robot), efforts(robot)
     joint = int(np.argmax(np.abs(robot.coriolis_torque(q, v)) / effort))
     parts = [float((np.abs(own.coriolis_torque(q, part * limit * v)) / effort).max()) for part in (WITHIN, BEYOND)]
-    python = (
-        f"{assigned({'q': q, 'v': v})}for part in ({WITHIN}, {BEYOND}):\n"
-        f"    torque = rd.Lagrangian(robot).coriolis_torque(q, part * {limit!r} * np.array(v))\n"
-        f"    print(abs(torque[{joint}]) / robot.effort_limit[{joint}])\n"
-    )
     within, beyond = (f"{part:.3f} of the effort limit" for part in parts)
     confirmed = bool(parts[0] < 1 < parts[1])
-    return Limit("speed", what, robot.joint_names[joint], limit, "times", within, beyond, confirmed, python)
+    return Limit(
+        "speed", what, robot.joint_names[joint], limit, "times", within, beyond, confirmed, listed({"q": q, "v": v})
+    )
 
 
 def payload_limit(
@@ -116,39 +113,34 @@ def payload_limit(
     sizes, state = found
     q, largest = state["q"], float(sizes["minimal"])
     if not largest > 1e-12:
-        return Limit("payload", what, "", np.inf, "kg", "it has no torque on any joint with a limit", "", None, "")
+        return Limit("payload", what, "", np.inf, "kg", "it has no torque on any joint with a limit", "", None)
     joint = robot.joint_names[int(np.argmax(inverse_masses({"q": q[None]})[0]))]
     if largest > 1e250:
-        return Limit(
-            "payload", what, joint, 0.0, "kg", "gravity alone passes its effort limit", "", None, assigned(state)
-        )
+        alone = "gravity alone passes its effort limit"
+        return Limit("payload", what, joint, 0.0, "kg", alone, "", None, listed(state))
     return work.do(
         "payload, judged", lambda until: _judged_payload(robot, state, Payload(frame, 1 / largest), joint, gains, until)
     )
 
 
 def _judged_payload(
-    robot: Robot, state: State, payload: Payload, joint: str, gains: Gains | None, deadline: Deadline
+    robot: Robot, state: State, payload: Payload, joint: str, gains: Gains | None, budget: Budget
 ) -> Limit:
     """Whether the arm holds the payload on both sides of the limit."""
-    q, frame, most, effort = state["q"], payload.frame, payload.mass, efforts(robot)
-    masses = [part * most for part in (WITHIN, BEYOND)]
-    said = [_held(robot, q, Payload(frame, mass), effort, gains, deadline) for mass in masses]
-    confirmed = said[0][0] and not said[1][0]
-    python = (
-        f"{assigned(state)}for mass in {expression(masses)}:\n"
-        f"    loaded = robot.with_(payload=rd.Payload({frame!r}, mass))\n"
-        "    print(mass, max(abs(rd.Lagrangian(loaded).N(q)) / robot.effort_limit))\n"
+    q, frame, most = state["q"], payload.frame, payload.mass
+    loads = [robot.with_(payload=Payload(frame, part * most)) for part in (WITHIN, BEYOND)]
+    setups = () if gains is None else tuple(_held_by_pd(each, q, gains) for each in loads)
+    (holds, within), (too_heavy, beyond) = (
+        _holds(loaded, q, setup, budget) for loaded, setup in zip(loads, setups or (None, None), strict=True)
     )
-    if gains is not None:
-        python += (
-            f"    law = rd.PDGravity(loaded, rd.hold(q), {expression(gains[0])}, {expression(gains[1])})\n"
-            "    plant = rd.Plant(loaded, [rd.EffortLimit(robot.effort_limit)])\n"
-            f"    run = rd.simulate(plant, q, controller=law, duration_s={_HOLD_S})\n"
-            "    print([str(each.kind) for each in run.remarks], abs(run.q[-1] - q).max())\n"
-        )
-    what = f"gravity torque of a payload at {frame}"
-    return Limit("payload", what, joint, most, "kg", said[0][1], said[1][1], confirmed, python)
+    what, confirmed = f"gravity torque of a payload at {frame}", holds and not too_heavy
+    return Limit("payload", what, joint, most, "kg", within, beyond, confirmed, listed(state), setups)
+
+
+def _held_by_pd(loaded: Robot, q: np.ndarray, gains: Gains) -> Setup:
+    """The arm held at q by a PD within its effort limits, its gravity balanced."""
+    plant, law = Plant(loaded, [EffortLimit(efforts(loaded))]), PDGravity(loaded, hold(q), *gains)
+    return Setup(plant, q, duration_s=_HOLD_S, controller=law, estimate_error=False, engine="interpreted")
 
 
 def _tip(robot: Robot, states: Batch) -> str:
@@ -163,21 +155,14 @@ def _tip(robot: Robot, states: Batch) -> str:
     return max(robot.frame_names, key=torque)
 
 
-def _held(
-    robot: Robot, q: np.ndarray, payload: Payload, effort: np.ndarray, gains: Gains | None, deadline: Deadline
-) -> tuple[bool, str]:
-    """Whether the arm can hold a payload, by the own road and by a run; and in words."""
-    loaded = robot.with_(payload=payload)
-    part = float((np.abs(Lagrangian(loaded).N(q)) / effort).max())
+def _holds(loaded: Robot, q: np.ndarray, setup: Setup | None, budget: Budget) -> tuple[bool, str]:
+    """Whether an arm holds what it is loaded with, by the own road and by a run; and in words."""
+    part = float((np.abs(Lagrangian(loaded).N(q)) / efforts(loaded)).max())
     said = f"{part:.3f} of the effort limit"
-    if gains is None:
+    if setup is None:
         return part < 1, said
-    plant = Plant(loaded, [EffortLimit(effort)])
     try:
-        run = simulate(
-            plant, q, controller=PDGravity(loaded, hold(q), *gains), duration_s=_HOLD_S, estimate_error=False,
-            engine="interpreted", on_progress=deadline.check,
-        )  # fmt: skip
+        run = simulate(setup, on_progress=budget.check)
     except RobotDynError as error:
         return part < 1, f"{said}; not run: {error}"
     reached = any(each.kind is Kind.EFFORT_REACHED for each in run.remarks)

@@ -10,15 +10,14 @@ from math import log10
 
 import numpy as np
 
+from robot_dyn.accuracy.budget import Budget
 from robot_dyn.accuracy.counting import Counting, Found
-from robot_dyn.accuracy.deadline import Deadline
 from robot_dyn.accuracy.digits import digits_of
 from robot_dyn.accuracy.road import Road, roads
 from robot_dyn.accuracy.worst_state import Batch
 from robot_dyn.model.quantity import FORWARD_DYNAMICS, INVERSE_DYNAMICS, Quantity
 from robot_dyn.model.robot import Robot
 from robot_dyn.stress_test.finding import Worst
-from robot_dyn.stress_test.lines import assigned
 from robot_dyn.stress_test.work import Work
 from robot_dyn.stress_test.worst import KEPT, listed, shrunk_state
 
@@ -27,7 +26,7 @@ _ROUNDS, _MOST_TRIES = 3, 60
 _OTHER_NUMBERS = ("Lagrangian, float32", "Lagrangian, longdouble")
 
 
-def lost_digits(robot: Robot, states: Batch, rng: np.random.Generator, words: str, work: Work) -> Iterator[Worst]:
+def lost_digits(robot: Robot, states: Batch, rng: np.random.Generator, work: Work) -> Iterator[Worst]:
     """The roads in float64, one after the other."""
     asked = (INVERSE_DYNAMICS, FORWARD_DYNAMICS)
     names = tuple(f"digits lost in {quantity.name}" for quantity in asked)
@@ -40,15 +39,15 @@ def lost_digits(robot: Robot, states: Batch, rng: np.random.Generator, words: st
     for quantity in asked:
         for road in found:
             if quantity in road.quantities and road.name not in _OTHER_NUMBERS:
-                made = _lost(counting, road, quantity, words, work)
+                made = _lost(counting, road, quantity, work)
                 if made is not None:
                     yield made
 
 
-def _lost(counting: Counting, road: Road, quantity: Quantity, words: str, work: Work) -> Worst | None:
+def _lost(counting: Counting, road: Road, quantity: Quantity, work: Work) -> Worst | None:
     """What one road loses; None for lack of time."""
     name = f"digits lost in {quantity.name} by {road.name}"
-    made = work.do(name, lambda deadline: _counted(counting, road, quantity, deadline))
+    made = work.do(name, lambda budget: _counted(counting, road, quantity, budget))
     if made is None:
         return None
     lost = _OF_FLOAT64 - made.searched
@@ -62,25 +61,18 @@ def _lost(counting: Counting, road: Road, quantity: Quantity, words: str, work: 
         f"shrinking of {name}", lambda until: shrunk_state(at, counting.states, losses, least, until, _MOST_TRIES)
     )
     state, minimal = small or (at, lost)
-    arguments = ", ".join(f"{name}={name}" for name in state)
-    python = (
-        f"{assigned(state)}made = rd.certify(robot, {arguments}, samples=100, repeats=1)\n"
-        f"print(made.of({quantity.name!r}, {road.name!r}).given)\n"
-    )
-    options = " ".join(f"--{name}={','.join(map(repr, x.tolist()))}" for name, x in state.items())
-    command = f"certify {words} {options} --samples=100 --repeats=1" if words and "--xacro" not in words else ""
     typical, random = _OF_FLOAT64 - made.typical, _OF_FLOAT64 - made.random
     note = f"{road.name}: {made.searched:.1f} digits hold, {made.typical:.1f} typically"
     what = f"digits lost in {quantity.name}"
-    return Worst(what, "", "digits", typical, random, max(lost, minimal), minimal, listed(state), note, python, command)
+    return Worst(what, "", "digits", typical, random, max(lost, minimal), minimal, listed(state), note)
 
 
-def _counted(counting: Counting, road: Road, quantity: Quantity, deadline: Deadline) -> Found:
+def _counted(counting: Counting, road: Road, quantity: Quantity, budget: Budget) -> Found:
     """The fewest digits of some searches."""
-    made = counting.count(road, quantity, deadline.check)
+    made = counting.count(road, quantity, budget.check)
     for _ in range(_ROUNDS - 1):
         if made.searched < made.random:
             break
-        again = counting.count(road, quantity, deadline.check)
+        again = counting.count(road, quantity, budget.check)
         made = again if again.searched < made.searched else made
     return made

@@ -6,14 +6,13 @@ from dataclasses import dataclass, field
 from math import isfinite
 from typing import final
 
+from robot_dyn.result import Result, reported
 from robot_dyn.stress_test.finding import Judged, Limit, Worst
-from robot_dyn.stress_test.lines import Loading
-from robot_dyn.validate import instance
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class Stress:
+class Stress(Result):
     """What an arm does at its worst, what breaks first, and what of that the library fails to tell.
 
     Attributes:
@@ -24,7 +23,6 @@ class Stress:
         runs: Random runs whose error estimates were judged.
         left_out: What was left out, and why.
         out_of_time: Names of what was not looked at, or not to its end, for lack of time.
-        loading: How the robot is loaded.
         environment: Versions and processor.
         samples, seed: Number of random states; of the random generator.
         spent_s: Time that it took, in [s].
@@ -38,14 +36,13 @@ class Stress:
     runs: tuple[Judged, ...]
     left_out: tuple[str, ...]
     out_of_time: tuple[str, ...]
-    loading: Loading
     environment: dict[str, str] = field(repr=False)
     samples: int
     seed: int
     spent_s: float
     interrupted: bool = False
 
-    @property
+    @reported
     def failures(self) -> tuple[str, ...]:
         """What the library fails at: limits that runs refute, and runs that mislead; in words."""
         return (
@@ -61,12 +58,12 @@ class Stress:
             ),
         )
 
-    @property
+    @reported
     def ok(self) -> bool:
         """Whether there are no failures."""
         return not self.failures
 
-    @property
+    @reported
     def sentence(self) -> str:
         """The worst of each kind, in a sentence."""
         parts = []
@@ -79,15 +76,6 @@ class Stress:
         if late := len(self.out_of_time):
             parts.append(f"{late} not looked at for lack of time")
         return f"{self.robot}: {failed or 'no'} failure{'s' * (failed != 1)} in {checked} checks; {'; '.join(parts)}"
-
-    def python(self, finding: Worst | Limit | Judged) -> str:
-        """Lines that repeat a finding, from the imports on; empty if it has none.
-
-        Raises:
-            QueryError: If it is not one of `worst`, `limits` and `runs`.
-        """
-        finding = instance("finding", finding, Worst | Limit | Judged, "give one of worst, limits or runs")
-        return self.loading.python + finding.python if finding.python else ""
 
 
 def _number(x: float) -> str:

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from robot_dyn.accuracy.deadline import Deadline
+from robot_dyn.accuracy.budget import Budget
 from robot_dyn.accuracy.worst_state import Batch
 from robot_dyn.errors import RobotDynError
 from robot_dyn.integrate.adaptive import Adaptive
@@ -21,7 +21,6 @@ from robot_dyn.simulation.simulate import simulate
 from robot_dyn.simulation.trajectory import Ending, Trajectory
 from robot_dyn.stress_test.confirm import LEAST, says
 from robot_dyn.stress_test.finding import Judged
-from robot_dyn.stress_test.lines import expression
 from robot_dyn.stress_test.scenes import scenes
 from robot_dyn.stress_test.shrink import shrunk
 from robot_dyn.stress_test.work import Work
@@ -46,20 +45,20 @@ def judged_runs(robot: Robot, states: Batch, count: int, rng: np.random.Generato
             yield shrunk_run(scene.setup, found, f"shrinking of run {k}", work) if found.misleads else found
 
 
-def judged(setup: Setup, what: str, deadline: Deadline) -> Judged:
+def judged(setup: Setup, what: str, budget: Budget) -> Judged:
     """A run beside two better ones.
 
     Raises:
         RobotDynError: If one of these cannot be made.
-        OvertimeError: If the deadline passes.
+        OvertimeError: If the budget ends.
     """
-    run = simulate(setup, on_progress=deadline.check)
+    run = simulate(setup, on_progress=budget.check)
     said = says(run) if run.outcome.ending is Ending.FINISHED else f"{run.outcome.ending} at {run.outcome.t:.3g} s"
     error = run.error
     if error is None or run.outcome.ending is not Ending.FINISHED or not error.resolved_until:
-        return Judged(what, setup.duration_s, np.nan, np.nan, np.nan, said, False, _lines(setup))
+        return Judged(what, setup.duration_s, np.nan, np.nan, np.nan, said, False, setup)
     sure = replace(setup, step_s=None, estimate_error=False, integrator=_BETTER[0])
-    better = [simulate(replace(sure, integrator=each), on_progress=deadline.check) for each in _BETTER]
+    better = [simulate(replace(sure, integrator=each), on_progress=budget.check) for each in _BETTER]
     known = run.t <= error.resolved_until
     if any(each.outcome.ending is not Ending.FINISHED for each in better):
         raise RobotDynError("a better run did not finish")
@@ -69,7 +68,7 @@ def judged(setup: Setup, what: str, deadline: Deadline) -> Judged:
     unsure = float(np.abs(better[1].q - better[0].q)[known].max())
     floor = _ROUNDING * (1 + float(np.abs(run.q).max())) + unsure
     misleads = not says_more(run) and max(error.final, floor) < LEAST * max(true, floor)
-    return Judged(what, setup.duration_s, error.final, true, unsure, said or str(error), misleads, _lines(setup))
+    return Judged(what, setup.duration_s, error.final, true, unsure, said or str(error), misleads, setup)
 
 
 def says_more(run: Trajectory) -> bool:
@@ -77,24 +76,16 @@ def says_more(run: Trajectory) -> bool:
     return bool(run.error is not None and run.error.note) or "does not close" in run.summary
 
 
-def _lines(setup: Setup) -> str:
-    return (
-        f"setup = {expression(setup)}\nrun = rd.simulate(setup)\nbetter = rd.simulate(setup, integrator="
-        f"{expression(_BETTER[0])}, estimate_error=False)\nprint(run.error)\n"
-        "print(abs(run.q - better.q).max())\n"
-    )
-
-
 def shrunk_run(setup: Setup, found: Judged, name: str, work: Work) -> Judged:
     """A run that misleads, from the start of fewest digits that was found; itself if that is none."""
     least = found
 
-    def shrink(deadline: Deadline) -> np.ndarray:
+    def shrink(budget: Budget) -> np.ndarray:
         def fails(x: np.ndarray) -> bool:
             nonlocal least
             q0, v0 = np.split(x, 2)
             try:
-                young = judged(replace(setup, q0=q0, v0=v0), found.what, deadline)
+                young = judged(replace(setup, q0=q0, v0=v0), found.what, budget)
             except RobotDynError:
                 return False
             least = young if young.misleads else least

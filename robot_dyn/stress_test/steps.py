@@ -13,7 +13,7 @@ from math import isfinite
 import numpy as np
 
 from robot_dyn.accuracy.advisor import Advice, advice_about, at_rest
-from robot_dyn.accuracy.deadline import Deadline
+from robot_dyn.accuracy.budget import Budget
 from robot_dyn.control.computed_torque import PDGravity
 from robot_dyn.control.reference import hold
 from robot_dyn.effects.friction import ViscousFriction
@@ -29,7 +29,6 @@ from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.stiffness import jacobian
 from robot_dyn.stress_test.confirm import BEYOND, WITHIN, pushed, told
 from robot_dyn.stress_test.finding import Limit
-from robot_dyn.stress_test.lines import expression
 from robot_dyn.stress_test.work import Work
 
 _TIMES = 400.0  # of the run, 1/|λ| of the fastest motion
@@ -73,48 +72,41 @@ def _linearised(setup: Setup) -> tuple[Advice, np.ndarray]:
     return advice_about(setup, at_rest), jacobian(loop, t, y, None)
 
 
-def _judged(setup: Setup, name: str, advice: Advice, J: np.ndarray, seed: int, deadline: Deadline) -> Limit:
+def _judged(setup: Setup, name: str, advice: Advice, J: np.ndarray, seed: int, budget: Budget) -> Limit:
     """The limit of a method."""
     limit, joint, n = advice.limits[name], advice.fastest.joint, len(setup.q0)
     try:
         unstable = isfinite(limit) and not _iterates(name)
         matrix = step_map(method(name), J, n)(BEYOND * limit) if unstable else J
         start = pushed(replace(setup, integrator=name), matrix, seed)
-        return _confirmed(start, setup.q0, name, limit, joint, deadline)
+        return _confirmed(start, setup.q0, name, limit, joint, budget)
     except RobotDynError as error:
-        return Limit("step", name, joint, limit, "s", f"not run: {error}", "", None, "")
+        return Limit("step", name, joint, limit, "s", f"not run: {error}", "", None)
 
 
-def _confirmed(setup: Setup, at: np.ndarray, name: str, limit: float, joint: str, deadline: Deadline) -> Limit:
+def _confirmed(setup: Setup, at: np.ndarray, name: str, limit: float, joint: str, budget: Budget) -> Limit:
     """The limit of a method, with runs at both sides of it, or with steps as long as are judged if it has none."""
+    where = {"q": at.tolist()}
     if not isfinite(limit):
         longest = setup.duration_s / _PARTS
-        run = told(replace(setup, step_s=longest), at, deadline, True)
+        longest_steps = replace(setup, step_s=longest)
+        run = told(longest_steps, at, budget, True)
         told_of = f"step {longest:.3g} s: {run.words}"
-        lines = _lines(setup, at, (longest,))
         holds = run.stays or (_iterates(name) and not isfinite(run.growth))
-        return Limit("step", name, "", limit, "s", told_of, "", holds and not run.misleads, lines)
-    steps, what, iterates = (WITHIN * limit, BEYOND * limit), name, _iterates(name)
+        return Limit("step", name, "", limit, "s", told_of, "", holds and not run.misleads, where, (longest_steps,))
+    what, iterates = name, _iterates(name)
     if iterates:  # every step is stable, and where its stages are not found, about there, the run says so
         setup, what = replace(setup, duration_s=_STEPS * limit), f"{name}, about where its stages are not found"
-    within = told(replace(setup, step_s=steps[0]), at, deadline)
-    beyond = told(replace(setup, step_s=steps[1]), at, deadline, not iterates)
+    setups = tuple(replace(setup, step_s=part * limit) for part in (WITHIN, BEYOND))
+    within, beyond = told(setups[0], at, budget), told(setups[1], at, budget, not iterates)
     confirmed = within.stays and beyond.leaves(within) and not beyond.misleads
     if iterates:
         grew = any(not each.stays and isfinite(each.growth) for each in (within, beyond))
         confirmed = False if grew else None  # a limit that is not sharp is neither reached nor kept
     said = beyond.words + " AND DOES NOT SAY SO" * beyond.misleads
-    return Limit("step", what, joint, limit, "s", within.words, said, confirmed, _lines(setup, at, steps))
+    return Limit("step", what, joint, limit, "s", within.words, said, confirmed, where, setups)
 
 
 def _iterates(name: str) -> bool:
     """Whether the stages of a method are iterated, so that a run ends, and says so, where they are not found."""
     return isinstance(method(name), Gauss | SinglyDiagonallyImplicit)
-
-
-def _lines(setup: Setup, at: np.ndarray, steps: tuple[float, ...]) -> str:
-    return (
-        f"q = {expression(at)}\nsetup = {expression(setup)}\nfor step_s in {expression(list(steps))}:\n"
-        "    run = rd.simulate(setup, step_s=step_s)\n    print(run.summary)\n"
-        "    print(f'{step_s:.4g} s: {run.outcome.ending}, off by {abs(run.q[-1] - q).max():.1e}')\n"
-    )

@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.accuracy.deadline import Deadline
+from robot_dyn.accuracy.budget import Budget
 from robot_dyn.accuracy.environment import environment
 from robot_dyn.accuracy.worst_state import random_states
 from robot_dyn.model.robot import Robot
 from robot_dyn.stress_test.finding import Judged, Limit, Worst
 from robot_dyn.stress_test.gains import gain_limit
-from robot_dyn.stress_test.lines import Loading
 from robot_dyn.stress_test.loads import payload_limit, speed_limit
 from robot_dyn.stress_test.lost_digits import lost_digits
 from robot_dyn.stress_test.result import Stress
@@ -59,23 +58,22 @@ def stress(
         QueryError: If an argument is wrong.
     """
     robot = instance("robot", robot, Robot, "give one of rd.load")
-    return stressed(robot, Loading.of(robot), samples, runs, seed, budget_s, on_progress)
+    return stressed(robot, samples, runs, seed, budget_s, on_progress)
 
 
 def stressed(
-    robot: Robot, loading: Loading, samples: int, runs: int, seed: int, budget_s: float,
+    robot: Robot, samples: int, runs: int, seed: int, budget_s: float,
     on_progress: Callable[[float, str], object] | None, clock: Callable[[], float] = perf_counter,
 ) -> Stress:  # fmt: skip
-    """The same of a robot that is loaded so, by a clock."""
+    """The same, by a clock."""
     samples = integer("samples", samples, least=_LEAST_SAMPLES, most=_MOST_SAMPLES)
     runs, seed = integer("runs", runs, most=_MOST_RUNS), integer("seed", seed, most=2**128 - 1)
     seconds = number("budget_s", budget_s, above=0)
-    told = function("on_progress", on_progress, "(spent, what)") or (lambda spent, what: None)
-    deadline = Deadline(clock=clock).within(seconds)
-    work = Work(deadline, seconds / _PIECES, lambda name: told(seconds - max(deadline.left, 0.0), name))
+    budget = Budget(seconds, function("on_progress", on_progress, "(spent, what)"), clock)
+    work = Work(budget, seconds / _PIECES)
     robot, found, interrupted = robot.warn_below(None), list[Found](), False
     try:
-        for each in _found(robot, loading, samples, runs, seed, work):
+        for each in _found(robot, samples, runs, seed, work):
             found.append(each)
     except KeyboardInterrupt:
         interrupted = True
@@ -86,11 +84,11 @@ def stressed(
 
     return Stress(
         robot.name, robot.joint_names, of(Worst), of(Limit), of(Judged), (*_unlimited(robot), *work.left_out),
-        tuple(work.out_of_time), loading, environment(), samples, seed, seconds - deadline.left, interrupted,
+        tuple(work.out_of_time), environment(), samples, seed, budget.spent, interrupted,
     )  # fmt: skip
 
 
-def _found(robot: Robot, loading: Loading, samples: int, runs: int, seed: int, work: Work) -> Iterator[Found]:
+def _found(robot: Robot, samples: int, runs: int, seed: int, work: Work) -> Iterator[Found]:
     """The findings of all parts, each with a random generator of its own."""
     streams = [np.random.default_rng(each) for each in np.random.SeedSequence(seed).spawn(6)]
     states = work.do("random states", lambda _: random_states(robot, samples, streams[0]), ("all at these",))
@@ -99,14 +97,14 @@ def _found(robot: Robot, loading: Loading, samples: int, runs: int, seed: int, w
     moves, fastest = robot.joint_without_inertia is None, None
     needed_for = ("worst fastest motion under it", *HELD)
     gains = work.do("gains of a PD", lambda _: pd_gains(robot, states), needed_for) if moves else None
-    for each in worst_configurations(robot, states, streams[1], gains, loading.words, work):
+    for each in worst_configurations(robot, states, streams[1], gains, work):
         fastest = each if each.note == BY_PD else fastest
         yield each
     yield from _kept(speed_limit(robot, states, streams[2], work))
     yield from _kept(payload_limit(robot, states, streams[3], gains, work))
     if moves:
         yield from _of_motion(robot, gains, fastest, seed, work)
-    yield from lost_digits(robot, states, streams[4], loading.words, work)
+    yield from lost_digits(robot, states, streams[4], work)
     if moves:
         yield from judged_runs(robot, states, runs, streams[5], work)
     else:

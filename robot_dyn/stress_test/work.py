@@ -7,8 +7,7 @@ from typing import TypeVar, final
 
 import numpy as np
 
-from robot_dyn.accuracy.budget import OvertimeError
-from robot_dyn.accuracy.deadline import NEVER, Deadline
+from robot_dyn.accuracy.budget import Budget, OvertimeError
 from robot_dyn.errors import RobotDynError
 
 T = TypeVar("T")
@@ -23,24 +22,21 @@ class Work:
     """Pieces of work, one after the other.
 
     Args:
-        deadline: Of all of them.
+        budget: Of all of them; it is told the name of each piece when it begins.
         longest_s: Time that one piece may take, in [s].
-        tell: Called with the name of each piece when it begins.
 
     Attributes:
         out_of_time: Names of the pieces that were not begun, or were ended, for lack of time.
         left_out: Names of those that have no answer, and why.
     """
 
-    def __init__(
-        self, deadline: Deadline = NEVER, longest_s: float = np.inf, tell: Callable[[str], object] = lambda name: None
-    ) -> None:
-        self._deadline, self._longest_s, self._tell = deadline, longest_s, tell
+    def __init__(self, budget: Budget | None = None, longest_s: float = np.inf) -> None:
+        self._budget, self._longest_s = budget or Budget(), longest_s
         self.out_of_time: list[str] = []
         self.left_out: list[str] = []
 
-    def do(self, name: str, piece: Callable[[Deadline], T], needed_for: tuple[str, ...] = ()) -> T | None:
-        """What a piece gives, called with its deadline; None if it was not done, or not to its end.
+    def do(self, name: str, piece: Callable[[Budget], T], needed_for: tuple[str, ...] = ()) -> T | None:
+        """What a piece gives, called with its budget; None if it was not done, or not to its end.
 
         Args:
             name: Of the piece.
@@ -50,10 +46,10 @@ class Work:
         if self.over:
             self.skip(name, *needed_for)
             return None
-        self._tell(name)
+        self._budget.tell(name)
         try:
             with np.errstate(over="raise", divide="raise", invalid="raise"):
-                return piece(self._deadline.within(self._longest_s))
+                return piece(self._budget.within(self._longest_s))
         except OvertimeError:
             self.skip(name, *needed_for)
         except (RobotDynError, np.linalg.LinAlgError, FloatingPointError) as error:
@@ -66,7 +62,7 @@ class Work:
     @property
     def over(self) -> bool:
         """Whether there is no time left."""
-        return self._deadline.passed
+        return self._budget.left <= 0
 
     def skip(self, *names: str) -> None:
         """Name pieces that are not done for lack of time."""

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from robot_dyn.accuracy.deadline import Deadline
+from robot_dyn.accuracy.budget import Budget
 from robot_dyn.accuracy.road import asked
 from robot_dyn.accuracy.worst_state import Batch, Search
 from robot_dyn.control.independent_joint import gains_from
@@ -19,7 +19,6 @@ from robot_dyn.lagrange.scale import unit_diagonal_conditions
 from robot_dyn.model.quantity import M, N
 from robot_dyn.model.robot import Robot
 from robot_dyn.stress_test.finding import Worst
-from robot_dyn.stress_test.lines import assigned, expression
 from robot_dyn.stress_test.shrink import shrunk
 from robot_dyn.stress_test.work import Work
 
@@ -59,7 +58,7 @@ def worst(
         name: Of the measure.
         needed_for: As of `Work.do`.
     """
-    found = work.do(name, lambda deadline: searched(states, rng, arguments, measure, deadline), needed_for)
+    found = work.do(name, lambda budget: searched(states, rng, arguments, measure, budget), needed_for)
     if found is None:
         return None
     sizes, state = found
@@ -71,7 +70,7 @@ def worst(
 
 
 def searched(
-    states: Batch, rng: np.random.Generator, arguments: tuple[str, ...], measure: Measure, deadline: Deadline
+    states: Batch, rng: np.random.Generator, arguments: tuple[str, ...], measure: Measure, budget: Budget
 ) -> tuple[Sizes, State]:
     """Typical, random and searched size of a measure, and the state."""
     known = measure(states)
@@ -79,7 +78,7 @@ def searched(
         raise OverflowedError("it has a finite value at none of the random states")
     random, found, best = float(np.nanmax(known)), -np.inf, states
     for _ in range(_ROUNDS):
-        at, size = Search(states, rng).worst(_timed(measure, deadline), known, arguments)
+        at, size = Search(states, rng).worst(_timed(measure, budget), known, arguments)
         if size > found:
             best, found = at, size
         if found > random:
@@ -88,21 +87,21 @@ def searched(
     return sizes, {name: best[name][0] for name in arguments}
 
 
-def _timed(measure: Measure, deadline: Deadline) -> Measure:
+def _timed(measure: Measure, budget: Budget) -> Measure:
     """A measure that asks first whether there is time."""
 
     def made(batch: Batch) -> np.ndarray:
-        deadline.check()
+        budget.check()
         return measure(batch)
 
     return made
 
 
 def shrunk_state(
-    state: State, states: Batch, measure: Measure, least: float, deadline: Deadline, most: int = 400
+    state: State, states: Batch, measure: Measure, least: float, budget: Budget, most: int = 400
 ) -> tuple[State, float]:
     """A state of few digits, within the range of random ones, at which a measure is at least so much; and how much."""
-    measure = _timed(measure, deadline)
+    measure = _timed(measure, budget)
     names, n = tuple(state), len(next(iter(state.values())))
     low = np.concatenate([states[name].min(axis=0) for name in names])
     high = np.concatenate([states[name].max(axis=0) for name in names])
@@ -119,20 +118,17 @@ def shrunk_state(
 
 
 def worst_configurations(
-    robot: Robot, states: Batch, rng: np.random.Generator, gains: Gains | None, words: str, work: Work
+    robot: Robot, states: Batch, rng: np.random.Generator, gains: Gains | None, work: Work
 ) -> Iterator[Worst]:
     """κ, the fastest motion, and gravity torque of each joint with an effort limit."""
-    for what, joint, unit, measure, note, python in _asked(robot, gains, work):
+    for what, joint, unit, measure, note in _asked(robot, gains, work):
         of = note if what == FASTEST else joint
         name, needed_for = f"worst {what}{f', {of}' if of else ''}", HELD if note == BY_PD else ()
         found = worst(states, rng, ("q",), measure, work, name, needed_for)
         if found is None or not found[0]["searched"] > _NOTHING:
             continue  # gravity has no torque on the joint
         sizes, state = found
-        q = ",".join(map(repr, state["q"].tolist()))
-        python = assigned(state) + python
-        command = f"query {words} --q={q}" if words and "robot.N" in python else ""
-        yield Worst(what, joint, unit, **sizes, state=listed(state), note=note, python=python, command=command)
+        yield Worst(what, joint, unit, **sizes, state=listed(state), note=note)
 
 
 def listed(state: dict[str, np.ndarray]) -> dict[str, list[float]]:
@@ -140,46 +136,36 @@ def listed(state: dict[str, np.ndarray]) -> dict[str, list[float]]:
     return {name: x.tolist() for name, x in state.items()}
 
 
-def _asked(robot: Robot, gains: Gains | None, work: Work) -> Iterator[tuple[str, str, str, Measure, str, str]]:
-    """What is looked for: quantity, joint, unit, measure, note and lines."""
+def _asked(robot: Robot, gains: Gains | None, work: Work) -> Iterator[tuple[str, str, str, Measure, str]]:
+    """What is looked for: quantity, joint, unit, measure and note."""
     if robot.joint_without_inertia is None:
-        lines = "M = robot.M(q)\nd = np.sqrt(np.diagonal(M))\nprint(np.linalg.cond(M / np.outer(d, d)))\n"
-        yield "κ of M", "", "", lambda batch: unit_diagonal_conditions(asked(robot, M, batch)), "", lines
+        yield "κ of M", "", "", lambda batch: unit_diagonal_conditions(asked(robot, M, batch)), ""
         yield from _fastest(robot, gains, work)
     for i, joint in enumerate(robot.joint_names):
         limit = robot.effort_limit[i]
         if 0 < limit < np.inf:
-            lines = f"print(abs(robot.N(q)[{i}]) / robot.effort_limit[{i}])\n"
             note = f"effort limit {limit:g}"
 
             def loaded(batch: Batch, i: int = i, limit: float = limit) -> np.ndarray:
                 return np.abs(asked(robot, N, batch)[:, i]) / limit
 
-            yield "gravity torque / effort limit", joint, "", loaded, note, lines
+            yield "gravity torque / effort limit", joint, "", loaded, note
 
 
-def _fastest(robot: Robot, gains: Gains | None, work: Work) -> Iterator[tuple[str, str, str, Measure, str, str]]:
+def _fastest(robot: Robot, gains: Gains | None, work: Work) -> Iterator[tuple[str, str, str, Measure, str]]:
     """The fastest decay by the friction of the file, and by a PD of stated gains, both where gravity is balanced."""
     if damping := work.do("friction at rest", lambda _: _slopes(robot)):
-        lines = (
-            "balance = rd.PDGravity(robot, rd.hold(q), 0.0, 0.0)\nsetup = rd.Setup(rd.Plant(robot, 'urdf'), q,"
-            " controller=balance, duration_s=1e-4)\nprint(rd.advise(setup).fastest)\n"
-        )
         note = "friction of the file, at rest"
-        yield FASTEST, "", "1/s", lambda batch: _rates(robot, batch, np.array(damping)), note, lines
+        yield FASTEST, "", "1/s", lambda batch: _rates(robot, batch, np.array(damping)), note
     if gains is None:
         return
-    kp, kd = gains
+    _, kd = gains
 
     def by_pd(batch: Batch) -> np.ndarray:
         mu = _rates(robot, batch, kd) / (2 * _FREQUENCY)
         return _FREQUENCY * np.where(mu > 1, mu + np.sqrt(np.maximum(mu * mu - mu, 0)), np.sqrt(mu))
 
-    lines = (
-        f"kp = {expression(kp)}\nkd = {expression(kd)}\nhold = rd.PDGravity(robot, rd.hold(q), kp, kd)\n"
-        "setup = rd.Setup(rd.Plant(robot), q, controller=hold, duration_s=1e-3)\nprint(rd.advise(setup).fastest)\n"
-    )
-    yield FASTEST, "", "1/s", by_pd, BY_PD, lines
+    yield FASTEST, "", "1/s", by_pd, BY_PD
 
 
 def _slopes(robot: Robot) -> list[float]:

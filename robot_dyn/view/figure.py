@@ -110,7 +110,7 @@ def draw(panels: list[Panel], run: Trajectory, theme: Mapping[str, Any]) -> Figu
             y -= _above(cells) + panel.height
             for k, cell in enumerate(cells):
                 box = (wide * k + left) / width, y / tall, (wide - left - right) / width, panel.height / tall
-                axes = figure.add_axes(box, facecolor=theme["paper"])
+                axes = figure.add_axes(box)
                 title = drawable(_short(cell.title, int(wide / 0.08) - len(cell.note)) + cell.note)
                 axes.set_title(title, loc="left", x=-0.75 / (wide - left - right), fontsize=8, **ink)
                 _fill(axes, cell, theme, run.outcome.ending is Ending.DIVERGED)
@@ -148,11 +148,8 @@ def _legend(owner: Any, axes: Any, theme: Mapping[str, Any], corner: tuple[float
 def _fill(axes: Any, cell: Cell, theme: Mapping[str, Any], diverged: bool) -> None:
     """The curves, limits and scales of a cell. All colours are given to the axes: later ticks take them from there."""
     colours, ink = theme["lines"], {"color": theme["ink"], "parse_math": False, "fontsize": 8}
-    axes.grid(color=theme["grid"], linewidth=0.6)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.spines[["bottom", "left"]].set_color(theme["ink"])
-    axes.tick_params(which="both", colors=theme["ink"], labelsize=7, labelbottom=bool(cell.x))
+    framed(axes, theme, 7)
+    axes.tick_params(labelbottom=bool(cell.x))
     axes.set_xlabel(cell.x, labelpad=2, **ink)
     axes.set_ylabel(cell.y, **ink)
     curves = [replace(curve, x=_shown(curve.x), y=_shown(curve.y)) for curve in cell.curves]
@@ -182,6 +179,16 @@ def _fill(axes: Any, cell: Cell, theme: Mapping[str, Any], diverged: bool) -> No
     else:
         _scale(axes, "x", np.array([begin, end]), np.inf, False, False)
         axes.set_xlim(begin, end if end > begin else begin + 1)
+
+
+def framed(axes: Any, theme: Mapping[str, Any], size: float) -> None:
+    """Axes in the colours of a theme, with a grid below and ticks of that size."""
+    axes.set_facecolor(theme["paper"])
+    axes.grid(color=theme["grid"], linewidth=0.6)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.spines[["bottom", "left"]].set_color(theme["ink"])
+    axes.tick_params(which="both", colors=theme["ink"], labelsize=size)
 
 
 def _shown(z: np.ndarray) -> np.ndarray:

@@ -37,9 +37,9 @@ def precision(effort: Effort, picture: Path | None) -> None:
         ]
         row(ladder.name, *times, *ratios)
     row("whole call of simulate, DOP853", *(f"{1e3 * x:.3f}" for x in whole(setup, effort)), *["—"] * len(TARGETS))
-    print("\n( ) extrapolated by the order.", result.sentence())
+    print("\n( ) extrapolated by the order.", result.sentence)
     if picture is not None:
-        rd.save_work_precision(result, picture)
+        rd.save_result(result, picture)
 
 
 def whole(setup: rd.Setup, effort: Effort) -> list[float]:

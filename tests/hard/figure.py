@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from robot_dyn.accuracy.diagram import styled
+from robot_dyn.accuracy.sheet import styled
 from robot_dyn.view.figure import THEMES
 from tests.hard.case import Row
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from importlib import import_module
 from time import perf_counter
 from typing import Any
@@ -11,7 +10,7 @@ import numpy as np
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 from robot_dyn.accuracy.budget import Limit
-from robot_dyn.accuracy.candidate import Candidate, Run
+from robot_dyn.accuracy.candidate import Candidate, Run, tolerances
 from robot_dyn.accuracy.peers.free_motion import FreeMotion, PeerError, bare_urdf
 
 
@@ -54,9 +53,6 @@ def candidates(motion: FreeMotion) -> list[Candidate]:
 
     motion.check(mass_matrix, bias)
 
-    def accuracies() -> Iterator[float]:
-        yield from (10.0**-k for k in range(2, 14))
-
     def run(accuracy: float, limit: Limit) -> Run:
         simulator: Any = analysis.Simulator(diagram)
         analysis.ResetIntegratorFromFlags(simulator, "runge_kutta3", 0.1)
@@ -77,4 +73,4 @@ def candidates(motion: FreeMotion) -> list[Candidate]:
         steps = integrator.get_num_steps_taken()
         return motion.run(q, v, steps, integrator.get_num_derivative_evaluations(), spent)
 
-    return [Candidate("Drake runge_kutta3", "", True, 3, "tolerance", accuracies, run)]
+    return [Candidate("Drake runge_kutta3", "", True, 3, "tolerance", tolerances, run)]

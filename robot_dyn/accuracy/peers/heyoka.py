@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from importlib import import_module
 from time import perf_counter
 from typing import Any
@@ -32,9 +32,6 @@ def candidates(motion: FreeMotion) -> list[Candidate]:
     start = np.concatenate([setup.q0, setup.v0])
     made: dict[float, Any] = {}
 
-    def tolerances() -> Iterator[float]:
-        yield from _TOLERANCES
-
     def warm() -> None:
         system = list(zip(names, rates, strict=True))
         for tolerance in _TOLERANCES:
@@ -50,7 +47,7 @@ def candidates(motion: FreeMotion) -> list[Candidate]:
         limit(motion.times[-1])
         return motion.run(y[:, :n], y[:, n:], steps, None, spent)
 
-    return [Candidate("heyoka, Taylor", "", True, None, "tolerance", tolerances, run, warm)]
+    return [Candidate("heyoka, Taylor", "", True, None, "tolerance", lambda: iter(_TOLERANCES), run, warm)]
 
 
 def _in_heyoka(hy: Any, program: Program, y: list[Any], parameters: np.ndarray) -> list[Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from importlib import import_module
 from time import perf_counter
 from typing import Any
@@ -94,9 +93,6 @@ def _candidate(motion: FreeMotion, module: Any, name: str) -> Candidate:
     setup, records = motion.setup, len(motion.times) - 1
     period = float(motion.times[-1]) / records
 
-    def steps() -> Iterator[float]:
-        yield from step_ladder(period, order)
-
     def run(step: float, limit: Limit) -> Run:
         data, count = module.MjData(model), round(period / step)
         module.set_mju_user_warning(lambda _: None)  # it would print, and write a file: the outcome says the same
@@ -115,4 +111,4 @@ def _candidate(motion: FreeMotion, module: Any, name: str) -> Candidate:
         lost = any(warning.number for warning in data.warning)
         return motion.run(q * np.nan if lost else q, v, count * records, each * count * records, spent)
 
-    return Candidate(f"MuJoCo {name}", "", True, order, "step", steps, run)
+    return Candidate(f"MuJoCo {name}", "", True, order, "step", lambda: step_ladder(period, order), run)

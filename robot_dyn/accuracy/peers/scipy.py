@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from importlib import import_module
 from time import perf_counter
 from typing import Any
@@ -10,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from robot_dyn.accuracy.budget import Limit
-from robot_dyn.accuracy.candidate import Candidate, Run
+from robot_dyn.accuracy.candidate import Candidate, Run, tolerances
 from robot_dyn.accuracy.peers.free_motion import FreeMotion, PeerError
 
 _LEAST = 3e-14  # SciPy's own bound
@@ -27,9 +26,6 @@ def candidates(motion: FreeMotion) -> list[Candidate]:
     n, zero, times = robot.n, np.zeros(robot.n), motion.times
     model: Any = robot.model
     data, start = model.createData(), np.concatenate([setup.q0, setup.v0])
-
-    def tolerances() -> Iterator[float]:
-        yield from (10.0**-k for k in range(2, 14))
 
     def run(rtol: float, limit: Limit) -> Run:
         def rate(t: float, y: np.ndarray) -> np.ndarray:

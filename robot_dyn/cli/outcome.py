@@ -1,0 +1,37 @@
+"""What a study leaves: its files, checked before the work is done, and what is said of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import typer
+
+import robot_dyn as rd
+from robot_dyn.cli import arguments
+from robot_dyn.cli.terminal import say, say_json, tell
+
+
+def outputs(of: Any, output: str | None, csv: str | None, inputs: Iterable[str], force: bool) -> list[Path]:
+    """The paths to write a figure and a table of a class of results to, those that are given."""
+    from robot_dyn.accuracy.save import table_kind
+    from robot_dyn.accuracy.sheet import ResultError
+    from robot_dyn.view.plots import PICTURES
+
+    paths = [arguments.output(output, PICTURES, ResultError, inputs, force)] if output else []
+    return paths + ([arguments.output(csv, table_kind(of), ResultError, [*inputs, *paths], force)] if csv else [])
+
+
+def give(result: Any, paths: Iterable[Path], as_json: bool, dark: bool = False) -> None:
+    """Write a result and say it; exit code 130 if the user ended it."""
+    from robot_dyn.cli import studies
+
+    try:  # the files first: a terminal or pipe may be gone
+        written = [rd.save_result(result, path, theme="dark" if dark else "light") for path in paths]
+    finally:
+        say_json(result) if as_json else say(*studies.lines(result))
+    for path in written:
+        tell(f"written: {path}")
+    if result.interrupted:
+        raise typer.Exit(130)
