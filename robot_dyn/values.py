@@ -6,11 +6,12 @@ from collections.abc import Callable
 from dataclasses import fields
 from functools import cached_property
 from threading import RLock
-from typing import TYPE_CHECKING, Any, Self, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 Result = TypeVar("Result")
+Late = TypeVar("Late", bound="Derived")
 
 
 class Value:
@@ -36,11 +37,12 @@ class Keeping:
         """What was computed, by the functions."""
         return {}
 
-    def kept(self, compute: Callable[[Any], Result]) -> Result:
-        """What a function of the value alone returns; it is called once."""
-        if compute not in self.known:
-            self.known[compute] = compute(self)
-        return self.known[compute]
+
+def kept(value: Keeping, compute: Callable[[Any], Result]) -> Result:
+    """What a function of the value alone returns; it is called once."""
+    if compute not in value.known:
+        value.known[compute] = compute(value)
+    return value.known[compute]
 
 
 class Derived(Value):
@@ -48,13 +50,6 @@ class Derived(Value):
 
     A field that may be read later has no default but by a factory: a default of the class would hide it.
     """
-
-    @classmethod
-    def of(cls, source: Any, **known: Any) -> Self:
-        """One whose fields are the attributes of the same name of a source, but for those that are given."""
-        made = object.__new__(cls)
-        vars(made).update({name: _frozen(x) for name, x in known.items()}, _source=(source, RLock()))
-        return made
 
     if not TYPE_CHECKING:  # what is no field is an error to a type checker
 
@@ -75,6 +70,13 @@ class Derived(Value):
         for each in fields(self):  # pyright: ignore[reportArgumentType]
             getattr(self, each.name)
         return super().__getstate__()
+
+
+def derived(of: type[Late], source: Any, **known: Any) -> Late:
+    """One whose fields are the attributes of the same name of a source, but for those that are given."""
+    made = object.__new__(of)
+    vars(made).update({name: _frozen(x) for name, x in known.items()}, _source=(source, RLock()))
+    return made
 
 
 def copied(x: Any) -> Any:

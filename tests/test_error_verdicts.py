@@ -356,7 +356,7 @@ def test_times_of_compiling_running_and_estimating_are_told_apart() -> None:
     assert s.compile_s > 0
     assert s.companions_s > 0
     assert s.samples_s > 0
-    assert f"compile {s.compile_s:.2g} s" in run.summary
+    assert (f"compile {s.compile_s:.2g} s" in run.summary) == (s.compile_s >= 0.01)  # less is not told
 
 
 def test_metadata_of_packages_are_read_once(monkeypatch) -> None:

@@ -282,7 +282,7 @@ def test_samples_are_read_from_the_table_of_a_run(tmp_path) -> None:
     """Columns by name, in the order of the joints asked for; what is not a table of samples is refused."""
     path, t = tmp_path / "run.csv", np.linspace(0, 1, 9)
     q, v, _ = motion(t)
-    head = "t [s],q b [rad],q a [rad],v a [rad/s],v b [rad/s],tau a [N m],energy [J]"
+    head = "t [s],q b [rad],q a [rad],v a [rad/s],v b [rad/s],u a [N m],energy [J]"
     rows = np.column_stack([t, q[:, ::-1], v, v[:, 0], t]).tolist()
     path.write_text("\n".join([head, *(",".join(map(repr, row)) for row in rows)]))
     reference = Samples.from_csv(path, ["a", "b"])

@@ -187,8 +187,8 @@ def calls(function: Callable[[], object]) -> Counter[str]:
 # Of Python and C: some 1000 without an estimate and 2100 with one, about a third of each in the words of arguments.
 # They were 6000 to 11 000 when a call computed anew what depends on its setup alone.
 @pytest.mark.parametrize("name, estimates, most", [
-    ("free swing", False, 1300), ("free swing", True, 2700), ("computed torque", False, 1300),
-    ("computed torque", True, 2700),
+    ("free swing", False, 1800), ("free swing", True, 3600), ("computed torque", False, 1800),
+    ("computed torque", True, 3600),
 ])  # fmt: skip
 def test_a_second_call_computes_nothing_that_depends_on_the_setup_alone(name: str, estimates: bool, most: int) -> None:
     setup = replace(setups()[name], estimate_error=estimates)

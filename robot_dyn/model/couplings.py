@@ -100,7 +100,7 @@ class Couplings(Value):
         return np.flatnonzero(np.any((self.S != 0) & (np.abs(self.S) != 1), axis=1) | (self.s0 != 0))
 
     def _hidden(self, full: Array) -> bool:
-        if full.ndim == 1 and is_moderate(full, _EXACT):
+        if full.ndim == 1 and full.dtype == np.float64 and is_moderate(full, _EXACT):
             return False
         position = full[..., self._rounded]
         return bool(np.finfo(position.dtype).eps * np.abs(position).max(initial=0.0) > LEAST_EXACT)

@@ -31,6 +31,7 @@ from robot_dyn.simulation.time_loop import WATCHED, Ended, Functions, Now, Recor
 from robot_dyn.simulation.trajectory import Ending, Outcome
 from robot_dyn.simulation.transfers import Transfers
 from robot_dyn.simulation.watch import LARGEST, DivergedError, Watch, one_step, overflowed
+from robot_dyn.values import kept
 
 _DOUBTFUL = 1e6  # of Σ |y| in machine code, which does not see that M becomes singular
 
@@ -78,7 +79,7 @@ class FixedStep(Followed):
         self.advance = machine_code or time_loop(self.stepper.step)
         every, thin = self._shared(pace)
         largest = _DOUBTFUL if self.compiled else LARGEST
-        self.rules = setup.kept(rules_alone)._replace(largest=largest, every=every, thin=thin)
+        self.rules = kept(setup, rules_alone)._replace(largest=largest, every=every, thin=thin)
         rows = samples_at_most(setup, self.plan.counts) if pace == 1 else 1
         states = int((-(-self.plan.counts // every)).sum()) // thin + 2
         shown = (np.empty((1 + 3 * n, 0)), NOTHING) if observer is None else (observer.columns, observer.observation)

@@ -20,7 +20,7 @@ from robot_dyn.simulation.observer import Observer
 from robot_dyn.simulation.reference_remarks import held, jumps
 from robot_dyn.simulation.remarks import Kind, Remark
 from robot_dyn.simulation.setup import Setup
-from robot_dyn.values import copied
+from robot_dyn.values import copied, kept
 
 Units = list[tuple[str, str, str]]  # of q, v and u of each joint
 QUANTITIES = ("q", "v", "u")
@@ -33,7 +33,7 @@ def observer_of(setup: Setup, of: Levels | None = None) -> Observer:
     """An observer of a run that has not begun, for its levels unless others are given."""
     if of is not None:
         return Observer(_observation(setup, of), of, setup.equation.canonical)
-    of, start = setup.kept(_beginning)
+    of, start = kept(setup, _beginning)
     return Observer(copied(start), of, setup.equation.canonical)
 
 

@@ -6,6 +6,7 @@ Names and defaults stand once, in `Setup`; `inspect.signature` and `help` of bot
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from copy import copy
 from dataclasses import fields, replace
 from inspect import Parameter, signature
 from typing import Any, TypedDict, TypeVar
@@ -62,7 +63,7 @@ def setup_of(caller: str, what: Setup | Plant | Dynamics, options: Mapping[str, 
         QueryError: If an option is unknown, or q0 is missing.
     """
     if isinstance(what, Setup) and not options:
-        return what.current()
+        return what if what.is_value else copy(what)  # parts may have changed since: nothing that was kept is taken
     known = {each.name for each in fields(Setup)} if isinstance(what, Setup) else {"q0", "v0", *Options.__annotations__}
     for name in options.keys() - known:
         raise QueryError(f"{caller}: no option {name!r}; {nearest(name, known)}")

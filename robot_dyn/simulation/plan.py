@@ -15,6 +15,7 @@ from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.simulation.schedule import paced
 from robot_dyn.simulation.setup import Setup
 from robot_dyn.simulation.time_loop import Plan
+from robot_dyn.values import kept
 
 _MOST_KEPT = 1000  # segments: to compute more of them takes little of the time of their run, and to keep them memory
 BOUNDS = 2  # numbers of p before the reference: time is kept between them, so that switches act as between them
@@ -24,7 +25,7 @@ def plan_of(setup: Setup, pace: Fraction = Fraction(1)) -> Plan:
     """The segments of a setup, with steps `pace` times as long, and its end, for one run, which changes it."""
     if pace != 1 or len(setup.segments) > _MOST_KEPT:
         return _plan(setup, pace)
-    plan = setup.kept(_plan)
+    plan = kept(setup, _plan)
     return plan._replace(ticks=plan.ticks.copy(), transfers=plan.transfers.copy())
 
 

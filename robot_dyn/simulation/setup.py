@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from copy import copy
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from math import inf
@@ -122,10 +121,6 @@ class Setup(Value, Keeping):
     def is_value(self) -> bool:
         """Whether no part but its events is the user's own code, or may change: what follows from it stays as it is."""
         return all(map(is_value, (self.plant, self.controller, self.integrator)))
-
-    def current(self) -> Setup:
-        """The setup as its parts are now: itself, or a copy without what was kept if parts may have changed since."""
-        return self if self.is_value else copy(self)
 
     @cached_property
     def equation(self) -> StateEquation:

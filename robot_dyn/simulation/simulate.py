@@ -35,6 +35,7 @@ from robot_dyn.simulation.stiffness import StiffError
 from robot_dyn.simulation.switched_run import AccumulationError
 from robot_dyn.simulation.trajectory import Ending, Outcome, Statistics, Trajectory
 from robot_dyn.validate import function
+from robot_dyn.values import derived, kept
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.machine.machine import Machine
@@ -87,7 +88,7 @@ def simulate(
         ran.engine, ran.ready - began, perf_counter() - estimated, spent, companions,
         ", ".join(named(part) for part, _ in setup.undeclared),
     )  # fmt: skip
-    return Trajectory.of(results, statistics=statistics) if waits else Trajectory(statistics=statistics, **read)
+    return derived(Trajectory, results, statistics=statistics) if waits else Trajectory(statistics=statistics, **read)
 
 
 class _Ran(NamedTuple):
@@ -130,9 +131,9 @@ def _by_choice(setup: Setup, on_progress: Callable[[float], object] | None) -> _
         except TooLongError as found:
             seen = found.evaluations
         except StiffError as found:
-            setup, chooses, said = setup.kept(_stiff), False, (found.remark,)
+            setup, chooses, said = kept(setup, _stiff), False, (found.remark,)
         except AccumulationError as found:
-            setup, chooses, said = setup.kept(_nonsmooth), False, (*said, found.remark)
+            setup, chooses, said = kept(setup, _nonsmooth), False, (*said, found.remark)
 
 
 def _stiff(setup: Setup) -> Setup:

@@ -16,6 +16,7 @@ from robot_dyn.simulation.state_equation import StateEquation
 from robot_dyn.simulation.stiffness import fastest
 from robot_dyn.simulation.trajectory import diverged_advice
 from robot_dyn.simulation.transfers import Transfers
+from robot_dyn.values import kept
 
 LARGEST = 1e100  # of Σ |y|: beyond it products overflow
 _PACED = 2000  # steps between looks at the pace of an adaptive method
@@ -60,7 +61,7 @@ class Watch:
 
     def __init__(self, setup: Setup, equation: StateEquation) -> None:
         self.setup, self.equation = setup, equation
-        K, V = setup.kept(_start)
+        K, V = kept(setup, _start)
         self.energy, self.scale = K + V, 1.0 + abs(K) + abs(V)
         self.paced, self.looked = 0.0, 0  # time and steps at the last look at the pace
 

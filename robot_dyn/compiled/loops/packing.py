@@ -75,6 +75,7 @@ class Packed:
     starts: tuple[int, ...]
 
 
+_one: dict[Kind, Kind] = {}  # equal types are one object, which is quick to compare
 _numbers = count()  # runs may start in several threads
 _layouts: dict[tuple[Any, ...], _Layout] = {}
 _kinds: dict[tuple[Any, ...], tuple[int, tuple[Kind, ...], Any]] = {}  # with what must live, so that no address is new
@@ -109,7 +110,9 @@ def pack(values: tuple[Any, ...], store: Callable[[], Store | None]) -> Packed:
     known = shape, forms.tobytes()
     found = _kinds.get(known)
     if found is None:
-        found = _kinds.setdefault(known, (next(_numbers), tuple(map(kind_of, values)), _dtypes(values)))
+        kinds = (kind_of(each) for each in values)
+        of_values = tuple([_one.setdefault(each, each) for each in kinds])
+        found = _kinds.setdefault(known, (next(_numbers), of_values, _dtypes(values)))
     return Packed(found[1], found[0], made, tuple([start + 8 * each for each in layout.starts]))
 
 
