@@ -65,7 +65,7 @@ def rollouts(
     Each run is that of `simulate`, to rounding. By an explicit, Gauss or Rosenbrock method of fixed step, such as
     `integrator="rk4"`, and by time stepping, the runs go side by side in machine code. Those that may pass a threshold
     (a stop, an effort limit, a reversal of friction with states) are made again one after the other on each thread,
-    with steps that end there: a few milliseconds a run and some 0.5 ms a threshold passed. So are all runs by a method
+    with steps that end there, in a few milliseconds a run. So are all runs by a method
     that chooses its steps, such as the default, and by one of fixed step where dry friction, rigid stops, payloads
     that come and go, or events end steps, or where samples lie between the ends of steps that may be cut.
 
