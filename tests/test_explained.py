@@ -164,7 +164,8 @@ def test_a_name_that_a_link_and_a_joint_share_is_the_links() -> None:
 
 def test_a_wrench_on_the_frame_of_a_joint_is_drawn_on_its_link() -> None:
     robot, force = rd.load("planar_2r"), [1.0, 0.0, 2.0, 0.0, 0.0, 0.0]
-    runs = [rd.simulate(rd.Plant(robot, [rd.ExternalWrench(frame, force)]), [0.3, 0.4], duration_s=0.01, engine="interpreted")
-            for frame in ("joint_2", robot.description.joint_frames["joint_2"])]  # fmt: skip
+    frames, options = ("joint_2", robot.description.joint_frames["joint_2"]), {"engine": "interpreted"}
+    plants = [rd.Plant(robot, [rd.ExternalWrench(frame, force)]) for frame in frames]
+    runs = [rd.simulate(plant, [0.3, 0.4], duration_s=0.01, **options) for plant in plants]
     np.testing.assert_array_equal(runs[0].q, runs[1].q)
     assert runs[0].wrenches.keys() == runs[1].wrenches.keys()
