@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
 
 import robot_dyn as rd
+from robot_dyn.coefficients import coefficient
 from robot_dyn.effects.set_valued import settled
 from robot_dyn.errors import EffectError, SingularError
 from tests.estimates.scenes import arms
@@ -44,6 +47,29 @@ def test_a_load_above_friction_moves_by_what_is_left() -> None:
     """1e-9 above: q = −(g − f) t²/2, to the rounding of the load itself."""
     run = rd.simulate(rd.Plant(level(RAIL, 5.0), [rd.DryFriction(5.0 * (1 - 1e-9))]), [0.0], duration_s=4.0, **OPTIONS)
     assert run.q[-1, 0] == pytest.approx(-5e-9 * 8, rel=1e-6)
+
+
+@dataclass(frozen=True, eq=False)
+class Drag(rd.Dissipative):
+    """τ = −c v, with c under the names that set-valued effects give their mode."""
+
+    held: Any = field(metadata=coefficient("N m s/rad", least=0))
+    _direction: Any = field(metadata=coefficient("N m s/rad", least=0))
+
+    def thresholds(self, n: int) -> tuple[()]:
+        return ()
+
+    def torque(self, dynamics, t, q, v):
+        return -(self.held + self._direction) * v
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_the_mode_is_written_into_effects_that_have_one_alone(engine: str) -> None:
+    """Beside dry friction, drag of the user's is what viscous friction with the same coefficients is."""
+    start, friction = ([0.31, -0.73], [0.9, -1.7]), rd.DryFriction([0.4, 0.2])
+    plants = [rd.Plant(ARM, [each, friction]) for each in (Drag(1.5, [0.5, 1.5]), rd.ViscousFriction([2.0, 3.0]))]
+    ours, theirs = (rd.simulate(each, *start, duration_s=0.3, engine=engine, **OPTIONS) for each in plants)
+    np.testing.assert_allclose(ours.q, theirs.q, rtol=0, atol=1e-13)
 
 
 @pytest.mark.parametrize("engine", ENGINES)

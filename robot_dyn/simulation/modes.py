@@ -8,10 +8,10 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.compiled.parameters import Parameter
-from robot_dyn.effects.effect import Conservative
+from robot_dyn.effects.effect import Conservative, Effect
 from robot_dyn.effects.rigid_backlash import RigidBacklash
 from robot_dyn.effects.rigid_stops import RigidStops, touching
-from robot_dyn.effects.set_valued import Mode
+from robot_dyn.effects.set_valued import Mode, SetValued
 from robot_dyn.effects.settling import settling
 from robot_dyn.simulation.event import Occurrence
 from robot_dyn.simulation.event_log import What, event_log
@@ -26,7 +26,7 @@ _SAID = {
     What.STRIKES: "strikes {}", What.RESTS_AT_LAST: "comes to rest at {}", What.STICKS: "sticks",
     What.RESTS: "rests at {}", What.SLIDES: "slides", What.LEAVES: "leaves {}", What.REVERSES: "reverses",
 }  # fmt: skip
-_MODE = "held", "_direction", "_contact"  # coefficients of effects
+_MODE = "held", "_direction", "_contact"  # coefficients of set-valued effects
 
 
 @final
@@ -159,11 +159,11 @@ def _room(equation: StateEquation, N: int, n: int) -> Room:
     )  # fmt: skip
 
 
-def places(known: Sequence[Parameter], first: int) -> Places:
-    """Where parameters have the mode, behind so many other own numbers."""
+def places(known: Sequence[Parameter], effects: Sequence[Effect], first: int) -> Places:
+    """Where the parameters of effects have the mode, behind so many other own numbers."""
     at: dict[str, list[int]] = {name: [] for name in _MODE}
     for each in known:
-        if each.key in at and each.part[0] == "effect":
+        if each.part[0] == "effect" and isinstance(effects[each.part[1]], SetValued) and each.key in at:
             at[each.key].append(first)
         first += each.size
     return Places(*(np.array(each, np.int64) for each in at.values()))

@@ -71,7 +71,8 @@ def prepared(
         if not setup.integrator.controls_error:
             ends = mesh(setup.segments, cast(Fraction, pace))
         first = equation.plant.dynamics.n * equation.sampled
-        of_mode = alone(equation.plant.dynamics.n, first) if machine is None else places(machine.known, first)
+        plant = equation.plant
+        of_mode = alone(plant.dynamics.n, first) if machine is None else places(machine.known, plant.effects, first)
         return EventRun(
             watch, transfers, made, ends, of_mode, loop, on_progress, observer, in_python, samples, most, thresholds,
             chooses,
