@@ -6,9 +6,39 @@ import numpy as np
 import pytest
 import quadprog
 
-from robot_dyn.convex import active_set, minimum, residual
+from robot_dyn.arithmetic import NotPositiveDefiniteError
+from robot_dyn.convex import PASSES, active_set, newton, not_found, residual
 
 SEEDS = [1, 20261127]
+
+
+def minimum(M: np.ndarray, p: np.ndarray, f: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+    """The x of least value, (n,); a coordinate at 0 or at a bound is so exactly.
+
+    Args:
+        M: Symmetric and positive definite, (n, n).
+        p: M x₀, (n,).
+        f: Not negative, (n,).
+        lower: Lower bounds, −inf for none, (n,).
+        upper: Upper bounds, not below the lower ones, inf for none, (n,).
+
+    Raises:
+        RobotDynError: If no minimum is found, as with numbers that are not finite or M that is not positive definite.
+    """
+    lower, upper = (np.asarray(each, float) for each in (lower, upper))
+    place = np.where((f == 0) & (lower < 0) & (upper > 0), 1.0, 0.0)
+    try:
+        for _ in range(PASSES):
+            x, after = newton(M, p, f, lower, upper, place)
+            if (after == place).all():
+                return x
+            place = after
+        n, x = len(p), np.zeros(len(p))
+        if active_set(M, p, f, lower, upper, x, place, np.empty((n + 1, n))):
+            return x
+    except NotPositiveDefiniteError:
+        pass
+    raise not_found(M, p)
 
 
 def problem(rng: np.random.Generator, degenerate: bool) -> tuple[np.ndarray, ...]:

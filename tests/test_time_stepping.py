@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.convex import minimum
 from robot_dyn.errors import QueryError
 from robot_dyn.integrate.integrator import RightSide
 from robot_dyn.integrate.primitives import copy
 from robot_dyn.integrate.time_stepping import TimeStepping, problem_rows
 from tests.estimates.scenes import arms
 from tests.long import long
-from tests.test_convex import problem
+from tests.test_convex import minimum, problem
 
 ENGINES = ["interpreted", "compiled"]
 RAIL = arms()["rail"]  # 1 kg on a vertical rail
