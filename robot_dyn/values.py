@@ -66,6 +66,9 @@ class Derived(Value):
                 raise AttributeError(f"{type(self).__name__!r} has no attribute {name!r}", name=name, obj=self)
             return held[name]
 
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *(each.name for each in fields(self))} - {"_source"})  # pyright: ignore[reportArgumentType]
+
     def __getstate__(self) -> Any:
         for each in fields(self):  # pyright: ignore[reportArgumentType]
             getattr(self, each.name)

@@ -112,6 +112,14 @@ def test_the_setups_leave_something_to_read() -> None:
     assert all(runs[name].events for name in ("computed torque", "stops", "held", "payload"))
 
 
+def test_fields_that_were_not_read_are_listed() -> None:
+    """As `run.` and tab asks for them, and as those of a run whose fields were all computed at once."""
+    run = rd.simulate(setups()["free swing"])
+    assert "q" not in vars(run)
+    assert {*NAMES} <= {*dir(run)} and "_source" not in dir(run)
+    assert dir(run) == dir(at_once(setups()["free swing"]))
+
+
 @pytest.mark.parametrize("name", setups())
 def test_what_is_read_late_is_what_it_would_be_at_once_in_whatever_order(name: str) -> None:
     setup = setups()[name]

@@ -37,8 +37,12 @@ _PURE_ROOMS = (
     "arithmetic", "coefficients", "control", "effects", "errors", "lagrange", "recursive", "spatial",
     "threshold", "values",
 )  # fmt: skip
-# Those of NumPy that read a file or a clock.
-_IMPURE = {"datetime64", "fromfile", "fromregex", "genfromtxt", "load", "loadtxt", "memmap"}
+# Those of NumPy that read or write a file, a clock, a setting or memory that holds anything.
+_IMPURE = {
+    "datetime64", "empty", "empty_like", "fromfile", "fromregex", "genfromtxt", "get_printoptions",
+    "getbufsize", "geterr", "geterrcall", "load", "loadtxt", "memmap", "save", "savetxt", "savez",
+    "savez_compressed", "set_printoptions", "setbufsize", "seterr", "seterrcall", "show_config",
+}  # fmt: skip
 _SPECIAL = {"__call__", "__class__", "__delattr__", "__init__", "__len__", "__name__", "__post_init__", "__setattr__"}
 _FIELDS = "__dataclass_fields__"
 # In a class: what follows from the rest, and what gives no numbers.

@@ -194,6 +194,8 @@ UNDEFINED = {
     "a file": "def f(t, q, v): return np.loadtxt('gains') * v",
     "a file that is opened": "def f(t, q, v): return float(open('gains').read()) * v",
     "the time": "import time\ndef f(t, q, v): return time.time() * v",
+    "a setting of NumPy": "def f(t, q, v): return -v * (2.0 if np.geterr()['over'] == 'warn' else 9.0)",
+    "memory that holds anything": "def f(t, q, v): return np.empty(2) * v",
     "the time of NumPy": "def f(t, q, v): return np.datetime64('now').astype(float) * v",
     "builtins of its own":
         "g = dict(__builtins__={'abs': lambda x: 2.0})\nexec('def f(t, q, v): return abs(v)', g)\nf = g['f']",
