@@ -167,13 +167,13 @@ def is_state(x: Any, shape: tuple[int] | None) -> bool:
 
 
 def is_moderate(x: np.ndarray, most: float = 1e100) -> bool:
-    """Whether ‖x‖ < most: then x holds neither NaN nor inf, nor numbers whose products overflow."""
+    """Whether ‖x‖ < most: then x holds neither NaN nor inf, nor numbers whose squares overflow."""
     return hypot(*x.tolist()) < most  # faster than any reduction of NumPy at this size, and never warns
 
 
 def is_plain(x: Any, shape: tuple[int] | None) -> bool:
-    """`is_state` and `is_moderate` in one call."""
-    return x.__class__ is np.ndarray and x.dtype is _F8 and x.shape == shape and hypot(*x.tolist()) < 1e100
+    """`is_state`, of numbers so moderate that no answer overflows: terms have at most four of them, as q² v²."""
+    return x.__class__ is np.ndarray and x.dtype is _F8 and x.shape == shape and hypot(*x.tolist()) < 1e50
 
 
 def joint_values(what: str, values: Any, joint_names: Sequence[str], arithmetic: Any = None) -> Any:

@@ -138,3 +138,41 @@ def test_huge_arguments_with_a_finite_answer_are_answered_without_a_warning():
     assert np.isfinite(robot.M(np.full(robot.n, 1.7e308))).all()
     assert np.isfinite(robot.inverse_dynamics(q, v, 1e200 * a)).all()
     assert np.isfinite(robot.forward_dynamics(q, v, 1e200 * a)).all()
+
+
+@pytest.mark.parametrize("follower", [False, True])
+@pytest.mark.parametrize(
+    "name", ["kinetic_energy", "coriolis_torque", "coriolis_transpose", "inverse_dynamics", "regressor"]
+)
+def test_products_of_four_numbers_that_overflow_are_refused(name: str, follower: bool, tmp_path: Path) -> None:
+    """A slide at 4e99 m that turns at 5e99 rad/s: m q² v² is 4e398, as an array, as a list and by `errors`."""
+    body = '<inertial><origin xyz="0.1 0.2 0.3"/><mass value="1"/><inertia ixx="1" iyy="1" izz="1" '
+    body += 'ixy="0" ixz="0" iyz="0"/></inertial>'
+    limits = '<axis xyz="1 0 0"/><limit lower="-1e120" upper="1e120" effort="1" velocity="1"/>'
+    joints = [
+        ("turn", "continuous", "base", "l1", '<axis xyz="0 0 1"/>'),
+        ("tilt", "continuous", "l1", "l2", '<axis xyz="0 1 0"/>'),
+        ("slide", "prismatic", "l2", "l3", limits),
+    ]
+    if follower:
+        tilts = '<axis xyz="0 1 0"/><mimic joint="tilt" multiplier="-1"/>'
+        joints.append(("follow", "continuous", "l1", "l4", tilts))
+    links = [f'<link name="{child}">{body}</link>' for _, _, _, child, _ in joints]
+    text = "".join(
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>{rest}</joint>'
+        for name, kind, parent, child, rest in joints
+    )
+    robot = rd.Robot.from_text(f'<robot name="arm"><link name="base"/>{"".join(links)}{text}</robot>')
+    q, v = np.array([0.3, 0.7, 4.5e99]), np.array([4e99, 5e99, 3e99])
+    given = [q, v, v][: 3 if name in ("inverse_dynamics", "regressor") else 2]
+    for state in (given, [x.tolist() for x in given]):
+        with pytest.raises(OverflowedError):
+            getattr(robot, name)(*state)
+        assert np.isnan(getattr(robot, name)(*state, errors="nan")).all()
+
+
+@pytest.mark.parametrize("name", ["kinetic_energy", "momentum", "jacobian"])
+def test_a_wrong_way_with_errors_is_refused_at_one_state_as_well(name: str) -> None:
+    robot, state = rd.load("ur5"), np.full(6, 0.3)
+    with pytest.raises(rd.RobotDynError, match="errors"):
+        getattr(robot, name)(state, "tool0" if name == "jacobian" else state, errors="nonsense")

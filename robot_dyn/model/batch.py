@@ -70,7 +70,7 @@ def answered(
         result = np.full((len(rows[0]), *shape), arithmetic.number("nan"), dtype=arithmetic.dtype)
         _halved(attempt, rows, result, 0, len(result), batch, errors)
         _at_once(attempt, rows, result, arithmetic)
-    return result.reshape(*batch, *shape)
+    return result.reshape((*batch, *shape))
 
 
 def _at_once(attempt: Callable[..., Array], rows: list[Array], result: Array, arithmetic: Arithmetic) -> None:
