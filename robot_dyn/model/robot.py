@@ -342,16 +342,12 @@ class Robot(Dynamics, Parametrised):
         return self._forward_dynamics(errors, q, v, tau)
 
     def kinetic_energy(self, q: Array, v: Array, *, errors: str = "raise") -> Any:
-        if errors == "raise" and is_plain(q, self._shape) and is_plain(v, self._shape):
-            return kernels.kinetic_energy(self.model, self._scratch.data, q, v)
         return self._ask("kinetic_energy", errors, kernels.kinetic_energy, None, self.model, q, v)
 
     def potential_energy(self, q: Array, *, errors: str = "raise") -> Any:
         return self._ask("potential_energy", errors, pin.computePotentialEnergy, None, self.model, q)
 
     def momentum(self, q: Array, v: Array, *, errors: str = "raise") -> ndarray:
-        if errors == "raise" and is_plain(q, self._shape) and is_plain(v, self._shape):
-            return kernels.momentum(self.model, self._scratch.data, q, v)
         return self._ask("momentum", errors, kernels.momentum, Couplings.torque, self.model, q, v)
 
     @property
@@ -386,8 +382,6 @@ class Robot(Dynamics, Parametrised):
         self, q: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, errors: str = "raise"
     ) -> ndarray:
         kernel = self._kernel(kernels.jacobian, frame, expressed_in)
-        if errors == "raise" and is_plain(q, self._shape):
-            return kernel(self.model, self._scratch.data, q)
         return self._ask("jacobian", errors, kernel, Couplings.columns, self.model, q)
 
     def jacobian_rate(
