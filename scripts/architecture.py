@@ -29,9 +29,9 @@ Place = tuple[float, float]
 DARK, UPWARD, FILL = "#1f3b57", "#c0392b", "#eef3f8"
 WIDTH, HEIGHT = 1.5, 0.5  # of a box; rows are 1 apart
 ACROSS = {  # middles of the boxes, such that no arrow passes behind another box
-    "cli": 0.0, "scene": -2.6, "stress_test": 0.0, "accuracy": 0.0, "doctor": 3.2, "view": 0.0, "proof": 2.2,
-    "simulation": 0.0, "compiled": 0.0, "effects": -3.2, "control": -1.0, "integrate": 3.2, "lagrange": 0.5,
-    "recursive": 2.4, "model": 0.0,
+    "cli": 0.0, "scene": -2.4, "studies": 0.6, "view": 0.6, "simulation": 0.0, "codegen": 0.0,
+    "effects": -3.2, "control": -1.2, "integrate": 3.2, "cross_check": 3.0, "model": 1.4, "lagrange": 1.4,
+    "queries": -0.6, "description": -2.6,
 }  # fmt: skip
 
 

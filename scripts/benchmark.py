@@ -31,7 +31,7 @@ from benchmarks import (
 )
 from benchmarks.measure import Effort
 
-from robot_dyn.accuracy.environment import environment
+from robot_dyn.studies.environment import environment
 
 PICTURES = Path(__file__).parents[1] / "docs" / "pictures"
 SUBJECTS = (

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
-from robot_dyn.model import catalog, description
+from robot_dyn.description import catalog, description
 from robot_dyn.model.robot import Robot
 from robot_dyn.view.geometry.visuals import Drawing, drawing
 

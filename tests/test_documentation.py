@@ -49,7 +49,7 @@ def test_the_index_lists_each_record_once_by_its_title() -> None:
 
 
 def test_files_that_are_named_exist() -> None:
-    """`model/tree.py` is a file of the package, or of the repository."""
+    """`lagrange/tree.py` is a file of the package, or of the repository."""
     pages = [DOCS / "architecture.md", *RECORDS]
     names = [
         (page, each)

@@ -13,7 +13,7 @@ import pinocchio as pin
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.compiled.dynamics import CompiledDynamics
+from robot_dyn.codegen.dynamics import CompiledDynamics
 from robot_dyn.errors import QueryError
 
 ENGINES = (rd.Robot, rd.Lagrangian, CompiledDynamics)

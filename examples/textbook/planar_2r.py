@@ -9,8 +9,8 @@ import casadi as ca
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from robot_dyn.description.solids import box
 from robot_dyn.lagrange.euler_lagrange import euler_lagrange
-from robot_dyn.model.solids import box
 
 m1, m2, l1, l2, g = 2.0, 1.5, 1.0, 0.8, 9.81  # the arm of urdf/planar_2r, in [kg], [m] and [m / s²]
 r1, r2 = l1 / 2, l2 / 2  # where the centres of mass are

@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from robot_dyn.description.solids import cylinder
 from robot_dyn.lagrange.euler_lagrange import euler_lagrange
 from robot_dyn.lagrange.rigid_body import world_acceleration
-from robot_dyn.model.solids import cylinder
 
 m, r, height = 2.0, 0.15, 0.4  # [kg], [m], [m]
 alpha, g = np.radians(25), 9.81  # slope, [m / s²]

@@ -31,18 +31,8 @@ def _run() -> Any:
     """The exit code of the command."""
     import warnings
 
-    from robot_dyn.cli import (  # each adds its commands
-        ask,  # noqa: F401
-        check,  # noqa: F401
-        demo,  # noqa: F401
-        keep,  # noqa: F401
-        price,  # noqa: F401
-        prove,  # noqa: F401
-        run,  # noqa: F401
-        show,  # noqa: F401
-        stress,  # noqa: F401
-    )
     from robot_dyn.cli.app import app
+    from robot_dyn.cli.commands import ask, check, demo, keep, price, prove, run, show, stress  # noqa: F401
     from robot_dyn.cli.terminal import failed, finish, open_streams, tell
     from robot_dyn.errors import RobotDynError, RobotDynWarning
 

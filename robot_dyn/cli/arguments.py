@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from robot_dyn.model.robot import Robot
-    from robot_dyn.simulation.setup import Setup
+    from robot_dyn.simulation.setup.setup import Setup
 
 
 def load(

@@ -7,9 +7,9 @@ from datetime import datetime
 from typing import Any
 
 from robot_dyn.cli.terminal import table
-from robot_dyn.compiled.cache import Store
-from robot_dyn.compiled.dynamics import CompiledDynamics
-from robot_dyn.compiled.trace import QUANTITIES
+from robot_dyn.codegen.dynamics import CompiledDynamics
+from robot_dyn.codegen.store.cache import Store
+from robot_dyn.codegen.trace.trace import QUANTITIES
 from robot_dyn.model.robot import Robot
 
 Document = dict[str, Any]

@@ -15,9 +15,9 @@ from robot_dyn.cli.terminal import say, say_json, tell
 
 def outputs(of: Any, output: str | None, csv: str | None, inputs: Iterable[str], force: bool) -> list[Path]:
     """The paths to write a figure and a table of a class of results to, those that are given."""
-    from robot_dyn.accuracy.save import table_kind
-    from robot_dyn.accuracy.sheet import ResultError
-    from robot_dyn.view.plots import PICTURES
+    from robot_dyn.studies.save import table_kind
+    from robot_dyn.studies.sheet import ResultError
+    from robot_dyn.view.plots.plots import PICTURES
 
     paths = [arguments.output(output, PICTURES, ResultError, inputs, force)] if output else []
     return paths + ([arguments.output(csv, table_kind(of), ResultError, [*inputs, *paths], force)] if csv else [])

@@ -8,9 +8,9 @@ from typing import Any, cast
 
 import numpy as np
 
-from robot_dyn.accuracy.compare import Comparison, compare
 from robot_dyn.cli.terminal import table
 from robot_dyn.coefficients import declared, with_values
+from robot_dyn.cross_check.compare import Comparison, compare
 from robot_dyn.effects.effect import Force
 from robot_dyn.effects.hold import Hold
 from robot_dyn.effects.plant import Plant
@@ -18,12 +18,12 @@ from robot_dyn.errors import QueryError, nearest
 from robot_dyn.lagrange.breakdown import breakdown
 from robot_dyn.lagrange.manipulator import Lagrangian
 from robot_dyn.model.gravity import gravity_acts, no_torque
-from robot_dyn.model.quantity import PLANT, C, M
 from robot_dyn.model.robot import Robot
-from robot_dyn.model.units import in_words, unit, units
-from robot_dyn.simulation.ledger import largest
-from robot_dyn.simulation.state_equation import numbered
-from robot_dyn.simulation.trajectory import Trajectory
+from robot_dyn.queries.quantity import PLANT, C, M
+from robot_dyn.queries.units import in_words, unit, units
+from robot_dyn.simulation.dynamics.state_equation import numbered
+from robot_dyn.simulation.results.ledger import largest
+from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.validate import joint_values
 
 Document = dict[str, Any]

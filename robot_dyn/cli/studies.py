@@ -6,15 +6,15 @@ from collections.abc import Iterator
 from math import isfinite
 from typing import Any
 
-from robot_dyn.accuracy.alternative import Alternative
-from robot_dyn.accuracy.certificate import Certificate, Held
-from robot_dyn.accuracy.cost import Cost
-from robot_dyn.accuracy.ladder import Ladder
-from robot_dyn.accuracy.work_precision import WorkPrecision
 from robot_dyn.cli.terminal import table
-from robot_dyn.simulation.seconds import in_words
-from robot_dyn.stress_test.finding import Judged, Limit, Worst
-from robot_dyn.stress_test.result import Stress
+from robot_dyn.seconds import in_words
+from robot_dyn.studies.certificate.certificate import Certificate, Held
+from robot_dyn.studies.costs.alternative import Alternative
+from robot_dyn.studies.costs.cost import Cost
+from robot_dyn.studies.stress_test.finding import Judged, Limit, Worst
+from robot_dyn.studies.stress_test.result import Stress
+from robot_dyn.studies.work_precision_diagram.ladder import Ladder
+from robot_dyn.studies.work_precision_diagram.work_precision import WorkPrecision
 
 _DIGITS = (3, 6, 9)
 _OWN = "robot_dyn"

@@ -15,7 +15,7 @@ from robot_dyn.control.controller import Stateless, check_model
 from robot_dyn.control.independent_joint import DAMPING, STIFFNESS, joint_count
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.errors import ControlError
-from robot_dyn.model.dynamics import Dynamics
+from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.threshold import smooth
 
 

@@ -17,7 +17,7 @@ from robot_dyn.arithmetic import Array
 from robot_dyn.coefficients import JOINTS, check_coefficients, declared, with_values
 from robot_dyn.control.reference import Reference
 from robot_dyn.errors import ControlError, shown
-from robot_dyn.model.dynamics import Dynamics
+from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.threshold import Threshold
 from robot_dyn.validate import duration
 from robot_dyn.values import Value

@@ -19,7 +19,7 @@ from robot_dyn.control.controller import Stateless, check_model
 from robot_dyn.control.orientation import orientation_error
 from robot_dyn.control.reference import number, numbers
 from robot_dyn.errors import ControlError, shown
-from robot_dyn.model.dynamics import Dynamics, acceleration
+from robot_dyn.queries.dynamics import Dynamics, acceleration
 from robot_dyn.threshold import smooth
 from robot_dyn.values import Value, read_only
 

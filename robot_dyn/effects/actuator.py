@@ -11,7 +11,7 @@ from robot_dyn.arithmetic import Array
 from robot_dyn.coefficients import URDF, coefficient, with_values
 from robot_dyn.effects.effect import Bound, Effect, Stateful
 from robot_dyn.errors import EffectError
-from robot_dyn.model.dynamics import Dynamics
+from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.saturation import limits_reached, middle_of, piece, saturated
 from robot_dyn.threshold import Threshold, smooth
 

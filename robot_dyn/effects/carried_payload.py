@@ -15,9 +15,9 @@ from math import inf
 from typing import Any, final
 
 from robot_dyn.coefficients import coefficient, with_values
+from robot_dyn.description.edits import Payload
 from robot_dyn.effects.effect import Effect
 from robot_dyn.errors import EditError, EffectError
-from robot_dyn.model.edits import Payload
 from robot_dyn.threshold import smooth
 from robot_dyn.validate import instance, truth
 

@@ -17,7 +17,7 @@ from robot_dyn.arithmetic import Array
 from robot_dyn.coefficients import coefficient
 from robot_dyn.effects.effect import Dissipative, Stateful
 from robot_dyn.effects.lugre import reversals
-from robot_dyn.model.dynamics import Dynamics
+from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.threshold import Threshold
 
 _SLOW = 1e-6  # of the deflection f_c/σ, in a second: where a joint moves to and fro more slowly, no digit depends on it

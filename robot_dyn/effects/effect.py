@@ -18,7 +18,7 @@ import numpy as np
 from robot_dyn.arithmetic import Array
 from robot_dyn.coefficients import check_coefficients, declared
 from robot_dyn.errors import EffectError
-from robot_dyn.model.dynamics import Dynamics
+from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.threshold import Threshold
 from robot_dyn.values import Value
 

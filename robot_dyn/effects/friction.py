@@ -11,7 +11,7 @@ import numpy as np
 from robot_dyn.arithmetic import Array, tanh
 from robot_dyn.coefficients import coefficient
 from robot_dyn.effects.effect import Dissipative
-from robot_dyn.model.dynamics import Dynamics
+from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.threshold import smooth
 
 

@@ -17,7 +17,7 @@ from robot_dyn.arithmetic import Array, positive_part
 from robot_dyn.coefficients import coefficient, with_values
 from robot_dyn.effects.effect import Conservative, Dissipative
 from robot_dyn.errors import EffectError
-from robot_dyn.model.dynamics import Dynamics
+from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.threshold import Threshold
 
 _NOWHERE = 1e9  # a stop that does not exist: no depth can be reached there

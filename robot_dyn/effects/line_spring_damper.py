@@ -16,7 +16,7 @@ from robot_dyn.arithmetic import Array, apply, sqrt, transpose
 from robot_dyn.coefficients import coefficient
 from robot_dyn.effects.effect import Conservative, Dissipative, Effect
 from robot_dyn.errors import EffectError, QueryError
-from robot_dyn.model.dynamics import Dynamics
+from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.spatial import hat
 from robot_dyn.threshold import smooth
 from robot_dyn.validate import instance

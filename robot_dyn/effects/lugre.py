@@ -18,7 +18,7 @@ from robot_dyn.arithmetic import Array
 from robot_dyn.coefficients import coefficient
 from robot_dyn.effects.effect import Active, Stateful
 from robot_dyn.errors import EffectError
-from robot_dyn.model.dynamics import Dynamics
+from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.threshold import Threshold
 
 _SLOW = 1e-6  # of v_s: where a joint moves to and fro more slowly, the bend matters to no digit

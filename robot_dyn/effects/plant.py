@@ -18,7 +18,7 @@ from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFricti
 from robot_dyn.effects.hold import Hold, held
 from robot_dyn.effects.set_valued import Mode, SetValued
 from robot_dyn.errors import EffectError, OverflowedError, QueryError, shown
-from robot_dyn.model.dynamics import Dynamics
+from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.validate import check_batches, is_moderate, is_plain, joint_values, number
 
 

@@ -19,7 +19,7 @@ from robot_dyn.coefficients import coefficient, with_values
 from robot_dyn.effects.effect import Drive
 from robot_dyn.effects.set_valued import Interval, Mode, SetValued
 from robot_dyn.errors import EffectError
-from robot_dyn.model.dynamics import Dynamics
+from robot_dyn.queries.dynamics import Dynamics
 
 
 @final

@@ -12,7 +12,7 @@ from robot_dyn.arithmetic import Array
 from robot_dyn.coefficients import coefficient, with_values
 from robot_dyn.effects.set_valued import Interval, Mode, SetValued
 from robot_dyn.errors import EffectError
-from robot_dyn.model.dynamics import Dynamics
+from robot_dyn.queries.dynamics import Dynamics
 
 _NEAR = 4e-15  # of a stop, or in its unit: as close as rounding leaves an event
 

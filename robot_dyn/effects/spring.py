@@ -8,7 +8,7 @@ from typing import Any, final
 from robot_dyn.arithmetic import Array
 from robot_dyn.coefficients import coefficient
 from robot_dyn.effects.effect import Conservative
-from robot_dyn.model.dynamics import Dynamics
+from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.threshold import smooth
 
 

@@ -13,7 +13,7 @@ from robot_dyn.arithmetic import apply as times
 from robot_dyn.coefficients import coefficient
 from robot_dyn.effects.effect import Active
 from robot_dyn.errors import EffectError, QueryError
-from robot_dyn.model.dynamics import Axes, Dynamics
+from robot_dyn.queries.dynamics import Axes, Dynamics
 from robot_dyn.threshold import smooth
 from robot_dyn.validate import instance, rows
 

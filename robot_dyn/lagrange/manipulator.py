@@ -23,8 +23,12 @@ from robot_dyn.arithmetic import (
     in_arithmetic,
     transpose,
 )
+from robot_dyn.description.description import Description
+from robot_dyn.description.inertial_parameters import NAMES as PARAMETERS
+from robot_dyn.description.inertial_parameters import Parametrised, parameters
 from robot_dyn.errors import QueryError, shown
 from robot_dyn.lagrange.christoffel import jacobian_derivative
+from robot_dyn.lagrange.linkage import BASE, Configuration, Linkage, linkage
 from robot_dyn.lagrange.summand import (
     coriolis_matrix,
     gravity_torque,
@@ -33,14 +37,10 @@ from robot_dyn.lagrange.summand import (
     of_bodies,
     regressor,
 )
-from robot_dyn.model.batch import answered
-from robot_dyn.model.description import Description
-from robot_dyn.model.dynamics import Axes, Dynamics, acceleration, entry
-from robot_dyn.model.inertial_parameters import NAMES as PARAMETERS
-from robot_dyn.model.inertial_parameters import Parametrised, parameters
-from robot_dyn.model.linkage import BASE, Configuration, Linkage, linkage
-from robot_dyn.model.quantity import ALL
-from robot_dyn.model.tree import Described, tree
+from robot_dyn.lagrange.tree import Described, tree
+from robot_dyn.queries.batch import answered
+from robot_dyn.queries.dynamics import Axes, Dynamics, acceleration, entry
+from robot_dyn.queries.quantity import ALL
 from robot_dyn.spatial import adjoint, adjoint_inverse, block_diagonal, bracket, first_moment, hat, homogeneous
 from robot_dyn.validate import shaped
 

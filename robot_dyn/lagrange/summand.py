@@ -15,9 +15,9 @@ from typing import final
 import numpy as np
 
 from robot_dyn.arithmetic import Array, apply, transpose
+from robot_dyn.description.inertial_parameters import unit_inertias
 from robot_dyn.lagrange.christoffel import christoffel, inertia_derivative
-from robot_dyn.model.inertial_parameters import unit_inertias
-from robot_dyn.model.linkage import BASE, Configuration
+from robot_dyn.lagrange.linkage import BASE, Configuration
 
 
 @final

@@ -1,1 +1,1 @@
-"""What the robot is: a checked description, and the dynamics that follow from it."""
+"""The thin layer over Pinocchio: Robot gives M, C, N, inverse and forward dynamics by CRBA, RNEA and ABA."""

@@ -20,7 +20,7 @@ import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy import ndarray
 
-from robot_dyn.model.couplings import Couplings
+from robot_dyn.description.couplings import Couplings
 from robot_dyn.model.regrouped import regrouped, rounding, slides
 from robot_dyn.spatial import bracket, first_moment, hat
 

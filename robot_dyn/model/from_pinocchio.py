@@ -13,10 +13,10 @@ import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
+from robot_dyn.description.description import check
+from robot_dyn.description.urdf import UNBOUNDED
 from robot_dyn.errors import DescriptionError, shorten
-from robot_dyn.model.description import check
 from robot_dyn.model.robot import Robot
-from robot_dyn.model.urdf import UNBOUNDED
 
 _KINDS = {
     f"JointModel{prefix}{axis}": kind

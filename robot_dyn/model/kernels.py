@@ -13,10 +13,10 @@ import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy import ndarray
 
+from robot_dyn.description.couplings import Couplings
 from robot_dyn.model.coriolis import Coriolis
 from robot_dyn.model.coriolis import jacobian_rate as rate_of
-from robot_dyn.model.couplings import Couplings
-from robot_dyn.model.dynamics import Axes
+from robot_dyn.queries.dynamics import Axes
 from robot_dyn.spatial import hat
 
 Kernel = Callable[..., Any]  # (model or Coriolis, data, q, …) → a fresh array, or a number

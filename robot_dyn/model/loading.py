@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from robot_dyn.model import catalog
-from robot_dyn.model.description import check, read
-from robot_dyn.model.packages import searched
+from robot_dyn.description import catalog
+from robot_dyn.description.description import check, read
+from robot_dyn.description.packages import searched
 from robot_dyn.model.robot import Robot
 
 
@@ -38,7 +38,7 @@ def load(
     if xacro is None:
         description = read(path)
     else:
-        from robot_dyn.model.xacro import expand
+        from robot_dyn.description.xacro import expand
 
         text, said = expand(path, xacro, package_dirs)
         description = check(text, source=str(path), findings=said)

@@ -10,12 +10,12 @@ import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 from robot_dyn.arithmetic import FLOAT64
+from robot_dyn.description.couplings import Couplings, Mimic, resolve
+from robot_dyn.description.description import Description
+from robot_dyn.description.edits import Edits
+from robot_dyn.description.structure import stated_mimics
+from robot_dyn.description.urdf import UNBOUNDED
 from robot_dyn.errors import DescriptionError, EditError, nearest
-from robot_dyn.model.couplings import Couplings, Mimic, resolve
-from robot_dyn.model.description import Description
-from robot_dyn.model.edits import Edits
-from robot_dyn.model.structure import stated_mimics
-from robot_dyn.model.urdf import UNBOUNDED
 
 MAX_MOVING = 250  # Pinocchio's scratch memory for n joints has 63 n³ bytes: 1 GB
 _MARK = "joint:"  # while Pinocchio works by name: a joint may share its name with a link, or be called "universe"

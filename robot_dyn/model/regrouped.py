@@ -23,8 +23,8 @@ import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy import ndarray
 from numpy.linalg import norm
 
-from robot_dyn.model.couplings import Couplings
-from robot_dyn.model.urdf import UNBOUNDED
+from robot_dyn.description.couplings import Couplings
+from robot_dyn.description.urdf import UNBOUNDED
 
 
 def regrouped(model: Any) -> Any:

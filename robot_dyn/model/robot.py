@@ -17,6 +17,12 @@ import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy import ndarray
 
+from robot_dyn.description.couplings import Couplings
+from robot_dyn.description.description import Description, check
+from robot_dyn.description.edits import Changes, Edits
+from robot_dyn.description.inertial_parameters import NAMES as PARAMETERS
+from robot_dyn.description.inertial_parameters import Parametrised, ordered
+from robot_dyn.description.structure import structure
 from robot_dyn.errors import (
     DescriptionError,
     EditError,
@@ -27,20 +33,15 @@ from robot_dyn.errors import (
     UndecidedError,
     announce,
 )
-from robot_dyn.model import doctor, kernels, pinocchio_model
-from robot_dyn.model.batch import answered
+from robot_dyn.model import findings as doctor
+from robot_dyn.model import kernels, pinocchio_model
 from robot_dyn.model.conditioning import LEAST_DIGITS, NearlySingular, nearly_singular
 from robot_dyn.model.coriolis import Coriolis
-from robot_dyn.model.couplings import Couplings
-from robot_dyn.model.description import Description, check
-from robot_dyn.model.dynamics import Array, Axes, Dynamics, acceleration, entry
-from robot_dyn.model.edits import Changes, Edits
 from robot_dyn.model.gravity import gravity_acts, no_torque
-from robot_dyn.model.inertial_parameters import NAMES as PARAMETERS
-from robot_dyn.model.inertial_parameters import Parametrised, ordered
 from robot_dyn.model.kernels import Kernel, Reduction, Scratch, frozen
-from robot_dyn.model.quantity import ALL, DOUBTFUL, MOST_DIGITS
-from robot_dyn.model.structure import structure
+from robot_dyn.queries.batch import answered
+from robot_dyn.queries.dynamics import Array, Axes, Dynamics, acceleration, entry
+from robot_dyn.queries.quantity import ALL, DOUBTFUL, MOST_DIGITS
 from robot_dyn.validate import instance, is_moderate, is_plain, is_state, number, shaped
 
 
@@ -150,7 +151,7 @@ class Robot(Dynamics, Parametrised):
             QueryError: If there is no such quantity, or an argument is wrong.
             SingularError: Of forward dynamics where M is singular; names the joint.
         """
-        from robot_dyn.accuracy.digits import digits  # the one import upward: who asks holds a Robot
+        from robot_dyn.lagrange.digits import digits  # the one import upward: who asks holds a Robot
 
         return digits(self, quantity, state)
 
@@ -484,7 +485,7 @@ class Robot(Dynamics, Parametrised):
         arrays = {name: shaped(name, x, self.joint_names) for name, x in state.items()}
         answer = answered(equation, arrays, ALL[quantity].shape(self.sizes), self.joint_names, errors)
         if self.least_digits is not None:
-            from robot_dyn.accuracy.digits import doubt
+            from robot_dyn.lagrange.digits import doubt
 
             if said := doubt(self, quantity, arrays, answer, self.least_digits):
                 warnings.warn(said, PrecisionWarning, stacklevel=4)

@@ -11,9 +11,9 @@ from robot_dyn.coefficients import URDF
 from robot_dyn.control.cartesian import CartesianReference, circle, line
 from robot_dyn.control.computed_torque import ComputedTorque, FeedForward, PDGravity
 from robot_dyn.control.controller import Controller
+from robot_dyn.control.digital_loop.loop import LINES, Loop
+from robot_dyn.control.digital_loop.multirate import Multirate
 from robot_dyn.control.independent_joint import PD, PID, gains_from
-from robot_dyn.control.loop import LINES, Loop
-from robot_dyn.control.multirate import Multirate
 from robot_dyn.control.operational_space import OperationalSpace
 from robot_dyn.control.reference import PiecewisePolynomial, hold, numbers, quintic, via_points
 from robot_dyn.control.samples import Samples, read_table

@@ -7,6 +7,7 @@ from typing import Annotated, Literal, Union, get_args
 
 from pydantic import Field
 
+from robot_dyn.description.edits import STANDARD_GRAVITY, Payload
 from robot_dyn.effects.actuator import ActuatorLag, EffortLimit
 from robot_dyn.effects.carried_payload import CarriedPayload
 from robot_dyn.effects.dahl import DahlFriction
@@ -22,7 +23,6 @@ from robot_dyn.effects.series_elastic import SeriesElastic
 from robot_dyn.effects.spring import Spring
 from robot_dyn.effects.wrench import ExternalWrench
 from robot_dyn.errors import SceneError
-from robot_dyn.model.edits import STANDARD_GRAVITY, Payload
 from robot_dyn.model.robot import Robot
 from robot_dyn.scene.declared import Acting, declared_part
 from robot_dyn.scene.schema import NotNegative, Number, Part, PerJoint, Positive, Vector3, per_joint

@@ -8,21 +8,21 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.control.loop import LINES
+from robot_dyn.control.digital_loop.loop import LINES
 from robot_dyn.effects.actuator import ActuatorLag, EffortLimit
 from robot_dyn.effects.effect import Effect
 from robot_dyn.errors import RobotDynError
 from robot_dyn.integrate.adaptive import ADAPTIVE
-from robot_dyn.model.units import in_words
+from robot_dyn.queries.units import in_words
 from robot_dyn.scene.control import LAWS, Control
 from robot_dyn.scene.declared import Acting, Declared
 from robot_dyn.scene.effects import ACTING, Carried, kind_of
 from robot_dyn.scene.loop import BLOCKS
 from robot_dyn.scene.scene import Scene
 from robot_dyn.scene.schema import Part
-from robot_dyn.simulation.origin import edits_of_machine_code
-from robot_dyn.simulation.setup import Setup
-from robot_dyn.simulation.state_equation import StateEquation
+from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.results.origin import edits_of_machine_code
+from robot_dyn.simulation.setup.setup import Setup
 
 _TERMS = {kind_of(part): part.term for part in ACTING}
 _BOUNDS = [kind_of(part) for part in ACTING if issubclass(part, Declared) and part.make in (EffortLimit, ActuatorLag)]
@@ -93,7 +93,7 @@ def explain(scene: Scene, setup: Setup) -> Iterator[str]:
 
 def _machine_code(setup: Setup) -> Iterator[str]:
     """What the compiled right-hand side costs, by effect."""
-    from robot_dyn.compiled.plant import Compiled
+    from robot_dyn.codegen.plant import Compiled
 
     try:
         compiled: Any = Compiled(StateEquation(setup.plant, None).in_a_mode.plant)
@@ -112,7 +112,7 @@ def _machine_code(setup: Setup) -> Iterator[str]:
 
 def _of_tick(control: Control, setup: Setup) -> Iterator[str]:
     """What a tick costs, and what of it are the loop and the slow controller."""
-    from robot_dyn.simulation.machine.making import machine
+    from robot_dyn.simulation.compiled.making import machine
 
     controller: Any = setup.controller
     inside: Any = controller.controller if control.loops else controller

@@ -26,7 +26,7 @@ from robot_dyn.scene.declared import Acting
 from robot_dyn.scene.effects import AnyEffect, Edit, kinds
 from robot_dyn.scene.own_effects import Makers, OwnEffect, check_makers, own_or
 from robot_dyn.scene.schema import NotNegative, Part, PerJoint, PlacedError, Positive, Truth, per_joint, placed
-from robot_dyn.simulation.setup import STEP_S, Setup
+from robot_dyn.simulation.setup.setup import STEP_S, Setup
 
 MAX_BYTES = 2**20
 SCENE = Kind("a scene", ".toml")

@@ -10,8 +10,8 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from robot_dyn.coefficients import URDF
+from robot_dyn.description.edits import by_joint
 from robot_dyn.errors import RobotDynError
-from robot_dyn.model.edits import by_joint
 from robot_dyn.model.robot import Robot
 
 

@@ -15,30 +15,31 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
 from robot_dyn.effects.plant import Plant
 from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, STIFF
 from robot_dyn.integrate.time_stepping import TimeStepping
-from robot_dyn.model.dynamics import Dynamics
-from robot_dyn.simulation.accuracy import run_to
-from robot_dyn.simulation.choice import choose, most_interpreted
-from robot_dyn.simulation.declarations import named
-from robot_dyn.simulation.error import ErrorEstimate, no_estimate
-from robot_dyn.simulation.estimate import estimate
-from robot_dyn.simulation.event_run import TooLongError
-from robot_dyn.simulation.observed import observer_of
-from robot_dyn.simulation.observer import Observer
-from robot_dyn.simulation.options import Options, setup_of, starts, takes_options
-from robot_dyn.simulation.prepared import prepared
-from robot_dyn.simulation.record import Record
-from robot_dyn.simulation.remarks import Remark
-from robot_dyn.simulation.results import Results
-from robot_dyn.simulation.setup import Setup
-from robot_dyn.simulation.size import check_record
-from robot_dyn.simulation.stiffness import StiffError
-from robot_dyn.simulation.switched_run import AccumulationError
-from robot_dyn.simulation.trajectory import Ending, Outcome, Statistics, Trajectory
+from robot_dyn.queries.dynamics import Dynamics
+from robot_dyn.simulation.compiled.choice import choose, most_interpreted
+from robot_dyn.simulation.diagnostics.observed import observer_of
+from robot_dyn.simulation.dynamics.declarations import named
+from robot_dyn.simulation.estimate.accuracy import run_to
+from robot_dyn.simulation.estimate.estimate import estimate
+from robot_dyn.simulation.observation.observer import Observer
+from robot_dyn.simulation.observation.remarks import Remark
+from robot_dyn.simulation.results.error import ErrorEstimate, no_estimate
+from robot_dyn.simulation.results.trajectory import Statistics, Trajectory
+from robot_dyn.simulation.results_of_run import Results
+from robot_dyn.simulation.run.event_run import TooLongError
+from robot_dyn.simulation.run.outcome import Ending, Outcome
+from robot_dyn.simulation.run.prepared import prepared
+from robot_dyn.simulation.run.record import Record
+from robot_dyn.simulation.run.stiffness import StiffError
+from robot_dyn.simulation.run.switched_run import AccumulationError
+from robot_dyn.simulation.setup.options import Options, setup_of, starts, takes_options
+from robot_dyn.simulation.setup.setup import Setup
+from robot_dyn.simulation.setup.size import check_record
 from robot_dyn.validate import function
 from robot_dyn.values import derived, kept
 
 if TYPE_CHECKING:
-    from robot_dyn.simulation.machine.machine import Machine
+    from robot_dyn.simulation.compiled.machine import Machine
 
 
 @takes_options
@@ -186,6 +187,6 @@ def _spent_on_loops(machine: Machine | None) -> float:
     """On the clock of what is compiled in the first call of a loop, which is no time of the run."""
     if machine is None:
         return 0.0
-    from robot_dyn.compiled.loops.call import spent_on_loops
+    from robot_dyn.codegen.loops.call import spent_on_loops
 
     return spent_on_loops()

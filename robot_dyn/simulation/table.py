@@ -11,11 +11,11 @@ import numpy as np
 
 from robot_dyn.errors import shown
 from robot_dyn.files import Kind, save, target
-from robot_dyn.model.units import unit
-from robot_dyn.simulation.origin import joint_types
-from robot_dyn.simulation.rollout_result import Rollouts
-from robot_dyn.simulation.run_file import RunFileError
-from robot_dyn.simulation.trajectory import Trajectory
+from robot_dyn.queries.units import unit
+from robot_dyn.simulation.results.origin import joint_types
+from robot_dyn.simulation.results.run_file import RunFileError
+from robot_dyn.simulation.results.trajectory import Trajectory
+from robot_dyn.simulation.rollouts.rollout_result import Rollouts
 
 TABLE = Kind("a table of a run", ".csv", b"t [s]")
 RUNS = Kind("a table of runs", ".csv", b"run,")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from robot_dyn.simulation.trajectory import Trajectory
+from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.view import commands
 from robot_dyn.view.geometry.shapes import arrow
 from robot_dyn.view.keyframes import corners

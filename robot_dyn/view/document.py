@@ -12,11 +12,11 @@ from typing import Any, final
 
 import numpy as np
 
+from robot_dyn.description.packages import searched
 from robot_dyn.errors import QueryError, RobotDynError
-from robot_dyn.model.packages import searched
-from robot_dyn.simulation.origin import robot_of
-from robot_dyn.simulation.remarks import lines
-from robot_dyn.simulation.trajectory import Trajectory
+from robot_dyn.simulation.observation.remarks import lines
+from robot_dyn.simulation.results.origin import robot_of
+from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.spatial import homogeneous
 from robot_dyn.validate import instance, truth
 from robot_dyn.view import commands
@@ -24,10 +24,10 @@ from robot_dyn.view.arrows import arrows
 from robot_dyn.view.geometry.visuals import Drawing, drawing
 from robot_dyn.view.keyframes import Keyframes, keyframes
 from robot_dyn.view.overlays import GHOST, Overlays, overlays
-from robot_dyn.view.price import price
+from robot_dyn.view.plots.price import price
+from robot_dyn.view.plots.series import plots
 from robot_dyn.view.rests import rests
 from robot_dyn.view.scenery import gravity_arrow, gravity_label, ground, scenery, turned, upright
-from robot_dyn.view.series import plots
 from robot_dyn.view.stage import Stage
 
 _MOST_EVENTS = 200  # of a run

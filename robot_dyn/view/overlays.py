@@ -11,7 +11,7 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.simulation.trajectory import Trajectory
+from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.spatial import first_moment
 from robot_dyn.view import commands
 from robot_dyn.view.commands import Command

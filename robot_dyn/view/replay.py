@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 from robot_dyn.errors import ModelWarning
 from robot_dyn.files import Kind, save, target
-from robot_dyn.model.dynamics import Array
 from robot_dyn.model.robot import Robot
-from robot_dyn.simulation.trajectory import Trajectory
+from robot_dyn.queries.dynamics import Array
+from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.validate import integer
 from robot_dyn.view.document import ReplayError, document
 from robot_dyn.view.page import page
 from robot_dyn.view.still import still
 
 if TYPE_CHECKING:
-    from robot_dyn.view.server import Server
+    from robot_dyn.view.live.server import Server
 
 PAGE = Kind("a page", ".html", b"<!DOCTYPE html>")
 
@@ -121,7 +121,7 @@ def _free(port: int | None) -> int | None:
 
 
 def _served(made: dict[str, Any], port: int | None) -> Server:
-    from robot_dyn.view.server import Server  # takes zmq and tornado along
+    from robot_dyn.view.live.server import Server  # takes zmq and tornado along
 
     _tell(made)
     drawn = made.pop("commands")

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robot_dyn.simulation.trajectory import Trajectory
+from robot_dyn.simulation.results.trajectory import Trajectory
 
 _HOLD = {"dry_friction", "rigid_stops"}  # among the names of what acts
 _MOST = 200  # of a joint

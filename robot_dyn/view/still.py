@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from robot_dyn.description.packages import searched
 from robot_dyn.errors import QueryError, shorten
-from robot_dyn.model.dynamics import Array
-from robot_dyn.model.packages import searched
 from robot_dyn.model.robot import Robot
+from robot_dyn.queries.dynamics import Array
 from robot_dyn.spatial import homogeneous
 from robot_dyn.validate import instance, one_state, truth
 from robot_dyn.view import commands

@@ -142,7 +142,7 @@ def threads(effort: Effort) -> None:
 
 _FIRST = """
 import time, numpy as np, casadi, llvmlite.binding, pinocchio, robot_dyn as rd
-import robot_dyn.compiled.dynamics, robot_dyn.compiled.plant
+import robot_dyn.codegen.dynamics, robot_dyn.codegen.plant
 arm = rd.load("panda").with_(lock={"panda_finger_joint1": 0.0})
 q = np.linspace(-0.5, 0.6, 7)
 arm.forward_dynamics(q, q, q)

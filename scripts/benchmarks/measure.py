@@ -9,7 +9,7 @@ from timeit import timeit
 from typing import final
 
 import robot_dyn as rd
-from robot_dyn.accuracy.timing import in_turns
+from robot_dyn.studies.timing import in_turns
 
 BATCH = 4096
 

@@ -14,16 +14,16 @@ import numpy as np
 
 import robot_dyn as rd
 from benchmarks.measure import Effort, arms, row, table
-from robot_dyn.compiled.right_angles import completed
+from robot_dyn.codegen.trace.right_angles import completed
 from robot_dyn.integrate.methods import method
-from robot_dyn.simulation.fixed_step import FixedStep
-from robot_dyn.simulation.machine.batch import LANES, Batch
-from robot_dyn.simulation.machine.machine import Machine
-from robot_dyn.simulation.machine.making import machine, machine_of_constants
-from robot_dyn.simulation.size import MOST_BYTES
-from robot_dyn.simulation.state_equation import StateEquation
-from robot_dyn.simulation.transfers import Transfers
-from robot_dyn.simulation.watch import Watch
+from robot_dyn.simulation.compiled.machine import Machine
+from robot_dyn.simulation.compiled.making import machine, machine_of_constants
+from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.events.transfers import Transfers
+from robot_dyn.simulation.rollouts.batch import LANES, Batch
+from robot_dyn.simulation.run.fixed_step import FixedStep
+from robot_dyn.simulation.run.watch import Watch
+from robot_dyn.simulation.setup.size import MOST_BYTES
 
 READY = np.array([0.3, 0.6, -0.4, -1.2, 0.5, 1.1, 0.2])
 

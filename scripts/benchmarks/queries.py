@@ -15,7 +15,7 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 import robot_dyn as rd
 from benchmarks.measure import BATCH, Effort, alternate, arms, lowest, row, table
-from robot_dyn.model.quantity import ALL
+from robot_dyn.queries.quantity import ALL
 
 Sides = dict[str, tuple[str, Callable[[], object], Callable[[], object]]]  # what is called bare, and both calls
 

@@ -14,7 +14,7 @@ import numpy as np
 
 import robot_dyn as rd
 from benchmarks.measure import BATCH, Effort, arms, row, table
-from robot_dyn.accuracy.peers.mujoco import STEP_S, mujoco_model
+from robot_dyn.studies.work_precision_diagram.peers.mujoco import STEP_S, mujoco_model
 
 mujoco: Any = import_module("mujoco")
 mujoco_rollout: Any = import_module("mujoco.rollout")

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.compiled.parameters import with_parameters
-from robot_dyn.simulation.observed import KINDS
-from robot_dyn.simulation.remarks import Kind, Remark
+from robot_dyn.codegen.parameters import with_parameters
+from robot_dyn.simulation.diagnostics.observed import KINDS
+from robot_dyn.simulation.observation.remarks import Kind, Remark
 from tests.batches.scenes import Batch, batch
 
 UNITS = 8  # of rounding, by which a start is pushed

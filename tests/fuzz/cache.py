@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from robot_dyn.compiled.cache import Store, key
+from robot_dyn.codegen.store.cache import Store, key
 from tests.fuzz.bytes import damage
 
 PAYLOADS = {key("kernel", str(i)): bytes(range(200)) * (1 + 5 * i) for i in range(3)}

@@ -19,11 +19,11 @@ import numpy as np
 import robot_dyn as rd
 from robot_dyn.errors import RobotDynError
 from robot_dyn.scene.starters import starter
-from robot_dyn.simulation import archive
-from robot_dyn.simulation.origin import robot_of
+from robot_dyn.simulation.results import archive
+from robot_dyn.simulation.results.origin import robot_of
 from robot_dyn.simulation.table import export_csv
 from robot_dyn.view.document import document
-from robot_dyn.view.plots import PLOTS, PlotError, _view
+from robot_dyn.view.plots.plots import PLOTS, PlotError, _view
 from tests.fuzz.bytes import WORDS, damage
 
 ODD = [None, True, -1, 0.5, 10**400, float("nan"), "", "x", "\ud800", "\x1b[31m", [], {}, [[]], {"a": 1}]

@@ -12,8 +12,8 @@ import numpy as np
 from lxml import etree
 
 import robot_dyn as rd
-from robot_dyn.doctor.literals import NUMBERS as NUMBERS_OF
 from robot_dyn.errors import OverflowedError, SingularError
+from robot_dyn.studies.doctor.literals import NUMBERS as NUMBERS_OF
 from robot_dyn.view.geometry.visuals import drawing
 from tests.broken_files import SOUND
 from tests.fuzz.bytes import damage, damage_text

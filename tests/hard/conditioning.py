@@ -30,7 +30,7 @@ from robot_dyn.lagrange.scale import (
     scaled,
     unit_diagonal_condition,
 )
-from robot_dyn.model.quantity import CORIOLIS_TORQUE, FORWARD_DYNAMICS, INVERSE_DYNAMICS, C, M, N, Quantity
+from robot_dyn.queries.quantity import CORIOLIS_TORQUE, FORWARD_DYNAMICS, INVERSE_DYNAMICS, C, M, N, Quantity
 from tests.hard.case import Case, Row
 from tests.hard.chains import CHAINS, FOLDER, LONG, file_of
 

@@ -16,11 +16,11 @@ import numpy as np
 
 import robot_dyn as rd
 from robot_dyn.arithmetic import midpoint
-from robot_dyn.compiled.right_angles import completed
+from robot_dyn.codegen.trace.right_angles import completed
 from robot_dyn.errors import NotFiniteError, RobotDynError
 from robot_dyn.lagrange.magnitude import magnitudes
 from robot_dyn.lagrange.scale import diagonal_scale, floored, scaled
-from robot_dyn.model.quantity import INVERSE_DYNAMICS, M, N, Quantity
+from robot_dyn.queries.quantity import INVERSE_DYNAMICS, M, N, Quantity
 from tests.hard.case import Case, Row
 from tests.hard.conditioning import SUMS, U
 

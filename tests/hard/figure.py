@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from robot_dyn.accuracy.sheet import styled
-from robot_dyn.view.figure import THEMES
+from robot_dyn.studies.sheet import styled
+from robot_dyn.view.plots.figure import THEMES
 from tests.hard.case import Row
 
 LEAST, MOST = 1e-6, 1e3  # what lies beyond is drawn at the edge

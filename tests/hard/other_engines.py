@@ -13,8 +13,8 @@ import numpy as np
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 import robot_dyn as rd
-from robot_dyn.accuracy.peers.free_motion import PeerError, bare_urdf
-from robot_dyn.accuracy.peers.mujoco import mujoco_model
+from robot_dyn.studies.work_precision_diagram.peers.free_motion import PeerError, bare_urdf
+from robot_dyn.studies.work_precision_diagram.peers.mujoco import mujoco_model
 
 
 class MuJoCo:

@@ -11,7 +11,7 @@ from inspect import cleandoc
 from pathlib import Path
 from typing import final
 
-from robot_dyn.accuracy.environment import environment
+from robot_dyn.studies.environment import environment
 from tests.hard.case import Row
 from tests.hard.families import FAMILIES
 from tests.hard.figure import save

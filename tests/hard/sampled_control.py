@@ -19,8 +19,8 @@ from functools import partial
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.simulation.remarks import Kind, lines
-from robot_dyn.simulation.sampled_loop import linearised
+from robot_dyn.simulation.dynamics.sampled_loop import linearised
+from robot_dyn.simulation.observation.remarks import Kind, lines
 from tests.hard.case import Case, Row
 from tests.loops import growth
 

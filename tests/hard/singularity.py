@@ -23,7 +23,7 @@ import robot_dyn as rd
 from robot_dyn.control.cartesian import CartesianReference, line
 from robot_dyn.control.operational_space import POSE, POSITION
 from robot_dyn.control.orientation import orientation_error
-from robot_dyn.simulation.remarks import Kind, lines
+from robot_dyn.simulation.observation.remarks import Kind, lines
 from robot_dyn.spatial import rotation
 from tests.hard.case import Case, Row
 

@@ -21,7 +21,7 @@ from functools import partial
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.compiled.right_angles import completed
+from robot_dyn.codegen.trace.right_angles import completed
 from robot_dyn.lagrange.magnitude import magnitudes
 from robot_dyn.lagrange.scale import (
     acceleration_norm,
@@ -31,7 +31,7 @@ from robot_dyn.lagrange.scale import (
     scaled,
     unit_diagonal_condition,
 )
-from robot_dyn.model.quantity import CORIOLIS_TORQUE, FORWARD_DYNAMICS, INVERSE_DYNAMICS, C, M, N, Quantity
+from robot_dyn.queries.quantity import CORIOLIS_TORQUE, FORWARD_DYNAMICS, INVERSE_DYNAMICS, C, M, N, Quantity
 from tests.hard.case import Case, Row
 from tests.hard.conditioning import U
 

@@ -17,9 +17,9 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import robot_dyn as rd
-from robot_dyn.compiled.right_angles import completed
+from robot_dyn.codegen.trace.right_angles import completed
 from robot_dyn.errors import RobotDynError
-from robot_dyn.model.quantity import FORWARD_DYNAMICS, M, N
+from robot_dyn.queries.quantity import FORWARD_DYNAMICS, M, N
 from tests.estimates.truth import truth
 from tests.hard import conditioning, far_out, sampled_control, tools
 from tests.hard.case import Case, Row

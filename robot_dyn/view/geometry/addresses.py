@@ -9,8 +9,8 @@ from itertools import islice
 from pathlib import Path
 from urllib.parse import unquote
 
+from robot_dyn.description import catalog
 from robot_dyn.errors import CatalogError, shorten
-from robot_dyn.model import catalog
 from robot_dyn.view.geometry.mesh_files import MeshError
 
 _LEVELS = 4  # of folders above a URDF that may be its package, as in package/robots/arm/urdf

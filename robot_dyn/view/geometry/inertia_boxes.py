@@ -2,7 +2,7 @@
 
     l_x² = 6 (I_y + I_z − I_x) / m        the uniform box of mass m with principal moments I
 
-[the moments of `robot_dyn.model.solids.box`, solved for its edges]
+[the moments of `robot_dyn.description.solids.box`, solved for its edges]
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy import ndarray
 
-from robot_dyn.model.inertia import implausibility
+from robot_dyn.description.inertia import implausibility
 from robot_dyn.model.robot import Robot
 from robot_dyn.spatial import homogeneous
 from robot_dyn.view.geometry.shapes import box, ellipsoid

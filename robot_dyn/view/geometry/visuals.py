@@ -16,8 +16,8 @@ from typing import Any, TypeVar, final
 import numpy as np
 from numpy import ndarray
 
+from robot_dyn.description.markup import parse
 from robot_dyn.errors import shorten
-from robot_dyn.model.markup import parse
 from robot_dyn.model.robot import Robot
 from robot_dyn.spatial import homogeneous, rotation_rpy
 from robot_dyn.view.geometry import mesh_files, meshes

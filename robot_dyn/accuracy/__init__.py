@@ -1,1 +1,0 @@
-"""How far the numbers can be believed."""

@@ -1,0 +1,151 @@
+"""Commands that ask a robot: list, info, query, compare."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+import robot_dyn as rd
+from robot_dyn.cli import arguments, completion
+from robot_dyn.cli.app import Json, Lock, Name, PackageDir, Xacro, app, progress
+from robot_dyn.cli.terminal import say, say_json
+from robot_dyn.errors import QueryError, RobotDynError
+
+if TYPE_CHECKING:
+    import numpy as np
+
+
+@app.command("list")
+def list_(as_json: Json = False) -> None:
+    """List the robots that can be named."""
+    names = rd.list_robots()
+    say_json({"robots": names}) if as_json else say(*names)
+
+
+@app.command()
+def info(
+    robot: Name,
+    compiled: Annotated[
+        bool, typer.Option("--compiled", help="Also trace each quantity, and say which formulation is compiled.")
+    ] = False,
+    lock: Lock = None,
+    package_dir: PackageDir = None,
+    xacro: Xacro = None,
+    as_json: Json = False,
+) -> None:
+    """Show a robot: joints, limits, friction, mass, and findings on its file."""
+    from robot_dyn.cli import kernels, report
+
+    loaded = arguments.load(robot, lock, package_dir, xacro, quiet=True)  # the findings are shown below
+    roads = {"compiled": kernels.formulations(loaded)} if compiled else {}
+    if as_json:
+        say_json(report.info(loaded) | roads)
+        return
+    say(*report.info_tables(loaded))
+    if compiled:
+        say(*kernels.formulation_table(roads["compiled"]))
+
+
+@app.command()
+def query(
+    what: Annotated[
+        str,
+        typer.Argument(
+            metavar="ROBOT|SCENE.toml",
+            help="A robot; or a scene file, with its robot, effects and start.",
+            autocompletion=completion.robots,
+        ),
+    ],
+    q: Annotated[
+        str | None, typer.Option(help="Positions in rad or m: 0.1,-0.2,… or joint=0.1,…; 0 by default.")
+    ] = None,
+    v: Annotated[str | None, typer.Option(help="Velocities in rad/s or m/s, in the same form.")] = None,
+    a: Annotated[str | None, typer.Option(help="Accelerations in rad/s² or m/s²: the torque is computed.")] = None,
+    tau: Annotated[str | None, typer.Option(help="Torques in N m or N: the acceleration is computed.")] = None,
+    why: Annotated[
+        str | None,
+        typer.Option(
+            metavar="JOINT", help="Split this joint's torque by link and cause.", autocompletion=completion.joints
+        ),
+    ] = None,
+    effects: Annotated[str | None, typer.Option(help='"urdf" adds the friction that the file states.')] = None,
+    lock: Lock = None,
+    package_dir: PackageDir = None,
+    xacro: Xacro = None,
+    as_json: Json = False,
+) -> None:
+    """Ask for M, C, N at a state, and for the torque of an acceleration or the acceleration of a torque.
+
+    Of a scene: at its start, under the actuation of its control; what dry friction and rigid stops hold is listed.
+    """
+    from robot_dyn.cli import report
+
+    if a is not None and tau is not None:
+        raise QueryError("give --a or --tau, not both: one follows from the other")
+    setup = arguments.scene(
+        what, {"--effects": effects, "--lock": lock, "--package-dir": package_dir, "--xacro": xacro}
+    )
+    plant = (
+        rd.Plant(arguments.load(what, lock, package_dir, xacro), effects or ())
+        if setup is None
+        else setup.plant.at(0.0)
+    )
+    names = plant.dynamics.joint_names
+    at = setup.q0 if setup is not None and q is None else arguments.vector("--q", q, names)
+    speed = setup.v0 if setup is not None and v is None else arguments.vector("--v", v, names)
+    torque = None if tau is None else arguments.vector("--tau", tau, names)
+    if setup is not None and a is None and tau is None:
+        torque = _actuation(setup, at, speed)
+    answer = report.query(plant, at, speed, arguments.vector("--a", a, names), torque)
+    if why is not None:
+        answer |= report.why(plant, answer, why)
+    say_json(answer) if as_json else say(*report.query_tables(answer))
+
+
+def _actuation(setup: rd.Setup, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """What the control of a setup does at t = 0, within the bounds of the plant, (n,)."""
+    from robot_dyn.simulation.dynamics.state_equation import StateEquation
+
+    equation = StateEquation(setup.plant, setup.controller)
+    y, held = equation.tick(0.0, equation.start(q, v))
+    q, v, z, _ = equation.state(y)
+    return equation.actuation(0.0, q, v, z, held)
+
+
+@app.command()
+def compare(
+    robots: Annotated[
+        list[str] | None, typer.Argument(metavar="ROBOT...", help="Names or paths.", autocompletion=completion.robots)
+    ] = None,
+    every: Annotated[bool, typer.Option("--all", help="All robots of `robot-dyn list` that load.")] = False,
+    samples: Annotated[int, typer.Option(min=1, help="Random states for each robot.")] = 20,
+    seed: Annotated[int, typer.Option(help="Seed of the random states.")] = 0,
+    lock: Lock = None,
+    package_dir: PackageDir = None,
+    xacro: Xacro = None,
+    as_json: Json = False,
+) -> None:
+    """Cross-check Pinocchio against the library's own Lagrangian; exit code 1 if they disagree."""
+    from robot_dyn.cli import report
+
+    if robots and every:
+        raise QueryError("give the names of robots or --all, not both")
+    if not (robots or every):
+        raise QueryError("nothing to compare; give the names of robots, or --all")
+    results, refused = [], {}
+    for name in progress(rd.list_robots() if every else robots or (), "comparing"):
+        try:
+            results.append(
+                (
+                    name,
+                    rd.compare(arguments.load(name, lock, package_dir, xacro, quiet=every), samples=samples, seed=seed),
+                )
+            )
+        except RobotDynError as error:
+            if not every:
+                raise
+            refused[name] = str(error)
+    say_json(report.comparison(results, refused)) if as_json else say(*report.comparison_tables(results, refused))
+    if not all(result.ok for _, result in results):
+        raise typer.Exit(1)

@@ -1,0 +1,84 @@
+"""The demo: an arm loaded, compared, simulated, shown, and what digits of its motion take."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import robot_dyn as rd
+from robot_dyn.cli import arguments
+from robot_dyn.cli.app import Force, app, bar
+from robot_dyn.cli.terminal import say
+from robot_dyn.errors import QueryError, RobotDynError
+
+_ERROR, _METHOD = 1e-8, "DOP853"  # [rad]
+_BUDGET_S = 8.0  # compiling not counted, which happens once for a version of the library
+
+
+@app.command()
+def demo(
+    output: Annotated[str, typer.Option("-o", "--output", metavar="FOLDER", help="Where its files go.")] = "demo",
+    force: Force = False,
+) -> None:
+    """Load a real arm, compare Pinocchio with the own Lagrangian, simulate it, write a replay and a plot.
+
+    At the end it says what 1e-8 rad takes here, by this library and by other programs that are installed.
+    """
+    from robot_dyn.cli import report
+    from robot_dyn.files import save
+    from robot_dyn.scene.scene import SCENE, SceneError
+    from robot_dyn.scene.starters import starter
+    from robot_dyn.simulation.results.run_file import RUN, RunFileError
+    from robot_dyn.view.plots.plots import PICTURES, PlotError
+    from robot_dyn.view.replay import PAGE, ReplayError
+
+    folder = Path(output)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise QueryError(f"--output {output}: {error.strerror}; name a folder that can be written") from None
+    kinds = (("toml", SCENE, SceneError), ("html", PAGE, ReplayError), ("png", PICTURES, PlotError))
+    kinds += (("npz", RUN, RunFileError),)
+    files = {end: arguments.output(folder / f"panda.{end}", kind, error, (), force) for end, kind, error in kinds}
+    save(files["toml"], lambda stream: stream.write(starter("panda_computed_torque").encode()), SceneError)
+    panda = rd.load("panda").with_(lock={"panda_finger_joint1": 0.0})
+    say(*report.demo_tables(panda), "", "The same arm under computed torque, its model 20 % too heavy", "")
+    scene = rd.read_scene(files["toml"])
+    run = rd.simulate(scene)
+    if run.outcome.ending == "stopped":
+        say(*run.summary.split("\n"))
+        raise typer.Exit(130)
+    rd.save_run(run, files["npz"])
+    rd.save_replay(run, files["html"])
+    rd.save_plot(run, files["png"])
+    say(*run.summary.split("\n"))
+    say(
+        "",
+        "Now look:",
+        f"  {files['html']}  the replay: open it in a browser",
+        f"  {files['png']}   its plots",
+        f"  {files['npz']}   the run itself",
+        f"  {files['toml']}  its scene: change it, then robot-dyn simulate {files['toml']}",
+    )
+    say(*_price(rd.Setup(rd.Plant(panda), scene.q0, engine="compiled")))
+
+
+def _price(swing: rd.Setup) -> Iterator[str]:
+    """What digits of a free swing cost, here and now."""
+    from robot_dyn.cli import studies
+
+    yield ""
+    yield f"What 1e-8 rad takes here: {swing.duration_s:g} s of the same arm, swinging freely"
+    try:
+        with bar(_BUDGET_S) as spent:
+            result = rd.work_precision(swing, methods=[_METHOD], budget_s=_BUDGET_S, repeats=5, on_progress=spent)
+    except RobotDynError as error:
+        yield f"left out: {error}"
+        return
+    yield from studies.programs(result, _ERROR)
+    if result.interrupted:
+        raise typer.Exit(130)
+    yield "  all methods: robot-dyn accuracy; each effect and algorithm: robot-dyn cost"

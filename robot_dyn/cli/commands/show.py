@@ -1,0 +1,124 @@
+"""Commands that show a robot or a run: show, replay, plot."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import robot_dyn as rd
+from robot_dyn.cli import arguments
+from robot_dyn.cli.app import Force, Lock, Name, PackageDir, app
+from robot_dyn.cli.arguments import output as checked_output
+from robot_dyn.cli.terminal import say
+from robot_dyn.errors import QueryError
+
+Html = Annotated[str | None, typer.Option(metavar="OUT.html", help="Write one file that needs no server, and end.")]
+Inertia = Annotated[bool, typer.Option("--inertia", help="Draw each link's equivalent inertia box.")]
+Port = Annotated[int | None, typer.Option(min=1, max=65535, help="Where to listen; a free one by default.")]
+Browse = Annotated[bool, typer.Option("--open", help="Open the page in your browser.")]
+
+
+@app.command("show")
+def show_(
+    robot: Name,
+    q: Annotated[
+        str | None, typer.Option(help="Positions in rad or m: 0.1,-0.2,… or joint=0.1,…; 0 by default.")
+    ] = None,
+    html: Html = None,
+    inertia: Inertia = False,
+    port: Port = None,
+    browse: Browse = False,
+    force: Force = False,
+    lock: Lock = None,
+    package_dir: PackageDir = None,
+) -> None:
+    """Show a robot in the browser, live on this machine until Ctrl-C, or as one HTML file."""
+    from robot_dyn.view.replay import PAGE, ReplayError
+
+    if html is not None and port is not None:
+        raise QueryError("give --html or --port, not both: a file needs no server")
+    page = None if html is None else checked_output(html, PAGE, ReplayError, [robot], force)
+    loaded = arguments.load(robot, lock, package_dir)
+    at = arguments.vector("--q", q, loaded.joint_names)
+    options = {"inertia": inertia, "package_dirs": package_dir or ()}
+    if page is not None:
+        _tell_file(rd.save_show(loaded, page, at, **options), browse)
+        return
+    with rd.show(loaded, at, port=port, **options) as server, suppress(KeyboardInterrupt):
+        say(f"{server.url} shows the robot; Ctrl-C ends it")
+        _open(server.url, browse)
+        server.wait()
+
+
+@app.command()
+def replay(
+    runs: Annotated[
+        list[str], typer.Argument(metavar="RUN.npz...", help="Run files; those after the first are drawn transparent.")
+    ],
+    html: Html = None,
+    frame: Annotated[
+        str | None, typer.Option(metavar="LINK", help="Link whose path is drawn; the tip by default.")
+    ] = None,
+    inertia: Inertia = False,
+    port: Port = None,
+    browse: Browse = False,
+    force: Force = False,
+    package_dir: PackageDir = None,
+) -> None:
+    """Replay runs in the browser, live on this machine until Ctrl-C, or as one HTML file."""
+    from robot_dyn.view.replay import PAGE, ReplayError
+
+    if html is not None and port is not None:
+        raise QueryError("give --html or --port, not both: a file needs no server")
+    page = None if html is None else checked_output(html, PAGE, ReplayError, runs, force)
+    trajectories = [rd.load_run(path) for path in runs]
+    options = {"frame": frame, "inertia": inertia, "package_dirs": package_dir or ()}
+    if page is not None:
+        _tell_file(rd.save_replay(trajectories[0], page, *trajectories[1:], **options), browse)
+        return
+    with rd.replay(*trajectories, port=port, **options) as server, suppress(KeyboardInterrupt):
+        say(f"{server.url} shows the run; Ctrl-C ends it")
+        _open(server.url, browse)
+        server.wait()
+
+
+@app.command()
+def plot(
+    run: Annotated[str, typer.Argument(metavar="RUN.npz", help="A run file, as `robot-dyn simulate … -o` writes.")],
+    output: Annotated[
+        str | None, typer.Option("-o", "--output", metavar="PLOT.png", help="A .png, .svg or .pdf; RUN.png by default.")
+    ] = None,
+    only: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--show",
+            metavar="NAME",
+            help="joints, torques, energy, tracking, phase or error_growth; may be repeated; by default all.",
+        ),
+    ] = None,
+    joint: Annotated[list[str] | None, typer.Option(metavar="JOINT", help="Show this joint; may be repeated.")] = None,
+    dark: Annotated[bool, typer.Option("--dark", help="For dark screens.")] = False,
+    force: Force = False,
+) -> None:
+    """Draw a run: joints, torques against limits, energy ledger, tracking error, phase portrait, error."""
+    from robot_dyn.view.plots.plots import PICTURES, PlotError
+
+    path = checked_output(output or Path(run).with_suffix(".png"), PICTURES, PlotError, [run], force)
+    theme = "dark" if dark else "light"
+    file = rd.save_plot(rd.load_run(run), path, *(only or ()), only=joint or None, theme=theme)
+    say(f"written: {file}")
+
+
+def _tell_file(file: Path, browse: bool) -> None:
+    say(f"written: {file} ({file.stat().st_size / 1e6:.1f} MB)")
+    _open(file.absolute().as_uri(), browse)
+
+
+def _open(address: str, browser: bool) -> None:
+    if browser:
+        import webbrowser
+
+        webbrowser.open(address)

@@ -1,0 +1,49 @@
+"""The command that looks for what breaks first: stress."""
+
+from __future__ import annotations
+
+import os
+from typing import Annotated
+
+import typer
+
+import robot_dyn as rd
+from robot_dyn.cli import arguments
+from robot_dyn.cli.app import Force, Json, Lock, Name, PackageDir, Xacro, app, bar
+from robot_dyn.cli.outcome import give
+
+
+@app.command()
+def stress(
+    robot: Name,
+    output: Annotated[
+        str | None,
+        typer.Option("-o", "--output", metavar="RESULT.json", help="Write all that was found, as of --json."),
+    ] = None,
+    samples: Annotated[int, typer.Option(help="Number of random states.")] = 10_000,
+    runs: Annotated[int, typer.Option(help="Number of random runs.")] = 7,
+    seed: Annotated[int, typer.Option(help="Of the random states and runs.")] = 0,
+    budget: Annotated[
+        float, typer.Option(metavar="SECONDS", help="Time to spend; what is not looked at by then is named.")
+    ] = 90.0,
+    force: Force = False,
+    lock: Lock = None,
+    package_dir: PackageDir = None,
+    xacro: Xacro = None,
+    as_json: Json = False,
+) -> None:
+    """Look for what breaks first on an arm: worst configurations, step, gain, speed, payload; exit code 1 on failures.
+
+    Ctrl-C ends it and keeps what was found.
+    """
+    from robot_dyn.studies.save import JSON
+    from robot_dyn.studies.sheet import ResultError
+
+    inputs = [robot] if os.path.isfile(robot) else []
+    paths = [arguments.output(output, JSON, ResultError, inputs, force)] if output else []
+    arm = arguments.load(robot, lock, package_dir, xacro)
+    with bar(budget) as spent:
+        result = rd.stress(arm, samples=samples, runs=runs, seed=seed, budget_s=budget, on_progress=spent)
+    give(result, paths, as_json)
+    if not result.ok:
+        raise typer.Exit(1)

@@ -1,0 +1,227 @@
+"""Compiled: a robot's equations as machine code, M(q) a + C(q, v) v + N(q) = τ, behind the Dynamics protocol."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import Any, final
+
+import numpy as np
+from numpy import empty
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.codegen.derivatives import forward_dynamics_derivatives
+from robot_dyn.codegen.engine import Engine
+from robot_dyn.codegen.on_first_use import OnFirstUse
+from robot_dyn.codegen.self_check import SelfCheck
+from robot_dyn.codegen.store.cache import default_store
+from robot_dyn.codegen.threads import thread_count
+from robot_dyn.codegen.trace.right_angles import RightAngle, completed
+from robot_dyn.codegen.trace.trace import QUANTITIES, Trace
+from robot_dyn.description.inertial_parameters import Parametrised
+from robot_dyn.model.robot import Robot
+from robot_dyn.queries.dynamics import Axes, Dynamics
+from robot_dyn.queries.quantity import FORWARD_DYNAMICS_DERIVATIVES
+from robot_dyn.validate import choice, instance, truth
+
+_DERIVATIVES = FORWARD_DYNAMICS_DERIVATIVES.name
+
+
+@final
+@dataclass(frozen=True)
+class CompiledDynamics(Dynamics, Parametrised):
+    """A robot as machine code; each quantity is compiled, and checked against Pinocchio, when first asked for.
+
+    With out= the answer goes into that array, which is left as it was if the query is refused.
+
+    Attributes:
+        original: The robot as given.
+        dtype: np.float64 or np.float32, or its name; kept as the name.
+        threads: For batches; None for all processors.
+        cache: Whether compiled code is kept on disk.
+    """
+
+    original: Robot
+    dtype: Any = "float64"
+    threads: int | None = 1
+    cache: bool = True
+
+    def __post_init__(self) -> None:
+        instance("robot", self.original, Robot, "give a Robot, such as rd.load('ur5')")
+        object.__setattr__(self, "dtype", _dtype(self.dtype))
+        truth("cache", self.cache)
+        thread_count(self.threads)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return CompiledDynamics, (self.original, self.dtype, self.threads, self.cache)
+
+    @cached_property
+    def _completed(self) -> tuple[Robot, tuple[RightAngle, ...]]:
+        return completed(self.original)
+
+    @property
+    def robot(self) -> Robot:
+        """The robot whose equations are compiled: the one given, with its right angles written out in full."""
+        return self._completed[0]
+
+    @property
+    def right_angles(self) -> tuple[str, ...]:
+        """Angles that the file states with too few digits and that were taken as right angles, in words."""
+        return tuple(map(str, self._completed[1]))
+
+    @cached_property
+    def engine(self) -> Engine:
+        """The kernels."""
+        trace, robot = Trace(self.robot), self.robot
+
+        def truth(quantity: str, state: dict[str, np.ndarray]) -> tuple[np.ndarray, Any]:
+            return np.asarray(self._otherwise(quantity)(*(state[name] for name in QUANTITIES[quantity].arguments))), 0.0
+
+        return Engine(
+            trace.quantity,
+            QUANTITIES,
+            robot.sizes,
+            SelfCheck(robot, "Pinocchio"),
+            truth,
+            self.joint_names,
+            self.dtype,
+            thread_count(self.threads),
+            default_store() if self.cache else None,
+            robot.joint_without_inertia is not None,
+            coupled=not robot.couplings.trivial,
+        )
+
+    @cached_property
+    def _ones(self) -> OnFirstUse:
+        return self.engine.ones
+
+    @property
+    def instructions(self) -> dict[str, dict[str, int]]:
+        """Instructions by formulation, of each quantity used so far; the first is the one that won."""
+        return {
+            name: dict(sorted(trace.counts.items(), key=lambda item: item[1]))
+            for name, trace in self.engine.traces.items()
+        }
+
+    def served_by(self, quantity: str) -> str:
+        """The formulation whose machine code answers a quantity, or "Pinocchio" past the size where compiling pays."""
+        if quantity not in QUANTITIES or not self.engine.pays(quantity):
+            return "Pinocchio"
+        return self.engine.traces[quantity].formulation
+
+    @property
+    def n(self) -> int:
+        """Number of degrees of freedom."""
+        return self.original.n
+
+    @cached_property
+    def joint_names(self) -> tuple[str, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Names of the n joints, in the order of q."""
+        return self.original.joint_names
+
+    @cached_property
+    def _vector(self) -> tuple[int, Any]:
+        """What `empty` takes for a result (n,)."""
+        return self.n, np.dtype(self.dtype)
+
+    def M(self, q: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
+        return self._matrix("M", (q,), out, errors)
+
+    def C(self, q: Array, v: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
+        return self._matrix("C", (q, v), out, errors)
+
+    def N(self, q: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
+        return self._torque("N", (q,), out, errors)
+
+    def coriolis_torque(self, q: Array, v: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
+        return self._torque("coriolis_torque", (q, v), out, errors)
+
+    def coriolis_transpose(self, q: Array, v: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
+        return self._torque("coriolis_transpose", (q, v), out, errors)
+
+    def inverse_dynamics(
+        self, q: Array, v: Array, a: Array, *, out: np.ndarray | None = None, errors: str = "raise"
+    ) -> Any:
+        y = empty(*self._vector) if out is None else out
+        if not self._ones["inverse_dynamics"](q, v, a, y):
+            return y
+        return self._ask("inverse_dynamics", (q, v, a), out, errors)
+
+    def forward_dynamics(
+        self, q: Array, v: Array, tau: Array, *, out: np.ndarray | None = None, errors: str = "raise"
+    ) -> Any:
+        y = empty(*self._vector) if out is None else out
+        if not self._ones["forward_dynamics"](q, v, tau, y):
+            return y
+        return self._ask("forward_dynamics", (q, v, tau), out, errors)
+
+    def forward_dynamics_derivatives(
+        self, q: Array, v: Array, tau: Array, *, errors: str = "raise"
+    ) -> tuple[Any, Any, Any]:
+        """∂a/∂q, ∂a/∂v, ∂a/∂τ of forward dynamics, each (..., n, n): −M⁻¹ ∂ID/∂q, −M⁻¹ ∂ID/∂v, M⁻¹."""
+        three = self._fast(_DERIVATIVES, (q, v, tau), None, errors, (3, self.n, self.n))
+        return three[..., 0, :, :], three[..., 1, :, :], three[..., 2, :, :]
+
+    def kinetic_energy(self, q: Array, v: Array, *, errors: str = "raise") -> Any:
+        return self._ask("kinetic_energy", (q, v), None, errors)
+
+    def potential_energy(self, q: Array, *, errors: str = "raise") -> Any:
+        return self._ask("potential_energy", (q,), None, errors)
+
+    def momentum(self, q: Array, v: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
+        return self._torque("momentum", (q, v), out, errors)
+
+    @property
+    def body_names(self) -> tuple[str, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        return self.robot.body_names
+
+    @property
+    def inertial_parameters(self) -> np.ndarray:  # pyright: ignore[reportIncompatibleMethodOverride]
+        return self.robot.inertial_parameters
+
+    def regressor(self, q: Array, v: Array, a: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
+        return self._fast("regressor", (q, v, a), out, errors, self.engine.shape("regressor"))
+
+    def placement(self, q: Array, frame: str, *, errors: str = "raise") -> Any:
+        return self.robot.placement(q, frame, errors=errors)
+
+    def jacobian(self, q: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, errors: str = "raise") -> Any:
+        return self.robot.jacobian(q, frame, expressed_in=expressed_in, errors=errors)
+
+    def jacobian_rate(
+        self, q: Array, v: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, errors: str = "raise"
+    ) -> Any:
+        return self.robot.jacobian_rate(q, v, frame, expressed_in=expressed_in, errors=errors)
+
+    def _torque(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None, errors: str) -> Any:
+        return self._fast(quantity, arguments, out, errors, self.n)
+
+    def _matrix(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None, errors: str) -> Any:
+        return self._fast(quantity, arguments, out, errors, (self.n, self.n))
+
+    def _fast(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None, errors: str, shape: Any) -> Any:
+        y = empty(shape, self._vector[1]) if out is None else out
+        if not self._ones[quantity](*arguments, y):
+            return y
+        return self._ask(quantity, arguments, out, errors)
+
+    def _ask(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None, errors: str) -> Any:
+        return self.engine.ask(quantity, arguments, out, errors, self._otherwise(quantity))
+
+    def _otherwise(self, quantity: str) -> Callable[..., Any]:
+        """Pinocchio's way to a quantity."""
+        if quantity == _DERIVATIVES:
+            return partial(forward_dynamics_derivatives, self.robot)
+        return getattr(self.robot, quantity)
+
+
+def _dtype(given: Any) -> str:
+    """The name of a type of NumPy that machine code is made for."""
+    name = given
+    if given is not None and not isinstance(given, str):
+        with suppress(Exception):  # whatever a foreign object makes of it
+            found = np.dtype(given)
+            name = found.name if found.isnative else given
+    return choice("dtype", name, ("float64", "float32"))

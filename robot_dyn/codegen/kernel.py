@@ -1,0 +1,149 @@
+"""Kernels: the machine code of y = f(x₁, x₂, …) for one state, and for many in vectors on one thread or several.
+
+The checks are in machine code as well: a shape, a number that is not finite, a result that is too large. A kernel only
+reports them; the words are found on the slow path.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property, partial
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.codegen.llvm import machine_code
+from robot_dyn.codegen.llvm.batch import batch_function, lanes
+from robot_dyn.codegen.llvm.entries import write_batch_entry, write_state_entry
+from robot_dyn.codegen.llvm.lanes import F32, F64
+from robot_dyn.codegen.llvm.one_state import Limits, state_function
+from robot_dyn.codegen.llvm.python_function import python_function
+from robot_dyn.codegen.program import Program
+from robot_dyn.codegen.status import Status
+from robot_dyn.codegen.store.identity import digest, sources_of_the_writer
+from robot_dyn.codegen.store.store import Store
+from robot_dyn.codegen.threads import shared
+
+# Instructions of vectors that a thread takes at a time, about 50 µs; fewer than _PIECES of these, and to wake a second
+# thread costs what it saves.
+_PIECE, _PIECES = 600_000, 6
+_LARGEST = {"float64": 1e100, "float32": 1e18}  # as Robot: below, products do not overflow
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Kernel:
+    """A function of states as machine code, compiled when first asked for.
+
+    Attributes:
+        program: Its instructions; its inputs are x₁, x₂, …, and the parameters if there are any.
+        shape: Shape of the result for one state.
+        dtype: "float64" or "float32".
+        times: Whether the first input is a time: a number in `call`, (B, 1) in `many`.
+        doubtful: Results whose absolute values sum to more are reported.
+        store: Where compiled code is kept, or None.
+        about: What it is of, for a reader of the store.
+        parameters: Numbers that all states share, (P,); two kernels that differ in them alone run the same code.
+        takes_any_angle: Whether `many` answers angles beyond the range of our sine too; else it reports them.
+    """
+
+    program: Program
+    shape: tuple[int, ...]
+    dtype: str = "float64"
+    times: bool = False
+    doubtful: float = np.inf
+    store: Store | None = None
+    about: str = ""
+    parameters: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    takes_any_angle: bool = True
+
+    @cached_property
+    def call(self) -> Callable[..., int]:
+        """For one state, (x₁, …, y) → Status: arrays (nᵢ,), y of the shape of the result, C-contiguous.
+
+        It takes any objects; those that are not such arrays it reports.
+        """
+        return self._function("one state", self._write_state)
+
+    @cached_property
+    def any_angle(self) -> Callable[..., int]:
+        """As `call`, with the sine and cosine of the C library, for angles beyond the range of ours."""
+        write = partial(self._write_state, any_angle=True)
+        return self._function("one state, any angle", write)
+
+    @property
+    def state(self) -> int:
+        """Address of the function for one state that other machine code may call: pointers (x₁, …, y) → int64."""
+        return self._address("state", "one state", self._write_state)
+
+    @cached_property
+    def batch(self) -> Callable[..., int]:
+        """(x₁, …, y, start, stop) → Status, for states start … stop − 1 of arrays (B, nᵢ) and y (B, m)."""
+        return self._function("batch", self._write_batch)
+
+    @property
+    def lanes(self) -> int:
+        """States that are computed side by side."""
+        return lanes(self._kind)
+
+    def many(self, inputs: Sequence[np.ndarray], y: np.ndarray, threads: int = 1) -> Status:
+        """Run a batch: inputs (B, nᵢ) and y (B, m), C-contiguous and of the kernel's dtype, else SHAPE is reported."""
+        states, least = len(y), self.lanes
+        if states < least:  # a vector of its own
+            made = np.empty((least, y.shape[1]), y.dtype)
+            status = self._run([np.resize(x, (least, x.shape[1])) for x in inputs], made, 0, least)
+            y[:] = made[:states]
+            return status
+        piece = max(_PIECE // (len(self.program) + 1), 1) * least
+        if threads == 1 or states < _PIECES * piece:
+            return self._run(inputs, y, 0, states)
+        return Status(shared(lambda start, stop: self._run(inputs, y, start, stop), states, piece, threads))
+
+    def _run(self, inputs: Sequence[np.ndarray], y: np.ndarray, start: int, stop: int) -> Status:
+        status = Status(self.batch(*inputs, y, start, stop))
+        if status is not Status.FAR or not self.takes_any_angle:
+            return status
+        first = [[float(t) for t in inputs[0][:, 0]] if self.times else inputs[0], *inputs[1:]]
+        shaped = y.reshape(len(y), *self.shape)
+        return Status(max(self.any_angle(*(x[i] for x in first), shaped[i]) for i in range(start, stop)))
+
+    def assembly(self) -> str:
+        """The machine code of the batch, as text."""
+        return machine_code.assembly(self._write_batch, "batch")
+
+    @property
+    def _kind(self) -> Any:
+        return F32 if self.dtype == "float32" else F64
+
+    @property
+    def _limits(self) -> Limits:
+        return Limits(_LARGEST[self.dtype], self.doubtful)
+
+    def _write_state(self, module: Any, name: str, any_angle: bool = False) -> None:
+        given = self.program, self._kind, self._limits, any_angle, self._parametrised
+        state = state_function(module, f"{name}state", *given)
+        write_state_entry(module, f"{name}call", state, self._of_states, self.shape, self.times, self._parametrised)
+
+    def _write_batch(self, module: Any, name: str) -> None:
+        given = self.program, self._kind, self._limits, self._parametrised
+        batch = batch_function(module, f"{name}batch", *given)
+        outputs = len(self.program.outputs)
+        write_batch_entry(module, f"{name}call", batch, self._of_states, outputs, self._parametrised)
+
+    @property
+    def _parametrised(self) -> bool:
+        return self.parameters.size > 0
+
+    @property
+    def _of_states(self) -> tuple[int, ...]:
+        """Lengths of the inputs that states have."""
+        return self.program.inputs[: len(self.program.inputs) - self._parametrised]
+
+    def _function(self, what: str, write: Callable[[Any, str], None]) -> Callable[..., int]:
+        return python_function(self._address("call", what, write), np.array(self.parameters, self.dtype))
+
+    def _address(self, function: str, what: str, write: Callable[[Any, str], None]) -> int:
+        form = str(self.shape), self.dtype, str(self.times), repr(self.doubtful), str(self._parametrised)
+        key = digest([what, sources_of_the_writer(), str(self.program), *form])
+        return machine_code.address(function, key, write, self.store, f"{self.about}, {what}")

@@ -1,0 +1,85 @@
+"""From a program to LLVM: each of its instructions on numbers, or on vectors of one number for each state.
+
+The sine and cosine hold for |x| ≤ RANGE; whether an angle is beyond is told with the results, and another writer, of
+the C library's sine and cosine, is for those.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import chain
+from typing import Any, final
+
+from robot_dyn.codegen.llvm.lanes import Lanes
+from robot_dyn.codegen.llvm.operations import OPERATIONS
+from robot_dyn.codegen.llvm.sincos import RANGE, sincos_lanes
+from robot_dyn.codegen.llvm.sine_groups import GROUP, in_groups
+from robot_dyn.codegen.llvm.vectors import Vectors
+from robot_dyn.codegen.program import Kind, Op, Program
+
+
+@final
+@dataclass(frozen=True)
+class Written:
+    """What instructions of a program give.
+
+    Attributes:
+        results: A vector of each.
+        beyond: The mask of states with an angle beyond RANGE.
+    """
+
+    results: list[Any]
+    beyond: Any
+
+
+@final
+@dataclass(frozen=True)
+class Writer:
+    """Writes programs.
+
+    Attributes:
+        builder: LLVM's, where the instructions go.
+        kind: LLVM's type of a number, F64 or F32.
+        count: States side by side; the numbers of a vector.
+        any_angle: Whether sines and cosines are the C library's.
+    """
+
+    builder: Any
+    kind: Any
+    count: int = 1
+    any_angle: bool = False
+
+    @property
+    def vectors(self) -> Vectors:
+        """The numbers of the states side by side."""
+        return Vectors(self.builder, self.kind, self.count)
+
+    def write(self, program: Program, inputs: Sequence[Sequence[Any]]) -> Written:
+        """The instructions of a program, given the vectors of each input."""
+        vectors = self.vectors
+        values = dict(enumerate(chain(*inputs, map(vectors.constant, program.constants))))
+        beyond = vectors.mask(False)
+        grouped = self.count == 1 and not self.any_angle
+        for ops in in_groups(program) if grouped else ((op,) for op in program.ops):
+            op = ops[0]
+            if op.kind is not Kind.SINE_COSINE:
+                values[op.made[0]] = OPERATIONS[op.kind](vectors, *(values[i] for i in op.of))
+            elif self.any_angle:
+                values.update(zip(op.made, (vectors.library(f, values[op.of[0]]) for f in ("sin", "cos")), strict=True))
+            else:
+                beyond = self.builder.or_(beyond, self._sines(ops, values))
+        return Written([values[i] for i in program.outputs], beyond)
+
+    def _sines(self, ops: tuple[Op, ...], values: dict[int, Any]) -> Any:
+        """Sines and cosines, of several angles of one state in one vector; the mask of angles beyond RANGE."""
+        together = Vectors(self.builder, self.kind, self.count if len(ops) == 1 else GROUP)
+        angles = [values[op.of[0]] for op in ops]
+        vector = angles[0] if len(ops) == 1 else together.of(angles)
+        both = sincos_lanes(Lanes(self.builder, vector, self.kind, together.count))
+        for i, op in enumerate(ops):
+            parts = [half.value if len(ops) == 1 else together.lane(half.value, i) for half in both]
+            values.update(zip(op.made, parts, strict=True))
+        size = together.intrinsic("fabs", vector)
+        beyond = self.builder.fcmp_ordered(">", size, together.constant(RANGE))
+        return beyond if len(ops) == 1 else together.any(beyond)

@@ -1,0 +1,190 @@
+"""Entries and views of arrays. An index out of range ends the call with an error; slices are cut off, as in Python."""
+
+from __future__ import annotations
+
+import ast
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from llvmlite import ir
+
+from robot_dyn.codegen.loops.kinds import BOOL, I8, I64, INT
+from robot_dyn.codegen.loops.numbers import converted, scalar
+from robot_dyn.codegen.loops.values import ONE, ArrayValue, Scalar, Value, number, times
+
+if TYPE_CHECKING:
+    from robot_dyn.codegen.loops.function import Function
+
+Place = Scalar | tuple[Scalar, Scalar, bool]  # an index; or a slice, from and to, and whether it is all
+
+
+def subscript(f: Function, x: ArrayValue, node: ast.Subscript) -> Value:
+    """An entry, or a view."""
+    places = _places(f, x, node)
+    if all(isinstance(each, Scalar) for each in places):
+        return load(f, x, [each for each in places if isinstance(each, Scalar)])
+    return _view(f, x, places)
+
+
+def store_at(f: Function, x: ArrayValue, node: ast.Subscript, value: Value) -> None:
+    """Write an entry, or one number into all entries of a view."""
+    if x.kind.frozen:
+        raise f.refused(node, "a write into an array that is read-only", "pass one that may be written")
+    places, number_ = _places(f, x, node), converted(f, scalar(f, value, node), x.kind.of, node)
+    if all(isinstance(each, Scalar) for each in places):
+        store(f, x, [each for each in places if isinstance(each, Scalar)], number_)
+    else:
+        fill(f, _view(f, x, places), number_)
+
+
+def indices(f: Function, x: ArrayValue, node: ast.Subscript) -> list[Scalar]:
+    """The indices of an entry."""
+    places = _places(f, x, node)
+    if not all(isinstance(each, Scalar) for each in places):
+        raise f.refused(node, "an operation on a part of an array", "write a loop over its entries")
+    return [each for each in places if isinstance(each, Scalar)]
+
+
+def load(f: Function, x: ArrayValue, indices: list[Scalar]) -> Scalar:
+    """An entry."""
+    value = f.builder.load(address(f, x, indices))
+    return Scalar(x.kind.of, f.builder.icmp_unsigned("!=", value, ir.Constant(I8, 0)) if x.kind.of == BOOL else value)
+
+
+def store(f: Function, x: ArrayValue, indices: list[Scalar], value: Scalar) -> None:
+    """Write an entry."""
+    made = f.builder.zext(value.ir, I8) if value.kind == BOOL else value.ir
+    f.builder.store(made, address(f, x, indices))
+
+
+def address(f: Function, x: ArrayValue, indices: list[Scalar]) -> Any:
+    """Of an entry, or of the first one of a view, by its leading indices."""
+    at, b = number(0), f.builder
+    for index, stride in zip(indices, x.strides(b), strict=False):
+        term = times(index, stride, b)
+        if at.const == 0:
+            at = term
+        elif term.const != 0:
+            at = Scalar(INT, b.add(at.ir, term.ir, flags=("nsw",)))
+    return x.data if at.const == 0 else b.gep(x.data, [at.ir], inbounds=True)
+
+
+def fill(f: Function, x: ArrayValue, value: Scalar, indices: list[Scalar] | None = None) -> None:
+    """Write a number into all entries."""
+    known = indices or []
+    if len(known) == x.kind.ndim:
+        store(f, x, known, value)
+        return
+    with f.loop(x.shape[len(known)]) as index:
+        fill(f, x, value, [*known, index])
+
+
+def _places(f: Function, x: ArrayValue, node: ast.Subscript) -> list[Place]:
+    """An index or a slice of each axis."""
+    parts = list(node.slice.elts) if isinstance(node.slice, ast.Tuple) else [node.slice]
+    if any(isinstance(each, ast.Constant) and each.value is ... for each in parts):
+        if len(parts) > 1:
+            raise f.refused(node, "an ellipsis among indices", "write a colon for each axis")
+        parts = []
+    if len(parts) > x.kind.ndim:
+        raise f.refused(node, f"{len(parts)} indices of an array with {x.kind.ndim} axes", "take as many as axes")
+    places: list[Place] = [_place(f, each, length) for each, length in zip(parts, x.shape, strict=False)]
+    return places + [(number(0), length, True) for length in x.shape[len(parts) :]]
+
+
+def _place(f: Function, node: ast.expr, length: Scalar) -> Place:
+    if not isinstance(node, ast.Slice):
+        return index_within(f, scalar(f, f.expression(node), node), length, node)
+    if node.step is not None:
+        raise f.refused(node, "a slice with a step", "write a loop")
+    low = number(0) if node.lower is None else _bound(f, node.lower, length)
+    high = length if node.upper is None else _bound(f, node.upper, length)
+    return low, high, node.lower is None and node.upper is None
+
+
+def index_within(f: Function, index: Scalar, length: Scalar, node: ast.AST) -> Scalar:
+    """An index that is checked to be within an axis; a negative one counts from the end."""
+    index, b = converted(f, index, INT, node), f.builder
+    if index.const is not None and length.const is not None and -length.const <= index.const < length.const:
+        return number(index.const % length.const)
+    if index.const is not None and index.const < 0:
+        index = Scalar(INT, b.add(index.ir, length.ir))
+    elif f.checks and index.const is None:
+        below = b.icmp_signed("<", index.ir, ir.Constant(I64, 0))
+        index = Scalar(INT, b.select(below, b.add(index.ir, length.ir), index.ir))
+    if f.checks:
+        f.check(b.icmp_unsigned("<", index.ir, length.ir), node, "an index is out of range")
+    return index
+
+
+def _bound(f: Function, node: ast.expr, length: Scalar) -> Scalar:
+    """A bound of a slice, cut off at the ends of the axis."""
+    bound, b, zero = converted(f, scalar(f, f.expression(node), node), INT, node), f.builder, ir.Constant(I64, 0)
+    if bound.const == 0 or (not f.checks and (bound.const is None or bound.const > 0)):
+        return bound
+    value = bound.ir
+    if bound.const is None or bound.const < 0:
+        below = b.icmp_signed("<", value, zero)
+        value = b.select(below, b.add(value, length.ir), value)
+        value = b.select(b.icmp_signed("<", value, zero), zero, value)
+    return Scalar(INT, b.select(b.icmp_signed("<", value, length.ir), value, length.ir))
+
+
+def _view(f: Function, x: ArrayValue, places: list[Place]) -> ArrayValue:
+    strides, firsts, shape, apart, kept = x.strides(f.builder), [], [], [], []
+    for axis, (place, stride) in enumerate(zip(places, strides, strict=True)):
+        if isinstance(place, Scalar):
+            firsts.append(place)
+            continue
+        low, high, whole = place
+        firsts.append(low)
+        shape.append(high if low.const == 0 else _length(f, low, high))
+        apart.append(stride)
+        kept.append((axis, whole))
+    single = x.kind.single and len(kept) > 1 and kept[-1] == (x.kind.ndim - 1, True)
+    contiguous = x.kind.contiguous and _is_contiguous(x, kept)
+    kind = replace(x.kind, ndim=len(kept), contiguous=contiguous, single=single)
+    return ArrayValue(kind, address(f, x, firsts), tuple(shape), () if contiguous else tuple(apart))
+
+
+def _length(f: Function, low: Scalar, high: Scalar) -> Scalar:
+    b = f.builder
+    length = b.sub(high.ir, low.ir)
+    return Scalar(INT, b.select(b.icmp_signed(">", length, ir.Constant(I64, 0)), length, ir.Constant(I64, 0)))
+
+
+def _is_contiguous(x: ArrayValue, kept: list[tuple[int, bool]]) -> bool:
+    """Whether the axes that are kept lie behind all others, and all but the first of them are whole."""
+    axes = [axis for axis in range(x.kind.ndim) if not (x.kind.single and axis == x.kind.ndim - 1)]
+    of = [(axis, whole) for axis, whole in kept if axis in axes]
+    return [axis for axis, _ in of] == axes[len(axes) - len(of) :] and all(whole for _, whole in of[1:])
+
+
+def reshaped(f: Function, x: ArrayValue, shape: list[Scalar], node: ast.AST) -> ArrayValue:
+    """A contiguous array in another shape."""
+    if not x.kind.contiguous:
+        raise f.refused(node, "the reshape of an array that is not contiguous", "copy it first")
+    shape, b = [converted(f, each, INT, node) for each in shape], f.builder
+    single = len(shape) > 1 and shape[-1].const == 1
+    f.check(b.icmp_signed("==", size(f, x).ir, _product(f, shape).ir), node, "a shape holds another number of entries")
+    return ArrayValue(replace(x.kind, ndim=len(shape), single=single), x.data, tuple(shape))
+
+
+def part(f: Function, x: ArrayValue, first: Scalar, count: Scalar, node: ast.AST) -> ArrayValue:
+    """So many entries of a contiguous array, in one axis."""
+    if not x.kind.contiguous:
+        raise f.refused(node, "a primitive of an array that is not contiguous", "copy it into one that is")
+    kind = replace(x.kind, ndim=1, single=False)
+    return ArrayValue(kind, f.builder.gep(x.data, [first.ir], inbounds=True), (count,))
+
+
+def size(f: Function, x: ArrayValue) -> Scalar:
+    """Number of entries."""
+    return _product(f, x.shape)
+
+
+def _product(f: Function, lengths: Any) -> Scalar:
+    made = ONE
+    for each in lengths:
+        made = times(made, each, f.builder)
+    return made

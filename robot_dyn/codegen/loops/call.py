@@ -1,0 +1,205 @@
+"""A plain function as machine code: compiled for the types of its arguments, or taken from a store.
+
+The words of arguments, such as the addresses of arrays, are made once, and again only for those that are others.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import threading
+from array import array
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
+from time import perf_counter
+from typing import Any, final
+
+from robot_dyn.codegen.interrupts import interrupts_later
+from robot_dyn.codegen.llvm import machine_code
+from robot_dyn.codegen.llvm.machine_code import Passes
+from robot_dyn.codegen.loops.identity import identity, sources_of_the_translator
+from robot_dyn.codegen.loops.kinds import Kind, Number, Static, TupleKind, unpacked, words
+from robot_dyn.codegen.loops.packing import Packed, pack
+from robot_dyn.codegen.store.identity import digest
+from robot_dyn.codegen.store.store import Store
+from robot_dyn.codegen.waiting import told
+from robot_dyn.errors import MachineCodeError
+
+_ENTRY = ctypes.CFUNCTYPE(ctypes.c_char_p, ctypes.c_void_p, ctypes.c_void_p)
+_LETTERS: Mapping[str, str] = {"float": "f", "int": "i", "uint": "u", "bool": "b"}
+_NUMBERS = {letter: Number(name) for name, letter in _LETTERS.items()}
+QUICK = Passes(level=1, effort=1)  # the work is behind addresses
+
+
+class _Spent(threading.local):
+    """Of each thread on its own: what another one compiles is no time of this one's run."""
+
+    seconds = 0.0
+
+
+_spent = _Spent()
+
+
+def spent_on_loops() -> float:
+    """Time that this thread has spent on loading and compiling functions, in [s]; a run's first call does so."""
+    return _spent.seconds
+
+
+@final
+class MachineFunction:
+    """A function as machine code, for whatever types it is called with; `calls` gives what calls it.
+
+    Args:
+        function: A plain function.
+        instead: As of `Program`.
+        store: Gives where machine code is kept, or None.
+        about: What it is of, for a reader of the store.
+        passes: How hard LLVM works.
+    """
+
+    def __init__(
+        self, function: Callable[..., Any], instead: Mapping[Any, Callable[..., Any]],
+        store: Callable[[], Store | None], about: str, passes: Passes = QUICK,
+    ) -> None:  # fmt: skip
+        self.function, self.about, self._passes = function, about, passes
+        self.store, self._instead, self._lock = store, instead, threading.Lock()
+        self._known: dict[Any, tuple[Any, Kind]] = {}
+
+    def calls(self) -> Call:
+        """What calls it, for one thread at a time."""
+        return Call(self)
+
+    def check(self, *given: Any) -> None:
+        """Translate it for such arguments, without compiling it.
+
+        Raises:
+            SubsetError: If it is not of the subset.
+        """
+        from robot_dyn.codegen.loops.program import translated
+
+        translated(self.function, pack(given, self.store).kinds, self._instead)
+
+    def key(self, kinds: tuple[Kind, ...]) -> str:
+        """Of its machine code in a store."""
+        return self._key(kinds, identity(self.function, self._instead))
+
+    def _key(self, kinds: tuple[Kind, ...], texts: list[str]) -> str:
+        return digest(["loop", str(self._passes), sources_of_the_translator(), *map(repr, kinds), *texts])
+
+    def is_kept(self) -> bool:
+        """Whether its machine code, for some types of arguments, is in memory or in the store."""
+        store = self.store()
+        return bool(self._known) or (store is not None and store.load(self._asked) is not None)
+
+    @cached_property
+    def _asked(self) -> str:
+        """The key of the note that it is there; what is compiled goes by the code and the values of then."""
+        return self.key(())
+
+    def entry(self, place: Any, kinds: Sequence[Kind]) -> tuple[Any, Kind]:
+        """The function of words, and the type of its result.
+
+        Args:
+            place: What the types are known by, or a number of their own.
+            kinds: Types of the arguments.
+
+        Raises:
+            SubsetError: If it is not of the subset.
+        """
+        if place in self._known:
+            return self._known[place]
+        began, known = perf_counter(), tuple(kinds)
+        with self._lock, interrupts_later():
+            if known not in self._known:
+                with told(f"compiling {self.about}, once for this version"):
+                    self._known[known] = self._compiled(known)
+            self._known[place] = self._known[known]
+        _spent.seconds += perf_counter() - began
+        return self._known[place]
+
+    def _compiled(self, kinds: tuple[Kind, ...]) -> tuple[Any, Kind]:
+        def write(module: Any, prefix: str) -> None:
+            from llvmlite import ir
+
+            from robot_dyn.codegen.loops.kinds import TEXT
+            from robot_dyn.codegen.loops.program import Program
+
+            program = Program(module, prefix, self._instead)
+            result = program.entry(self.function, kinds, "call")  # pyright: ignore
+            of_result = ir.Function(module, ir.FunctionType(TEXT, []), f"{prefix}result")
+            ir.IRBuilder(of_result.append_basic_block()).ret(program.text(_written(result)))
+
+        texts = identity(self.function, self._instead)
+        key, note, store = self._key(kinds, texts), self._key((), texts), self.store()
+        call, result = machine_code.addresses(("call", "result"), key, write, store, self.about, self._passes)
+        if store is not None and store.load(note) is None:
+            store.save(note, b"", f"{self.about} is there")
+        text = ctypes.CFUNCTYPE(ctypes.c_char_p)(result)().decode()
+        return _ENTRY(call), _read(text)
+
+
+@final
+class Call:
+    """A call of machine code whose arguments are much the same from one time to the next.
+
+    Raises:
+        MachineCodeError: If it fails; says where.
+    """
+
+    def __init__(self, function: MachineFunction) -> None:
+        self._function = function
+        self._given: list[Any] = []
+        self._kinds: list[Kind] = []
+        self._packed: dict[tuple[int, ...], Packed] = {}  # by which arguments it is of
+        self._entry: Any = None
+
+    def __call__(self, *given: Any) -> Any:
+        """The result for these arguments."""
+        before = self._given
+        if len(before) != len(given):
+            self._given, self._packed, self._kinds = [None] * len(given), {}, [Static.of(None)] * len(given)
+            self._block = array("q", bytes(8 * len(given)))
+            self._take(tuple(range(len(given))), given)
+        else:
+            others = tuple([i for i, each in enumerate(given) if each is not before[i]])
+            if others:
+                self._take(others, given)
+        text = self._entry(self._addresses, self._out_address)
+        if text is not None:
+            raise MachineCodeError(text.decode())
+        return self._result()
+
+    def _take(self, others: tuple[int, ...], given: tuple[Any, ...]) -> None:
+        """The words of the arguments that are not those of the call before."""
+        made, same = pack(tuple([given[i] for i in others]), self._function.store), True
+        self._packed[others] = made
+        for i, start, kind in zip(others, made.starts, made.kinds, strict=True):
+            same &= self._kinds[i] is kind
+            self._given[i], self._block[i], self._kinds[i] = given[i], start, kind
+        if not same:
+            whole = made.number if len(others) == len(given) else tuple(self._kinds)
+            self._entry, self._kind = self._function.entry(whole, self._kinds)
+            self._out = array("q", bytes(8 * max(1, words(self._kind))))
+            self._addresses, self._out_address = self._block.buffer_info()[0], self._out.buffer_info()[0]
+
+    def _result(self) -> Any:
+        return unpacked(self._out.tolist(), self._kind)
+
+
+def _written(kind: Kind) -> str:
+    if isinstance(kind, TupleKind):
+        return f"({''.join(map(_written, kind.items))})"
+    return _LETTERS[kind.name] if isinstance(kind, Number) else "-"
+
+
+def _read(text: str) -> Kind:
+    """The type that `_written` tells."""
+    stack: list[list[Kind]] = [[]]
+    for letter in text:
+        if letter == "(":
+            stack.append([])
+        elif letter == ")":
+            items = stack.pop()
+            stack[-1].append(TupleKind(tuple(items)))
+        else:
+            stack[-1].append(_NUMBERS.get(letter, Static.of(None)))
+    return stack[0][0]

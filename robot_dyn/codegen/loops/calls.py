@@ -1,0 +1,189 @@
+"""Calls: of functions that are translated too, of those that stand in for them, and of some of Python and NumPy."""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Callable, Mapping
+from types import FunctionType, MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from llvmlite import ir
+
+from robot_dyn.codegen.loops import arrays, numbers
+from robot_dyn.codegen.loops.kinds import F64, FLOAT, I64, INT, TEXT, UINT, Kind
+from robot_dyn.codegen.loops.values import (
+    ArrayValue,
+    Scalar,
+    StaticValue,
+    TupleValue,
+    Value,
+    leaf_types,
+    leaves,
+    number,
+    of_leaves,
+)  # fmt: skip
+
+if TYPE_CHECKING:
+    from robot_dyn.codegen.loops.function import Function
+
+Handler = Callable[..., Value]  # (f, node, arguments) → value
+
+
+def called(f: Function, node: ast.Call) -> Value:
+    """The result of a call."""
+    if node.keywords or any(isinstance(each, ast.Starred) for each in node.args):
+        raise f.refused(node, "an argument by name, or with a star", "give arguments by their places")
+    if isinstance(node.func, ast.Attribute) and node.func.attr == "reshape":
+        return _reshape(f, node, node.func.value)
+    function, given = f.expression(node.func), [f.expression(each) for each in node.args]
+    of = function.value if isinstance(function, StaticValue) else None
+    handler = f.program.instead.get(of) if callable(of) else None
+    if isinstance(handler, FunctionType) and not hasattr(handler, "emits"):
+        return _translated(f, node, handler, given)
+    handler = handler or _KNOWN.get(of) if callable(of) else None
+    if handler is not None:
+        try:
+            return handler(f, node, *given)
+        except TypeError as error:
+            raise f.refused(node, f"the call {ast.unparse(node)} ({error})", "see docs/extending.md") from None
+    if isinstance(of, FunctionType):
+        return _translated(f, node, of, given)
+    known = "plain functions, abs, min, max, len, float, int, np.sqrt, np.sign, np.spacing, np.nextafter, math.frexp"
+    raise f.refused(node, f"the call {ast.unparse(node)}", f"call {known}, or a primitive")
+
+
+def _translated(f: Function, node: ast.Call, function: Any, given: list[Value]) -> Value:
+    """The result of another function, which is translated for these types."""
+    written = f.program.written(function, tuple(each.kind for each in given), lambda *x: f.refuse(node, *x))
+    f.may_fail |= written.may_fail
+    parts = leaf_types(written.result)
+    if f.silent:
+        return of_leaves(written.result, [None] * len(parts))
+    b = f.builder
+    made = b.call(written.ir, [leaf for each in given for leaf in leaves(each)])
+    count = written.may_fail + len(parts)
+    found = [made] if count == 1 else [b.extract_value(made, i) for i in range(count)]
+    if written.may_fail:
+        f.fail_unless(b.icmp_unsigned("==", found[0], ir.Constant(TEXT, None)), found[0])
+    return of_leaves(written.result, found[written.may_fail :])
+
+
+def leaves_of(f: Function, value: Value, kind: Kind, node: ast.AST) -> list[Any]:
+    """The parts of a value of a type that holds it."""
+    return leaves(f.fitted(value, kind, node))
+
+
+def _reshape(f: Function, node: ast.Call, of: ast.expr) -> Value:
+    x = f.expression(of)
+    shape = f.expression(node.args[0]) if len(node.args) == 1 else None
+    if isinstance(shape, Scalar):
+        shape = TupleValue((shape,))
+    if not isinstance(x, ArrayValue) or not isinstance(shape, TupleValue):
+        raise f.refused(node, f"the call {ast.unparse(node)}", "reshape an array to a tuple of lengths")
+    return arrays.reshaped(f, x, [numbers.scalar(f, each, node) for each in shape.items], node)
+
+
+def _abs(f: Function, node: ast.AST, x: Value) -> Value:
+    x = numbers.scalar(f, x, node)
+    if x.kind == INT:
+        below = f.builder.icmp_signed("<", x.ir, ir.Constant(I64, 0))
+        return Scalar(INT, f.builder.select(below, numbers.negated(f, x, node).ir, x.ir))
+    return Scalar(FLOAT, f.intrinsic("fabs", numbers.converted(f, x, FLOAT, node).ir))
+
+
+def _extreme(sign: str) -> Handler:
+    """The first of the largest, or smallest, as Python's: nan is neither above nor below."""
+
+    def of(f: Function, node: ast.AST, *given: Value) -> Value:
+        if len(given) < 2:
+            raise f.refused(node, "min or max of one argument", "give two or more numbers")
+        made, *others = (numbers.scalar(f, each, node) for each in given)
+        for each in others:
+            made, each = numbers.together(f, made, each, node)
+            beyond = numbers.compared(f, ast.Gt if sign == ">" else ast.Lt, each, made, node)
+            made = Scalar(made.kind, f.builder.select(beyond.ir, each.ir, made.ir))
+        return made
+
+    return of
+
+
+def _len(f: Function, node: ast.AST, x: Value) -> Value:
+    if isinstance(x, ArrayValue):
+        return x.shape[0]
+    count = len(x.items) if isinstance(x, TupleValue) else len(getattr(x, "value", ""))
+    return number(count)
+
+
+def _float(f: Function, node: ast.AST, x: Value) -> Value:
+    x = numbers.scalar(f, x, node)
+    if x.kind == UINT:
+        return Scalar(FLOAT, f.builder.uitofp(x.ir, F64))
+    return numbers.converted(f, x, FLOAT, node)
+
+
+def _int(f: Function, node: ast.AST, x: Value) -> Value:
+    """Towards 0, of what has 64 bits."""
+    x, b = numbers.scalar(f, x, node), f.builder
+    if x.kind == FLOAT:
+        size = f.intrinsic("fabs", x.ir)
+        f.check(b.fcmp_ordered("<", size, ir.Constant(F64, 2.0**63)), node, "a float is no integer of 64 bits")
+        return Scalar(INT, b.fptosi(x.ir, I64))
+    if x.kind == UINT:
+        f.check(b.icmp_signed(">=", x.ir, ir.Constant(I64, 0)), node, "an integer overflows 64 bits")
+        return Scalar(INT, x.ir)
+    return numbers.converted(f, x, INT, node)
+
+
+def _word(f: Function, node: ast.AST, x: Value) -> Value:
+    x = numbers.scalar(f, x, node)
+    if x.kind == INT and x.const is None:
+        f.check(f.builder.icmp_signed(">=", x.ir, ir.Constant(I64, 0)), node, "np.uint64 of a negative number")
+        return Scalar(UINT, x.ir)
+    return numbers.converted(f, x, UINT, node)
+
+
+def _sqrt(f: Function, node: ast.AST, x: Value) -> Value:
+    return Scalar(FLOAT, f.intrinsic("sqrt", numbers.converted(f, numbers.scalar(f, x, node), FLOAT, node).ir))
+
+
+def _sign(f: Function, node: ast.AST, x: Value) -> Value:
+    """0 of ±0, nan of nan."""
+    x, b, zero = numbers.converted(f, numbers.scalar(f, x, node), FLOAT, node), f.builder, ir.Constant(F64, 0.0)
+    made = b.select(b.fcmp_ordered("<", x.ir, zero), ir.Constant(F64, -1.0), x.ir)
+    made = b.select(b.fcmp_ordered(">", x.ir, zero), ir.Constant(F64, 1.0), made)
+    return Scalar(FLOAT, b.select(b.fcmp_ordered("==", x.ir, zero), zero, made))
+
+
+def _nextafter(f: Function, node: ast.AST, x: Value, y: Value) -> Value:
+    given = [numbers.converted(f, numbers.scalar(f, each, node), FLOAT, node).ir for each in (x, y)]
+    return Scalar(FLOAT, f.builder.call(f.external("nextafter", F64, F64, F64), given))
+
+
+def _spacing(f: Function, node: ast.AST, x: Value) -> Value:
+    """To the next float away from 0."""
+    x, b = numbers.converted(f, numbers.scalar(f, x, node), FLOAT, node), f.builder
+    size = f.intrinsic("fabs", x.ir)
+    following = b.call(f.external("nextafter", F64, F64, F64), [size, ir.Constant(F64, math.inf)])
+    return Scalar(FLOAT, f.intrinsic("copysign", b.fsub(following, size), x.ir))
+
+
+def _frexp(f: Function, node: ast.AST, x: Value) -> Value:
+    """M and e of x = m 2ᵉ."""
+    x, b = numbers.converted(f, numbers.scalar(f, x, node), FLOAT, node), f.builder
+    if f.silent:
+        return TupleValue((Scalar(FLOAT, None), Scalar(INT, None)))
+    i32 = ir.IntType(32)
+    with b.goto_entry_block():
+        slot = b.alloca(i32)
+    m = b.call(f.external("frexp", F64, F64, i32.as_pointer()), [x.ir, slot])
+    return TupleValue((Scalar(FLOAT, m), Scalar(INT, b.sext(b.load(slot), I64))))
+
+
+_KNOWN: Mapping[Any, Handler] = MappingProxyType(
+    {
+        abs: _abs, min: _extreme("<"), max: _extreme(">"), len: _len, float: _float, int: _int, np.uint64: _word,
+        np.sqrt: _sqrt, np.sign: _sign, np.spacing: _spacing, np.nextafter: _nextafter, math.frexp: _frexp,
+    }
+)  # fmt: skip

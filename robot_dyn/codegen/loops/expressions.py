@@ -1,0 +1,224 @@
+"""Expressions of the subset."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+from llvmlite import ir
+
+from robot_dyn.codegen.loops import arrays, calls, numbers
+from robot_dyn.codegen.loops.kinds import BOOL, I64, RecordKind, Static, TupleKind
+from robot_dyn.codegen.loops.values import (
+    ArrayValue,
+    RecordValue,
+    Scalar,
+    StaticValue,
+    TupleValue,
+    Value,
+    leaf_types,
+    number,
+    of_leaves,
+)  # fmt: skip
+
+if TYPE_CHECKING:
+    from robot_dyn.codegen.loops.function import Function
+
+
+def value(f: Function, node: ast.expr) -> Value:
+    """The value of an expression."""
+    if type(node) not in EXPRESSIONS:
+        raise f.refused(
+            node, f"the expression {ast.unparse(node)} ({type(node).__name__})", "write it with plain loops"
+        )
+    return EXPRESSIONS[type(node)](f, node)
+
+
+def _constant(f: Function, node: ast.Constant) -> Value:
+    return f.program.constant(node.value, lambda *x: f.refuse(node, *x))
+
+
+def _tuple(f: Function, node: ast.Tuple) -> Value:
+    return TupleValue(tuple(value(f, each) for each in node.elts))
+
+
+def _attribute(f: Function, node: ast.Attribute) -> Value:
+    of = value(f, node.value)
+    if isinstance(of, StaticValue) and hasattr(of.value, node.attr):
+        return f.program.constant(getattr(of.value, node.attr), lambda *x: f.refuse(node, *x))
+    if isinstance(of, RecordValue) and node.attr in of.kind.names:
+        return field(f, of, node.attr)
+    if isinstance(of, ArrayValue):
+        if node.attr == "shape":
+            return TupleValue(of.shape)
+        if node.attr == "size":
+            return arrays.size(f, of)
+        if node.attr == "ndim":
+            return number(of.kind.ndim)
+    raise f.refused(node, f"the attribute {ast.unparse(node)}", "take fields of named tuples, or shape, size and ndim")
+
+
+def field(f: Function, record: RecordValue, name: str) -> Value:
+    """A field of a named tuple; its words do not change while machine code runs."""
+    kind, first = record.kind.kinds[record.kind.names.index(name)], record.kind.first(name)
+    if isinstance(kind, RecordKind):
+        return RecordValue(kind, f.builder.gep(record.pointer, [ir.Constant(I64, first)]))
+    if isinstance(kind, TupleKind):
+        raise f.refused(f.tree, f"the tuple {name!r} in a named tuple", "take a named tuple")
+    if f.silent or isinstance(kind, Static):
+        return of_leaves(kind, [None] * len(leaf_types(kind)))
+    return f.program.read(f.builder, record.pointer, kind, first)
+
+
+def _subscript(f: Function, node: ast.Subscript) -> Value:
+    of = value(f, node.value)
+    if isinstance(of, ArrayValue):
+        return arrays.subscript(f, of, node)
+    if isinstance(of, StaticValue) and isinstance(of.value, tuple):
+        items = [f.program.constant(each, lambda *x: f.refuse(node, *x)) for each in of.value]
+        of = TupleValue(tuple(items))
+    if isinstance(of, TupleValue) and not isinstance(node.slice, ast.Slice):
+        return _item(f, of, numbers.scalar(f, value(f, node.slice), node), node)
+    raise f.refused(node, f"the subscript {ast.unparse(node)}", "take entries of arrays and tuples")
+
+
+def _item(f: Function, of: TupleValue, index: Scalar, node: ast.AST) -> Value:
+    """An item of a tuple; one that is not known beforehand, of items of one type."""
+    count = len(of.items)
+    if index.const is not None:
+        if not -count <= index.const < count:
+            raise f.refused(node, f"the item {index.const} of {count}", "take one that is there")
+        return of.items[index.const]
+    if len({each.kind for each in of.items}) != 1 or not isinstance(of.items[0], Scalar):
+        raise f.refused(node, "an item of a tuple by a number that varies", "take a tuple of numbers of one type")
+    index = arrays.index_within(f, index, number(count), node)
+    first, *others = of.items
+    made = first.ir  # pyright: ignore
+    for i, each in enumerate(others, 1):
+        here = f.builder.icmp_signed("==", index.ir, ir.Constant(I64, i))
+        made = f.builder.select(here, each.ir, made)  # pyright: ignore
+    return Scalar(first.kind, made)  # pyright: ignore
+
+
+def _binary(f: Function, node: ast.BinOp) -> Value:
+    x, y = (numbers.scalar(f, value(f, each), node) for each in (node.left, node.right))
+    return numbers.binary(f, type(node.op), x, y, node)
+
+
+def _unary(f: Function, node: ast.UnaryOp) -> Value:
+    if isinstance(node.op, ast.Not):
+        return Scalar(BOOL, f.builder.not_(test(f, node.operand)))
+    x = numbers.scalar(f, value(f, node.operand), node)
+    if isinstance(node.op, ast.USub):
+        return numbers.negated(f, x, node)
+    raise f.refused(node, f"the operation {ast.unparse(node)}", "write it otherwise")
+
+
+def _logic(f: Function, node: ast.BoolOp) -> Value:
+    """Of truth values, the later ones only where they matter."""
+
+    def item(each: ast.expr) -> Any:
+        made = numbers.scalar(f, value(f, each), each)
+        if made.kind != BOOL:
+            raise f.refused(each, "and, or of what is no truth value", "compare it, as x != 0")
+        return made.ir
+
+    return Scalar(BOOL, _shortened(f, node.values, isinstance(node.op, ast.And), item))
+
+
+def _shortened(f: Function, nodes: list[ast.expr], all_: bool, item: Callable[[ast.expr], Any]) -> Any:
+    """Whether all hold, or any, asked for one after the other until it is known."""
+    b, b0 = f.builder, ir.Constant(BOOL.llvm, int(not all_))
+    behind = b.append_basic_block()
+    ends = []
+    for each in nodes[:-1]:
+        holds, more = item(each), b.append_basic_block()
+        ends.append((b0, b.block))
+        b.cbranch(holds, *((more, behind) if all_ else (behind, more)))
+        b.position_at_end(more)
+    ends.append((item(nodes[-1]), b.block))
+    b.branch(behind)
+    b.position_at_end(behind)
+    return _merged(f, BOOL.llvm, ends)
+
+
+def _merged(f: Function, kind: Any, ends: list[tuple[Any, Any]]) -> Any:
+    if f.silent:
+        return None
+    phi = f.builder.phi(kind)
+    for each, block in ends:
+        phi.add_incoming(each, block)
+    return phi
+
+
+def test(f: Function, node: ast.expr) -> Any:
+    """Whether an expression holds, as LLVM's I1: numbers hold unless they are 0."""
+    if isinstance(node, ast.BoolOp):
+        return _shortened(f, node.values, isinstance(node.op, ast.And), lambda each: test(f, each))
+    return numbers.truth(f, numbers.scalar(f, value(f, node), node))
+
+
+def _comparison(f: Function, node: ast.Compare) -> Value:
+    """A chain of relations, each asked for if those before it hold."""
+    left, ends, b = numbers.scalar(f, value(f, node.left), node), [], f.builder
+    behind = b.append_basic_block() if len(node.ops) > 1 else None
+    for i, (op, each) in enumerate(zip(node.ops, node.comparators, strict=True)):
+        right = numbers.scalar(f, value(f, each), node)
+        holds = numbers.compared(f, type(op), left, right, node)
+        if behind is None and len(node.ops) == 1:
+            return holds
+        last = i == len(node.ops) - 1
+        more = behind if last else b.append_basic_block()
+        ends.append((holds.ir if last else ir.Constant(BOOL.llvm, 0), b.block))
+        b.branch(more) if last else b.cbranch(holds.ir, more, behind)
+        b.position_at_end(more)
+        left = right
+    return Scalar(BOOL, _merged(f, BOOL.llvm, ends))
+
+
+def _conditional(f: Function, node: ast.IfExp) -> Value:
+    b = f.builder
+    yes, no, behind = (b.append_basic_block() for _ in range(3))
+    b.cbranch(test(f, node.test), yes, no)
+    made, ends = [], []
+    for block, each in ((yes, node.body), (no, node.orelse)):
+        b.position_at_end(block)
+        made.append(value(f, each))
+        ends.append(b.block)
+    return _either(f, node, made, ends, behind)
+
+
+def _either(f: Function, node: ast.AST, made: list[Value], ends: list[Any], behind: Any) -> Value:
+    """One of two values, by where the translation comes from."""
+    kind, b = f.common(made[0].kind, made[1].kind, node), f.builder
+    parts = []
+    for each, block in zip(made, ends, strict=True):
+        b.position_at_end(block)
+        parts.append(calls.leaves_of(f, each, kind, node))
+        b.branch(behind)
+    b.position_at_end(behind)
+    if f.silent:
+        return of_leaves(kind, [None] * len(leaf_types(kind)))
+    columns = zip(*parts, strict=True)
+    kinds = leaf_types(kind)
+    merged = [_merged(f, t, list(zip(x, ends, strict=True))) for t, x in zip(kinds, columns, strict=True)]
+    return of_leaves(kind, merged)
+
+
+def _called(f: Function, node: ast.Call) -> Value:
+    return calls.called(f, node)
+
+
+def _name(f: Function, node: ast.Name) -> Value:
+    return f.name(node)
+
+
+EXPRESSIONS: Mapping[type[ast.expr], Callable[[Any, Any], Value]] = MappingProxyType(
+    {
+        ast.Constant: _constant, ast.Name: _name, ast.Tuple: _tuple, ast.Attribute: _attribute,
+        ast.Subscript: _subscript, ast.BinOp: _binary, ast.UnaryOp: _unary, ast.BoolOp: _logic,
+        ast.Compare: _comparison, ast.IfExp: _conditional, ast.Call: _called,
+    }
+)  # fmt: skip

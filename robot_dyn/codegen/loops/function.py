@@ -1,0 +1,298 @@
+"""A function on its way to machine code: its names, its blocks, and where it may fail.
+
+Types settle by translating it without writing anything until none changes; then it is written. A function that may
+fail gives the text of its failure, or null, besides its result.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NoReturn, final
+
+from llvmlite import ir
+
+from robot_dyn.codegen.loops import expressions, statements
+from robot_dyn.codegen.loops.kinds import (
+    F64,
+    TEXT,
+    ArrayKind,
+    Kind,
+    Number,
+    Static,
+    TupleKind,
+)  # fmt: skip
+from robot_dyn.codegen.loops.numbers import converted, joined
+from robot_dyn.codegen.loops.source import SubsetError, names_of, refused, stores, syntax
+from robot_dyn.codegen.loops.values import (
+    Scalar,
+    StaticValue,
+    TupleValue,
+    Value,
+    Written,
+    leaf_types,
+    leaves,
+    number,
+    of_leaves,
+)  # fmt: skip
+
+if TYPE_CHECKING:
+    from robot_dyn.codegen.loops.program import Program
+
+_PASSES = 8
+
+
+class _Silent:
+    """In place of LLVM's builder, where types are looked for: it writes nothing."""
+
+    block = None
+
+    def __getattr__(self, name: str) -> Callable[..., None]:
+        return _nothing
+
+
+def _nothing(*_: Any, **__: Any) -> None:
+    return None
+
+
+@final
+class Function:
+    """A function on its way.
+
+    Args:
+        program: Of which it is a part.
+        function: Python's.
+        kinds: The types of its arguments.
+        checks: Whether indices and integers are checked; not in primitives, which look at their arguments themselves.
+
+    Attributes:
+        builder: LLVM's, or one that writes nothing.
+        assigned: Names that have a value wherever the translation is.
+        result: The type of what it gives, as far as it is known.
+        may_fail: Whether something in it may fail.
+        leaving: For each loop around: the blocks of its next round and behind it, and the names assigned at breaks.
+    """
+
+    def __init__(self, program: Program, function: Callable[..., Any], kinds: Sequence[Kind], checks: bool) -> None:
+        self.program, self.function, self.checks = program, function, checks
+        self.tree = syntax(function)
+        self.builder: Any = _Silent()
+        self.arguments = dict(zip(self._parameters(len(kinds)), kinds, strict=True))
+        self.known = names_of(function)
+        self._times = Counter(self.arguments.keys()) + stores(self.tree)
+        self._kinds: dict[str, Kind] = dict(self.arguments)
+        self._values: dict[str, Value] = {}  # of names that are assigned at one place
+        self._slots: dict[str, list[Any]] = {}  # of the others
+        self.assigned: set[str] = set()
+        self.result: Kind | None = None
+        self.may_fail = False
+        self.leaving: list[Any] = []
+        self._failure: Any = None
+        self._settled = True
+
+    @property
+    def silent(self) -> bool:
+        """Whether nothing is written yet."""
+        return isinstance(self.builder, _Silent)
+
+    def _parameters(self, count: int) -> list[str]:
+        of = self.tree.args
+        if of.vararg or of.kwarg or of.kwonlyargs or of.defaults:
+            raise self.refused(self.tree, "a parameter with a default, * or **", "take plain parameters")
+        names = [each.arg for each in (*of.posonlyargs, *of.args)]
+        if len(names) != count:
+            raise self.refused(self.tree, f"a call with {count} arguments of {len(names)}", "give each parameter one")
+        return names
+
+    def refused(self, node: ast.AST, what: str, remedy: str) -> SubsetError:
+        """The error of a construct of this function."""
+        return refused(self.function, getattr(node, "lineno", self.tree.lineno), what, remedy)
+
+    # What is done in two passes
+
+    def written(self) -> Written:
+        """The function, written into the module of its program."""
+        for _ in range(_PASSES):
+            self._settled = True
+            self._body([None] * sum(len(leaf_types(each)) for each in self.arguments.values()))
+            if self._settled:
+                break
+        else:
+            raise self.refused(self.tree, "a function whose types do not settle", "give each name one type")
+        result: Any = Static.of(None) if self.result is None else self.result
+        given = [leaf for each in self.arguments.values() for leaf in leaf_types(each)]
+        made = ir.Function(
+            self.program.module, ir.FunctionType(_llvm_result(result, self.may_fail), given),
+            self.program.name(self.function.__name__),
+        )  # fmt: skip
+        made.linkage = "internal"
+        inlined = hasattr(self.function, "inlined")  # else the time of LLVM doubles; the work is behind addresses
+        made.attributes.add("alwaysinline" if inlined else "noinline")
+        made.attributes.add("nounwind")
+        self.builder = ir.IRBuilder(made.append_basic_block())
+        self._body(list(made.args))
+        return Written(made, result, self.may_fail)
+
+    def _body(self, given: list[Any]) -> None:
+        self.assigned, self.leaving, self._failure = set(self.arguments), [], None
+        if not self.silent:
+            self._slots = {
+                name: [self.builder.alloca(each) for each in leaf_types(kind)]
+                for name, kind in self._kinds.items() if self._times[name] > 1
+            }  # fmt: skip
+        for name, kind in self.arguments.items():
+            count = len(leaf_types(kind))
+            value, given = of_leaves(kind, given[:count]), given[count:]
+            self._bind(name, self.fitted(value, self._kinds[name], self.tree))
+        if not statements.block(self, self.tree.body):
+            if self.result not in (None, Static.of(None)):
+                raise self.refused(self.tree, "a function that ends without its result", "end it with a return")
+            self.give(StaticValue(None), self.tree)
+        if self._failure is not None and not self.silent:
+            block, text = self._failure
+            self.builder.position_at_end(block)
+            self._leave(text, [ir.Constant(each, ir.Undefined) for each in leaf_types(_known(self.result))])
+
+    # Names
+
+    def assign(self, name: str, value: Value, node: ast.AST) -> None:
+        """Give a name a value, of the type of the name."""
+        kind = self._kinds.get(name)
+        if kind is None or (self.silent and kind != value.kind):
+            self._kinds[name] = value.kind if kind is None else self.common(kind, value.kind, node)
+            self._settled &= kind is None  # else what was made of the first one is to be made again
+        self._bind(name, self.fitted(value, self._kinds[name], node))
+        self.assigned.add(name)
+
+    def _bind(self, name: str, value: Value) -> None:
+        if self._times[name] == 1:
+            self._values[name] = value
+        elif not self.silent:
+            for slot, leaf in zip(self._slots[name], leaves(value), strict=True):
+                self.builder.store(leaf, slot)
+
+    def common(self, x: Kind, y: Kind, node: ast.AST) -> Kind:
+        """The type that holds values of two."""
+        made: Kind | None = None
+        if x == y:
+            return x
+        if isinstance(x, Number) and isinstance(y, Number):
+            made = joined(x, y)
+        elif isinstance(x, ArrayKind) and isinstance(y, ArrayKind) and (x.of, x.ndim) == (y.of, y.ndim):
+            both = x.contiguous and y.contiguous, x.single and y.single, x.frozen or y.frozen
+            made = ArrayKind(x.of, x.ndim, *both)
+        elif isinstance(x, TupleKind) and isinstance(y, TupleKind) and len(x.items) == len(y.items):
+            pairs = zip(x.items, y.items, strict=True)
+            made = TupleKind(tuple(self.common(a, b, node) for a, b in pairs))
+        if made is None:
+            raise self.refused(node, "a name, or a result, of different types", "give each type a name of its own")
+        return made
+
+    def fitted(self, value: Value, kind: Kind, node: ast.AST) -> Value:
+        """A value as one of a type that holds it as well."""
+        if value.kind == kind:
+            return value
+        if isinstance(value, Scalar) and isinstance(kind, Number):
+            if kind.name == "float" and value.const is None:
+                remedy = "begin with a float, as 0.0, or convert it with float"
+                raise self.refused(node, "an integer where a float is elsewhere", remedy)
+            return converted(self, value, kind, node)
+        if isinstance(value, TupleValue) and isinstance(kind, TupleKind):
+            pairs = zip(value.items, kind.items, strict=True)
+            return TupleValue(tuple(self.fitted(a, b, node) for a, b in pairs))
+        apart = value.strides(self.builder)  # pyright: ignore
+        return replace(value, kind=kind, apart=() if kind.contiguous else apart)  # pyright: ignore
+
+    def name(self, node: ast.Name) -> Value:
+        """The value of a name."""
+        if node.id not in self._times:
+            if node.id not in self.known:
+                self.refuse(node, f"the name {node.id!r}, which has no value,", "define it before")
+            return self.program.constant(self.known[node.id], lambda *x: self.refuse(node, *x))
+        if node.id not in self.assigned:
+            remedy = "give it one before the branch or loop that does"
+            raise self.refused(node, f"{node.id!r}, which may have no value here,", remedy)
+        if self._times[node.id] == 1:
+            return self._values[node.id]
+        kind = self._kinds[node.id]
+        parts = [None] * len(leaf_types(kind)) if self.silent else [self.builder.load(x) for x in self._slots[node.id]]
+        return of_leaves(kind, parts)
+
+    def refuse(self, node: ast.AST, what: str, remedy: str) -> NoReturn:
+        """Raise it."""
+        raise self.refused(node, what, remedy)
+
+    def expression(self, node: ast.expr) -> Value:
+        """The value of an expression."""
+        return expressions.value(self, node)
+
+    # Blocks
+
+    def give(self, value: Value, node: ast.AST) -> None:
+        """End the function with a result."""
+        before = self.result
+        self.result = value.kind if before is None else self.common(before, value.kind, node)
+        self._settled &= before is None or before == self.result
+        if not self.silent:
+            self._leave(ir.Constant(TEXT, None), leaves(self.fitted(value, self.result, node)))
+
+    def _leave(self, text: Any, parts: list[Any]) -> None:
+        parts = [text, *parts] if self.may_fail else parts
+        if len(parts) < 2:
+            self.builder.ret(parts[0]) if parts else self.builder.ret_void()
+            return
+        made = ir.Constant(_llvm_result(_known(self.result), self.may_fail), ir.Undefined)
+        for i, each in enumerate(parts):
+            made = self.builder.insert_value(made, each, i)
+        self.builder.ret(made)
+
+    def check(self, holds: Any, node: ast.AST, what: str) -> None:
+        """Fail unless a condition holds."""
+        self.may_fail = True
+        if not self.silent:
+            where = f"{self.function.__module__}.{self.function.__qualname__}, line {getattr(node, 'lineno', 0)}"
+            self.fail_unless(holds, self.program.text(f"{where}: {what}"))
+
+    def fail_unless(self, holds: Any, text: Any) -> None:
+        """Fail with a text unless a condition holds."""
+        self.may_fail = True
+        if self.silent:
+            return
+        if self._failure is None:
+            block = self.builder.append_basic_block("failed")
+            self._failure = block, ir.PhiInstr(block, TEXT, "text", ())
+            block.instructions.append(self._failure[1])
+        block, phi = self._failure
+        phi.add_incoming(text, self.builder.block)
+        going_on = self.builder.append_basic_block()
+        self.builder.cbranch(holds, going_on, block)
+        self.builder.position_at_end(going_on)
+
+    def external(self, name: str, result: Any, *given: Any) -> Any:
+        """A function of the C library, which LLVM takes as any other."""
+        return None if self.silent else self.program.external(name, result, *given)
+
+    def intrinsic(self, name: str, *given: Any) -> Any:
+        """A function of LLVM."""
+        if self.silent:
+            return None
+        shape = ir.FunctionType(F64, [F64] * len(given))
+        return self.builder.call(self.program.module.declare_intrinsic(f"llvm.{name}", [F64], shape), list(given))
+
+    @contextmanager
+    def loop(self, count: Scalar) -> Iterator[Scalar]:
+        """Instructions that are done for each index from 0 to before a count."""
+        with statements.counted(self, number(0), count, 1) as (index, _):
+            yield index
+
+
+def _llvm_result(kind: Kind, may_fail: bool) -> Any:
+    parts = [TEXT] * may_fail + leaf_types(kind)
+    return ir.LiteralStructType(parts) if len(parts) > 1 else parts[0] if parts else ir.VoidType()
+
+
+def _known(kind: Kind | None) -> Kind:
+    return Static.of(None) if kind is None else kind

@@ -1,0 +1,195 @@
+"""Arithmetic of numbers, as Python and NumPy have it: floats by IEEE 754, integers of 64 bits that may not overflow.
+
+Nothing is contracted or reordered. An integer that overflows, and a division of integers by zero, end the call with an
+error; a float divided by zero is inf or nan, as of NumPy. Unsigned integers wrap.
+"""
+
+from __future__ import annotations
+
+import ast
+import operator
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+from llvmlite import ir
+
+from robot_dyn.codegen.loops.kinds import BOOL, F64, FLOAT, I1, I64, INT, UINT, Kind, Number
+from robot_dyn.codegen.loops.values import Scalar, Value, number, word
+
+if TYPE_CHECKING:
+    from robot_dyn.codegen.loops.function import Function
+
+_LEAST = -(2**63)
+Names = Mapping[type[ast.operator], str]
+_IN_PYTHON: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = MappingProxyType(
+    {
+        ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
+        ast.FloorDiv: operator.floordiv, ast.Mod: operator.mod, ast.Pow: operator.pow,
+        ast.BitAnd: operator.and_, ast.BitOr: operator.or_, ast.BitXor: operator.xor,
+        ast.LShift: operator.lshift, ast.RShift: operator.rshift,
+    }
+)  # fmt: skip
+_CHECKED: Names = MappingProxyType({ast.Add: "sadd", ast.Sub: "ssub", ast.Mult: "smul"})
+_PLAIN: Names = MappingProxyType({ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul"})
+_FLOATING: Names = MappingProxyType({ast.Add: "fadd", ast.Sub: "fsub", ast.Mult: "fmul", ast.Div: "fdiv"})
+_BITS: Names = MappingProxyType({ast.BitAnd: "and_", ast.BitOr: "or_", ast.BitXor: "xor"})
+_RELATIONS: Mapping[type[ast.cmpop], str] = MappingProxyType(
+    {ast.Eq: "==", ast.NotEq: "!=", ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">="}
+)
+
+
+def scalar(f: Function, value: Value, node: ast.AST) -> Scalar:
+    """A value that is a number."""
+    if not isinstance(value, Scalar):
+        raise f.refused(node, "an operation on what is not a number", "write it entry by entry, or with a primitive")
+    return value
+
+
+def converted(f: Function, x: Scalar, kind: Kind, node: ast.AST) -> Scalar:
+    """A number as one of another type, without loss: truth value to integer to float, constants to unsigned."""
+    if x.kind == kind:
+        return x
+    if kind == FLOAT and x.kind in (INT, BOOL):
+        if x.const is not None and float(x.const) == x.const:
+            return number(float(x.const))
+        make = f.builder.sitofp if x.kind == INT else f.builder.uitofp
+        return Scalar(FLOAT, make(x.ir, F64))
+    if kind == INT and x.kind == BOOL:
+        return number(int(x.const)) if x.const is not None else Scalar(INT, f.builder.zext(x.ir, I64))
+    if kind == UINT and x.kind == INT and x.const is not None and 0 <= x.const < 2**64:
+        return word(x.const)
+    remedy = "convert it with int, float or np.uint64"
+    raise f.refused(node, f"a number of type {x.kind.name} where {getattr(kind, 'name', 'another')} is asked", remedy)
+
+
+def together(f: Function, x: Scalar, y: Scalar, node: ast.AST) -> tuple[Scalar, Scalar]:
+    """Two numbers as ones of the type that holds both."""
+    kinds = {x.kind, y.kind}
+    if len(kinds) == 1:
+        return x, y
+    kind = UINT if UINT in kinds else FLOAT if FLOAT in kinds else INT
+    return converted(f, x, kind, node), converted(f, y, kind, node)
+
+
+def binary(f: Function, of: type[ast.operator], x: Scalar, y: Scalar, node: ast.AST) -> Scalar:
+    """An operation on two numbers."""
+    if x.const is not None and y.const is not None and UINT not in (x.kind, y.kind):
+        return _of_constants(f, of, x, y, node)
+    if of in _BITS and x.kind == y.kind and x.kind != FLOAT:
+        return Scalar(x.kind, getattr(f.builder, _BITS[of])(x.ir, y.ir))
+    if x.kind == y.kind == BOOL:
+        raise f.refused(node, "arithmetic of two truth values", "convert them with int, or write and, or")
+    if of is ast.Pow:
+        return _power(f, x, y, node)
+    if of is ast.Div and UINT not in (x.kind, y.kind):
+        x, y = converted(f, x, FLOAT, node), converted(f, y, FLOAT, node)
+    x, y = together(f, x, y, node)
+    if x.kind == FLOAT and of in _FLOATING:
+        return Scalar(FLOAT, getattr(f.builder, _FLOATING[of])(x.ir, y.ir))
+    if x.kind == INT:
+        return _of_integers(f, of, x, y, node)
+    if x.kind == UINT and (of in _PLAIN or of in (ast.LShift, ast.RShift)):
+        return _of_words(f, of, x, y)
+    raise f.refused(node, f"{of.__name__} of numbers of type {x.kind.name}", "convert them, or write it otherwise")
+
+
+def _of_constants(f: Function, of: type[ast.operator], x: Scalar, y: Scalar, node: ast.AST) -> Scalar:
+    try:
+        made = _IN_PYTHON[of](x.const, y.const)
+    except (ArithmeticError, TypeError, KeyError, ValueError) as error:
+        raise f.refused(node, f"an operation on constants ({error})", "correct it") from None
+    if not isinstance(made, bool | float) and not (isinstance(made, int) and _LEAST <= made < -_LEAST):
+        raise f.refused(node, f"the constant {made}", "take one of 64 bits")
+    return number(made)
+
+
+def _of_integers(f: Function, of: type[ast.operator], x: Scalar, y: Scalar, node: ast.AST) -> Scalar:
+    b = f.builder
+    if of in _PLAIN and not f.checks:
+        return Scalar(INT, getattr(b, _PLAIN[of])(x.ir, y.ir, flags=("nsw",)))
+    if of in _PLAIN:
+        both = getattr(b, f"{_CHECKED[of]}_with_overflow")(x.ir, y.ir)
+        f.check(b.not_(b.extract_value(both, 1)), node, "an integer overflows 64 bits")
+        return Scalar(INT, b.extract_value(both, 0))
+    if of in (ast.FloorDiv, ast.Mod):
+        return _divided(f, of, x, y, node)
+    raise f.refused(node, f"{of.__name__} of integers", "convert them with np.uint64 for operations on bits")
+
+
+def _divided(f: Function, of: type[ast.operator], x: Scalar, y: Scalar, node: ast.AST) -> Scalar:
+    """⌊x / y⌋ and its rest, which has the sign of y."""
+    b, zero, one = f.builder, ir.Constant(I64, 0), ir.Constant(I64, 1)
+    if y.const is None or y.const == 0:
+        f.check(b.icmp_signed("!=", y.ir, zero), node, "an integer is divided by zero")
+    if y.const is None or y.const == -1:
+        whole = b.and_(
+            b.icmp_signed("==", x.ir, ir.Constant(I64, _LEAST)), b.icmp_signed("==", y.ir, ir.Constant(I64, -1))
+        )
+        f.check(b.not_(whole), node, "an integer overflows 64 bits")
+    quotient, rest = b.sdiv(x.ir, y.ir), b.srem(x.ir, y.ir)
+    below = b.and_(b.icmp_signed("!=", rest, zero), b.icmp_signed("<", b.xor(rest, y.ir), zero))
+    if of is ast.Mod:
+        return Scalar(INT, b.select(below, b.add(rest, y.ir), rest))
+    return Scalar(INT, b.select(below, b.sub(quotient, one), quotient))
+
+
+def _of_words(f: Function, of: type[ast.operator], x: Scalar, y: Scalar) -> Scalar:
+    b = f.builder
+    if of in _PLAIN:
+        return Scalar(UINT, getattr(b, _PLAIN[of])(x.ir, y.ir))
+    small = b.icmp_unsigned("<", y.ir, ir.Constant(I64, 64))  # beyond, LLVM's shift has no value
+    shifted = (b.shl if of is ast.LShift else b.lshr)(x.ir, b.select(small, y.ir, ir.Constant(I64, 0)))
+    return Scalar(UINT, b.select(small, shifted, ir.Constant(I64, 0)))
+
+
+def _power(f: Function, x: Scalar, y: Scalar, node: ast.AST) -> Scalar:
+    """By the C library, as Python and NumPy take it."""
+    if x.kind != FLOAT:
+        raise f.refused(node, "a power of an integer", "convert it with float, or multiply")
+    return Scalar(FLOAT, f.builder.call(f.external("pow", F64, F64, F64), [x.ir, converted(f, y, FLOAT, node).ir]))
+
+
+def compared(f: Function, of: type[ast.cmpop], x: Scalar, y: Scalar, node: ast.AST) -> Scalar:
+    """A relation of two numbers; those with nan hold for != alone."""
+    if of not in _RELATIONS:
+        raise f.refused(node, f"the relation {of.__name__}", "compare numbers with ==, !=, <, <=, > or >=")
+    sign = _RELATIONS[of]
+    x, y = together(f, x, y, node)
+    b = f.builder
+    if x.kind == FLOAT:
+        return Scalar(BOOL, (b.fcmp_unordered if sign == "!=" else b.fcmp_ordered)(sign, x.ir, y.ir))
+    return Scalar(BOOL, (b.icmp_signed if x.kind == INT else b.icmp_unsigned)(sign, x.ir, y.ir))
+
+
+def truth(f: Function, x: Scalar) -> Any:
+    """Whether a number is not 0, as LLVM's I1."""
+    if x.kind == BOOL:
+        return x.ir
+    zero = ir.Constant(x.kind.llvm, 0)
+    if x.kind == FLOAT:
+        return f.builder.fcmp_unordered("!=", x.ir, zero)
+    return f.builder.icmp_signed("!=", x.ir, zero)
+
+
+def negated(f: Function, x: Scalar, node: ast.AST) -> Scalar:
+    """−x."""
+    if x.const is not None and x.kind != BOOL:
+        return number(-x.const)
+    if x.kind == FLOAT:
+        return Scalar(FLOAT, f.builder.fneg(x.ir))
+    if x.kind == INT:
+        return _of_integers(f, ast.Sub, number(0), x, node)
+    raise f.refused(node, f"the negative of a number of type {x.kind.name}", "convert it with int")
+
+
+def opposite(f: Function, x: Scalar) -> Scalar:
+    """Whether a number is 0."""
+    return Scalar(BOOL, f.builder.xor(truth(f, x), ir.Constant(I1, 1)))
+
+
+def joined(x: Number, y: Number) -> Number | None:
+    """The type of a variable that holds both; None if there is none."""
+    if x == y:
+        return x
+    return FLOAT if {x, y} == {INT, FLOAT} else None

@@ -1,0 +1,215 @@
+"""A module of LLVM of a function and all that it calls, each translated once for the types of its arguments."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from enum import Enum
+from types import FunctionType, ModuleType
+from typing import Any, NoReturn, final
+
+import numpy as np
+from llvmlite import ir
+
+from robot_dyn.codegen.loops.function import Function
+from robot_dyn.codegen.loops.kinds import (
+    BOOL,
+    FLOAT,
+    I8,
+    I64,
+    TEXT,
+    WORDS,
+    ArrayKind,
+    Kind,
+    Number,
+    RecordKind,
+    Static,
+    TupleKind,
+    kind_of,
+    words,
+)  # fmt: skip
+from robot_dyn.codegen.loops.source import SubsetError
+from robot_dyn.codegen.loops.values import (
+    ArrayValue,
+    Scalar,
+    StaticValue,
+    Value,
+    Written,
+    leaves,
+    number,
+    of_leaves,
+    word,
+)  # fmt: skip
+
+Refuse = Callable[[str, str], NoReturn]
+Instead = Mapping[Any, Callable[..., Any]]
+_WORDS: Any = np.uint64
+_TRUTHS: Any = (bool, np.bool_)
+_INTEGERS: Any = (int, np.integer)
+_KNOWN: Any = (str, tuple, ModuleType, type, Enum)
+
+
+@final
+class Program:
+    """A module on its way.
+
+    Args:
+        module: LLVM's.
+        prefix: With which the names of its functions begin.
+        instead: What is translated in place of a function: one of the subset, which is not checked; or one marked by
+            `emits`, (f, node, arguments) → value, which writes instructions.
+    """
+
+    def __init__(self, module: Any, prefix: str, instead: Instead) -> None:
+        self.module, self.prefix, self.instead = module, prefix, instead
+        self._unchecked = {each for each in instead.values() if not hasattr(each, "emits")}
+        self._done: dict[tuple[Callable[..., Any], tuple[Kind, ...]], Written | None] = {}
+        self._texts: dict[str, Any] = {}
+        self._arrays: dict[int, tuple[np.ndarray, Any]] = {}
+        self._known = module.add_metadata([])
+
+    def written(self, function: FunctionType, kinds: tuple[Kind, ...], refuse: Refuse) -> Written:
+        """A function for arguments of these types."""
+        place = function, kinds
+        if place not in self._done:
+            self._done[place] = None
+            checks = function not in self._unchecked and not hasattr(function, "unchecked")
+            self._done[place] = Function(self, function, kinds, checks).written()
+        made = self._done[place]
+        if made is None:
+            refuse(f"{function.__name__!r}, which calls itself,", "write a loop")
+        return made
+
+    def name(self, of: str) -> str:
+        """A name that no other function of the module has."""
+        return f"{self.prefix}{of}_{len(self._done)}"
+
+    def entry(self, function: FunctionType, kinds: tuple[Kind, ...], name: str) -> Kind:
+        """Write the function that others call; the type of its result.
+
+        It takes the addresses of the words of each argument, and that of room for the words of the result; it gives
+        the text of its failure, or null.
+        """
+        written = self.written(function, kinds, self._alone)
+        shape = ir.FunctionType(TEXT, [WORDS.as_pointer(), WORDS])
+        made = ir.Function(self.module, shape, f"{self.prefix}{name}")
+        b = ir.IRBuilder(made.append_basic_block())
+        given, out = made.args
+        parts: list[Any] = []
+        for i, kind in enumerate(kinds):
+            pointer = self.known_load(b, b.gep(given, [ir.Constant(I64, i)]))
+            parts += self._loaded(b, pointer, kind)
+        result = b.call(written.ir, parts)
+        count = written.may_fail + len(leaves(self._nothing(written.result)))
+        found = [result] if count == 1 else [b.extract_value(result, i) for i in range(count)]
+        text, found = (found[0], found[1:]) if written.may_fail else (ir.Constant(TEXT, None), found)
+        for i, each in enumerate(found):
+            b.store(_word(b, each), b.gep(out, [ir.Constant(I64, i)]))
+        b.ret(text)
+        return written.result
+
+    @staticmethod
+    def _alone(what: str, remedy: str) -> NoReturn:
+        raise SubsetError(f"{what} is not translated; {remedy}")
+
+    @staticmethod
+    def _nothing(kind: Kind) -> Value:
+        if not _only_numbers(kind):
+            raise SubsetError("a function that gives an array is not called from outside; write into one it is given")
+        return of_leaves(kind, [None] * words(kind))
+
+    def _loaded(self, b: Any, pointer: Any, kind: Kind) -> list[Any]:
+        """The parts of an argument, from its words."""
+        if isinstance(kind, RecordKind):
+            return [pointer]
+        if isinstance(kind, TupleKind):
+            made, at = [], 0
+            for each in kind.items:
+                made += self._loaded(b, b.gep(pointer, [ir.Constant(I64, at)]), each)
+                at += words(each)
+            return made
+        if isinstance(kind, Static):
+            return []
+        return leaves(self.read(b, pointer, kind, 0))
+
+    def read(self, b: Any, pointer: Any, kind: Number | ArrayKind, first: int) -> Value:
+        """A number or an array, from its words."""
+        made = [self.known_load(b, b.gep(pointer, [ir.Constant(I64, first + i)])) for i in range(words(kind))]
+        if isinstance(kind, Number):
+            of_word = made[0] if kind.llvm == I64 else None
+            of_word = b.trunc(made[0], kind.llvm) if kind == BOOL else of_word
+            return Scalar(kind, b.bitcast(made[0], kind.llvm) if kind == FLOAT else of_word)
+        n = kind.ndim
+        lengths, apart = made[1 : 1 + n - kind.single], made[1 + n : 1 + 2 * n - kind.single]
+        bytes_ = ir.Constant(I64, 1 if kind.of == BOOL else 8)
+        apart = [] if kind.contiguous else [b.sdiv(each, bytes_, flags=("exact",)) for each in apart]
+        return of_leaves(kind, [b.inttoptr(made[0], kind.of.stored.as_pointer()), *lengths, *apart])
+
+    def known_load(self, b: Any, pointer: Any) -> Any:
+        """What lies at an address and does not change while machine code runs."""
+        made = b.load(pointer)
+        made.set_metadata("invariant.load", self._known)
+        return made
+
+    def external(self, name: str, result: Any, *given: Any) -> Any:
+        """A function of the C library."""
+        if name in self.module.globals:
+            return self.module.globals[name]
+        made = ir.Function(self.module, ir.FunctionType(result, given), name)
+        made.attributes.add("nobuiltin")  # LLVM has a square root, or a product, for some powers
+        return made
+
+    def text(self, text: str) -> Any:
+        """The address of a text."""
+        if text not in self._texts:
+            data = bytearray(text.encode() + b"\0")
+            kind = ir.ArrayType(I8, len(data))
+            self._texts[text] = self._global(kind, data).bitcast(TEXT)
+        return self._texts[text]
+
+    def _global(self, kind: Any, data: Any) -> Any:
+        made: Any = ir.GlobalVariable(self.module, kind, f"{self.prefix}data_{len(self.module.globals)}")
+        made.linkage, made.global_constant, made.initializer = "internal", True, ir.Constant(kind, data)
+        return made
+
+    def constant(self, value: Any, refuse: Refuse) -> Value:
+        """A value that is known."""
+        if isinstance(value, _WORDS):
+            return word(int(value))
+        if isinstance(value, _TRUTHS):
+            return number(bool(value))
+        if isinstance(value, float):
+            return number(float(value))
+        if isinstance(value, _INTEGERS) and -(2**63) <= value < 2**63:
+            return number(int(value))
+        if isinstance(value, np.ndarray):
+            return self._constant_array(value)
+        if isinstance(value, _KNOWN) or value is None or callable(value):
+            return StaticValue(value)
+        return refuse(f"a value of type {type(value).__name__}", "take numbers, arrays, tuples and functions")
+
+    def _constant_array(self, x: np.ndarray) -> ArrayValue:
+        kind = kind_of(x)
+        assert isinstance(kind, ArrayKind)
+        if id(x) not in self._arrays:
+            stored = ir.ArrayType(kind.of.stored, x.size)
+            entries = [each if kind.of == FLOAT else int(each) for each in x.ravel().tolist()]
+            self._arrays[id(x)] = x, self._global(stored, entries).bitcast(kind.of.stored.as_pointer())
+        kind = ArrayKind(kind.of, kind.ndim, True, kind.single, True)
+        return ArrayValue(kind, self._arrays[id(x)][1], tuple(number(each) for each in x.shape))
+
+
+def _word(b: Any, value: Any) -> Any:
+    if value.type == I64:
+        return value
+    return b.zext(value, I64) if value.type == BOOL.llvm else b.bitcast(value, I64)
+
+
+def _only_numbers(kind: Kind) -> bool:
+    if isinstance(kind, TupleKind):
+        return all(map(_only_numbers, kind.items))
+    return isinstance(kind, Number | Static)
+
+
+def translated(function: Any, kinds: tuple[Kind, ...], instead: Instead) -> Kind:
+    """Translate a function for arguments of these types, for nothing but its type and its errors."""
+    return Program(ir.Module(), "", instead).written(function, kinds, Program._alone).result

@@ -1,0 +1,236 @@
+"""Statements of the subset. Each tells whether what follows it is never reached."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+from llvmlite import ir
+
+from robot_dyn.codegen.loops import arrays, expressions, numbers
+from robot_dyn.codegen.loops.kinds import I64, INT
+from robot_dyn.codegen.loops.values import (
+    ArrayValue,
+    Scalar,
+    StaticValue,
+    TupleValue,
+    Value,
+    number,
+)  # fmt: skip
+
+if TYPE_CHECKING:
+    from robot_dyn.codegen.loops.function import Function
+
+
+def block(f: Function, nodes: list[ast.stmt]) -> bool:
+    """Statements one after the other."""
+    for node in nodes:
+        if type(node) not in STATEMENTS:
+            what = f"the statement {type(node).__name__}"
+            raise f.refused(node, what, "take assignments, if, for over range or an array, while and return")
+        if STATEMENTS[type(node)](f, node):
+            return True
+    return False
+
+
+def _assign(f: Function, node: ast.Assign) -> bool:
+    value = f.expression(node.value)
+    for target in node.targets:
+        _store(f, target, value, node)
+    return False
+
+
+def _annotated(f: Function, node: ast.AnnAssign) -> bool:
+    if node.value is None:
+        raise f.refused(node, "an annotation without a value", "give it one")
+    _store(f, node.target, f.expression(node.value), node)
+    return False
+
+
+def _store(f: Function, target: ast.expr, value: Value, node: ast.AST) -> None:
+    if isinstance(target, ast.Name):
+        f.assign(target.id, value, node)
+    elif isinstance(target, ast.Tuple | ast.List):
+        if not isinstance(value, TupleValue) or len(value.items) != len(target.elts):
+            raise f.refused(node, "taking apart what is not as many values", "give a tuple of as many")
+        for each, item in zip(target.elts, value.items, strict=True):
+            _store(f, each, item, node)
+    elif isinstance(target, ast.Subscript) and isinstance(of := f.expression(target.value), ArrayValue):
+        arrays.store_at(f, of, target, value)
+    else:
+        raise f.refused(node, f"an assignment to {ast.unparse(target)}", "assign to names and entries of arrays")
+
+
+def _augmented(f: Function, node: ast.AugAssign) -> bool:
+    """X op= y, with the place of x found once."""
+    op, target = type(node.op), node.target
+    if isinstance(target, ast.Name):
+        x = numbers.scalar(f, f.name(ast.copy_location(ast.Name(target.id, ast.Load()), target)), node)
+        made = numbers.binary(f, op, x, numbers.scalar(f, f.expression(node.value), node), node)
+        f.assign(target.id, made, node)
+        return False
+    of = f.expression(target.value) if isinstance(target, ast.Subscript) else None
+    if not isinstance(of, ArrayValue) or not isinstance(target, ast.Subscript):
+        raise f.refused(node, f"an assignment to {ast.unparse(target)}", "assign to names and entries of arrays")
+    if of.kind.frozen:
+        raise f.refused(node, "a write into an array that is read-only", "pass one that may be written")
+    places = arrays.indices(f, of, target)
+    x = arrays.load(f, of, places)
+    made = numbers.binary(f, op, x, numbers.scalar(f, f.expression(node.value), node), node)
+    arrays.store(f, of, places, numbers.converted(f, made, of.kind.of, node))
+    return False
+
+
+def _if(f: Function, node: ast.If) -> bool:
+    b = f.builder
+    yes, no, behind = (b.append_basic_block() for _ in range(3))
+    b.cbranch(expressions.test(f, node.test), yes, no)
+    before, ends = set(f.assigned), []
+    for start, nodes in ((yes, node.body), (no, node.orelse)):
+        b.position_at_end(start)
+        f.assigned = set(before)
+        ended = block(f, nodes)
+        if not ended:
+            ends.append(f.assigned)
+            b.branch(behind)
+    if not ends:
+        if not f.silent:
+            b.function.blocks.remove(behind)
+        return True
+    f.assigned = set.intersection(*ends)
+    b.position_at_end(behind)
+    return False
+
+
+def _while(f: Function, node: ast.While) -> bool:
+    _no_else(f, node)
+    b = f.builder
+    endless = isinstance(node.test, ast.Constant) and node.test.value is True
+    look, behind = b.append_basic_block(), b.append_basic_block()
+    b.branch(look)
+    b.position_at_end(look)
+    if not endless:
+        body = b.append_basic_block()
+        b.cbranch(expressions.test(f, node.test), body, behind)
+        b.position_at_end(body)
+    before = set(f.assigned)
+    breaks = _body(f, node.body, look, behind)
+    f.assigned = before if not endless else set.intersection(*breaks) if breaks else before
+    if endless and not breaks:
+        if not f.silent:
+            b.function.blocks.remove(behind)
+        return True
+    b.position_at_end(behind)
+    return False
+
+
+def _for(f: Function, node: ast.For) -> bool:
+    _no_else(f, node)
+    over = _range(f, node.iter)
+    of = None if over else f.expression(node.iter)
+    if over is None and not (isinstance(of, ArrayValue) and of.kind.ndim == 1):
+        raise f.refused(node, f"a loop over {ast.unparse(node.iter)}", "take a range, or an array with one axis")
+    start, stop, step = over or (number(0), of.shape[0], 1)  # pyright: ignore
+    before = set(f.assigned)
+    with counted(f, start, stop, step) as (index, (following, behind)):
+        item = index if of is None else arrays.load(f, of, [index])  # pyright: ignore
+        _store(f, node.target, item, node)
+        _body(f, node.body, following, behind)
+    f.assigned = before
+    return False
+
+
+@contextmanager
+def counted(f: Function, start: Scalar, stop: Scalar, step: int) -> Iterator[tuple[Scalar, Any]]:
+    """A loop over a range: its number, and the blocks of its next round and behind it."""
+    b = f.builder
+    slot = None if f.silent else _slot(b)
+    b.store(start.ir, slot)
+    look, body, following, behind = (b.append_basic_block(each) for each in ("look", "body", "next", "behind"))
+    b.branch(look)
+    b.position_at_end(look)
+    index = b.load(slot)
+    b.cbranch(b.icmp_signed("<" if step > 0 else ">", index, stop.ir), body, behind)
+    b.position_at_end(body)
+    yield Scalar(INT, index), (following, behind)
+    if not f.silent and not b.block.is_terminated:
+        b.branch(following)
+    b.position_at_end(following)
+    b.store(b.add(index, ir.Constant(I64, step), flags=("nsw",)), slot)
+    b.branch(look)
+    b.position_at_end(behind)
+
+
+def _slot(b: Any) -> Any:
+    """Room for a counter, at the start of the function, so that loops do not use up the stack."""
+    with b.goto_entry_block():
+        return b.alloca(I64)
+
+
+def _range(f: Function, node: ast.expr) -> tuple[Scalar, Scalar, int] | None:
+    """Start, end and step of a range."""
+    if not isinstance(node, ast.Call):
+        return None
+    function = f.expression(node.func)
+    if not (isinstance(function, StaticValue) and function.value is range) or node.keywords:
+        return None
+    given = [numbers.converted(f, numbers.scalar(f, f.expression(each), node), INT, node) for each in node.args]
+    start, stop = (number(0), given[0]) if len(given) == 1 else given[:2]
+    step = given[2] if len(given) == 3 else number(1)
+    if not step.const:
+        raise f.refused(node, "a range whose step is not a constant other than 0", "write a while loop")
+    return start, stop, step.const
+
+
+def _body(f: Function, nodes: list[ast.stmt], following: Any, behind: Any) -> list[set[str]]:
+    """The body of a loop; the names that are assigned at each of its breaks."""
+    breaks: list[set[str]] = []
+    f.leaving.append((following, behind, breaks))
+    if not block(f, nodes):
+        f.builder.branch(following)
+    f.leaving.pop()
+    return breaks
+
+
+def _no_else(f: Function, node: ast.While | ast.For) -> None:
+    if node.orelse:
+        raise f.refused(node, "else of a loop", "set a truth value before each break")
+
+
+def _break(f: Function, node: ast.Break) -> bool:
+    _, behind, breaks = f.leaving[-1]
+    breaks.append(set(f.assigned))
+    f.builder.branch(behind)
+    return True
+
+
+def _continue(f: Function, node: ast.Continue) -> bool:
+    f.builder.branch(f.leaving[-1][0])
+    return True
+
+
+def _return(f: Function, node: ast.Return) -> bool:
+    f.give(StaticValue(None) if node.value is None else f.expression(node.value), node)
+    return True
+
+
+def _expression(f: Function, node: ast.Expr) -> bool:
+    if not isinstance(node.value, ast.Constant):  # a text about it
+        f.expression(node.value)
+    return False
+
+
+def _pass(f: Function, node: ast.Pass) -> bool:
+    return False
+
+
+STATEMENTS: Mapping[type[ast.stmt], Callable[[Any, Any], bool]] = MappingProxyType(
+    {
+        ast.Assign: _assign, ast.AnnAssign: _annotated, ast.AugAssign: _augmented, ast.If: _if, ast.While: _while,
+        ast.For: _for, ast.Break: _break, ast.Continue: _continue, ast.Return: _return, ast.Expr: _expression,
+        ast.Pass: _pass,
+    }
+)  # fmt: skip

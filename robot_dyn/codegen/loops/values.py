@@ -1,0 +1,182 @@
+"""Values while a function is translated: LLVM's, each with its type in the subset."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, final
+
+from llvmlite import ir
+
+from robot_dyn.codegen.loops.kinds import (
+    BOOL,
+    FLOAT,
+    I64,
+    INT,
+    UINT,
+    WORDS,
+    ArrayKind,
+    Kind,
+    Number,
+    RecordKind,
+    Static,
+    TupleKind,
+)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Scalar:
+    """A number.
+
+    Attributes:
+        kind: Its type.
+        ir: LLVM's value.
+        const: Python's value, where it is known.
+    """
+
+    kind: Number
+    ir: Any
+    const: Any = None
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class ArrayValue:
+    """An array: the address of its first entry, its lengths, and its strides in entries unless it is contiguous."""
+
+    kind: ArrayKind
+    data: Any
+    shape: tuple[Scalar, ...]
+    apart: tuple[Scalar, ...] = ()
+
+    def strides(self, builder: Any) -> tuple[Scalar, ...]:
+        """The strides."""
+        if not self.kind.contiguous:
+            return self.apart
+        made = [ONE]
+        for length in reversed(self.shape[1:]):
+            made.insert(0, times(length, made[0], builder))
+        return tuple(made)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class RecordValue:
+    """A named tuple, by the address of its words."""
+
+    kind: RecordKind
+    pointer: Any
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class TupleValue:
+    """Several values."""
+
+    items: tuple[Value, ...]
+
+    @property
+    def kind(self) -> TupleKind:
+        """Its type."""
+        return TupleKind(tuple(each.kind for each in self.items))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class StaticValue:
+    """What is known beforehand."""
+
+    value: Any
+
+    @property
+    def kind(self) -> Static:
+        """Its type."""
+        return Static.of(self.value)
+
+
+@final
+@dataclass(frozen=True)
+class Written:
+    """A function of a module.
+
+    Attributes:
+        ir: LLVM's function.
+        result: The type of what it gives.
+        may_fail: Whether it gives the text of a failure first.
+    """
+
+    ir: Any
+    result: Kind
+    may_fail: bool
+
+
+Value = Scalar | ArrayValue | RecordValue | TupleValue | StaticValue
+
+
+def number(value: float) -> Scalar:
+    """A constant."""
+    kind = BOOL if isinstance(value, bool) else INT if isinstance(value, int) else FLOAT
+    return Scalar(kind, ir.Constant(kind.llvm, value), value)
+
+
+def word(value: int) -> Scalar:
+    """A constant that is unsigned."""
+    return Scalar(UINT, ir.Constant(I64, value), value)
+
+
+ONE = number(1)
+
+
+def leaf_types(kind: Kind) -> list[ir.Type]:
+    """LLVM's types of the parts of a value, as they are passed and kept in variables."""
+    if isinstance(kind, Number):
+        return [kind.llvm]
+    if isinstance(kind, ArrayKind):
+        known = kind.ndim - kind.single
+        return [kind.of.stored.as_pointer(), *[I64] * (known if kind.contiguous else 2 * known)]
+    if isinstance(kind, RecordKind):
+        return [WORDS]
+    return [] if isinstance(kind, Static) else [leaf for each in kind.items for leaf in leaf_types(each)]
+
+
+def leaves(value: Value) -> list[Any]:
+    """LLVM's values of the parts."""
+    if isinstance(value, Scalar):
+        return [value.ir]
+    if isinstance(value, ArrayValue):
+        known = value.kind.ndim - value.kind.single
+        return [value.data, *(each.ir for each in (*value.shape[:known], *value.apart[:known]))]
+    if isinstance(value, RecordValue):
+        return [value.pointer]
+    return [] if isinstance(value, StaticValue) else [leaf for each in value.items for leaf in leaves(each)]
+
+
+def of_leaves(kind: Kind, parts: Sequence[Any]) -> Value:
+    """The value of these parts."""
+    if isinstance(kind, Number):
+        return Scalar(kind, parts[0])
+    if isinstance(kind, ArrayKind):
+        known = kind.ndim - kind.single
+        lengths = tuple(Scalar(INT, each) for each in parts[1:])
+        last = (ONE,) * kind.single
+        return ArrayValue(kind, parts[0], lengths[:known] + last, () if kind.contiguous else lengths[known:] + last)
+    if isinstance(kind, RecordKind):
+        return RecordValue(kind, parts[0])
+    if isinstance(kind, Static):
+        return StaticValue(kind.value)
+    items, at = [], 0
+    for each in kind.items:
+        count = len(leaf_types(each))
+        items.append(of_leaves(each, parts[at : at + count]))
+        at += count
+    return TupleValue(tuple(items))
+
+
+def times(x: Scalar, y: Scalar, builder: Any) -> Scalar:
+    """A product of lengths, which does not overflow."""
+    if x.const is not None and y.const is not None:
+        return number(x.const * y.const)
+    if x.const == 1 or y.const == 1:
+        return y if x.const == 1 else x
+    return Scalar(INT, builder.mul(x.ir, y.ir, flags=("nsw",)))

@@ -1,0 +1,102 @@
+"""Operations on all entries of arrays, by vectors of the processor; each entry is computed as if it were alone."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from llvmlite import ir
+
+from robot_dyn.codegen.loops import arrays
+from robot_dyn.codegen.loops.kinds import I64, Number
+from robot_dyn.codegen.loops.values import ArrayValue, Scalar, Value
+
+if TYPE_CHECKING:
+    from robot_dyn.codegen.loops.function import Function
+
+WIDTHS = 8, 4, 1
+ZERO = ir.Constant(I64, 0)
+Rule = Callable[..., Any]  # (builder, numbers or vectors of them) → the same
+
+
+def each(f: Function, node: ast.AST, to: ArrayValue, operands: list[Value], rule: Rule) -> None:
+    """Write rule(operands) into the entries of a contiguous array, from those of others and from numbers."""
+    check(f, node, to, operands)
+    if f.silent:
+        return
+    b, of = f.builder, to.kind.of
+    for width, e in chunks(f, arrays.size(f, to), WIDTHS):
+        given = [
+            loaded(b, x.data, e, width, of) if isinstance(x, ArrayValue) else spread(b, x.ir, width, of)
+            for x in operands if isinstance(x, ArrayValue | Scalar)
+        ]  # fmt: skip
+        stored(b, rule(b, *given), to.data, e, width, of)
+
+
+def check(f: Function, node: ast.AST, to: ArrayValue, operands: list[Value]) -> None:
+    """An array that may be written, and others like it: contiguous, of one size and type."""
+    for x in operands:
+        if isinstance(x, ArrayValue):
+            same = f.builder.icmp_signed("==", arrays.size(f, x).ir, arrays.size(f, to).ir)
+            f.check(same, node, "arrays of a primitive have different sizes")
+            if not (x.kind.contiguous and to.kind.contiguous) or x.kind.of != to.kind.of:
+                raise f.refused(node, "a primitive of arrays that are not contiguous, or not alike", "copy them first")
+    if to.kind.frozen:
+        raise f.refused(node, "a write into an array that is read-only", "pass one that may be written")
+
+
+def chunks(f: Function, count: Scalar, widths: tuple[int, ...]) -> Iterator[tuple[int, Any]]:
+    """Loops over entries, so many at a time: first of the largest width, then what is left by smaller ones."""
+    b, first = f.builder, ZERO
+    for width in widths:
+        last = b.and_(count.ir, ir.Constant(I64, -width))
+        with steps(b, first, last, width) as e:
+            yield width, e
+        first = last
+
+
+@contextmanager
+def steps(b: Any, start: Any, stop: Any, step: int) -> Iterator[Any]:
+    """A loop in steps, by a phi: it needs no variable."""
+    before, look, body, behind = b.block, *(b.append_basic_block() for _ in range(3))
+    b.branch(look)
+    b.position_at_end(look)
+    index = b.phi(I64)
+    index.add_incoming(start, before)
+    b.cbranch(b.icmp_signed("<", index, stop), body, behind)
+    b.position_at_end(body)
+    yield index
+    index.add_incoming(b.add(index, ir.Constant(I64, step), flags=("nsw",)), b.block)
+    b.branch(look)
+    b.position_at_end(behind)
+
+
+def kind(width: int, of: Number) -> Any:
+    """LLVM's type of so many numbers."""
+    return of.stored if width == 1 else ir.VectorType(of.stored, width)
+
+
+def loaded(b: Any, data: Any, at: Any, width: int, of: Number) -> Any:
+    """So many entries from one on."""
+    return b.load(b.bitcast(b.gep(data, [at], inbounds=True), kind(width, of).as_pointer()), align=_bytes(of))
+
+
+def stored(b: Any, value: Any, data: Any, at: Any, width: int, of: Number) -> None:
+    """Write so many entries."""
+    pointer = b.bitcast(b.gep(data, [at], inbounds=True), kind(width, of).as_pointer())
+    b.store(value, pointer, align=_bytes(of))
+
+
+def spread(b: Any, x: Any, width: int, of: Number) -> Any:
+    """A vector of one number."""
+    if width == 1:
+        return x
+    vector, i32 = kind(width, of), ir.IntType(32)
+    one = b.insert_element(ir.Constant(vector, ir.Undefined), x, ir.Constant(i32, 0))
+    return b.shuffle_vector(one, one, ir.Constant(ir.VectorType(i32, width), [0] * width))
+
+
+def _bytes(of: Number) -> int:
+    return 1 if of.name == "bool" else 8

@@ -1,0 +1,227 @@
+"""CompiledPlant: a plant as machine code, M(q) a + C(q, v) v + N(t, q, v) = Υ, effects and bounds in the kernel.
+
+The effects are traced from the lines that the interpreted plant runs; what a plant does not name is not in the kernel.
+Coefficients, gravity and payloads are inputs of the code: plants that differ in them alone share it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, final, overload
+
+import casadi as ca
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.codegen.dynamics import CompiledDynamics
+from robot_dyn.codegen.engine import Engine
+from robot_dyn.codegen.interrupts import interrupts_later
+from robot_dyn.codegen.parameters import ROBOT, Parameter, joined, parameters, split
+from robot_dyn.codegen.self_check import SelfCheck
+from robot_dyn.codegen.store.cache import default_store
+from robot_dyn.codegen.trace.from_casadi import instructions
+from robot_dyn.codegen.trace.symbolic import Symbolic, Symbols, column, inputs
+from robot_dyn.codegen.trace.symbolic_dynamics import SymbolicDynamics
+from robot_dyn.codegen.trace.symbolic_plant import symbolic_plant
+from robot_dyn.codegen.trace.trace import Traced
+from robot_dyn.effects.plant import Plant
+from robot_dyn.model.robot import Robot
+from robot_dyn.queries.quantity import PLANT
+
+_TIMES = (float, int, np.float64)  # what machine code takes for a time; others are looked at in general
+
+
+@final
+@dataclass(frozen=True)
+class CompiledPlant:
+    """A plant as machine code; each quantity is compiled, and checked against the interpreted one, on first use.
+
+    Attributes:
+        plant: The plant.
+        dynamics: Its rigid bodies, compiled.
+    """
+
+    plant: Plant
+    dynamics: CompiledDynamics
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return CompiledPlant, (self.plant, self.dynamics)
+
+    @cached_property
+    def interpreted(self) -> Plant:
+        """The plant whose equations are compiled: the one given, with right angles written out in full."""
+        return Plant(self.dynamics.robot, self.plant.effects)
+
+    @cached_property
+    def engine(self) -> Engine:
+        """The kernels."""
+
+        def truth(quantity: str, state: dict[str, np.ndarray]) -> tuple[np.ndarray, Any]:
+            rows = [[state[name][i] for name in PLANT[quantity].arguments] for i in range(len(state["t"]))]
+            times = zip(state["t"], state["q"], state["v"], strict=True)
+            effects = np.array(
+                [np.broadcast_to(self.interpreted.torque(*each), state["q"].shape[1:]) for each in times]
+            )
+            method = getattr(self.interpreted, quantity)
+            return np.array([np.broadcast_to(method(*row), state["q"].shape[1:]) for row in rows]), effects
+
+        robot = self.dynamics.robot
+        return Engine(
+            self._traced,
+            PLANT,
+            robot.sizes,
+            SelfCheck(robot, "the interpreted plant"),
+            truth,
+            robot.joint_names,
+            self.dynamics.dtype,
+            self.dynamics.engine.threads,
+            default_store() if self.dynamics.cache else None,
+            robot.joint_without_inertia is not None,
+            joined(self._known),
+            not robot.couplings.trivial,
+        )
+
+    @property
+    def instructions(self) -> dict[str, dict[str, int]]:
+        """Instructions by formulation, of each quantity used so far, effects included; the least first."""
+        return self.dynamics.instructions | {
+            name: dict(sorted(trace.counts.items(), key=lambda item: item[1]))
+            for name, trace in self.engine.traces.items()
+        }
+
+    @property
+    def instructions_by_effect(self) -> dict[str, int]:
+        """Instructions of each effect by itself."""
+        (t, ts), (q, qs), (v, vs), _ = self._inputs
+        given = [t, q, v, *self._numbers[0]]
+        counts: dict[str, int] = {}
+        torques = self._symbolic.equation_of_motion.torques(ts[0], qs, vs)
+        for effect, torque in zip(self.plant.forces, torques, strict=True):
+            function = ca.Function("f", given, [ca.cse(ca.densify(column(torque)))])
+            counts[effect.name] = counts.get(effect.name, 0) + instructions(function)
+        return counts
+
+    @property
+    def n(self) -> int:
+        """Number of degrees of freedom."""
+        return self.dynamics.n
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the n joints, in the order of q."""
+        return self.dynamics.joint_names
+
+    def M(self, q: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
+        """Mass matrix, (..., n, n)."""
+        return self.dynamics.M(q, out=out, errors=errors)
+
+    def C(self, q: Array, v: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
+        """Coriolis matrix, (..., n, n)."""
+        return self.dynamics.C(q, v, out=out, errors=errors)
+
+    def N(self, t: Any, q: Array, v: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
+        """Every force but actuation, as what must be overcome: N = ∂V/∂q − Σ τ_effect, (..., n)."""
+        return self._ask("N", (t, q, v), out, errors)
+
+    def torque(self, t: Any, q: Array, v: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
+        """Σ τ_effect, (..., n)."""
+        return self._ask("torque", (t, q, v), out, errors)
+
+    def inverse_dynamics(
+        self, t: Any, q: Array, v: Array, a: Array, *, out: np.ndarray | None = None, errors: str = "raise"
+    ) -> Any:
+        """Actuation Υ = M a + C v + N that gives the acceleration a, (..., n)."""
+        return self._ask("inverse_dynamics", (t, q, v, a), out, errors)
+
+    def forward_dynamics(
+        self, t: Any, q: Array, v: Array, u: Array, *, out: np.ndarray | None = None, errors: str = "raise"
+    ) -> Any:
+        """Acceleration under the actuation u, (..., n)."""
+        return self._ask("forward_dynamics", (t, q, v, u), out, errors)
+
+    def _ask(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None, errors: str) -> Any:
+        if arguments[0].__class__ in _TIMES:
+            y = np.empty(self.n, self.dynamics.dtype) if out is None else out
+            if not self.engine.ones[quantity](*arguments, y):
+                return y
+        return self.engine.ask(quantity, arguments, out, errors, getattr(self.interpreted, quantity))
+
+    # --- the trace
+
+    @cached_property
+    def _inputs(self) -> tuple[Any, ...]:
+        """t, q, v, u as CasADi vectors and arrays of symbols."""
+        made = (inputs(name, 1 if name == "t" else self.n) for name in ("t", "q", "v", "u"))
+        return tuple((vector, array.view(Symbols)) for vector, array in made)
+
+    @cached_property
+    def _known(self) -> tuple[Parameter, ...]:
+        """The coefficients of the effects, gravity and payloads: inputs, so that to change one compiles nothing."""
+        return parameters(self.dynamics.robot, self.plant.effects, None)
+
+    @cached_property
+    def _numbers(self) -> tuple[tuple[Any, ...], Any]:
+        """Their values as a CasADi vector, if there are any, and as an array of symbols."""
+        vector, array = inputs("p", sum(each.size for each in self._known))
+        return (vector,) if len(array) else (), array.view(Symbols)
+
+    @cached_property
+    def _bodies(self) -> SymbolicDynamics:
+        """The rigid bodies in symbols."""
+        known = [each for each in self._known if each.part == ROBOT]
+        return SymbolicDynamics(self.dynamics.robot, known).of(split(self._known, self._numbers[1]).get(ROBOT, {}))
+
+    @cached_property
+    def _symbolic(self) -> Plant:
+        """The plant in symbols."""
+        return symbolic_plant(self.plant, self._bodies, split(self._known, self._numbers[1]))
+
+    @interrupts_later()
+    def _traced(self, quantity: str) -> Traced:
+        (t, ts), (q, qs), (v, vs), (u, us) = self._inputs
+        with Symbolic().scope():
+            equation = self._symbolic.equation_of_motion
+            torque = sum(equation.torques(ts[0], qs, vs), start=0 * vs)
+            made: dict[str, Callable[[], Any]] = {
+                "torque": lambda: torque,
+                "N": lambda: equation.N(qs, torque),
+                "inverse_dynamics": lambda: equation.inverse_dynamics(qs, vs, us, torque),
+                "forward_dynamics": lambda: equation.acceleration(
+                    qs, vs, equation.on_joints(equation.actuation(us)) + torque
+                ),
+            }
+            answer = column(made[quantity]())
+        given = [*[t, q, v, u][: len(PLANT[quantity].arguments)], *self._numbers[0]]
+        function = ca.Function("f", given, [ca.cse(ca.densify(answer))])
+        formulation = "effects" if quantity == "torque" else self._bodies.formulation(quantity)
+        return Traced(function, formulation, {formulation: instructions(function)})
+
+
+@overload
+def Compiled(
+    robot_or_plant: Robot, *, dtype: Any = ..., threads: int | None = ..., cache: bool = ...
+) -> CompiledDynamics: ...
+@overload
+def Compiled(
+    robot_or_plant: Plant, *, dtype: Any = ..., threads: int | None = ..., cache: bool = ...
+) -> CompiledPlant: ...
+def Compiled(
+    robot_or_plant: Any, *, dtype: Any = "float64", threads: int | None = 1, cache: bool = True
+) -> CompiledDynamics | CompiledPlant:
+    """A robot or a plant as machine code, for one state (n,) and batches (..., n).
+
+    Args:
+        robot_or_plant: A Robot, or a Plant whose dynamics is one (or the Lagrangian of one).
+        dtype: np.float64 or np.float32, or its name.
+        threads: For batches; None for all processors.
+        cache: Whether compiled code is kept on disk.
+
+    Raises:
+        QueryError: If it is neither, or an option is not allowed.
+    """
+    if not isinstance(robot_or_plant, Plant):
+        return CompiledDynamics(robot_or_plant, dtype, threads, cache)
+    robot: Any = getattr(robot_or_plant.dynamics, "robot", robot_or_plant.dynamics)
+    return CompiledPlant(robot_or_plant, CompiledDynamics(robot, dtype, threads, cache))

@@ -1,0 +1,122 @@
+"""The self check: a fresh kernel is compared with an independent engine at random states, or refused.
+
+    |x_kernel − x_independent| ≤ tolerance · (Σ of the absolute values of the terms added into x)
+
+Accelerations are held in the units d_i = √M_ii of the joints, to the terms of the torque they are solved from.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.errors import RobotDynError
+from robot_dyn.lagrange.magnitude import Magnitudes, magnitudes
+from robot_dyn.lagrange.manipulator import Lagrangian
+from robot_dyn.lagrange.scale import (
+    acceleration_entries,
+    derivative_entries,
+    floored,
+    joint_units,
+    scaled,
+    solved_tolerance,
+)
+from robot_dyn.queries.quantity import Quantity
+
+STATES = 16
+_LEAST = {"float64": 1e-12, "float32": 2e-5}  # the library's tolerance; its rounding times that of float32 over float64
+
+
+class SelfCheckError(RobotDynError):
+    """A compiled kernel that does not agree with its self check; nothing of it is used."""
+
+
+@final
+@dataclass(frozen=True)
+class SelfCheck:
+    """An engine that kernels must agree with.
+
+    Attributes:
+        dynamics: Rigid bodies in gravity: Pinocchio's Robot.
+        name: What it is called in a report.
+    """
+
+    dynamics: Any
+    name: str
+
+    def states(self) -> dict[str, np.ndarray]:
+        """Random states without zeros, (STATES, n) each, and times t (STATES,).
+
+        Torques are those of random accelerations: random ones would move a light link more than a kernel answers.
+        """
+        rng, n = np.random.default_rng(20), self.dynamics.n
+        q = rng.uniform(-np.pi, np.pi, (STATES, n))
+        v, a, other = rng.normal(size=(3, STATES, n))
+        tau = self.dynamics.inverse_dynamics(q, v, other)
+        return {"t": rng.uniform(0, 1, STATES), "q": q, "v": v, "a": a, "tau": tau, "u": tau}
+
+    def judge(
+        self,
+        quantity: Quantity,
+        ours: np.ndarray,
+        theirs: np.ndarray,
+        dtype: str,
+        effects: np.ndarray | float = 0.0,
+        answered: np.ndarray | None = None,
+    ) -> None:
+        """Hold results at `states()` to the independent ones.
+
+        Args:
+            quantity: What they are.
+            ours: Results of the kernel, (STATES, …).
+            theirs: The independent ones.
+            dtype: That of the kernel.
+            effects: Torques of effects, terms of the sum.
+            answered: At which states the kernel gives a result rather than reports a doubt, (STATES,).
+
+        Raises:
+            SelfCheckError: If they differ by more than rounding, or there is no result at all.
+        """
+        if answered is not None and not answered.any():
+            raise SelfCheckError(f"compiled {quantity.name} gives no result at any of {STATES} random states")
+        scale = self._scale(quantity, theirs, effects)
+        error = scaled(np.asarray(ours, dtype=float) - theirs, np.broadcast_to(scale, theirs.shape))
+        error = np.where(np.isnan(error), np.inf, error)
+        if answered is not None:
+            error[~answered] = 0.0
+        worst, tolerance = np.unravel_index(np.argmax(error), error.shape), self._tolerance(quantity, dtype)
+        if not error[worst] <= tolerance:
+            state = {name: x[worst[0]].tolist() for name, x in self.states().items()}
+            raise SelfCheckError(
+                f"compiled {quantity.name} {np.asarray(ours)[worst]:.17g} is not {self.name}'s {theirs[worst]:.17g} at"
+                f" entry {tuple(map(int, worst[1:]))}: {error[worst]:.1e} of its terms, {tolerance:.1e} allowed;"
+                f" state {state}"
+            )
+
+    @cached_property
+    def _sizes(self) -> list[Magnitudes]:
+        linkage = Lagrangian(self.dynamics).linkage
+        return [magnitudes(linkage, q) for q in self.states()["q"]]
+
+    def _scale(self, quantity: Quantity, theirs: np.ndarray, effects: np.ndarray | float) -> np.ndarray:
+        """Of each entry: the largest over all states, for at some its terms may happen to vanish."""
+        state, d = self.states(), joint_units(self._M)
+        rows = [{name: np.abs(x[i]) for name, x in state.items()} for i in range(STATES)]
+        terms = [np.asarray(quantity.terms(size, row)) for size, row in zip(self._sizes, rows, strict=True)]
+        if quantity.solves:
+            of_torque = np.array(terms) + np.abs(effects)
+            entries = acceleration_entries if len(quantity.axes) == 1 else derivative_entries
+            return entries(d, of_torque, theirs)
+        own = np.max([floored(each) for each in terms], axis=0)
+        return own + d * np.max(np.abs(effects) / d) if np.ndim(effects) else own
+
+    def _tolerance(self, quantity: Quantity, dtype: str) -> float:
+        return solved_tolerance(_LEAST[dtype], self._M, dtype) if quantity.solves else _LEAST[dtype]
+
+    @cached_property
+    def _M(self) -> np.ndarray:
+        """M at all states, (STATES, n, n)."""
+        return self.dynamics.M(self.states()["q"])

@@ -1,0 +1,1 @@
+"""Machine code on disk: a folder of entries, each under the digest of all it came from."""

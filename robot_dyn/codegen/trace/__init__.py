@@ -1,0 +1,1 @@
+"""From the library's own lines to a program: the formulations run on symbols."""

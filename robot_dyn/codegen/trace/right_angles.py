@@ -1,0 +1,95 @@
+"""Right angles that a file states with too few digits: rpy = 1.57079632679 means π/2, and R gets its exact zeros.
+
+A literal of nine decimals or more within one unit of its last digit of a multiple of π/2 is written out in full. That
+turns a frame by less than 1e-9 rad, and halves the kernel. Masses, inertias and translations are never touched.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any, final
+
+from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
+
+from robot_dyn.description.description import Description
+from robot_dyn.model.robot import Robot
+
+_LEAST_DECIMALS = 9  # with fewer, the angle meant is a guess, and the change could be seen in a comparison of roads
+_FULL = 15  # decimals: nothing to add
+
+
+@final
+@dataclass(frozen=True)
+class RightAngle:
+    """A joint whose rpy is taken as right angles.
+
+    Attributes:
+        joint: Its name.
+        rpy: As the file states it.
+        change: The largest change of an angle, in [rad].
+    """
+
+    joint: str
+    rpy: str
+    change: float
+
+    def __str__(self) -> str:
+        return f"joint {self.joint!r}: rpy {self.rpy} taken as right angles ({self.change:.0e} rad)"
+
+
+def completed(robot: Robot) -> tuple[Robot, tuple[RightAngle, ...]]:
+    """The robot with right angles written out in full, and what was changed."""
+    description, changes = _written_out(robot.description)
+    return (Robot(description, robot.edits) if changes else robot), changes
+
+
+def robot_of(dynamics: Any) -> Robot | None:
+    """The robot whose equations a dynamics has, its right angles written out in full; None if there is none."""
+    robot = _described(dynamics)
+    return None if robot is None else completed(robot)[0]
+
+
+def written_out(*given: Any) -> str:
+    """The right angles that machine code of these dynamics writes out in full, in one sentence; "" if none."""
+    robots = [robot for each in given if (robot := _described(each)) is not None]
+    changes = tuple(dict.fromkeys(change for robot in robots for change in completed(robot)[1]))
+    return in_words(changes) if changes else ""
+
+
+def _described(dynamics: Any) -> Robot | None:
+    robot = getattr(dynamics, "robot", dynamics)
+    return robot if isinstance(robot, Robot) and isinstance(robot.description, Description) else None
+
+
+def in_words(changes: tuple[RightAngle, ...]) -> str:
+    """Changes, one at least, in one sentence."""
+    names, most = ", ".join(each.joint for each in changes), max(each.change for each in changes)
+    return f"rpy of {names} taken as exact multiples of π/2 (changed by {most:.0e} rad at most)"
+
+
+@lru_cache(maxsize=32)
+def _written_out(description: Description) -> tuple[Description, tuple[RightAngle, ...]]:
+    root, changes = description.element, []
+    for joint in root.iterfind("joint"):
+        origin = joint.find("origin")
+        if origin is None:
+            continue
+        words = origin.get("rpy", "").split()
+        full = [_completed(word) for word in words]
+        if full != words:
+            change = max(abs(float(a) - float(b)) for a, b in zip(words, full, strict=True))
+            changes.append(RightAngle(joint.get("name"), " ".join(words), change))
+            origin.set("rpy", " ".join(full))
+    return (replace(description, xml=etree.tostring(root)) if changes else description), tuple(changes)
+
+
+def _completed(literal: str) -> str:
+    mantissa, _, exponent = literal.lower().partition("e")
+    decimals = len(mantissa.partition(".")[2])
+    if exponent or not _LEAST_DECIMALS <= decimals < _FULL:
+        return literal
+    angle = float(literal)
+    right = round(angle / (math.pi / 2)) * (math.pi / 2)
+    return repr(right) if 0 < abs(angle - right) <= 10.0**-decimals else literal

@@ -1,0 +1,144 @@
+"""Symbolic arithmetic: the formulations run on symbols, and an `if` in an effect is followed both ways.
+
+A comparison of symbols has no truth value while tracing. `every_branch` runs a function once for each way its
+comparisons can turn out, and joins the results: x = if_else(c₁, if_else(c₂, x₁₁, x₁₀), x₀).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
+from typing import Any, final
+
+import casadi as ca
+import numpy as np
+
+from robot_dyn.arithmetic import Arithmetic, Array
+from robot_dyn.codegen.trace.condition import Condition, Node, deciding, truth
+from robot_dyn.codegen.trace.symbol import Symbol, node, select, symbol
+from robot_dyn.errors import TraceError
+
+_MOST_BRANCHES = 64  # each is a copy of the function in the kernel
+
+
+@final
+@dataclass(frozen=True)
+class Symbolic(Arithmetic):
+    """Symbols; within its scope the comparisons of a formulation, which ask whether M is regular, are taken as true."""
+
+    dtype: np.dtype = field(default_factory=lambda: np.dtype(object), init=False, repr=False)
+
+    def number(self, literal: Any) -> Symbol:
+        return literal if isinstance(literal, Symbol) else Symbol(float(literal))
+
+    def scope(self) -> AbstractContextManager[None]:
+        return deciding(lambda condition: True)
+
+    def asarray(self, values: Any) -> Array:
+        return self.array(values)
+
+    def finite(self, x: Array) -> np.ndarray:
+        return np.ones(np.shape(x), dtype=bool)
+
+
+@final
+class Symbols(np.ndarray):
+    """An object array of symbols on which min, max, where and comparisons work as on numbers."""
+
+    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **options: Any) -> Any:
+        plain = [np.asarray(x) if isinstance(x, Symbols) else x for x in inputs]
+        if options.get("out") is not None:
+            options["out"] = tuple(np.asarray(x) if isinstance(x, Symbols) else x for x in options["out"])
+        if ufunc in _OF_SYMBOLS:
+            function, arguments = _OF_SYMBOLS[ufunc]
+            with np.errstate(all="ignore"):  # NumPy takes flags of the processor that CasADi leaves for its own
+                return _symbols(getattr(np.frompyfunc(function, arguments, 1), method)(*plain, **options))
+        return _symbols(getattr(ufunc, method)(*plain, **options))
+
+    def __array_function__(self, function: Any, kinds: Any, args: Any, options: Any) -> Any:
+        if function is np.where and len(args) == 3:
+            return _symbols(np.frompyfunc(select, 3, 1)(*(np.asarray(x) for x in args)))
+        return _symbols(super().__array_function__(function, kinds, args, options))
+
+
+def _symbols(x: Any) -> Any:
+    return x.view(Symbols) if isinstance(x, np.ndarray) and x.dtype == object else x
+
+
+def _sign(x: Any) -> Symbol:
+    return node(ca.sign(symbol(x).expression))
+
+
+_OF_SYMBOLS: dict[Any, tuple[Callable[..., Any], int]] = {
+    np.maximum: (lambda x, y: node(ca.fmax(symbol(x).expression, symbol(y).expression)), 2),
+    np.minimum: (lambda x, y: node(ca.fmin(symbol(x).expression, symbol(y).expression)), 2),
+    np.arctan2: (lambda y, x: node(ca.atan2(symbol(y).expression, symbol(x).expression)), 2),
+    np.sign: (_sign, 1),
+    np.floor: (lambda x: node(ca.floor(symbol(x).expression)), 1),
+    np.ceil: (lambda x: node(ca.ceil(symbol(x).expression)), 1),
+    np.less: (lambda x, y: symbol(x) < y, 2),
+    np.less_equal: (lambda x, y: symbol(x) <= y, 2),
+    np.greater: (lambda x, y: symbol(x) > y, 2),
+    np.greater_equal: (lambda x, y: symbol(x) >= y, 2),
+    np.logical_and: (lambda x, y: Condition(ca.logic_and(truth(x), truth(y))), 2),
+    np.logical_or: (lambda x, y: Condition(ca.logic_or(truth(x), truth(y))), 2),
+    np.logical_not: (lambda x: Condition(ca.logic_not(truth(x))), 1),
+}
+
+
+def inputs(name: str, n: int) -> tuple[Node, Array]:
+    """A CasADi vector of n inputs, and the same as an array of symbols."""
+    vector = ca.SX.sym(name, n)
+    array = np.empty(n, dtype=object)
+    array[:] = [node(vector[i]) for i in range(n)]
+    return vector, array
+
+
+def column(array: Any) -> Node:
+    """The entries of an array, row by row, as one CasADi column."""
+    return ca.vertcat(*(symbol(x).expression for x in np.asarray(array, dtype=object).flat))
+
+
+def array_of(expression: Node) -> Array:
+    """A CasADi matrix as an array of symbols."""
+    rows, columns = expression.shape
+    array = np.empty((rows, columns), dtype=object)
+    for i in range(rows):
+        for j in range(columns):
+            array[i, j] = node(expression[i, j])
+    return array
+
+
+def every_branch(function: Callable[[], Array]) -> Array:
+    """The value of a function that compares symbols, whichever way its comparisons turn out.
+
+    Raises:
+        TraceError: If there are more than 64 ways.
+    """
+    left = _MOST_BRANCHES
+
+    def follow(decided: list[bool]) -> Array:
+        nonlocal left
+        asked: list[Node] = []
+
+        def decide(condition: Node) -> bool:
+            asked.append(condition)
+            return decided[len(asked) - 1] if len(asked) <= len(decided) else True
+
+        with deciding(decide):
+            yes = np.asarray(function(), dtype=object)
+        left -= 1
+        if left < 0:
+            raise TraceError(f"more than {_MOST_BRANCHES} branches; write the effect with np.where or without if")
+        made = yes
+        for depth in reversed(range(len(decided), len(asked))):  # the last question was answered yes: what if no
+            no = follow([*decided, *[True] * (depth - len(decided)), False])
+            made = _joined(Condition(asked[depth]), made, no)
+        return made
+
+    return follow([])
+
+
+def _joined(condition: Condition, yes: Array, no: Array) -> Array:
+    return np.frompyfunc(lambda a, b: select(condition, a, b), 2, 1)(*np.broadcast_arrays(yes, no))

@@ -1,0 +1,214 @@
+"""Trace: the library's formulations run on symbols → CasADi Functions; of each quantity the one of fewest instructions.
+
+closed form        M = Σ Jᵢᵀ 𝓜ᵢ Jᵢ and the Christoffel symbols, as `Lagrangian` writes them
+recursion          Newton–Euler, composite body, articulated body
+energies           p = ∂K/∂v, M = ∂p/∂v, C v = ṗ − ∂K/∂q, N = ∂V/∂q by algorithmic differentiation of K and V
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, final
+
+import casadi as ca
+import numpy as np
+
+from robot_dyn.arithmetic import Array, in_arithmetic
+from robot_dyn.codegen.interrupts import interrupts_later
+from robot_dyn.codegen.trace.base_parameters import regrouped
+from robot_dyn.codegen.trace.condition import Node
+from robot_dyn.codegen.trace.from_casadi import instructions
+from robot_dyn.codegen.trace.origins import slid
+from robot_dyn.codegen.trace.symbol import symbol
+from robot_dyn.codegen.trace.symbolic import Symbolic, array_of, column, inputs
+from robot_dyn.lagrange.christoffel import christoffel
+from robot_dyn.lagrange.linkage import Linkage
+from robot_dyn.lagrange.manipulator import Lagrangian
+from robot_dyn.lagrange.recursions.articulated_body import articulated_body
+from robot_dyn.lagrange.recursions.composite_body import composite_body
+from robot_dyn.lagrange.recursions.kinetic_energy import kinetic_energy
+from robot_dyn.lagrange.recursions.newton_euler import newton_euler
+from robot_dyn.lagrange.recursions.regressor import regressor
+from robot_dyn.lagrange.tree import Described
+from robot_dyn.queries.dynamics import acceleration
+from robot_dyn.queries.quantity import EQUATION, FORWARD_DYNAMICS_DERIVATIVES, by_name
+
+QUANTITIES = EQUATION | by_name(FORWARD_DYNAMICS_DERIVATIVES)  # what has formulations
+_SOLVED_MOST = 8  # joints one after the other; with more, to solve M a = τ − … outnumbers articulated bodies
+_DERIVED_MOST = 6  # joints; with more, to derive C v from K is longer yet, and takes as long to trace as all the rest
+_CLOSED_FORM_MOST = 4  # joints; with more its O(n³) terms outnumber the recursions' everywhere, except of C
+
+
+@final
+@dataclass(frozen=True)
+class Traced:
+    """A quantity as a CasADi Function.
+
+    Attributes:
+        function: Of the quantity's arguments, each (n,); its result row by row.
+        formulation: The one that won.
+        counts: Instructions by formulation.
+    """
+
+    function: ca.Function
+    formulation: str
+    counts: dict[str, int]
+
+
+@final
+@dataclass(frozen=True)
+class Trace:
+    """A robot's dynamics in symbols.
+
+    Attributes:
+        robot: The robot; its file, edits and order of joints are used.
+        parameters: Inputs that its numbers are made of, CasADi symbols: one vector, the last argument of each function.
+    """
+
+    robot: Described
+    parameters: tuple[Node, ...] = ()
+
+    @cached_property
+    def lagrangian(self) -> Lagrangian:
+        """The closed form, a `Dynamics` of symbols: what effects are traced with."""
+        return Lagrangian(self.robot, Symbolic())
+
+    @cached_property
+    @in_arithmetic
+    def linkage(self) -> Linkage:
+        """The bodies that the recursions run on: other frames and fewer numbers, the same M, C and N."""
+        return regrouped(slid(self.lagrangian.linkage))
+
+    @property
+    def arithmetic(self) -> Symbolic:
+        """The numbers it runs in."""
+        return Symbolic()
+
+    @property
+    def given(self) -> tuple[Node, ...]:
+        """The vector of the parameters; nothing without."""
+        return (ca.vertcat(*self.parameters),) if self.parameters else ()
+
+    @cached_property
+    def symbols(self) -> dict[str, tuple[Node, Array]]:
+        """q, v, a, tau as CasADi vectors and as arrays of symbols."""
+        return {name: inputs(name, self.lagrangian.n) for name in ("q", "v", "a", "tau")}
+
+    def shape(self, quantity: str) -> tuple[int, ...]:
+        """Shape of a quantity for one state, (1,) of a number."""
+        return QUANTITIES[quantity].shape(self.lagrangian.sizes) or (1,)
+
+    @interrupts_later()
+    @in_arithmetic
+    def formulations(self, name: str) -> dict[str, ca.Function]:
+        """A quantity by each formulation that is worth a trace."""
+        arguments = [*(self.symbols[argument][0] for argument in QUANTITIES[name].arguments), *self.given]
+        return {
+            formulation: ca.Function("f", arguments, [ca.cse(ca.densify(make()))])
+            for formulation, make in self._roads(name)
+        }
+
+    def quantity(self, name: str) -> Traced:
+        """A quantity of the `Dynamics` protocol, or "forward_dynamics_derivatives": ∂a/∂q, ∂a/∂v, ∂a/∂τ."""
+        functions = self.formulations(name)
+        counts = {formulation: instructions(function) for formulation, function in functions.items()}
+        least = min(counts, key=counts.__getitem__)
+        return Traced(functions[least], least, counts)
+
+    def _roads(self, name: str) -> Iterator[tuple[str, Callable[[], Node]]]:
+        """The formulations of a quantity."""
+        own, coupled = self.lagrangian, self.lagrangian.linkage.couplings.S.shape[0] != self.lagrangian.n
+        if name != "forward_dynamics_derivatives" and (own.n <= _CLOSED_FORM_MOST or name == "C"):
+            arrays = [self.symbols[argument][1] for argument in QUANTITIES[name].arguments]
+            yield "closed form", lambda: column(getattr(own, name)(*arrays))
+        if name == "forward_dynamics" and not coupled:
+            yield "articulated body", lambda: self._forward
+            depth = max(len(body.path) for body in own.linkage.bodies)
+            yield from self._of_recursion(name) if depth <= _SOLVED_MOST else ()
+            yield from self._of_energies(name) if depth <= _DERIVED_MOST else ()
+            return
+        yield from self._of_recursion(name)
+        yield from self._of_energies(name)
+
+    def _of_recursion(self, name: str) -> Iterator[tuple[str, Callable[[], Node]]]:
+        (_, q), (_, v), (_, a), (_, tau) = self.symbols.values()
+        linkage = self.linkage
+        zero = self.arithmetic.array(np.zeros(len(q)))
+        made: dict[str, Callable[[], Any]] = {
+            "M": lambda: self._mass,
+            "inverse_dynamics": lambda: newton_euler(linkage, q, v, a),
+            "coriolis_torque": lambda: newton_euler(linkage, q, v, zero, gravity=False),
+            "momentum": lambda: newton_euler(linkage, q, zero, v, gravity=False),
+            "N": lambda: newton_euler(linkage, q, zero, zero),
+            "kinetic_energy": lambda: self._kinetic,
+            "potential_energy": lambda: self._potential,
+            "forward_dynamics": lambda: acceleration(
+                self._mass, tau - newton_euler(linkage, q, v, zero), self.lagrangian.joint_names
+            ),
+            "C": lambda: christoffel(self._mass_derivative, v),
+            "regressor": lambda: regressor(self.lagrangian.linkage, q, v, a),  # of the bodies as the file has them
+        }
+        if name in made:
+            yield "recursion", lambda: column(made[name]())
+        if name == "forward_dynamics_derivatives":
+            yield "recursion", self._derivatives
+
+    def _of_energies(self, name: str) -> Iterator[tuple[str, Callable[[], Node]]]:
+        (q, _), (v, _), (a, _), (_, tau) = self.symbols.values()
+        K, V = symbol(self._kinetic).expression, symbol(self._potential).expression
+        p = ca.gradient(K, v)
+        made = {
+            "M": lambda: ca.vec(ca.jacobian(p, v)),  # symmetric: its columns are its rows
+            "N": lambda: ca.gradient(V, q),
+            "momentum": lambda: p,
+            "coriolis_torque": lambda: ca.jtimes(p, q, v) - ca.gradient(K, q),
+            "coriolis_transpose": lambda: ca.gradient(K, q),
+            "inverse_dynamics": lambda: (
+                ca.jtimes(p, ca.vertcat(q, v), ca.vertcat(v, a)) - ca.gradient(K, q) + ca.gradient(V, q)
+            ),
+            "forward_dynamics": lambda: column(
+                acceleration(
+                    array_of(ca.jacobian(p, v)),
+                    tau - array_of(ca.jtimes(p, q, v) - ca.gradient(K - V, q))[:, 0],
+                    self.lagrangian.joint_names,
+                )
+            ),
+        }
+        if name in made:
+            yield "energies", made[name]
+
+    @cached_property
+    def _mass(self) -> Array:
+        return composite_body(self.linkage, self.symbols["q"][1])
+
+    @cached_property
+    def _mass_derivative(self) -> Array:
+        """∂M_ij/∂q_k."""
+        n = self.lagrangian.n
+        return array_of(ca.jacobian(column(self._mass), self.symbols["q"][0])).reshape(n, n, n)
+
+    @cached_property
+    def _kinetic(self) -> Any:
+        return kinetic_energy(self.linkage, self.symbols["q"][1], self.symbols["v"][1])
+
+    @cached_property
+    def _potential(self) -> Any:
+        return self.lagrangian.potential_energy(self.symbols["q"][1])
+
+    @cached_property
+    def _forward(self) -> Node:
+        (_, q), (_, v), _, (_, tau) = self.symbols.values()
+        return column(articulated_body(self.linkage, q, v, tau))
+
+    def _derivatives(self) -> Node:
+        """∂a/∂x = −M⁻¹ ∂ID/∂x at a = FD(q, v, τ), and ∂a/∂τ = M⁻¹."""
+        (q, qs), (v, vs), (a, as_), _ = self.symbols.values()
+        n, names = len(qs), self.lagrangian.joint_names
+        forward = self.quantity("forward_dynamics").function
+        ID = column(newton_euler(self.linkage, qs, vs, as_))
+        columns = ca.horzcat(-ca.jacobian(ID, q), -ca.jacobian(ID, v), ca.DM.eye(n))
+        solved = acceleration(self._mass, array_of(ca.densify(columns).T), names)  # row i: the derivative by xᵢ
+        answer = column(np.stack([solved[i * n : (i + 1) * n].T for i in range(3)]))
+        return ca.substitute(answer, a, forward(q, v, self.symbols["tau"][0], *self.given))

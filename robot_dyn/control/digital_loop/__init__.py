@@ -1,0 +1,1 @@
+"""The loop of a real controller: delays, quantisation, filters, noise, rates."""

@@ -1,0 +1,216 @@
+"""The loop of a real controller: what is measured comes late and rounded, and what is asked for acts late and limited.
+
+    q, v at t_k − τ_m ─ blocks ─► q̂, v̂ ─ controller at t_k ─► blocks ─► u from t_k + τ_u on
+
+All of it is a map of the states z of a sampled controller: z holds what is on its way, and the states of the blocks.
+A delay that is no whole number of periods makes a second instant in each, at which z passes it on.
+[Åström, Wittenmark, Computer-Controlled Systems, 3rd ed., 1997, sec. 2.3 and ch. 9]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import ceil
+from typing import Any, ClassVar, final
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.coefficients import declared, with_values
+from robot_dyn.control.controller import Controller, Nested
+from robot_dyn.control.digital_loop.block import Block
+from robot_dyn.control.digital_loop.delay import Instant, delay, instants
+from robot_dyn.control.digital_loop.differences import Differences
+from robot_dyn.control.digital_loop.tick import tick
+from robot_dyn.control.nested import check_sampled, nested
+from robot_dyn.errors import ControlError, shown
+from robot_dyn.threshold import smooth
+from robot_dyn.validate import integer
+
+LINES = ("position", "velocity", "actuation")
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Loop(Controller):
+    """A sampled controller with delays, and blocks between it and the arm.
+
+    Delays are in periods T. The controller computes at t_k = k T, with the reference of that time and what was measured
+    at t_k − measurement_delay · T; its torque acts from t_k + actuation_delay · T on. Before the start the arm has been
+    where it starts, with the velocity it has there, and the torque is 0 until the first one acts. The actuation of a
+    run is the torque that acts.
+
+    Attributes:
+        controller: A sampled controller, whose period is that of the loop.
+        position: Blocks of the measured position, in the order from the joints to the controller.
+        velocity: Blocks of the measured velocity; `Differences` as the first takes the position behind its blocks.
+        actuation: Blocks of the torque, in the order from the controller to the joints.
+        measurement_delay: Of position and velocity, in periods, not negative.
+        actuation_delay: Of the torque, time to compute it and on its way, in periods, not negative.
+        seed: Of noise, a whole number.
+        run: Number of the run whose noise it is; `rollouts` counts on from it.
+
+    Raises:
+        ControlError: If the controller is continuous, or a loop itself, or a block or delay is not allowed.
+    """
+
+    outermost: ClassVar[bool] = True
+
+    controller: Controller
+    position: tuple[Block, ...] = ()
+    velocity: tuple[Block, ...] = ()
+    actuation: tuple[Block, ...] = ()
+    measurement_delay: float = 0.0
+    actuation_delay: float = 0.0
+    seed: int = 0
+    run: int = 0
+    period_s: float = field(init=False, default=0.0)
+
+    thresholds = smooth  # a sampled controller's torque is constant between ticks
+
+    def __post_init__(self) -> None:
+        check_sampled("controller", self.controller)
+        object.__setattr__(self, "period_s", self.controller.period_s)
+        for line in LINES:
+            object.__setattr__(self, line, _blocks(line, getattr(self, line)))
+        for name in ("measurement_delay", "actuation_delay"):
+            object.__setattr__(self, name, delay(name, getattr(self, name)))
+        for name in ("seed", "run"):
+            object.__setattr__(self, name, integer(name, getattr(self, name), most=2**63 - 1, error=ControlError))
+        super().__post_init__()
+        self._check_blocks(self.period_s)
+        self.places  # noqa: B018  # while the controller in it has numbers: a trace puts symbols in their place
+
+    def _check_blocks(self, period_s: float) -> None:
+        for line, i, block in self.blocks:
+            if isinstance(block, Differences) and (line, i) != ("velocity", 0):
+                raise ControlError(f"{line}: Differences may only be the first block of velocity; move it there")
+            for name, each in declared(type(block)).items():
+                shape = np.shape(getattr(block, name))
+                if each.of_joints and shape not in ((), (self.n,)):
+                    raise ControlError(f"{line}: {name} must be one number or of shape ({self.n},), got {shape}")
+            block.check(period_s)
+
+    @property
+    def blocks(self) -> Iterator[tuple[str, int, Block]]:
+        """Line, number and block of each."""
+        return ((line, i, block) for line in LINES for i, block in enumerate(getattr(self, line)))
+
+    @cached_property
+    def n(self) -> int:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Number of joints it drives."""
+        return self.controller.n
+
+    @property
+    def parts(self) -> tuple[Nested, ...]:
+        made = [*nested(self, "controller", "")]
+        for line in LINES:
+            names = [block.name for block in getattr(self, line)]
+            for i, (name, block) in enumerate(zip(names, getattr(self, line), strict=True)):
+                number = f" {names[: i + 1].count(name)}" if names.count(name) > 1 else ""
+                made.append(Nested(f"{line}.{i}", f"{line}.{name}{number}.", block))
+        return tuple(made)
+
+    @property
+    def task_frame(self) -> str | None:
+        return self.controller.task_frame
+
+    @property
+    def saturation(self) -> Array:
+        return self.controller.saturation
+
+    @property
+    def cycle(self) -> int:
+        return self.controller.cycle
+
+    @property
+    def instants(self) -> tuple[float, ...]:
+        return tuple(each.part for each in self.ticks)
+
+    @property
+    def acting_instant(self) -> int:
+        return next(i for i, each in enumerate(self.ticks) if each.acts)
+
+    @property
+    def deviates(self) -> int:
+        return sum(block.state_size(self.n) for _, _, block in self.blocks if block.random)
+
+    @property
+    def noise_key(self) -> tuple[int, int]:
+        return self.seed, self.run
+
+    def of_run(self, run: int) -> Loop:
+        return with_values(self, {"run": self.run + run})
+
+    @property
+    def state_size(self) -> int:
+        return max((each.stop for each in self.places.values()), default=0)
+
+    @cached_property
+    def ticks(self) -> tuple[Instant, ...]:
+        """In each period, the first at its start."""
+        return instants(self.measurement_delay, self.actuation_delay)
+
+    @property
+    def differs(self) -> bool:
+        """Whether the velocity is that of differences."""
+        return bool(self.velocity) and isinstance(self.velocity[0], Differences)
+
+    @cached_property
+    def places(self) -> dict[str, slice]:
+        """Where z has what."""
+        n, several = self.n, len(self.ticks) > 1
+        measured = n if self.differs else 2 * n
+        whole = int(self.measurement_delay), int(self.actuation_delay)
+        named = {f"{line}.{i}": block for line, i, block in self.blocks}
+        sizes = {"controller": self.controller.state_size, "instant": several, "begun": 0}
+        sizes["sample"] = measured * (self.measurement_delay % 1.0 > 0)
+        sizes["past"] = measured * whole[0]
+        sizes |= {name: block.state_size(n) for name, block in named.items() if not block.random}
+        sizes["begun"] = any(sizes[name] for name in sizes if name not in ("controller", "instant"))
+        sizes["coming"] = n * whole[1]
+        sizes["computed"] = n * (self.actuation_delay % 1.0 > 0)
+        sizes["acting"] = n * several
+        sizes |= {name: block.state_size(n) for name, block in named.items() if block.random}
+        ends = np.cumsum([0, *sizes.values()]).tolist()
+        return {name: slice(a, b) for name, a, b in zip(sizes, ends, ends[1:], strict=False)}
+
+    def torque(self, t: float, q: Array, v: Array, z: Array) -> Array:
+        return tick(self, t, q, v, z)[0]
+
+    def state_rate(self, t: float, q: Array, v: Array, z: Array) -> Array:
+        return 0 * z
+
+    def next_state(self, t: float, q: Array, v: Array, z: Array) -> Array:
+        return tick(self, t, q, v, z)[1]
+
+    def at_period(self, period_s: float) -> Controller:
+        inside = self.controller.at_period(period_s)
+        if not period_s:
+            return inside
+        self._check_blocks(period_s)
+        return with_values(self, {"controller": inside, "period_s": period_s})
+
+    def small_signal(self) -> Loop:
+        lines: Any = {line: tuple(block for block in getattr(self, line) if block.linear) for line in LINES}
+        return replace(self, controller=self.controller.small_signal(), **lines)
+
+    def settled(self, t: float, q: Array, v: Array, z: Array) -> Array:
+        inside = self.controller.settled(t, q, v, z)
+        z = np.concatenate([inside, np.zeros(self.state_size - len(inside))])
+        late = ceil(self.measurement_delay) + ceil(self.actuation_delay) + 2
+        for k in range(-self.cycle * ceil(late / self.cycle), 0):
+            for part in self.instants:
+                s = (k + part) * self.period_s
+                z = self.next_state(t + s, q + s * v, v, z)
+        return z
+
+
+def _blocks(line: str, given: Any) -> tuple[Block, ...]:
+    """The blocks that are meant: several, or one."""
+    made = (given,) if isinstance(given, Block) else given
+    if not isinstance(made, tuple | list) or not all(isinstance(each, Block) for each in made):
+        raise ControlError(f"{line} must be blocks, such as [rd.Quantisation(1e-4)], got {shown(given)}")
+    return tuple(made)

@@ -1,0 +1,160 @@
+"""The cross-check: one robot by Pinocchio and by the library's own Lagrangian, and its file by a second reader.
+
+    |x_Pinocchio − x_own| ≤ 1e-12 · (Σ of the absolute values of the terms added into x)
+
+M_ij is held to √(M_ii M_jj), and forward dynamics to max(1e-12, 8 n u κ) of its terms M⁻¹τ, M⁻¹C v, M⁻¹N in the norm of
+M, or of the terms of τ, C v and N if these are more, with κ the condition number of M scaled to a unit diagonal. An
+entry that has no terms is held to the largest scale in its row and column. What both roads take from the file, its
+numbers, is compared with those that yourdfpy reads there (`second_reading`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from robot_dyn.cross_check.agreement import Agreement, Comparison, Pair, worst_by_quantity
+from robot_dyn.cross_check.second_reading import second_reading
+from robot_dyn.description.inertial_parameters import parameter_names
+from robot_dyn.errors import SingularError
+from robot_dyn.lagrange.magnitude import Magnitudes, magnitudes
+from robot_dyn.lagrange.manipulator import Lagrangian
+from robot_dyn.lagrange.recursions.articulated_body import articulated_body
+from robot_dyn.lagrange.scale import acceleration_norm, diagonal_scale, mass_norm, solved_tolerance
+from robot_dyn.model.robot import Robot
+from robot_dyn.queries.dynamics import Axes
+from robot_dyn.queries.quantity import EQUATION, FORWARD_DYNAMICS, INVERSE_DYNAMICS
+from robot_dyn.validate import function, instance, integer, number
+
+TOLERANCE = 1e-12
+
+
+def compare(
+    robot: Robot,
+    *,
+    samples: int = 20,
+    seed: int = 0,
+    tolerance: float = TOLERANCE,
+    on_sample: Callable[[], object] | None = None,
+) -> Comparison:
+    """Cross-check a robot at random states within its joint limits, and the read of its file by yourdfpy's.
+
+    Args:
+        robot: The robot; its joints are matched by name.
+        samples: Number of states.
+        seed: Seed of the random generator.
+        tolerance: Allowed error on each quantity's scale.
+        on_sample: Called after each state.
+
+    Raises:
+        QueryError: If samples is not positive.
+    """
+    instance("robot", robot, Robot, "give one of rd.load")
+    samples, seed = integer("samples", samples, least=1, most=10**6), integer("seed", seed, most=2**128 - 1)
+    function("on_sample", on_sample, "no argument")
+    tolerance = number("tolerance", tolerance, above=0)
+    own, rng = Lagrangian(robot), np.random.default_rng(seed)
+    worst: tuple[Agreement, ...] = ()
+    unsolved = 0
+    for sample in range(samples):
+        state = random_state(robot, rng)
+        frames = robot.frame_names[sample % len(robot.frame_names) :: samples] or robot.frame_names[:1]
+        pairs = list(_pairs(robot, own, state, frames, tolerance))
+        if robot.joint_without_inertia is None:
+            forward = _forward_pairs(robot, own, state, tolerance)
+            unsolved += not forward
+            pairs += forward
+        worst = worst_by_quantity((*worst, *(pair.worst(state) for pair in pairs)))
+        if on_sample is not None:
+            on_sample()
+    of_file, unread = second_reading(robot.description, tolerance)
+    worst = worst_by_quantity((*worst, *(pair.worst({}) for pair in of_file)))
+    return Comparison(robot.name, robot.n, samples, worst, (*unread, *_notes(robot, unsolved, samples)))
+
+
+def random_state(robot: Robot, rng: np.random.Generator) -> dict[str, np.ndarray]:
+    """A general state: q of `random_configuration`; v, a and tau without zeros."""
+    q = robot.random_configuration(rng)
+    v, a, tau = rng.normal(size=(3, robot.n))
+    return {"q": q, "v": v, "a": a, "tau": tau * (1 + np.abs(robot.N(q)))}
+
+
+def _pairs(
+    robot: Robot, own: Lagrangian, state: dict[str, np.ndarray], frames: tuple[str, ...], tolerance: float
+) -> Iterator[Pair]:
+    q, v, a = (state[name] for name in ("q", "v", "a"))
+    size, absolute = magnitudes(own.linkage, q), {name: np.abs(x) for name, x in state.items()}
+    letters = {"n": robot.joint_names, "p": parameter_names(robot.body_names)}
+    known: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+    for quantity in EQUATION.values():
+        if not quantity.solves:
+            one, two = known[quantity.name] = quantity.ask(robot, state), quantity.ask(own, state)
+            scale = diagonal_scale(two) if quantity.definite else quantity.terms(size, absolute)
+            yield Pair(quantity.name, one, two, scale, tolerance, tuple(letters[str(axis)] for axis in quantity.axes))
+    (M, C, N), pin_C, ID = (known[name][1] for name in "MCN"), known["C"][0], known[INVERSE_DYNAMICS.name][0]
+    rate, both = own.mass_matrix_derivative(q) @ v, size.C(v) + size.C(v).T
+    yield Pair("Ṁ = C + Cᵀ", pin_C + pin_C.T, rate, both, tolerance, (robot.joint_names,) * 2)
+    terms = INVERSE_DYNAMICS.terms(size, absolute)
+    yield Pair("M a + C v + N = ID", ID, M @ a + C @ v + N, terms, tolerance, (robot.joint_names,))
+    for frame in frames:
+        yield from _frame_pairs(robot, own, q, v, frame, size, tolerance)
+
+
+def _frame_pairs(
+    robot: Robot, own: Lagrangian, q: np.ndarray, v: np.ndarray, frame: str, size: Magnitudes, tolerance: float
+) -> Iterator[Pair]:
+    """Placement and Jacobians of one link. A lever is a difference of positions, so its scale is their size."""
+    g, own_g, reach = robot.placement(q, frame), own.placement(q, frame), size.reach[frame]
+    arm = size.lever[frame] + reach
+    turn, swing = np.abs(v).sum(), arm @ np.abs(v)
+    rows = ("x", "y", "z", "rx", "ry", "rz")
+    unit = np.ones((3, 3))
+    yield Pair("placement", g[:3, :3], own_g[:3, :3], unit, tolerance, (rows[3:], rows[:3]), frame)
+    yield Pair("placement", g[:3, 3], own_g[:3, 3], np.full(3, reach), tolerance, (rows[:3],), frame)
+    for axes in Axes:
+        J = np.vstack([np.tile(arm, (3, 1)), np.ones((3, robot.n))])
+        rate = np.vstack([np.tile(arm * turn + swing, (3, 1)), np.full((3, robot.n), turn)])
+        names, where = (rows, robot.joint_names), f"{frame} ({axes})"
+        one, two = (each.jacobian(q, frame, expressed_in=axes) for each in (robot, own))
+        yield Pair("jacobian", one, two, J, tolerance, names, where)
+        one, two = (each.jacobian_rate(q, v, frame, expressed_in=axes) for each in (robot, own))
+        yield Pair("jacobian_rate", one, two, rate, tolerance, names, where)
+
+
+def _forward_pairs(robot: Robot, own: Lagrangian, state: dict[str, np.ndarray], tolerance: float) -> list[Pair]:
+    """Forward dynamics by three algorithms, and there and back; nothing where M is not positive definite."""
+    q, v, tau = (state[name] for name in ("q", "v", "tau"))
+    size, pairs = magnitudes(own.linkage, q), []
+    try:
+        roads = {"forward_dynamics": own.forward_dynamics(q, v, tau)}
+        if robot.couplings.trivial:
+            roads["forward_dynamics (articulated body)"] = articulated_body(own.linkage, q, v, tau)
+    except SingularError:
+        return []
+    M = own.M(q)
+    tolerance = solved_tolerance(tolerance, M)
+    a, C, N = robot.forward_dynamics(q, v, tau), own.C(q, v), own.N(q)
+    of_torque = FORWARD_DYNAMICS.terms(size, {"v": np.abs(v), "tau": np.abs(tau)})
+    terms = acceleration_norm(M, (tau, C @ v, N), of_torque)
+    for quantity, b in roads.items():
+        weight = np.abs(a - b) * np.sqrt(np.diagonal(M))
+        joint = int(np.argmax(weight))  # names the joint; the error is that of the whole vector, in the norm of M
+        error = mass_norm(M, a - b)
+        scale = terms * np.abs(a - b)[joint] / error if error else 1.0
+        where = ((robot.joint_names[joint],),)
+        pairs.append(Pair(quantity, a[joint : joint + 1], b[joint : joint + 1], scale, tolerance, where))
+    there_and_back = robot.inverse_dynamics(q, v, a)
+    scale = size.inverse_dynamics(v, a) + np.abs(tau)
+    return [*pairs, Pair("ID(FD(τ)) = τ", there_and_back, tau, scale, tolerance, (robot.joint_names,))]
+
+
+def _notes(robot: Robot, unsolved: int, samples: int) -> tuple[str, ...]:
+    notes = []
+    if unsolved:
+        notes.append(
+            f"forward dynamics not compared at {unsolved} of {samples} states: M is not positive definite there"
+        )
+    if robot.joint_without_inertia is not None:
+        notes.append(f"no forward dynamics: joint {robot.joint_without_inertia!r} carries no inertia")
+    return (*notes, *robot.findings)

@@ -1,0 +1,146 @@
+"""The second reading: a robot's file by yourdfpy, against the checked numbers that both roads are made of.
+
+Pinocchio and the own road take what the hardened read has written, so that a fault of that read is in both, where no
+comparison of M, C and N shows it. yourdfpy reads the bytes of the file. The two readings share the XML parser
+(libxml2) and `float`; nothing that looks for elements, attributes, defaults or names. [URDF: wiki.ros.org/urdf/XML]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
+
+from robot_dyn.arithmetic import FLOAT64
+from robot_dyn.cross_check.agreement import Pair
+from robot_dyn.description.description import Description
+from robot_dyn.description.edits import Edits
+from robot_dyn.description.urdf import UNBOUNDED
+from robot_dyn.errors import shorten
+from robot_dyn.lagrange.tree import tree
+from robot_dyn.spatial import homogeneous, rotation_rpy
+
+_MOMENTS = np.triu_indices(3)  # Ixx, Ixy, Ixz, Iyy, Iyz, Izz
+_NONE = float(UNBOUNDED)
+
+Numbers = dict[tuple[str, str], np.ndarray]  # by quantity and element
+
+
+def second_reading(description: Description, tolerance: float) -> tuple[list[Pair], tuple[str, ...]]:
+    """The numbers of a description, each with yourdfpy's; and a note if yourdfpy does not read the file."""
+    try:
+        robot = _by_yourdfpy(description.text)
+        stated, elements = dict(_stated(robot)), set(_elements_stated(robot))
+    except Exception as error:  # whatever yourdfpy raises
+        said = getattr(error, "msg", f"{type(error).__name__}: {error}")  # that of a syntax error, without its place
+        why = shorten(" ".join(str(said).split()), 200)
+        return [], (f"the file is not read a second time: yourdfpy cannot read it ({why})",)
+    taken, known = dict(_taken(description)), set(_elements_taken(description))
+    pairs = [
+        Pair("file: links and joints", float(each in known), float(each in elements), 1.0, tolerance, frame=each)
+        for each in sorted(known | elements)
+    ]
+    for key in sorted(taken.keys() | stated.keys()):
+        one, two = (side.get(key, np.array(np.nan)) for side in (taken, stated))
+        scale = np.ones((4, 4)) if key[0] == "file: origin" else np.maximum(np.abs(one), np.abs(two))
+        pairs.append(Pair(key[0], one, two, scale, tolerance, frame=key[1]))
+    return pairs, ()
+
+
+@np.errstate(all="ignore")  # of infinities in visuals, which are not compared
+def _by_yourdfpy(text: bytes) -> Any:
+    from yourdfpy import URDF  # heavy: it takes trimesh along
+
+    etree.fromstring(text)  # raises, where yourdfpy would read on with what the parser can recover
+    return URDF.load(BytesIO(text), build_scene_graph=False, load_meshes=False).robot
+
+
+def _elements_stated(robot: Any) -> Iterator[str]:
+    """Links, a root that joints only name among them, and joints with their kind and links, by yourdfpy."""
+    names = {link.name for link in robot.links} | {joint.parent for joint in robot.joints}
+    yield from (f"link {name.strip()!r}" for name in names)
+    for joint in robot.joints:
+        source = joint.mimic.joint.strip() if joint.mimic and joint.type != "fixed" else None
+        yield _joint(joint.name.strip(), joint.type, joint.parent.strip(), joint.child.strip(), source)
+
+
+def _elements_taken(description: Description) -> Iterator[str]:
+    taken = tree(description, Edits())
+    yield from (f"link {link.name!r}" for link in taken.links)
+    for joint in taken.joints:
+        yield _joint(joint.name, joint.kind, joint.parent, joint.child, joint.mimic and joint.mimic.source)
+
+
+def _joint(name: str, kind: str, parent: str, child: str, source: str | None) -> str:
+    follows = f", follows {source!r}" if source else ""
+    return f"joint {name!r}: {kind}, {parent!r} → {child!r}{follows}"
+
+
+def _stated(robot: Any) -> Iterator[tuple[tuple[str, str], np.ndarray]]:
+    """The numbers of the file by yourdfpy; where the file states none, the format's defaults."""
+    for link in robot.links:
+        where, inertial = f"link {link.name.strip()!r}", link.inertial
+        if inertial is not None:
+            yield ("file: origin", where), _or_identity(inertial.origin)
+            yield ("file: mass", where), np.array(inertial.mass)
+            yield ("file: inertia", where), inertial.inertia[_MOMENTS]
+    for joint in robot.joints:
+        where = f"joint {joint.name.strip()!r}"
+        yield ("file: origin", where), _or_identity(joint.origin)
+        if joint.type == "fixed":
+            continue
+        yield ("file: axis", where), joint.axis
+        yield ("file: limits", where), _limits(joint)
+        if joint.dynamics is not None:
+            terms = joint.dynamics.damping, joint.dynamics.friction
+            yield ("file: friction", where), np.array([float(term or 0) for term in terms])
+        if joint.mimic is not None:
+            yield ("file: mimic", where), np.array([joint.mimic.multiplier, joint.mimic.offset])
+
+
+def _or_identity(origin: np.ndarray | None) -> np.ndarray:
+    return np.eye(4) if origin is None else origin
+
+
+def _limits(joint: Any) -> np.ndarray:
+    """Lower, upper, effort, velocity; docs/findings.md says what of the stated ones is not taken."""
+    lower, upper, *rates = (
+        joint.limit and getattr(joint.limit, key) for key in ("lower", "upper", "effort", "velocity")
+    )
+    if joint.type == "continuous" or (lower is None and upper is None) or (lower or 0) > (upper or 0):
+        lower, upper = -_NONE, _NONE
+    return np.array([lower or 0, upper or 0, *(_NONE if x is None or x < 0 else x for x in rates)])
+
+
+def _taken(description: Description) -> Iterator[tuple[tuple[str, str], np.ndarray]]:
+    """The same numbers in the description, of which both roads are made."""
+    taken = tree(description, Edits())
+    for link in taken.links:
+        where = f"link {link.name!r}"
+        for part in link.inertials:
+            yield ("file: origin", where), _placement(part.xyz, part.rpy)
+            yield ("file: mass", where), FLOAT64.array(part.mass)
+            yield ("file: inertia", where), FLOAT64.array(part.moments)
+    elements = {joint.get("name"): joint for joint in description.element.iterfind("joint")}
+    for joint in taken.joints:
+        where, element = f"joint {joint.name!r}", elements[joint.name]
+        yield ("file: origin", where), _placement(joint.xyz, joint.rpy)
+        if joint.kind == "fixed":
+            continue
+        yield ("file: axis", where), FLOAT64.array(joint.axis)
+        yield ("file: limits", where), _attributes(element.find("limit"), "lower", "upper", "effort", "velocity")
+        if (dynamics := element.find("dynamics")) is not None:
+            yield ("file: friction", where), _attributes(dynamics, "damping", "friction")
+        if joint.mimic is not None:
+            yield ("file: mimic", where), FLOAT64.array((joint.mimic.multiplier, joint.mimic.offset))
+
+
+def _placement(xyz: Any, rpy: Any) -> np.ndarray:
+    return homogeneous(rotation_rpy(FLOAT64.array(rpy)), FLOAT64.array(xyz))
+
+
+def _attributes(element: etree._Element, *keys: str) -> np.ndarray:
+    return FLOAT64.array([element.get(key) for key in keys])

@@ -1,0 +1,127 @@
+"""The catalog: a name, a path or a package:// address → a URDF file.
+
+Names are those of the files of `urdf/` and of every URDF of the installed example-robot-data.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+
+from robot_dyn.description.packages import environment_folders, package_folders
+from robot_dyn.errors import CatalogError, nearest, shorten, shown
+
+# Files whose own stem is shared, or says nothing.
+_RENAMED = {
+    "anymal_b_simple_description/robots/anymal.urdf": "anymal_b",
+    "anymal_b_simple_description/robots/anymal-kinova.urdf": "anymal_b_kinova",
+    "anymal_c_simple_description/urdf/anymal.urdf": "anymal_c",
+    "alexander_description/urdf/alexander_v1.lowerBodyOnly.urdf": "alexander",
+    "hector_description/robots/quadrotor_base.urdf": "hector",
+    "ur_description/urdf/ur3.urdf": "ur3_empty",
+}
+
+
+def list_robots() -> tuple[str, ...]:
+    """Names that `load` takes, sorted."""
+    return tuple(sorted(_files()))
+
+
+def files() -> frozenset[Path]:
+    """The URDF files of these robots."""
+    return frozenset(_files().values())
+
+
+def find(name_or_path: str | Path, package_dirs: Iterable[str | Path] = ()) -> Path:
+    """The URDF file of a name, a path or a package:// address.
+
+    Raises:
+        CatalogError: If the robot is not found; names the nearest robots or the places tried.
+    """
+    start = name_or_path.decode(errors="replace") if isinstance(name_or_path, bytes) else name_or_path
+    if isinstance(start, str) and start.lstrip("\ufeff \t\r\n").startswith("<"):
+        raise CatalogError("this is the text of a URDF, not its name or path; give it to Robot.from_text")
+    if not isinstance(name_or_path, str | Path) or not str(name_or_path).strip():
+        raise CatalogError(f"give the name of a robot or the path of a URDF file, got {shown(name_or_path)}")
+    text = str(name_or_path)
+    if text in _files():
+        return _files()[text]
+    try:
+        if text.startswith("package://"):
+            return resolve(text, Path.cwd() / "x", package_dirs)
+        path = Path(name_or_path).expanduser()
+        if path.exists():
+            return path
+        if path.suffix or len(path.parts) > 1:
+            raise CatalogError(f"no file {shorten(text, 200)}; looked for {shorten(path.absolute(), 300)}")
+    except (OSError, RuntimeError, ValueError) as error:  # too long, not to be searched, no such user, a NUL
+        why = getattr(error, "strerror", error)
+        raise CatalogError(f"no file {shorten(text)!r}: {why}; give the path of a URDF file") from None
+    raise CatalogError(f"no robot {shorten(text)!r}; {nearest(text, list_robots())}; or give the path of a URDF file")
+
+
+def resolve(address: str, urdf: Path, package_dirs: Iterable[str | Path] = ()) -> Path:
+    """The file of a package://package/path address that stands in `urdf`.
+
+    Raises:
+        CatalogError: If no package of that name holds it, see `packages`; lists the places tried.
+    """
+    name, _, inside = address.removeprefix("package://").lstrip("/").partition("/")  # a third slash is common
+    package_dirs = tuple(package_dirs)
+    for folder in package_folders(name, urdf, package_dirs) if name and inside else ():
+        if (folder / inside).is_file():
+            return folder / inside
+    raise CatalogError(f"no file for {shorten(address, 200)}; {_remedy(name, urdf, package_dirs)}")
+
+
+def package(name: str, urdf: Path, package_dirs: Iterable[str | Path] = ()) -> Path:
+    """The folder of a package that `urdf` names.
+
+    Raises:
+        CatalogError: If the file is not found; lists the places tried.
+    """
+    package_dirs = tuple(package_dirs)
+    for folder in package_folders(name, urdf, package_dirs):
+        if folder.is_dir():
+            return folder
+    raise CatalogError(f"no package {name!r}; {_remedy(name, urdf, package_dirs)}")
+
+
+def _remedy(name: str, urdf: Path, package_dirs: Iterable[str | Path]) -> str:
+    named = (Path(folder).expanduser() for folder in package_dirs)
+    tried = dict.fromkeys(map(str, (*named, *urdf.absolute().parents, *environment_folders())))
+    return (
+        f"tried in {', '.join(tried)}; name the folder that holds {name or 'the package'!r} in package_dirs"
+        " or ROS_PACKAGE_PATH"
+    )
+
+
+@cache
+def _files() -> dict[str, Path]:
+    """File by name."""
+    own = {path.stem: path for path in sorted(_own_folder().glob("*.urdf"))}
+    files = dict(_example_robot_data())
+    clash = own.keys() & files.keys()
+    assert not clash, f"names taken twice: {clash}"
+    return files | own
+
+
+def _own_folder() -> Path:
+    """`urdf/`: inside the installed package, or beside it in a checkout."""
+    package = Path(__file__).parents[1]
+    inside = package / "urdf"
+    return inside if inside.is_dir() else package.parent / "urdf"
+
+
+def _example_robot_data() -> Iterator[tuple[str, Path]]:
+    try:
+        distribution = metadata.distribution("example-robot-data")
+    except metadata.PackageNotFoundError:
+        return
+    for file in distribution.files or ():
+        if file.suffix == ".urdf":
+            inside = str(file).partition("/example-robot-data/robots/")[2]
+            name = _RENAMED.get(inside, file.stem.removesuffix("_robot").lower().replace("-", "_"))
+            yield name, Path(str(distribution.locate_file(file))).resolve()

@@ -1,0 +1,169 @@
+"""Edits of a described robot: gravity, locked joints, payloads, armature. Values; each road applies them itself."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import Any, TypedDict, Unpack, final
+
+import numpy as np
+
+from robot_dyn.description.inertia import implausibility
+from robot_dyn.description.urdf import LARGEST
+from robot_dyn.errors import EditError, nearest, shown
+from robot_dyn.validate import instance, numbers
+
+STANDARD_GRAVITY = (0.0, 0.0, -9.80665)  # [m/s²], CGPM 1901
+
+Matrix3 = tuple[tuple[float, float, float], ...]
+
+
+@final
+@dataclass(frozen=True)
+class Payload:
+    """A rigid body fastened to a frame of the robot.
+
+    Attributes:
+        frame: Link that carries it.
+        mass: In [kg], not negative.
+        com: Centre of mass in the frame, shape (3,), in [m].
+        inertia: Rotational inertia about its centre of mass, axes of the frame, shape (3, 3), in [kg m²].
+    """
+
+    frame: str
+    mass: float
+    com: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    inertia: Matrix3 = ((0.0, 0.0, 0.0),) * 3
+
+    def __post_init__(self) -> None:
+        instance("payload frame", self.frame, str, "give the name of a link", error=EditError)
+        inertia = _numbers("payload inertia", self.inertia, (3, 3))
+        if not np.array_equal(inertia, inertia.T):
+            raise EditError(f"payload inertia must be symmetric, got {inertia.tolist()}")
+        mass = float(_numbers("payload mass", self.mass, (), least=0))
+        object.__setattr__(self, "mass", mass)
+        object.__setattr__(self, "com", tuple(_numbers("payload com", self.com, (3,)).tolist()))
+        object.__setattr__(self, "inertia", tuple(map(tuple, inertia.tolist())))
+
+
+class Changes(TypedDict, total=False):
+    """What can be changed of a robot, by keyword; see `Robot.with_`."""
+
+    gravity: Any
+    lock: Mapping[str, float]
+    payload: Payload | Iterable[Payload]
+    armature: Any
+    mass_scale: float
+    masses: Mapping[str, float]
+    inertias: Mapping[str, Any]
+
+
+@final
+@dataclass(frozen=True)
+class Edits:
+    """What was changed of a description.
+
+    Attributes:
+        gravity: Acceleration of free fall in base axes, in [m/s²].
+        lock: Joints held at a value: (name, value in [rad] or [m]) each.
+        payloads: Bodies fastened to links.
+        armature: Inertia of the drives felt at the joints: (name, value in [kg m²] or [kg]) each.
+        mass_scale: Factor on the mass and inertia of all links, payloads excepted: for models that are wrong.
+        masses: In place of those that the file states: (link, value in [kg]) each.
+        inertias: Likewise, about the centre of mass in the axes of the link's inertial frame: (link, (3, 3) in
+            [kg m²]) each.
+    """
+
+    gravity: tuple[float, float, float] = STANDARD_GRAVITY
+    lock: tuple[tuple[str, float], ...] = ()
+    payloads: tuple[Payload, ...] = ()
+    armature: tuple[tuple[str, float], ...] = ()
+    mass_scale: float = 1.0
+    masses: tuple[tuple[str, float], ...] = ()
+    inertias: tuple[tuple[str, Matrix3], ...] = ()
+
+    def with_(self, joint_names: tuple[str, ...], **changes: Unpack[Changes]) -> Edits:
+        """These edits and more, as `Robot.with_`; `joint_names` are the joints that can be named."""
+        for name in changes.keys() - Changes.__annotations__.keys():
+            raise EditError(f"no edit {name!r}; {nearest(name, Changes.__annotations__)}")
+        new = self
+        if "gravity" in changes:
+            gravity = changes["gravity"]
+            new = replace(new, gravity=tuple(_numbers("gravity", gravity, (3,)).tolist()))
+        if "armature" in changes:
+            armature = changes["armature"]
+            new = replace(new, armature=tuple(by_joint("armature", armature, joint_names).items()))
+        if "lock" in changes:
+            lock = changes["lock"]
+            if not isinstance(lock, Mapping):
+                raise EditError(
+                    f"lock must give values by joint name, such as {{{joint_names[0]!r}: 0.0}}, got {shown(lock)}"
+                )
+            new = replace(new, lock=new.lock + tuple(by_joint("lock", lock, joint_names).items()))
+        if "payload" in changes:
+            payload = changes["payload"]
+            more = tuple(payload) if isinstance(payload, Iterable) else (payload,)
+            if not all(isinstance(each, Payload) for each in more):
+                raise EditError(f"payload must be a Payload or several, got {shown(payload)}")
+            new = replace(new, payloads=new.payloads + more)
+        if "mass_scale" in changes:
+            mass_scale = changes["mass_scale"]
+            factor = float(_numbers("mass_scale", mass_scale, (), above=0))
+            new = replace(new, mass_scale=factor)
+        if "masses" in changes:
+            masses = {
+                link: float(_numbers(f"mass of {link!r}", x, (), above=0))
+                for link, x in _by_link("masses", changes["masses"])
+            }
+            new = replace(new, masses=tuple((dict(new.masses) | masses).items()))
+        if "inertias" in changes:
+            inertias = {link: _inertia(link, x) for link, x in _by_link("inertias", changes["inertias"])}
+            new = replace(new, inertias=tuple((dict(new.inertias) | inertias).items()))
+        return new
+
+    def as_json(self) -> str:
+        """These edits as a JSON text, for run files."""
+        return json.dumps(asdict(self))
+
+
+def by_joint(what: str, values: Any, joint_names: tuple[str, ...]) -> dict[str, float]:
+    """Values by joint name, of a scalar, an array (n,) or a mapping that may leave joints out.
+
+    Raises:
+        EditError: If a joint is unknown, or a value is not a finite number; armature must not be negative.
+    """
+    if not isinstance(values, Mapping):
+        n = len(joint_names)
+        given = _numbers(what, values, (), (n,))
+        values = dict(zip(joint_names, np.broadcast_to(given, (n,)).tolist(), strict=True))
+    least, checked = 0 if what == "armature" else None, {}
+    for name, value in values.items():
+        if name not in joint_names:
+            raise EditError(f"{what}: no joint {name!r} that moves freely; {nearest(str(name), joint_names)}")
+        checked[name] = float(_numbers(f"{what} of {name!r}", value, (), least=least))
+    return checked
+
+
+def _by_link(what: str, values: Any) -> Iterable[tuple[str, Any]]:
+    if not isinstance(values, Mapping) or not all(isinstance(link, str) for link in values):
+        raise EditError(f"{what} must give values by link name, such as {{'panda_link3': …}}, got {shown(values)}")
+    return values.items()
+
+
+def _inertia(link: str, values: Any) -> Matrix3:
+    inertia = _numbers(f"inertia of {link!r}", values, (3, 3))
+    if not np.array_equal(inertia, inertia.T):
+        raise EditError(f"inertia of {link!r} must be symmetric, got {inertia.tolist()}")
+    if why := implausibility(0.0, np.zeros(3), inertia):
+        raise EditError(f"inertia of {link!r}: no body has it, {why}")
+    return tuple(map(tuple, inertia.tolist()))
+
+
+def _numbers(
+    what: str, values: Any, *shapes: tuple[int, ...], least: float | None = None, above: float | None = None
+) -> np.ndarray:
+    array = numbers(what, values, *shapes, error=EditError, least=least, above=above)
+    if (np.abs(array) > LARGEST).any():
+        raise EditError(f"{what} is beyond ±{LARGEST:g} in SI units, got {shown(values)}; correct it")
+    return array

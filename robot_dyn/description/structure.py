@@ -1,0 +1,158 @@
+"""The structure of a description in floats: its links as stated, its joints, and which links move as one body."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, final
+
+import numpy as np
+from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
+
+from robot_dyn.arithmetic import FLOAT64
+from robot_dyn.description.couplings import Mimic, resolve
+from robot_dyn.description.description import Description
+from robot_dyn.description.edits import Edits
+
+_MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+Triple = tuple[float, ...]
+
+
+@final
+@dataclass(frozen=True)
+class StatedLink:
+    """A link as its file or an edit states it, before any others are merged with it; zeros without an <inertial>.
+
+    Attributes:
+        mass: In [kg].
+        com: Centre of mass in the link's frame, in [m].
+        moments: Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the centre of mass, in the axes of the inertial, in [kg m²].
+    """
+
+    mass: float = 0.0
+    com: Triple = (0.0, 0.0, 0.0)
+    moments: Triple = (0.0,) * 6
+
+    @property
+    def inertia(self) -> np.ndarray:
+        """The moments as a matrix, (3, 3)."""
+        Ixx, Ixy, Ixz, Iyy, Iyz, Izz = self.moments
+        return np.array([[Ixx, Ixy, Ixz], [Ixy, Iyy, Iyz], [Ixz, Iyz, Izz]])
+
+
+@final
+@dataclass(frozen=True)
+class StatedJoint:
+    """A joint as its file states it: origin in [m]; limits in SI units, 1e308 where none is stated, None if fixed."""
+
+    kind: str
+    parent: str
+    child: str
+    xyz: Triple
+    lower: float | None = None
+    upper: float | None = None
+    effort: float | None = None
+    velocity: float | None = None
+
+
+@final
+@dataclass(frozen=True)
+class Structure:
+    """Links and joints of a description by name, and its edits."""
+
+    links: dict[str, StatedLink]
+    joints: dict[str, StatedJoint]
+    mimics: dict[str, Mimic]
+    edits: Edits
+
+    @cached_property
+    def root(self) -> str:
+        """The link fixed to the world."""
+        (root,) = self.links.keys() - {joint.child for joint in self.joints.values()}
+        return root
+
+    @cached_property
+    def moving(self) -> tuple[str, ...]:
+        """Joints that move: neither fixed nor locked, nor following one that is locked."""
+        locked = dict(self.edits.lock)
+        return tuple(
+            name
+            for name, joint in self.joints.items()
+            if joint.kind != "fixed" and resolve(name, self.mimics, FLOAT64)[0] not in locked
+        )
+
+    @cached_property
+    def free(self) -> tuple[str, ...]:
+        """Joints that move and follow no other one."""
+        return tuple(name for name in self.moving if name not in self.mimics)
+
+    @cached_property
+    def bodies(self) -> dict[str, tuple[str, ...]]:
+        """For each joint that moves, the links that it carries as one rigid body."""
+        return {name: self._body(self.joints[name].child) for name in self.moving}
+
+    @cached_property
+    def base(self) -> tuple[str, ...]:
+        """The links fixed to the world."""
+        return self._body(self.root)
+
+    @cached_property
+    def _fixed_below(self) -> dict[str, list[str]]:
+        """The links fixed to each link by a joint below it."""
+        below: dict[str, list[str]] = {name: [] for name in self.links}
+        for name in self.joints.keys() - set(self.moving):
+            below[self.joints[name].parent].append(self.joints[name].child)
+        return below
+
+    def _body(self, first: str) -> tuple[str, ...]:
+        links = [first]
+        for link in links:
+            links += self._fixed_below[link]
+        return tuple(links)
+
+    def ancestors(self, joint: str) -> Iterator[str]:
+        """The joints that carry a joint, from the next one to the root."""
+        above = {each.child: name for name, each in self.joints.items()}
+        while joint := above.get(self.joints[joint].parent, ""):
+            yield joint
+
+
+def structure(description: Description, edits: Edits) -> Structure:
+    """The structure of a description with its edits."""
+    file = description.element
+    links = {link.get("name"): _link(link.find("inertial")) for link in file.iterfind("link")}
+    for name in links.keys() & dict(edits.masses):
+        links[name] = replace(links[name], mass=dict(edits.masses)[name])
+    for name in links.keys() & dict(edits.inertias):
+        (Ixx, Ixy, Ixz), (_, Iyy, Iyz), (_, _, Izz) = dict(edits.inertias)[name]
+        links[name] = replace(links[name], moments=(Ixx, Ixy, Ixz, Iyy, Iyz, Izz))
+    joints = {joint.get("name"): _joint(joint) for joint in file.iterfind("joint")}
+    return Structure(links, joints, stated_mimics(file), edits)
+
+
+def stated_mimics(file: etree._Element) -> dict[str, Mimic]:
+    """The joints of a checked file that follow another one, in literals."""
+    return {
+        joint.get("name"): Mimic(mimic.get("joint"), mimic.get("multiplier"), mimic.get("offset"))
+        for joint in file.iterfind("joint")
+        if (mimic := joint.find("mimic")) is not None
+    }
+
+
+def _link(inertial: etree._Element | None) -> StatedLink:
+    if inertial is None:
+        return StatedLink()
+    mass, moments = float(inertial.find("mass").get("value")), inertial.find("inertia")
+    return StatedLink(mass, _triple(inertial), tuple(float(moments.get(key)) for key in _MOMENTS))
+
+
+def _joint(joint: etree._Element) -> StatedJoint:
+    limit: Any = joint.find("limit")
+    limits = {} if limit is None else {key: float(limit.get(key)) for key in ("lower", "upper", "effort", "velocity")}
+    parent, child = (joint.find(role).get("link") for role in ("parent", "child"))
+    return StatedJoint(joint.get("type"), parent, child, _triple(joint), **limits)
+
+
+def _triple(element: etree._Element) -> Triple:
+    return tuple(map(float, element.find("origin").get("xyz").split()))

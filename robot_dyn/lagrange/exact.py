@@ -1,0 +1,167 @@
+"""True values of M, C, N, inverse and forward dynamics: the own equations in balls, of more bits until they are narrow.
+
+    radius ≤ 1e-20 · scale
+
+The scale of M_ij is √(M_ii M_jj); of accelerations, in the norm of M, Σ ‖M⁻¹ τ_k‖_M of τ, C v and N; of other entries
+the largest of them in the units √M_ii of the joints, or what they typically are if that is given and more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.arithmetic import Arithmetic, Array, Ball, midpoint, radius
+from robot_dyn.errors import UndecidedError
+from robot_dyn.lagrange.manipulator import Lagrangian
+from robot_dyn.lagrange.scale import diagonal_scale, floored, joint_units, mass_norm, scaled, solved_norm
+from robot_dyn.lagrange.tree import Described
+from robot_dyn.queries.quantity import CORIOLIS_TORQUE, MOST_DIGITS, M, N, Quantity
+
+RESOLUTION = 10.0**-MOST_DIGITS
+_FIRST_BITS, _MOST_BITS = 128, 4096
+
+NOTHING = 1e-12  # in the units of the joints: a joint, or an answer, that is less is rounding of zero
+
+State = Mapping[str, np.ndarray]  # q, v, a, tau
+
+
+@final
+@dataclass(frozen=True)
+class RoundedLiterals(Arithmetic):
+    """Balls of the float64 nearest to each decimal of a file, in place of the decimal."""
+
+    ball: Ball
+    dtype: np.dtype = field(default_factory=lambda: np.dtype(object), init=False, repr=False)
+
+    def number(self, literal: Any) -> Any:
+        return self.ball.number(float(literal) if isinstance(literal, str) else literal)
+
+    def scope(self) -> AbstractContextManager[None]:
+        return self.ball.scope()
+
+    def asarray(self, values: Any) -> Array:
+        return self.ball.asarray(values)
+
+    def finite(self, x: Array) -> np.ndarray:
+        return self.ball.finite(x)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Scale:
+    """What errors are divided by, at one state or at several (S, …).
+
+    Attributes:
+        size: Of each entry; in the norm of M, of the whole.
+        M: Of that norm, (..., n, n); None for errors entry by entry.
+    """
+
+    size: np.ndarray
+    M: np.ndarray | None = None
+
+    def relative(self, error: np.ndarray, radius: np.ndarray | float = 0.0) -> np.ndarray:
+        """Errors, known to a radius, on the scale: in the norm of M the bound of it, (...,), else of each entry."""
+        if self.M is None:
+            return scaled(np.abs(error) + radius, self.size)
+        return scaled(mass_norm(self.M, error) + (radius * joint_units(self.M)).sum(axis=-1), self.size)
+
+
+def entry_units(values: np.ndarray, M: np.ndarray) -> np.ndarray:
+    """√(M_ii M_jj) for entries of C, (..., n, n), √M_ii for torques, (..., n).
+
+    A joint without inertia has no unit of its own: it gets 1e-12 of the largest.
+    """
+    units = joint_units(M)
+    units = np.maximum(units, NOTHING * units.max(axis=-1, keepdims=True))
+    return units[..., :, None] * units[..., None, :] if values.ndim == M.ndim else units
+
+
+def in_joint_units(values: np.ndarray, M: np.ndarray, least: float = 0.0) -> np.ndarray:
+    """The largest entry of C or of torques in the units of the joints, or `least` if that is more, for each entry."""
+    units = entry_units(values, M)
+    axes = (-2, -1) if values.ndim == M.ndim else (-1,)
+    return units * np.maximum(np.max(np.abs(values) / units, axis=axes, keepdims=True), least)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """True values of a quantity at one state.
+
+    Attributes:
+        values: Balls, of the shape of the quantity.
+        scale: Of errors.
+        bits: It took.
+    """
+
+    values: Array
+    scale: Scale
+    bits: int
+
+    def error(self, answer: Any) -> float:
+        """A bound of the largest error of an answer, of floats or balls, on the scale; inf if it is not finite."""
+        ball = Ball(2 * self.bits)
+        with ball.scope():
+            difference = ball.asarray(answer) - self.values
+            if not ball.finite(difference).all():
+                return float("inf")
+            return float(np.max(self.scale.relative(midpoint(difference), radius(difference))))
+
+
+@final
+class Exact:
+    """The exact equations of a robot.
+
+    Args:
+        robot: Its file and edits are used, none of its numbers.
+        rounded: Whether the float64 nearest to each decimal of the file counts, or the decimal itself.
+    """
+
+    def __init__(self, robot: Described, rounded: bool = False) -> None:
+        self._robot, self._rounded = robot, rounded
+        self._engines: dict[int, Lagrangian] = {}
+
+    def at(self, quantity: Quantity, state: State, typical: float = 0.0) -> Truth:
+        """The truth at one state, (n,) each.
+
+        Args:
+            quantity: M, C, N, inverse or forward dynamics.
+            state: Its arguments, by name.
+            typical: Least size of C, N and inverse dynamics that errors are relative to, in the units of the joints.
+
+        Raises:
+            SingularError: Of forward dynamics where M is singular; names the joint.
+        """
+        bits = _FIRST_BITS
+        while True:
+            engine = self._engine(bits)
+            try:
+                values = np.asarray(quantity.ask(engine, state), dtype=object)
+                scale = self._scale(engine, quantity, state, values, typical)
+                if np.all(scale.relative(0 * midpoint(values), radius(values)) <= RESOLUTION) or bits >= _MOST_BITS:
+                    return Truth(values, scale, bits)
+            except UndecidedError:
+                if bits >= _MOST_BITS:
+                    raise
+            bits *= 2
+
+    def _scale(self, engine: Lagrangian, quantity: Quantity, state: State, values: Array, typical: float) -> Scale:
+        if quantity.definite:
+            return Scale(floored(diagonal_scale(midpoint(values))))
+        inertia = midpoint(M.ask(engine, state))
+        if quantity.solves:
+            torques = (state["tau"], *(midpoint(each.ask(engine, state)) for each in (CORIOLIS_TORQUE, N)))
+            return Scale(solved_norm(inertia, torques), inertia)
+        known = np.where(np.abs(midpoint(values)) > radius(values), midpoint(values), 0.0)
+        return Scale(in_joint_units(known, inertia, typical))
+
+    def _engine(self, bits: int) -> Lagrangian:
+        if bits not in self._engines:
+            ball = Ball(bits)
+            self._engines[bits] = Lagrangian(self._robot, RoundedLiterals(ball) if self._rounded else ball)
+        return self._engines[bits]

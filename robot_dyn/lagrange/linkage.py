@@ -1,0 +1,270 @@
+"""The linkage: a Tree in the numbers of one arithmetic, and its kinematics g(q) = Π gᵢ exp(ξ̂ᵢ qᵢ).
+
+Links that do not move against each other are one body; its generalised inertia is 𝓜 = Σ Adᵀ 𝓜_link Ad, taken in the
+frame of the joint that carries it. [Murray, Li, Sastry 1994, ch. 3 and 4]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.arithmetic import Arithmetic, Array, apply, sqrt, symmetric, transpose
+from robot_dyn.description.couplings import Couplings, resolve
+from robot_dyn.description.inertial_parameters import ordered
+from robot_dyn.lagrange.tree import Joint, Link, Tree
+from robot_dyn.spatial import adjoint_inverse, hat, rotation_rpy, spatial_inertia, turned_about
+
+BASE = -1  # the body that does not move
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """A constant placement (R, p)."""
+
+    R: Array
+    p: Array
+
+    def __matmul__(self, other: Pose) -> Pose:
+        return Pose(self.R @ other.R, self.R @ other.p + self.p)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A moving body and the joint that carries it.
+
+    Attributes:
+        joint: Name of the joint.
+        parent: Index of the body before it, or BASE.
+        pose: Placement of the joint in the parent's frame at q = 0.
+        axis: Unit vector (3,).
+        revolute: Whether it turns about the axis, or slides along it.
+        path: Indices of the bodies from the base to this one, itself last.
+    """
+
+    joint: str
+    parent: int
+    pose: Pose
+    axis: Array
+    revolute: bool
+    path: tuple[int, ...]
+
+    @cached_property
+    def screw(self) -> Array:
+        """ξ, the body twist at unit rate, (6,)."""
+        return np.concatenate((np.zeros_like(self.axis), self.axis)[:: 1 if self.revolute else -1])
+
+    @cached_property
+    def generators(self) -> tuple[Array, Array]:
+        """â and â² of the axis, as `turned_about` takes them."""
+        A = hat(self.axis)
+        return A, A @ A
+
+    def step(self, q: Array) -> Step:
+        """The change of frame from the parent at the joint's coordinate q (...,)."""
+        zero, one = np.zeros_like(self.axis), np.broadcast_to(np.eye(3, dtype=self.axis.dtype), (*q.shape, 3, 3))
+        slide = q[..., None] * self.axis
+        motion = (turned_about(*self.generators, q), zero) if self.revolute else (one, slide)
+        origin = self.pose.p if self.revolute else self.pose.p + apply(self.pose.R, slide)
+        return Step(adjoint_inverse(self.pose.R, self.pose.p), adjoint_inverse(*motion), origin)
+
+    def moved(self, q: Array) -> tuple[Array, Array]:
+        """(R, p) in the parent's frame at the joint's coordinate q (...,)."""
+        if self.revolute:
+            return self.pose.R @ turned_about(*self.generators, q), np.broadcast_to(self.pose.p, (*q.shape, 3))
+        slide = self.pose.R @ self.axis
+        return np.broadcast_to(self.pose.R, (*q.shape, 3, 3)), self.pose.p + q[..., None] * slide
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Step:
+    """The change of frame from a body to the one before it, Ad⁻¹ = Ad_joint⁻¹ Ad_pose⁻¹; in two, for fewer products.
+
+    Attributes:
+        pose: Ad⁻¹ of the joint's constant placement, (6, 6).
+        joint: Ad⁻¹ of the joint's own motion, (..., 6, 6).
+        origin: Of the body's frame in its parent's, (3,) or (..., 3).
+    """
+
+    pose: Array
+    joint: Array
+    origin: Array
+
+    def turned(self, x: Array) -> Array:
+        """A vector in the parent's axes, in the body's: Rᵀ x."""
+        return apply(self.joint[..., 3:, 3:], apply(self.pose[3:, 3:], x))
+
+    def twist(self, V: Array) -> Array:
+        """The parent's twist, as the body's: Ad⁻¹ V."""
+        return apply(self.joint, apply(self.pose, V))
+
+    def wrench(self, F: Array) -> Array:
+        """A wrench on the body, as one on the parent: Ad⁻ᵀ F."""
+        return apply(self.pose.T, apply(transpose(self.joint), F))
+
+    def inertia(self, A: Array) -> Array:
+        """A symmetric form on the body's twists, as one on the parent's: Ad⁻ᵀ A Ad⁻¹."""
+        for X in (self.joint, self.pose):
+            A = symmetric(transpose(X) @ (A @ X))
+        return A
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Linkage:
+    """The N bodies that move, parents first.
+
+    Attributes:
+        bodies: Each with its joint.
+        links: By name: the body a link belongs to, its placement in that body's frame, its own 𝓜 in that frame (6, 6).
+        couplings: q_full = S q + s₀, from the coordinates that the user sees to the N joints.
+        gravity: (3,) in [m/s²].
+        armature: Of the N joints, (N,).
+        order: Indices of the bodies, in the order of their inertial parameters.
+    """
+
+    bodies: tuple[Body, ...]
+    links: dict[str, tuple[int, Pose, Array]]
+    couplings: Couplings
+    gravity: Array
+    armature: Array
+    order: tuple[int, ...]
+
+    @cached_property
+    def inertias(self) -> tuple[Array, ...]:
+        """𝓜 of each body in its frame, (6, 6)."""
+        total = [np.zeros((6, 6), dtype=self.gravity.dtype) for _ in self.bodies]
+        for body, _, inertia in self.links.values():
+            if body != BASE:
+                total[body] = total[body] + inertia
+        return tuple(total)
+
+    def steps(self, q: Array) -> list[Step]:
+        """The change of frame from each body's parent at coordinates q (..., n)."""
+        q = self.couplings.position(q)
+        return [body.step(q[..., i]) for i, body in enumerate(self.bodies)]
+
+    def at(self, q: Array) -> Configuration:
+        """The linkage at coordinates q (..., n)."""
+        return self._at(q, range(len(self.bodies)))
+
+    def at_link(self, q: Array, link: str) -> Configuration:
+        """What a link hangs on, at coordinates q (..., n): the bodies of its path alone."""
+        body, *_ = self.links[link]
+        return self._at(q, () if body == BASE else self.bodies[body].path)
+
+    def _at(self, q: Array, which: Iterable[int]) -> Configuration:
+        q = self.couplings.position(q)
+        return Configuration(self, q.shape[:-1], {i: self.bodies[i].moved(q[..., i]) for i in which})
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Configuration:
+    """The linkage, or those of its bodies that are asked for, at one configuration or a batch.
+
+    Attributes:
+        batch: Shape of the batch axes.
+        in_parent: (R, p) of each body in its parent's frame, by its index; parents first.
+    """
+
+    linkage: Linkage
+    batch: tuple[int, ...]
+    in_parent: dict[int, tuple[Array, Array]]
+
+    @cached_property
+    def in_base(self) -> dict[int, tuple[Array, Array]]:
+        """(R, p) of each body in the base."""
+        result: dict[int, tuple[Array, Array]] = {}
+        for i, (R, p) in self.in_parent.items():
+            parent = self.linkage.bodies[i].parent
+            if parent != BASE:
+                R0, p0 = result[parent]
+                R, p = R0 @ R, apply(R0, p) + p0
+            result[i] = R, p
+        return result
+
+    @cached_property
+    def jacobians(self) -> dict[int, Array]:
+        """Body Jacobian of each body, (..., 6, len(path)): its columns are the joints of its path.
+
+        Jᵢ = [Ad⁻¹ J_parent, ξᵢ].  [Murray, Li, Sastry 1994, eq. 3.56]
+        """
+        J: dict[int, Array] = {}
+        for i, (R, p) in self.in_parent.items():
+            body = self.linkage.bodies[i]
+            J[i] = np.broadcast_to(body.screw[:, None], (*self.batch, 6, 1))
+            if body.parent != BASE:
+                J[i] = np.concatenate([adjoint_inverse(R, p) @ J[body.parent], J[i]], axis=-1)
+        return J
+
+
+def linkage(tree: Tree, joint_names: tuple[str, ...], arithmetic: Arithmetic) -> Linkage:
+    """The numbers of a tree; coordinates in the order of `joint_names`. To be called in the arithmetic's scope."""
+    mimics = {joint.name: joint.mimic for joint in tree.joints if joint.mimic and joint.kind != "fixed"}
+    held = {joint.name: arithmetic.number(joint.locked) for joint in tree.joints if joint.locked is not None}
+    followed = {joint.name: resolve(joint.name, mimics, arithmetic) for joint in tree.joints}
+    identity = Pose(np.eye(3, dtype=arithmetic.dtype), np.zeros(3, dtype=arithmetic.dtype))
+    where: dict[str, tuple[int, Pose]] = {tree.root: (BASE, identity)}
+    bodies: list[Body] = []
+    for joint in tree.joints:
+        parent, pose = where[joint.parent]
+        pose = pose @ Pose(rotation_rpy(arithmetic.array(joint.rpy)), arithmetic.array(joint.xyz))
+        if joint.kind != "fixed":
+            path = bodies[parent].path if parent != BASE else ()
+            body = Body(
+                joint.name, parent, pose, _unit(joint, arithmetic), joint.kind != "prismatic", (*path, len(bodies))
+            )
+            source, ratio, offset = followed[joint.name]
+            if source in held:
+                pose = Pose(*body.moved(np.asarray(ratio * held[source] + offset, dtype=arithmetic.dtype)))
+            else:
+                bodies.append(body)
+                parent, pose = len(bodies) - 1, identity
+        where[joint.child] = parent, pose
+    links = {link.name: (*where[link.name], _inertia(link, where[link.name][1], arithmetic)) for link in tree.links}
+    armature = {joint.name: joint.armature for joint in tree.joints}
+    carriers = [body.joint for body in bodies]
+    return Linkage(
+        tuple(bodies),
+        links,
+        _couplings(bodies, followed, joint_names, arithmetic),
+        arithmetic.array(tree.gravity),
+        arithmetic.array([armature[name] for name in carriers]),
+        tuple(map(carriers.index, ordered(joint_names, carriers))),
+    )
+
+
+def _unit(joint: Joint, arithmetic: Arithmetic) -> Array:
+    axis = arithmetic.array(joint.axis)
+    return axis / sqrt((axis * axis).sum())
+
+
+def _inertia(link: Link, pose: Pose, arithmetic: Arithmetic) -> Array:
+    """𝓜 of a link in its body's frame: change of frame 𝓜_b = Ad⁻ᵀ 𝓜_c Ad⁻¹ of each part."""
+    total = np.zeros((6, 6), dtype=arithmetic.dtype)
+    for part in link.inertials:
+        at = pose @ Pose(rotation_rpy(arithmetic.array(part.rpy)), arithmetic.array(part.xyz))
+        Ixx, Ixy, Ixz, Iyy, Iyz, Izz = arithmetic.array(part.moments)
+        about_com = np.array([[Ixx, Ixy, Ixz], [Ixy, Iyy, Iyz], [Ixz, Iyz, Izz]], dtype=arithmetic.dtype)
+        own = spatial_inertia(arithmetic.number(part.mass), at.p, at.R @ about_com @ at.R.T)
+        total = total + arithmetic.number(part.scale) * own
+    return total
+
+
+def _couplings(
+    bodies: list[Body], followed: dict[str, Any], joint_names: tuple[str, ...], arithmetic: Arithmetic
+) -> Couplings:
+    S = np.zeros((len(bodies), len(joint_names)), dtype=arithmetic.dtype)
+    s0 = np.zeros(len(bodies), dtype=arithmetic.dtype)
+    for row, body in enumerate(bodies):
+        source, ratio, s0[row] = followed[body.joint]
+        S[row, joint_names.index(source)] = ratio
+    return Couplings(S, s0)

@@ -1,0 +1,173 @@
+"""Findings about a robot description that loads: what is doubtful in it, and the remedy, one sentence each.
+
+A refusal (`urdf.py`) is for what has no meaning; a finding is for what has one that is hardly meant. Criteria and
+reasons are in docs/findings.md. Each function yields the findings of one kind.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from math import hypot
+from typing import Any
+
+import numpy as np
+
+from robot_dyn.arithmetic import FLOAT64
+from robot_dyn.description.couplings import resolve
+from robot_dyn.description.inertia import implausibility
+from robot_dyn.description.mobile_base import stands_on
+from robot_dyn.description.structure import StatedLink, Structure
+from robot_dyn.errors import shorten
+from robot_dyn.model.conditioning import LEAST_DIGITS, NearlySingular
+
+LONGEST = 1e4  # [m], and of a mimic's multiplier: the digits that a sum of lengths of 1e-12 of it leaves
+LIGHTEST = 1e-12  # [kg]
+_LISTED = 6  # names in a finding
+
+
+def findings(
+    structure: Structure, joint_without_inertia: str | None = None, near: NearlySingular | None = None
+) -> tuple[str, ...]:
+    """What is doubtful in a description with its edits, in words: where, what and the remedy; the gravest first.
+
+    Args:
+        structure: The description with its edits.
+        joint_without_inertia: The joint at which M is singular at every configuration, if there is one.
+        near: What M leaves of the digits of forward dynamics, if it is few.
+    """
+    kinds = (
+        massless_bodies, moments_without_mass, impossible_inertias, tiny_masses, long_lengths, large_ratios,
+        welded_base, zero_limits, equal_limits, impossible_inertias_of_the_base,
+    )  # fmt: skip
+    found = (finding for kind in kinds for finding in kind(structure))
+    return (*no_inertia_about_axis(structure, joint_without_inertia), *found, *hardly_any_inertia(near))
+
+
+def impossible_inertias(robot: Structure) -> Iterator[str]:
+    """Links that move, before any are merged, whose mass and moments no body has."""
+    for name, link in robot.links.items():
+        if name not in robot.base and (why := _why_impossible(link)):
+            yield f"link {name!r}: {why}; correct the inertia of this link"
+
+
+def impossible_inertias_of_the_base(robot: Structure) -> Iterator[str]:
+    """The same of links that are fixed to the world."""
+    for name in robot.base:
+        if why := _why_impossible(robot.links[name]):
+            yield (
+                f"link {name!r}: {why}; correct the inertia of this link, which has no effect while it is fixed to the"
+                " world"
+            )
+
+
+def massless_bodies(robot: Structure) -> Iterator[str]:
+    """Bodies that move, all their links counted, without mass or moments."""
+    for joint in robot.bodies:
+        if not _has_mass(robot, joint):
+            yield (
+                f"link {robot.joints[joint].child!r} moves but has no mass; give it an <inertial>, or make its joint"
+                " fixed"
+            )
+
+
+def moments_without_mass(robot: Structure) -> Iterator[str]:
+    """Links that move with moments of inertia and without mass, which no body has; programs differ in what they do."""
+    for name, link in robot.links.items():
+        if name not in robot.base and link.mass == 0 and any(link.moments):
+            most = np.abs(np.linalg.eigvalsh(link.inertia)).max()
+            yield (
+                f"link {name!r}: has moments of inertia up to {most:.3g} kg m² and no mass: they count here, and MuJoCo"
+                " drops them; give it a mass, or remove its <inertial>"
+            )
+
+
+def no_inertia_about_axis(robot: Structure, joint: str | None) -> Iterator[str]:
+    """A joint whose bodies have mass, but on its axis alone, so that M is singular."""
+    # beside a body without mass, the axes of two joints may coincide: then that body is the fault
+    if joint is not None and all(_has_mass(robot, each) for each in robot.bodies):
+        yield (
+            f"joint {joint!r}: what it moves has mass but no inertia about its axis, so M is singular; give its link"
+            " moments of inertia, or give the joint armature"
+        )
+
+
+def hardly_any_inertia(near: NearlySingular | None) -> Iterator[str]:
+    """A matrix M so near to a singular one that rounding takes most digits of forward dynamics."""
+    if near is not None:
+        yield (
+            f"joint {near.joint!r}: M is nearly singular, κ = {near.condition:.1e}, so that forward dynamics may keep"
+            f" only {near.digits:.0f} digits; correct the inertia of what it moves, or give it armature (queries warn"
+            f" below {LEAST_DIGITS} digits; Robot.warn_below(None) for none of these warnings)"
+        )
+
+
+def tiny_masses(robot: Structure) -> Iterator[str]:
+    """Links with a mass that is not 0 and less than any part of an arm has."""
+    for name, link in robot.links.items():
+        if 0 < link.mass < LIGHTEST:
+            yield f"link {name!r}: its mass of {link.mass:g} kg is below {LIGHTEST:g} kg; correct it, or its unit"
+
+
+def long_lengths(robot: Structure) -> Iterator[str]:
+    """Origins of joints and centres of mass so far from their link's frame that digits are lost."""
+    lengths = [(f"link {name!r}: its centre of mass", link.com) for name, link in robot.links.items()]
+    lengths += [(f"joint {name!r}: its origin", joint.xyz) for name, joint in robot.joints.items()]
+    for what, xyz in lengths:
+        if (length := hypot(*xyz)) > LONGEST:
+            yield f"{what} lies {length:g} m away, beyond {LONGEST:g} m, which costs digits; correct it, or its unit"
+
+
+def large_ratios(robot: Structure) -> Iterator[str]:
+    """Joints that follow another one so fast that digits are lost."""
+    for name in robot.mimics:
+        source, ratio, _ = resolve(name, robot.mimics, FLOAT64)
+        if abs(ratio) > LONGEST:
+            yield (
+                f"joint {name!r}: moves {ratio:g} times as far as {source!r}, beyond {LONGEST:g}, which costs digits;"
+                " correct the multiplier of its <mimic>"
+            )
+
+
+def zero_limits(robot: Structure) -> Iterator[str]:
+    """Effort and velocity limits of 0, which allow nothing; most often a number that nobody filled in."""
+    for limit, unit in (("effort", "N m or N"), ("velocity", "rad/s or m/s")):
+        if names := [name for name in robot.free if getattr(robot.joints[name], limit) == 0]:
+            yield (
+                f"{_joints(names)}: the {limit} limit is 0, which allows no {limit} at all; write the limit in {unit},"
+                f" or leave {limit} out for none"
+            )
+
+
+def equal_limits(robot: Structure) -> Iterator[str]:
+    """Joints whose lower limit is their upper one."""
+    if names := [name for name in robot.free if robot.joints[name].lower == robot.joints[name].upper]:
+        yield f"{_joints(names)}: the lower limit is the upper one; correct them, or make the joint fixed"
+
+
+def welded_base(robot: Structure) -> Iterator[str]:
+    """A robot that stands, rolls or flies, fixed to the world at its root link."""
+    if signs := stands_on(robot):
+        yield (
+            f"link {robot.root!r}: the base of a robot with legs, wheels or rotors"
+            f" ({', '.join(map(repr, signs[:_LISTED]))}) is fixed to the world here, since a floating base is not"
+            " simulated; take its numbers as those of the robot on a stand"
+        )
+
+
+def _why_impossible(link: StatedLink) -> str | None:
+    return implausibility(link.mass, np.zeros(3), link.inertia)
+
+
+def _has_mass(robot: Structure, joint: str) -> bool:
+    """Whether the body that a joint carries has mass or moments, payloads and the armature of the joint included."""
+    links, edits = robot.bodies[joint], robot.edits
+    stated = any(robot.links[name].mass or any(robot.links[name].moments) for name in links)
+    carried = any(load.frame in links and (load.mass or np.any(load.inertia)) for load in edits.payloads)
+    return stated or carried or dict(edits.armature).get(joint, 0.0) > 0
+
+
+def _joints(names: Iterable[Any]) -> str:
+    names = list(names)
+    shown = ", ".join(repr(shorten(name)) for name in names[:_LISTED])
+    more = f", … ({len(names)} in all)" if len(names) > _LISTED else ""
+    return f"joint{'s' if len(names) > 1 else ''} {shown}{more}"

@@ -1,0 +1,1 @@
+"""What every implementation answers: the Dynamics protocol, its quantities, units and batches."""

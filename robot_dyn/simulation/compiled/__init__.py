@@ -1,0 +1,1 @@
+"""The state equation and time loops as machine code."""

@@ -1,0 +1,173 @@
+"""The choice of the engine that runs a setup: machine code, or Python where compiling does not pay or cannot be.
+
+It is made by a count, about how often the equation of motion is evaluated: the same for a setup on every machine.
+Machine code that this process already has, or the store, is used in any case.
+"""
+
+from __future__ import annotations
+
+import sys
+from math import inf
+from typing import TYPE_CHECKING, Any
+
+from robot_dyn.codegen.waiting import told
+from robot_dyn.errors import RobotDynError
+from robot_dyn.simulation.compiled.programs import Identified, Traces, identified, interpreted, stored
+from robot_dyn.simulation.dynamics.declarations import named, undeclared
+from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.setup.setup import Setup
+from robot_dyn.simulation.setup.size import segments
+
+if TYPE_CHECKING:
+    from robot_dyn.simulation.compiled.machine import Machine
+
+# Interpreted, an evaluation takes some 0.1 ms: these take about as long as imports, trace and LLVM, 1 to 2 s; half of
+# it without the time loop, which is compiled once for a version of this library.
+_COMPILED = 20_000
+_WITHOUT_LOOP = _COMPILED / 2
+_GUESSED = 10  # evaluations in a step of an implicit method, beside those of its Jacobian
+_PER_SECOND, _PER_SEGMENT = 1000, 17  # evaluations of an adaptive method: for each second, at least for each segment
+
+
+def choose(setup: Setup, equation: StateEquation, seen: float = 0) -> tuple[Machine | None, str]:
+    """The machine that runs a setup, or None for the interpreted engine; and words for the summary.
+
+    Args:
+        setup: What to run.
+        equation: Its state equation.
+        seen: Evaluations that it is known to take at least, without its companions.
+
+    Raises:
+        TraceError: If engine is "compiled" and a part cannot be; names it.
+        MachineError: If the machine code does not agree with the interpreted engine.
+    """
+    if setup.engine == "interpreted":
+        return None, _interpreted(setup)
+    asked = setup.engine == "compiled"
+    if not asked and (parts := undeclared(setup.plant, setup.controller)):  # they may do what a trace would lose
+        return None, _interpreted(setup, " ".join((named(parts[0][0]), parts[0][1])))
+    try:
+        made, what = identified(_code(setup, equation)), _traces(setup)
+        found = _existing(setup, made, what)
+        if found is None and not asked and not _is_worthwhile(setup, made, what, seen):
+            return None, _interpreted(setup, "short: compiling does not pay")
+        machine = _checked(setup, equation, found)
+        return machine, _label(machine)
+    except (ImportError, RobotDynError) as error:
+        if asked:
+            raise
+        return None, _interpreted(setup, str(error))
+
+
+def most_interpreted(setup: Setup, equation: StateEquation, machine: Machine | None) -> float:
+    """Evaluations after which a run is begun again in machine code: a count that was guessed too low."""
+    guessed = setup.engine == "auto" and machine is None and setup.integrator.controls_error
+    if not guessed or undeclared(setup.plant, setup.controller):  # what is not compiled would never end
+        return inf
+    return _COMPILED / _in_all(setup, equation.size)
+
+
+def _checked(setup: Setup, equation: StateEquation, found: Machine | None) -> Machine:
+    """The machine that was found, or another, once it has been compared."""
+    if found is not None:
+        found.check(setup)
+        return found
+    with told("compiling the equations of this run, once for its structure"):
+        made = machine_of(setup, equation)
+        made.check(setup)
+    return made
+
+
+def machine_of(setup: Setup, equation: StateEquation, swept: tuple[str, ...] = ()) -> Machine:
+    """The machine code of a run by itself, not checked yet; `swept` as of `machine`.
+
+    Raises:
+        TraceError: If a part cannot be compiled; names it.
+    """
+    from robot_dyn.simulation.compiled.making import machine
+
+    code, (_, jacobian, nonsmooth) = _code(setup, equation), _traces(setup)
+    return machine(code, _plain(setup), swept=swept, jacobian=jacobian, cuts=setup.finds_events, nonsmooth=nonsmooth)
+
+
+def _existing(setup: Setup, made: Identified, what: Traces) -> Machine | None:
+    """The machine code that this process has, or the store."""
+    programs = None
+    if "robot_dyn.simulation.compiled.making" not in sys.modules:  # to import it takes ten times as long as to ask
+        programs = stored(made, what)
+        if programs is None:
+            return None
+    from robot_dyn.simulation.compiled.making import existing
+
+    return existing(made, what, _plain(setup), setup.finds_events, programs)
+
+
+def _is_worthwhile(setup: Setup, made: Identified, what: Traces, seen: float) -> bool:
+    """Whether compiling takes less than this run and those of its structure that were interpreted before it."""
+    before, size = interpreted(made, what), made.equation.size
+    count = before[0] + max(seen * _in_all(setup, size), _evaluations(setup, size))
+    if count >= _COMPILED or (count >= _WITHOUT_LOOP and _has_loop(setup)):
+        return True
+    before[0] = count
+    return False
+
+
+def _has_loop(setup: Setup) -> bool:
+    """Whether the time loop is in the store."""
+    from robot_dyn.simulation.compiled.making import loop_of
+
+    method = _plain(setup)
+    return (
+        method is not None
+        and loop_of(method, setup.finds_events, holds=bool(setup.plant.equation_of_motion.set_valued)).is_kept()
+    )
+
+
+def _code(setup: Setup, equation: StateEquation) -> StateEquation:
+    """The equation that is compiled."""
+    return equation if _traces(setup).nonsmooth else equation.in_a_mode
+
+
+def _traces(setup: Setup) -> Traces:
+    method: Any = setup.integrator
+    return Traces(None, method.needs_jacobian, method.nonsmooth)
+
+
+def _plain(setup: Setup) -> Any:
+    """The method, if its steps are compiled."""
+    method: Any = setup.integrator
+    return method if method.plain else None
+
+
+def _interpreted(setup: Setup, why: str = "") -> str:
+    words = [why] * bool(why) + ["Jacobian by differences"] * setup.integrator.needs_jacobian
+    return f"interpreted ({'; '.join(words)})" if words else "interpreted"
+
+
+def _label(machine: Machine) -> str:
+    if machine.loop is not None:
+        return "compiled"
+    why = f": {machine.refused}" if machine.refused else ""
+    return f"compiled (the equation of motion; steps in Python{why})"
+
+
+def _evaluations(setup: Setup, size: int) -> float:
+    """About how many evaluations of an equation of motion of that size a run takes, with its companions."""
+    method: Any = setup.integrator
+    if method.controls_error:
+        own = max(_PER_SECOND * setup.duration_s, _PER_SEGMENT * segments(setup))
+    else:
+        own = setup.steps * (method.evaluations_per_step or _GUESSED)
+    return own * _in_all(setup, size)
+
+
+def _in_all(setup: Setup, size: int) -> float:
+    """Evaluations for each one of a run: those of its Jacobians, and of its companions by halved and by other steps."""
+    companions = (2 if setup.integrator.controls_error else 1) if setup.estimate_error else 0
+    return (1 + companions) * _with_jacobians(setup, size)
+
+
+def _with_jacobians(setup: Setup, size: int) -> float:
+    """Evaluations for each one of a step, those for a Jacobian by differences in each step included."""
+    method: Any = setup.integrator
+    return 1 + 2 * size / (method.evaluations_per_step or _GUESSED) if method.needs_jacobian else 1

@@ -1,0 +1,58 @@
+"""Where operational-space control damps its task: the smallest eigenvalue of J M⁻¹ Jᵀ is below the threshold.
+
+There the arm no longer follows along a direction that it is told to move in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from robot_dyn.control.operational_space import OperationalSpace, task_dynamics
+from robot_dyn.errors import RobotDynError
+from robot_dyn.simulation.observation.remarks import Kind, Remark
+from robot_dyn.simulation.run.record import Record
+from robot_dyn.simulation.setup.setup import Setup
+
+_MOST = 2000  # states that are looked at
+
+
+def damped(setup: Setup, record: Record) -> Iterator[Remark]:
+    """A remark for each frame whose task is damped at a sample or at the end of a step."""
+    controller, n = setup.controller, setup.plant.dynamics.n
+    if controller is None:
+        return
+    parts = (controller, *(each.part for each in controller.parts))
+    tasks = [each for each in parts if isinstance(each, OperationalSpace)]
+    if not tasks:
+        return
+    t, first = np.unique(np.concatenate([record.t, record.walked.t]), return_index=True)
+    q = np.concatenate([record.y[:, :n], record.walked.y[:, :n]])[first]
+    t, q = (each[np.isfinite(q).all(axis=1)] for each in (t, q))
+    rows = np.unique(np.linspace(0, len(t) - 1, min(len(t), _MOST)).astype(int))
+    for task in tasks:
+        yield from _of(task, t[rows], q[rows])
+
+
+def _of(task: OperationalSpace, t: np.ndarray, q: np.ndarray) -> Iterator[Remark]:
+    try:
+        made = task_dynamics(task.model, q, 0 * q, task.frame, rows=task.rows, threshold=task.threshold)
+    except RobotDynError:  # of its model: the outcome of a run
+        return
+    smallest = np.asarray(made.smallest, float)
+    below = smallest < task.threshold
+    if not below.any():
+        return
+    lasts = np.append(np.diff(t), 0.0)
+    at, start, duration = int(smallest.argmin()), float(t[below.argmax()]), float(lasts[below].sum())
+    least, when = float(smallest[at]), float(t[at])
+    text = (
+        f"{task.frame} for {duration:.3g} s from {start:.4g} s (smallest eigenvalue of J M⁻¹ Jᵀ {max(least, 0.0):.2g}"
+        f" of threshold {task.threshold:.2g} at {when:.4g} s)"
+    )
+    yield Remark(
+        Kind.DAMPED, task.frame, "q", start, duration, when, least, float(task.threshold), text,
+        "it does not follow along that direction: keep the reference within reach, or take a larger threshold for"
+        " smaller torques",
+    )  # fmt: skip

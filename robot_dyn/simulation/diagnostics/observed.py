@@ -1,0 +1,232 @@
+"""What an observer saw, as remarks: in words, with times, values and what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+
+from robot_dyn.effects.effect import Conservative, Dissipative, Stateful
+from robot_dyn.errors import RobotDynError
+from robot_dyn.model.robot import Robot
+from robot_dyn.queries.units import unit
+from robot_dyn.simulation.diagnostics.creep import creeping
+from robot_dyn.simulation.diagnostics.reference_remarks import held, jumps
+from robot_dyn.simulation.observation.chatter import Episode
+from robot_dyn.simulation.observation.levels import Level, Levels, levels
+from robot_dyn.simulation.observation.observation import Observation, Observed, Visit, observation_of
+from robot_dyn.simulation.observation.observer import Observer
+from robot_dyn.simulation.observation.remarks import Kind, Remark
+from robot_dyn.simulation.setup.setup import Setup
+from robot_dyn.values import copied, kept
+
+Units = list[tuple[str, str, str]]  # of q, v and u of each joint
+QUANTITIES = ("q", "v", "u")
+KINDS = Kind.EFFORT_REACHED, Kind.STOP_REACHED, Kind.BEYOND  # of levels, in the order in which they are told
+_HIDDEN = 0.1  # of the range of a quantity: what the samples beside a window leave out
+_ROUNDING = 1e-9  # of a quantity: a smaller range is noise
+
+
+def observer_of(setup: Setup, of: Levels | None = None) -> Observer:
+    """An observer of a run that has not begun, for its levels unless others are given."""
+    if of is not None:
+        return Observer(_observation(setup, of), of, setup.equation.canonical)
+    of, start = kept(setup, _beginning)
+    return Observer(copied(start), of, setup.equation.canonical)
+
+
+def _beginning(setup: Setup) -> tuple[Levels, Observation]:
+    of = levels(setup.plant.dynamics, setup.plant.effects, setup.controller)
+    return of, _observation(setup, of)
+
+
+def _observation(setup: Setup, of: Levels) -> Observation:
+    """Of the start; nan for what u is not known before the first tick."""
+    equation, u = setup.equation, np.full(len(setup.q0), np.nan)
+    if not equation.sampled:
+        with suppress(RobotDynError):  # the run will tell
+            u = equation.actuation(0.0, setup.q0, setup.v0, np.zeros(equation.states), None)
+    return observation_of(np.concatenate([setup.q0, setup.v0, u])[:, None], of)
+
+
+def remarks(
+    setup: Setup, observer: Observer, of: Observed, t: np.ndarray, samples: np.ndarray, power: dict[str, np.ndarray]
+) -> tuple[Remark, ...]:
+    """All remarks on a run, chatter first.
+
+    Args:
+        setup: What ran.
+        observer: Closed, at the end of the run.
+        of: What it observed.
+        t: Times of its samples, (m,), in [s].
+        samples: q, v and u beside each other, (m, 3n).
+        power: Of each source, (m,), in [W].
+    """
+    units, n = units_of(setup.plant.dynamics), len(setup.q0)
+    v = samples[:, n : 2 * n]
+    of_run = (
+        setup.plant.dynamics.joint_names,
+        units,
+        of.visits_of(0),
+        of.episodes_of(0),
+        against(setup, t, samples[:, :n]),
+    )
+    return (
+        *of_steps(*of_run), *_coarse(setup, observer, t, samples, units), *_gaining(setup, t, power),
+        *creeping(setup, t, v, units), *of_reference(setup, t, of.extremes[0], units),
+    )  # fmt: skip
+
+
+def of_reference(setup: Setup, t: np.ndarray, extremes: np.ndarray, units: Units) -> Iterator[Remark]:
+    """Remarks on the reference of a run, with extremes (3, 2, n) of its steps and samples at times t (m,)."""
+    yield from (remark for remark, _ in jumps(setup, setup.q0[None], setup.v0[None], units))
+    yield from held(setup, extremes, t, units)
+
+
+def of_steps(
+    names: tuple[str, ...], units: Units, visits: dict[Level, Visit], episodes: dict[int, Episode],
+    remedy: Callable[[Episode], str], instants: int = 0,
+) -> list[Remark]:  # fmt: skip
+    """Remarks on what was observed of a run: chatter, then levels.
+
+    Args:
+        names: Of the joints.
+        units: As of `units_of`.
+        visits: By level.
+        episodes: Of chatter, by joint.
+        remedy: What to do about one.
+        instants: As of `Observed`.
+    """
+    found = [*_chatter(names, units, episodes, remedy)]
+    for kind in KINDS:
+        of_kind = {level: visit for level, visit in visits.items() if level.kind is kind}
+        found += _passed(names, units, of_kind, instants)
+    return found
+
+
+def _gaining(setup: Setup, t: np.ndarray, power: dict[str, np.ndarray]) -> Iterator[Remark]:
+    """Effects declared dissipative with τᵀv > 0 at a sample, by more than rounding."""
+    working = [force for force in setup.plant.forces if not isinstance(force, Conservative)]
+    for force, (name, P) in zip(working, list(power.items())[1:], strict=False):  # behind the control, as of `sources`
+        takes = isinstance(force, Dissipative) and not isinstance(force, Stateful)  # what stores may give back
+        if not takes or not (np.nan_to_num(P) > _ROUNDING * np.nanmax(np.abs(P))).any():
+            continue
+        at = int(np.nanargmax(P))
+        text = f"{name} {P[at]:.4g} W at {t[at]:.4g} s"
+        yield Remark(
+            Kind.GAINS, name, "power", float(t[at]), 0.0, float(t[at]), float(P[at]), 0.0, text,
+            "declare it Active, or see to the sign of its torque",
+        )  # fmt: skip
+
+
+def units_of(dynamics: Any) -> Units:
+    """Units of q, v and u of each joint."""
+    robot: Any = getattr(dynamics, "robot", dynamics)
+    types = robot.joint_types if isinstance(robot, Robot) else (None,) * dynamics.n
+    return [(unit("q", each), unit("v", each), unit("u", each)) for each in types]
+
+
+def _passed(names: tuple[str, ...], units: Units, visits: dict[Level, Visit], instants: int) -> Iterator[Remark]:
+    """Levels passed, both sides of a limit as one."""
+    n = len(units)
+    rows: dict[int, list[tuple[Level, Visit]]] = {}
+    for level, visit in sorted(visits.items(), key=lambda each: each[1].start):
+        rows.setdefault(level.row, []).append((level, visit))
+    for row, both in rows.items():
+        quantity, joint = divmod(row, n)
+        level, most = max(both, key=lambda each: abs(each[1].value - each[0].limit))
+        start = min(x.start for _, x in both)
+        duration = sum({level.limit: x.duration for level, x in both}.values())  # a limit of 0 is both sides of one
+        unit = f" {units[joint][quantity]}".rstrip()
+        far = f"{most.value:.4g} of {level.limit:.4g}{unit} at {most.at:.4g} s"
+        spent = f"for {duration:.3g} s from {start:.4g} s"
+        words = {
+            Kind.BEYOND: far,
+            Kind.STOP_REACHED: f"{far}, {spent}",
+            Kind.EFFORT_REACHED: f"{spent} ({abs(level.limit):.4g}{unit})",
+        }
+        seen = f" (at samples and {instants} instants)" if QUANTITIES[quantity] == "u" and instants else ""
+        text = f"{names[joint]} {words[level.kind]}{seen}"
+        yield Remark(
+            level.kind, names[joint], QUANTITIES[quantity], start, duration, most.at, most.value, level.limit, text,
+            "nothing in the plant enforces them" if level.kind is Kind.BEYOND else "",
+        )  # fmt: skip
+
+
+def _chatter(
+    names: tuple[str, ...], units: Units, episodes: dict[int, Episode], remedy: Callable[[Episode], str]
+) -> Iterator[Remark]:
+    for joint, episode in sorted(episodes.items(), key=lambda each: -each[1].amplitude):
+        unit = f" {units[joint][2]}".rstrip()
+        text = f"{names[joint]} ±{episode.amplitude:.3g}{unit} from {episode.start:.4g} s for {episode.duration:.3g} s"
+        yield Remark(
+            Kind.CHATTER, names[joint], "u", episode.start, episode.duration, episode.start, episode.amplitude,
+            None, text, remedy(episode),
+        )  # fmt: skip
+
+
+def against(setup: Setup, t: np.ndarray, q: np.ndarray) -> Callable[[Episode], str]:
+    """What to do about chatter of a run with positions q (m, n) at times t (m,)."""
+    period = setup.controller.period_s if setup.controller else 0.0
+    if not period:
+        return lambda episode: "the step is too long for the gains: take a smaller one"
+    return lambda episode: _remedy(
+        setup, episode.start, q[np.clip(np.searchsorted(t, episode.start), 0, len(t) - 1)], period
+    )
+
+
+def _remedy(setup: Setup, t: float, q: np.ndarray, period: float) -> str:
+    """What to do about a chatter, with the largest kd T/M: the eigenvalue of −M⁻¹ ∂u/∂v times the period."""
+    general = "take a shorter period_s or less damping: it reverses where an eigenvalue of M⁻¹ kd period_s is above 1"
+    controller, n = setup.controller, len(q)
+    assert controller is not None
+    z, v = np.zeros(controller.state_size), np.zeros(n)
+    try:
+        with np.errstate(all="ignore"):
+            u = [controller.torque(t, q, v + side * dv, z) for dv in 1e-6 * np.eye(n) for side in (1, -1)]
+            slope = np.array([(plus - minus) / 2e-6 for plus, minus in zip(u[::2], u[1::2], strict=True)]).T
+            ratio = float(np.abs(np.linalg.eigvals(np.linalg.solve(setup.plant.at(t).M(q), -slope))).max()) * period
+    except (RobotDynError, np.linalg.LinAlgError):
+        return general
+    if not 1 < ratio < np.inf:
+        return general
+    return (
+        f"kd period_s / M is {ratio:.3g}, and above 1 it reverses, above 2 it grows: take period_s below "
+        f"{period / ratio:.2g} s, or less damping"
+    )
+
+
+def _coarse(setup: Setup, observer: Observer, t: np.ndarray, samples: np.ndarray, units: Units) -> Iterator[Remark]:
+    """Where q, v or u left the hull of the samples around it by a good part of its range; the worst for each joint."""
+    edges, low, high = observer.windows
+    every = not setup.record_period_s and not setup.integrator.controls_error
+    if every or not len(low) or not len(t):
+        return
+    spacing = 1e-9 * (t[-1] - t[0])
+    first = np.clip(np.searchsorted(t, edges[:-1] + spacing, "right") - 1, 0, None)
+    last = np.maximum(np.clip(np.searchsorted(t, edges[1:] - spacing), 0, len(t) - 1), first) + 1
+    padded, pairs = np.vstack([samples, samples[-1:]]), np.column_stack([first, last]).ravel()
+    with np.errstate(all="ignore"):
+        least, largest = (extreme.reduceat(padded, pairs)[::2] for extreme in (np.minimum, np.maximum))
+        above, below = high - largest, least - low
+        bottom, top = low.min(axis=0), high.max(axis=0)
+        noise = _ROUNDING * np.maximum(1.0, np.maximum(np.abs(bottom), np.abs(top)))
+        part = np.where(top - bottom > noise, np.maximum(above, below) / (top - bottom), 0.0)
+    part = np.nan_to_num(part)
+    n, names = len(units), setup.plant.dynamics.joint_names
+    worst = part.max(axis=0).reshape(3, n)
+    for joint in np.flatnonzero(worst.max(axis=0) > _HIDDEN):
+        row = int(worst[:, joint].argmax()) * n + int(joint)
+        window = int(part[:, row].argmax())
+        up = above[window, row] > below[window, row]
+        value, shown = (high, largest) if up else (low, least)
+        start, end, quantity = float(edges[window]), float(edges[window + 1]), QUANTITIES[row // n]
+        seen, unit = float(shown[window, row]), f" {units[joint][row // n]}".rstrip()
+        at = (start + end) / 2
+        text = f"{quantity} of {names[joint]} {value[window, row]:.4g}{unit} near {at:.4g} s (sampled: {seen:.4g})"
+        yield Remark(
+            Kind.COARSE, names[joint], quantity, start, end - start, at, float(value[window, row]), seen, text,
+            "take a shorter record_period_s",
+        )  # fmt: skip

@@ -1,0 +1,100 @@
+"""What a reference asks for that the run cannot do: it jumps where it begins, or moves a joint that friction holds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from robot_dyn.control.reference import PiecewisePolynomial
+from robot_dyn.effects.dry_friction import DryFriction
+from robot_dyn.simulation.observation.remarks import Kind, Remark
+from robot_dyn.simulation.setup.setup import Setup
+
+_JUMP = 0.01  # of the range of a reference, or of its largest velocity
+_ROUNDING = 1e-9  # of a position
+_LOOKS = 2000  # at a reference
+
+Units = list[tuple[str, str, str]]
+
+
+def jumps(setup: Setup, q0: np.ndarray, v0: np.ndarray, units: Units) -> Iterator[tuple[Remark, np.ndarray]]:
+    """The joints whose reference does not begin where the joint is, or as fast as it moves there.
+
+    A reference rests before its first break. One that rests at all times is a set point, which may be anywhere. Each
+    remark is on the run with the largest jump, beside the jumps of all runs, (B,), 0 where there is none.
+
+    Args:
+        setup: What ran.
+        q0: Positions at the start of each run, (B, n).
+        v0: Velocities there, (B, n).
+        units: Of q, v and u of each joint.
+    """
+    reference = _joint_reference(setup)
+    if reference is None or reference.start >= setup.duration_s:
+        return
+    q, v = _along(setup, reference)
+    t, names = max(0.0, reference.start), setup.plant.dynamics.joint_names
+    before = (q0, v0) if t == 0 else (np.broadcast_to(reference.at(0.0)[0], q0.shape), np.zeros_like(v0))
+    sizes = np.ptp(q, axis=0), np.abs(v).max(axis=0)
+    for row, (quantity, begin, there, size) in enumerate(zip("qv", reference.at(t), before, sizes, strict=False)):
+        gaps = np.abs(begin - there)
+        gaps[:, ~_moves(q)] = 0.0
+        gaps[gaps <= _JUMP * size] = 0.0
+        for i in np.flatnonzero(gaps.any(axis=0)):
+            asked, at_start = float(begin[i]), float(there[gaps[:, i].argmax(), i])
+            text = f"{quantity} of {names[i]} from {at_start:.4g} to {asked:.4g} {units[i][row]} at {t:.4g} s"
+            yield Remark(
+                Kind.JUMPS, names[i], quantity, t, 0.0, t, asked, at_start, text,
+                "let it begin where and as fast as the joint does; rd.via_points(times_s, points) begins at rest",
+            ), gaps[:, i]  # fmt: skip
+
+
+def held(setup: Setup, extremes: np.ndarray, t: np.ndarray, units: Units) -> Iterator[Remark]:
+    """The joints that dry friction holds at every step while their reference moves.
+
+    Args:
+        setup: What ran.
+        extremes: Of q, v and u over all steps, (3, 2, n).
+        t: Times of its samples, (m,), in [s].
+        units: Of q, v and u of each joint.
+    """
+    reference = _joint_reference(setup)
+    if reference is None or not len(t):
+        return
+    rubs = np.zeros(setup.plant.dynamics.n, dtype=bool)
+    for effect in setup.plant.effects:
+        if isinstance(effect, DryFriction):
+            rubs |= np.asarray(effect.friction(0 * setup.v0)) > 0
+    path = reference.at(t)[0]
+    asked, moves = np.ptp(path, axis=0), _moves(path)
+    for i in np.flatnonzero(rubs & at_rest(extremes) & moves):
+        name, (unit, _, of_u) = setup.plant.dynamics.joint_names[i], units[i]
+        most = float(np.nan_to_num(np.abs(extremes[2, :, i])).max())
+        text = f"{name} at {setup.q0[i]:.4g} {unit}, its reference moves by {asked[i]:.3g}, |u| up to {most:.3g} {of_u}"
+        yield Remark(
+            Kind.HELD, name, "q", 0.0, float(t[-1]), 0.0, float(setup.q0[i]), float(asked[i]), text,
+            "the control asks for less than friction holds: take larger gains, or less friction",
+        )  # fmt: skip
+
+
+def at_rest(extremes: np.ndarray) -> np.ndarray:
+    """Of extremes over all steps (…, 3, 2, n), which joints did not move, (…, n)."""
+    return (extremes[..., 0, 0, :] == extremes[..., 0, 1, :]) & (extremes[..., 1, :, :] == 0).all(axis=-2)
+
+
+def _joint_reference(setup: Setup) -> PiecewisePolynomial | None:
+    desired = None if setup.controller is None else setup.controller.desired
+    return desired if isinstance(desired, PiecewisePolynomial) and desired.n == setup.plant.dynamics.n else None
+
+
+def _moves(q: np.ndarray) -> np.ndarray:
+    """Of which joints positions (k, n) differ by more than rounding, (n,)."""
+    return np.ptp(q, axis=0) > _ROUNDING * np.maximum(1.0, np.abs(q).max(axis=0))
+
+
+def _along(setup: Setup, reference: PiecewisePolynomial) -> tuple[np.ndarray, np.ndarray]:
+    """Position and velocity of a reference during a run, at equal times and at its first breaks, (k, n)."""
+    breaks = reference.breaks[(reference.breaks >= 0) & (reference.breaks <= setup.duration_s)][:_LOOKS]
+    q, v, _ = reference.at(np.concatenate([np.linspace(0.0, setup.duration_s, _LOOKS), breaks]))
+    return q, v

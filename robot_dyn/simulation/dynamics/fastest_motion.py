@@ -1,0 +1,124 @@
+"""The fastest motion of a system: the largest eigenvalue of its Jacobian, the joint and the effect it is due to.
+
+    J x = λ x,   wᴴ J = λ wᴴ,   λ = Σ_k λ_k with λ_k = wᴴ (∂f_k/∂y) x / wᴴ x
+
+f_k is what a force or the control adds to the state equation; the rest is that of the rigid bodies. |w_i x_i| / |wᴴ x|
+is the participation of entry i. [Hairer, Wanner 1996, IV.1; Pérez-Arriaga, Verghese, Schweppe 1982]
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.integrate.differences import by_state
+from robot_dyn.simulation.dynamics.state_equation import CONTROL, StateEquation, numbered
+
+BODIES = "the motion of the bodies"
+
+
+@final
+@dataclass(frozen=True)
+class Fastest:
+    """The fastest motion near a state.
+
+    Attributes:
+        eigenvalue: λ, in [1/s].
+        joint: Name of the joint that takes part most.
+        source: Name of the effect or of the control whose λ_k is the largest; BODIES if none is.
+    """
+
+    eigenvalue: complex
+    joint: str
+    source: str
+
+    @property
+    def decays(self) -> bool:
+        """Whether it decays more than it oscillates."""
+        return -self.eigenvalue.real > abs(self.eigenvalue.imag)
+
+    def __str__(self) -> str:
+        if self.eigenvalue == 0:
+            return "nothing acts back on the motion"
+        how = "decays" if self.decays else "changes"
+        by = self.source if self.source == BODIES else repr(self.source)
+        return f"the fastest motion {how} with {abs(self.eigenvalue):.1e} per second, of joint {self.joint!r}, by {by}"
+
+
+def jacobian(equation: StateEquation, t: float, y: Array, held: Array | None) -> Array:
+    """∂y'/∂y without the works, which do not act back, by differences.
+
+    Args:
+        equation: The state equation.
+        t: Time, in [s].
+        y: State, (m,).
+        held: The actuation in zero-order hold, or None.
+    """
+    size = len(y) - len(equation.sources)
+
+    def f(at: Any, states: Array) -> Array:
+        rows = [equation.rate(t, row, held)[0] for row in states.reshape(-1, len(y))]
+        return np.array(rows).reshape(states.shape)
+
+    return np.moveaxis(by_state(f, t, y, equation.widths), 0, -1)[:size, :size]
+
+
+def fastest(equation: StateEquation, t: float, y: Array, held: Array | None, *, oscillation: bool = False) -> Fastest:
+    """The fastest motion near a state, by differences of the interpreted equation.
+
+    Args:
+        equation: The state equation, in (q, v).
+        t: Time, in [s].
+        y: State, (m,).
+        held: The actuation in zero-order hold, or None.
+        oscillation: Whether to pass over what decays more than it oscillates.
+
+    Raises:
+        RobotDynError: If the equation has no answer near the state.
+        numpy.linalg.LinAlgError: If its eigenvalues are not found, or nothing oscillates.
+    """
+    n, J = equation.plant.dynamics.n, jacobian(equation, t, y, held)
+    values, right = np.linalg.eig(J)
+    among = np.abs(np.imag(values)) > np.abs(np.real(values)) if oscillation else np.full(len(values), True)
+    if not among.any():
+        raise np.linalg.LinAlgError("nothing oscillates")
+    k = int(np.argmax(np.where(among, np.abs(values), -1.0)))
+    x = right[:, k]
+    others, left = np.linalg.eig(J.T)
+    w = left[:, np.argmin(np.abs(others - values[k]))]
+    if values[k] == 0:  # as of a joint in free flight
+        return Fastest(0j, equation.plant.dynamics.joint_names[int(np.argmax(np.abs(x[:n])))], BODIES)
+    part = np.abs(w * x)
+    joint = int(np.argmax(part[:n] + part[n : 2 * n]))
+    with np.errstate(all="ignore"):  # times wᴴ x, which is 0 where λ is defective, as of critical damping
+        parts = {name: w[n : 2 * n] @ (A @ x) for name, A in _accelerations(equation, t, y, held).items()}
+        kinematic = w[:n] @ (J[:n] @ x)  # q' = v, half of every oscillation
+        parts[BODIES] = values[k] * (w @ x) - kinematic - sum(parts.values())
+        source = max(reversed(parts), key=lambda name: np.nan_to_num(abs(parts[name]), nan=0.0))
+    return Fastest(complex(values[k]), equation.plant.dynamics.joint_names[joint], source)
+
+
+def _accelerations(equation: StateEquation, t: float, y: Array, held: Array | None) -> dict[str, Array]:
+    """M⁻¹ ∂τ_k/∂(q, v, z) of the control and of each force, (n, 2 n + z), by name."""
+    n, M = equation.plant.dynamics.n, equation.plant.M(y[: equation.plant.dynamics.n])
+    size = 2 * n + equation.states
+    made = {}
+    for k, name in enumerate(numbered(CONTROL, *(force.name for force in equation.plant.forces))):
+
+        def torque(at: Any, states: Array, k: int = k) -> Array:
+            rows = states.reshape(-1, size)
+            return np.array([_torque(equation, k, t, row, held) for row in rows]).reshape(*states.shape[:-1], n)
+
+        made[name] = np.linalg.solve(M, by_state(torque, t, y[:size], equation.widths[:size]).T)
+    return made
+
+
+def _torque(equation: StateEquation, k: int, t: float, x: Array, held: Array | None) -> Array:
+    n = equation.plant.dynamics.n
+    q, v, z = x[:n], x[n : 2 * n], x[2 * n :]
+    if k == 0:
+        return equation.equation_of_motion.on_joints(equation.actuation(t, q, v, z, held))
+    return equation.equation_of_motion.torques(t, q, v, (n,), z[equation.state_size :])[k - 1]

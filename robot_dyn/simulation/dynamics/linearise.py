@@ -1,0 +1,76 @@
+"""Linearisation of a plant about a state: d/dt (δq, δv) = A (δq, δv) + B δu.
+
+A = [[0, 1], [∂a/∂q, ∂a/∂v]],   B = [[0], [M⁻¹]]
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.effects.plant import Plant
+from robot_dyn.errors import QueryError
+from robot_dyn.queries.dynamics import Dynamics
+from robot_dyn.validate import one_state
+
+_STEPS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)  # of Richardson's extrapolated central difference: error O(h⁴) and u/h
+_ONE_SIDED = 0.01  # of a slope: a larger difference between its two sides is not curvature at the shortest step
+_NO_DERIVATIVE = "the plant has no derivative at this state, such as at an effort limit or a stop; move the state"
+_AGREE = 1e-6  # of the largest slope: two steps that differ by more do not show a derivative
+
+
+def linearise(
+    plant: Plant | Dynamics, q: Array, v: Array = None, u: Array = None, *, t: float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """A and B about one state.
+
+    Args:
+        plant: A plant, or a robot without effects.
+        q: Position, shape (n,), in [rad] or [m].
+        v: Velocity, shape (n,), in [rad/s] or [m/s]; 0 by default.
+        u: Actuation, shape (n,), in [N m] or [N]; by default the actuation at which the acceleration is 0, so that a
+            state at rest is an equilibrium.
+        t: Time, in [s].
+
+    Returns:
+        A, shape (2n, 2n), and B, shape (2n, n).
+
+    Raises:
+        QueryError: If an argument is wrong, or the acceleration has no derivative at this state.
+    """
+    if not isinstance(plant, Plant):
+        plant = Plant(plant)
+    plant = plant.at(t)
+    if drives := plant.equation_of_motion.drives:
+        name = next(iter(drives.values())).name
+        raise QueryError(f"linearise: {name} has motors of its own, which are no part of (q, v); leave it out")
+    names, n = plant.dynamics.joint_names, plant.dynamics.n
+    q, v = one_state("q", q, names), one_state("v", np.zeros(n) if v is None else v, names)
+    u = plant.inverse_dynamics(t, q, v, np.zeros(n)) if u is None else one_state("u", u, names)
+    x = np.concatenate([q, v, u])
+
+    def a(x: np.ndarray) -> np.ndarray:
+        return plant.forward_dynamics(t, x[:n], x[n : 2 * n], x[2 * n :])
+
+    def differences(h: float) -> np.ndarray:
+        slopes = np.empty((n, 3 * n))
+        for i, step in enumerate(h * np.eye(3 * n)):
+            near, far = a(x + step) - a(x - step), a(x + 2 * step) - a(x - 2 * step)
+            slopes[:, i] = (8 * near - far) / (12 * h)
+        return slopes
+
+    slopes, rest = differences(_STEPS[0]), list(_STEPS[1:])
+    while rest:  # steep friction needs a short step; the longest one that a shorter one confirms errs least
+        shorter = differences(rest.pop(0))
+        if np.abs(shorter - slopes).max() <= _AGREE * np.abs(shorter).max():
+            break
+        slopes = shorter
+    else:
+        raise QueryError(_NO_DERIVATIVE)
+    h, here = _STEPS[-1], a(x)
+    for i, step in enumerate(h * np.eye(3 * n)):  # where one-sided slopes differ, though their mean has a value
+        if np.abs(a(x + step) + a(x - step) - 2 * here).max() > _ONE_SIDED * h * np.abs(slopes[:, i]).max() + 1e-9:
+            raise QueryError(_NO_DERIVATIVE)
+    A = np.zeros((2 * n, 2 * n))
+    A[:n, n:], A[n:] = np.eye(n), slopes[:, : 2 * n]
+    return A, np.vstack([np.zeros((n, n)), slopes[:, 2 * n :]])

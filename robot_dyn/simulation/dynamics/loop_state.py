@@ -1,0 +1,149 @@
+"""What a time loop works on: functions of the state equation, arrays of runs, rules, and why it returned."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import Any, NamedTuple
+
+from robot_dyn.arithmetic import Array
+
+
+class Ended(IntEnum):
+    """Why the loop came back."""
+
+    DONE = 0
+    PAUSED = 1  # its budget of steps is spent
+    DOUBTFUL = 2  # the next step is to be looked at; y is the state before it
+    TICK = 3  # the controller asks for no finite torque
+    GAINS = 4  # energy may grow without a source; y is the state after the step
+    TOO_SMALL = 5  # no step that floats can tell from none is within the tolerance
+    NOT_FINITE = 6  # the rate at y
+    FAST = 7  # a joint moves without bound; y is the state after the step
+    EVENT = 8  # y is the state at it
+    TRANSFER = 9  # a payload is picked up or dropped; y is the state before it
+    CHANGED = 10  # the mode, and with it the side of a threshold; y is the state behind it
+    ACCUMULATED = 11  # changes of the mode, in next to no time
+    UNSETTLED = 12  # the state and the mode behind an event were not found
+
+
+class Why(IntEnum):
+    """Why a run in lock step ended."""
+
+    GOES_ON = 0
+    OVERFLOWED = 1
+    GAINED = 2
+    NOT_FOUND = 3  # the stages of a step
+
+
+class _Entries(NamedTuple):
+    """Entries of `now`, where the loop is."""
+
+    SEGMENT: int = 0
+    STEP: int = 1  # of the segment
+    ROW: int = 2  # of the samples, next
+    STEPS: int = 3  # done in all
+    SEEN: int = 4  # states shared with companions, in all
+    SHARED: int = 5  # row of these, next
+    BUDGET: int = 6  # steps to do before it comes back
+    EVALUATIONS: int = 7  # of the rate, in all
+    COLUMN: int = 8  # of what an observer sees, next
+    DUE: int = 9  # period of the next sample, where steps do not end at samples
+    MET: int = 10  # the same of the next shared state
+    WALKED: int = 11  # row of the ends of steps, next
+    EVENT: int = 12  # the switching function that has changed sign
+
+
+Now = _Entries()
+
+
+class Functions(NamedTuple):
+    """The state equation, each as of `evaluate`, as a step and the time loop call it.
+
+    Attributes:
+        rate: y', of a single run also u.
+        tick: The next own numbers.
+        energy: K and V.
+        sample: What a sample holds.
+        jacobian: As of `RightSide`.
+        events: Values of the events.
+        step, behind: As of `RightSide`.
+        actuation: u, of runs in lock step in which it changes between ticks.
+        bodies: Mass matrix and loads, where something may hold joints: as of `bodies`.
+    """
+
+    rate: Any
+    tick: Any
+    energy: Any
+    sample: Any
+    jacobian: Any = 0
+    events: Any = 0
+    step: Any = 0
+    behind: Any = 0
+    actuation: Any = 0
+    bodies: Any = 0
+
+
+class Runs(NamedTuple):
+    """W runs: their states (m, W), own numbers (O, W), and what is known of each (W,); the rest is room to work.
+
+    Attributes:
+        y, own: State, and numbers of each run: first what a sampled controller holds.
+        after, made, command, u, energies, size, lost: y⁺, a sample, a tick, the actuation, K and V, Σ |y⁺|, stages
+            not found.
+        alive, why, ended: 1 while it goes on; then the reason and the time.
+        last: Its state where it ended, (m, W).
+        energy, scale: E(0), and 1 + |K(0)| + |V(0)|.
+        peak: Largest K at the looks at the energy.
+        keys: Seed and number of the run, of which its noise is, (2, W), as uint64.
+    """
+
+    y: Array
+    own: Array
+    after: Array
+    made: Array
+    command: Array
+    u: Array
+    energies: Array
+    size: Array
+    lost: Array
+    alive: Array
+    why: Array
+    ended: Array
+    last: Array
+    energy: Array
+    scale: Array
+    peak: Array
+    keys: Array
+
+
+class Rules(NamedTuple):
+    """What the loop does, beside the steps.
+
+    Attributes:
+        n, works: Number of joints, and of works at the end of y.
+        states: Number of states of the controller, behind q and v.
+        held: Number of torques in the zero-order hold of a sampled controller; 0 for any other.
+        instants, acting: Ticks of the controller in each of its periods, and which of them changes its torque.
+        deviates: Number of its last states that are drawn anew before each tick.
+        canonical: Whether y has momenta in place of velocities.
+        alone: Whether what may end a run is looked at by its driver.
+        largest: Σ |y| beyond which a step is doubtful, or a run in lock step ends.
+        every, thin: Steps between shared states, 0 for none; and how many of these to one that is kept.
+        base: First run of the records.
+        apart: In lock step, steps between the instants at which u is observed; 0 where it is held between ticks.
+    """
+
+    n: int
+    works: int
+    states: int
+    held: int
+    instants: int
+    acting: int
+    deviates: int
+    canonical: bool
+    alone: bool
+    largest: float
+    every: int
+    thin: int
+    base: int
+    apart: int

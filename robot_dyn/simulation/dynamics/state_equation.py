@@ -1,0 +1,298 @@
+"""The state equation: the motion of a plant as a first-order system y' = f(t, y), with y = (q, v or p, z, W).
+
+    q' = v,   v' = M⁻¹ (u + Σ τ − C v − N)   or   p' = u + Σ τ + Cᵀ v − N with p = M v,
+    z' = rate of the states of the controller, then of the effects; then J' = λ, the reactions of what holds joints,
+    W_k' = τ_kᵀ v: the work of the control and of each effect without a potential
+
+[Murray, Li, Sastry 1994, ch. 4; Hairer, Lubich, Wanner 2006, §VI.1 for canonical coordinates]
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import count
+from typing import TYPE_CHECKING, Any, final
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.control.controller import Controller
+from robot_dyn.effects.effect import Bound, Conservative, Stateful
+from robot_dyn.effects.equation_of_motion import EquationOfMotion
+from robot_dyn.effects.plant import Plant, carrying, in_mode
+from robot_dyn.effects.set_valued import Mode
+from robot_dyn.errors import RobotDynError
+from robot_dyn.foreign import call
+from robot_dyn.queries.dynamics import acceleration
+from robot_dyn.values import Keeping
+
+if TYPE_CHECKING:
+    from robot_dyn.simulation.setup.event import Event
+
+CONTROL = "control"
+PICK_UP = "pick_up"  # the work of impacts where payloads at rest are picked up
+CONTROLLER = -1  # among the parts that switch, beside the numbers of the effects
+
+
+@final
+@dataclass(frozen=True)
+class StateEquation(Keeping):
+    """The state equation of a plant under a controller.
+
+    Attributes:
+        plant: What moves.
+        controller: What drives it, or None.
+        canonical: Whether the second part of y is the momentum p instead of v.
+        events: Functions of the state that a run looks out for.
+    """
+
+    plant: Plant
+    controller: Controller | None
+    canonical: bool = False
+    events: tuple[Event, ...] = ()
+
+    @cached_property
+    def equation_of_motion(self) -> EquationOfMotion:
+        """The equation of motion of the plant."""
+        return self.plant.equation_of_motion
+
+    @cached_property
+    def sources(self) -> tuple[str, ...]:
+        """Names of the works in y: control, then effects, of a second effect of a name with a number.
+
+        Payloads that come and go, and the impacts of their picking up, work at once, not by a power: they come last.
+        """
+        payloads = self.equation_of_motion.payloads
+        impacts = [PICK_UP] * any(each.at_rest and each.start_s > 0 for each in payloads)
+        return numbered(CONTROL, *self._working, *(x.name for x in payloads), *impacts)
+
+    @cached_property
+    def _working(self) -> list[str]:
+        """Names of the forces that work by a power."""
+        return [x.name for x in self.plant.forces if not isinstance(x, Conservative)]
+
+    @cached_property
+    def of_payloads(self) -> range:
+        """Numbers of the works of payloads that come and go."""
+        first = 1 + len(self._working)
+        return range(first, first + len(self.equation_of_motion.payloads))
+
+    @cached_property
+    def state_size(self) -> int:
+        """Number of states of the controller."""
+        return self.controller.state_size if self.controller else 0
+
+    @cached_property
+    def states(self) -> int:
+        """Number of states of the controller and of the effects, and of the impulses of reactions."""
+        return self.state_size + self.equation_of_motion.state_size + self.impulses
+
+    @cached_property
+    def impulses(self) -> int:
+        """Number of the impulses of reactions, the last of the states: n where joints may be held, or 0."""
+        return self.plant.dynamics.n if self.equation_of_motion.set_valued else 0
+
+    @cached_property
+    def in_a_mode(self) -> StateEquation:
+        """The equation in a mode, one in which nothing is held and all payloads are carried; or itself."""
+        if payloads := [each for each in self.equation_of_motion.payloads if each.carried is None]:
+            return replace(self, plant=carrying(self.plant, [True] * len(payloads))).in_a_mode
+        if not self.impulses:
+            return self
+        return replace(self, plant=in_mode(self.plant, Mode(*np.zeros((2, self.plant.dynamics.n)))))
+
+    @property
+    def size(self) -> int:
+        """Number m of entries of y."""
+        return 2 * self.plant.dynamics.n + self.states + len(self.sources)
+
+    @cached_property
+    def widths(self) -> np.ndarray:
+        """Change of each entry of y over which the rate bends, (m,): the least of the effects, inf where none says."""
+        n = self.plant.dynamics.n
+        widths = np.full(self.size, np.inf)
+        for effect in self.plant.effects:
+            for part, width in zip((slice(0, n), slice(n, 2 * n)), effect.widths, strict=True):
+                widths[part] = np.minimum(widths[part], width)
+        return widths
+
+    def start(self, q: Array, v: Array) -> Array:
+        """Y at the start: states of the controller, and works, are zero."""
+        second = self.plant.dynamics.momentum(q, v) if self.canonical else v
+        y = np.concatenate([q, second, np.zeros(self.states + len(self.sources))])
+        first = 2 * len(q) + self.state_size
+        y[first : first + self.equation_of_motion.state_size] = self.equation_of_motion.start(q, v)
+        return y
+
+    def state(self, y: Array) -> tuple[Array, Array, Array, Array]:
+        """q, v, z, W of y, with z the states of the controller, then of the effects."""
+        n, m = self.plant.dynamics.n, self.states
+        q, second = y[:n], y[n : 2 * n]
+        v = acceleration(self.plant.M(q), second, self.plant.dynamics.joint_names) if self.canonical else second
+        return q, v, y[2 * n : 2 * n + m], y[2 * n + m :]
+
+    def controller_states(self, y: Array) -> Array | None:
+        """Controller states in states y (k, m), (k, state_size); None without any."""
+        n, m = self.plant.dynamics.n, self.state_size
+        return y[:, 2 * n : 2 * n + m].copy() if m else None
+
+    def effect_states(self, y: Array) -> dict[str, Array]:
+        """States of each effect that has some in states y (k, m), (k, size) by name."""
+        first, equation = 2 * self.plant.dynamics.n + self.state_size, self.equation_of_motion
+        names = numbered(*(self.plant.effects[k].name for k in equation.states))
+        places = zip(names, equation.states.values(), strict=True)
+        return {name: y[:, first + place.start : first + place.stop].copy() for name, place in places}
+
+    def stored(self, t: Array, y: Array) -> dict[str, Array]:
+        """Energy that the states of effects hold at times t (k,) and states y (k, m), (k,) by name."""
+        held = self.effect_states(y)
+        effects = [x for x in self.plant.effects if isinstance(x, Stateful)]
+        return {
+            name: np.array(
+                [
+                    call(effect.stored_energy, self.plant.dynamics, *state)
+                    for state in zip(t, y[:, : self.plant.dynamics.n], z, strict=True)
+                ]
+            ).reshape(len(t))
+            for effect, (name, z) in zip(effects, held.items(), strict=True)
+        }
+
+    def velocities(self, y: Array) -> Array:
+        """V of states y (k, m), (k, n)."""
+        n = self.plant.dynamics.n
+        return np.array([self.state(row)[1] for row in y]).reshape(-1, n) if self.canonical else y[:, n : 2 * n]
+
+    def fastest_joint(self, y: Array) -> str:
+        """Name of the joint that moves fastest at a state, which may be far out; by momentum where M is singular."""
+        n = self.plant.dynamics.n
+        with np.errstate(all="ignore"):
+            try:
+                v = self.state(y)[1]
+            except RobotDynError:
+                v = y[n : 2 * n]
+        return self.plant.dynamics.joint_names[int(np.argmax(np.abs(v)))]
+
+    def command(self, t: float, q: Array, v: Array, z: Array) -> Array:
+        """The actuation that the controller asks for, within the bounds of the plant before one with states."""
+        if self.controller is None:
+            return np.zeros_like(v)
+        return self.equation_of_motion.commanded(call(self.controller.torque, t, q, v, z[: self.state_size]))
+
+    def actuation(self, t: float, q: Array, v: Array, z: Array, held: Array | None) -> Array:
+        """The actuation within all bounds of the plant; of `held` in zero-order hold, if it is not None."""
+        u = self.command(t, q, v, z) if held is None else held
+        return self.equation_of_motion.applied(u, z[self.state_size :])[0]
+
+    def acceleration(self, t: float, q: Array, v: Array, z: Array, u: Array) -> Array:
+        """The acceleration under the actuation u within all bounds."""
+        equation = self.equation_of_motion
+        torques = equation.torques(t, q, v, z=z[self.state_size :])
+        return equation.acceleration(q, v, sum(torques, start=equation.on_joints(u)))
+
+    @property
+    def sampled(self) -> bool:
+        """Whether the controller acts at ticks, with a zero-order hold between them."""
+        return self.controller is not None and self.controller.period_s > 0
+
+    def tick(self, t: float, y: Array) -> tuple[Array, Array | None]:
+        """A tick of a sampled controller: y with the next controller states, and u; y and None for any other."""
+        if self.controller is None or not self.sampled:
+            return y, None
+        q, v, z, _ = self.state(y)
+        held, n = self.command(t, q, v, z), self.plant.dynamics.n
+        if self.state_size:
+            y = y.copy()
+            y[2 * n : 2 * n + self.state_size] = call(self.controller.next_state, t, q, v, z[: self.state_size])
+        return y, held
+
+    def rate(self, t: float, y: Array, held: Array | None) -> tuple[Array, Array]:
+        """f(t, y), and the actuation u; in floats or, for the compiled engine, in symbols.
+
+        Args:
+            t: In [s].
+            y: One state.
+            held: The actuation in zero-order hold of a sampled controller; None if it acts continuously.
+        """
+        equation, controller, n = self.equation_of_motion, self.controller, self.plant.dynamics.n
+        q, v, z, _ = self.state(y)
+        of_controller, of_effects = z[: self.state_size], z[self.state_size :]
+        u, reached = equation.applied(self.command(t, q, v, z) if held is None else held, of_effects)
+        torques = equation.torques(t, q, v, z=of_effects)
+        total = sum(torques, start=equation.on_joints(u))
+        result = np.empty_like(y)
+        result[:n] = v
+        end, W = 2 * n + self.state_size, 2 * n + self.states
+        if self.impulses:
+            result[n : 2 * n], result[W - n : W] = equation.with_reaction(q, v, total)
+        else:
+            second = equation.momentum_rate if self.canonical else equation.acceleration
+            result[n : 2 * n] = second(q, v, total)
+        remembers = held is None and controller is not None and self.state_size > 0
+        result[2 * n : end] = call(controller.state_rate, t, q, v, of_controller) if remembers and controller else 0.0
+        rates = result[end : end + equation.state_size]
+        a = result[n : 2 * n]
+        for place, rate in equation.state_rates(t, q, v, u, reached, of_effects, a):
+            rates[place] = rate
+        result[W:] = self._powers(v, u, torques, of_effects, a)
+        return result, u
+
+    def _powers(self, v: Array, u: Array, torques: list[Array], z: Array, a: Array) -> list[Array]:
+        """Of each source; those that work at once have none."""
+        powers = self.equation_of_motion.powers(v, u, torques, z, a)
+        return powers + [0.0] * (len(self.sources) - len(powers))
+
+    @cached_property
+    def limited(self) -> tuple[int, ...]:
+        """Parts with thresholds of an actuation that changes between ticks: CONTROLLER, and numbers of effects."""
+        if self.controller is None:
+            return ()
+        effects, n = self.plant.effects, self.plant.dynamics.n
+        numbers = self.equation_of_motion.bounds_at_all_times if self.sampled else range(len(effects))
+        bounds = [k for k in numbers if isinstance(effects[k], Bound)]
+        declared = {k: effects[k].thresholds(n) for k in bounds}
+        if not self.sampled:
+            declared = {CONTROLLER: self.controller.thresholds()} | declared
+        return tuple(k for k, of in declared.items() if any(each.of_actuation for each in of))
+
+    @property
+    def switches(self) -> bool:
+        """Whether a part switches at a threshold, or there are events."""
+        parts = self.plant.effects, self.plant.dynamics.n
+        declared = [each for effect in parts[0] for each in effect.thresholds(parts[1])]
+        if self.controller is not None and not self.sampled:
+            declared += self.controller.thresholds()
+        return bool(self.events or self.limited or self.impulses or any(not each.of_actuation for each in declared))
+
+    def demands(self, t: float, q: Array, v: Array, z: Array, held: Array | None, of: tuple[int, ...]) -> list[Array]:
+        """What reaches those parts, (n,) each, which thresholds of the actuation are levels of: as of `limited`."""
+        if not of or self.controller is None:
+            return []
+        state, equation = (t, q, v, z[: self.state_size]), self.equation_of_motion
+        whole = range(len(equation.effects))
+        u, bounds = (call(self.controller.torque, *state), whole) if held is None else (held, None)
+        reached = equation.applied(u, z[self.state_size :], bounds)[1]
+        return [call(self.controller.demand, *state) if k == CONTROLLER else reached[k] for k in of]
+
+    def switching(self, t: float, q: Array, v: Array) -> list[Any]:
+        """The values of the events, in floats or symbols."""
+        return [call(each.function, t, q, v) for each in self.events]
+
+    def energies(self, t: Array, q: Array, v: Array) -> tuple[Array, Array]:
+        """Kinetic energy, and the potential of gravity and of all conservative effects, of samples (m, n)."""
+        return self.equation_of_motion.energies(t, q, v)
+
+    def powers(self, t: float, q: Array, v: Array, z: Array, u: Array) -> list[float]:
+        """Power of the control and of the effects that work, in the order of `sources`."""
+        equation = self.equation_of_motion
+        own = z[self.state_size :]
+        return self._powers(v, u, equation.torques(t, q, v, z=own), own, 0 * v)
+
+
+def numbered(*names: str) -> tuple[str, ...]:
+    """Names, each of them once: a second part of a name gets a number, "spring" and "spring 2"."""
+    made: list[str] = []
+    for name in names:
+        others = (f"{name} {k}" for k in count(2))
+        made.append(name if name not in made else next(each for each in others if each not in {*made, *names}))
+    return tuple(made)

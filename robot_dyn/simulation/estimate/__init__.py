@@ -1,0 +1,1 @@
+"""The error of a run: companion runs, verdicts, requested accuracies."""

@@ -1,0 +1,186 @@
+"""The error estimate of a run: companion runs are made until one of the verdicts of `companions` holds to its end.
+
+Longer steps cost about as much as the run and come first; shorter ones cost five times as much, and are taken where
+longer ones cannot be made, or do not show the order of the method throughout.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from robot_dyn.coefficients import with_values
+from robot_dyn.integrate.adaptive import LEAST_RTOL, Adaptive
+from robot_dyn.integrate.integrator import Integrator
+from robot_dyn.simulation.diagnostics.between import cut_alike, stepped_over
+from robot_dyn.simulation.diagnostics.stiffness import damped_oscillation
+from robot_dyn.simulation.dynamics.smoothness import first_kink
+from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.estimate.companions import (
+    COARSE,
+    FINE,
+    PUSH,
+    ROUNDED,
+    Estimated,
+    carried,
+    differences,
+    meaningless,
+    rounding,
+)
+from robot_dyn.simulation.results.error import ErrorEstimate, Verdict, no_estimate
+from robot_dyn.simulation.run.record import Path, Record
+from robot_dyn.simulation.setup.schedule import LEAST_STEPS
+from robot_dyn.simulation.setup.setup import Setup
+
+_EARLY = 10  # steps of a method that chooses them: by then an error that is not rounding is more than that
+_GAIN = 1.1  # in the time resolved, that a shorter step must bring
+_FAR_TURN = 1.0  # [rad] in a step: beyond, longer steps may meet the same angles
+_BLIND_TURN = np.pi  # [rad] in a step: beyond, shorter ones may, too
+_FAR_PUSH = 1000 * PUSH  # of what a short step adds to q, rounding may lose all until v has grown
+
+Companion = Callable[[Any, Setup], Record]  # of a factor of the steps, or of a mesh
+
+
+def estimate(setup: Setup, equation: StateEquation, run: Record, companion: Companion) -> ErrorEstimate:
+    """The estimated error of a run.
+
+    Args:
+        setup: What was run.
+        equation: Its state equation.
+        run: What it left behind.
+        companion: Runs a setup with steps, or tolerances, multiplied by a factor.
+    """
+    if len(run.shared.t) < 2:
+        return no_estimate("it ended in its first step")
+    if equation.impulses and setup.integrator.nonsmooth:
+        return no_estimate(
+            "the error of time stepping falls with the step, but from step to step by no order; compare it with"
+            " step_s / 4, or with integrator='DOP853'"
+        )
+    n = equation.plant.dynamics.n
+    kink, why = first_kink(setup, equation, run.walked)
+    estimated = Estimated(run.shared, n, kink, rounding(run.shared, n), meaningless(run.walked, n))
+    method: Any = setup.integrator
+    if method.controls_error:
+        made = _by_refinement(setup, method, run, estimated, companion)
+    else:
+        if motion := damped_oscillation(setup, equation, run):
+            return no_estimate(
+                f"the energy ledger does not close: {motion}, which {method.name} damps in steps longer than"
+                f" {1 / abs(motion.eigenvalue):.0e} s, so that runs with other steps do not show it; take shorter ones"
+            )
+        made = _by_steps(setup, method, estimated, companion, _turn(equation, run.walked))
+        made = _until_alike(setup, run, made)
+    return _advised(setup, _looked_between(setup, equation, run, made), why)
+
+
+def _by_steps(
+    setup: Setup, method: Integrator, estimated: Estimated, companion: Companion, turn: float
+) -> ErrorEstimate:
+    """From longer steps; from shorter ones where those are lost, or show less than the order of the method would."""
+    if turn > _BLIND_TURN:
+        return no_estimate(
+            f"a joint turns by {turn:.3g} rad in a step, so that runs with other steps may meet the same angles"
+        )
+    made = no_estimate("fewer than 3 steps between ticks, switches or breaks")
+    if turn < _FAR_TURN and min(each.steps for each in setup.segments) >= LEAST_STEPS:
+        paths = {pace: companion(pace, setup).shared for pace in COARSE}
+        magnified = _with_rounding(estimated, companion(COARSE[1], _pushed(setup)).shared, paths[COARSE[1]])
+        made = magnified.from_longer_steps(paths, method.order)
+        if made.resolved_until >= estimated.path.t[-1] and not estimated.doubts(made, paths, method.order):
+            return made
+    half = companion(FINE[0], setup).shared
+    if made.resolved_until > 0 and estimated.lost_at(half) < _GAIN * made.resolved_until:
+        return made  # chaos: no step of practical length resolves it
+    magnified = estimated
+    for units in (PUSH, _FAR_PUSH):
+        pushed = companion(Fraction(1), _pushed(setup, units)).shared
+        magnified = _with_rounding(magnified, pushed, estimated.path, units)
+    shorter = magnified.from_shorter_steps({FINE[0]: half, FINE[1]: companion(FINE[1], setup).shared}, method.order)
+    return shorter if shorter.resolved_until >= made.resolved_until else made
+
+
+def _until_alike(setup: Setup, run: Record, made: ErrorEstimate) -> ErrorEstimate:
+    """The estimate up to where each companion cuts its steps as the run does, so that all make the same one or two."""
+    alike = cut_alike(setup, run)
+    if alike is None or alike.t >= made.resolved_until:
+        return made
+    return replace(made, resolved_until=alike.t, note=alike.why)
+
+
+def _by_refinement(
+    setup: Setup, method: Adaptive, run: Record, estimated: Estimated, companion: Companion
+) -> ErrorEstimate:
+    """From half as long steps; where something may switch unseen, from a tenth of the tolerance as well.
+
+    Two runs whose errors are rounding alone, magnified, differ by anything: then a push tells how much is magnified.
+    Steps of a tenth of the tolerance may err alike where stability bounds them, half as long ones where both step over
+    a kink at the same place.
+    """
+    assert run.ends is not None
+    ends = np.append(0.0, run.ends)
+    halves = np.unique(np.append(ends[1:], (ends[1:] + ends[:-1]) / 2))
+    if run.events:
+        halves = np.setdiff1d(halves, [each.t for each in run.events], assume_unique=True)
+    tight = None
+    if estimated.kink < np.inf and method.rtol / 10 > LEAST_RTOL:
+        tight = companion(Fraction(1), _tolerant(setup, method, 0.1)).shared
+    halved = companion(halves, setup).shared
+    gap = differences(estimated.path, halved, estimated.n)
+    if estimated.begins_as_rounding(gap, ends[min(_EARLY, len(ends) - 1)]):
+        estimated = _with_rounding(estimated, companion(halves, _pushed(setup)).shared, halved)
+    return estimated.from_refinement(gap, tight)
+
+
+def _with_rounding(estimated: Estimated, pushed: Path, of: Path, units: float = PUSH) -> Estimated:
+    """With what the motion makes of rounding as the floor, seen on a companion and another one that was pushed."""
+    rounds = carried(of, differences(of, pushed, estimated.n) * (PUSH / units), estimated.n)
+    rows = np.searchsorted(of.key[:-1], estimated.path.key)
+    return replace(estimated, floor=np.fmax(estimated.floor, np.append(rounds, rounds[-1])[rows]))
+
+
+def _tolerant(setup: Setup, method: Adaptive, factor: float) -> Setup:
+    method = replace(method, rtol=method.rtol * factor, atol=method.atol * factor)
+    return with_values(setup, {"integrator": method})  # all else was checked
+
+
+def _pushed(setup: Setup, units: float = PUSH) -> Setup:
+    """The setup from a start that differs by units of rounding: its run tells what the motion makes of rounding."""
+    sign = np.where(np.arange(len(setup.q0)) % 2, -1.0, 1.0)
+    unit = units * np.finfo(float).eps
+    q0, v0 = setup.q0 + sign * unit * (1 + np.abs(setup.q0)), setup.v0 + unit * (1 + np.abs(setup.v0))
+    return with_values(setup, {"q0": q0, "v0": v0})
+
+
+def _turn(equation: StateEquation, walked: Path) -> float:
+    """Largest angle by which a joint turns in a step, in [rad]; joints that slide do not count."""
+    dynamics = equation.plant.dynamics
+    kinds = getattr(dynamics, "joint_types", ("revolute",) * dynamics.n)
+    turns = np.array([kind != "prismatic" for kind in kinds])
+    steps = np.maximum(1, np.diff(walked.key))[:, None]
+    return float((np.abs(np.diff(walked.y[:, : dynamics.n], axis=0)) / steps)[:, turns].max(initial=0.0))
+
+
+def _looked_between(setup: Setup, equation: StateEquation, run: Record, made: ErrorEstimate) -> ErrorEstimate:
+    """The estimate up to where something acted between two steps only, if that matters beside it."""
+    missed = stepped_over(setup, equation, run.walked, made.final)
+    if missed is None or missed.t >= made.resolved_until:
+        return made
+    return replace(made, resolved_until=missed.t, note=missed.why)
+
+
+def _advised(setup: Setup, made: ErrorEstimate, why: str) -> ErrorEstimate:
+    """The estimate with what to do where it ends early, and the reason where it is a bound."""
+    if made.verdict is Verdict.BOUND:
+        made = replace(made, reason=why or "the order of the method does not show")
+    if not made.note:
+        return made
+    if made.note.startswith(ROUNDED):
+        return replace(made, note=f"{made.note}; take a shorter run")
+    method: Any = setup.integrator
+    finer = f"rtol = {method.rtol / 100:.0e}" if method.controls_error else f"step_s = {setup.taken_step_s / 4:.0e}"
+    return replace(made, note=f"{made.note}; take {finer}, or a shorter run")

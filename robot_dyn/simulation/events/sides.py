@@ -1,0 +1,93 @@
+"""Thresholds that are passed within the loop: parts are other formulas on each side, by other numbers of the run.
+
+Numbers of sides that have not been met before are made in Python, and kept. Plain functions of arrays.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.simulation.dynamics.loop_state import Runs
+from robot_dyn.simulation.events.crossings import Switches
+from robot_dyn.simulation.events.event_log import EventLog, What, may_chatter, note
+from robot_dyn.simulation.events.holding import Holding, write_mode
+
+_KNOWN = 64  # sides for which there is room
+
+
+class Sides(NamedTuple):
+    """What runs on each side of the thresholds.
+
+    Attributes:
+        sides: Those that are known, as of `Switches` without guards and events asked for, (T, K).
+        own: Own numbers of the run on them, behind the actuation in zero-order hold, (P, K).
+        known: How many are filled, (1,); 0 where functions of Python change with the sides.
+        directions: Of the events asked for, (G,).
+        terminal: Whether they end the run, (G,).
+        restarts: Whether the first step behind an event of the equation is to be found anew.
+        log: What happened.
+    """
+
+    sides: Array
+    own: Array
+    known: Array
+    directions: Array
+    terminal: Array
+    restarts: bool
+    log: EventLog
+
+
+def sides_of(
+    thresholds: int, parameters: int, directions: Array, terminal: Array, restarts: bool, log: EventLog
+) -> Sides:  # fmt: skip
+    """None known yet."""
+    return Sides(
+        np.zeros((thresholds, _KNOWN)), np.zeros((parameters, _KNOWN)), np.zeros(1, np.int64), directions, terminal,
+        restarts, log,
+    )  # fmt: skip
+
+
+def goes_on(t: float, runs: Runs, switches: Switches, of: Sides, holding: Holding, event: int, held: int) -> bool:
+    """Go on behind a threshold, or an event asked for, that is no guard; whether Python need not be asked."""
+    number = event if event < switches.thresholds else event - switches.guards
+    side, log = switches.sides[event], of.log
+    if log.filled[0] >= log.room:
+        return False
+    asked = number - len(of.sides)
+    if asked >= 0:
+        counts = of.directions[asked] * side >= 0.0
+        if of.terminal[asked] and counts:
+            return False
+        if counts:
+            note(log, t, runs.y, number, What.PASSES, side, side)
+        return True
+    if may_chatter(log, t) or not take_numbers(runs, switches, of, holding, held):
+        return False
+    note(log, t, runs.y, number, What.PASSES, side, side)
+    return True
+
+
+def take_numbers(runs: Runs, switches: Switches, of: Sides, holding: Holding, held: int) -> bool:
+    """Take the numbers of the sides that the thresholds are on; whether they are known."""
+    for k in range(of.known[0]):
+        same = True
+        for e in range(len(of.sides)):
+            at = e if e < switches.thresholds else e + switches.guards
+            same = same and of.sides[e, k] == switches.sides[at]
+        if same:
+            for i in range(len(of.own)):
+                runs.own[held + i, 0] = of.own[i, k]
+            write_mode(holding, runs.own)
+            return True
+    return False
+
+
+def keep_numbers(of: Sides, sides: np.ndarray, parameters: np.ndarray) -> None:
+    """Keep the numbers on sides that were not known; once there is no room, Python is asked each time."""
+    k = int(of.known[0])
+    if k < _KNOWN and not (sides == of.sides[:, :k].T).all(axis=1).any():
+        of.sides[:, k], of.own[:, k] = sides, parameters
+        of.known[0] += 1

@@ -1,0 +1,114 @@
+"""Payloads that are picked up and dropped in a run: what is carried, and the state behind such a time.
+
+    v⁺ = (M + ΔM)⁻¹ M v⁻  of bodies picked up at rest, else v⁺ = v⁻;   W_k⁺ = W_k⁻ + energy that came, or went, with it
+
+M has what is carried before and after; of several bodies at one time those that are dropped go first.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import final
+
+import numpy as np
+
+from robot_dyn.effects.carried_payload import in_hand
+from robot_dyn.effects.plant import carrying
+from robot_dyn.queries.dynamics import acceleration
+from robot_dyn.simulation.dynamics.state_equation import PICK_UP, StateEquation
+from robot_dyn.simulation.events.occurrence import Occurrence
+
+Carried = tuple[bool, ...]
+
+
+@final
+class Transfers:
+    """What a run carries.
+
+    Args:
+        equation: Its state equation, of payloads that come and go.
+
+    Attributes:
+        equation: The same with what is carried now in its bodies; itself if nothing comes or goes.
+    """
+
+    def __init__(self, equation: StateEquation) -> None:
+        self._whole = equation
+        self._carried = self._at(0.0)
+        self.equation = _carrying(equation, self._carried)
+
+    def _at(self, t: float) -> Carried:
+        payloads = self._whole.equation_of_motion.payloads
+        return tuple(in_hand(each, t) for each in payloads if each.carried is None)
+
+    @property
+    def any(self) -> bool:
+        """Whether there are payloads that come and go."""
+        return bool(self._carried)
+
+    def over(self, t: float, y: np.ndarray) -> tuple[np.ndarray, list[Occurrence]]:
+        """The state behind a time in [s] at which payloads are picked up or dropped, and what happened."""
+        now = self._at(t)
+        y, happened = _transferred(self._whole, self._carried, now, t, y)
+        self._carried, self.equation = now, _carrying(self._whole, now)
+        return y, happened
+
+
+def _carrying(equation: StateEquation, carried: Carried) -> StateEquation:
+    return replace(equation, plant=carrying(equation.plant, carried)) if carried else equation
+
+
+def _transferred(
+    equation: StateEquation, was: Carried, now: Carried, t: float, y: np.ndarray
+) -> tuple[np.ndarray, list[Occurrence]]:
+    """The state behind a time at which payloads are picked up or dropped, and what happened.
+
+    Args:
+        equation: The state equation, of payloads that come and go.
+        was: Which of them are carried before.
+        now: Which are behind.
+        t: Time, in [s].
+        y: The state before.
+    """
+    y, n, payloads = y.copy(), equation.plant.dynamics.n, equation.equation_of_motion.payloads
+    names, first = equation.plant.dynamics.joint_names, equation.size - len(equation.sources)
+    q, v = y[:n], y[n : 2 * n]
+    place = {name: first + k for k, name in enumerate(equation.sources)}
+    works = [first + k for k in equation.of_payloads]
+    held, happened = list(was), []
+
+    def energies(v: np.ndarray) -> np.ndarray:
+        of = _carrying(equation, tuple(held)).equation_of_motion
+        return np.array(of.energies(np.array([t]), q[None], v[None]))[:, 0]
+
+    def momentum() -> np.ndarray:
+        return carrying(equation.plant, tuple(held)).dynamics.momentum(q, v)
+
+    def told(k: int, what: str, direction: int) -> None:
+        name = f"payload on {payloads[k].payload.frame} {what}"
+        happened.append(Occurrence(t, name, direction, tuple(q.tolist()), tuple(v.tolist())))
+
+    changes = [k for k in range(len(was)) if was[k] != now[k]]
+    dropped = [k for k in changes if was[k]]
+    caught = [k for k in changes if now[k] and payloads[k].at_rest]
+    for k in dropped:
+        before, held[k] = energies(v).sum(), False
+        y[works[k]] += energies(v).sum() - before
+        told(k, "dropped", -1)
+    if caught:
+        (kinetic, potential), p = energies(v), momentum()
+        for k in caught:
+            held[k] = True
+            after = energies(v)[1]
+            y[works[k]] += after - potential
+            potential = after
+        v[:] = acceleration(carrying(equation.plant, tuple(held)).dynamics.M(q), p, names)
+        y[place[PICK_UP]] += energies(v)[0] - kinetic
+        for k in caught:
+            told(k, "picked up at rest", 1)
+    for k in changes:
+        if now[k] and not held[k]:
+            before, held[k] = energies(v).sum(), True
+            y[works[k]] += energies(v).sum() - before
+            told(k, "picked up at the speed of the link", 1)
+    return y, happened

@@ -1,0 +1,1 @@
+"""What is observed at the end of every step, and the remarks that follow."""

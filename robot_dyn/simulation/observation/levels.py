@@ -1,0 +1,105 @@
+"""Levels that a run may reach: effort limits and stops that act in the plant, and the limits of the robot's file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any, NamedTuple, final
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.control.controller import Controller
+from robot_dyn.effects.actuator import EffortLimit
+from robot_dyn.effects.effect import Effect
+from robot_dyn.effects.joint_limit import JointStopSpring
+from robot_dyn.model.robot import Robot
+from robot_dyn.simulation.observation.remarks import Kind
+
+_ROUNDING = 1e-9  # of a limit: nearer to it is at it
+_NONE = 1e9  # stops and limits beyond it do not exist
+
+
+@final
+@dataclass(frozen=True)
+class Level:
+    """A value that a quantity of a joint may pass: upwards if `side` is 1, downwards if −1.
+
+    Attributes:
+        kind: What passing it means.
+        row: Of q, v, u one below the other, (3n,).
+        side: 1 or −1.
+        limit: The limit as stated.
+    """
+
+    kind: Kind
+    row: int
+    side: int
+    limit: float
+
+
+class Levels(NamedTuple):
+    """L levels of W runs.
+
+    Attributes:
+        levels: In the order of rows, with the limits of the first run that has them.
+        limits: As stated for each run, (L, W); nan where it has none.
+        bounds: Where they count as passed, (L, W).
+    """
+
+    levels: tuple[Level, ...]
+    limits: Array
+    bounds: Array
+
+    def of_runs(self, numbers: Any) -> Levels:
+        """Those of some of the runs."""
+        return Levels(self.levels, self.limits[:, numbers], self.bounds[:, numbers])
+
+
+NO_LEVELS = Levels((), np.empty((0, 1)), np.empty((0, 1)))
+
+
+def levels(dynamics: Any, effects: Iterable[Effect], controller: Controller | None, W: int = 1) -> Levels:
+    """All levels of a plant under a controller, whose coefficients may be arrays over W runs, (W, n) or (W, 1)."""
+    n, found = dynamics.n, []
+    for kind, row, side, bounds, part in _bounds(dynamics, tuple(effects), controller):
+        some = np.atleast_2d(bounds)
+        for joint, limits in enumerate(np.broadcast_to(some, (len(some), n)).T):
+            known = np.abs(limits) < _NONE
+            if known.any():
+                limits = np.where(known, limits, np.nan)
+                slack = part * np.maximum(np.abs(limits), 1e-3)
+                level = Level(kind, row * n + joint, side, float(limits[known][0]))
+                found.append((level, limits, side * slack + limits))
+    if not found:
+        return Levels((), np.empty((0, W)), np.empty((0, W)))
+    of, *arrays = zip(*sorted(found, key=lambda each: each[0].row), strict=True)
+    limits, bounds = (np.array([np.broadcast_to(x, W) for x in each]) for each in arrays)
+    return Levels(of, limits, bounds)
+
+
+def _bounds(
+    dynamics: Any, effects: tuple[Effect, ...], controller: Controller | None
+) -> Iterator[tuple[Kind, int, int, np.ndarray, float]]:
+    """Kind, 0, 1, 2 for q, v, u, side, bounds (n,) or (W, n), and the part of a bound by which it must be passed."""
+    n, robot = dynamics.n, getattr(dynamics, "robot", dynamics)
+    effort: Any = np.inf if controller is None else controller.saturation
+    for limit in (effect.limit for effect in effects if isinstance(effect, EffortLimit)):
+        effort = np.minimum(effort, limit)
+    yield from ((Kind.EFFORT_REACHED, 2, side, side * effort, -_ROUNDING) for side in (1, -1))
+    lower, upper = np.full(n, -np.inf), np.full(n, np.inf)
+    for stop in (effect for effect in effects if isinstance(effect, JointStopSpring)):
+        acts = stop.stiffness > 0
+        lower = np.where(acts, np.maximum(lower, stop.lower), lower)
+        upper = np.where(acts, np.minimum(upper, stop.upper), upper)
+    yield Kind.STOP_REACHED, 0, 1, upper, 0.0
+    yield Kind.STOP_REACHED, 0, -1, lower, 0.0
+    if not isinstance(robot, Robot):
+        return
+    # a soft stop is overrun a little: what it holds is told as a stop reached; lower = upper = 0: none is stated
+    free = robot.lower >= robot.upper
+    yield Kind.BEYOND, 0, 1, np.where(free | (upper <= robot.upper + _ROUNDING), np.inf, robot.upper), _ROUNDING
+    yield Kind.BEYOND, 0, -1, np.where(free | (lower >= robot.lower - _ROUNDING), -np.inf, robot.lower), _ROUNDING
+    for row, stated in ((1, robot.velocity_limit), (2, robot.effort_limit)):
+        stated = np.where(stated > 0, stated, np.inf)  # 0: none is stated
+        yield from ((Kind.BEYOND, row, side, side * stated, _ROUNDING) for side in (1, -1))

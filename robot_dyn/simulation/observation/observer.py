@@ -1,0 +1,110 @@
+"""The observer of a run: sees t, q, v, u of every step, whatever is recorded, in memory that does not grow with it.
+
+A time loop adds each step to `observation`, and writes a column for it into `columns`; when these are full, NumPy takes
+the extremes of windows of time from all of them at once.
+"""
+
+from __future__ import annotations
+
+from typing import final
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.simulation.observation.levels import NO_LEVELS, Levels
+from robot_dyn.simulation.observation.observation import Observation, Observed, observe, observed
+
+CHUNK = 16384  # columns looked at together: with fewer, the calls of NumPy cost more than what they do
+_PAD = 8  # so that the rows of a column lie in different sets of the processor's cache
+_WINDOW = 64  # columns whose extremes are kept as one, at first
+_FEW = 1000  # columns that may wait until it is asked what was observed
+_WINDOWS = 256  # at most so many are kept: beyond, two become one, and the next are twice as wide
+
+
+@final
+class Observer:
+    """What is seen of a run so far.
+
+    Args:
+        start: The observation before the first step, which it goes on with.
+        levels: To be looked out for.
+        canonical: As below.
+
+    Attributes:
+        observation: What was observed so far.
+        columns: (1 + 3n, CHUNK and some): end of the step in [s]; q and v at its end; the actuation u during it.
+        filled: Number of columns written.
+        seen: v and u of the latest evaluation of the equation of motion, (2n,).
+        canonical: Whether steps are in (q, p).
+    """
+
+    def __init__(self, start: Observation, levels: Levels = NO_LEVELS, canonical: bool = False) -> None:
+        self.n, self.canonical = len(start.low) // 3, canonical
+        self.columns, self.filled, self._chunk = np.empty((1 + 3 * self.n, CHUNK + _PAD)), 0, CHUNK
+        self.seen = np.zeros(2 * self.n)
+        self.observation, self._levels = start, levels
+        self._edges, self._width = np.zeros(1), _WINDOW
+        self._low, self._high = (np.empty((0, 3 * self.n)) for _ in range(2))
+
+    @property
+    def room(self) -> int:
+        """Columns that can still be written."""
+        return self._chunk - self.filled
+
+    def step(self, began: float, t: float, y: Array, acted: bool) -> None:
+        """One step to the state y at t; whether the controller `acted` at its start. Its actuation is `seen`."""
+        n, column = self.n, self.columns[:, self.filled]
+        column[0], column[1 : 1 + 2 * n] = t, y[: 2 * n]
+        column[1 + 2 * n :] = self.seen[n:]
+        if self.canonical:
+            column[1 + n : 1 + 2 * n] = self.seen[:n]
+        q, v, u = column[1:].reshape(3, n, 1)
+        observe(self.observation, began, t, q, v, u, acted)
+        self.filled += 1
+        self.look()
+
+    def look(self, end: bool = False) -> None:
+        """Look at the columns if there is no room for more, or at the end of the run."""
+        if self.room and not (end and self.filled):
+            return
+        with np.errstate(all="ignore"):
+            self._windows(self.columns[0, : self.filled], self.columns[1:, : self.filled])
+        self.filled = 0
+
+    def end(self) -> None:
+        """No step follows: look at the last ones, or if these are few keep them, without the room that was left."""
+        self.look(end=self.filled > _FEW)
+        self.columns = self.columns[:, : self.filled].copy()
+
+    def close(self) -> Observed:
+        """Look at the last steps; what was observed."""
+        self.look(end=True)
+        return observed([self.observation], self._levels)
+
+    @property
+    def windows(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Edges (w + 1,) in [s] of windows of time, and the least and the largest (w, 3n) of q, v, u in each."""
+        return self._edges, self._low, self._high
+
+    def _windows(self, t: np.ndarray, x: np.ndarray) -> None:
+        """Keep the extremes of each window."""
+        width = min(self._width, len(t))
+        whole = len(t) // width * width
+        parts = x[:, :whole].reshape(len(x), -1, width)
+        low, high = parts.min(axis=2), parts.max(axis=2)
+        ends = t[width - 1 : whole : width]
+        if whole < len(t):
+            low = np.column_stack([low, x[:, whole:].min(axis=1)])
+            high = np.column_stack([high, x[:, whole:].max(axis=1)])
+            ends = np.append(ends, t[-1])
+        self._edges = np.concatenate([self._edges, ends])
+        self._low, self._high = np.vstack([self._low, low.T]), np.vstack([self._high, high.T])
+        while len(self._low) > _WINDOWS:
+            self._halve()
+
+    def _halve(self) -> None:
+        """Two windows become one; from now on each is twice as wide, up to a whole chunk."""
+        pairs = np.arange(0, len(self._low), 2)
+        self._low, self._high = np.minimum.reduceat(self._low, pairs), np.maximum.reduceat(self._high, pairs)
+        self._edges = np.append(self._edges[pairs], self._edges[-1])
+        self._width = min(2 * self._width, self._chunk)

@@ -1,0 +1,1 @@
+"""The trajectory of a run: samples, ledger, tables, files, where it came from."""

@@ -1,0 +1,72 @@
+"""The summary of a run: outcome, what acted, energy ledger, error, remarks, tracking, cost."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from robot_dyn.errors import escaped
+from robot_dyn.queries.units import units
+from robot_dyn.simulation.events.occurrence import Occurrence
+from robot_dyn.simulation.observation.remarks import lines as said
+from robot_dyn.simulation.results.ledger import largest
+from robot_dyn.simulation.results.origin import joint_types
+from robot_dyn.simulation.results.trajectory import Trajectory
+from robot_dyn.simulation.run.outcome import Ending
+
+_TOLD = 3  # events in a summary
+_NOTICED = 0.01  # [s]: shorter times are not worth a word
+
+
+def summary(run: Trajectory) -> str:
+    """A few lines: outcome, what acted, ledger, error, tracking, cost."""
+    s, ledger, unit = run.statistics, run.ledger, units("q", joint_types(run))
+    opening = f"{run.outcome.ending} at t = {run.outcome.t:g} s, {len(run.t)} samples"
+    residual = f"residual {largest(np.abs(ledger.residual)):.2e} J, {ledger.closure:.1e} of the energy exchanged"
+    lines = [
+        opening + _after(run.outcome.advice),
+        *([] if run.acting is None else [f"effects: {', '.join(run.acting) or 'none'}"]),
+        *([f"right angles, in machine code: {run.about['right_angles']}"] if "right_angles" in run.about else []),
+        f"energy ledger: {residual}" + _after(run.leak) if ledger.known else "energy ledger: was not recorded",
+        f"error of q [{unit}]: {run.error or _not_estimated(run)}",
+    ]
+    lines += [] if run.accuracy is None else [f"accuracy: {run.accuracy}"]
+    lines += ["between samples: not watched"] if run.extremes is None else []
+    lines += [f"events: {_told(run.events)}"] if run.events else []
+    lines += [line for line in said(run.remarks) if line != run.outcome.advice]
+    if run.tracking_error is not None:
+        what = "the frame [m]" if run.desired is None else f"q [{unit}]"
+        lines.append(f"tracking error of {what}: {run.tracking_error:.3e} rms")
+    step = f"step {s.step_s:.4g} s, " if s.step_s else ""
+    lines.append(f"{s.method}: {step}{s.steps} steps, {s.evaluations} evaluations, {s.engine}")
+    if s.user_code and s.companion_runs:
+        lines.append(
+            f"error estimate: {s.companion_evaluations} evaluations in {s.companion_runs} companion runs, which"
+            f" call {s.user_code} as well; estimate_error=False leaves them out"
+        )
+    parts = (
+        ("compile", s.compile_s),
+        ("run", s.wall_s),
+        ("error estimate", s.companions_s),
+        ("samples", s.samples_s),
+    )
+    lines.append(
+        "time: " + ", ".join(f"{name} {spent:.2g} s" for name, spent in parts if spent >= _NOTICED or name == "run")
+    )
+    return "\n".join(map(escaped, lines))
+
+
+def _not_estimated(run: Trajectory) -> str:
+    """That its error was not estimated, and why."""
+    if run.outcome.ending is Ending.STOPPED:
+        return "not estimated (the run was stopped)"
+    return f"not estimated ({'a run of rollouts' if 'run' in run.about else 'estimate_error is False'})"
+
+
+def _told(events: tuple[Occurrence, ...]) -> str:
+    """The first events in words."""
+    words = [f"{each.name} at {each.t:.4g} s" for each in events[:_TOLD]]
+    return ", ".join(words) + (f", and {len(events) - _TOLD} more" if len(events) > _TOLD else "")
+
+
+def _after(text: str) -> str:
+    return f"; {text}" if text else ""

@@ -1,0 +1,224 @@
+"""The trajectory of a run: samples with names and units, what each effect did, how it ended, how far to trust it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import inf
+from types import NoneType
+from typing import TYPE_CHECKING, Any, Protocol, final, runtime_checkable
+
+import numpy as np
+
+from robot_dyn.errors import QueryError, shown
+from robot_dyn.simulation.events.occurrence import Occurrence
+from robot_dyn.simulation.observation.remarks import Remark
+from robot_dyn.simulation.results.error import ErrorEstimate
+from robot_dyn.simulation.results.ledger import Ledger
+from robot_dyn.simulation.results.tracking import root_mean_square
+from robot_dyn.simulation.run.outcome import Outcome
+from robot_dyn.values import Derived, read_only
+
+if TYPE_CHECKING:
+    pass
+
+# Residuals, as parts of the energy exchanged. Over 150 random scenes they were at most 10 times the estimated error of
+# q, as a part of the motion; one that is far larger contradicts the estimate.
+_CONTRADICTS, _ROUNDING = 100.0, 1e-12
+
+
+@runtime_checkable
+class Theorem(Protocol):
+    """What is proven of a motion, as `rd.Proof`."""
+
+    joint_names: tuple[str, ...]
+
+    def contains(self, t: float, q: Any, v: Any = None) -> bool:
+        """Whether a state may be that of the motion at t."""
+        ...
+
+    def digits_of(self, t: np.ndarray, q: np.ndarray) -> float:
+        """Decimal digits of positions (m, n) at times (m,) that are confirmed."""
+        ...
+
+
+@final
+@dataclass(frozen=True)
+class Statistics:
+    """What a run took.
+
+    Attributes:
+        method: Name of the integrator.
+        step_s: Its step, or 0 if it chose its own.
+        steps: Number of steps.
+        evaluations: Evaluations of the equation of motion, those of its Jacobian apart.
+        wall_s: Time of the run itself, in [s].
+        companions_s: Time of the error estimate.
+        engine: Which loop ran, and why if another was possible.
+        compile_s: Time before the run, for the choice of the loop and for compiling it.
+        samples_s: Time after it, for what follows from the states of its samples and does not wait until it is read.
+        companion_evaluations: Evaluations of the error estimate.
+        companion_runs: Companion runs of the error estimate.
+        user_code: Parts of the setup that are code of the user's, by name; each run calls them.
+    """
+
+    method: str
+    step_s: float
+    steps: int
+    evaluations: int
+    wall_s: float
+    companions_s: float = 0.0
+    engine: str = "interpreted"
+    compile_s: float = 0.0
+    samples_s: float = 0.0
+    companion_evaluations: int = 0
+    companion_runs: int = 0
+    user_code: str = ""
+
+
+@final
+@dataclass(frozen=True)
+class Accuracy:
+    """An accuracy that was asked for, what was got, and what it took in evaluations of the equation of motion.
+
+    Attributes:
+        asked: Largest error of q over joints and times, in [rad] and [m].
+        estimated: The estimated one.
+        rtol: The tolerance that was chosen, atol a hundredth of it; 0 for a method of fixed step.
+        run: Of the run.
+        pilots: Of the runs before it, with their error estimates.
+        check: Of its own error estimate.
+        digit_more, digit_less: Of a run with an error ten times smaller, or larger, by the order of the method.
+    """
+
+    asked: float
+    estimated: float
+    rtol: float
+    run: int
+    pilots: int
+    check: int
+    digit_more: float
+    digit_less: float
+
+    @property
+    def margin(self) -> float:
+        """What was asked over what is estimated: at least 2, or 1 where no tolerance brings more; inf for no error."""
+        return self.asked / self.estimated if self.estimated > 0 else inf
+
+    def __str__(self) -> str:
+        at = f" at rtol {self.rtol:.1e}" if self.rtol else ""
+        return (
+            f"asked {self.asked:.1e}, estimated {self.estimated:.1e}{at}, a margin of {self.margin:.1f};"
+            f" {self.run} evaluations,"
+            f" pilots {self.pilots}, check {self.check}; a digit more about {self.digit_more:.0f}, a digit less"
+            f" {self.digit_less:.0f}"
+        )
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Trajectory(Derived):
+    """Samples of a run, m of them; arrays are (m,) or (m, n).
+
+    What follows from the states of a run of `simulate` is computed when it is first read; where parts are the user's
+    own code, or the run did not finish, `simulate` computes it.
+
+    Attributes:
+        joint_names: Of the n joints.
+        t: In [s].
+        q, v, a: In [rad], [rad/s], [rad/s²] or [m], [m/s], [m/s²].
+        u: Actuation within its bounds, in [N m] or [N].
+        power: Of the control and of each effect without a potential, by name, in [W].
+        ledger: Energy and work.
+        desired: Positions of a joint reference, or None.
+        deviation: q − q_d, (m, n); or p − p_d of a frame that follows a Cartesian reference, (m, 3) in [m];
+            None without a reference.
+        outcome: How it ended.
+        statistics: What it took.
+        error: Its estimated error; None without an estimate.
+        about: Texts that make it whole: URDF, its path, edits, scene, versions; the frame under control, if one is.
+        wrenches: External wrench by link, rows (t, force, torque), (k, 7), in base axes at its frame, in SI units:
+            at the samples and at both sides of each switch.
+        at_stop: Whether each joint is at or beyond a stop, (m, n); None without stops.
+        remarks: What was seen at every step that the samples need not show.
+        extremes: The least and the largest of q, v and u over all steps, (3, 2, n); None if it was not watched.
+        acting: What acted, in words: gravity, payloads, effects, limits, control; None if it is not known.
+        controller_states: z of the controller, (m, z), of a sampled one after its tick; None if it has none, or they
+            were not recorded.
+        events: Where effects switched, and those asked for, in the order of time.
+        effect_states: z of each effect with states, by name, (m, z); empty if they were not recorded.
+        accuracy: What was asked for, and what it took; None if nothing was.
+    """
+
+    joint_names: tuple[str, ...]
+    t: np.ndarray
+    q: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+    u: np.ndarray
+    power: dict[str, np.ndarray]
+    ledger: Ledger
+    desired: np.ndarray | None
+    deviation: np.ndarray | None
+    outcome: Outcome
+    statistics: Statistics
+    error: ErrorEstimate | None = field(default_factory=NoneType)
+    about: dict[str, str] = field(default_factory=dict, repr=False)
+    wrenches: dict[str, np.ndarray] = field(default_factory=dict)
+    at_stop: np.ndarray | None = field(default_factory=NoneType)
+    remarks: tuple[Remark, ...] = field(default_factory=tuple)
+    extremes: np.ndarray | None = field(default_factory=NoneType)
+    acting: tuple[str, ...] | None = field(default_factory=NoneType)
+    controller_states: np.ndarray | None = field(default_factory=NoneType)
+    events: tuple[Occurrence, ...] = field(default_factory=tuple)
+    effect_states: dict[str, np.ndarray] = field(default_factory=dict)
+    accuracy: Accuracy | None = field(default_factory=NoneType)
+
+    def __post_init__(self) -> None:
+        read_only(self)
+
+    @property
+    def tracking_error(self) -> float | None:
+        """Root mean square of the deviation over samples and joints or axes; None without a reference."""
+        return None if self.deviation is None else root_mean_square(self.deviation)
+
+    @property
+    def leak(self) -> str:
+        """Why the energy ledger casts doubt on the run; empty if it does not."""
+        return leak(self.ledger, self.error, self.q)
+
+    def proven_digits(self, proof: Theorem) -> float:
+        """Decimal digits of q that a theorem confirms: −log₁₀ of the largest possible error, in [rad] or [m].
+
+        Args:
+            proof: Of the same motion, as `rd.prove` makes it; samples beyond its end are left out.
+
+        Raises:
+            QueryError: If it is of other joints, or its motion starts elsewhere.
+        """
+        if not isinstance(proof, Theorem):
+            raise QueryError(f"proof: give one, as rd.prove(setup), got {shown(proof)}")
+        if proof.joint_names != self.joint_names:
+            raise QueryError(f"proof is of the joints {', '.join(proof.joint_names)}; give one of this motion")
+        if self.t[0] == 0 and not proof.contains(0.0, self.q[0], self.v[0]):
+            raise QueryError("the motion of the proof starts elsewhere; give one of this motion")
+        return proof.digits_of(self.t, self.q)
+
+    @property
+    def summary(self) -> str:
+        """A few lines: outcome, what acted, ledger, error, tracking, cost."""
+        from robot_dyn.simulation.results.summary import summary
+
+        return summary(self)
+
+
+def leak(ledger: Ledger, error: ErrorEstimate | None, q: np.ndarray) -> str:
+    """As of `Trajectory.leak`, from the ledger, the estimated error and the samples q (m, n) of a run."""
+    if not ledger.closes:
+        return f"it does not close: {ledger.cause or 'simulate it by itself with its error estimate, which tells why'}"
+    if ledger.rounded or error is None or not error.resolved_until > 0:
+        return ""
+    span = float(np.ptp(q, axis=0).max())
+    if not span > 0 or ledger.closure <= _CONTRADICTS * max(error.final / span, _ROUNDING):
+        return ""
+    why = ledger.cause or "do not trust the estimate, take a smaller step"
+    return f"it does not close as the estimated error of q says: {why}"

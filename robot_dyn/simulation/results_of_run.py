@@ -1,0 +1,187 @@
+"""What follows from the record of a run: samples, energy ledger, deviation, loads, remarks; each when it is read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import final
+
+import numpy as np
+
+from robot_dyn.simulation.diagnostics.damped_task import damped
+from robot_dyn.simulation.diagnostics.divergence import explained
+from robot_dyn.simulation.diagnostics.imbalance import cause
+from robot_dyn.simulation.diagnostics.observed import remarks
+from robot_dyn.simulation.diagnostics.stiffness import bounded_by_stability
+from robot_dyn.simulation.diagnostics.unstable_loop import unstable
+from robot_dyn.simulation.events.occurrence import Occurrence
+from robot_dyn.simulation.observation.observation import Observed
+from robot_dyn.simulation.observation.observer import Observer
+from robot_dyn.simulation.observation.remarks import Remark
+from robot_dyn.simulation.results.acting import acting
+from robot_dyn.simulation.results.error import ErrorEstimate
+from robot_dyn.simulation.results.ledger import Ledger
+from robot_dyn.simulation.results.loads import at_stop, frame_of, wrenches
+from robot_dyn.simulation.results.origin import edits_of_machine_code, origin
+from robot_dyn.simulation.results.samples import columns, ledger
+from robot_dyn.simulation.results.tracking import deviation_of
+from robot_dyn.simulation.results.trajectory import Accuracy, leak
+from robot_dyn.simulation.run.outcome import Ending, Outcome
+from robot_dyn.simulation.run.record import Record
+from robot_dyn.simulation.setup.setup import Setup
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Results:
+    """The attributes of a `Trajectory` but for its statistics, from the record of a run and values that do not change.
+
+    Attributes:
+        setup: What ran, of the method that made the run.
+        record: What it left behind.
+        observer: What saw it, at its end.
+        error: Its estimated error.
+        own: Texts of the user's.
+        compiled: Whether machine code ran.
+        before: Remarks on runs before it.
+        accuracy: None, as none was asked for.
+    """
+
+    setup: Setup
+    record: Record
+    observer: Observer
+    error: ErrorEstimate | None
+    own: dict[str, str]
+    compiled: bool
+    before: tuple[Remark, ...]
+    accuracy: Accuracy | None = None
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Of the n joints."""
+        return self.setup.plant.dynamics.joint_names
+
+    @property
+    def t(self) -> np.ndarray:
+        """Times of the samples, (m,)."""
+        return self.record.t
+
+    @cached_property
+    def _columns(self) -> tuple[np.ndarray, ...]:
+        return columns(self.setup.equation, self.record.t, self.record.y, self.record.made)
+
+    @property
+    def q(self) -> np.ndarray:
+        """Positions there, (m, n)."""
+        return self._columns[0]
+
+    @property
+    def v(self) -> np.ndarray:
+        """Velocities there, (m, n)."""
+        return self._columns[1]
+
+    @property
+    def a(self) -> np.ndarray:
+        """Accelerations there, (m, n)."""
+        return self._columns[2]
+
+    @property
+    def u(self) -> np.ndarray:
+        """Actuation there, (m, n)."""
+        return self._columns[3]
+
+    @property
+    def power(self) -> dict[str, np.ndarray]:
+        """Of each source, (m,), by name."""
+        return dict(zip(self.setup.equation.sources, self._columns[5].T, strict=True))
+
+    @cached_property
+    def ledger(self) -> Ledger:
+        """Energy and work; with the cause where it does not close, unless undeclared parts are not to be asked."""
+        made, equation = ledger(self.setup.equation, self.record), self.setup.equation
+        asks = self.setup.estimate_error or not self.setup.undeclared  # the search calls these 4000 times
+        if asks and self.record.outcome.ending is not Ending.STOPPED and leak(made, self.error, self.q):
+            return replace(made, cause=cause(self.setup, equation, self.record, made.closes))
+        return made
+
+    @cached_property
+    def _tracking(self) -> tuple[np.ndarray | None, np.ndarray | None]:
+        return deviation_of(self.setup, self.t, self.q)
+
+    @property
+    def desired(self) -> np.ndarray | None:
+        """Positions of a joint reference, (m, n)."""
+        return self._tracking[0]
+
+    @property
+    def deviation(self) -> np.ndarray | None:
+        """From the reference."""
+        return self._tracking[1]
+
+    @property
+    def outcome(self) -> Outcome:
+        """How it ended; if it diverged, with its loop as the reason where that explains it."""
+        outcome = self.record.outcome
+        return explained(outcome, self.setup, self._of_control) if outcome.ending is Ending.DIVERGED else outcome
+
+    @property
+    def about(self) -> dict[str, str]:
+        """Texts: where it comes from, what machine code changed, and the user's."""
+        edits = edits_of_machine_code(self.setup) if self.compiled else {}
+        return frame_of(self.setup) | origin(self.setup.plant.dynamics) | edits | self.own
+
+    @property
+    def wrenches(self) -> dict[str, np.ndarray]:
+        """External wrench by link."""
+        return wrenches(self.setup.plant, self.t, self.q)
+
+    @property
+    def at_stop(self) -> np.ndarray | None:
+        """Whether each joint is at or beyond a stop, (m, n)."""
+        return at_stop(self.setup.plant, self.q)
+
+    @cached_property
+    def _observed(self) -> Observed:
+        return self.observer.close()
+
+    @property
+    def extremes(self) -> np.ndarray:
+        """Of q, v and u over all steps, (3, 2, n)."""
+        return self._observed.extremes[0]
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """On what was observed, on runs before it, on its steps and on its control."""
+        observed, samples = self._observed, np.hstack([self.q, self.v, self.u])
+        return (
+            *remarks(self.setup, self.observer, observed, self.t, samples, self.power), *self.before,
+            *bounded_by_stability(self.setup, self.setup.equation, self.record), *self._of_control,
+        )  # fmt: skip
+
+    @cached_property
+    def _of_control(self) -> tuple[Remark, ...]:
+        """What is said of the controller; one that was interrupted is not asked again."""
+        if self.record.outcome.ending is Ending.STOPPED:
+            return ()
+        equation, record = self.setup.equation, self.record
+        return (*unstable(self.setup, equation, record.t, record.y), *damped(self.setup, record))
+
+    @property
+    def acting(self) -> tuple[str, ...]:
+        """What acted, in words."""
+        return acting(self.setup)
+
+    @property
+    def controller_states(self) -> np.ndarray | None:
+        """Of the controller at the samples."""
+        return self.setup.equation.controller_states(self.record.y)
+
+    @property
+    def effect_states(self) -> dict[str, np.ndarray]:
+        """Of each effect with states at the samples."""
+        return self.setup.equation.effect_states(self.record.y)
+
+    @property
+    def events(self) -> tuple[Occurrence, ...]:
+        """That occurred."""
+        return self.record.events

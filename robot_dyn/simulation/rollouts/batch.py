@@ -1,0 +1,265 @@
+"""A batch of runs in tiles of 64 in lock step, each tile run by one thread from beginning to end.
+
+Records are arrays over time, row and run, in this order, so that a tile writes whole vectors. Where `simulate` cuts
+steps at thresholds, the runs that may pass one are made again by themselves, and written over what lock step gave.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import replace
+from time import perf_counter
+from typing import cast, final
+
+import numpy as np
+
+from robot_dyn.arithmetic import FLOAT64
+from robot_dyn.codegen.parameters import over_runs
+from robot_dyn.codegen.trace.right_angles import robot_of
+from robot_dyn.coefficients import with_values
+from robot_dyn.effects.plant import Plant
+from robot_dyn.integrate.integrator import PlainMethod
+from robot_dyn.simulation.compiled.machine import Machine
+from robot_dyn.simulation.dynamics.loop_state import Ended, Now, Runs, Why
+from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.events.detection import Detecting
+from robot_dyn.simulation.observation.levels import levels
+from robot_dyn.simulation.observation.observation import observations_of, observed
+from robot_dyn.simulation.results.origin import origin
+from robot_dyn.simulation.results.trajectory import Statistics
+from robot_dyn.simulation.rollouts.one_by_one import OneByOne, Single, said
+from robot_dyn.simulation.rollouts.pool import in_threads
+from robot_dyn.simulation.rollouts.rollout_result import Rollouts
+from robot_dyn.simulation.rollouts.thresholds import Thresholds
+from robot_dyn.simulation.run.fixed_step import rules_of, runs_of, samples_at_most
+from robot_dyn.simulation.run.outcome import Ending, Outcome
+from robot_dyn.simulation.run.time_loop import Records
+from robot_dyn.simulation.run.watch import LARGEST, diverged_advice
+from robot_dyn.simulation.setup.plan import plan_of
+from robot_dyn.simulation.setup.schedule import ON_STEP
+from robot_dyn.simulation.setup.setup import Setup
+from robot_dyn.simulation.setup.size import check_batch
+
+LANES = 64  # runs in a tile: with 8, 16 or 32 a step of RK4 took 1.5, 1.1 and 1.05 times as long
+_REASONS = {
+    Why.GOES_ON: "",
+    Why.OVERFLOWED: "a number overflowed",
+    Why.GAINED: "energy grows without a source",
+    Why.NOT_FOUND: "the stages of a step are not found",
+}
+_INSTANTS = 200  # at least, or every step, at which an actuation that changes between ticks is observed
+
+
+@final
+class Batch:
+    """The tiles of a batch and what they record: time by row by run, so that a tile writes whole vectors."""
+
+    def __init__(
+        self, setup: Setup, machine: Machine, q0: np.ndarray, v0: np.ndarray,
+        sweep: dict[str, np.ndarray], recorded: tuple[str, ...], kept: tuple[str, ...], most: int,
+        thresholds: Thresholds | None = None,
+    ) -> None:  # fmt: skip
+        equation, n = machine.equation, machine.equation.plant.dynamics.n
+        self.setup, self.machine, self.recorded, self.kept, self.values = setup, machine, recorded, kept, sweep
+        self.q0, self.v0, self.y, self.thresholds = q0, v0, _starts(equation, q0, v0), thresholds
+        self.levels = levels(equation.plant.dynamics, *over_runs(equation.plant, equation.controller, sweep), len(q0))
+        self.columns = [*range(n)] * ("q" in recorded)
+        if "v" in recorded and not equation.canonical:
+            self.columns += range(n, 2 * n)
+        if "work" in recorded:
+            self.columns += range(equation.size - len(equation.sources), equation.size)
+        tiles = -(-len(self.y) // LANES)
+        width, more = tiles * LANES, sum({"u": n, "v": n, "energy": 2}[name] for name in kept)
+        check_batch(setup, len(self.y), len(self.columns) + more, most)
+        self.plan, self.apart = plan_of(setup), 0
+        steps = int(self.plan.counts[:-1].sum())
+        if "actuation" in machine.equations.programs:
+            self.apart = 1 if equation.sampled else max(1, steps // _INSTANTS)
+        self.instants = steps // self.apart if self.apart > 1 else 0
+        most = samples_at_most(setup, self.plan.counts)
+        self.out_y, self.made = np.empty((most, len(self.columns), width)), np.empty((most, more, width))
+        numbers = np.minimum(np.arange(width), len(self.y) - 1)
+        start = np.vstack([q0[numbers].T, v0[numbers].T, np.full((n, width), np.nan)])
+        self.observations = observations_of(start, self.levels.of_runs(numbers), tiles)
+        self.place = np.zeros((0, 2), np.int64)  # segment and step of each sample, of the tile that has most
+        self.lock = threading.Lock()
+        self.unfinished = np.ones(tiles, dtype=bool)
+        self.why, self.last = np.zeros(width, np.int64), np.zeros((equation.size, width))
+        self.ended, self.until = np.full(width, setup.duration_s), np.full(width, np.inf)
+        self.again: dict[int, Single | None] = {}  # runs made again by themselves; None where Ctrl-C came first
+        self.clocks = np.tile([0.0, setup.record_period_s, ON_STEP * setup.nominal_step_s], (tiles, 1))
+        self.evaluations, self.stop = np.zeros(tiles, np.int64), np.zeros(1, np.int64)
+
+    def run(self, threads: int, on_progress: Callable[[float], object] | None = None) -> Rollouts:
+        """All tiles, each by one thread; Ctrl-C ends them at their next step, and an error of `on_progress`."""
+        began, end, reached = perf_counter(), self.setup.duration_s, 0.0
+
+        def tell(t: float) -> None:
+            nonlocal reached
+            reached = max(reached, t)
+            if on_progress is not None:
+                on_progress(reached)
+
+        in_threads(self._tile, len(self.unfinished), threads, self.stop, lambda: tell(self._reached()))
+        self._make_again(threads, tell)
+        result = self._result()
+        if on_progress is not None and not result.stopped.any():
+            tell(end)
+        return replace(result, statistics=replace(result.statistics, wall_s=perf_counter() - began))
+
+    def _reached(self) -> float:
+        """The time reached, in [s], the mean over the runs: that of the next sample of each that goes on."""
+        end, left = self.setup.duration_s, np.isinf(self.until).reshape(-1, LANES).mean(axis=1)
+        return float((left * np.where(self.unfinished, np.minimum(self.clocks[:, 0], end), end)).mean())
+
+    def _make_again(self, threads: int, tell: Callable[[float], object]) -> None:
+        """Make those runs by themselves that may have passed a threshold, or diverged, where steps are cut."""
+        if self.thresholds is None:
+            return
+        passed = np.isfinite(self.until) | (self.why > 0)
+        numbers = np.flatnonzero(passed[: len(self.y)])
+        self.again = dict.fromkeys(numbers.tolist())
+        if not len(numbers) or self.stop[0]:
+            return
+        sweep = {name: x[numbers] for name, x in self.values.items()}
+        starts, of = (self.q0[numbers], self.v0[numbers]), self.levels.of_runs(numbers)
+        runs = OneByOne(self.setup, *starts, sweep, self.recorded, of, numbers.tolist())
+        part = len(numbers) / len(self.y)
+        runs.run(threads, lambda t: tell((1 - part) * self.setup.duration_s + part * t))
+        self.again = dict(zip(numbers.tolist(), runs.made, strict=True))
+
+    def _write_again(self, t: np.ndarray) -> None:
+        """What these runs recorded, in place of what lock step gave; without them, that up to their thresholds."""
+        names = [name for name in ("q", "v", "work") if name in self.recorded and name not in self.kept]
+        for run, single in self.again.items():
+            if single is None:
+                rows = int(np.searchsorted(t, self.until[run], side="right"))
+            else:
+                rows = len(single.t)
+                for array, of in ((self.out_y, names), (self.made, self.kept)):
+                    array[:rows, :, run] = np.hstack([*(single.columns[name] for name in of), np.empty((rows, 0))])
+            self.out_y[rows:, :, run], self.made[rows:, :, run] = np.nan, np.nan
+
+    def _runs(self, tile: int) -> Runs:
+        """The runs of a tile at their start; a tile that is not full repeats a run."""
+        equation, index = self.machine.equation, self._numbers(tile)
+        own = self.machine.own({name: values[index] for name, values in self.values.items()})
+        return runs_of(equation, self.y[index].T, own, self.made.shape[1], index)
+
+    def _numbers(self, tile: int) -> np.ndarray:
+        """The numbers of the runs in a tile."""
+        return np.minimum(np.arange(tile * LANES, (tile + 1) * LANES), len(self.y) - 1)
+
+    def _tile(self, tile: int) -> None:
+        equation, n = self.machine.equation, self.machine.equation.plant.dynamics.n
+        own, runs = slice(tile * LANES, (tile + 1) * LANES), self._runs(tile)
+        method = cast(PlainMethod, self.setup.integrator)
+        advance = self.machine.advance()
+        assert advance is not None
+        rows = equation.size | 1  # odd: stages a power of two apart would share the sets of a cache
+        stepper = method.stepper(FLOAT64, equation.size, n, rows, LANES)
+        functions, now = self.machine.equations.functions, np.zeros(len(Now), dtype=np.int64)
+        now[Now.BUDGET] = np.iinfo(np.int64).max
+        records = Records(
+            np.array(self.columns, np.int64), np.empty((len(self.out_y), 2), np.int64), self.out_y, self.made,
+            np.empty((0, equation.size + 2)), np.empty((1 + 3 * n, 0)), self.observations[tile],
+        )  # fmt: skip
+        rules = rules_of(equation, False, LARGEST, base=own.start, apart=self.apart)
+        work = stepper.work
+        if self.thresholds is not None:
+            positions = 0 if equation.canonical else n
+            switches = self.thresholds.lanes(self._numbers(tile), equation.size, positions)
+            self.until[own] = switches.until
+            work = Detecting(work, work.K, switches._replace(until=self.until[own]))
+        ended = advance(
+            functions, self.plan, runs, records, rules, stepper.coefficients, work, now, self.clocks[tile], self.stop
+        )
+        self.unfinished[tile], self.evaluations[tile] = ended != Ended.DONE, now[Now.EVALUATIONS]
+        with self.lock:
+            if now[Now.ROW] > len(self.place):
+                self.place = records.place[: now[Now.ROW]]
+        self.why[own], self.last[:, own] = runs.why, runs.last
+        self.ended[own] = np.where(runs.why > 0, runs.ended, self.setup.duration_s)
+        if ended != Ended.DONE:
+            reached = self.plan.starts[now[Now.SEGMENT]] + now[Now.STEP] * self.plan.lengths[now[Now.SEGMENT]]
+            self.ended[own] = np.where(runs.why > 0, runs.ended, reached)
+            for array in (self.out_y, self.made):
+                array[int(now[Now.ROW]) :, :, own] = np.nan
+
+    def _result(self) -> Rollouts:
+        B, equation, n = len(self.y), self.machine.equation, self.machine.equation.plant.dynamics.n
+        segment, step = self.place.T
+        t = self.plan.starts[segment] + step * self.plan.lengths[segment]
+        self._write_again(t)
+        why, ended = self.why[:B], self.ended[:B].copy()
+        diverged, advice, steps = why > 0, self._advice(why), self._steps(ended)
+        stopped = np.repeat(self.unfinished, LANES)[:B] & ~diverged
+        evaluations = np.repeat(self.evaluations, LANES)[:B]
+        for run, single in self.again.items():
+            outcome = Outcome(Ending.STOPPED, min(self.until[run], ended[run])) if single is None else single.outcome
+            ended[run], advice[run] = outcome.t, said(outcome)
+            diverged[run], stopped[run] = (outcome.ending is each for each in (Ending.DIVERGED, Ending.STOPPED))
+            if single is not None:
+                steps[run], evaluations[run] = single.steps, single.evaluations
+        alone = {run: single.observation for run, single in self.again.items() if single is not None}
+        y, made, lengths = np.moveaxis(self.out_y[: len(t), :, :B], -1, 0), {}, {"u": n, "v": n, "energy": 2}
+        at = 0
+        for name in self.kept:
+            made[name] = np.moveaxis(self.made[: len(t), at : at + lengths[name], :B], -1, 0)
+            at += lengths[name]
+        q = y[..., :n] if "q" in self.recorded else None
+        v = made.get("v") if equation.canonical else y[..., n * ("q" in self.recorded) :][..., :n]
+        works = (
+            [y[..., i - len(equation.sources)] for i in range(len(equation.sources))] if "work" in self.recorded else []
+        )
+        energy = made.get("energy")
+        K, V = (None, None) if energy is None else (energy[..., 0], energy[..., 1])
+        named = dict(zip(equation.sources, works, strict=True)) if works else None
+        return Rollouts(
+            equation.plant.dynamics.joint_names, t, q, v if "v" in self.recorded else None, made.get("u"), K, V, named,
+            ended, diverged, stopped, tuple(advice), steps, evaluations, self._statistics(), tuple(equation.sources),
+            origin(self.setup.plant.dynamics) | self.setup.about, dict(self.values), self._compiled(),
+            (), self.q0, self.v0, observed(self.observations, self.levels, alone, self.instants)[:B],
+        )  # fmt: skip
+
+    def _compiled(self) -> Setup:
+        """The setup whose equations were compiled: right angles of the file written out in full."""
+        plant, controller = self.setup.plant, self.setup.controller
+        if controller is not None:
+            models = {name: robot_of(each) or each for name, each in controller.models.items()}
+            controller = with_values(controller, models)
+        plant = Plant(robot_of(plant.dynamics) or plant.dynamics, plant.effects)
+        return replace(self.setup, plant=plant, controller=controller)
+
+    def _advice(self, why: np.ndarray) -> list[str]:
+        """Why runs diverged and what to do; nothing for the others."""
+        advice, equation = [""] * len(why), self.machine.equation
+        for run in np.flatnonzero(why).tolist():
+            fastest = equation.fastest_joint(self.last[:, run])
+            advice[run] = diverged_advice(_REASONS[Why(why[run])], fastest, self.setup)
+        return advice
+
+    def _steps(self, ended: np.ndarray) -> np.ndarray:
+        """Number of steps of each run up to its end."""
+        plan = self.plan
+        lengths = np.where(plan.lengths > 0, plan.lengths, 1.0)
+        segment = np.maximum(np.searchsorted(plan.starts[:-1], ended, side="right") - 1, 0)
+        before = np.cumsum(plan.counts) - plan.counts
+        return before[segment] + np.rint((ended - plan.starts[segment]) / lengths[segment]).astype(np.int64)
+
+    def _statistics(self) -> Statistics:
+        """Of the batch; its steps and evaluations are those of one run to the end."""
+        method, steps = self.setup.integrator, int(self.plan.counts[:-1].sum())
+        runs = f"compiled, {len(self.y)} runs side by side"
+        if self.again:
+            runs += f", {len(self.again)} of them made again with steps cut at thresholds"
+        most = int(self.evaluations.max())
+        return Statistics(method.name, self.setup.duration_s / steps, steps, most, 0.0, engine=runs)
+
+
+def _starts(equation: StateEquation, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """The states at the starts of runs, (B, m)."""
+    if equation.canonical or equation.equation_of_motion.drives:
+        return np.stack([equation.start(*each) for each in zip(q, v, strict=True)])
+    return np.column_stack([q, v, np.zeros((len(q), equation.size - 2 * q.shape[1]))])

@@ -1,0 +1,195 @@
+"""What the runs of a batch come to: remarks with counts, tracking errors, and the run to look at first."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, final
+
+import numpy as np
+
+from robot_dyn.queries.units import unit
+from robot_dyn.simulation.diagnostics.observed import KINDS, Units, against, of_reference, of_steps, units_of
+from robot_dyn.simulation.diagnostics.reference_remarks import at_rest, held, jumps
+from robot_dyn.simulation.diagnostics.unstable_loop import unstable
+from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.observation.chatter import Episode
+from robot_dyn.simulation.observation.observation import Observed
+from robot_dyn.simulation.observation.remarks import Kind, Remark
+from robot_dyn.simulation.results.origin import joint_types
+from robot_dyn.simulation.results.tracking import deviation_of, root_mean_square
+from robot_dyn.simulation.setup.setup import Setup
+from robot_dyn.values import Value, read_only
+
+if TYPE_CHECKING:
+    from robot_dyn.simulation.rollouts.rollout_result import Rollouts
+
+OF_REFERENCES = Kind.JUMPS, Kind.HELD
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Overview(Value):
+    """What the runs of a batch come to.
+
+    Attributes:
+        worst: As of `Rollouts`.
+        remarks: As of `Rollouts`.
+        tracking_error: As of `Rollouts`.
+    """
+
+    worst: int
+    remarks: tuple[Remark, ...]
+    tracking_error: np.ndarray | None
+
+    def __post_init__(self) -> None:
+        read_only(self)
+
+
+def overview(runs: Rollouts) -> Overview:
+    """Of runs with their setup."""
+
+    def remedy(run: int) -> Callable[[Episode], str]:
+        setup = runs.setup_of(run)
+        return against(setup, runs.t, np.tile(setup.q0, (len(runs.t), 1)) if runs.q is None else runs.q[run])
+
+    errors = tracking_errors(runs)
+    remarks = () if runs.observed is None else tuple(counted(runs, runs.observed, remedy))
+    worst = worst_of(runs, remarks, errors)
+    if runs.setup is not None:
+        remarks = (*remarks, *_of_references(runs, runs.setup), *_linearised(runs, worst))
+    return Overview(worst, remarks, errors)
+
+
+def of_some(runs: Rollouts, numbers: range, whole: Overview) -> Overview:
+    """Of runs without their setup that were these of a larger batch."""
+    errors = None if whole.tracking_error is None else whole.tracking_error[numbers]
+    remedies = {each.kind: each.remedy for each in whole.remarks}
+    remarks: list[Remark] = []
+    if runs.observed is not None:
+        remarks += counted(runs, runs.observed, lambda _: lambda _: remedies[Kind.CHATTER])
+    remarks += _of_whole(whole, numbers)
+    alone = (each for each in whole.remarks if each.looked == 1 != len(numbers) and each.runs[0] in numbers)
+    remarks += (replace(each, runs=(numbers.index(each.runs[0]),)) for each in alone)
+    return Overview(worst_of(runs, tuple(remarks), errors), tuple(remarks), errors)
+
+
+def remarks_of(runs: Rollouts, run: int, setup: Setup | None, t: np.ndarray, q: np.ndarray) -> tuple[Remark, ...]:
+    """On what was observed of one run, with positions q (m, n) at times t (m,)."""
+    if runs.observed is None:
+        return ()
+    visits, episodes = runs.observed.visits_of(run), runs.observed.episodes_of(run)
+    remedy = (lambda _: "") if setup is None else against(setup, t, q)
+    instants = int(runs.observed.instants[run])
+    found = of_steps(runs.joint_names, units(runs), visits, episodes, remedy, instants)
+    if setup is not None:
+        found += of_reference(setup, t, runs.observed.extremes[run], units(runs))
+    elif runs.saved is not None:
+        found += (replace(each, runs=(), looked=0) for each in _of_whole(runs.saved, range(run, run + 1)))
+    return tuple(found)
+
+
+def _of_whole(whole: Overview, numbers: range) -> Iterator[Remark]:
+    """Remarks on the reference of some runs of a batch without their setup; the text may be of another of them."""
+    for each in whole.remarks:
+        of = tuple(numbers.index(run) for run in each.runs if run in numbers)
+        if of and each.kind in OF_REFERENCES:
+            other = "" if each.runs[0] in numbers else ", in another run"
+            yield replace(each, runs=of, looked=len(numbers), text=each.text + other)
+
+
+def units(runs: Rollouts) -> Units:
+    """Of q, v and u of each joint."""
+    if runs.setup is not None:
+        return units_of(runs.setup.plant.dynamics)
+    return [(unit("q", each), unit("v", each), unit("u", each)) for each in joint_types(runs)]
+
+
+def counted(runs: Rollouts, of: Observed, remedy: Callable[[int], Callable[[Episode], str]]) -> Iterator[Remark]:
+    """For each kind, joint and quantity the remark on the worst run, and which runs have one.
+
+    Args:
+        runs: All.
+        of: What was observed of them.
+        remedy: Against the chatter of a run.
+    """
+    named = runs.joint_names, units(runs)
+    amplitudes = of.episodes[:, :, 2]
+    for joint in np.argsort(-amplitudes.max(axis=0)):
+        if amplitudes[:, joint].any():
+            worst = int(amplitudes[:, joint].argmax())
+            (remark,) = of_steps(*named, {}, {joint: of.episodes_of(worst)[joint]}, remedy(worst))
+            yield _in_runs(remark, worst, amplitudes[:, joint] > 0)
+    for kind, row in sorted(
+        {(each.kind, each.row) for each in of.levels}, key=lambda each: (KINDS.index(each[0]), each)
+    ):
+        both = [k for k, each in enumerate(of.levels) if (each.kind, each.row) == (kind, row)]
+        _, duration, _, value = np.moveaxis(of.visits[:, both], 2, 0)
+        some = ~np.isnan(duration).all(axis=1)
+        if some.any():
+            beyond = np.abs(value - of.limits[:, both])
+            size = np.nansum(duration, axis=1) if kind is Kind.EFFORT_REACHED else np.fmax.reduce(beyond, axis=1)
+            worst = int(np.nanargmax(np.where(some, size, np.nan)))
+            visits = {x: visit for x, visit in of.visits_of(worst).items() if (x.kind, x.row) == (kind, row)}
+            (remark,) = of_steps(*named, visits, {}, remedy(worst), int(of.instants[worst]))
+            yield _in_runs(remark, worst, some)
+
+
+def _of_references(runs: Rollouts, setup: Setup) -> Iterator[Remark]:
+    """Remarks on the reference, which all runs share: where it jumps from their starts, which joints friction holds."""
+    q0 = np.tile(setup.q0, (len(runs), 1)) if runs.q0 is None else runs.q0
+    v0 = np.tile(setup.v0, (len(runs), 1)) if runs.v0 is None else runs.v0
+    for remark, gaps in jumps(setup, q0, v0, units(runs)):
+        yield _in_runs(remark, int(gaps.argmax()), gaps > 0)
+    if runs.observed is None:
+        return
+    extremes, of = runs.observed.extremes, dict[str, list[tuple[int, Remark]]]()
+    for run in map(int, np.flatnonzero(at_rest(extremes).any(axis=1))):
+        for remark in held(runs.setup_of(run), extremes[run], runs.t[runs.t <= runs.ended[run]], units(runs)):
+            of.setdefault(remark.joint, []).append((run, remark))
+    for each in of.values():
+        worst, remark = max(each, key=lambda of_run: of_run[1].limit or 0.0)
+        yield _in_runs(remark, worst, np.isin(np.arange(len(runs)), [run for run, _ in each]))
+
+
+def _in_runs(remark: Remark, worst: int, some: np.ndarray) -> Remark:
+    """A remark on the worst run as one on some (B,) of a batch."""
+    numbers = (int(run) for run in np.flatnonzero(some) if run != worst)
+    return replace(remark, runs=(worst, *numbers), looked=len(some))
+
+
+def _linearised(runs: Rollouts, run: int) -> Iterator[Remark]:
+    """The remark on the sampled loop of one run."""
+    setup = runs.setup_of(run)
+    equation = StateEquation(setup.plant, setup.controller, setup.integrator.canonical)
+    t, y = np.zeros(1), equation.start(setup.q0, setup.v0)[None]
+    if runs.q is not None and runs.v is not None and not equation.equation_of_motion.state_size:
+        t, rest = runs.t, np.zeros((len(runs.t), equation.size - 2 * len(setup.q0)))
+        y = np.hstack([runs.q[run], runs.v[run], rest])
+    for remark in unstable(setup, equation, t, y):
+        yield replace(remark, runs=(run,), looked=1)
+
+
+def worst_of(runs: Rollouts, remarks: tuple[Remark, ...], errors: np.ndarray | None) -> int:
+    """As of `Rollouts.worst`."""
+    if runs.diverged.any():
+        return int(np.where(runs.diverged, runs.ended, np.inf).argmin())
+    for remark in remarks:
+        if remark.kind is Kind.CHATTER:
+            return remark.runs[0]
+    beyond = [each for each in remarks if each.kind is Kind.BEYOND and each.limit]
+    if beyond:
+        return max(beyond, key=lambda each: abs(each.value / (each.limit or 1.0) - 1)).runs[0]
+    return 0 if errors is None or np.isnan(errors).all() else int(np.nanargmax(errors))
+
+
+def tracking_errors(runs: Rollouts) -> np.ndarray | None:
+    """As of `Rollouts.tracking_error`; nan for a run that was not begun."""
+    if runs.q is None or runs.setup is None or runs.setup.controller is None:
+        return None
+    known = np.isfinite(runs.q.sum(axis=2))
+    q = np.where(known[..., None], runs.q, 0.0)
+    _, deviation = deviation_of(runs.setup, runs.t, q)
+    if deviation is None:
+        return None
+    return np.array([root_mean_square(x[of]) if of.any() else np.nan for x, of in zip(deviation, known, strict=True)])

@@ -1,0 +1,255 @@
+"""Rollouts: one setup from many starts, or with many values of its parameters, at once in machine code.
+
+    q' = v,   v' = M⁻¹ (u + Σ τ − C v − N)   for 64 runs side by side, on all threads
+
+Each run is a lane of a tile, and no lane depends on another: one that diverges leaves the rest as they are.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from typing import Any, Unpack, cast
+
+import numpy as np
+
+from robot_dyn.codegen.parameters import CONTROLLER, link_parameters, names_of, parameters, with_parameters
+from robot_dyn.codegen.threads import thread_count
+from robot_dyn.coefficients import rebuilt
+from robot_dyn.description.edits import Edits
+from robot_dyn.effects.plant import Plant
+from robot_dyn.effects.rigid_stops import RigidStops
+from robot_dyn.errors import QueryError, nearest, shown
+from robot_dyn.integrate.adaptive import AUTO, EXPLICIT
+from robot_dyn.integrate.integrator import Integrator
+from robot_dyn.queries.dynamics import Dynamics
+from robot_dyn.simulation.compiled.making import machine
+from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.results.loads import frame_of
+from robot_dyn.simulation.results.origin import edits_of_machine_code
+from robot_dyn.simulation.rollouts.batch import LANES, Batch
+from robot_dyn.simulation.rollouts.divergence import causes
+from robot_dyn.simulation.rollouts.one_by_one import one_by_one
+from robot_dyn.simulation.rollouts.rollout_result import Rollouts
+from robot_dyn.simulation.rollouts.thresholds import Thresholds, thresholds
+from robot_dyn.simulation.setup.checks import check_stops
+from robot_dyn.simulation.setup.options import Options, setup_of, takes_options
+from robot_dyn.simulation.setup.setup import Setup
+from robot_dyn.simulation.setup.size import MOST_BYTES
+from robot_dyn.validate import choice, instance, integer, joint_values, numbers, truth
+
+RECORDS = ("q", "v", "u", "energy", "work")
+_WITHOUT_EFFECT = {
+    "estimate_error": "simulate one of the runs for that",
+    "accuracy": "simulate one of the runs for that",
+}
+
+
+@takes_options
+def rollouts(
+    what: Setup | Plant | Dynamics,
+    q0: Any = None,
+    v0: Any = None,
+    *,
+    params: Mapping[str, Any] | None = None,
+    record: Iterable[str] = ("q", "v"),
+    cuts: bool = True,
+    threads: int | None = None,
+    most_bytes: int = MOST_BYTES,
+    on_progress: Callable[[float], object] | None = None,
+    **options: Unpack[Options],
+) -> Rollouts:
+    """Run a plant or a robot from many starts, or a setup with the options that are given in place of its own.
+
+    Each run is that of `simulate`, to rounding. By an explicit, Gauss or Rosenbrock method of fixed step, such as
+    `integrator="rk4"`, and by time stepping, the runs go side by side in machine code. Those that may pass a threshold
+    (a stop, an effort limit, a reversal of friction with states) are made again one after the other on each thread,
+    with steps that end there, in a few milliseconds a run. So are all runs by a method
+    that chooses its steps, such as the default, and by one of fixed step where dry friction, rigid stops, payloads
+    that come and go, or events end steps, or where samples lie between the ends of steps that may be cut.
+
+    Args:
+        what: What to run.
+        q0: Positions at the start, (B, n) or (n,), in [rad] or [m] by joint; required unless `what` is a setup.
+        v0: Velocities at the start, (B, n) or (n,), in [rad/s] or [m/s]; 0, or those of the setup, unless given.
+        params: Values that differ from run to run, each (B,) or (B, n): a gain of the controller by its name, as
+            {"kp": …}, a coefficient of an effect, as {"viscous_friction.damping": …} (of several of a kind
+            {"external_wrench 2.wrench": …}), "gravity", (B, 3), or of a
+            payload that a link carries its mass in [kg], as {"payload_mass:tool0": …}, or its centre of mass,
+            "payload_com:tool0", (B, 3); "armature", (B, n); "mass_scale", (B,); mass and inertia of a link as of
+            `Robot.with_`, as {"link3.mass": …, "link3.inertia": …}, (B,) and (B, 3, 3). Models of controllers keep
+            theirs: they are "model.gravity", ….
+        record: Which of "q", "v", "u", "energy", "work" to keep at the samples; states of effects and controllers are
+            those of `simulate`.
+        cuts: False for runs in lock step whose steps do not end at thresholds, which the summary then names: faster,
+            and wrong by as much as a step that passes one.
+        threads: Number of threads; None for all processors.
+        most_bytes: Refuse to record more than this.
+        on_progress: Called with the time that the runs have reached, the mean in [s], some ten times a second; with
+            a record period of 0 it grows as tiles of 64 runs end.
+        **options: As of `simulate`; all but `estimate_error` and `accuracy`, which have no effect here: no error is
+            estimated (`simulate` one of the runs for that). The method "auto" is DOP853 here, and the engine "auto" is
+            machine code; "interpreted" makes the runs one after the other in Python.
+
+    Runs are watched at every step: `Rollouts.remarks` counts in how many of them actuation reverses at every tick, and
+    in how many a limit or a stop is reached or passed. In lock step the actuation of a continuous controller is watched
+    at samples and at least 200 instants, or every step if there are fewer; whether it reverses at every step is not.
+    Likewise where the reference does not begin as the joint does, or moves a joint that friction holds. The other
+    remarks of `simulate` are made on single runs alone.
+
+    Returns:
+        The runs, in the order given. Ctrl-C ends them, and keeps what there is.
+
+    Raises:
+        QueryError: If an argument is not allowed or has the wrong shape, or the record would exceed `most_bytes`.
+        TraceError: If a part of the setup cannot be compiled; names it.
+    """
+    setup = replace(_setup(what, q0, options), estimate_error=False)
+    if setup.integrator.name == AUTO:
+        setup = replace(setup, integrator=replace(setup.integrator, method=EXPLICIT))
+    most_bytes = integer("most_bytes", most_bytes, most=2**63 - 1)
+    if not setup.integrator.plain:
+        raise QueryError(
+            f"rollouts run by an explicit, Gauss or Rosenbrock method, or by one that chooses its steps, not by"
+            f" {setup.integrator.name}: give integrator='rk4' and its step_s; simulate takes any method"
+        )
+    if params is not None and not (isinstance(params, Mapping) and all(isinstance(name, str) for name in params)):
+        raise QueryError(f"params must give values by name, such as {{'kp': …}}, got {shown(params)}")
+    recorded, threads = _recorded(record), thread_count(threads)
+    q, v, sweep = _starts(setup, q0, v0, params or {})
+    why = _why_one_by_one(setup)
+    if not truth("cuts", cuts) and why:
+        raise QueryError(f"cuts=False: {why}, and so runs are made one after the other; leave it out")
+    passed = None if why else thresholds(setup, sweep, len(q))
+    cut = passed is not None or setup.finds_events  # samples are then interpolated within steps, which lock step cannot
+    if why or (cuts and cut and not setup.samples_on_steps):
+        runs = one_by_one(setup, q, v, sweep, recorded, most_bytes, threads, on_progress)
+    else:
+        at = passed if cuts else None
+        runs = _side_by_side(setup, q, v, sweep, recorded, most_bytes, at, threads, on_progress)
+        if passed is not None and not cuts:
+            runs = replace(runs, uncut=passed.names)
+    about = frame_of(setup) | edits_of_machine_code(setup) | runs.about
+    return replace(runs, about=about, advice=causes(runs, setup, q, v))
+
+
+def _why_one_by_one(setup: Setup) -> str:
+    """Why runs of a setup do not go in lock step; "" if they do."""
+    motion, method = setup.plant.equation_of_motion, setup.integrator
+    if method.controls_error:
+        return f"{method.name} chooses its steps"
+    if setup.engine == "interpreted":
+        return "the engine is interpreted"
+    if motion.set_valued and not method.nonsmooth:
+        return f"{motion.set_valued[0].name} holds joints and lets them go, where steps must end"
+    if motion.payloads:
+        return f"{motion.payloads[0].name} comes and goes, where steps must end"
+    return "steps end at events" if setup.events else ""
+
+
+def _side_by_side(
+    setup: Setup, q: np.ndarray, v: np.ndarray, sweep: dict[str, np.ndarray], recorded: tuple[str, ...], most: int,
+    passed: Thresholds | None, threads: int, on_progress: Callable[[float], object] | None,
+) -> Rollouts:  # fmt: skip
+    """The runs in lock step, of which those that pass a threshold are made again."""
+    equation = StateEquation(setup.plant, setup.controller, setup.integrator.canonical)
+    asked = {"u": "u" in recorded, "v": equation.canonical and "v" in recorded, "energy": "energy" in recorded}
+    kept = tuple(name for name, yes in asked.items() if yes)
+    made = machine(
+        equation,
+        cast(Integrator, setup.integrator),
+        lanes=LANES,
+        kept=kept,
+        swept=tuple(sweep),
+        jacobian=setup.integrator.needs_jacobian,
+        detects=passed is not None,
+        nonsmooth=setup.integrator.nonsmooth,
+    )
+    made.check(setup)
+    return Batch(setup, made, q, v, sweep, recorded, kept, most, passed).run(threads, on_progress)
+
+
+def _recorded(record: Any) -> tuple[str, ...]:
+    """Names of what is to be kept."""
+    instance("record", record, Iterable, f"give names of {', '.join(RECORDS)}")
+    return tuple(choice("record", name, RECORDS) for name in record)
+
+
+def _setup(what: Setup | Plant | Dynamics, q0: Any, options: Mapping[str, Any]) -> Setup:
+    """The setup of all runs; of a plant or robot, with the first start as its own."""
+    for name in options.keys() & _WITHOUT_EFFECT.keys():
+        raise QueryError(f"rollouts: {name} has no effect, {_WITHOUT_EFFECT[name]}; leave it out")
+    start = {}
+    if not isinstance(what, Setup):
+        what = what if isinstance(what, Plant) else Plant(what)
+        if q0 is not None:
+            q = joint_values("q0", q0, what.dynamics.joint_names)
+            start = {"q0": q.reshape(-1, q.shape[-1])[0] if q.size else np.zeros(q.shape[-1])}
+    setup = setup_of("rollouts", what, {**start, **options})
+    if setup.accuracy is not None:
+        without = "give the setup without it, as dataclasses.replace(setup, accuracy=None)"
+        raise QueryError(f"rollouts: accuracy has no effect, {_WITHOUT_EFFECT['accuracy']}; {without}")
+    return setup
+
+
+def _starts(
+    setup: Setup, q0: Any, v0: Any, params: Mapping[str, Any]
+) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:
+    """Starts (B, n) and values (B, n), of one number of runs."""
+    names = setup.plant.dynamics.joint_names
+    n = len(names)
+    q = joint_values("q0", setup.q0 if q0 is None else q0, names)
+    v = joint_values("v0", setup.v0 if v0 is None else v0, names)
+    sweep = {name: _values(setup, name, x) for name, x in params.items()}
+    counts = {len(x) for x in (q, v, *sweep.values()) if x.ndim > 1} or {1}
+    if len(counts) > 1 or max(q.ndim, v.ndim) > 2 or counts == {0}:
+        shapes = {"q0": q.shape, "v0": v.shape} | {name: np.shape(x) for name, x in params.items()}
+        rows = f"starts ({n},) or (B, {n}), params (B,) or (B, …)"
+        raise QueryError(f"starts and params must be of one number of runs, B ≥ 1: {rows}; got {shapes}")
+    B = counts.pop()
+    q = np.broadcast_to(q, (B, n))
+    if any(isinstance(each, RigidStops) for each in setup.plant.effects):
+        for run in range(B):
+            plant, _ = with_parameters(setup.plant, setup.controller, {name: x[run] for name, x in sweep.items()})
+            check_stops(plant, q[run], f"q0 of run {run}")
+    return q, np.broadcast_to(v, (B, n)), sweep
+
+
+def _values(setup: Setup, name: str, values: Any) -> np.ndarray:
+    """The values of a parameter, (B, size)."""
+    plant = setup.plant
+    known = parameters(plant.dynamics, plant.effects, setup.controller, (name, "armature", "mass_scale"))
+    swept = [each for each in known if each.declared.swept]
+    mine = [each for each in swept if each.name == name]
+    if not mine:
+        part, _, key = name.rpartition(".")
+        several = [each for each in names_of(plant.effects) if re.fullmatch(rf"{re.escape(part)} \d+", each)]
+        if several:
+            both = " and ".join(repr(f"{each}.{key}") for each in dict.fromkeys(several))
+            raise QueryError(f"params: {name} names a coefficient of several effects of the plant; give {both}")
+        if name.startswith("payload_") and not any(each.name.startswith("payload_") for each in swept):
+            payload = f"rd.Payload({name.partition(':')[2] or 'link'!r}, 1.0)"
+            raise QueryError(
+                f"params: no {name!r}: the arm carries no payload; add one, as robot.with_(payload={payload})"
+            )
+        names = dict.fromkeys((*(each.name for each in swept), *link_parameters(plant.dynamics)))
+        raise QueryError(f"params: no {name!r}; {nearest(name, names)}")
+    n, declared = mine[0].size, mine[0].declared
+    shapes = (("B",), ("B", 1), ("B", n)) if declared.of_joints or n == 1 else (("B", *mine[0].value.shape),)
+    array = numbers(
+        f"params: {name}", values, *shapes,
+        least=declared.least, above=declared.above, infinite=declared.infinite,
+    )  # fmt: skip
+    rows = np.ascontiguousarray(np.broadcast_to(array.reshape(len(array), -1), (len(array), n)))
+    for part in (each for each in mine if each.key.startswith("inertia ")):
+        for inertia in rows.reshape(-1, 3, 3):
+            Edits().with_((), inertias={part.key.partition(" ")[2]: inertia})  # refuses what no body has
+    for part in {each.part for each in mine if each.part[0] == "effect"}:
+        for row in np.unique(rows, axis=0):
+            value = row.reshape(mine[0].value.shape)
+            replace(plant.effects[part[1]], **{mine[0].key: value})  # refuses what has no meaning
+    for part in (each for each in mine if each.part == CONTROLLER and "." in each.key):
+        for row in np.unique(rows, axis=0):
+            rebuilt(setup.controller, {part.key: row.reshape(part.value.shape)})
+    return rows

@@ -1,0 +1,113 @@
+"""One run of a batch as a trajectory: what was recorded, and what follows from it and the setup.
+
+a = M⁻¹ (u + Σ τ − C v − N),   P_k = τ_kᵀ v;   nan where neither record nor setup tells
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from robot_dyn.codegen.parameters import with_parameters
+from robot_dyn.errors import QueryError
+from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.results.acting import acting
+from robot_dyn.simulation.results.ledger import Ledger
+from robot_dyn.simulation.results.loads import at_stop, wrenches
+from robot_dyn.simulation.results.samples import columns
+from robot_dyn.simulation.results.tracking import deviation_of
+from robot_dyn.simulation.results.trajectory import Trajectory
+from robot_dyn.simulation.rollouts.overview import remarks_of
+from robot_dyn.simulation.run.state_functions import sample
+from robot_dyn.simulation.setup.setup import Setup
+
+if TYPE_CHECKING:
+    from robot_dyn.simulation.rollouts.rollout_result import Rollouts
+
+
+def trajectory(runs: Rollouts, run: int) -> Trajectory:
+    """The trajectory of a run; see `Rollouts`.
+
+    Raises:
+        QueryError: If its positions or velocities were not recorded.
+    """
+    if runs.q is None or runs.v is None:
+        raise QueryError("a run of rollouts is a trajectory if q and v were recorded: add them to record")
+    known = ~np.isnan(runs.q[run]).all(axis=1)  # a run that ended early has nan after its end
+    t, q, v = runs.t[known], runs.q[run, known], runs.v[run, known]
+    unknown = np.full_like(q, np.nan)
+    u = unknown if runs.u is None else runs.u[run, known]
+    a, power, energy = unknown, np.full((len(t), len(runs.sources)), np.nan), np.full((len(t), 2), np.nan)
+    setup = None if runs.setup is None else setup_of(runs, runs.setup, run)
+    if setup is not None:
+        a, u, power, energy = _follows(setup, t, q, v, None if runs.u is None else u)
+    if runs.kinetic is not None and runs.potential is not None:
+        energy = np.column_stack([runs.kinetic[run, known], runs.potential[run, known]])
+    work = {name: np.full(len(t), np.nan) for name in runs.sources}
+    if runs.work is not None:
+        work = {name: x[run, known] for name, x in runs.work.items()}
+    desired, deviation, loads, stops, acts = None, None, {}, None, None
+    if setup is not None:
+        desired, deviation = deviation_of(setup, t, q)
+        loads, stops, acts = wrenches(setup.plant, t, q), at_stop(setup.plant, q), acting(setup)
+    steps, evaluations = int(runs.steps[run]), int(runs.evaluations[run])
+    about = runs.about | {"run": f"{run} of {len(runs)}"}
+    return Trajectory(
+        joint_names=runs.joint_names,
+        t=t,
+        q=q,
+        v=v,
+        a=a,
+        u=u,
+        power=dict(zip(runs.sources, power.T, strict=True)),
+        ledger=Ledger(energy[:, 0], energy[:, 1], work),
+        desired=desired,
+        deviation=deviation,
+        outcome=runs.outcome(run),
+        statistics=replace(runs.statistics, steps=steps, evaluations=evaluations),
+        about=about,
+        wrenches=loads,
+        at_stop=stops,
+        acting=acts,
+        remarks=remarks_of(runs, run, setup, t, q),
+        extremes=None if runs.observed is None else runs.observed.extremes[run],
+    )
+
+
+def setup_of(runs: Rollouts, setup: Setup, run: int) -> Setup:
+    """As of `Rollouts`: the setup of a batch with the start, parameters and noise of a run."""
+    if runs.params:
+        plant, controller = with_parameters(
+            setup.plant, setup.controller, {name: x[run] for name, x in runs.params.items()}
+        )
+        setup = replace(setup, plant=plant, controller=controller)
+    if setup.controller is not None:
+        number = run if runs.numbers is None else int(runs.numbers[run])
+        setup = replace(setup, controller=setup.controller.of_run(number))
+    return replace(
+        setup,
+        q0=setup.q0 if runs.q0 is None else runs.q0[run],
+        v0=setup.v0 if runs.v0 is None else runs.v0[run],
+        estimate_error=True,
+    )
+
+
+def _follows(
+    setup: Setup, t: np.ndarray, q: np.ndarray, v: np.ndarray, u: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Acceleration, torque, powers and energies at the samples."""
+    equation = StateEquation(setup.plant, setup.controller)
+    if equation.equation_of_motion.state_size:  # torques depend on states that are not recorded
+        nothing, energies = np.full_like(q, np.nan), np.column_stack(equation.energies(0.0, q, v))
+        return nothing, nothing if u is None else u, np.full((len(t), len(equation.sources)), np.nan), energies
+    if u is None and (equation.sampled or equation.states):
+        u = np.full_like(q, np.nan)  # it depends on what was before
+    made = np.full((len(t), equation.size + q.shape[1] + 2), np.nan)
+    rest = np.zeros((len(t), equation.size - 2 * q.shape[1]))
+    y = np.hstack([q, v, rest])
+    for i in range(len(t)):
+        sample(equation, float(t[i]), y[i], None if u is None else u[i], made[i])
+    _, _, a, u, _, power, energy = columns(equation, t, y, made)
+    return a, u, power, energy

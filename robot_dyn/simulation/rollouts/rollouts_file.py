@@ -1,0 +1,79 @@
+"""Files of rollouts: one .npz that holds the recorded arrays of all runs, in the manner of a run file."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from robot_dyn.simulation.results.archive import ArchiveError, Header
+from robot_dyn.simulation.results.members import OF_ROLLOUTS, check_headers
+from robot_dyn.simulation.results.run_file import (
+    MAX_BYTES,
+    ROLLOUTS_FORMAT,
+    RunFileError,
+    are_times,
+    read_whole,
+    write_whole,
+)
+from robot_dyn.simulation.results.serialise import Arrays, build
+from robot_dyn.simulation.rollouts.rollout_result import Rollouts
+
+
+def save_rollouts(runs: Rollouts, path: str | Path) -> Path:
+    """Write rollouts to `path` (.npz is added if it has no suffix), whole or not at all; without their setup.
+
+    Another run file under that name is replaced; a file of another kind is not.
+
+    Raises:
+        RunFileError: If it cannot be written.
+    """
+    if not isinstance(runs, Rollouts):
+        raise RunFileError(f"save_rollouts takes the Rollouts of rd.rollouts, got {type(runs).__name__}")
+    return write_whole(replace(runs, setup=None, numbers=None, saved=runs.overview), path, ROLLOUTS_FORMAT, _checked)
+
+
+def load_rollouts(path: str | Path, *, max_bytes: int = MAX_BYTES) -> Rollouts:
+    """The rollouts of a file; `setup` is None.
+
+    Args:
+        path: Of the file.
+        max_bytes: The largest size of its arrays that is read.
+
+    Raises:
+        RunFileError: If it is missing, damaged, cut short, larger, of another format, or was changed.
+    """
+    return read_whole(path, max_bytes, ROLLOUTS_FORMAT, OF_ROLLOUTS, _checked)
+
+
+def _checked(arrays: Arrays, about: dict[str, Any]) -> Rollouts:
+    """The rollouts of these, whose arrays fit together and whose numbers can be those of runs."""
+    check_headers({name: Header(x.shape, x.dtype) for name, x in arrays.items()}, about, OF_ROLLOUTS)
+    if about.get("setup") is not None:
+        raise ArchiveError("'setup' is not empty")
+    runs = build(Rollouts, {key: value for key, value in about.items() if key != "format"}, arrays)
+    if arrays:
+        raise ArchiveError(f"member {min(arrays)!r} belongs to nothing")
+    if not are_times(runs.t) or not len(runs.t):
+        raise ArchiveError("the times of member 't' are not finite, or do not grow")
+    if not all(map(are_times, runs.ended[:, None])) or (runs.diverged & runs.stopped).any():
+        raise ArchiveError("members 'ended', 'diverged' and 'stopped' are not those of runs")
+    numbered = (number for each in (() if runs.saved is None else runs.saved.remarks) for number in each.runs)
+    if runs.observed is not None and len(runs.observed.levels) != runs.observed.limits.shape[1]:
+        raise ArchiveError("'observed/levels' are not those of member 'observed/limits'")
+    if not all(0 <= number < len(runs) for number in (*numbered, 0 if runs.saved is None else runs.saved.worst)):
+        raise ArchiveError(f"'saved' tells of a run that is not one of the {len(runs)}")
+    if len(runs.advice) != len(runs):
+        raise ArchiveError(f"'advice' is of {len(runs.advice)} runs, not of {len(runs)}")
+    if runs.work is not None and set(runs.work) != set(runs.sources):
+        raise ArchiveError("members 'work/…' and 'sources' have different names")
+    whole = ~(runs.diverged | runs.stopped)[:, None] & (
+        (runs.t < runs.ended[:, None]) | (runs.ended >= runs.t[-1])[:, None]
+    )
+    for name in ("q", "v", "u", "kinetic", "potential"):
+        array = getattr(runs, name)
+        if array is not None and not np.isfinite(array[whole]).all():
+            raise ArchiveError(f"member {name!r} of a run that did not diverge holds nan or inf")
+    return runs

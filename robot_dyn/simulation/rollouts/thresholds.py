@@ -1,0 +1,113 @@
+"""The thresholds of the runs of a batch, where coefficients may differ from run to run, and levels with them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.codegen.parameters import CONTROLLER, Part, joined, parameters, rows, split
+from robot_dyn.coefficients import with_values
+from robot_dyn.effects.plant import Plant
+from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.events.detection import LockStep, lock_step
+from robot_dyn.simulation.events.switching import Switching
+from robot_dyn.simulation.setup.setup import Setup
+from robot_dyn.simulation.setup.size import MOST_CUT
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Thresholds:
+    """The thresholds of B runs, K of each.
+
+    Attributes:
+        rows, coordinates: As of `LockStep`.
+        levels: Of each run, inf where it has none, (K, B).
+        functions: Number of the functions of the actuation.
+        others: Runs in which other parts have thresholds than in the compiled equation, (B,).
+        names: What the thresholds are, each once.
+    """
+
+    rows: np.ndarray
+    coordinates: int
+    levels: np.ndarray
+    functions: int
+    others: np.ndarray
+    names: tuple[str, ...]
+
+    def lanes(self, runs: np.ndarray, rows: int, positions: int) -> LockStep:
+        """The switching functions of some of the runs at their start: of rates of so many rows, and `positions`."""
+        made = lock_step(self.rows, self.coordinates, self.levels[:, runs], rows, self.functions, positions)
+        made.until[self.others[runs]] = 0.0
+        made.left[0] -= self.others[runs].sum()
+        return made
+
+
+def thresholds(setup: Setup, sweep: Mapping[str, np.ndarray], count: int) -> Thresholds | None:
+    """Those of so many runs of a setup, where `simulate` cuts steps; None where it does not.
+
+    Args:
+        setup: Of all runs.
+        sweep: Values that differ from run to run, (B, size) by name.
+        count: B.
+    """
+    if setup.steps > MOST_CUT or setup.integrator.nonsmooth:
+        return None
+    equation = StateEquation(setup.plant, setup.controller, setup.integrator.canonical)
+    of_runs = _of_runs(equation, sweep, count)
+    others = np.array([each.equation.limited != equation.limited for each, _ in of_runs])
+    known = [(each, runs) for (each, runs), other in zip(of_runs, others, strict=True) if not other]
+    names = tuple(dict.fromkeys(threshold.name for each, _ in of_runs for threshold in each.thresholds))
+    if not names:
+        return None
+    places = [_places(each) for each, _ in known]
+    union = sorted({place for each in places for place in each})
+    levels = np.full((len(union), count), np.inf)
+    for (each, runs), own in zip(known, places, strict=True):
+        for place, level in zip(own, each.levels, strict=True):
+            levels[union.index(place), runs] = level
+    unknown = np.zeros(count, bool)
+    for (_, runs), other in zip(of_runs, others, strict=True):
+        unknown[runs] = other
+    rows = np.array([row for _, row, _ in union], np.int64)
+    coordinates = sum(not function for function, _, _ in union)
+    return Thresholds(rows, coordinates, levels, len(equation.limited) * equation.plant.dynamics.n, unknown, names)
+
+
+def _places(switching: Switching) -> list[tuple[bool, int, int]]:
+    """Where each threshold is: whether of a function, its row, and which one of that row."""
+    made: list[tuple[bool, int, int]] = []
+    for k, row in enumerate(switching.rows.tolist()):
+        function = k >= switching.coordinates
+        made.append((function, row, sum(each[:2] == (function, row) for each in made)))
+    return made
+
+
+def _of_runs(
+    equation: StateEquation, sweep: Mapping[str, np.ndarray], count: int
+) -> list[tuple[Switching, np.ndarray]]:
+    """The thresholds of the runs, with the numbers of those that have them, (k,)."""
+    plant, controller = equation.plant, equation.controller
+    known = parameters(plant.dynamics, plant.effects, controller, sweep)
+    parts = {each.part for each in known if each.name in sweep and each.part[0] in ("effect", *CONTROLLER)}
+    known = [each for each in known if each.part in parts]
+    of = {part: controller if part == CONTROLLER else plant.effects[part[1]] for part in parts}
+    values, places = joined(known), {each.name: rows(known, each.name) for each in known if each.name in sweep}
+    groups: dict[Any, tuple[dict[Part, Any], list[int]]] = {}
+    for run in range(count if parts else 1):
+        for name, place in places.items():
+            values[place] = sweep[name][run]
+        own = {part: with_values(of[part], made) for part, made in split(known, values).items()}
+        declared = tuple(
+            each.thresholds() if part == CONTROLLER else each.thresholds(plant.dynamics.n) for part, each in own.items()
+        )
+        groups.setdefault(declared, (own, []))[1].append(run)
+    made = []
+    for own, runs in groups.values():
+        effects = [own.get(("effect", i), each) for i, each in enumerate(plant.effects)]
+        state = StateEquation(Plant(plant.dynamics, effects), own.get(CONTROLLER, controller), equation.canonical)
+        made.append((Switching(state), np.array(runs if parts else range(count))))
+    return made

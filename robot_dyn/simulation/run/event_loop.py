@@ -1,0 +1,311 @@
+"""The time loop of a run whose steps are chosen, or cut at events: samples lie between the ends of steps.
+
+Plain functions of arrays, for one run, as of `time_loop`. The dense output of a step brackets a root of a switching
+function g; the step is then made anew, up to where g vanishes after it, which keeps the order of the method:
+
+    g(step(t, y, θ h)) = 0
+
+[Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed., 1993, II.6; Shampine, Thompson 2000]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.integrate.bernstein import NONE
+from robot_dyn.integrate.primitives import between, copy, evaluate
+from robot_dyn.integrate.step_control import At, chosen_step, finite, first_step, shortened
+from robot_dyn.simulation.dynamics.loop_state import Ended, Functions, Now, Rules, Runs
+from robot_dyn.simulation.events.crossings import (
+    Switches,
+    approaches,
+    correction,
+    first_event,
+    nears,
+    remember,
+    settle_sides,
+)
+from robot_dyn.simulation.events.detection import FASTEST
+from robot_dyn.simulation.events.holding import Holding
+from robot_dyn.simulation.events.sides import Sides, goes_on
+from robot_dyn.simulation.observation.observation import Observation
+from robot_dyn.simulation.run.time_loop import act, acts, conserve, show
+from robot_dyn.simulation.setup.plan import Plan
+
+_EARLY = 1e-9  # of a period: a sample at the end of a segment belongs to the next one
+_ROOTS = 6  # steps made anew for an event, at most
+_SHORT = 1e-8  # of a step: over so little of it y is a straight line, to rounding
+_WATCHED = 8  # steps between looks at the energy
+
+
+class Kept(NamedTuple):
+    """What is kept.
+
+    Attributes:
+        t, y, made: Times of samples (R,), the states (R, m, 1), and what else a sample holds (R, d, 1).
+        shared_t, shared: States that companion runs share, (S,) and (S, m).
+        walked_t, walked: The ends of steps, (K,), and the states at the first of them, (k, m).
+        columns, observation: As of `time_loop.Records`.
+    """
+
+    t: Array
+    y: Array
+    made: Array
+    shared_t: Array
+    shared: Array
+    walked_t: Array
+    walked: Array
+    columns: Array
+    observation: Observation
+
+
+class Times(NamedTuple):
+    """Times as numbers.
+
+    Attributes:
+        reached: The time reached, (1,), in [s].
+        period, compared: Periods of samples and of shared states, in [s]; inf for none.
+        nodes, every: Whether there is a sample at the start of every segment, and at the end of every step, too.
+        end: Of the run.
+        mesh: Where steps end, (k,), if they are to do so at given times; error control makes more of them.
+    """
+
+    reached: Array
+    period: float
+    compared: float
+    nodes: bool
+    every: bool
+    end: float
+    mesh: Array
+
+
+def event_loop(
+    begin: Callable[..., int], step: Callable[..., int], error: Callable[..., float], accept: Callable[..., int],
+    dense: Callable[..., int], end_mode: Callable[..., int],
+) -> Callable[..., int]:  # fmt: skip
+    """The time loop of the functions of a method, see `ControlledStepper`, and of the end of a mode, as of `end_mode`.
+
+    advance(functions, plan, runs, kept, times, rules, coefficients, work, switches, sides, holding, now, control,
+    stop) → Ended, with `control` as of `control_of`; `stop[0]` other than 0 ends it.
+    """
+    choose = chosen_step(step, error)
+
+    def cut(
+        f: Functions, c: Any, t: float, whole: float, theta: float, p: Array, runs: Runs, work: Any,
+        switches: Switches, event: int, control: Array,
+    ) -> tuple[int, float, float, float]:  # fmt: skip
+        """The step made anew, up to where a switching function vanishes after it, but for the last bit of its length.
+
+        Its evaluations, its length, that bit, over which y is a straight line, and its error as of `error`: it may pass
+        slowly through what the whole step leapt over, as friction near v = 0.
+        """
+        h, evaluations, y, after, e = theta * whole, 0, runs.y, runs.after, 0.0
+        for k in range(_ROOTS):
+            if abs(h) <= np.spacing(abs(t)):  # at once, as right behind another event
+                copy(after, y)
+                copy(work.last, work.K[0])
+                return evaluations, 0.0, 0.0, 0.0
+            evaluations += step(f, c, t, h, y, p, runs.own, after, work, runs.lost)
+            if control[At.RTOL] + control[At.ATOL] > 0.0:  # 0 for steps of a fixed length
+                e = error(c, h, y, after, work, control[At.RTOL], control[At.ATOL])
+            evaluations += accept(f, c, t, h, y, p, runs.own, after, work)
+            shift = correction(f, t, h, whole, y, p, runs, work, switches, event)
+            if not abs(shift) > _SHORT * h:
+                return evaluations, h, shift, e
+            if k == _ROOTS - 1 or (abs(shift) > h and event >= len(switches.exact)):
+                break  # a function that jumps, say: where it is bracketed
+            h = max(h + shift, 0.0)
+        return evaluations, h, 0.0, e
+
+    def advance(
+        f: Functions, plan: Plan, runs: Runs, kept: Kept, times: Times, rules: Rules, c: Any, work: Any,
+        switches: Switches, sides: Sides, holding: Holding, now: Array, control: Array, stop: Array,
+    ) -> int:  # fmt: skip
+        last = len(plan.counts) - 1
+        own, y, after = runs.own, runs.y, runs.after
+        while now[Now.SEGMENT] <= last:
+            s = now[Now.SEGMENT]
+            start, p = plan.starts[s], plan.parameters[s]
+            if plan.transfers[s] == 1:
+                return Ended.TRANSFER
+            if now[Now.STEP] == 0:
+                if plan.ticks[s] > 0 and not act(f, runs, rules, start, plan.at_ticks[s], plan.ticks[s]):
+                    return Ended.TICK
+                node(f, runs, kept, times, now, start, p)
+                times.reached[0] = start
+                now[Now.STEP] = 1
+            if s == last:
+                now[Now.SEGMENT] += 1
+                continue
+            end = plan.starts[s + 1]
+            if now[Now.STEP] == 1:  # at the start of a segment, and behind an event
+                now[Now.EVALUATIONS] += begin(f, c, times.reached[0], y, p, own, work)
+                if not finite(work.K[0]):
+                    return Ended.NOT_FINITE
+                remember(times.reached[0], y, p, own, switches)
+                if control[At.NEXT] == 0.0 and control[At.RTOL] + control[At.ATOL] > 0.0:
+                    now[Now.EVALUATIONS] += first_step(f, times.reached[0], end, y, p, own, after, work, control)
+                now[Now.STEP] = 2
+            while times.reached[0] < end:
+                t = times.reached[0]
+                made, found = choose(f, c, t, end, y, p, own, after, work, runs.lost, control, times.mesh)
+                now[Now.EVALUATIONS] += made
+                if found != 0:
+                    return Ended.TOO_SMALL
+                h, t1 = control[At.TAKEN], control[At.END]
+                now[Now.EVALUATIONS] += accept(f, c, t, h, y, p, own, after, work)
+                has_dense, event, theta, rest = False, -1, NONE, 0.0
+                if len(switches.sides) > 0:
+                    near = nears(t1, after, p, own, switches)
+                    if near or approaches(y, after, h, work.K[0], work.last, rules, switches):
+                        now[Now.EVALUATIONS] += dense(f, c, t, h, y, p, own, after, work)
+                        event, theta = first_event(f, t, h, y, p, runs, work.F, switches)
+                        has_dense = event < 0
+                    if event >= 0:
+                        made, h, rest, e = cut(f, c, t, h, theta, p, runs, work, switches, event, control)
+                        now[Now.EVALUATIONS] += made
+                        if runs.lost[0] != 0 or not finite(after):
+                            return Ended.TOO_SMALL
+                        if e > 1.0:
+                            control[At.NEXT] = shortened(h, e, control)
+                            remember(t, y, p, own, switches)
+                            continue
+                        t1 = t + (h + rest)
+                        control[At.NEXT] = max(control[At.NEXT], abs(control[At.TAKEN]))  # the cut is no error
+                        switches.sides[event] = -switches.sides[event]
+                if h > 0.0 and asked(times, now, t1, end):
+                    if not has_dense:
+                        now[Now.EVALUATIONS] += dense(f, c, t, h, y, p, own, after, work)
+                    inside(f, runs, kept, times, now, t, h, t1, end, p, work.F)
+                copy(y, after)
+                if event >= 0:
+                    arrive(y, work.last, rest, switches, event)
+                for row in switches.zeroed:
+                    y[row, 0] = 0.0
+                times.reached[0] = t1
+                copy(work.K[0], work.last)
+                if times.every and event < 0 and t1 < end:
+                    keep(f, runs, kept, now, t1, y, p)
+                now[Now.STEPS] += 1
+                now[Now.BUDGET] -= 1
+                walk(runs, kept, now, t1)
+                show(runs, kept, rules, work.last, now, t, t1, t == start and acts(rules, plan.ticks[s]))
+                if event >= 0:
+                    now[Now.EVENT] = event
+                    now[Now.STEP] = 1
+                    guard = event - switches.thresholds
+                    if sides.restarts and event < len(switches.rows) - switches.asked:
+                        control[At.NEXT] = 0.0
+                    if 0 <= guard < switches.guards:
+                        ended = end_mode(f, t1, runs, p, switches, holding, guard)
+                        if ended != Ended.DONE:
+                            return ended
+                    elif not goes_on(t1, runs, switches, sides, holding, event, rules.held):
+                        return Ended.EVENT
+                    if now[Now.BUDGET] <= 0 or stop[0] != 0:
+                        return Ended.PAUSED
+                    break
+                settle_sides(switches)
+                if not rules.canonical and fast(y, rules.n):
+                    return Ended.FAST
+                if now[Now.STEPS] % _WATCHED == 0 and not conserve(f, runs, rules, t1, p):
+                    return Ended.GAINS
+                if now[Now.BUDGET] <= 0 or stop[0] != 0:
+                    return Ended.PAUSED
+            if now[Now.STEP] == 1:  # behind an event
+                continue
+            now[Now.SEGMENT] += 1
+            now[Now.STEP] = 0
+        return Ended.DONE
+
+    return advance
+
+
+def arrive(y: Array, rate: Array, rest: float, switches: Switches, event: int) -> None:
+    """The last bit of a step up to an event; what passes its level there lies on it, but for rounding."""
+    for e in range(len(y)):
+        y[e, 0] += rest * rate[e, 0]
+    if event < len(switches.exact) and not switches.rates[event]:
+        row, level = switches.rows[event], switches.levels[event]
+        if abs(y[row, 0] - level) <= switches.exact[event]:
+            y[row, 0] = level
+
+
+def node(f: Functions, runs: Runs, kept: Kept, times: Times, now: Array, t: float, p: Array) -> None:
+    """A sample, if there is to be one, and a shared state, at the start of a segment or at the end of the run."""
+    due = now[Now.DUE] * times.period <= t + _EARLY * times.period
+    if due or times.nodes or (t == times.end and times.period < np.inf):
+        keep(f, runs, kept, now, t, runs.y, p)
+    while now[Now.DUE] * times.period <= t + _EARLY * times.period and times.period < np.inf:
+        now[Now.DUE] += 1
+    if times.compared < np.inf:
+        share(kept, now, t, runs.y)
+        while now[Now.MET] * times.compared <= t + _EARLY * times.compared:
+            now[Now.MET] += 1
+
+
+def asked(times: Times, now: Array, t: float, end: float) -> bool:
+    """Whether a sample or a shared state is due before t."""
+    return due(now[Now.DUE], times.period, t, end) or due(now[Now.MET], times.compared, t, end)
+
+
+def due(k: int, period: float, t: float, end: float) -> bool:
+    """Whether the k-th period ends at t at the latest, and before the end of the segment."""
+    return k * period <= t and k * period < end - _EARLY * period
+
+
+def inside(
+    f: Functions, runs: Runs, kept: Kept, times: Times, now: Array, t: float, h: float, t1: float, end: float,
+    p: Array, F: Array,
+) -> None:  # fmt: skip
+    """The samples and shared states within a step."""
+    x = runs.last
+    while due(now[Now.DUE], times.period, t1, end):
+        at = now[Now.DUE] * times.period
+        between(runs.y, F, (at - t) / h, x)
+        keep(f, runs, kept, now, at, x, p)
+        now[Now.DUE] += 1
+    while due(now[Now.MET], times.compared, t1, end):
+        at = now[Now.MET] * times.compared
+        between(runs.y, F, (at - t) / h, x)
+        share(kept, now, at, x)
+        now[Now.MET] += 1
+
+
+def keep(f: Functions, runs: Runs, kept: Kept, now: Array, t: float, y: Array, p: Array) -> None:
+    """Keep a sample."""
+    row = now[Now.ROW]
+    kept.t[row] = t
+    copy(kept.y[row], y)
+    evaluate(f.sample, t, y, p, runs.own, kept.made[row])
+    now[Now.ROW] += 1
+
+
+def share(kept: Kept, now: Array, t: float, y: Array) -> None:
+    """Keep a state for companion runs."""
+    row = now[Now.SHARED]
+    kept.shared_t[row] = t
+    copy(kept.shared[row], y[:, 0])
+    now[Now.SHARED] += 1
+
+
+def walk(runs: Runs, kept: Kept, now: Array, t: float) -> None:
+    """Keep the end of a step, while there is room."""
+    row = now[Now.WALKED]
+    if row < len(kept.walked_t):
+        kept.walked_t[row] = t
+        if row < len(kept.walked):
+            copy(kept.walked[row], runs.y[:, 0])
+        now[Now.WALKED] += 1
+
+
+def fast(y: Array, n: int) -> bool:
+    """Whether a joint moves without bound."""
+    most = 0.0
+    for e in range(n, 2 * n):
+        most = max(most, abs(y[e, 0]))
+    return not most < FASTEST

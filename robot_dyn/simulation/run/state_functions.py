@@ -1,0 +1,149 @@
+"""The state equation as functions for a time loop, (t, y, p, own, out), of one interpreted run.
+
+rate: y' and u    tick: u, in zero-order hold from then on, and the next states of the controller    energy: K and V
+sample: y', u, K and V    jacobian: as of `RightSide`, by differences    bodies: as of `bodies`
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.effects.plant import in_mode
+from robot_dyn.effects.set_valued import Mode
+from robot_dyn.errors import RobotDynError
+from robot_dyn.integrate.integrator import System
+from robot_dyn.integrate.primitives import evaluate
+from robot_dyn.simulation.dynamics.bodies import bodies
+from robot_dyn.simulation.dynamics.loop_state import Functions
+from robot_dyn.simulation.dynamics.moreau_jean import behind, stepped
+from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.run.watch import Watch
+
+
+def interpreted(equation: StateEquation, watch: Watch) -> Functions:
+    """The functions of a state equation, in Python.
+
+    `rate` and `jacobian` raise what the equation raises, `tick` and `energy` the DivergedError of the watch; `sample`
+    gives nan.
+    """
+    n, m = equation.plant.dynamics.n, equation.size
+
+    def rate(t: float, y: Array, p: Array, own: Array, out: Array) -> None:
+        made, u = equation.rate(min(max(t, p[0]), p[1]), _state(y), own[:n, 0].copy() if equation.sampled else None)
+        out[:m, 0], out[m:, 0] = made, u
+
+    def tick(t: float, y: Array, p: Array, own: Array, out: Array) -> None:
+        after, held = watch.tick(t, _state(y))
+        out[:n, 0], out[n:, 0] = held, after[2 * n : 2 * n + equation.state_size]
+
+    def energy(t: float, y: Array, p: Array, own: Array, out: Array) -> None:
+        x = _state(y)
+        q, v, _, _ = watch.answer(t, x, lambda: equation.state(x))
+        out[:, 0] = watch.answer(t, x, lambda: equation.energies(t, q, v))
+
+    def sampled(t: float, y: Array, p: Array, own: Array, out: Array) -> None:
+        sample(equation, min(max(t, p[0]), p[1]), _state(y), own[:n, 0] if equation.sampled else None, out[:, 0])
+
+    def jacobian(t: float, y: Array, p: Array, own: Array, out: Array) -> None:
+        end = p[1] if t - p[0] < p[1] - t else p[0]
+        out[:, :, 0] = system(functions, equation, p, own, exact=False).derivatives(t, y[:, 0], end)
+
+    def step(t: float, x: Array, p: Array, own: Array, out: Array) -> None:
+        held = own[:n, 0].copy() if equation.sampled else None
+        made = stepped(equation, min(max(t, p[0]), p[1]), _state(x), held)
+        out[: len(made), 0] = made
+
+    def of_behind(t: float, x: Array, p: Array, found: Array, out: Array) -> None:
+        out[:, 0] = behind(equation, x[:, 0], found[:, 0])
+
+    def of_bodies(t: float, y: Array, p: Array, own: Array, out: Array) -> None:
+        held = own[:n, 0].copy() if equation.sampled else None
+        out[:, 0] = bodies(equation, min(max(t, p[0]), p[1]), _state(y), held)
+
+    functions = Functions(rate, tick, energy, sampled, jacobian, 0, step, of_behind, bodies=of_bodies)
+    return functions
+
+
+def in_modes(equation: StateEquation, watch: Watch) -> Functions:
+    """The same in the mode that the last 3n own numbers are: held, direction and contact."""
+    known: dict[bytes, Functions] = {}
+
+    def of(own: Array) -> Functions:
+        numbers = own[len(own) - 3 * equation.plant.dynamics.n :, 0]
+        key = numbers.tobytes()
+        if key not in known:
+            mode = Mode(*numbers.copy().reshape(3, -1))
+            known[key] = interpreted(replace(equation, plant=in_mode(equation.plant, mode)), watch)
+        return known[key]
+
+    def forwarded(name: str) -> Callable[..., None]:
+        def function(t: float, y: Array, p: Array, own: Array, out: Array) -> None:
+            getattr(of(own), name)(t, y, p, own, out)
+
+        return function
+
+    names = "rate", "tick", "energy", "sample", "jacobian", "bodies"
+    return Functions(**{name: forwarded(name) for name in names})
+
+
+def sample(equation: StateEquation, t: float, y: Array, held: Array | None, out: Array) -> None:
+    """What a sample holds: y', u, K and V, (m + n + 2,); nan for what has no value just before a run diverges."""
+    n, m = equation.plant.dynamics.n, equation.size
+    out[...] = np.nan
+    try:
+        with np.errstate(all="ignore"):
+            q, v, z, _ = equation.state(y)
+            out[:n], out[m + n :] = v, equation.energies(t, q, v)
+            out[m : m + n] = u = equation.actuation(t, q, v, z, held)
+            out[m - len(equation.sources) : m] = equation.powers(t, q, v, z, u)
+            out[:m], _ = equation.rate(t, y, held)
+    except RobotDynError:
+        pass
+
+
+def _state(y: Array) -> Array:
+    """A state (m,) that code of a user's own may keep, and may not change."""
+    x = y[:, 0].copy()
+    x.setflags(write=False)
+    return x
+
+
+def system(
+    functions: Functions,
+    equation: StateEquation,
+    p: Array,
+    own: Array,
+    seen: Array | None = None,
+    exact: bool = True,
+) -> System:
+    """The equation y' = f(t, y) on one segment.
+
+    Args:
+        functions: Of the state equation, in Python.
+        equation: The state equation.
+        p: Of the segment.
+        own: u of a sampled controller, in zero-order hold, (n, 1), or nothing, (0, 1).
+        seen: Where the velocity and the actuation of each evaluation are written, (2n,).
+        exact: Whether derivatives are those of the functions, if they have them.
+    """
+    n, m = equation.plant.dynamics.n, equation.size
+    out, J = np.empty((m + n, 1)), np.empty((m + 1, m, 1))
+
+    def rate(t: Any, y: Array) -> Array:
+        if y.ndim > 1:  # an implicit method asks for its Jacobian
+            return np.array([rate(t, row) for row in y.reshape(-1, m)]).reshape(y.shape)
+        evaluate(functions.rate, float(t), np.ascontiguousarray(y)[:, None], p, own, out)
+        if seen is not None:
+            seen[:n], seen[n:] = out[:n, 0], out[m:, 0]
+        return out[:m, 0].copy()
+
+    def derivatives(t: Any, y: Array) -> Array:
+        evaluate(functions.jacobian, float(t), np.ascontiguousarray(y)[:, None], p, own, J)
+        return J[:, :, 0].copy()
+
+    return System(rate, n, equation.widths, derivatives if exact and functions.jacobian else None)

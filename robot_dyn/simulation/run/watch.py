@@ -1,0 +1,142 @@
+"""The watch over a run: what ends it before its time, and the words for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar, final
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.errors import RobotDynError
+from robot_dyn.foreign import is_mistake
+from robot_dyn.integrate.integrator import IntegrationError, Integrator, System
+from robot_dyn.simulation.dynamics.fastest_motion import fastest
+from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.events.transfers import Transfers
+from robot_dyn.simulation.setup.setup import Setup
+from robot_dyn.values import kept
+
+LARGEST = 1e100  # of Σ |y|: beyond it products overflow
+_PACED = 2000  # steps between looks at the pace of an adaptive method
+_MOST_AHEAD = 1e7  # steps that such a run may have before it at the pace it has: about an hour
+_STEEP = 1e-3  # of q or v: an effect that bends within less makes a system stiff
+
+T = TypeVar("T")
+
+
+class DivergedError(Exception):
+    """Internal: the run cannot go on from `t`; the message is advice."""
+
+    def __init__(self, t: float, advice: str) -> None:
+        super().__init__(advice)
+        self.t = t
+
+
+def one_step(method: Integrator, system: System, t: float, y: Array, h: float, watch: Watch) -> Array:
+    """The state after a step; DivergedError if there is none, or a number overflowed."""
+    after = watch.answer(t, y, lambda: method.step(system, t, y, h))
+    if overflowed(after):
+        raise watch.diverged(t, y, "a number overflowed")
+    return after
+
+
+def overflowed(y: Array) -> bool:
+    """Whether Σ |y| has reached LARGEST, or is nan, as the time loop judges runs in lock step."""
+    with np.errstate(over="ignore"):
+        return not np.abs(y).sum() < LARGEST
+
+
+def _start(setup: Setup) -> tuple[float, float]:
+    """Kinetic and potential energy at the start."""
+    energies = Transfers(setup.equation).equation.energies
+    K, V = (float(x[0]) for x in energies(np.zeros(1), setup.q0[None], setup.v0[None]))
+    return K, V
+
+
+@final
+class Watch:
+    """Tells when energy grows without a source: the ledger's residual exceeds all there was and came a thousandfold."""
+
+    def __init__(self, setup: Setup, equation: StateEquation) -> None:
+        self.setup, self.equation = setup, equation
+        K, V = kept(setup, _start)
+        self.energy, self.scale = K + V, 1.0 + abs(K) + abs(V)
+        self.paced, self.looked = 0.0, 0  # time and steps at the last look at the pace
+
+    def tick(self, t: float, y: Array) -> tuple[Array, Array | None]:
+        """A tick of the controller; DivergedError if it fails, or asks for no finite torque."""
+        y, held = self.answer(t, y, lambda: self.equation.tick(t, y))
+        if held is not None and not np.isfinite(held).all():
+            raise self.diverged(t, y, "the controller asks for a torque that is not finite")
+        return y, held
+
+    def look(self, t: float, y: Array) -> None:
+        """DivergedError if energy grows without a source."""
+        if self.answer(t, y, lambda: self.gains(t, y)):
+            raise self.diverged(t, y, "energy grows without a source")
+
+    def answer(self, t: float, y: Array, ask: Callable[[], T]) -> T:
+        """What the equations answer; DivergedError if they have no answer."""
+        try:
+            return ask()
+        except IntegrationError as error:  # it names its own remedy
+            raise DivergedError(t, str(error) + self._steepest()) from None
+        except RobotDynError as error:
+            if is_mistake(error):
+                raise
+            raise self.diverged(t, y, str(error)) from None
+
+    def pace(self, t: float, y: Array, steps: int) -> None:
+        """DivergedError if the steps of an adaptive method have become so short that the run would not end."""
+        since = steps - self.looked
+        if since < _PACED:
+            return
+        made, self.paced, self.looked = t - self.paced, t, steps
+        ahead = (self.setup.duration_s - t) / max(made, 1e-300) * since
+        if ahead > _MOST_AHEAD:
+            why = self._fastest(t, y, made / since)
+            implicit = "" if self.setup.integrator.name == "Rosenbrock" else "Rosenbrock, "
+            raise DivergedError(
+                t, f"the last {since} steps led {made:.1e} s on, at which pace {ahead:.0e} more are left: the system "
+                f"is stiff; {why}take {implicit}softer effects or a larger tolerance{self._steepest()}"
+            )  # fmt: skip
+
+    def _fastest(self, t: float, y: Array, h: float) -> str:
+        """Words for the fastest motion, if it is found at this state and such that steps h are those of stability."""
+        held = np.zeros(self.equation.plant.dynamics.n) if self.equation.sampled else None
+        try:
+            motion = fastest(self.equation, t, y, held)
+        except (RobotDynError, np.linalg.LinAlgError):
+            return ""
+        return f"{motion}: " if abs(motion.eigenvalue) * h > 1 else ""
+
+    def _steepest(self) -> str:
+        """Words for the effect that bends within the least change of q or v, if that is small."""
+        names, found = self.equation.plant.dynamics.joint_names, (_STEEP, "")
+        for effect in self.equation.plant.effects:
+            for width, unit in zip(effect.widths, ("rad or m", "rad/s or m/s"), strict=True):
+                at = np.broadcast_to(width, (len(names),))
+                i = int(np.argmin(at))
+                found = min(
+                    found, (float(at[i]), f"{effect.name} of joint {names[i]!r} bends within {at[i]:.1e} {unit}")
+                )
+        return found[1] and f" ({found[1]})"
+
+    def gains(self, t: float, y: Array) -> bool:
+        """Whether the ledger's residual says so."""
+        q, v, _, W = self.equation.state(y)
+        K, V = self.equation.energies(np.array([t]), q[None], v[None])
+        return bool((K + V)[0] - self.energy - W.sum() > 1e3 * (self.scale + np.abs(W).sum()))
+
+    def diverged(self, t: float, y: Array, why: str) -> DivergedError:
+        """The end of a run at time t and state y, with the fastest joint and the remedy."""
+        return DivergedError(t, diverged_advice(why, self.equation.fastest_joint(y), self.setup))
+
+
+def diverged_advice(why: str, joint: str, setup: Setup) -> str:
+    """Why a run diverged, which joint moved fastest then, and what to do, as long as its loop does not explain it."""
+    advice = f"take a smaller step than {setup.taken_step_s:g} s, or an implicit method"
+    if setup.controller is not None and setup.controller.period_s:
+        advice += f"; or, if the sampled loop is unstable, a shorter period than {setup.controller.period_s:g} s"
+    return f"{why}; the fastest joint is {joint!r}: {advice}"

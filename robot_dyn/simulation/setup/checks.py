@@ -1,0 +1,161 @@
+"""What a setup is checked for: that its parts fit each other and the method, and have an answer at the start."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.effects.plant import Plant
+from robot_dyn.effects.rigid_stops import RigidStops
+from robot_dyn.errors import ControlError, EffectError, OverflowedError, QueryError, shown
+from robot_dyn.foreign import call
+from robot_dyn.simulation.setup.size import MOST_CUT
+from robot_dyn.validate import returned
+
+if TYPE_CHECKING:
+    from robot_dyn.simulation.setup.setup import Setup
+
+
+def check_parts(setup: Setup) -> None:
+    """That the method can make the run, and that effects, controller and events have an answer at the start.
+
+    Raises:
+        QueryError: If the method cannot, or an event returns no number.
+        EffectError, ControlError: If an effect or the controller does not return one number for each joint.
+    """
+    if setup.events and not setup.finds_events:
+        method = setup.integrator
+        raise QueryError(
+            f"events: steps of {method.name} are not cut; take integrator='DOP853'"
+            if method.nonsmooth
+            else f"events: runs of more than {MOST_CUT} steps of {method.name} are not cut; take longer"
+            " steps, or integrator='DOP853'"
+        )
+    _check_set_valued(setup)
+    _check_payloads(setup)
+    _check_drives(setup)
+    _check_torques(setup)
+    _check_control(setup)
+    _check_events(setup)
+    nothing = np.zeros(setup.plant.dynamics.n)
+    setup.plant.actuation(nothing)
+    with suppress(OverflowedError):  # a start so far out is the outcome of a run
+        setup.plant.forward_dynamics(0.0, setup.q0, setup.v0, nothing)  # a singular M is told at once
+
+
+def check_model(setup: Setup) -> None:
+    """That the controller means the joints and links of the plant; a file with other names all over may fit too."""
+    plant, controller = setup.plant.dynamics, setup.controller
+    if controller is None:
+        return
+    for model in controller.models.values():
+        pairs = tuple(zip(model.joint_names, plant.joint_names, strict=False))
+        if not any(own in plant.joint_names for own, _ in pairs):
+            continue
+        for own, name in pairs:
+            if own != name:
+                raise QueryError(
+                    f"the controller's model has the joint {own!r} where the plant has {name!r}; lock the same"
+                    " joints of both"
+                )
+    if controller.task_frame is not None:
+        plant.placement(setup.q0, controller.task_frame)  # so that an unknown link is told now
+
+
+def check_stops(plant: Plant, q0: Array, of: str = "q0") -> None:
+    """That a start is not beyond a rigid stop.
+
+    Raises:
+        QueryError: If it is; names the joint, and by `of` the start.
+    """
+    for each in plant.effects:
+        if isinstance(each, RigidStops) and (depth := each.beyond_by(q0)).any():
+            i = int(np.argmax(depth))
+            name, which = plant.dynamics.joint_names[i], "lower" if each.touched(q0)[i] < 0 else "upper"
+            raise QueryError(f"{of}: {name!r} is {depth[i]:.3g} beyond its {which} stop; start between the stops")
+
+
+def _check_set_valued(setup: Setup) -> None:
+    """That steps can end where joints are held and let go, and that the start is not beyond a rigid stop."""
+    effects = setup.plant.equation_of_motion.set_valued
+    method: Any = setup.integrator
+    for fails, why in (
+        (method.canonical, "integrates momenta"),
+        (not method.controls_error and method.order < 2, "is of order 1, too low to find where"),
+        (not setup.finds_events, f"takes more than {MOST_CUT} steps"),
+    ):
+        if effects and fails and not method.nonsmooth:
+            raise QueryError(
+                f"{effects[0].name}: steps must end where it holds a joint or lets it go, and {method.name} {why};"
+                " take integrator='DOP853', or 'time_stepping' with a step_s"
+            )
+    if method.nonsmooth and (other := [x for x in effects if not (x.rubs or x.stops)]):
+        raise QueryError(f"{other[0].name}: has no law for {method.name}; take integrator='DOP853'")
+    check_stops(setup.plant, setup.q0)
+
+
+def _check_payloads(setup: Setup) -> None:
+    """That the state is one of velocities where payloads come and go."""
+    if setup.plant.equation_of_motion.payloads and setup.integrator.canonical:
+        raise QueryError(
+            f"carried_payload: what is picked up or dropped changes momenta, which {setup.integrator.name}"
+            " integrates; take integrator='DOP853'"
+        )
+    if setup.plant.equation_of_motion.payloads and setup.integrator.nonsmooth:
+        raise QueryError(
+            f"carried_payload: steps of {setup.integrator.name} do not end where it comes and goes; take"
+            " integrator='DOP853'"
+        )
+
+
+def _check_drives(setup: Setup) -> None:
+    """That the method integrates motors with the joints that they drive."""
+    for drive in setup.plant.equation_of_motion.drives.values():
+        if setup.integrator.nonsmooth:
+            raise QueryError(
+                f"{drive.name}: {setup.integrator.name} takes no motors of a drive; take integrator='DOP853'"
+            )
+
+
+def _check_torques(setup: Setup) -> None:
+    """That what each effect returns at the start is one number for each joint."""
+    dynamics = setup.plant.dynamics
+    with np.errstate(all="ignore"):
+        torques = setup.plant.equation_of_motion.torques(0.0, setup.q0, setup.v0)
+        for force, torque in zip(setup.plant.forces, torques, strict=True):
+            returned(f"{type(force).__name__}.torque", torque, dynamics.n, error=EffectError)
+            if any(each.of_actuation for each in force.thresholds(dynamics.n)):
+                raise EffectError(f"{force.name}: thresholds of the actuation are for bounds")
+        equation = setup.plant.equation_of_motion
+        u, z = np.zeros(dynamics.n), np.zeros(equation.state_size)
+        u, reached = equation.applied(u, z)
+        names = (type(setup.plant.effects[k]).__name__ for k in equation.states)
+        rates = equation.state_rates(0.0, setup.q0, setup.v0, u, reached, z)
+        for name, (place, rate) in zip(names, rates, strict=True):
+            returned(f"{name}.state_rate", rate, place.stop - place.start, "state", error=EffectError)
+
+
+def _check_control(setup: Setup) -> None:
+    """That what the controller returns at the start is one number for each joint, and for each of its states."""
+    controller, n = setup.controller, setup.plant.dynamics.n
+    if controller is None:
+        return
+    with np.errstate(all="ignore"), suppress(OverflowedError):  # of its model: the outcome of a run
+        start = 0.0, setup.q0, setup.v0, np.zeros(controller.state_size)
+        torque = call(controller.torque, *start)
+        returned(f"{controller.name}.torque", torque, n, error=ControlError)
+        if controller.state_size:
+            after = controller.next_state if controller.period_s else controller.state_rate
+            made = f"{controller.name}.{after.__name__}"
+            returned(made, call(after, *start), controller.state_size, "state", error=ControlError)
+
+
+def _check_events(setup: Setup) -> None:
+    """That what each event returns at the start is a number."""
+    for event in setup.events:
+        value = call(event.function, 0.0, setup.q0, setup.v0)
+        if np.ndim(value) or not isinstance(value, int | float | np.number) or not np.isfinite(value):
+            raise QueryError(f"event {event.name!r}: its function must return a finite number, got {shown(value)}")

@@ -1,0 +1,52 @@
+"""Events: where a run passes a threshold of an effect, or a function of the user's own vanishes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from inspect import signature
+from typing import Any, final
+
+from robot_dyn.errors import QueryError, shown
+from robot_dyn.validate import instance, truth
+
+_DIRECTIONS = (-1, 0, 1)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Event:
+    """An event that the user asks for: g(t, q, v) = 0.
+
+    A step of integration ends there. Between the ends of steps g is looked at eight times on the dense output.
+
+    Attributes:
+        function: g, a function of (t, q, v) that returns a number.
+        direction: 1 if only growing g counts, −1 if only falling g does, 0 for both.
+        terminal: Whether the run ends there.
+        name: For people; that of the function unless given.
+
+    Raises:
+        QueryError: If the function does not take three arguments, or an option is not allowed.
+    """
+
+    function: Callable[[Any, Any, Any], Any]
+    direction: int = 0
+    terminal: bool = False
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        if not callable(self.function):
+            raise QueryError(f"function: give one of (t, q, v), got {shown(self.function)}")
+        if type(self.direction) is not int or self.direction not in _DIRECTIONS:
+            raise QueryError(f"direction must be -1, 0 or 1, got {shown(self.direction)}")
+        truth("terminal", self.terminal)
+        instance("name", self.name, str, "give a text")
+        try:
+            signature(self.function).bind(0.0, None, None)
+        except TypeError:
+            raise QueryError(f"event {self.function!r}: give a function of (t, q, v)") from None
+        except ValueError:  # of some functions written in C the arguments are not known
+            pass
+        if not self.name:
+            object.__setattr__(self, "name", getattr(self.function, "__name__", type(self.function).__name__))

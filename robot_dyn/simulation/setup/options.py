@@ -1,0 +1,79 @@
+"""The options of a run: the attributes of a `Setup`, as keyword arguments of `simulate` and `rollouts`.
+
+Names and defaults stand once, in `Setup`; `inspect.signature` and `help` of both functions show them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from copy import copy
+from dataclasses import fields, replace
+from inspect import Parameter, signature
+from typing import Any, TypedDict, TypeVar
+
+from robot_dyn.effects.plant import Plant
+from robot_dyn.errors import QueryError, nearest
+from robot_dyn.integrate.methods import as_method
+from robot_dyn.queries.dynamics import Dynamics
+from robot_dyn.simulation.setup.setup import Setup, no_step
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+class Options(TypedDict, total=False):
+    """Attributes of a `Setup`, but for plant and start, for readers of the source and for type checkers."""
+
+    duration_s: float
+    controller: Any
+    integrator: Any
+    step_s: float | None
+    record_period_s: float
+    estimate_error: bool
+    about: dict[str, str]
+    engine: str
+    events: Any
+    accuracy: Any
+
+
+def takes_options(function: Function) -> Function:
+    """A decorator: the signature shows each option with its default, in place of `**options`."""
+    known = signature(function)
+    (rest,) = (each for each in known.parameters.values() if each.kind is Parameter.VAR_KEYWORD)
+    given = [each for each in known.parameters.values() if each is not rest]
+    of_setup = signature(Setup).parameters
+    options = [of_setup[name].replace(kind=Parameter.KEYWORD_ONLY) for name in Options.__annotations__]
+    function.__signature__ = known.replace(parameters=[*given, *options])  # pyright: ignore[reportFunctionMemberAccess]
+    return function
+
+
+def starts(q0: Any, v0: Any) -> dict[str, Any]:
+    """The start, as far as it was given, as options."""
+    return {name: x for name, x in (("q0", q0), ("v0", v0)) if x is not None}
+
+
+def setup_of(caller: str, what: Setup | Plant | Dynamics, options: Mapping[str, Any]) -> Setup:
+    """The setup that is meant: of a plant or robot with options, or a setup with some of its attributes changed.
+
+    Args:
+        caller: Name of the function that takes the options.
+        what: What to run.
+        options: The options that were given, q0 and v0 among them.
+
+    Raises:
+        QueryError: If an option is unknown, or q0 is missing.
+    """
+    if isinstance(what, Setup) and not options:
+        return what if what.is_value else copy(what)  # parts may have changed since: nothing that was kept is taken
+    known = {each.name for each in fields(Setup)} if isinstance(what, Setup) else {"q0", "v0", *Options.__annotations__}
+    for name in options.keys() - known:
+        raise QueryError(f"{caller}: no option {name!r}; {nearest(name, known)}")
+    if "integrator" in options and (method := as_method(options["integrator"])).controls_error:
+        if "step_s" in options:
+            raise QueryError(no_step(method.name))
+        options = {"step_s": None, **options}  # that of the setup was given for another method
+    if isinstance(what, Setup):
+        return replace(what, **options)
+    plant = what if isinstance(what, Plant) else Plant(what)
+    if "q0" not in options:
+        raise QueryError(f"{caller}: give q0, the position at the start, ({plant.dynamics.n},)")
+    return Setup(plant, **options)

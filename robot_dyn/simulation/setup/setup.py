@@ -1,0 +1,236 @@
+"""The setup of a run: plant, start, duration, controller, method. A value; `simulate` turns it into a Trajectory."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+from math import inf
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array, Ball
+from robot_dyn.control.control_law import ControlLaw
+from robot_dyn.control.controller import Controller
+from robot_dyn.effects.plant import Plant
+from robot_dyn.errors import QueryError, shown
+from robot_dyn.integrate.adaptive import AUTO, Adaptive
+from robot_dyn.integrate.methods import as_method
+from robot_dyn.simulation.dynamics.declarations import is_value, undeclared
+from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.setup.asked import asked
+from robot_dyn.simulation.setup.checks import check_model, check_parts
+from robot_dyn.simulation.setup.event import Event
+from robot_dyn.simulation.setup.schedule import LEAST_STEPS, ON_STEP, Segment, cuts, near, nodes, steps_on
+from robot_dyn.simulation.setup.size import MOST_CUT, check_segments
+from robot_dyn.validate import choice, duration, instance, integer, one_state, truth
+from robot_dyn.values import Keeping, Value
+
+ENGINES = ("auto", "interpreted", "compiled")
+STEP_S = 1e-3  # of a method of fixed step, unless given
+_LONGEST_STEP_S, _LEAST_STEPS = 0.01, 200  # where a part does not declare where it switches
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Setup(Value, Keeping):
+    """All that a run depends on; what follows from it alone is computed once and kept with it, and not copied.
+
+    Attributes:
+        plant: What moves.
+        q0: Position at the start, (n,).
+        v0: Velocity at the start, (n,); 0 if not given.
+        duration_s: In [s].
+        controller: What drives it: a `Controller`; a function (t, q, v) → torque (n,), which is made one; or None.
+        integrator: The method, by its name as in a scene or itself: "auto", "DOP853" and "Rosenbrock", or an `Adaptive`
+            with other tolerances, choose their steps; "rk4", "order_8", "gauss_4" and others of `rd.method` have a
+            fixed one.
+        step_s: Fixed step, 1 ms unless given; made smaller where samples, ticks, switches and the end ask for it. It is
+            not to be given for a method that chooses its steps.
+        record_period_s: Time between samples; 0 for every step, or 1000 samples where the method chooses its steps.
+        estimate_error: Whether companion runs are made, which cost about as much as the run; five times as much
+            where only shorter steps can tell.
+        about: Texts kept with the run.
+        engine: "interpreted"; "compiled", the run in machine code, right angles of the file written out in
+            full; or "auto", which compiles where that pays, and uses machine code that this process already has.
+        events: What to look out for: steps end there, and the run does if one is terminal.
+        accuracy: Largest error of q to have, over joints and times: a number for rad and m alike, or one of each, as
+            {"rad": 1e-8, "m": 1e-6}, of which the least holds. Pilot runs choose method and tolerance, and the error
+            estimate is the check.
+    """
+
+    plant: Plant
+    q0: Array
+    v0: Array = None
+    duration_s: float = 1.0
+    controller: Any = None
+    integrator: Any = "auto"
+    step_s: float | None = None
+    record_period_s: float = 0.0
+    estimate_error: bool = True
+    about: dict[str, str] = field(default_factory=dict, repr=False)
+    engine: str = "auto"
+    events: tuple[Event, ...] = ()
+    accuracy: Any = None
+
+    def __post_init__(self) -> None:
+        instance("plant", self.plant, Plant, "give one, as rd.Plant(robot)")
+        if isinstance(getattr(self.plant.dynamics, "arithmetic", None), Ball):
+            raise QueryError(
+                "plant: runs are computed in floats, got dynamics in ball arithmetic; give rd.Plant(robot)"
+            )
+        names = self.plant.dynamics.joint_names
+        if self.v0 is None:
+            object.__setattr__(self, "v0", np.zeros(len(names)))
+        object.__setattr__(self, "integrator", as_method(self.integrator))
+        for name in ("q0", "v0"):
+            object.__setattr__(self, name, one_state(name, getattr(self, name), names))
+        for name in ("duration_s", "step_s", "record_period_s"):
+            if (seconds := getattr(self, name)) is not None or name != "step_s":
+                object.__setattr__(self, name, duration(name, seconds, zero=name == "record_period_s"))
+        truth("estimate_error", self.estimate_error)
+        if self.accuracy is not None:
+            self._check_accuracy()
+        for text in (
+            text for pair in instance("about", self.about, dict, "give texts by name").items() for text in pair
+        ):
+            instance("about", text, str, "give texts by name")
+        object.__setattr__(self, "about", dict(self.about))
+        if self.integrator.controls_error and self.step_s is not None:
+            raise QueryError(no_step(self.integrator.name))
+        choice("engine", self.engine, ENGINES)
+        object.__setattr__(self, "events", _events(self.events))
+        object.__setattr__(self, "controller", _controller(self.controller, len(names)))
+        check_model(self)
+        check_segments(self)
+        check_parts(self)
+
+    def _check_accuracy(self) -> None:
+        """That an accuracy is one, and that nothing else chooses method or tolerance."""
+        object.__setattr__(self, "accuracy", asked(self.accuracy, self.plant.dynamics))
+        if self.integrator != Adaptive(AUTO):
+            raise QueryError(f"accuracy: chooses method and tolerance; leave out integrator, got {self.integrator}")
+        if not self.estimate_error:
+            raise QueryError("accuracy: is held to the error estimate; leave out estimate_error=False")
+
+    def __getstate__(self) -> Any:
+        state, frozen = super().__getstate__()
+        return {each.name: state[each.name] for each in fields(self)}, frozen
+
+    @cached_property
+    def is_value(self) -> bool:
+        """Whether no part but its events is the user's own code, or may change: what follows from it stays as it is."""
+        return all(map(is_value, (self.plant, self.controller, self.integrator)))
+
+    @cached_property
+    def equation(self) -> StateEquation:
+        """Its state equation."""
+        return StateEquation(self.plant, self.controller, self.integrator.canonical, self.events)
+
+    @cached_property
+    def undeclared(self) -> tuple[tuple[Any, str], ...]:
+        """Its parts that do not declare what they must, each with what to declare."""
+        return undeclared(self.plant, self.controller)
+
+    @cached_property
+    def segments(self) -> tuple[Segment, ...]:
+        """The run cut at the ticks of the controller, the breaks of its reference and the switches of effects.
+
+        Raises:
+            QueryError: If two switches lie closer together than floats can tell.
+        """
+        starts, step = self._cuts[:-1], self.nominal_step_s
+        ends = [t for t, _ in self._cuts[1:]]
+        counts = [
+            steps_on(end - start, step, self.record_period_s) for (start, _), end in zip(starts, ends, strict=True)
+        ]
+        few = sum(count < LEAST_STEPS for count in counts)
+        if LEAST_STEPS * few <= sum(counts) / 10:  # so that companion runs can take longer steps there
+            counts = [max(count, LEAST_STEPS) for count in counts]
+        firsts = np.cumsum([0, *counts[:-1]]).tolist()
+        return tuple(
+            Segment(start, end, tick, count, first)
+            for (start, tick), end, count, first in zip(starts, ends, counts, firsts, strict=True)
+        )
+
+    @cached_property
+    def _cuts(self) -> list[tuple[float, bool]]:
+        switches = {t for effect in self.plant.effects for t in effect.switches}
+        switches |= set(self.controller.knots if self.controller else ())
+        period, instants = (self.controller.period_s, self.controller.instants) if self.controller else (0.0, (0.0,))
+        return cuts(self.duration_s, period, switches, instants)
+
+    @property
+    def ends_on_tick(self) -> bool:
+        """Whether the controller acts at the end of the run."""
+        return self._cuts[-1][1]
+
+    @property
+    def finds_events(self) -> bool:
+        """Whether steps end where effects and the controller switch, and at events asked for."""
+        if self.integrator.controls_error or self.integrator.nonsmooth:
+            return not self.integrator.nonsmooth
+        return self.equation.switches and self.steps <= MOST_CUT
+
+    @property
+    def samples_on_steps(self) -> bool:
+        """Whether each sample of a method of fixed step is at the end of a step that is not cut."""
+        if not self.record_period_s:
+            return True
+        ends, due = nodes(self.segments), np.arange(0.0, self.duration_s, self.record_period_s)
+        return bool((np.abs(near(ends, due) - due) <= ON_STEP * self.nominal_step_s).all())
+
+    @property
+    def steps(self) -> int:
+        """Number of steps of a method of fixed step."""
+        return self.segments[-1].first + self.segments[-1].steps
+
+    @property
+    def nominal_step_s(self) -> float:
+        """Step of a method of fixed step before it is made smaller, in [s]."""
+        return STEP_S if self.step_s is None else self.step_s
+
+    @property
+    def taken_step_s(self) -> float:
+        """Longest step that a method of fixed step takes, in [s]: at most `nominal_step_s` and the record period."""
+        return max((each.end - each.start) / each.steps for each in self.segments)
+
+    @property
+    def longest_step_s(self) -> float:
+        """Longest step that an adaptive method may take, in [s]: 10 ms and 1/200 of the run with an undeclared part.
+
+        What does not declare where it switches may act between the ends of a step, and error control does not see what
+        no stage meets. A fixed step is the user's.
+        """
+        longest = min(_LONGEST_STEP_S, self.duration_s / _LEAST_STEPS)
+        return longest if self.undeclared else inf
+
+
+def no_step(name: str) -> str:
+    """What is wrong with a step for a method that chooses its own."""
+    return (
+        f"step_s has no effect on {name}, which chooses its steps: leave it out, name a method of fixed step, such as"
+        " integrator='rk4', or give rd.Adaptive(max_step_s=…)"
+    )
+
+
+def _events(given: Any) -> tuple[Event, ...]:
+    """The events that are meant: several, or one."""
+    given = (given,) if isinstance(given, Event) else given
+    if not isinstance(given, tuple | list):
+        raise QueryError(f"events: give a list of rd.Event, got {shown(given)}")
+    return tuple(instance("events", each, Event, "give a list of rd.Event") for each in given)
+
+
+def _controller(given: Any, n: int) -> Controller | None:
+    """The controller of n joints that is meant; raises QueryError if it is not one."""
+    made: Any = given
+    if callable(given) and not isinstance(given, Controller) and not isinstance(given, type):
+        made = ControlLaw(given, n)
+    instance("controller", made, Controller | None, "give one, such as rd.PD(…), a function of (t, q, v), or None")
+    if made is not None:
+        duration("period_s of the controller", made.period_s, zero=True)
+        if made.n != n:
+            raise QueryError(f"the controller drives {made.n} joints, the plant has {n}")
+        integer("state_size of the controller", made.state_size)
+    return made

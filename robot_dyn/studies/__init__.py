@@ -1,0 +1,1 @@
+"""What accuracy costs, and how far the numbers can be believed."""

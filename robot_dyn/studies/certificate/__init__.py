@@ -1,0 +1,1 @@
+"""What a digit of M, C, N, inverse and forward dynamics costs."""

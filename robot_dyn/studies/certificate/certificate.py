@@ -1,0 +1,154 @@
+"""A certificate: how many digits of each quantity are true by each road, and what they cost."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from math import log10
+from typing import Any, ClassVar, final
+
+from robot_dyn.errors import QueryError
+from robot_dyn.result import Result, reported
+from robot_dyn.seconds import in_words
+from robot_dyn.validate import choice
+
+
+@final
+@dataclass(frozen=True)
+class Held:
+    """The digits of one quantity by one road, from 0 to 20.
+
+    Attributes:
+        quantity: Its name.
+        road: Program or formulation, and numbers.
+        given: At the state that was given; None if none was.
+        typical: Median of random states.
+        random: At the worst of them.
+        searched: At the worst state that was found.
+        samples: Number of random states; 1 for balls, whose digits are proven.
+        time_s: Of one query from Python, median, in [s].
+        repeats: Number of times it was timed.
+        state: The worst state, q, v, a, tau by name.
+    """
+
+    quantity: str
+    road: str
+    given: float | None
+    typical: float
+    random: float
+    searched: float
+    samples: int
+    time_s: float
+    repeats: int
+    state: dict[str, list[float]] = field(hash=False, repr=False)
+
+
+@final
+@dataclass(frozen=True)
+class Condition:
+    """κ of M scaled to a unit diagonal; inf where M is singular.
+
+    Attributes:
+        given: At the state that was given; None if none was.
+        typical: Median of random states.
+        random: The largest of them.
+        searched: The largest that was found.
+        q: Where that is.
+    """
+
+    given: float | None
+    typical: float
+    random: float
+    searched: float
+    q: tuple[float, ...] = field(repr=False)
+
+    @property
+    def digits(self) -> float:
+        """log₁₀ κ at its largest: what a solution of M a = τ may lose."""
+        return log10(self.searched)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Certificate(Result):
+    """True digits of a robot's dynamics.
+
+    Attributes:
+        robot: Its name.
+        joints: Their names.
+        digits: Of each quantity by each road.
+        decimals: By quantity, digits that the float64 nearest to the decimals of the file leave, at the worst state.
+        right_angles: By quantity, digits of the file that machine code leaves where it writes right angles out in full.
+        condition: Of M.
+        bits: Of the balls that the truth took, at most.
+        left_out: What was left out, and why.
+        environment: Versions and processor.
+        seed: Of the random states.
+        interrupted: Whether it was ended by the user.
+    """
+
+    columns: ClassVar[tuple[str, ...]] = (
+        "quantity", "road", "given", "typical", "samples", "random", "searched", "time_s", "repeats",
+    )  # fmt: skip
+    robot: str
+    joints: tuple[str, ...]
+    digits: tuple[Held, ...]
+    decimals: dict[str, float]
+    right_angles: dict[str, float]
+    condition: Condition
+    bits: int
+    left_out: tuple[str, ...]
+    environment: dict[str, str] = field(repr=False)
+    seed: int
+    interrupted: bool = False
+
+    def of(self, quantity: str, road: str) -> Held:
+        """The digits of one quantity by one road.
+
+        Raises:
+            QueryError: If they were not counted.
+        """
+        choice("quantity", quantity, self.quantities)
+        choice("road", road, self.roads)
+        for each in self.digits:
+            if (each.quantity, each.road) == (quantity, road):
+                return each
+        raise QueryError(f"{road!r} does not answer {quantity}; look at the quantities of each road in digits")
+
+    @property
+    def rows(self) -> Iterator[Mapping[str, Any]]:
+        yield from map(vars, self.digits)
+        for quantity, digits in self.decimals.items():
+            yield {"quantity": quantity, "road": "decimals of the file as float64", "searched": digits}
+
+    @reported
+    def lost(self) -> dict[str, float]:
+        """By road, digits of inverse dynamics less those of forward dynamics, at the worst states."""
+        found = {(each.quantity, each.road): each.searched for each in self.digits if each.samples > 1}
+        pairs = ((road, ("inverse_dynamics", road), ("forward_dynamics", road)) for road in self.roads)
+        return {road: found[one] - found[two] for road, one, two in pairs if one in found and two in found}
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """That were looked at."""
+        return tuple(dict.fromkeys(each.quantity for each in self.digits))
+
+    @property
+    def roads(self) -> tuple[str, ...]:
+        """That were looked at."""
+        return tuple(dict.fromkeys(each.road for each in self.digits))
+
+    @reported
+    def sentence(self) -> str:
+        """The digits of forward dynamics, or of what else there is, in a sentence."""
+        if not self.digits:
+            return "no digits were counted"
+        quantity = self.quantities[-1]
+        parts = [
+            f"{each.road} {each.searched:.1f} in {in_words(each.time_s)}"
+            for each in sorted(self._of(quantity), key=lambda each: each.time_s)
+        ]
+        return f"digits of {quantity} at the worst state found: {'; '.join(parts)}"
+
+    def _of(self, quantity: str) -> Iterator[Held]:
+        return (each for each in self.digits if each.quantity == quantity)

@@ -1,0 +1,70 @@
+"""The diagram of a certificate: digits over time, a panel for each quantity, from typical states to the worst found."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from robot_dyn.studies.certificate.certificate import Certificate, Held
+from robot_dyn.studies.sheet import Colours, ResultError, legend, lines, sheet, styled
+from robot_dyn.view.plots.figure import THEMES
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_WORDS = {"inverse_dynamics": "inverse dynamics", "forward_dynamics": "forward dynamics"}
+_WIDTH, _HEIGHT = 15.0, 5.2  # [inch]
+_TOP = 21.0  # digits
+
+
+def draw(result: Certificate, theme: str = "light") -> Figure:
+    """The diagram.
+
+    Raises:
+        ResultError: If no digits were counted.
+    """
+    from matplotlib.lines import Line2D
+
+    colours = THEMES[theme]
+    if not result.digits:
+        raise ResultError("no digits were counted, so there is nothing to draw; look at left_out")
+    figure = sheet(_WIDTH, _HEIGHT, result.sentence, _caption(result), colours)
+    grid = figure.add_gridspec(1, len(result.quantities), left=0.04, right=0.99, top=0.76, bottom=0.2, wspace=0.16)
+    for k, quantity in enumerate(result.quantities):
+        axes = figure.add_subplot(grid[0, k])
+        axes.set(xscale="log", ylim=(0, _TOP), yticks=range(0, 21, 5))
+        styled(axes, colours, "time of a query [µs]", _WORDS.get(quantity, quantity), "" if k else "digits")
+        for each in result.digits:
+            if each.quantity == quantity:
+                _mark(axes, each, colours["lines"][_hue(result, each.road, colours)], colours)
+        axes.axhline(result.decimals[quantity], color=colours["ink"], linewidth=0.9, linestyle=(0, (6, 3)))
+    handles = [
+        Line2D([], [], color=colours["lines"][_hue(result, road, colours)], marker="o", linewidth=3, label=lines(road))
+        for road in result.roads
+    ]
+    handles.append(Line2D([], [], color=colours["ink"], linestyle="--", label="decimals of the file as float64"))
+    legend(figure, handles, colours)
+    return figure
+
+
+def _caption(result: Certificate) -> str:
+    """What is drawn."""
+    samples = max(each.samples for each in result.digits)
+    return (
+        f"{result.robot}: bars from the median of {samples} random states to the worst state found, a tick at the worst"
+        f" random one; errors against balls of {result.bits} bits. κ of M up to {result.condition.searched:.3g}."
+        f" {result.environment['processor']}."
+    )
+
+
+def _mark(axes: Any, each: Held, colour: str, colours: Colours) -> None:
+    """One road: the range of its digits at its time."""
+    t = 1e6 * each.time_s
+    axes.plot([t, t], [each.searched, each.typical], color=colour, linewidth=3, solid_capstyle="butt")
+    axes.plot([t], [each.random], marker="_", color=colour, markersize=11, markeredgewidth=1.5)
+    axes.plot([t], [each.searched], marker="o", color=colour, markersize=5)
+    if each.given is not None:
+        axes.plot([t], [each.given], marker="x", color=colours["ink"], markersize=6)
+
+
+def _hue(result: Certificate, road: str, colours: Colours) -> int:
+    return result.roads.index(road) % len(colours["lines"])

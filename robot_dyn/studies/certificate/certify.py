@@ -1,0 +1,155 @@
+"""What a digit costs in M, C, N, inverse and forward dynamics: true digits of each road beside its time.
+
+    digits = −log₁₀(error),   error against balls of radius 1e-20
+
+Errors of M_ij are relative to √(M_ii M_jj); of accelerations, in the norm of M, to Σ ‖M⁻¹ τ_k‖ of τ, C v and N; of C, N
+and inverse dynamics to the largest entry in the units √M_ii of the joints, or its root mean square over the random
+states if that is more: an answer that vanishes at a state is no loss.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import inf
+from typing import Any
+
+import numpy as np
+
+from robot_dyn.arithmetic import Ball
+from robot_dyn.errors import QueryError
+from robot_dyn.lagrange.digits import QUANTITIES
+from robot_dyn.lagrange.manipulator import Lagrangian
+from robot_dyn.lagrange.scale import unit_diagonal_conditions
+from robot_dyn.model.robot import Robot
+from robot_dyn.queries.quantity import MOST_DIGITS, M, Quantity
+from robot_dyn.studies.certificate.certificate import Certificate, Condition, Held
+from robot_dyn.studies.certificate.counting import Counting
+from robot_dyn.studies.certificate.road import Road, asked, roads
+from robot_dyn.studies.certificate.worst_state import Batch, Search, random_states, row
+from robot_dyn.studies.environment import environment
+from robot_dyn.studies.timing import in_turns
+from robot_dyn.validate import function, instance, integer, joint_values
+
+_AT_LEAST_S = 1e-3  # of a loop that is timed
+_MOST_REPEATS, _LEAST_SAMPLES, _MOST_SAMPLES = 1000, 100, 10**6
+
+
+def certify(
+    robot: Robot,
+    *,
+    q: Any = None,
+    v: Any = None,
+    a: Any = None,
+    tau: Any = None,
+    samples: int = 10_000,
+    seed: int = 0,
+    repeats: int = 7,
+    on_progress: Callable[[float, str], object] | None = None,
+) -> Certificate:
+    """True digits of M, C, N, inverse and forward dynamics by each road, at random and searched-for states, and times.
+
+    Roads are Pinocchio, the Lagrangian in float32, float64 and longdouble, articulated bodies, machine code (judged
+    by its own right angles) and balls. Random states are as of `compare`, in numbers of float32, so that no road rounds
+    them. Their errors, and those of the search that begins at the worst of them, are taken against longdouble; balls
+    judge the worst of each. Errors of longdouble are taken against balls, at 1/250 of the states.
+
+    Args:
+        robot: The robot.
+        q: Positions of a state to look at too, (n,), in [rad] or [m].
+        v: Its velocities, (n,), in [rad/s] or [m/s]; 0 unless given.
+        a: Its accelerations, (n,), in [rad/s²] or [m/s²]; 0 unless given.
+        tau: Its torques, (n,), in [N m] or [N]; 0 unless given.
+        samples: Number of random states.
+        seed: Of the random generator.
+        repeats: How often each query is timed; they take turns.
+        on_progress: Called with the part that is done, from 0 to 1, and with what is being done.
+
+    Raises:
+        QueryError: If an argument is wrong.
+    """
+    robot = instance("robot", robot, Robot, "give one of rd.load").warn_below(None)
+    samples = integer("samples", samples, least=_LEAST_SAMPLES, most=_MOST_SAMPLES)
+    seed, repeats = integer("seed", seed, most=2**128 - 1), integer("repeats", repeats, least=1, most=_MOST_REPEATS)
+    tell = function("on_progress", on_progress, "(part, what)") or (lambda part, what: None)
+    given = _given(robot, q, v, a, tau)
+    rng = np.random.default_rng(seed)
+    states = random_states(robot, samples, rng)
+    tell(0.0, "machine code")
+    found, left_out = roads(robot)
+    counting, held, interrupted = Counting(robot, states, given, rng), list[Held](), False
+    asked_for = [each for each in QUANTITIES.values() if each in found[0].quantities]
+    try:
+        for k, quantity in enumerate(asked_for):
+            held += _quantity(
+                counting, quantity, [road for road in found if quantity in road.quantities], repeats, left_out,
+                lambda part, what, k=k: tell((k + part) / len(asked_for), what),
+            )  # fmt: skip
+    except KeyboardInterrupt:
+        interrupted = True
+        left_out.append("what was to come when it was interrupted")
+    return Certificate(
+        robot.name, robot.joint_names, tuple(held), counting.decimals, counting.right_angles,
+        _condition(robot, states, given, rng), counting.bits, tuple(left_out), environment(), seed, interrupted,
+    )  # fmt: skip
+
+
+def _given(robot: Robot, q: Any, v: Any, a: Any, tau: Any) -> dict[str, np.ndarray] | None:
+    """The state to look at, or None."""
+    more = {name: x for name, x in {"v": v, "a": a, "tau": tau}.items() if x is not None}
+    if q is None:
+        if more:
+            raise QueryError(f"{next(iter(more))} is given without q; give q, or leave it out")
+        return None
+    state = {name: np.zeros(robot.n) for name in ("v", "a", "tau")}
+    for name, x in ({"q": q} | more).items():
+        state[name] = np.array(joint_values(name, x, robot.joint_names))
+        if state[name].ndim != 1:
+            raise QueryError(f"{name} must have shape ({robot.n},), got {state[name].shape}")
+    return state
+
+
+def _quantity(
+    counting: Counting, quantity: Quantity, found: list[Road], repeats: int, left_out: list[str],
+    tell: Callable[[float, str], object],
+) -> list[Held]:  # fmt: skip
+    """The digits and times of one quantity by each road, and by balls; `left_out` takes those without an answer."""
+    counted = {}
+    for k, road in enumerate(found):
+        tell(k / len(found), f"{quantity.name}: {road.name}")
+        try:
+            counted[road.name] = counting.count(road, quantity)
+        except QueryError as error:
+            left_out.append(str(error))
+    state = counting.given or row(counting.states, 0)
+    balls = Lagrangian(counting.robot, Ball(counting.truth(counting.robot, quantity, state).bits))
+    proven = Road(f"balls, {balls.dtype.bits} bits", counting.robot, balls, (quantity,))
+    calls = {
+        road.name: road.call(quantity, state) for road in (*found, proven) if road.name in counted or road is proven
+    }
+    tell(1.0, f"{quantity.name}: times")
+    times = in_turns(calls, repeats, _AT_LEAST_S)
+    held = [
+        Held(
+            quantity.name, name, each.given, each.typical, each.random, each.searched, each.samples, times[name],
+            repeats, {key: x.tolist() for key, x in each.state.items() if key in quantity.arguments},
+        )
+        for name, each in counted.items()
+    ]  # fmt: skip
+    most = float(MOST_DIGITS)
+    own = None if counting.given is None else most
+    at = {key: state[key].tolist() for key in quantity.arguments}
+    return [*held, Held(quantity.name, proven.name, own, most, most, most, 1, times[proven.name], repeats, at)]
+
+
+def _condition(robot: Robot, states: Batch, given: dict[str, np.ndarray] | None, rng: np.random.Generator) -> Condition:
+    """κ of M, and its largest."""
+
+    def conditions(states: Batch) -> np.ndarray:
+        return unit_diagonal_conditions(asked(robot, M, states))
+
+    if robot.joint_without_inertia is not None:
+        return Condition(None if given is None else inf, inf, inf, inf, ())
+    known = conditions(states)
+    worst, most = Search(states, rng).worst(conditions, known, ("q",))
+    own = None if given is None else float(conditions({"q": given["q"][None]})[0])
+    return Condition(own, float(np.median(known)), float(known.max()), most, tuple(worst["q"][0].tolist()))

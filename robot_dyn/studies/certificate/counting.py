@@ -1,0 +1,153 @@
+"""Counting of digits: errors of a road at many states against finer numbers, and at the worst of them against balls."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from robot_dyn.errors import QueryError
+from robot_dyn.lagrange.digits import digits_of
+from robot_dyn.lagrange.exact import NOTHING, Exact, Scale, Truth, entry_units, in_joint_units
+from robot_dyn.lagrange.manipulator import Lagrangian
+from robot_dyn.lagrange.scale import diagonal_scale, floored, solved_norm
+from robot_dyn.model.robot import Robot
+from robot_dyn.queries.quantity import CORIOLIS_TORQUE, M, N, Quantity
+from robot_dyn.studies.certificate.road import Road, asked
+from robot_dyn.studies.certificate.worst_state import Batch, Search, row
+
+FEWER = 250  # random states for each one that balls judge, where no other numbers are fine enough; 8 at least
+_SIDE_BY_SIDE = 8  # states of a batch that machine code answers at once: as in the search, so in the judgement
+
+
+@final
+@dataclass(frozen=True)
+class Found:
+    """Digits of one quantity by one road; as of `Held`."""
+
+    given: float | None
+    typical: float
+    random: float
+    searched: float
+    samples: int
+    state: dict[str, np.ndarray]
+
+
+@final
+class Counting:
+    """The counting for one robot.
+
+    Args:
+        robot: The robot.
+        states: Random ones.
+        given: A state to look at, or None.
+        rng: Of the search.
+    """
+
+    def __init__(self, robot: Robot, states: Batch, given: dict[str, np.ndarray] | None, rng: np.random.Generator):
+        self.robot, self.states, self.given, self._rng = robot, states, given, rng
+        self.decimals: dict[str, float] = {}
+        self.right_angles: dict[str, float] = {}
+        self.bits = 0
+        self._exact, self._rounded = {robot: Exact(robot)}, Exact(robot, rounded=True)
+        self._own = Lagrangian(robot)
+        self._sizes: dict[Quantity, float] = {}
+        self._fine: dict[tuple[Robot, Quantity], np.ndarray] = {}
+
+    def count(self, road: Road, quantity: Quantity, check: Callable[[], object] = lambda: None) -> Found:
+        """The digits of one road.
+
+        Args:
+            road: The road.
+            quantity: Of which they are counted.
+            check: Called before each batch of states; what it raises ends the counting.
+
+        Raises:
+            QueryError: If the road has no finite answer.
+        """
+
+        def errors(states: Batch) -> np.ndarray:
+            check()
+            return self._errors(road, quantity, states)
+
+        states = self.states
+        search = Search(states, self._rng)
+        if road.fine is None:
+            states = {name: x[: max(len(x) // FEWER, 8)] for name, x in states.items()}
+            search = Search(states, self._rng, parents=4, children=4, generations=3)
+        known = errors(states)
+        if np.isnan(known).all():
+            raise QueryError(f"{quantity.name} by {road.name}: no random state has a finite answer")
+        at = row(states, int(np.nanargmax(known)))
+        worst, _ = search.worst(errors, known, quantity.arguments)
+        check()
+        judged = [(self.judged(road, quantity, state), state) for state in (at, row(worst, 0))]
+        searched, state = max(judged, key=lambda each: each[0])
+        given = None if self.given is None else digits_of(self.judged(road, quantity, self.given))
+        typical = digits_of(float(np.nanmedian(known)))
+        self._of_file(road, quantity, state)
+        return Found(given, typical, digits_of(judged[0][0]), digits_of(searched), len(known), state)
+
+    def truth(self, robot: Robot, quantity: Quantity, state: dict[str, np.ndarray]) -> Truth:
+        """True values at a state."""
+        exact = self._exact.setdefault(robot, Exact(robot))
+        truth = exact.at(quantity, state, self._typical(quantity))
+        self.bits = max(self.bits, truth.bits)
+        return truth
+
+    def judged(self, road: Road, quantity: Quantity, state: dict[str, np.ndarray]) -> float:
+        """The error at a state, by balls."""
+        several = {name: np.tile(x, (_SIDE_BY_SIDE, 1)) for name, x in state.items()}
+        return self.truth(road.robot, quantity, state).error(road.ask(quantity, several)[0])
+
+    def _errors(self, road: Road, quantity: Quantity, states: Batch) -> np.ndarray:
+        """Errors at states (S, n); NaN where there is no answer."""
+        if road.fine is None:
+            answers = road.ask(quantity, states)
+            rows = (row(states, k) for k in range(len(answers)))
+            return np.array([self.truth(road.robot, quantity, x).error(y) for x, y in zip(rows, answers, strict=True)])
+        key = (road.robot, quantity)
+        if states is not self.states:
+            fine = asked(road.fine, quantity, states)
+        elif key in self._fine:
+            fine = self._fine[key]
+        else:
+            fine = self._fine[key] = asked(road.fine, quantity, states)
+        error = (road.ask(quantity, states) - fine).astype(float)
+        relative = self._scale(quantity, states, fine).relative(error)
+        return relative.reshape(len(error), -1).max(axis=1)
+
+    def _scale(self, quantity: Quantity, states: Batch, fine: np.ndarray) -> Scale:
+        """Of errors at states, from fine answers; that of `truth`, but for rounding."""
+        if not (quantity.definite or quantity.solves):
+            inertia = asked(self._own, M, states)
+            return Scale(in_joint_units(fine.astype(float), inertia, self._typical(quantity)))
+        inertia = asked(self._own, M, states)
+        if quantity.definite:
+            return Scale(np.array([floored(each) for each in diagonal_scale(inertia)]))
+        inertia[~np.all(np.isfinite(fine), axis=-1)] = np.eye(self.robot.n)  # where there is no answer
+        torques = (states["tau"], asked(self._own, CORIOLIS_TORQUE, states), asked(self._own, N, states))
+        return Scale(solved_norm(inertia, torques), inertia)
+
+    def _typical(self, quantity: Quantity) -> float:
+        """The largest root mean square of an entry at random states, in the units of the joints; 1 if it is zero."""
+        if quantity.definite or quantity.solves:
+            return 0.0
+        if quantity not in self._sizes:
+            answers, inertia = asked(self._own, quantity, self.states), asked(self._own, M, self.states)
+            ratios = answers / entry_units(answers, inertia)
+            largest = float(np.nanmax(np.abs(ratios))) or 1.0  # by which they are divided: squares may overflow
+            size = largest * float(np.sqrt(np.nanmean((ratios / largest) ** 2, axis=0)).max())
+            self._sizes[quantity] = size if size > NOTHING else 1.0
+        return self._sizes[quantity]
+
+    def _of_file(self, road: Road, quantity: Quantity, state: dict[str, np.ndarray]) -> None:
+        """What the float64 of the file's decimals leaves at a state, and what right angles do."""
+        truth = self.truth(self.robot, quantity, state)
+        both = [(self.decimals, self._rounded.at(quantity, state, self._typical(quantity)))]
+        if road.robot is not self.robot:
+            both.append((self.right_angles, self.truth(road.robot, quantity, state)))
+        for table, other in both:
+            table[quantity.name] = min(digits_of(truth.error(other.values)), table.get(quantity.name, np.inf))

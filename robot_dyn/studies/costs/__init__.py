@@ -1,0 +1,1 @@
+"""What effects and algorithms cost on one arm."""

@@ -1,0 +1,158 @@
+"""Two ways to one result, or a part on and off: their instructions counted, their times medians of turns.
+
+ratio = first / second, of times in each turn, so that the machine's moods meet both
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import final
+
+import numpy as np
+
+from robot_dyn.errors import RobotDynError
+from robot_dyn.result import reported
+from robot_dyn.studies.budget import Budget
+
+_QUARTILES = (25, 50, 75)
+
+
+@final
+@dataclass(frozen=True)
+class Version:
+    """One of two.
+
+    Attributes:
+        name: What sets it apart, such as "on".
+        instructions: Of its program, exact.
+        time_s: Median of its times of the processor, in [s]; None if it was not timed.
+        spread_s: Half of the interquartile range of its times, in [s]; likewise.
+        repeats: Number of times it was timed.
+    """
+
+    name: str
+    instructions: int
+    time_s: float | None
+    spread_s: float | None
+    repeats: int
+
+
+@final
+@dataclass(frozen=True)
+class Alternative:
+    """Two versions beside each other.
+
+    Attributes:
+        group: What it is about: "parts", "algorithms" or "machine code".
+        what: What differs.
+        per: What instructions and time are of.
+        first, second: The two.
+        time_ratio: Time of the first by that of the second, the median over the turns; None if one was not timed.
+        time_ratio_spread: Half of the interquartile range of that; likewise.
+        time_between_s: Time of the first less that of the second, in [s], the median over the turns; None if the middle
+            half of the turns do not agree on its sign.
+    """
+
+    group: str
+    what: str
+    per: str
+    first: Version
+    second: Version
+    time_ratio: float | None = None
+    time_ratio_spread: float | None = None
+    time_between_s: float | None = None
+
+    @reported
+    def instructions_ratio(self) -> float:
+        """Instructions of the first by those of the second; inf if that has none."""
+        return self.first.instructions / self.second.instructions if self.second.instructions else float("inf")
+
+
+@final
+@dataclass(eq=False)
+class Way:
+    """A version that can be run.
+
+    Attributes:
+        name: As of `Version`, as are instructions.
+        run: Gives the time it takes, in [s]; RobotDynError if it cannot be run.
+        factor: How many of these make what is compared.
+    """
+
+    name: str
+    instructions: int
+    run: Callable[[], float]
+    factor: int = 1
+    times: list[float] = field(default_factory=list)
+
+    @property
+    def times_s(self) -> np.ndarray:
+        """Its times, in [s]."""
+        return self.factor * np.array(self.times)
+
+    def version(self) -> Version:
+        """What was found."""
+        time, spread = _middle(self.times_s)
+        return Version(self.name, self.factor * self.instructions, time, spread, len(self.times))
+
+    def named(self, name: str, factor: int = 1) -> Way:
+        """The same under another name, and so many of it; its times are shared."""
+        return Way(name, self.instructions, self.run, factor, self.times)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """Two ways, to be measured; attributes as of `Alternative`."""
+
+    group: str
+    what: str
+    per: str
+    first: Way
+    second: Way
+
+    def alternative(self) -> Alternative:
+        """What was found."""
+        turns = min(len(self.first.times), len(self.second.times))
+        first, second = self.first.times_s[:turns], self.second.times_s[:turns]
+        low, between, high = np.percentile(first - second, _QUARTILES).tolist() if turns else (0.0, 0.0, 0.0)
+        return Alternative(
+            self.group, self.what, self.per, self.first.version(), self.second.version(), *_middle(first / second),
+            between if low * high > 0 else None,
+        )  # fmt: skip
+
+
+def _middle(values: np.ndarray) -> tuple[float | None, float | None]:
+    """Median of some values, and half of their interquartile range; None without any."""
+    if not len(values):
+        return None, None
+    low, middle, high = np.percentile(values, _QUARTILES).tolist()
+    return middle, (high - low) / 2
+
+
+def in_turns(pairs: Iterable[Pair], budget: Budget, repeats: int) -> list[str]:
+    """Time all ways so often at most, one after the other, and say which were not.
+
+    What the first run of each compiles or loads is apart from the budget.
+    """
+    ways: dict[int, tuple[str, Way]] = {}  # by what they share
+    for pair in pairs:
+        for way in (pair.first, pair.second):
+            ways.setdefault(id(way.times), (f"{pair.what}, {way.name}", way))
+    left_out: list[str] = []
+    for k in range(repeats):
+        for key, (name, way) in list(ways.items()):
+            if budget.left <= 0:
+                untimed = [name for name, way in ways.values() if not way.times]
+                return left_out + [f"time of {each}: the budget of {budget.seconds:g} s ended" for each in untimed]
+            budget.tell(f"round {k + 1}: {name}")
+            try:
+                if not k:
+                    with budget.apart():
+                        way.run()
+                way.times.append(way.run())
+            except RobotDynError as error:
+                left_out.append(f"time of {name}: {error}")
+                del ways[key]
+    return left_out

@@ -1,0 +1,165 @@
+"""What effects and algorithms cost on one arm: instructions, counted exactly, and times of runs that take turns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, final
+
+from robot_dyn.effects.plant import Plant
+from robot_dyn.errors import RobotDynError
+from robot_dyn.model.robot import Robot
+from robot_dyn.queries.dynamics import Dynamics
+from robot_dyn.result import Result, reported
+from robot_dyn.seconds import in_words
+from robot_dyn.simulation.results.acting import acting
+from robot_dyn.simulation.setup.options import setup_of, starts
+from robot_dyn.simulation.setup.setup import Setup
+from robot_dyn.studies.budget import Budget
+from robot_dyn.studies.costs import step_cost
+from robot_dyn.studies.costs.alternative import Alternative, Pair, Version, in_turns
+from robot_dyn.studies.costs.query_cost import QueryCost
+from robot_dyn.studies.environment import environment
+from robot_dyn.validate import choice, function, integer, number
+
+_MOST_REPEATS = 1000
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Cost(Result):
+    """What the parts of a setup, and ways to its equations, cost.
+
+    Attributes:
+        robot: Its name.
+        acting: What acts, in words.
+        alternatives: Two of each kind beside each other.
+        left_out: What was left out, and why.
+        environment: Versions and processor.
+        budget_s: That was allowed, in [s].
+        spent_s: That was spent, without compiling, in [s].
+        interrupted: Whether it was ended by the user.
+    """
+
+    columns: ClassVar[tuple[str, ...]] = (
+        "group", "what", "per", *(f"{of}_{key}" for of in ("first", "second") for key in Version.__annotations__),
+        "instructions_ratio", "time_ratio", "time_ratio_spread", "time_between_s",
+    )  # fmt: skip
+    robot: str
+    acting: tuple[str, ...]
+    alternatives: tuple[Alternative, ...]
+    left_out: tuple[str, ...]
+    environment: dict[str, str] = field(repr=False)
+    budget_s: float
+    spent_s: float
+    interrupted: bool = False
+
+    def of(self, what: str) -> Alternative:
+        """The two versions of what differs, such as "gravity" or "forward dynamics".
+
+        Raises:
+            QueryError: If it is not among them.
+        """
+        known = {each.what: each for each in self.alternatives}
+        return known[choice("cost of", what, known)]
+
+    @property
+    def rows(self) -> Iterator[Mapping[str, Any]]:
+        for each in self.alternatives:
+            versions = {"first": each.first, "second": each.second}
+            yield {
+                **vars(each), "instructions_ratio": each.instructions_ratio,
+                **{f"{of}_{key}": x for of, version in versions.items() for key, x in vars(version).items()},
+            }  # fmt: skip
+
+    @reported
+    def parts(self) -> dict[str, int]:
+        """Instructions in a step that each part of the setup adds to the others, by name."""
+        parts = [each for each in self.alternatives if each.group == "parts" and each.what != step_cost.EVERYTHING]
+        return {each.what: each.first.instructions - each.second.instructions for each in parts}
+
+    @reported
+    def shared(self) -> int:
+        """Instructions in a step of all parts, less the sum of `parts`: negative where several count the same ones."""
+        whole = [each for each in self.alternatives if each.what == step_cost.EVERYTHING]
+        return sum(each.first.instructions - each.second.instructions for each in whole) - sum(self.parts.values())
+
+    @reported
+    def sentence(self) -> str:
+        """What a step costs and what of it the parts are, in a sentence."""
+        whole = next((each for each in self.alternatives if each.what == step_cost.EVERYTHING), None)
+        if whole is None:
+            return "no step was counted"
+        on, off = whole.first, whole.second
+        time = "" if on.time_s is None else f", {in_words(on.time_s)}"
+        made = [
+            f"rigid bodies {off.instructions}",
+            *(f"{name} {count}".replace(" -", " −") for name, count in self.parts.items()),
+        ]
+        made += [f"several of these together {self.shared}"] * (self.shared > 0)
+        made += [f"less {-self.shared} that several of these count"] * (self.shared < 0)
+        return f"a step of RK4 takes {on.instructions} instructions{time}: {', '.join(made)}"
+
+
+def cost(
+    what: Setup | Plant | Dynamics,
+    q0: Any = None,
+    v0: Any = None,
+    *,
+    controller: Any = None,
+    budget_s: float = 10.0,
+    repeats: int = 25,
+    on_progress: Callable[[float, str], object] | None = None,
+) -> Cost:
+    """Instructions and time of each effect, controller and term, on and off, and of algorithms beside each other.
+
+    Parts are compared in a step of RK4 in machine code, whatever the method of a setup. Times are those of the
+    processor, so that other programs on the machine matter little.
+
+    Args:
+        what: A setup, or a plant or robot with a start.
+        q0: Position at the start, (n,), in [rad] or [m]; required unless `what` is a setup.
+        v0: Velocity at the start, (n,), in [rad/s] or [m/s]; 0, or that of the setup, unless given.
+        controller: As of a setup.
+        budget_s: Time to spend, compiling not counted, in [s].
+        repeats: How often each is timed at most, while the budget lasts.
+        on_progress: Called with the time spent, in [s], and with what is being done.
+
+    Raises:
+        QueryError: If an argument is wrong.
+    """
+    given = starts(q0, v0) | ({} if controller is None else {"controller": controller})
+    setup = setup_of("cost", what, given)
+    integer("repeats", repeats, least=1, most=_MOST_REPEATS)
+    budget = Budget(number("budget_s", budget_s, above=0), function("on_progress", on_progress, "(spent, what)"))
+    pairs: list[Pair] = []
+    left_out: list[str] = []
+    interrupted = False
+    try:
+        with budget.apart():
+            for name, make in _questions(setup):
+                budget.tell(f"counting: {name}")
+                try:
+                    pairs += make()
+                except (ImportError, RobotDynError) as error:
+                    left_out.append(f"{name}: {error}")
+        left_out += in_turns(pairs, budget, repeats)
+    except KeyboardInterrupt:
+        interrupted = True
+        left_out.append("what was to come when it was interrupted")
+    dynamics: Any = setup.plant.dynamics
+    return Cost(
+        getattr(dynamics, "name", type(dynamics).__name__), acting(setup),
+        tuple(pair.alternative() for pair in pairs), tuple(left_out), environment(), budget.seconds, budget.spent,
+        interrupted,
+    )  # fmt: skip
+
+
+def _questions(setup: Setup) -> Iterator[tuple[str, Callable[[], list[Pair]]]]:
+    """What is compared, by name."""
+    yield "parts", lambda: list(step_cost.pairs_of_parts(setup))
+    yield step_cost.NUMBERS, lambda: [step_cost.numbers(setup)]
+    yield step_cost.SIDE_BY_SIDE, lambda: [step_cost.side_by_side(setup)]
+    robot = getattr(setup.plant.dynamics, "robot", setup.plant.dynamics)
+    if isinstance(robot, Robot):
+        yield from ((name, lambda make=make: [make()]) for name, make in QueryCost(robot).pairs())

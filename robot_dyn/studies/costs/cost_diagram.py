@@ -1,0 +1,108 @@
+"""What parts and algorithms cost, drawn: instructions of a step by part, and ratios of alternatives."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from robot_dyn.seconds import in_words
+from robot_dyn.studies.costs.alternative import Alternative
+from robot_dyn.studies.costs.cost import Cost
+from robot_dyn.studies.costs.step_cost import EVERYTHING
+from robot_dyn.studies.sheet import Colours, ResultError, lines, sheet, styled
+from robot_dyn.view.plots.figure import THEMES
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_WIDTH, _HEIGHT, _ROW = 13.0, 2.3, 0.42  # [inch]
+_BAR = 0.36
+_TICKS = (0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500)
+
+
+def draw(result: Cost, theme: str = "light") -> Figure:
+    """The figure.
+
+    Raises:
+        ResultError: If nothing was counted.
+    """
+    if not result.alternatives:
+        raise ResultError("nothing was counted, so there is nothing to draw; look at left_out")
+    colours = THEMES[theme]
+    parts = _parts(result)
+    others = [each for each in result.alternatives if each.group != "parts"]
+    height = _HEIGHT + _ROW * max(len(parts), len(others))
+    figure = sheet(_WIDTH, height, result.sentence, _caption(result), colours)
+    grid = figure.add_gridspec(
+        1, 2, left=0.125, right=0.975, top=1 - 1.3 / height, bottom=0.55 / height, wspace=0.55, width_ratios=(1, 1.15)
+    )
+    if parts:
+        _draw_parts(figure.add_subplot(grid[0]), parts, colours)
+    if others:
+        _draw_ratios(figure.add_subplot(grid[1]), others, colours)
+    return figure
+
+
+def _caption(result: Cost) -> str:
+    versions = result.environment
+    programs = ", ".join(f"{k} {x}" for k, x in versions.items() if k in ("robot-dyn", "pin", "llvmlite", "casadi"))
+    return (
+        f"{result.robot}: {', '.join(result.acting) or 'no effects'}. Times of the processor: medians over turns."
+        f" {programs}; {versions.get('processor', '')}."
+    )
+
+
+def _parts(result: Cost) -> list[tuple[str, int, float | None]]:
+    """What a step is made of: names, instructions and times, in [s]."""
+    alternatives = [each for each in result.alternatives if each.group == "parts"]
+    made = []
+    for each in alternatives:
+        on, off = each.first, each.second
+        if each.what == EVERYTHING:
+            made.append(("rigid bodies", off.instructions, off.time_s))
+        else:
+            made.append((each.what, on.instructions - off.instructions, each.time_between_s))
+    return made + ([("of several", result.shared, None)] if result.shared else [])
+
+
+def _draw_parts(axes: Any, parts: list[tuple[str, int, float | None]], colours: Colours) -> None:
+    styled(axes, colours, "instructions", "A step of RK4, by part: with it less without it")
+    whole = sum(count for _, count, _ in parts) or 1
+    places = range(len(parts))
+    axes.barh(places, [count for _, count, _ in parts], 2 * _BAR, color=colours["lines"][0])
+    for place, (_, count, spent) in enumerate(parts):
+        time = "" if spent is None else f", {'−' * (spent < 0)}{in_words(abs(spent))}"
+        said = f" {count} ({100 * count / whole:.1f} %){time}".replace("-", "−")
+        axes.text(max(count, 0), place, said, va="center", fontsize=8, color=colours["ink"], parse_math=False)
+    _named(axes, [name for name, _, _ in parts], colours)
+    axes.set_xlim(min(0, *(count for _, count, _ in parts)), 1.45 * max(count for _, count, _ in parts) or 1)
+
+
+def _draw_ratios(axes: Any, others: list[Alternative], colours: Colours) -> None:
+    from matplotlib.ticker import NullFormatter
+
+    styled(axes, colours, "ratio, first / second", "Alternatives: instructions in blue, time in orange")
+    ratios = [(each.instructions_ratio, each.time_ratio) for each in others]
+    known = [x for pair in ratios for x in pair if x is not None and 0 < x < float("inf")] or [1.0]
+    axes.set_xscale("log")
+    axes.set_xticks(_TICKS, [f"{x:g}" for x in _TICKS])
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    for k, colour in enumerate(colours["lines"][:2]):
+        for place, pair in enumerate(ratios):
+            x, y = pair[k], place + (k - 0.5) * _BAR
+            if x is None or not 0 < x < float("inf"):
+                continue
+            axes.barh(y, x - 1, _BAR, left=1, color=colour)
+            axes.text(max(x, 1.0), y, f" {x:.2g}", va="center", fontsize=8, color=colours["ink"], parse_math=False)
+    axes.axvline(1, color=colours["ink"], linewidth=0.9)
+    _named(axes, [f"{each.what}:\n{each.first.name} / {each.second.name}" for each in others], colours)
+    axes.set_xlim(min(0.7, *(x / 1.2 for x in known)), 1.6 * max(2.0, *known))
+
+
+def _named(axes: Any, names: list[str], colours: Colours) -> None:
+    """Rows from above, by name."""
+    axes.set_yticks(range(len(names)), [lines(name) for name in names])
+    axes.tick_params(axis="y", length=0)
+    for label in axes.get_yticklabels():
+        label.set(color=colours["ink"], fontsize=8, parse_math=False)
+    axes.set_ylim(len(names) - 0.4, -0.6)
+    axes.grid(visible=False, axis="y")

@@ -1,0 +1,165 @@
+"""What a step of RK4 costs: with each part of a setup on and off, alone and side by side, numbers inputs or constants.
+
+instructions = 4 · those of y' = f(t, y), and those of a tick where the control is sampled
+
+A step is so short that the motion stays at its start, whatever acts, and a sampled controller has a tick at each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from fractions import Fraction
+from time import process_time
+from typing import Any
+
+import numpy as np
+
+from robot_dyn.codegen.parameters import names_of
+from robot_dyn.coefficients import with_values
+from robot_dyn.control.digital_loop.loop import Loop
+from robot_dyn.effects.plant import Plant
+from robot_dyn.errors import RobotDynError
+from robot_dyn.integrate.methods import method
+from robot_dyn.model.robot import Robot
+from robot_dyn.simulation.compiled.machine import Machine
+from robot_dyn.simulation.compiled.making import machine, machine_of_constants
+from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.events.transfers import Transfers
+from robot_dyn.simulation.rollouts.batch import LANES, Batch
+from robot_dyn.simulation.run.fixed_step import FixedStep
+from robot_dyn.simulation.run.outcome import Ending
+from robot_dyn.simulation.run.watch import Watch
+from robot_dyn.simulation.setup.setup import Setup
+from robot_dyn.simulation.setup.size import MOST_BYTES
+from robot_dyn.studies.costs.alternative import Pair, Way
+
+RUNS = 4096  # side by side
+PER_STEP, PER_RUN = "step of RK4", "step of RK4 and run"
+EVERYTHING, NUMBERS, SIDE_BY_SIDE = "everything", "numbers of the setup", "runs"
+_EVALUATIONS = 4  # of RK4, in a step
+_STEP_S, _STEPS, _STEPS_OF_MANY = 1e-7, 4000, 25
+
+
+def parts(setup: Setup) -> Iterator[tuple[str, Setup]]:
+    """Each part that acts, by name, with the setup without it: gravity, other edits, effects, loop and control.
+
+    Models of the controller are without what the plant is without: what both compute alike is computed once.
+    """
+    plant, controller = setup.plant, setup.controller
+    models: dict[str, Any] = {} if controller is None else controller.models
+    for name in _edits(plant.dynamics):
+        off = {key: without for key, model in models.items() if (without := _edits(model).get(name)) is not None}
+        dynamics = _edits(plant.dynamics)[name]
+        yield name, replace(setup, plant=Plant(dynamics, plant.effects), controller=with_values(controller, off))
+    names = names_of(plant.effects)
+    for name in dict.fromkeys(names):
+        left = [each for each, own in zip(plant.effects, names, strict=True) if own != name]
+        yield name, replace(setup, plant=Plant(plant.dynamics, left))
+    if isinstance(controller, Loop):
+        yield "loop", replace(setup, controller=controller.controller)
+    if setup.controller is not None:
+        yield "control", replace(setup, controller=None)
+
+
+def _edits(dynamics: Any) -> dict[str, Robot]:
+    """What acts by an edit of a robot, by name, with the robot without it."""
+    robot = getattr(dynamics, "robot", dynamics)
+    if not isinstance(robot, Robot):
+        return {}
+    edits = robot.edits
+    made = {
+        "gravity": replace(edits, gravity=(0.0, 0.0, 0.0)) if any(edits.gravity) else None,
+        "payload": replace(edits, payloads=()) if edits.payloads else None,
+        "armature": replace(edits, armature=()) if any(value for _, value in edits.armature) else None,
+    }
+    return {name: Robot(robot.description, each) for name, each in made.items() if each is not None}
+
+
+def bare(setup: Setup) -> Setup:
+    """The rigid bodies of a setup, with nothing that acts on them."""
+    left = dict(parts(setup))
+    while left:
+        setup = next(iter(left.values()))
+        left = dict(parts(setup))
+    return setup
+
+
+def pairs_of_parts(setup: Setup) -> Iterator[Pair]:
+    """A step with everything on and off, then with each part off.
+
+    Raises:
+        TraceError: If a part cannot be compiled; names it.
+    """
+    whole = one_run(setup)
+    yield Pair("parts", EVERYTHING, PER_STEP, whole.named("on"), one_run(bare(setup)).named("off"))
+    for name, without in parts(setup):
+        yield Pair("parts", name, PER_STEP, whole.named("on"), one_run(without).named("off"))
+
+
+def numbers(setup: Setup) -> Pair:
+    """Numbers as inputs of machine code, and as constants."""
+    short = _short(setup, _STEPS)
+    constants = _alone(short, machine_of_constants(_equation(short), short.integrator))
+    return Pair("machine code", NUMBERS, PER_STEP, one_run(setup).named("inputs"), constants.named("constants"))
+
+
+def side_by_side(setup: Setup) -> Pair:
+    """One run, and many of them side by side on one thread."""
+    short = _short(setup, _STEPS_OF_MANY)
+    made = machine(_equation(short), short.integrator, lanes=LANES, kept=())
+    starts = np.tile(short.q0, (RUNS, 1)), np.tile(short.v0, (RUNS, 1))
+
+    def run() -> float:
+        batch = Batch(short, made, *starts, {}, (), (), MOST_BYTES)
+        began = process_time()
+        batch.run(1)
+        return (process_time() - began) / (RUNS * short.steps)
+
+    several = Way(f"{RUNS} side by side", instructions(made), run)
+    return Pair("machine code", SIDE_BY_SIDE, PER_RUN, one_run(setup).named("one"), several)
+
+
+def one_run(setup: Setup) -> Way:
+    """A step of one run."""
+    short = _short(setup, _STEPS)
+    return _alone(short, machine(_equation(short), short.integrator))
+
+
+def instructions(made: Machine) -> int:
+    """Of a step, what the method itself adds apart."""
+    programs = made.equations.programs
+    return _EVALUATIONS * len(programs["rate"]) + (len(programs["tick"]) if "tick" in programs else 0)
+
+
+def _alone(short: Setup, made: Machine) -> Way:
+    def run() -> float:
+        functions, equation = (made.equations.functions, made.parameters), made.equation
+        watch, transfers = Watch(short, equation), Transfers(equation)
+        steps = FixedStep(watch, transfers, lambda _: functions, Fraction(1), made.advance())
+        began = process_time()
+        record = steps.record()
+        spent = process_time() - began
+        if record.outcome.ending is Ending.STOPPED:
+            raise KeyboardInterrupt
+        if record.outcome.ending is not Ending.FINISHED:
+            raise RobotDynError(f"a run of {short.duration_s:g} s from the start ends early: {record.outcome.advice}")
+        return spent / short.steps
+
+    return Way("", instructions(made), run)
+
+
+def _equation(setup: Setup) -> StateEquation:
+    return StateEquation(setup.plant, setup.controller).in_a_mode
+
+
+def _short(setup: Setup, steps: int) -> Setup:
+    """So many short steps of RK4 from the start, with a tick at each where the control is sampled."""
+    controller: Any = setup.controller
+    if controller is not None and controller.period_s:
+        controller = controller.at_period(_STEP_S)
+    duration = steps * _STEP_S
+    return replace(
+        setup, controller=controller, integrator=method("rk4"), step_s=_STEP_S, duration_s=duration,
+        record_period_s=duration, estimate_error=False, accuracy=None, events=(), engine="compiled",
+    )  # fmt: skip

@@ -1,0 +1,58 @@
+"""A URDF as its file has it, comments included: where each element belongs, and where its line is."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Any, final
+
+from robot_dyn.description.markup import parse
+from robot_dyn.errors import DescriptionError
+
+
+@final
+class Document:
+    """The elements of a file.
+
+    Args:
+        text: Its bytes.
+        source: Names it in messages.
+
+    Raises:
+        DescriptionError: If it is not XML.
+    """
+
+    def __init__(self, text: bytes, source: str) -> None:
+        self.text, self.source = text, source
+        self.root, self.assumed = parse(text, source, comments=True)
+        if self.root.tag != "robot":
+            raise DescriptionError(f"{source}: begins with <{self.root.tag}>, not <robot>; give a URDF file")
+
+    def elements(self) -> Iterator[Any]:
+        """All elements of links and joints, and these themselves, without comments."""
+        for part in self.root:
+            if part.tag in ("link", "joint"):
+                yield from (each for each in part.iter() if isinstance(each.tag, str))
+
+    def named(self, kind: str, name: str) -> Any:
+        """A link or joint by its name, or None."""
+        found = (each for each in self.root.iterfind(kind) if (each.get("name") or "").strip() == name)
+        return next(found, None)
+
+    def line(self, where: str, what: str) -> int | None:
+        """The line of a link or joint, or of its element, or that of its inertial, of which a refusal speaks."""
+        for part in self.root.iter("link", "joint"):
+            if self.where(part) == where:
+                tag = re.match(r"<(\w+)>", what)
+                inner = () if tag is None else (*part.iterfind(tag[1]), *part.iterfind(f"inertial/{tag[1]}"))
+                return next(iter(inner), part).sourceline
+        return None
+
+    @staticmethod
+    def where(element: Any) -> str:
+        """The link or joint that an element belongs to."""
+        while element.tag not in ("link", "joint") or element.getparent() is None or element.getparent().tag != "robot":
+            if (above := element.getparent()) is None:
+                return "robot"
+            element = above
+        return f"{element.tag} {(element.get('name') or '').strip()!r}"

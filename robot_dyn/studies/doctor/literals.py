@@ -1,0 +1,123 @@
+"""Numbers as the file writes them: decimal commas, line breaks, right angles with few digits, degrees."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from math import degrees, isfinite, pi
+from typing import Any
+
+from robot_dyn.studies.doctor.document import Document
+from robot_dyn.studies.doctor.finding import Change, Finding, Severity
+
+NUMBERS = {
+    "origin": ("xyz", "rpy"), "mass": ("value",), "inertia": ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"),
+    "axis": ("xyz",), "limit": ("lower", "upper", "effort", "velocity"), "dynamics": ("damping", "friction"),
+    "mimic": ("multiplier", "offset"), "box": ("size",), "cylinder": ("radius", "length"), "sphere": ("radius",),
+    "mesh": ("scale",),
+}  # fmt: skip
+_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
+_BREAK = re.compile(rb"<\s*([A-Za-z_]+)((?:[^<>\"']|\"[^\"<]*\"|'[^'<]*')*)>")
+_QUOTED = re.compile(rb"([A-Za-z_]+)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
+_TURN = 2 * pi
+_LEAST_DECIMALS = 2
+_WHOLE = 15.0  # [degrees]: angles in degrees are most often multiples of this
+
+
+def numbers(document: Document) -> Iterator[tuple[Any, str, list[str]]]:
+    """Each element and attribute that holds numbers, with its words."""
+    for element in document.elements():
+        for key in NUMBERS.get(element.tag, ()):
+            if (text := element.get(key)) is not None:
+                yield element, key, text.split()
+
+
+def decimal_commas(document: Document) -> Iterator[Finding]:
+    """Numbers with a comma in place of the point."""
+    for element, key, words in numbers(document):
+        if words and any(_COMMA.fullmatch(word) for word in words):
+            text = " ".join(word.replace(",", ".") if _COMMA.fullmatch(word) else word for word in words)
+            yield Finding(
+                Severity.ERROR, "decimal_comma", document.where(element),
+                f'{key} of <{element.tag}> is "{" ".join(words)}", with decimal commas',
+                "write a point; many programs read the digits before the comma alone, or drop the element",
+                element.sourceline, (Change(element, key, text),),
+            )  # fmt: skip
+
+
+def line_breaks(document: Document) -> Iterator[Finding]:
+    """Numbers broken by line ends or tabs, for which urdfdom drops the whole element, an inertial with all of it.
+
+    XML makes blanks of them, which is how they are read here; urdfdom's reader keeps them.
+    """
+    lines = {}
+    for tag in _BREAK.finditer(document.text):
+        for key, *value in _QUOTED.findall(tag[2]):
+            if re.search(rb"[\r\n\t]", value[0] or value[1]):
+                lines.setdefault((tag[1].decode(), key.decode()), []).append(
+                    document.text.count(b"\n", 0, tag.end()) + 1
+                )
+    for element, key, words in numbers(document):
+        if element.sourceline in lines.get((element.tag, key), ()):  # the line where its start tag ends
+            inertial = element.getparent().tag == "inertial"
+            drops = "urdfdom drops the whole <inertial> for that" if inertial else "urdfdom refuses that"
+            yield Finding(
+                Severity.ERROR if inertial else Severity.WARNING, "line_break", document.where(element),
+                f"{key} of <{element.tag}> has a line break or tab between its numbers; {drops}",
+                "write its numbers in one line", element.sourceline, (Change(element, key, " ".join(words)),),
+            )  # fmt: skip
+
+
+def near_right_angles(document: Document) -> Iterator[Finding]:
+    """Angles that are multiples of π/2 to the digits that are written, and less exact than a float."""
+    for element, key, words in numbers(document):
+        if key != "rpy":
+            continue
+        full = [_right_angle(word) or word for word in words]
+        if full != words:
+            off = max(abs(float(a) - float(b)) for a, b in zip(full, words, strict=True) if a != b)
+            drawn = element.getparent().tag in ("visual", "collision")
+            severity = Severity.WARNING if off > 1e-6 and not drawn else Severity.NOTE
+            yield Finding(
+                severity, "near_right_angle", document.where(element),
+                f'rpy "{" ".join(words)}" is off a right angle by {off:.1e} rad', "write π/2 to 16 digits",
+                element.sourceline, (Change(element, key, " ".join(full)),),
+            )  # fmt: skip
+
+
+def _right_angle(word: str) -> str | None:
+    """The multiple of π/2 that a literal is rounded or cut to, in full; None if it is not one, or exact."""
+    match = re.fullmatch(r"[+-]?\d*\.(\d+)", word)
+    if not match or len(match[1]) < _LEAST_DECIMALS or not float(word):
+        return None
+    x, unit = float(word), 10.0 ** -len(match[1])
+    nearest = round(x / (pi / 2)) * (pi / 2)
+    if nearest == 0 or x == nearest or abs(x - nearest) > unit:
+        return None
+    return repr(nearest)
+
+
+def angles_in_degrees(document: Document) -> Iterator[Finding]:
+    """Angles of more than a turn that are whole degrees."""
+    for element, key, words in numbers(document):
+        angles = key == "rpy" or (key in ("lower", "upper") and element.getparent().get("type") == "revolute")
+        values = [x for word in words if isfinite(x := _number(word))]
+        if not angles or len(values) != len(words) or not any(_TURN * 1.01 < abs(x) <= 720 for x in values):
+            continue
+        whole = all(x % (_WHOLE if key == "rpy" else 1.0) == 0 for x in values)
+        if key != "rpy" and not whole:  # some joints turn several times
+            continue
+        meant = " ".join(repr(x * pi / 180) for x in values)
+        yield Finding(
+            Severity.WARNING, "degrees", document.where(element),
+            f'{key} "{" ".join(words)}" is more than a turn ({degrees(max(map(abs, values))):.0f}°)'
+            + (": degrees are suspected" if whole else ""),
+            "write radians", element.sourceline, (Change(element, key, meant),) if whole else (),
+        )  # fmt: skip
+
+
+def _number(word: str) -> float:
+    try:
+        return float(word)
+    except ValueError:
+        return float("nan")

@@ -1,0 +1,97 @@
+"""Masses and inertias by themselves: what no body has, links without any, masses out of all proportion.
+
+I₁ ≥ 0,   I₁ + I₂ ≥ I₃,   for each link and for the links that joints merge into one body
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+import numpy as np
+
+from robot_dyn.description.inertia import implausibility
+from robot_dyn.description.structure import Structure, structure
+from robot_dyn.model import findings as doctor
+from robot_dyn.model.robot import Robot
+from robot_dyn.studies.doctor.finding import Finding, Severity
+
+_QUOTED = r"""(?:'[^']*'|"[^"]*")"""  # a name, which may hold colons and semicolons
+_SENTENCE = re.compile(rf"((?:link|joint)s? {_QUOTED}(?:, {_QUOTED})*)(?:: | )(.*?); (.*)", re.DOTALL)
+_NOTHING = 1e-9  # of the largest moment
+_RATIO = 1e4  # of the masses of two bodies of an arm: of a base of 100 kg to a finger of 10 g
+_KINDS = (
+    (Severity.ERROR, "inertia_impossible", doctor.impossible_inertias),
+    (Severity.ERROR, "mass_missing", doctor.massless_bodies),
+    (Severity.WARNING, "inertia_without_mass", doctor.moments_without_mass),
+    (Severity.WARNING, "mass_tiny", doctor.tiny_masses),
+    (Severity.WARNING, "length_long", doctor.long_lengths),
+    (Severity.WARNING, "mimic_ratio", doctor.large_ratios),
+    (Severity.NOTE, "base_mobile", doctor.welded_base),
+    (Severity.NOTE, "inertia_impossible", doctor.impossible_inertias_of_the_base),
+)
+
+
+def masses(robot: Robot) -> Iterator[Finding]:
+    """What is wrong with the masses and inertias of a robot that loads."""
+    stated = structure(robot.description, robot.edits)
+    for text in doctor.no_inertia_about_axis(stated, robot.joint_without_inertia):
+        yield _of_words(Severity.ERROR, "inertia_missing", text)
+    for severity, kind, find in _KINDS:
+        for text in find(stated):
+            yield _of_words(severity, kind, text)
+    yield from _rods_and_points(stated)
+    yield from _merged(robot, stated)
+    yield from _proportions(robot, stated)
+
+
+def _of_words(severity: Severity, kind: str, text: str) -> Finding:
+    """A finding of `model.doctor`: where, what and remedy in one sentence."""
+    if said := _SENTENCE.fullmatch(text):
+        return Finding(severity, kind, said[1], said[2], said[3])
+    what, _, remedy = text.rpartition("; ")  # of a name with quotes of both kinds, or of more joints than are listed
+    return Finding(severity, kind, "robot", what, remedy)
+
+
+def _rods_and_points(stated: Structure) -> Iterator[Finding]:
+    """Links that move with mass and a principal moment of 0, which other programs refuse."""
+    for name, link in stated.links.items():
+        least, _, most = np.linalg.eigvalsh(link.inertia)
+        if link.mass > 0 and abs(least) <= _NOTHING * most and name not in stated.base:
+            yield Finding(
+                Severity.NOTE, "inertia_zero", f"link {name!r}",
+                f"its least principal moment is 0, as of a rod or a point of {link.mass:g} kg; MuJoCo refuses that",
+                "give it the moments of a body with some width",
+            )  # fmt: skip
+
+
+def _merged(robot: Robot, stated: Structure) -> Iterator[Finding]:
+    """Bodies of several links whose sum no body has, though each link may be one."""
+    for joint, body in zip(robot.model.names[1:], list(robot.model.inertias)[1:], strict=True):
+        links = next((links for name, links in stated.bodies.items() if joint.endswith(name)), ())
+        if len(links) > 1 and body.mass > 0 and (why := implausibility(body.mass, body.lever, body.inertia)):
+            named = ", ".join(map(repr, links[:4]))
+            yield Finding(
+                Severity.ERROR, "inertia_impossible", f"link {links[0]!r}",
+                f"merged with what is fixed to it ({named}), {why}", "correct the inertias of these links",
+            )  # fmt: skip
+
+
+def _proportions(robot: Robot, stated: Structure) -> Iterator[Finding]:
+    """The lightest and the heaviest body that move, if their masses are out of all proportion."""
+    of = {
+        stated.joints[joint].child: sum(stated.links[name].mass for name in links)
+        for joint, links in stated.bodies.items()
+    }
+    of = {name: mass for name, mass in of.items() if mass > 0}
+    if not of:
+        return
+    (light, least), (heavy, most) = min(of.items(), key=lambda x: x[1]), max(of.items(), key=lambda x: x[1])
+    if most > _RATIO * least:
+        typical = float(np.exp(np.median(np.log(list(of.values())))))
+        odd = light if typical / least > most / typical else heavy
+        yield Finding(
+            Severity.WARNING, "mass_ratio", f"link {odd!r}",
+            f"the masses of bodies that move reach from {least:.3g} kg ({light!r}) to {most:.3g} kg ({heavy!r})",
+            "check its mass and the unit of it",
+        )  # fmt: skip

@@ -1,0 +1,167 @@
+"""Masses and inertias against the shapes of links: what fits at no density, and the units that would explain it.
+
+    ½ tr I ≤ m max |x − c|²   for a mass m with centre c anywhere within the shape
+
+Shapes are those of <collision>, else of <visual>. [Wensing, Kim, Slotine 2018, §III-B]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.description.inertia import MassProperties, combined
+from robot_dyn.description.structure import StatedLink, structure
+from robot_dyn.model.robot import Robot
+from robot_dyn.studies.doctor.document import Document
+from robot_dyn.studies.doctor.finding import Change, Finding, Severity
+from robot_dyn.view.geometry.visuals import Piece, solids
+
+_SLACK = 1.1  # of a shape's extent: collision shapes leave out screws
+_LIGHT, _HEAVY = 2.0, 3e4  # [kg/m³] of a link and its convex hull: below foam, above tungsten
+_UNITS = {1e3: "g m²", 1e4: "kg cm²", 1e6: "kg mm²", 1e7: "g cm²", 1e9: "g mm²"}
+_WITHIN = 4.0  # a factor on either side, by which the inertia of a link is off that of a uniform body
+_LONG = 100.0  # times the length of the arm that a shape is: millimetres
+_MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+
+
+@final
+@dataclass(frozen=True)
+class Shape:
+    """The shapes of a link.
+
+    Attributes:
+        points: Their corners in the link's frame, (k, 3), in [m].
+        unit: Their mass properties at 1 kg/m³; None if they have no volume.
+    """
+
+    points: np.ndarray
+    unit: MassProperties | None
+
+
+def shapes(robot: Robot, package_dirs: Iterable[str | Path]) -> tuple[dict[str, Shape], tuple[str, ...]]:
+    """The shape of each link that has one, and what cannot be read."""
+    pieces, notes = solids(robot, package_dirs)
+    return {name: _shape(of) for name, of in pieces.items() if of}, notes
+
+
+def _shape(pieces: tuple[Piece, ...]) -> Shape:
+    points = np.vstack([each.mesh.vertices @ each.pose[:3, :3].T + each.pose[:3, 3] for each in pieces])
+    bodies = [body for each in pieces if (body := _of_piece(each)) is not None]
+    return Shape(points, combined(bodies) if bodies else None)
+
+
+@np.errstate(all="ignore")  # a surface without volume, which MassProperties refuses
+def _of_piece(piece: Piece) -> MassProperties | None:
+    """A closed surface as it is, any other by its convex hull."""
+    import trimesh
+
+    surface: Any = trimesh.Trimesh(piece.mesh.vertices.astype(float), piece.mesh.faces.astype(int))
+    try:
+        solid = surface if surface.is_watertight and surface.volume > 0 else surface.convex_hull
+        R, p = piece.pose[:3, :3], piece.pose[:3, 3]
+        return MassProperties(solid.volume, solid.center_mass, solid.moment_inertia).moved(R, p)
+    except Exception:  # a flat surface, of which SciPy's hull raises its own errors
+        return None
+
+
+def misfits(document: Document, robot: Robot, of: dict[str, Shape]) -> Iterator[Finding]:
+    """Masses and inertias that their shapes have at no density."""
+    stated, reach = structure(robot.description, robot.edits), _reach(robot)
+    links = stated.links
+    for name, shape in of.items():
+        link, size = links[name], float(np.ptp(shape.points, axis=0).max())
+        element = document.named("link", name)
+        if size > _LONG * reach:
+            yield _oversized(document, name, element, size, reach)
+            continue
+        if link.mass <= 0:
+            continue
+        inertial = element.find("inertial")
+        if (found := _mass(name, link, shape, inertial)) is not None:
+            yield found
+        if (found := _inertia(name, link, shape, inertial)) is not None:
+            yield replace(found, severity=Severity.NOTE) if name in stated.base else found
+
+
+def _reach(robot: Robot) -> float:
+    """The sum of the distances between joints, in [m]; 1 m if they coincide."""
+    total = sum(float(np.linalg.norm(joint.xyz)) for joint in structure(robot.description, robot.edits).joints.values())
+    return total or 1.0
+
+
+def _oversized(document: Document, name: str, element: Any, size: float, reach: float) -> Finding:
+    changes = tuple(
+        Change(mesh, "scale", "0.001 0.001 0.001")
+        for mesh in element.iterfind("*/geometry/mesh")
+        if mesh.get("scale", "1 1 1").split() in (["1", "1", "1"], ["1.0", "1.0", "1.0"])
+    )
+    return Finding(
+        Severity.WARNING, "shape_in_mm", f"link {name!r}",
+        f"its shape is {size:.3g} m long, on a robot of {reach:.3g} m: millimetres are suspected",
+        'scale its mesh, scale="0.001 0.001 0.001"', element.sourceline, changes, True,
+    )  # fmt: skip
+
+
+def _mass(name: str, link: StatedLink, shape: Shape, inertial: Any) -> Finding | None:
+    if shape.unit is None:
+        return None
+    density, mass = link.mass / shape.unit.mass, inertial.find("mass")
+    if _LIGHT <= density <= _HEAVY:
+        return None
+    grams = density > _HEAVY and 100.0 <= density / 1e3 <= 2e4
+    suspected = ": grams are suspected" if grams else ""
+    changes = (Change(mass, "value", _scaled(mass.get("value"), -3)),) if grams else ()
+    return Finding(
+        Severity.WARNING, "mass_density", f"link {name!r}",
+        f"its mass of {link.mass:g} kg in its shape is a density of {density:.3g} kg/m³{suspected}",
+        "correct the mass, or its unit", inertial.sourceline, changes, True,
+    )  # fmt: skip
+
+
+def _inertia(name: str, link: StatedLink, shape: Shape, inertial: Any) -> Finding | None:
+    Ixx, _, _, Iyy, _, Izz = link.moments
+    half, far = (Ixx + Iyy + Izz) / 2, float(np.linalg.norm(shape.points - np.array(link.com), axis=1).max())
+    if half <= _SLACK * link.mass * far**2:
+        return None
+    changes, suspected = (), ""
+    if shape.unit is not None:
+        ratio = half / link.mass / (np.trace(shape.unit.inertia) / 2 / shape.unit.mass)
+        factor, unit = min(_UNITS.items(), key=lambda each: abs(np.log(ratio / each[0])))
+        if factor / _WITHIN < ratio < factor * _WITHIN:
+            suspected, inertia = f": {unit} is suspected", inertial.find("inertia")
+            power = -round(np.log10(factor))
+            moments = {key: inertia.get(key) for key in _MOMENTS}
+            changes = tuple(Change(inertia, key, _scaled(x, power)) for key, x in moments.items() if float(x))
+    return Finding(
+        Severity.ERROR, "inertia_shape", f"link {name!r}",
+        f"its inertia is that of {link.mass:g} kg at {np.sqrt(half / link.mass):.3g} m and more from the centre of"
+        f" mass, and its shape ends at {far:.3g} m{suspected}",
+        "correct the inertia, or its unit", inertial.sourceline, changes, True,
+    )  # fmt: skip
+
+
+def _scaled(text: str, power: int) -> str:
+    """A literal times a power of ten, digit by digit."""
+    mantissa, _, exponent = text.strip().lower().partition("e")
+    return f"{mantissa}e{int(exponent or 0) + power}"
+
+
+def outside(robot: Robot, of: dict[str, Shape]) -> Iterator[Finding]:
+    """Centres of mass beyond the box around the shapes of their link."""
+    links = structure(robot.description, robot.edits).links
+    for name, shape in of.items():
+        link, (low, high) = links[name], (shape.points.min(axis=0), shape.points.max(axis=0))
+        room = 0.1 * (high - low) + 0.01
+        away = float(np.linalg.norm(np.maximum(low - room - link.com, 0) + np.maximum(link.com - high - room, 0)))
+        if link.mass > 0 and away > 0:
+            yield Finding(
+                Severity.WARNING, "com_outside", f"link {name!r}",
+                f"its centre of mass {np.array(link.com).tolist()} m lies {away + float(room.min()):.2g} m outside its"
+                " shape",
+                "correct the origin of its <inertial>: it is that of the centre of mass in the frame of the link",
+            )  # fmt: skip

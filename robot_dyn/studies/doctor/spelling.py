@@ -1,0 +1,78 @@
+"""Elements and attributes that URDF does not have, where one it has is spelt nearly so: other programs pass over them.
+
+<orgin xyz="0 0 0.1"/>, <inertia xx="…"/>
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from difflib import get_close_matches
+from typing import Any
+
+from robot_dyn.studies.doctor.document import Document
+from robot_dyn.studies.doctor.finding import Change, Finding, Severity
+
+_SHAPES = {"box": {"size"}, "cylinder": {"radius", "length"}, "sphere": {"radius"}, "mesh": {"filename", "scale"}}
+CHILDREN: dict[str, set[str]] = {  # of URDF, and what ROS, Gazebo and Drake add
+    "link": {"inertial", "visual", "collision", "self_collision_checking", "contact", "verbose"},
+    "joint": {"origin", "parent", "child", "axis", "calibration", "dynamics", "limit", "mimic", "safety_controller"},
+    "inertial": {"origin", "mass", "inertia"},
+    "visual": {"origin", "geometry", "material"},
+    "collision": {"origin", "geometry", "material", "verbose"},
+    "geometry": {*_SHAPES, "capsule"},
+}
+ATTRIBUTES: dict[str, set[str]] = {
+    "link": {"name", "type"},
+    "joint": {"name", "type"},
+    "origin": {"xyz", "rpy"},
+    "mass": {"value"},
+    "inertia": {"ixx", "ixy", "ixz", "iyy", "iyz", "izz"},
+    "parent": {"link"},
+    "child": {"link"},
+    "axis": {"xyz"},
+    "limit": {"lower", "upper", "effort", "velocity", "acceleration"},
+    "dynamics": {"damping", "friction"},
+    "mimic": {"joint", "multiplier", "offset"},
+    **_SHAPES,
+}
+_NEEDED = {"mass": {"value"}, "inertia": ATTRIBUTES["inertia"], "parent": {"link"}, "child": {"link"}}
+_MATTER = {  # to dynamics: what is passed over in their place changes the robot
+    "inertial", "origin", "mass", "inertia", "parent", "child", "axis", "dynamics", "limit", "mimic",
+}  # fmt: skip
+_NEAR = 0.75
+
+
+def misspelt(document: Document) -> Iterator[Finding]:
+    """Elements and attributes with a name that URDF does not have."""
+    for element in document.elements():
+        tag, above = element.tag, element.getparent().tag
+        known = CHILDREN.get(above, set())
+        if above in CHILDREN and tag not in known and "}" not in tag and ":" not in tag:
+            free = [each for each in known & _MATTER if element.getparent().find(each) is None]
+            yield _finding(document, element, f"<{tag}>", get_close_matches(tag.lower(), free, 1, _NEAR), "")
+        for key in (*element.attrib,):
+            if (allowed := ATTRIBUTES.get(tag)) and key not in allowed and "}" not in key:
+                missing = allowed - {*element.attrib}
+                near = get_close_matches(key.lower(), missing, 1, _NEAR) or _only(tag, missing)
+                yield _finding(document, element, f"{key} of <{tag}>", near, key)
+
+
+def _only(tag: str, missing: set[str]) -> list[str]:
+    """The one attribute that an element cannot be without."""
+    needed = list(_NEEDED.get(tag, set()) & missing)
+    return needed if len(needed) == 1 else []
+
+
+def _finding(document: Document, element: Any, what: str, near: list[str], key: str) -> Finding:
+    where, kind = document.where(element), "unknown_attribute" if key else "unknown_element"
+    if not near:
+        remedy = "remove it, or write what URDF calls it"
+        return Finding(
+            Severity.NOTE, kind, where, f"{what} is not of URDF, and is passed over", remedy, element.sourceline
+        )
+    change = Change(element, near[0], "", key) if key else Change(element, "", near[0])
+    meant = near[0] if key else f"<{near[0]}>"
+    return Finding(
+        Severity.ERROR, kind, where, f"{what} is not of URDF, and is passed over", f"{meant} is meant; correct it",
+        element.sourceline, (change,),
+    )  # fmt: skip

@@ -1,0 +1,81 @@
+"""The Jacobian of f(t, q, v) = (v, a) on sets, J = [0 1; ∂a/∂q ∂a/∂v], from derivatives of inverse dynamics.
+
+    M ∂a/∂x = −∂R/∂x (t, x, a),   x = (q, v)
+
+as matrices of balls, or as power series of these, order by order: M₀ Jₖ = −Gₖ − Σ Mᵢ Jₖ₋ᵢ. On a set x = p(t) + b the
+acceleration is a = p'' + c with M c = −R(t, x, p'') = −ρ − ∂R/∂x b: c is small, and needs no forward dynamics.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from robot_dyn.studies.proof.enclosure.balls import Ball, Matrix, NotProvenError, dot, matrix, upper
+from robot_dyn.studies.proof.enclosure.mass import Inverse
+from robot_dyn.studies.proof.enclosure.polynomial import coefficient
+from robot_dyn.studies.proof.tape.tape import Tape
+
+
+def jacobian(tape: Tape, inverse: Inverse, given: Sequence[Any], length: int = 1) -> list[Matrix]:
+    """∂a/∂(q, v), (n, 2n), as series of a length.
+
+    Args:
+        tape: Of the motion.
+        inverse: Close to M⁻¹.
+        given: t, q, v, a: balls, or series of the length.
+        length: Number of coefficients; 1 for balls.
+
+    Raises:
+        NotProvenError: If M may be singular.
+    """
+    parts = _parts(tape, given, length)
+    more = inverse.contraction(parts[0][1])
+    made: list[Matrix] = []
+    for k, (right, _) in enumerate(parts):
+        for i in range(1, k + 1):
+            right = right + parts[i][1] * made[k - i]
+        made.append(-inverse.solve(more, right))
+    return made
+
+
+def on_a_set(
+    tape: Tape, inverse: Inverse, t: Ball, p: tuple[list[Ball], list[Ball], list[Ball]], B: Sequence[Ball],
+    C: Sequence[Ball], rho: Sequence[Ball],
+) -> Matrix:  # fmt: skip
+    """∂a/∂(q, v) wherever (q, v) is in p(t) + B, (n, 2n).
+
+    Args:
+        tape: Of the motion.
+        inverse: Close to M⁻¹.
+        t: Times, a ball.
+        p: Position, velocity and acceleration of the polynomial at these times.
+        B: Balls about 0, (2n,).
+        C: Balls about 0 that are to hold a − p'', (n,).
+        rho: Bounds of the residual along the polynomial at these times, (n,).
+
+    Raises:
+        NotProvenError: If C does not hold a − p'' everywhere, or M may be singular.
+    """
+    n = tape.n
+    q, v, a = (
+        [x + b for x, b in zip(known, wide, strict=True)] for known, wide in zip(p, (B[:n], B[n:], C), strict=True)
+    )
+    ((right, M),) = _parts(tape, (t, q, v, a), 1)
+    more = inverse.contraction(M)
+    J = -inverse.solve(more, right)
+    sizes = [upper(b) for b in B]
+    for i, (c, d) in enumerate(zip(C, inverse.bound(more, rho), strict=True)):
+        if not d + dot([upper(J[i, j]) for j in range(2 * n)], sizes) < c.upper():
+            raise NotProvenError("accelerations within the tube are not bounded: the set of states is too wide")
+    return J
+
+
+def _parts(tape: Tape, given: Sequence[Any], length: int) -> list[tuple[Matrix, Matrix]]:
+    """∂R/∂(q, v), (n, 2n), and M, (n, n), of each order."""
+    n, made = tape.n, tape.derivatives(*given)
+    parts = []
+    for k in range(length):
+        rows = [[coefficient(x, k) for x in made[3 * n * i : 3 * n * (i + 1)]] for i in range(n)]
+        parts.append((matrix([row[: 2 * n] for row in rows]), matrix([row[2 * n :] for row in rows])))
+    return parts

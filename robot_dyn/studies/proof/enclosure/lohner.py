@@ -1,0 +1,157 @@
+"""The error from step to step, e ∈ Q [−r, r], with Q that turns along: Lohner's way against the wrapping effect.
+
+    e(h) ∈ Y(h) e(0) + w [−1, 1] (δ |e(0)| + h e^{hL} |d|),    δ = h e^{hL} ‖Y' − J Y‖
+
+Y is a polynomial close to the fundamental matrix: Yₖ₊₁ = Σ Jᵢ Yₖ₋ᵢ / (k + 1). Q' is orthonormal in units of the
+weights, by Householder's QR of Y Q diag(r), longest columns first. [Lohner 1987; Nedialkov, Jackson, Corliss 1999]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+from flint import arb, arb_mat, ctx
+
+from robot_dyn.studies.proof.enclosure.balls import Ball, Matrix, NotProvenError, dot, largest, matrix, upper
+from robot_dyn.studies.proof.enclosure.linearised import jacobian
+from robot_dyn.studies.proof.enclosure.mass import Inverse
+from robot_dyn.studies.proof.enclosure.polynomial import Polynomial, series
+from robot_dyn.studies.proof.enclosure.tube import Tube
+from robot_dyn.studies.proof.tape.tape import Tape
+
+_ORDERS = 3, 6  # of Y: the second where the first does not know it to a thousandth
+_ENOUGH = 1e-3
+_DOUBT = 0.05  # δ at most
+
+
+@final
+@dataclass(frozen=True)
+class ErrorSet:
+    """The set Q [−r, r].
+
+    Attributes:
+        Q: Exact, (m, m).
+        r: Exact and not negative, (m,).
+    """
+
+    Q: Matrix
+    r: tuple[Ball, ...]
+
+    @property
+    def bounds(self) -> list[Ball]:
+        """Of each |eᵢ|."""
+        m = len(self.r)
+        return [upper(dot([upper(self.Q[i, j]) for j in range(m)], self.r)) for i in range(m)]
+
+
+def box(r: Sequence[Ball]) -> ErrorSet:
+    """The set |eᵢ| ≤ rᵢ."""
+    return ErrorSet(_identity(len(r)), tuple(r))
+
+
+def fundamental(
+    tape: Tape, time: Ball, p: Polynomial, everywhere: Polynomial, inverse: Inverse, h: Ball, T: Ball, within: Tube
+) -> tuple[Matrix, Ball]:  # fmt: skip
+    """Y(h), and δ, on a tube; `everywhere` is p about T.
+
+    Raises:
+        NotProvenError: If δ is too large.
+    """
+    Y, delta = [_identity(2 * tape.n)], arb("inf")
+    for order in _ORDERS:
+        J = [
+            *_coefficients(tape, time, p, inverse, within, order)[:order],
+            _coefficients(tape, time + T, everywhere, inverse, within, order)[order],
+        ]
+        Y, delta = _expansion(J, h, within)
+        if delta < _ENOUGH:
+            break
+    if not delta < _DOUBT:
+        raise NotProvenError("the fundamental matrix is not well known: the start is too wide, or a step too long")
+    at_end = Y[-1]
+    for each in Y[-2::-1]:
+        at_end = at_end * h + each
+    return at_end, delta
+
+
+def _coefficients(
+    tape: Tape, time: Ball, p: Polynomial, inverse: Inverse, within: Tube, order: int
+) -> list[Matrix]:  # fmt: skip
+    """Those of J(p + b) for all b in a tube, to the order."""
+    n, length = tape.n, order + 1
+    ctx.cap = length
+    sets = within.B[:n], within.B[n:], within.C
+    x = (
+        [series([each[0] + b, *each[1:]], length) for each, b in zip(known, wide, strict=True)]
+        for known, wide in zip((p.q, p.v, p.a), sets, strict=True)
+    )
+    made = jacobian(tape, inverse, (series([time, arb(1)], length), *x), length)
+    return [_whole(each, k == 0) for k, each in enumerate(made)]
+
+
+def _expansion(J: Sequence[Matrix], h: Ball, within: Tube) -> tuple[list[Matrix], Ball]:
+    """Y of order m by the m + 1 coefficients of J, and δ."""
+    m, size = len(J) - 1, J[0].nrows()
+    Y = [_identity(size)]
+    for k in range(m):
+        total = sum((J[i] * Y[k - i] for i in range(1, k + 1)), start=J[0] * Y[k])
+        Y.append((total * (arb(1) / (k + 1))).mid())
+    delta, power = arb(0), arb(1)
+    for k in range(2 * m + 1):
+        defect = Y[k + 1] * arb(k + 1) if k < m else arb_mat(size, size)
+        for i in range(max(0, k - m), min(k, m) + 1):
+            defect = defect - J[i] * Y[k - i]
+        delta, power = delta + _norm(defect, within.weights) * power, power * h
+    return Y, upper(h * within.growth * delta)
+
+
+def carried(before: ErrorSet, Y: Matrix, delta: Ball, within: Tube, rounding: Sequence[Ball]) -> ErrorSet:
+    """The set at the end of a step, of centres with a rounding, (m,)."""
+    w, m = within.weights, len(before.r)
+    size = largest(e / x for e, x in zip(before.bounds, w, strict=True))
+    local = [upper(x * (delta * size + within.local) + e) for x, e in zip(w, rounding, strict=True)]
+    YQ = Y * before.Q
+    Q = _turned(YQ, before.r, w)
+    try:
+        inverse = Q.inv()
+    except ZeroDivisionError:
+        raise NotProvenError("the frame of the error set is singular") from None
+    Z = inverse * YQ
+    r = [
+        upper(dot([upper(Z[i, j]) for j in range(m)], before.r) + dot([upper(inverse[i, j]) for j in range(m)], local))
+        for i in range(m)
+    ]
+    return ErrorSet(Q, tuple(r))
+
+
+def _turned(YQ: Matrix, r: Sequence[Ball], w: Sequence[Ball]) -> Matrix:
+    """Q', exact: any matrix is right, this one keeps the set narrow."""
+    m, most = len(r), largest(r)
+    units = np.array([float(x) for x in w])
+    sizes = np.array([float(x / most) if most > 0 else 0.0 for x in r])
+    columns = np.array([[float(YQ[i, j].mid()) for j in range(m)] for i in range(m)]) / units[:, None] * sizes
+    if not np.isfinite(columns).all():
+        raise NotProvenError("the error set is too wide")
+    order = np.argsort(-np.linalg.norm(columns, axis=0), kind="stable")
+    Q = np.linalg.qr(columns[:, order])[0] * units[:, None]
+    return matrix([[arb(float(x)) for x in row] for row in Q])
+
+
+def _whole(J: Matrix, constant: bool) -> Matrix:
+    """[0 1; J], of a coefficient of a power series: the identity is constant."""
+    n = J.nrows()
+    top = [[arb(int(constant and j == n + i)) for j in range(2 * n)] for i in range(n)]
+    return matrix([*top, *([J[i, j] for j in range(2 * n)] for i in range(n))])
+
+
+def _norm(A: Matrix, w: Sequence[Ball]) -> Ball:
+    """A bound of ‖A‖ in the norm maxᵢ |eᵢ| / wᵢ."""
+    m = len(w)
+    return largest(dot([upper(A[i, j]) for j in range(m)], w) / w[i] for i in range(m))
+
+
+def _identity(m: int) -> Matrix:
+    return matrix([[arb(int(i == j)) for j in range(m)] for i in range(m)])

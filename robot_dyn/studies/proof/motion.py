@@ -1,0 +1,175 @@
+"""The motion that a theorem is about, M(q) a + C(q, v) v + N(q) = Σ τ_effect + u(t, q, v), all of it analytic.
+
+What switches has no Taylor series across the switch, and what is written elsewhere may do what cannot be seen: both are
+refused by name. Coefficients and gains are the floats that a part holds, and nothing is computed with them in floats.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.codegen.trace.base_parameters import regrouped
+from robot_dyn.codegen.trace.origins import slid
+from robot_dyn.coefficients import with_values
+from robot_dyn.control.computed_torque import ComputedTorque, FeedForward, PDGravity
+from robot_dyn.control.controller import Controller
+from robot_dyn.control.independent_joint import PD
+from robot_dyn.control.reference import PiecewisePolynomial, polynomial
+from robot_dyn.effects.carried_payload import CarriedPayload
+from robot_dyn.effects.effect import Effect
+from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFriction
+from robot_dyn.effects.spring import Spring
+from robot_dyn.errors import ProofError
+from robot_dyn.lagrange.linkage import Linkage, linkage
+from robot_dyn.lagrange.recursions.newton_euler import newton_euler
+from robot_dyn.lagrange.tree import tree
+from robot_dyn.model.robot import Robot
+from robot_dyn.simulation.setup.setup import Setup
+from robot_dyn.studies.proof.tape.literals import Literals
+
+_EFFECTS = (ViscousFriction, RegularisedCoulombFriction, Spring)
+_CONTROLLERS = (PD, ComputedTorque, PDGravity, FeedForward)
+
+
+@final
+@dataclass(frozen=True)
+class Motion:
+    """A plant and its controller, if each part is analytic.
+
+    Attributes:
+        robot: With the payloads that it carries all the time.
+        effects: Torques besides gravity.
+        controller: A continuous one, or None.
+    """
+
+    robot: Robot
+    effects: tuple[Effect, ...]
+    controller: Controller | None
+
+    @property
+    def knots(self) -> tuple[float, ...]:
+        """Times in [s] at which a reference passes to another polynomial."""
+        return self.controller.knots if self.controller is not None else ()
+
+    def torque(self, model: Bodies, t: Array, q: Array, v: Array, piece: float) -> Array:
+        """Σ τ_effect + u in numbers of a trace, (n,).
+
+        Args:
+            model: The bodies.
+            t: Time, (1,).
+            q: Position, (n,).
+            v: Velocity, (n,).
+            piece: A time in [s] on the piece of the reference that counts.
+        """
+        total = model.arithmetic.array(np.zeros(len(q)))
+        for effect in self.effects:
+            total = total + effect.torque(model, t[0], q, v)  # pyright: ignore[reportAttributeAccessIssue]
+        if self.controller is None:
+            return total
+        own: dict[str, Any] = {name: _Piece(each, piece) for name, each in self.controller.references.items()}
+        own |= {name: Bodies(_robot(each, self.controller.name), model.arithmetic) for name, each in self._models}
+        return total + with_values(self.controller, own).torque(t, q, v, total[:0])
+
+    @property
+    def _models(self) -> Any:
+        return self.controller.models.items() if self.controller is not None else ()
+
+
+@final
+class Bodies:
+    """The rigid bodies of a robot in gravity, by recursion, in numbers of a trace.
+
+    Args:
+        robot: Its file and edits.
+        arithmetic: Of the trace, in whose scope all of this is called.
+    """
+
+    def __init__(self, robot: Robot, arithmetic: Literals) -> None:
+        self.robot, self.arithmetic, self.n = robot, arithmetic, robot.n
+
+    @cached_property
+    def linkage(self) -> Linkage:
+        """Other frames and fewer numbers, the same M, C and N."""
+        known = tree(self.robot.description, self.robot.edits)
+        return regrouped(slid(linkage(known, self.robot.joint_names, self.arithmetic)))
+
+    def inverse_dynamics(self, q: Array, v: Array, a: Array) -> Array:
+        """M a + C v + N, (n,)."""
+        return newton_euler(self.linkage, q, v, a)
+
+    def N(self, q: Array) -> Array:
+        """∂V/∂q, (n,)."""
+        zero = self.arithmetic.array(np.zeros(self.n))
+        return newton_euler(self.linkage, q, zero, zero)
+
+
+@final
+class _Piece:
+    """One polynomial of a reference, of the exact floats that it holds."""
+
+    def __init__(self, reference: Any, t: float) -> None:
+        breaks, table = reference.breaks, reference.coefficients
+        k = int(np.searchsorted(breaks[1:-1], min(max(t, breaks[0]), breaks[-1]), side="right"))
+        self._start, self._coefficients, self._rests = float(breaks[k]), table[k], None
+        if not breaks[0] <= t <= breaks[-1]:
+            self._rests = float(breaks[0] if t < breaks[0] else breaks[-1])
+
+    def at(self, t: Array) -> tuple[Array, Array, Array]:
+        """Position, velocity and acceleration at t (1,); at rest outside of the breaks."""
+        if self._rests is None:
+            return polynomial(self._coefficients, t - self._start)
+        q, _, _ = polynomial(self._coefficients, 0 * t + self._rests - self._start)
+        return q, 0 * q, 0 * q
+
+
+def motion(setup: Setup, until_s: float) -> Motion:
+    """The motion of a setup up to a time.
+
+    Raises:
+        ProofError: If a part of it is not analytic, or is not known to be; names it.
+    """
+    plant, controller = setup.plant, setup.controller
+    for effect in plant.effects:
+        if isinstance(effect, CarriedPayload):
+            if any(0 < t < until_s for t in effect.switches):
+                raise ProofError(f"{effect.name} comes or goes within {until_s:g} s: prove the motion up to there")
+        elif type(effect) not in _EFFECTS:
+            raise ProofError(
+                f"effect {effect.name} switches, or is not known to be analytic: theorems are about gravity, payloads,"
+                " viscous friction, springs and tanh friction; leave it out"
+            )
+    if controller is not None:
+        _check(controller)
+    whole = plant.at(0.0)
+    robot = _robot(whole.dynamics, "plant")
+    return Motion(robot, tuple(each for each in whole.effects if not isinstance(each, CarriedPayload)), controller)
+
+
+def _check(controller: Controller) -> None:
+    if type(controller) not in _CONTROLLERS:
+        raise ProofError(
+            f"controller {controller.name} switches, has states, or is not known to be analytic: theorems are about PD,"
+            " PDGravity, FeedForward and ComputedTorque"
+        )
+    if controller.period_s > 0:
+        raise ProofError(
+            f"controller {controller.name} is sampled every {controller.period_s:g} s: theorems are about continuous"
+            " control; take period_s=0"
+        )
+    for name, each in controller.references.items():
+        if not isinstance(each, PiecewisePolynomial):
+            raise ProofError(f"{name} of {controller.name} is no piecewise polynomial")
+
+
+def _robot(dynamics: Any, what: str) -> Robot:
+    robot = getattr(dynamics, "robot", dynamics)
+    if not isinstance(robot, Robot):
+        raise ProofError(
+            f"{what}: {type(dynamics).__name__} comes from no robot's file, whose decimals theorems are about"
+        )
+    return robot

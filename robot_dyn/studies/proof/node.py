@@ -1,0 +1,64 @@
+"""What is kept of a proven step: balls at its end, and polynomial and tube on the way, as plain data."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, final
+
+from flint import arb
+
+from robot_dyn.studies.proof.enclosure.balls import horner
+from robot_dyn.studies.proof.enclosure.polynomial import derivatives
+from robot_dyn.studies.proof.enclosure.step import State, Step
+from robot_dyn.studies.proof.packed import Packed, of_joints, unpacked
+
+
+@final
+@dataclass(frozen=True)
+class Node:
+    """What is known at the end of a step, and of the step before it.
+
+    Attributes:
+        t: Time in [s], exact.
+        q, v: Balls that hold the state at t.
+        polynomial: Of q on the step that ends there, by powers of the time since its start; none at the start.
+        tube_q, tube_v: Balls about 0: the state is off the polynomial by no more, anywhere on the step.
+    """
+
+    t: float
+    q: tuple[Packed, ...]
+    v: tuple[Packed, ...]
+    polynomial: tuple[tuple[Packed, ...], ...] = field(default=(), repr=False)
+    tube_q: tuple[Packed, ...] = field(default=(), repr=False)
+    tube_v: tuple[Packed, ...] = field(default=(), repr=False)
+
+
+def node_of(state: State, step: Step | None = None) -> Node:
+    """What is kept of a state, and of the step before it."""
+    n = len(state.q)
+    wide = [arb(0, bound) for bound in state.error.bounds]
+    q, v = (
+        [x + e for x, e in zip(known, own, strict=True)] for known, own in ((state.q, wide[:n]), (state.v, wide[n:]))
+    )
+    t = float(state.t)
+    assert t == state.t
+    if step is None:
+        return Node(t, of_joints(q), of_joints(v))
+    polynomial = tuple(map(of_joints, step.p.q))
+    return Node(t, of_joints(q), of_joints(v), polynomial, of_joints(step.tube.B[:n]), of_joints(step.tube.B[n:]))
+
+
+def on_the_way(start: float, node: Node) -> Callable[[float], tuple[list[Any], list[Any]]]:
+    """Balls that hold q and v at a time of the step from `start` to the node; in the precision of the calls."""
+    q = tuple(tuple(map(unpacked, each)) for each in node.polynomial)
+    v, wide_q, wide_v = derivatives(q), [*map(unpacked, node.tube_q)], [*map(unpacked, node.tube_v)]
+
+    def at(t: float) -> tuple[list[Any], list[Any]]:
+        tau = arb(t) - arb(start)
+        return (
+            [horner(each, tau) + b for each, b in zip(q, wide_q, strict=True)],
+            [horner(each, tau) + b for each, b in zip(v, wide_v, strict=True)],
+        )
+
+    return at

@@ -1,0 +1,118 @@
+"""Prove: a theorem about the flow of a setup, step by step, for as long as every bound holds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from fractions import Fraction
+from time import perf_counter
+from typing import Any
+
+from flint import ctx
+
+from robot_dyn.arithmetic import Ball
+from robot_dyn.errors import QueryError
+from robot_dyn.simulation.setup.setup import Setup
+from robot_dyn.studies.proof.assumed import assumed
+from robot_dyn.studies.proof.enclosure.balls import NotProvenError
+from robot_dyn.studies.proof.enclosure.step import State, effort, proven_step
+from robot_dyn.studies.proof.motion import Motion, motion
+from robot_dyn.studies.proof.node import Node, node_of
+from robot_dyn.studies.proof.start import start
+from robot_dyn.studies.proof.tape.tape import Tape
+from robot_dyn.studies.proof.theorem import Proof
+from robot_dyn.validate import duration, function, instance, integer, number
+
+_LEAST_BITS, _MOST_BITS = 40, 4096
+_LONGEST_S = 4096.0  # so that times are exact
+
+
+def prove(
+    setup: Setup,
+    until_s: float | None = None,
+    bits: int = 100,
+    *,
+    q0: Any = None,
+    v0: Any = None,
+    width_q: float = 0.0,
+    width_v: float = 0.0,
+    budget_s: float = 60.0,
+    on_progress: Callable[[float], object] | None = None,
+) -> Proof:
+    """A theorem: the motion exists, is the only one, and q(t), v(t) lie in balls, for 0 ≤ t ≤ until_s.
+
+    It is about the decimals of the URDF as they stand; floats of the setup (start, gravity, payloads, coefficients,
+    gains) are meant as the binary numbers that they are. Integrator and step of the setup do not matter.
+
+    Args:
+        setup: Plant, start, and continuous controller or none.
+        until_s: In [s]; that of the setup unless given.
+        bits: Precision of the balls, from 40 to 4096; the radius of q comes to about 2^-(0.7 bits), times its growth.
+        q0: Start, (n,), in place of that of the setup: numbers, or text for decimals that are meant exactly.
+        v0: Its velocity, likewise.
+        width_q: The start may be anywhere within so much of each q, in [rad] or [m], not negative.
+        width_v: Likewise of v.
+        budget_s: Time that it may take, in [s].
+        on_progress: Called with the time reached, in [s], after each step.
+
+    Returns:
+        The theorem, which may reach less far than asked for, and says why.
+
+    Raises:
+        QueryError: If an argument is not allowed.
+        ProofError: If something switches, is sampled, or is not known to be analytic; names it.
+
+    Source: Lohner 1987; Nedialkov, Jackson, Corliss 1999.
+    """
+    instance("setup", setup, Setup, "give one, as rd.Setup(rd.Plant(robot), q0)")
+    until_s = setup.duration_s if until_s is None else duration("until_s", until_s)
+    if until_s > _LONGEST_S:
+        raise QueryError(f"until_s must not exceed {_LONGEST_S:g} s, got {until_s:g}")
+    bits = integer("bits", bits, least=_LEAST_BITS, most=_MOST_BITS)
+    budget_s, began = duration("budget_s", budget_s), perf_counter()
+    widths = number("width_q", width_q, least=0), number("width_v", width_v, least=0)
+    function("on_progress", on_progress, "the time reached in [s]")
+    about = motion(setup, until_s)
+    with _precision(bits):
+        state = start(about.robot.joint_names, (setup.q0 if q0 is None else q0, setup.v0 if v0 is None else v0), widths)
+        nodes, why = [node_of(state)], ""
+    try:
+        for node in _nodes(about, state, until_s, bits):
+            nodes.append(node)
+            if on_progress is not None:
+                on_progress(node.t)
+            if perf_counter() - began > budget_s and node.t < until_s:
+                raise NotProvenError(f"the budget of {budget_s:g} s is spent")
+    except NotProvenError as error:
+        why = str(error)
+    meant = assumed(about, setup, q0 is not None, v0 is not None, widths)
+    return Proof(about.robot.name, about.robot.joint_names, until_s, nodes[-1].t, why, bits, meant, tuple(nodes))
+
+
+def _nodes(about: Motion, state: State, until_s: float, bits: int) -> Iterator[Node]:
+    """Ends of proven steps, one after the other; a step ends where a reference passes to another polynomial.
+
+    Raises:
+        NotProvenError: If no step is proven from the last one on.
+    """
+    how, before, tape = effort(bits), None, None
+    for end in (*sorted(t for t in about.knots if 0 < t < until_s), until_s):
+        if tape is None or about.knots:
+            tape = Tape(about, float((state.t + Fraction(end)) / 2))
+        while state.t < end:
+            with _precision(bits):
+                step = proven_step(tape, state, Fraction(end), how, before)
+                state, before = step.end, step.h
+                node = node_of(state, step)
+            yield node
+
+
+@contextmanager
+def _precision(bits: int) -> Iterator[None]:
+    """The precision of balls, with the length of power series as it was before."""
+    with Ball(bits).scope():
+        cap = ctx.cap
+        try:
+            yield
+        finally:
+            ctx.cap = cap

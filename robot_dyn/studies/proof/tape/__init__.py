@@ -1,0 +1,1 @@
+"""The equation of motion as a program in balls: a trace that rounds nothing."""

@@ -1,0 +1,205 @@
+"""Terms: the numbers of a trace that rounds nothing, x = c + node, of a ball c and a CasADi node.
+
+Where a ball meets a node it becomes an input of the trace, one for each value, so that neither CasADi nor this library
+computes with it in floats. Only an exact 0 or ±1 is folded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextvars import ContextVar
+from typing import Any, final
+
+import casadi as ca
+import numpy as np
+from flint import arb
+
+from robot_dyn.arithmetic import Ball
+from robot_dyn.codegen.trace.condition import Node
+
+BITS = 400  # of the constants: what they are rounded to, far below all else
+BALLS = Ball(BITS)
+
+
+@final
+class Constants:
+    """The balls that nodes of a trace are made of.
+
+    Attributes:
+        symbols: Their inputs of the trace.
+        balls: Their values, in the same order.
+    """
+
+    def __init__(self) -> None:
+        self.symbols: list[Node] = []
+        self.balls: list[Any] = []
+        self._known: dict[tuple[Any, Any], Node] = {}
+
+    def node(self, ball: Any) -> Node:
+        """The node of a ball: an exact 0 or ±1 itself, of others an input, or its opposite."""
+        if ball.is_exact() and ball.is_integer() and abs(ball) <= 1:
+            return ca.SX(int(float(ball)))
+        if ball.mid() < 0:
+            return -self.node(-ball)
+        key = ball.mid().man_exp(), ball.rad().man_exp()
+        if key not in self._known:
+            self._known[key] = ca.SX.sym(f"c{len(self.balls)}")
+            self.symbols.append(self._known[key])
+            self.balls.append(ball)
+        return self._known[key]
+
+
+CONSTANTS: ContextVar[Constants] = ContextVar("constants")
+
+
+def _zero() -> Any:
+    return arb(0)
+
+
+@final
+class Term:
+    """A number c + node; node None means the constant c.
+
+    Comparisons of constants are those of midpoints, and of nodes true: a formulation only asks which of several
+    identities to take, or whether M is regular, which the proof decides by its pivots. What counts as 0 is exactly 0.
+    """
+
+    __slots__ = ("constant", "node")
+
+    def __init__(self, constant: Any, node: Node = None) -> None:
+        self.constant, self.node = constant, node
+
+    @property
+    def expression(self) -> Node:
+        """It as one CasADi expression."""
+        c = CONSTANTS.get().node(self.constant)
+        return c if self.node is None else c + self.node
+
+    def __add__(self, other: Any) -> Any:
+        if (x := _term(other)) is None:
+            return NotImplemented
+        nodes = [each.node for each in (self, x) if each.node is not None]
+        return Term(self.constant + x.constant, sum(nodes[1:], start=nodes[0]) if nodes else None)
+
+    __radd__ = __add__
+
+    def __neg__(self) -> Term:
+        return Term(-self.constant, None if self.node is None else -self.node)
+
+    def __pos__(self) -> Term:
+        return self
+
+    def __sub__(self, other: Any) -> Any:
+        return NotImplemented if (x := _term(other)) is None else self + -x
+
+    def __rsub__(self, other: Any) -> Any:
+        return -self + other
+
+    def __mul__(self, other: Any) -> Any:
+        if (x := _term(other)) is None:
+            return NotImplemented
+        if x.node is None:
+            return self._times(x.constant)
+        return x._times(self.constant) if self.node is None else _of(self.expression * x.expression)
+
+    __rmul__ = __mul__
+
+    def _times(self, k: Any) -> Term:
+        if self.node is None or k.is_zero():
+            return Term(self.constant * k)
+        return Term(self.constant * k, CONSTANTS.get().node(k) * self.node)
+
+    def __truediv__(self, other: Any) -> Any:
+        if (x := _term(other)) is None:
+            return NotImplemented
+        if x.node is None:
+            return self._times(1 / x.constant)
+        return self if self.node is None and self.constant.is_zero() else _of(self.expression / x.expression)
+
+    def __rtruediv__(self, other: Any) -> Any:
+        return NotImplemented if (x := _term(other)) is None else x / self
+
+    def __pow__(self, exponent: Any) -> Term:
+        if exponent != 2:
+            raise TypeError("only squares")
+        return self * self
+
+    def sin(self) -> Term:
+        """Its sine."""
+        return self._unary(ca.sin, "sin")
+
+    def cos(self) -> Term:
+        """Its cosine."""
+        return self._unary(ca.cos, "cos")
+
+    def tanh(self) -> Term:
+        """Its hyperbolic tangent."""
+        return self._unary(ca.tanh, "tanh")
+
+    def sqrt(self) -> Term:
+        """Its square root."""
+        return self._unary(ca.sqrt, "sqrt")
+
+    def conjugate(self) -> Term:
+        """Itself: it is real."""
+        return self
+
+    def _unary(self, symbolic: Callable[[Node], Node], name: str) -> Term:
+        return Term(getattr(self.constant, name)()) if self.node is None else _of(symbolic(self.expression))
+
+    def __abs__(self) -> Term:
+        if self.node is not None:
+            raise TypeError("|x| is not analytic")
+        return Term(abs(self.constant))
+
+    def __bool__(self) -> bool:
+        return self != 0
+
+    def _below(self, other: Any, or_equal: bool) -> bool:
+        x = _term(other)
+        assert x is not None
+        if self.node is not None or x.node is not None:
+            return True
+        a, b = self.constant.mid(), x.constant.mid()
+        return bool(a <= b if or_equal else a < b)
+
+    def __lt__(self, other: Any) -> bool:
+        return self._below(other, or_equal=False)
+
+    def __le__(self, other: Any) -> bool:
+        return self._below(other, or_equal=True)
+
+    def __gt__(self, other: Any) -> bool:
+        return (-self)._below(-other, or_equal=False)
+
+    def __ge__(self, other: Any) -> bool:
+        return (-self)._below(-other, or_equal=True)
+
+    def __eq__(self, other: object) -> Any:
+        if (x := _term(other)) is None:
+            return NotImplemented
+        return self.node is None and x.node is None and bool(self.constant == x.constant)  # both exact
+
+    def __ne__(self, other: object) -> Any:
+        return not self == other
+
+    __hash__ = None  # pyright: ignore[reportAssignmentType]
+
+
+def expressions(array: Any) -> Node:
+    """The entries of an array, row by row, as one CasADi column."""
+    made = (_term(x) for x in np.asarray(array, dtype=object).flat)
+    return ca.vertcat(*(x.expression for x in made if x is not None))
+
+
+def _of(expression: Node) -> Term:
+    return Term(_zero(), expression)
+
+
+def _term(x: Any) -> Term | None:
+    if x.__class__ is Term:
+        return x
+    try:
+        return Term(BALLS.number(x))
+    except (TypeError, ValueError):
+        return None

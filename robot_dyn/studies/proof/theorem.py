@@ -1,0 +1,219 @@
+"""A theorem about where an arm will be: existence, uniqueness, and balls that hold q(t) and v(t)."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from math import inf, log10, nextafter
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array, Ball
+from robot_dyn.errors import QueryError, escaped
+from robot_dyn.result import UNREPORTED, reported
+from robot_dyn.studies.proof.node import Node, on_the_way
+from robot_dyn.studies.proof.packed import Packed, unpacked
+from robot_dyn.studies.proof.start import numbers_of
+from robot_dyn.validate import number, numbers
+from robot_dyn.values import Value
+
+TRUSTED = (
+    "the ball arithmetic of Arb (python-flint)",
+    "the derivatives and common subexpressions of CasADi",
+    "CPython, and this library's equations, which tests hold to a second formulation",
+)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Proof(Value):
+    """A theorem about the flow, of the numbers that a file and a setup state; `rd.prove` makes it.
+
+    Attributes:
+        robot: Name of the arm.
+        joint_names: Of the n joints.
+        asked_s: Time up to which it was asked for, in [s].
+        until_s: Time up to which it is proven.
+        why_not: Why it is not proven beyond; empty if all that was asked for is.
+        bits: Precision of the balls.
+        assumed: Which numbers are meant, in sentences.
+        nodes: Ends of steps, the start first.
+    """
+
+    robot: str
+    joint_names: tuple[str, ...] = field(metadata=UNREPORTED)
+    asked_s: float
+    until_s: float
+    why_not: str
+    bits: int
+    assumed: tuple[str, ...]
+    nodes: tuple[Node, ...] = field(repr=False, metadata=UNREPORTED)
+
+    @reported
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joints, by which `q` and `v` are ordered."""
+        return self.joint_names
+
+    @reported
+    def proven(self) -> bool:
+        """Whether it reaches the time that was asked for."""
+        return not self.why_not
+
+    @reported
+    def radius_q(self) -> np.ndarray:
+        """Upper bounds of the radii of q at the end, (n,), in [rad] or [m]."""
+        return _radii(self.nodes[-1].q)
+
+    @reported
+    def radius_v(self) -> np.ndarray:
+        """Those of v, in [rad/s] or [m/s]."""
+        return _radii(self.nodes[-1].v)
+
+    @property
+    def radii(self) -> tuple[np.ndarray, np.ndarray]:
+        """Times of the nodes, (k,), and upper bounds of the largest radius of q there, (k,)."""
+        return np.array([node.t for node in self.nodes]), np.array([_radii(node.q).max() for node in self.nodes])
+
+    @property
+    def digits(self) -> float:
+        """−log₁₀ of the largest radius of q at the end; inf if that is a point."""
+        return _digits(float(self.radius_q.max()))
+
+    def at(self, t: float) -> tuple[Array, Array]:
+        """Balls that hold q(t) and v(t), (n,) each: those of a node there, else polynomial and tube of the step.
+
+        Args:
+            t: Time in [s] from 0 to `until_s`, taken exactly.
+
+        Raises:
+            QueryError: If t is another.
+        """
+        t = number("t", t)
+        if not 0 <= t <= self.until_s:
+            raise QueryError(f"t must be between 0 and {self.until_s!r} s, up to which it is proven, got {t!r}")
+        k = bisect_right(self.nodes, t, key=lambda node: node.t) - 1
+        with self._precision():
+            if self.nodes[k].t == t:
+                q, v = ([unpacked(x) for x in known] for known in (self.nodes[k].q, self.nodes[k].v))
+            else:
+                q, v = on_the_way(self.nodes[k].t, self.nodes[k + 1])(t)
+        return _array(q), _array(v)
+
+    def contains(self, t: float, q: Any, v: Any = None) -> bool:
+        """Whether a state lies in the balls at t, all of it if it is balls; in those of q alone if v is not given.
+
+        Args:
+            t: Time in [s].
+            q: Position, (n,), numbers, text or balls.
+            v: Velocity, likewise.
+
+        Raises:
+            QueryError: If one has another shape, or t is beyond what is proven.
+        """
+        known = dict(zip("qv", self.at(t), strict=True))
+        with self._precision():
+            given = {"q": numbers_of("q", q, self.joint_names)}
+            if v is not None:
+                given["v"] = numbers_of("v", v, self.joint_names)
+            return all(
+                bool(ball.contains(x)) for name in given for x, ball in zip(given[name], known[name], strict=True)
+            )
+
+    def digits_of(self, t: Any, q: Any) -> float:
+        """Decimal digits of positions that the theorem confirms: −log₁₀ of the largest distance that is possible.
+
+        Args:
+            t: Times in [s], (m,); those beyond `until_s` are left out.
+            q: Positions, (m, n), floats.
+
+        Raises:
+            QueryError: If they are not finite numbers of these shapes, or no time is within what is proven.
+        """
+        t, q = numbers("t", t, ("m",)), numbers("q", q, ("m", "n"))
+        if q.shape != (len(t), len(self.joint_names)):
+            raise QueryError(f"q must have shape ({len(t)}, {len(self.joint_names)}), got {q.shape}")
+        within = (t >= 0) & (t <= self.until_s)
+        if not within.any():
+            raise QueryError(f"no sample lies within the {self.until_s!r} s that are proven")
+        ends, most = np.array([node.t for node in self.nodes]), 0.0
+        steps = np.clip(np.searchsorted(ends, t[within], side="left"), 1, None)
+        with self._precision():
+            for k in np.unique(steps).tolist() if len(ends) > 1 else ():
+                at = on_the_way(self.nodes[k - 1].t, self.nodes[k])
+                for time, row in zip(t[within][steps == k].tolist(), q[within][steps == k].tolist(), strict=True):
+                    most = max(most, *(_far(ball, x) for ball, x in zip(at(time)[0], row, strict=True)))
+        return _digits(most)
+
+    @reported
+    def q(self) -> tuple[str, ...]:
+        """The balls of q at the end, as decimals with a radius that hold them."""
+        return tuple(map(_told, self.nodes[-1].q))
+
+    @reported
+    def v(self) -> tuple[str, ...]:
+        """Those of v."""
+        return tuple(map(_told, self.nodes[-1].v))
+
+    @reported
+    def steps(self) -> int:
+        """Number of steps that are proven."""
+        return len(self.nodes) - 1
+
+    @reported
+    def trusted(self) -> tuple[str, ...]:
+        """What the theorem rests on."""
+        return TRUSTED
+
+    @property
+    def summary(self) -> str:
+        """The theorem in words."""
+        lines = [f"{self.robot}: " + self._claim]
+        rows = zip(self.joint_names, self.q, self.v, strict=True)
+        lines += [f"  {name}: q = {q}, v = {v}" for name, q, v in rows]
+        if self.why_not:
+            lines.append(f"Not proven beyond t = {self.until_s!r} s, because {self.why_not}.")
+        lines += ["Which numbers are meant:", *(f"  {each}" for each in self.assumed)]
+        lines += [f"Trusted: {'; '.join(self.trusted)}.", f"{self.steps} steps, balls of {self.bits} bits"]
+        return "\n".join(map(escaped, lines))
+
+    @property
+    def _claim(self) -> str:
+        if not self.until_s:
+            return "nothing is proven."
+        return f"the motion exists and is the only one for 0 ≤ t ≤ {self.until_s!r} s, and at its end it is within"
+
+    @contextmanager
+    def _precision(self) -> Iterator[None]:
+        with Ball(self.bits).scope():
+            yield
+
+
+def _far(ball: Any, x: float) -> float:
+    """The largest distance of a number from a ball, rounded up; inf if it is not a number."""
+    far = float((ball - x).abs_upper())
+    return nextafter(far, inf) if far < inf else inf
+
+
+def _array(balls: list[Any]) -> Array:
+    made = np.empty(len(balls), dtype=object)
+    made[:] = balls
+    return made
+
+
+def _radii(balls: tuple[Packed, ...]) -> np.ndarray:
+    with Ball().scope():
+        return np.array([float(unpacked(x).rad().upper()) for x in balls])
+
+
+def _digits(error: float) -> float:
+    return -log10(error) if error > 0 else inf
+
+
+def _told(x: Packed) -> str:
+    with Ball(max(64, x[0].bit_length() + 8)).scope():
+        ball = unpacked(x)
+        known = ball.rel_accuracy_bits()
+        return ball.str(max(2, min(int(known * 0.30103) + 2, 60)) if known < 10**6 else 20)

@@ -1,0 +1,79 @@
+"""The one writer of results: a figure, a CSV table of the rows, or JSON, by the suffix."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from robot_dyn import files
+from robot_dyn.result import Result, json_text
+from robot_dyn.studies.certificate import certificate_diagram
+from robot_dyn.studies.certificate.certificate import Certificate
+from robot_dyn.studies.costs import cost_diagram
+from robot_dyn.studies.costs.cost import Cost
+from robot_dyn.studies.sheet import ResultError
+from robot_dyn.studies.work_precision_diagram import diagram
+from robot_dyn.studies.work_precision_diagram.work_precision import WorkPrecision
+from robot_dyn.validate import choice, instance
+from robot_dyn.view.plots.figure import THEMES
+from robot_dyn.view.plots.plots import PICTURES
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+JSON = files.Kind("a result", ".json", b'{\n "robot":')
+DRAWINGS: Mapping[type, Callable[[Any, str], Figure]] = {
+    Certificate: certificate_diagram.draw,
+    Cost: cost_diagram.draw,
+    WorkPrecision: diagram.draw,
+}
+
+
+def save_result(result: Result, path: str | Path, *, theme: str = "light") -> Path:
+    """Write a result by the suffix of `path`, and by the first of these that it can be if there is none.
+
+    PNG, SVG or PDF hold the figure and CSV the table of a certificate, of costs or of work and precision; JSON holds
+    any result. Another file of that kind under that name is replaced; any other is not.
+
+    Args:
+        result: Of `certify`, `cost`, `stress` or `work_precision`.
+        path: Where to.
+        theme: For "light" or "dark" paper.
+
+    Raises:
+        QueryError: If an argument is wrong.
+        ResultError: If it cannot be written, or there is nothing to draw.
+    """
+    instance("result", result, Result, "give that of rd.certify, rd.cost, rd.stress or rd.work_precision")
+    choice("theme", theme, THEMES)
+    path = files.target(path, kinds(type(result)), ResultError)
+    stream = io.BytesIO()
+    if path.suffix.lower() == ".csv":
+        stream.write(table(result).encode())
+    elif path.suffix.lower() == JSON.suffix:
+        stream.write(json_text(result).encode())
+    else:
+        DRAWINGS[type(result)](result, theme).savefig(stream, format=path.suffix[1:].lower(), dpi=120)
+    return files.save(path, lambda file: file.write(stream.getvalue()), ResultError)
+
+
+def kinds(of: type[Result]) -> tuple[files.Kind, ...]:
+    """The files that a result of a class can be."""
+    return (*(PICTURES if of in DRAWINGS else ()), *((table_kind(of),) if of.columns else ()), JSON)
+
+
+def table_kind(of: type[Result]) -> files.Kind:
+    """The CSV table of a class of results."""
+    return files.Kind("a table of results", ".csv", ",".join(of.columns[:2]).encode())
+
+
+def table(result: Result) -> str:
+    """The rows of a result as CSV."""
+    text = io.StringIO()
+    writer = csv.DictWriter(text, result.columns, extrasaction="ignore")
+    writer.writeheader()
+    writer.writerows(result.rows)
+    return text.getvalue()

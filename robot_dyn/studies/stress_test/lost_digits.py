@@ -1,0 +1,78 @@
+"""The states at which each road loses most digits of inverse and forward dynamics, judged by balls.
+
+lost = −log₁₀(2⁻⁵³) − digits
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import log10
+
+import numpy as np
+
+from robot_dyn.lagrange.digits import digits_of
+from robot_dyn.model.robot import Robot
+from robot_dyn.queries.quantity import FORWARD_DYNAMICS, INVERSE_DYNAMICS, Quantity
+from robot_dyn.studies.budget import Budget
+from robot_dyn.studies.certificate.counting import Counting, Found
+from robot_dyn.studies.certificate.road import Road, roads
+from robot_dyn.studies.certificate.worst_state import Batch
+from robot_dyn.studies.stress_test.finding import Worst
+from robot_dyn.studies.stress_test.work import Work
+from robot_dyn.studies.stress_test.worst import KEPT, listed, shrunk_state
+
+_OF_FLOAT64 = -log10(2.0**-53)
+_ROUNDS, _MOST_TRIES = 3, 60
+_OTHER_NUMBERS = ("Lagrangian, float32", "Lagrangian, longdouble")
+
+
+def lost_digits(robot: Robot, states: Batch, rng: np.random.Generator, work: Work) -> Iterator[Worst]:
+    """The roads in float64, one after the other."""
+    asked = (INVERSE_DYNAMICS, FORWARD_DYNAMICS)
+    names = tuple(f"digits lost in {quantity.name}" for quantity in asked)
+    known = work.do("roads, machine code among them", lambda _: roads(robot), names)
+    if known is None:
+        return
+    found, left_out = known
+    work.left_out += left_out
+    counting = Counting(robot, states, None, rng)
+    for quantity in asked:
+        for road in found:
+            if quantity in road.quantities and road.name not in _OTHER_NUMBERS:
+                made = _lost(counting, road, quantity, work)
+                if made is not None:
+                    yield made
+
+
+def _lost(counting: Counting, road: Road, quantity: Quantity, work: Work) -> Worst | None:
+    """What one road loses; None for lack of time."""
+    name = f"digits lost in {quantity.name} by {road.name}"
+    made = work.do(name, lambda budget: _counted(counting, road, quantity, budget))
+    if made is None:
+        return None
+    lost = _OF_FLOAT64 - made.searched
+
+    def losses(batch: Batch) -> np.ndarray:
+        state = {name: batch[name][0] for name in quantity.arguments}
+        return np.array([_OF_FLOAT64 - digits_of(counting.judged(road, quantity, state))])
+
+    at, least = {name: made.state[name] for name in quantity.arguments}, KEPT * lost if lost > 0 else -np.inf
+    small = work.do(
+        f"shrinking of {name}", lambda until: shrunk_state(at, counting.states, losses, least, until, _MOST_TRIES)
+    )
+    state, minimal = small or (at, lost)
+    typical, random = _OF_FLOAT64 - made.typical, _OF_FLOAT64 - made.random
+    note = f"{road.name}: {made.searched:.1f} digits hold, {made.typical:.1f} typically"
+    what = f"digits lost in {quantity.name}"
+    return Worst(what, "", "digits", typical, random, max(lost, minimal), minimal, listed(state), note)
+
+
+def _counted(counting: Counting, road: Road, quantity: Quantity, budget: Budget) -> Found:
+    """The fewest digits of some searches."""
+    made = counting.count(road, quantity, budget.check)
+    for _ in range(_ROUNDS - 1):
+        if made.searched < made.random:
+            break
+        again = counting.count(road, quantity, budget.check)
+        made = again if again.searched < made.searched else made
+    return made

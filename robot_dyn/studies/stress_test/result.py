@@ -1,0 +1,82 @@
+"""The result of a stress test."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import isfinite
+from typing import final
+
+from robot_dyn.result import Result, reported
+from robot_dyn.studies.stress_test.finding import Judged, Limit, Worst
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Stress(Result):
+    """What an arm does at its worst, what breaks first, and what of that the library fails to tell.
+
+    Attributes:
+        robot: Its name.
+        joints: Their names.
+        worst: Worst configurations.
+        limits: Of step, gain, speed and payload, each confirmed at 0.98 and 1.02 of it.
+        runs: Random runs whose error estimates were judged.
+        left_out: What was left out, and why.
+        out_of_time: Names of what was not looked at, or not to its end, for lack of time.
+        environment: Versions and processor.
+        samples, seed: Number of random states; of the random generator.
+        spent_s: Time that it took, in [s].
+        interrupted: Whether it was ended by the user.
+    """
+
+    robot: str
+    joints: tuple[str, ...]
+    worst: tuple[Worst, ...]
+    limits: tuple[Limit, ...]
+    runs: tuple[Judged, ...]
+    left_out: tuple[str, ...]
+    out_of_time: tuple[str, ...]
+    environment: dict[str, str] = field(repr=False)
+    samples: int
+    seed: int
+    spent_s: float
+    interrupted: bool = False
+
+    @reported
+    def failures(self) -> tuple[str, ...]:
+        """What the library fails at: limits that runs refute, and runs that mislead; in words."""
+        return (
+            *(
+                f"{each.of} {each.what}: {_number(each.value)} [{each.unit}] is refuted: {each.within}; {each.beyond}"
+                for each in self.limits
+                if each.confirmed is False
+            ),
+            *(
+                f"run, {each.what}: estimated {each.estimated:.1e}, true {each.true:.1e}, and nothing says so"
+                for each in self.runs
+                if each.misleads
+            ),
+        )
+
+    @reported
+    def ok(self) -> bool:
+        """Whether there are no failures."""
+        return not self.failures
+
+    @reported
+    def sentence(self) -> str:
+        """The worst of each kind, in a sentence."""
+        parts = []
+        for what in dict.fromkeys(each.what for each in self.worst):
+            top = max((each for each in self.worst if each.what == what), key=lambda each: each.searched)
+            joint = f" ({top.joint})" if top.joint else ""
+            parts.append(f"{what} up to {top.searched:.3g}{f' {top.unit}' if top.unit else ''}{joint}")
+        checked = sum(each.confirmed is not None for each in self.limits) + len(self.runs)
+        failed = len(self.failures)
+        if late := len(self.out_of_time):
+            parts.append(f"{late} not looked at for lack of time")
+        return f"{self.robot}: {failed or 'no'} failure{'s' * (failed != 1)} in {checked} checks; {'; '.join(parts)}"
+
+
+def _number(x: float) -> str:
+    return f"{x:.4g}" if isfinite(x) else "none"

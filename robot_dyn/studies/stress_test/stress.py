@@ -1,0 +1,139 @@
+"""A stress test of an arm: its worst configurations, what breaks first, and runs that are judged."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from robot_dyn.model.robot import Robot
+from robot_dyn.studies.budget import Budget
+from robot_dyn.studies.certificate.worst_state import random_states
+from robot_dyn.studies.environment import environment
+from robot_dyn.studies.stress_test.finding import Judged, Limit, Worst
+from robot_dyn.studies.stress_test.gains import gain_limit
+from robot_dyn.studies.stress_test.loads import payload_limit, speed_limit
+from robot_dyn.studies.stress_test.lost_digits import lost_digits
+from robot_dyn.studies.stress_test.result import Stress
+from robot_dyn.studies.stress_test.runs import judged_runs
+from robot_dyn.studies.stress_test.steps import held, step_limits
+from robot_dyn.studies.stress_test.work import Work
+from robot_dyn.studies.stress_test.worst import BY_PD, HELD, pd_gains, worst_configurations
+from robot_dyn.validate import function, instance, integer, number
+
+_LEAST_SAMPLES, _MOST_SAMPLES, _MOST_RUNS = 100, 10**6, 10**5
+
+_PIECES = 8  # of the budget; one piece of work may take this part of it
+
+Found = Worst | Limit | Judged
+
+
+def stress(
+    robot: Robot,
+    *,
+    samples: int = 10_000,
+    runs: int = 7,
+    seed: int = 0,
+    budget_s: float = 90.0,
+    on_progress: Callable[[float, str], object] | None = None,
+) -> Stress:
+    """The worst configurations of an arm, the step, gain, speed and payload at which it breaks, and runs judged.
+
+    Worst configurations are searched for from random states on: κ of M, the fastest motion, gravity torque over effort
+    limit, and digits lost by each road. Limits are confirmed at 0.98 and 1.02 of them. Estimated errors of random runs
+    are held against better runs; one that is too small, and says nothing, misleads.
+
+    Args:
+        robot: The robot.
+        samples: Number of random states.
+        runs: Number of random runs.
+        seed: Of the random generator.
+        budget_s: Time to spend, in [s]. What is to come when it ends, or takes more than an eighth of it, is named in
+            `out_of_time`; with time enough for all, what is found depends on the seed alone.
+        on_progress: Called with the time spent, in [s], and with what is being done.
+
+    Raises:
+        QueryError: If an argument is wrong.
+    """
+    robot = instance("robot", robot, Robot, "give one of rd.load")
+    return stressed(robot, samples, runs, seed, budget_s, on_progress)
+
+
+def stressed(
+    robot: Robot, samples: int, runs: int, seed: int, budget_s: float,
+    on_progress: Callable[[float, str], object] | None, clock: Callable[[], float] = perf_counter,
+) -> Stress:  # fmt: skip
+    """The same, by a clock."""
+    samples = integer("samples", samples, least=_LEAST_SAMPLES, most=_MOST_SAMPLES)
+    runs, seed = integer("runs", runs, most=_MOST_RUNS), integer("seed", seed, most=2**128 - 1)
+    seconds = number("budget_s", budget_s, above=0)
+    budget = Budget(seconds, function("on_progress", on_progress, "(spent, what)"), clock)
+    work = Work(budget, seconds / _PIECES)
+    robot, found, interrupted = robot.warn_below(None), list[Found](), False
+    try:
+        for each in _found(robot, samples, runs, seed, work):
+            found.append(each)
+    except KeyboardInterrupt:
+        interrupted = True
+        work.left_out.append("what was to come when it was interrupted")
+
+    def of(kind: type) -> tuple[Any, ...]:
+        return tuple(each for each in found if isinstance(each, kind))
+
+    return Stress(
+        robot.name, robot.joint_names, of(Worst), of(Limit), of(Judged), (*_unlimited(robot), *work.left_out),
+        tuple(work.out_of_time), environment(), samples, seed, budget.spent, interrupted,
+    )  # fmt: skip
+
+
+def _found(robot: Robot, samples: int, runs: int, seed: int, work: Work) -> Iterator[Found]:
+    """The findings of all parts, each with a random generator of its own."""
+    streams = [np.random.default_rng(each) for each in np.random.SeedSequence(seed).spawn(6)]
+    states = work.do("random states", lambda _: random_states(robot, samples, streams[0]), ("all at these",))
+    if states is None:
+        return
+    moves, fastest = robot.joint_without_inertia is None, None
+    needed_for = ("worst fastest motion under it", *HELD)
+    gains = work.do("gains of a PD", lambda _: pd_gains(robot, states), needed_for) if moves else None
+    for each in worst_configurations(robot, states, streams[1], gains, work):
+        fastest = each if each.note == BY_PD else fastest
+        yield each
+    yield from _kept(speed_limit(robot, states, streams[2], work))
+    yield from _kept(payload_limit(robot, states, streams[3], gains, work))
+    if moves:
+        yield from _of_motion(robot, gains, fastest, seed, work)
+    yield from lost_digits(robot, states, streams[4], work)
+    if moves:
+        yield from judged_runs(robot, states, runs, streams[5], work)
+    else:
+        why = f"joint {robot.joint_without_inertia!r} carries no inertia"
+        work.left_out += [f"{what}: {why}" for what in ("κ of M", "fastest motion, steps and gains", "runs")]
+
+
+def _of_motion(robot: Robot, gains: Any, fastest: Worst | None, seed: int, work: Work) -> Iterator[Limit]:
+    """The limits of step and gain, where motion is fastest."""
+    if gains is None or fastest is None:
+        return
+    at = np.array(fastest.state["q"])
+    setup = work.do("start of steps and gain", lambda _: held(robot, at, gains, fastest.minimal), HELD)
+    if setup is None:
+        return
+    yield from step_limits(setup, seed, work)
+    yield from _kept(gain_limit(setup, seed, work))
+
+
+def _kept(limit: Limit | None) -> Iterator[Limit]:
+    """A limit, if there was time for it."""
+    if limit is not None:
+        yield limit
+
+
+def _unlimited(robot: Robot) -> Iterator[str]:
+    """What the file does not limit."""
+    for what, limit in (("effort", robot.effort_limit), ("velocity", robot.velocity_limit)):
+        without = [name for name, x in zip(robot.joint_names, limit, strict=True) if not (np.isfinite(x) and x > 0)]
+        if without:
+            instead = "" if what == "effort" else "; 1 rad/s or 1 m/s is taken"
+            yield f"joints without an {what} limit: {', '.join(without)}{instead}".replace("an velocity", "a velocity")

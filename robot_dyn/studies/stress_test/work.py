@@ -1,0 +1,69 @@
+"""Work within a time: each piece has a name, and what is not done, or not to its end, is kept by that name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar, final
+
+import numpy as np
+
+from robot_dyn.errors import RobotDynError
+from robot_dyn.studies.budget import Budget, OvertimeError
+
+T = TypeVar("T")
+_REASONS = {
+    np.linalg.LinAlgError: "; M is near a singular one",
+    FloatingPointError: "; its numbers are beyond those of a float64",
+}
+
+
+@final
+class Work:
+    """Pieces of work, one after the other.
+
+    Args:
+        budget: Of all of them; it is told the name of each piece when it begins.
+        longest_s: Time that one piece may take, in [s].
+
+    Attributes:
+        out_of_time: Names of the pieces that were not begun, or were ended, for lack of time.
+        left_out: Names of those that have no answer, and why.
+    """
+
+    def __init__(self, budget: Budget | None = None, longest_s: float = np.inf) -> None:
+        self._budget, self._longest_s = budget or Budget(), longest_s
+        self.out_of_time: list[str] = []
+        self.left_out: list[str] = []
+
+    def do(self, name: str, piece: Callable[[Budget], T], needed_for: tuple[str, ...] = ()) -> T | None:
+        """What a piece gives, called with its budget; None if it was not done, or not to its end.
+
+        Args:
+            name: Of the piece.
+            piece: The work.
+            needed_for: Names of the pieces that cannot be done without it.
+        """
+        if self.over:
+            self.skip(name, *needed_for)
+            return None
+        self._budget.tell(name)
+        try:
+            with np.errstate(over="raise", divide="raise", invalid="raise"):
+                return piece(self._budget.within(self._longest_s))
+        except OvertimeError:
+            self.skip(name, *needed_for)
+        except (RobotDynError, np.linalg.LinAlgError, FloatingPointError) as error:
+            why = next((why for kind, why in _REASONS.items() if isinstance(error, kind)), "")
+            self.left_out.append(f"{name}: {error}{why}")
+            if needed_for:
+                self.left_out.append(f"{', '.join(needed_for)}: not without {name}")
+        return None
+
+    @property
+    def over(self) -> bool:
+        """Whether there is no time left."""
+        return self._budget.left <= 0
+
+    def skip(self, *names: str) -> None:
+        """Name pieces that are not done for lack of time."""
+        self.out_of_time += names

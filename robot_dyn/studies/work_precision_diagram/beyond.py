@@ -1,0 +1,100 @@
+"""Beyond the horizon of a chaotic motion no error can be measured: there energy judges, and the way back.
+
+    |q − q₀|   of a run to the end and, with its velocity turned round, back to the start
+
+A motion that is not driven and loses nothing comes back. Rounding grows on the way as the errors of the method do: a
+method that errs less comes back nearer, until only rounding is left. [Hairer, Lubich, Wanner, Geometric Numerical
+Integration, 2nd ed., 2006, V.1]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from math import isfinite
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.effects.effect import Conservative
+from robot_dyn.errors import RobotDynError
+from robot_dyn.simulation.results.trajectory import Trajectory
+from robot_dyn.simulation.run.outcome import Ending
+from robot_dyn.simulation.setup.setup import Setup
+from robot_dyn.simulation.simulate import simulate
+from robot_dyn.studies.budget import Budget, Limit, OvertimeError
+from robot_dyn.studies.work_precision_diagram.candidate import ATOL, recorded
+from robot_dyn.studies.work_precision_diagram.ladder import Ladder, Point
+
+_PART = 0.02  # of the budget, for one run
+
+
+@final
+@dataclass(frozen=True)
+class Beyond:
+    """The finest run of a method over all of the time that was asked for.
+
+    Attributes:
+        name: Of the method.
+        setting: Step, in [s], or relative tolerance.
+        energy: Largest residual of the energy ledger, as a part of the energy exchanged.
+        returned: Distance from the start of the run there and back, in [rad] or [m]; None if it does not come back, or
+            the motion is driven or loses energy.
+    """
+
+    name: str
+    setting: float
+    energy: float
+    returned: float | None
+
+
+def beyond(
+    setup: Setup, horizon_s: float, ladders: Iterable[Ladder], made: Mapping[str, Any], budget: Budget
+) -> tuple[Beyond, ...]:
+    """What can be said of each method beyond the horizon.
+
+    Args:
+        setup: Of the whole time.
+        horizon_s: Up to which errors were measured.
+        ladders: What was measured; the first one of each method counts.
+        made: The methods, by name.
+        budget: Of which a run may take a fiftieth.
+    """
+    found: dict[str, Beyond] = {}
+    longest = _PART * budget.seconds
+    for ladder in ladders:
+        in_time = [p for p in ladder.points if isfinite(p.error) and p.time_s * setup.duration_s / horizon_s < longest]
+        if ladder.peer or not ladder.events or ladder.method in found or not in_time:
+            continue
+        budget.tell(f"beyond the horizon: {ladder.name}")
+        with suppress(OvertimeError, RobotDynError):
+            found[ladder.method] = _of(
+                _with(setup, made[ladder.method], ladder, in_time[-1]), ladder, in_time[-1], longest
+            )
+    return tuple(found.values())
+
+
+def _with(setup: Setup, method: Any, ladder: Ladder, point: Point) -> Setup:
+    setup = replace(recorded(setup, setup.duration_s), engine=ladder.engine)
+    if ladder.by == "tolerance":
+        return replace(setup, integrator=replace(method, rtol=point.setting, atol=ATOL * point.setting))
+    return replace(setup, integrator=method, step_s=point.setting)
+
+
+def _of(setup: Setup, ladder: Ladder, point: Point, longest: float) -> Beyond:
+    there = _run(setup, longest)
+    returned = None
+    if setup.controller is None and all(isinstance(each, Conservative) for each in setup.plant.effects):
+        back = _run(replace(setup, q0=there.q[-1], v0=-there.v[-1]), longest)
+        returned = float(np.abs(back.q[-1] - setup.q0).max())
+    return Beyond(ladder.method, point.setting, there.ledger.closure, returned)
+
+
+def _run(setup: Setup, longest: float) -> Trajectory:
+    run = simulate(setup, on_progress=Limit(longest))
+    if run.outcome.ending is Ending.STOPPED:
+        raise KeyboardInterrupt
+    if run.outcome.ending is not Ending.FINISHED:
+        raise RobotDynError(run.outcome.advice)
+    return run

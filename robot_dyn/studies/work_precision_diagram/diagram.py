@@ -1,0 +1,177 @@
+"""The work-precision diagram: error over time and evaluations, energy beside it, the Pareto front, what is believed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from robot_dyn.studies.sheet import Colours, ResultError, legend, sheet, styled
+from robot_dyn.studies.work_precision_diagram.ladder import INTERPRETED, Ladder, Point
+from robot_dyn.studies.work_precision_diagram.work_precision import WorkPrecision
+from robot_dyn.view.plots.figure import THEMES
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_LOOK = {  # colour of the theme and marker, by family: explicit, Gauss, for stiff systems, those that choose steps
+    "DOP853": (0, "o"), "Rosenbrock": (3, "o"), "order_8": (6, "s"), "rk4": (1, "D"), "midpoint": (5, "<"),
+    "explicit_euler": (5, "^"), "semi_implicit_euler": (5, "v"), "gauss_2": (2, "<"), "gauss_4": (2, ">"),
+    "gauss_6": (2, "h"), "rosenbrock_5": (3, "s"), "sdirk_3": (3, "^"), "linearly_implicit_euler": (3, "v"),
+}  # fmt: skip
+_PEERS = {
+    "SciPy DOP853 + pin.aba": "x", "MuJoCo RK4": "D", "MuJoCo Euler": "^", "MuJoCo implicitfast": "v",
+    "Drake runge_kutta3": "P", "heyoka, Taylor": "*",
+}  # fmt: skip
+_MOST_ERROR = 3.0  # [rad] or [m]: larger ones are lost, and not drawn
+_WIDTH, _HEIGHT = 13.0, 8.0  # [inch]
+
+
+def draw(result: WorkPrecision, theme: str = "light") -> Figure:
+    """The diagram.
+
+    Raises:
+        ResultError: If no run ended.
+    """
+    colours = THEMES[theme]
+    if not any(np.isfinite(p.error) for each in result.ladders for p in each.points):
+        raise ResultError("no run ended, so there is nothing to draw; look at left_out")
+    figure = sheet(_WIDTH, _HEIGHT, result.sentence, _caption(result), colours)
+    grid = figure.add_gridspec(
+        3, 2, width_ratios=(2.1, 1), left=0.065, right=0.985, top=0.845, bottom=0.195, hspace=0.62, wspace=0.17
+    )
+    first = [each for each in result.ladders if each.events and (each.peer or each.engine != INTERPRETED)]
+    first = first if any(not each.peer for each in first) else list(result.ladders)
+    own = [each for each in first if not each.peer]
+    slow = [each for each in result.ladders if each.engine == INTERPRETED and each not in first]
+    without = [each for each in result.ladders if not each.events]
+    main = figure.add_subplot(grid[:, 0])
+    _axes(main, result, colours, "time of the loop [ms]", "Error over time: lower left is better")
+    _front(main, result, colours)
+    for each in first:
+        _curve(main, each, colours, lambda p: 1e3 * p.time_s, lambda p: p.error, 1.0)
+    for each in without:
+        _curve(main, each, colours, lambda p: 1e3 * p.time_s, lambda p: p.error, 0.9, dashed=True)
+    _limits(main, result, [1e3 * p.time_s for each in first + without for p in _shown(each)])
+    _believed(main, result, colours, words=True)
+    _legend(figure, first, without, colours)
+    small = [figure.add_subplot(grid[k, 1]) for k in range(3)]
+    _axes(small[0], result, colours, "evaluations of the equation of motion", "Error over evaluations")
+    for each in [each for each in first + without if any(p.evaluations for p in each.points)]:
+        _curve(small[0], each, colours, lambda p: p.evaluations, lambda p: p.error, 0.6, dashed=not each.events)
+    _axes(small[1], result, colours, "error of q", "Energy residual, as a part of what was exchanged")
+    for each in own:
+        _curve(small[1], each, colours, lambda p: p.error, lambda p: p.energy, 0.6)
+    small[1].set_ylabel("residual")
+    small[1].set_xlim(_MOST_ERROR, result.reference.error / 3)
+    words = "Error over time, interpreted [ms]" if slow else "Error over steps"
+    _axes(small[2], result, colours, "time [ms]" if slow else "steps", words)
+    for each in slow or own:
+        _curve(small[2], each, colours, _ms if slow else _steps, lambda p: p.error, 0.6)
+    for axes in (small[0], small[2]):
+        axes.set_ylim(result.reference.error / 10, _MOST_ERROR)
+        _believed(axes, result, colours, words=False)
+    return figure
+
+
+def _ms(p: Point) -> float:
+    return 1e3 * p.time_s
+
+
+def _steps(p: Point) -> float:
+    return float(p.steps or np.nan)
+
+
+def _caption(result: WorkPrecision) -> str:
+    """What was run, and what errors are measured against."""
+    of, versions = result.reference, result.environment
+    cut = f" of {result.duration_s:g} s, where its references part" if of.parted_s is not None else ""
+    programs = ", ".join(
+        f"{k} {x}" for k, x in versions.items() if k in ("robot-dyn", "pin", "mujoco", "drake", "heyoka")
+    )
+    return (
+        f"{result.robot}: {', '.join(result.acting) or 'no effects'}; {of.horizon_s:g} s{cut}.  Error: largest"
+        f" |q − q_ref| over joints and {of.records} records, in {result.unit}.\n"
+        f"Reference: {of.methods[0]}, {of.error:.0e} {result.unit} from {of.methods[1]}: no error below that is"
+        f" believed.  {programs}; {versions['processor']}."
+    )
+
+
+def _shown(ladder: Ladder) -> list[Point]:
+    return [p for p in ladder.points if p.error < _MOST_ERROR]
+
+
+def _axes(axes: Any, result: WorkPrecision, colours: Colours, x: str, title: str) -> None:
+    from matplotlib.ticker import NullFormatter
+
+    axes.set(xscale="log", yscale="log")
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.yaxis.set_minor_formatter(NullFormatter())
+    styled(axes, colours, x, title, f"error of q [{result.unit}]")
+
+
+def _curve(
+    axes: Any, ladder: Ladder, colours: Colours, x: Callable[[Point], Any], y: Callable[[Point], float],
+    size: float, dashed: bool = False,
+) -> None:  # fmt: skip
+    """The runs of a ladder; those that are not believed are hollow."""
+    colour, marker = _look(ladder, colours)
+    points = [p for p in _shown(ladder) if y(p) > 0]
+    style = "--" if ladder.peer else ":" if dashed else "-"
+    bold = 1.9 if ladder.method in ("DOP853", "Rosenbrock") else 1.1
+    xs, ys = [x(p) for p in points], [y(p) for p in points]
+    axes.plot(xs, ys, style, color=colour, linewidth=size * bold)
+    for believed, face in ((True, colour), (False, colours["paper"])):
+        at = [k for k, p in enumerate(points) if p.believed is believed]
+        hollow = "none" if dashed else face
+        shape = {"marker": marker, "s": 30 * size**2, "color": colour, "zorder": 3, "linewidths": 0.9}
+        faced = {} if marker == "x" else {"facecolors": hollow}
+        axes.scatter([xs[k] for k in at], [ys[k] for k in at], **shape, **faced)
+
+
+def _look(ladder: Ladder, colours: Colours) -> tuple[str, str]:
+    if ladder.peer:
+        return colours["ink"], _PEERS.get(ladder.method, ".")
+    hue, marker = _LOOK.get(ladder.method, (4, "."))
+    return colours["lines"][hue], marker
+
+
+def _front(axes: Any, result: WorkPrecision, colours: Colours) -> None:
+    front = [(1e3 * p.time_s, p.error) for _, p in result.front if p.error < _MOST_ERROR]
+    if front:
+        x, y = zip(*front, strict=True)
+        axes.plot(x, y, color=colours["grid"], linewidth=9, solid_capstyle="round", solid_joinstyle="round", zorder=0.8)
+
+
+def _limits(axes: Any, result: WorkPrecision, times: list[float]) -> None:
+    axes.set_xlim(min(times) / 1.5, max(times) * 1.5)
+    axes.set_ylim(result.reference.error / 10, _MOST_ERROR)
+
+
+def _believed(axes: Any, result: WorkPrecision, colours: Colours, words: bool) -> None:
+    """The error of the reference as a line, and what lies below it."""
+    error = result.reference.error
+    axes.axhline(error, color=colours["ink"], linewidth=0.9, linestyle=(0, (6, 3)))
+    axes.axhspan(axes.get_ylim()[0], error, color=colours["veil"], zorder=0.5)
+    if words:
+        at = {"xy": (0.995, error), "xycoords": ("axes fraction", "data"), "ha": "right", "va": "top", "fontsize": 8}
+        axes.annotate(f"error of the reference, {error:.0e}: not believed below ", **at, color=colours["ink"])
+
+
+def _legend(figure: Any, first: list[Ladder], without: list[Ladder], colours: Colours) -> None:
+    from matplotlib.lines import Line2D
+
+    handles = []
+    for each in first:
+        colour, marker = _look(each, colours)
+        order = "" if each.order is None else f"{each.order}"
+        seen = f"{each.measured_order:.1f}" if each.measured_order is not None else "–"
+        label = f"{each.method}: order {seen} ({order})" if order else each.method
+        handles.append(
+            Line2D([], [], color=colour, marker=marker, markersize=5, label=label, linestyle="--" if each.peer else "-")
+        )
+    handles.append(Line2D([], [], color=colours["grid"], linewidth=9, label="no run beats these (Pareto front)"))
+    if without:
+        handles.append(Line2D([], [], color=colours["ink"], linestyle=":", label="dotted: the same without events"))
+    legend(figure, handles, colours, "measured order (nominal); hollow: not believed")

@@ -1,0 +1,130 @@
+"""The measurement of candidates: each walks its ladder as far as it pays, then all runs are timed again in turns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from contextlib import suppress
+from dataclasses import dataclass, field
+from math import isfinite
+from statistics import median
+from typing import final
+
+from robot_dyn.errors import RobotDynError
+from robot_dyn.studies.budget import Budget, Limit, OvertimeError
+from robot_dyn.studies.work_precision_diagram.candidate import Candidate, Run
+from robot_dyn.studies.work_precision_diagram.ladder import COMPILED, INTERPRETED, Ladder, Point, ladder_name
+from robot_dyn.studies.work_precision_diagram.reference_run import Reference
+
+_PART = {COMPILED: 1 / 400, INTERPRETED: 1 / 150, "": 1 / 200}  # of the budget, for one run
+_SHORT = 1 / 3000  # of the budget: runs that are timed again before the longer ones
+_LATE = 3  # runs of a ladder that may take longer than that
+_KEPT = {COMPILED: 0.2, INTERPRETED: 0.4, "": 0.2}  # of the budget, for repeats
+_HARD = 4.0  # times that, for a run that takes longer than was foreseen
+
+
+@final
+@dataclass(eq=False)
+class Rung:
+    """One run: its setting, what it left behind, its error and all its times."""
+
+    setting: float
+    run: Run
+    error: float
+    times: list[float]
+
+
+@final
+@dataclass(eq=False)
+class Walk:
+    """A candidate on its ladder."""
+
+    candidate: Candidate
+    rungs: list[Rung] = field(default_factory=list)
+    ended: str = ""
+
+    @property
+    def name(self) -> str:
+        """Of the candidate, as of its ladder."""
+        return ladder_name(self.candidate.method, self.candidate.engine, self.candidate.events)
+
+    def longest(self, budget: Budget) -> float:
+        """Time that a run may take, in [s]."""
+        return _PART[self.candidate.engine] * budget.seconds
+
+    def ladder(self, floor: float) -> Ladder:
+        """What was found, with errors above `floor` believed."""
+        of = self.candidate
+        points = tuple(
+            Point(
+                each.setting, each.run.steps, each.run.evaluations, each.error, each.run.energy, median(each.times),
+                len(each.times), isfinite(each.error) and each.error > floor,
+            )
+            for each in self.rungs
+        )  # fmt: skip
+        return Ladder(of.method, of.engine, of.events, of.order, of.by, points, self.ended, floor)
+
+
+def measured(
+    candidates: Iterable[Candidate], reference: Reference, budget: Budget, repeats: int
+) -> tuple[list[Walk], bool]:
+    """The ladders of all candidates, each run timed so often at most, and whether Ctrl-C ended them."""
+    walks = [Walk(each) for each in candidates]
+    try:
+        for each in walks:
+            _walk(each, reference, budget)
+        runs = [(each, rung) for each in walks for rung in each.rungs if isfinite(rung.error)]
+        short = [(each, rung) for each, rung in runs if rung.times[0] <= _SHORT * budget.seconds]
+        for among in (short, [each for each in runs if each not in short]):  # short ones are lost in noise most easily
+            for k in range(repeats - 1):
+                for walk, rung in among:
+                    if budget.left <= 0:
+                        return walks, False
+                    budget.tell(f"round {k + 2}: {walk.name}")
+                    _again(walk, rung, budget)
+    except KeyboardInterrupt:
+        return walks, True
+    return walks, False
+
+
+def _walk(walk: Walk, reference: Reference, budget: Budget) -> None:
+    """Run from coarse to fine, until the error of the reference is reached or the next run would take too long."""
+    candidate, longest, before = walk.candidate, walk.longest(budget), 0.0
+    late = 0
+    for setting in candidate.settings():
+        if budget.left <= _KEPT[candidate.engine] * budget.seconds:
+            walk.ended = f"the budget of {budget.seconds:g} s ended"
+            return
+        if walk.rungs and isfinite(walk.rungs[-1].error):
+            foreseen = candidate.growth(before, setting) * walk.rungs[-1].times[0]
+            if foreseen > longest:
+                walk.ended = f"a finer run would take more than {longest:.2g} s"
+                return
+        budget.tell(f"{walk.name}, {candidate.by} {setting:.3g}")
+        try:
+            if not before:
+                budget.tell(f"{walk.name}: loading")
+                with budget.apart():  # what is compiled or loaded once
+                    candidate.warm()
+            before = setting
+            run = candidate.run(setting, Limit(_HARD * longest))
+        except OvertimeError:
+            walk.ended = f"a run with {candidate.by} {setting:.3g} takes more than {_HARD * longest:.2g} s"
+            late += 1
+            if late < _LATE and not any(isfinite(each.error) for each in walk.rungs):
+                continue  # steps that are too long may bring forth a motion that takes longer
+            return
+        except RobotDynError as error:
+            walk.ended = str(error)
+            return
+        error = reference.distance(run)
+        walk.rungs.append(Rung(setting, run, error, [run.time_s]))
+        if error <= reference.error:
+            walk.ended = "the error of the reference is reached"
+            return
+    walk.ended = "there is no finer setting"
+
+
+def _again(walk: Walk, rung: Rung, budget: Budget) -> None:
+    """One more time of a run."""
+    with suppress(OvertimeError):
+        rung.times.append(walk.candidate.run(rung.setting, Limit(_HARD * walk.longest(budget))).time_s)

@@ -1,0 +1,76 @@
+"""Drake's error-controlled runge_kutta3, from the same file by its own parser."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
+
+from robot_dyn.studies.budget import Limit
+from robot_dyn.studies.work_precision_diagram.candidate import Candidate, Run, tolerances
+from robot_dyn.studies.work_precision_diagram.peers.free_motion import FreeMotion, PeerError, bare_urdf
+
+
+def candidates(motion: FreeMotion) -> list[Candidate]:
+    """Its default method at growing accuracy."""
+    framework, parsing, tree, analysis, mathematics = (
+        import_module(f"pydrake.{name}")
+        for name in ("systems.framework", "multibody.parsing", "multibody.plant", "systems.analysis", "math")
+    )
+    robot, setup, n = motion.robot, motion.setup, motion.robot.n
+    builder: Any = framework.DiagramBuilder()
+    plant = builder.AddSystem(tree.MultibodyPlant(time_step=0.0))
+    try:
+        text = etree.tostring(bare_urdf(robot), encoding="unicode")
+        parsing.Parser(plant).AddModelsFromString(text, "urdf")
+        root = next(iter(robot.frame_names))
+        plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(root), mathematics.RigidTransform())
+        plant.mutable_gravity_field().set_gravity_vector(np.array(robot.edits.gravity))
+        plant.Finalize()
+    except (RuntimeError, ValueError) as error:
+        raise PeerError(f"it does not take the file: {' '.join(str(error).split())[:200]}") from None
+    if plant.num_positions() != n:
+        raise PeerError(f"it finds {plant.num_positions()} joints in the file, not {n}")
+    places = [plant.GetJointByName(name).position_start() for name in robot.joint_names]
+    diagram = builder.Build()
+    free = plant.CreateDefaultContext()
+
+    def at(context: Any, q: np.ndarray, v: np.ndarray) -> None:
+        x = np.empty(2 * n)
+        x[places], x[n + np.array(places)] = q, v
+        plant.SetPositionsAndVelocities(context, x)
+
+    def mass_matrix(q: np.ndarray) -> np.ndarray:
+        at(free, q, np.zeros(n))
+        return plant.CalcMassMatrix(free)[np.ix_(places, places)]
+
+    def bias(q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        at(free, q, v)
+        return (plant.CalcBiasTerm(free) - plant.CalcGravityGeneralizedForces(free))[places]
+
+    motion.check(mass_matrix, bias)
+
+    def run(accuracy: float, limit: Limit) -> Run:
+        simulator: Any = analysis.Simulator(diagram)
+        analysis.ResetIntegratorFromFlags(simulator, "runge_kutta3", 0.1)
+        integrator = simulator.get_mutable_integrator()
+        integrator.set_target_accuracy(accuracy)
+        context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+        at(context, setup.q0, setup.v0)
+        simulator.Initialize()
+        q, v = (np.empty((len(motion.times), n)) for _ in range(2))
+        q[0], v[0] = setup.q0, setup.v0
+        limit(0.0)
+        began = perf_counter()
+        for k, t in enumerate(motion.times[1:], start=1):
+            simulator.AdvanceTo(t)
+            q[k], v[k] = plant.GetPositions(context)[places], plant.GetVelocities(context)[places]
+            limit(t)
+        spent = perf_counter() - began
+        steps = integrator.get_num_steps_taken()
+        return motion.run(q, v, steps, integrator.get_num_derivative_evaluations(), spent)
+
+    return [Candidate("Drake runge_kutta3", "", True, 3, "tolerance", tolerances, run)]

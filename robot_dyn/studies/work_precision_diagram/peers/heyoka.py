@@ -1,0 +1,75 @@
+"""heyoka's Taylor method, in compact mode, of the equations that our machine code is of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from robot_dyn.codegen.program import Kind, Program
+from robot_dyn.simulation.compiled.choice import choose
+from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.studies.budget import Limit
+from robot_dyn.studies.work_precision_diagram.candidate import Candidate, Run
+from robot_dyn.studies.work_precision_diagram.ladder import COMPILED
+from robot_dyn.studies.work_precision_diagram.peers.free_motion import FreeMotion, PeerError
+
+_TOLERANCES = (1e-6, 1e-10, 1e-14)  # each is compiled by itself, which takes many seconds
+
+
+def candidates(motion: FreeMotion) -> list[Candidate]:
+    """Its Taylor method."""
+    hy: Any = import_module("heyoka")
+    setup, n = motion.setup, motion.robot.n
+    machine, _ = choose(setup, StateEquation(setup.plant, None))
+    if machine is None or setup.engine != COMPILED:
+        raise PeerError("its equations are taken from our machine code, which this run has not")
+    names = [hy.make_vars(f"y{i}") for i in range(2 * n)]
+    rates = _in_heyoka(hy, machine.equations.programs["rate"], names, machine.parameters)
+    start = np.concatenate([setup.q0, setup.v0])
+    made: dict[float, Any] = {}
+
+    def warm() -> None:
+        system = list(zip(names, rates, strict=True))
+        for tolerance in _TOLERANCES:
+            made[tolerance] = hy.taylor_adaptive(system, start.tolist(), tol=tolerance, compact_mode=True)
+
+    def run(tolerance: float, limit: Limit) -> Run:
+        integrator = made[tolerance]
+        integrator.time = 0.0
+        integrator.state[:] = start
+        began = perf_counter()
+        *_, steps, _, y = integrator.propagate_grid(motion.times.tolist())
+        spent = perf_counter() - began
+        limit(motion.times[-1])
+        return motion.run(y[:, :n], y[:, n:], steps, None, spent)
+
+    return [Candidate("heyoka, Taylor", "", True, None, "tolerance", lambda: iter(_TOLERANCES), run, warm)]
+
+
+def _in_heyoka(hy: Any, program: Program, y: list[Any], parameters: np.ndarray) -> list[Any]:
+    """The outputs y' of a program without branches, of its inputs (t, y, p, own)."""
+    works = program.inputs[1] - len(y)
+    inputs = [hy.expression(0.0), *y, *[hy.expression(0.0)] * works, *[hy.expression(0.0)] * program.inputs[2]]
+    inputs += [hy.expression(float(x)) for x in parameters]
+    values: dict[int, Any] = dict(enumerate([*inputs, *(hy.expression(x) for x in program.constants)]))
+    two: dict[Kind, Callable[[Any, Any], Any]] = {
+        Kind.ADD: lambda a, b: a + b, Kind.SUBTRACT: lambda a, b: a - b, Kind.MULTIPLY: lambda a, b: a * b,
+        Kind.DIVIDE: lambda a, b: a / b, Kind.MINIMUM: lambda a, _: a, Kind.MAXIMUM: lambda a, _: a,
+    }  # fmt: skip
+    one: dict[Kind, Callable[[Any], Any]] = {
+        Kind.NEGATE: lambda a: -a, Kind.SQUARE: lambda a: a * a, Kind.TWICE: lambda a: 2.0 * a,
+        Kind.RECIPROCAL: lambda a: 1.0 / a, Kind.SQUARE_ROOT: hy.sqrt,
+    }  # fmt: skip
+    for op in program.ops:
+        of = [values[i] for i in op.of]
+        if op.kind is Kind.SINE_COSINE:
+            values[op.made[0]], values[op.made[1]] = hy.sin(of[0]), hy.cos(of[0])
+        elif (known := two.get(op.kind) if len(of) == 2 else one.get(op.kind)) is not None:
+            values[op.made[0]] = known(*of)
+        else:
+            raise PeerError(f"its equations have a {op.kind.name.lower()}, which is not translated")
+    return [values[i] for i in program.outputs[: len(y)]]

@@ -1,0 +1,208 @@
+"""The reference of a diagram: two runs by methods of different kind, tighter than all others.
+
+Their distance is the error of the reference. Where they part, as in chaotic motion, the horizon is cut.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from typing import final
+
+import numpy as np
+
+from robot_dyn.errors import QueryError, RobotDynError
+from robot_dyn.integrate.adaptive import Adaptive
+from robot_dyn.integrate.methods import method
+from robot_dyn.result import UNREPORTED, reported
+from robot_dyn.simulation.setup.setup import Setup
+from robot_dyn.studies.budget import Budget, Limit, OvertimeError
+from robot_dyn.studies.work_precision_diagram.candidate import Run, common, recorded, step_ladder, timed, warmed
+from robot_dyn.studies.work_precision_diagram.ladder import COMPILED, INTERPRETED
+from robot_dyn.values import Value, read_only
+
+_PARTED = 1e-9  # of the positions: where references differ by more, nothing finer can be shown
+_COARSE = 1e-6  # the same where the second one could not be refined until only rounding is left
+_STAGNANT = 0.3  # decades that twice as many steps must win
+_ORDERLY = 1e-6  # distance at the first record, from which on that is judged
+_ENOUGH = {COMPILED: 0.0, INTERPRETED: 1e-12}  # distance that need not be less: where shorter steps take seconds
+_ROUGH, _ROUGHLY = 1e-11, 1e-6  # a tolerance, and where its run parts from the first one: beyond, nothing is resolved
+_LATE = 3  # runs of one method that may take too long
+_LOST = 0.1  # [rad] or [m]: runs that far apart have nothing in common
+_LEAST = 1e-3  # of the duration: a horizon that is shorter shows nothing
+_ULPS = 4.0  # of rounding in any position
+_FIRST = (Adaptive("DOP853", 3e-14, 1e-15), Adaptive("Rosenbrock", 1e-12, 1e-14))
+_SECOND = ("gauss_6", "rosenbrock_5")
+_SHARE, _LEAST_S = 0.08, 0.5  # of the budget, for one run; and at least, in [s]
+
+
+class HorizonError(RobotDynError):
+    """A motion of which no reference can be had."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Reference(Value):
+    """What errors are measured against.
+
+    Attributes:
+        t: Times of the records, (k,), in [s].
+        q: Positions there, (k, n).
+        error: Distance of the two runs, in [rad] or [m]: no error below it is believed.
+        methods: What made them, the one that q is of first.
+        horizon_s: Time up to which it reaches, in [s].
+        parted_s: Time at which they, or runs at tolerances of 3e-14 and 1e-11, parted, in [s]: it ends the horizon;
+            None if they did not.
+        lost_s: Time at which the latter differed by 0.1 rad or m, in [s]; None if they did not.
+    """
+
+    t: np.ndarray = field(metadata=UNREPORTED)
+    q: np.ndarray = field(metadata=UNREPORTED)
+    error: float
+    methods: tuple[str, str]
+    horizon_s: float
+    parted_s: float | None = None
+    lost_s: float | None = None
+
+    def __post_init__(self) -> None:
+        read_only(self)
+
+    @reported
+    def records(self) -> int:
+        """Number of times at which errors are looked at."""
+        return len(self.t) - 1
+
+    def distance(self, run: Run) -> float:
+        """Largest |q − q_ref| of a run over joints and records; inf if it diverged."""
+        return np.inf if run.q is None else float(_distance(self.t, self.q, run)[1].max())
+
+
+def reference(setup: Setup, budget: Budget) -> tuple[Setup, Reference]:
+    """The setup up to the horizon, and its reference.
+
+    Raises:
+        HorizonError: If there is none.
+    """
+    asked = setup.duration_s
+    parted = lost = None
+    while True:
+        setup = recorded(setup, setup.duration_s)
+        first, run, q = _first(setup, budget)
+        if parted is None:
+            parted, lost = _rough_ends(setup, run, q, budget)
+            if parted is not None:
+                setup = replace(setup, duration_s=parted, record_period_s=0.0)
+                continue
+        second, t, distance, refined = _second(setup, run, q, budget)
+        size = max(1.0, float(np.abs(q).max()))
+        end = _passes(t, distance, size * (_PARTED if refined else _COARSE))
+        if end is None:
+            error = max(float(distance.max()), _ULPS * np.finfo(float).eps * size)
+            return setup, Reference(run, q, error, (first, second), setup.duration_s, parted, lost)
+        parted = end = float(f"{end:.2g}") if float(f"{end:.2g}") < setup.duration_s else end
+        if end < _LEAST * asked:
+            raise HorizonError(
+                f"{first} and {second} part within {_LEAST:g} of the duration, at t = {end:.2g} s: no error can be"
+                " measured; take a shorter run, or a start that is less sensitive"
+            )
+        setup = replace(setup, duration_s=end, record_period_s=0.0)
+
+
+def _first(setup: Setup, budget: Budget) -> tuple[str, np.ndarray, np.ndarray]:
+    """Words for the tightest run that ends in time, its records and its positions there."""
+    for each in _FIRST:
+        words = f"{each.name}, rtol {each.rtol:g}"
+        budget.tell(f"reference: {words}")
+        try:
+            with budget.apart():
+                warmed(replace(setup, integrator=each))
+            run = timed(replace(setup, integrator=each), Limit(_longest(budget)))
+        except OvertimeError:
+            continue
+        if run.q is not None:
+            return words, run.t, run.q
+    raise HorizonError(
+        f"no run of {setup.duration_s:g} s ends by {' or '.join(each.name for each in _FIRST)} at tight tolerances:"
+        " take a shorter run, a larger budget, or look at rd.simulate(…).summary"
+    )
+
+
+def _rough_ends(setup: Setup, t: np.ndarray, q: np.ndarray, budget: Budget) -> tuple[float | None, float | None]:
+    """When a run with a looser tolerance parts from the first one, and when nothing is left; None if it does not."""
+    try:
+        run = timed(replace(setup, integrator=Adaptive("DOP853", _ROUGH, _ROUGH)), Limit(_longest(budget)))
+    except OvertimeError:
+        return None, None
+    if run.q is None:
+        return None, None
+    times, distance = _distance(t, q, run)
+    return _passes(times, distance, _ROUGHLY * max(1.0, float(np.abs(q).max()))), _passes(times, distance, _LOST)
+
+
+def _longest(budget: Budget) -> float:
+    """Time that a run may take, in [s]."""
+    return max(_SHARE * budget.seconds, _LEAST_S)
+
+
+def _second(setup: Setup, t: np.ndarray, q: np.ndarray, budget: Budget) -> tuple[str, np.ndarray, np.ndarray, bool]:
+    """Words for the other run, times, its distance from q there, and whether shorter steps win nothing more."""
+    best: tuple[str, np.ndarray, np.ndarray, bool] | None = None
+    for name in _SECOND:
+        try:
+            replace(setup, integrator=method(name))
+        except QueryError:  # it cannot end its steps where joints are held, say
+            continue
+        for best in _refined(setup, name, t, q, budget):
+            if best[-1]:
+                return best
+        if best is not None:
+            return best
+    raise HorizonError(
+        f"no run by {' or '.join(_SECOND)} ends within {_longest(budget):.2g} s: take a larger budget, or a shorter run"
+    )
+
+
+def _refined(
+    setup: Setup, name: str, t: np.ndarray, q: np.ndarray, budget: Budget
+) -> Iterator[tuple[str, np.ndarray, np.ndarray, bool]]:
+    """Runs with ever shorter steps, until these win nothing or take too long."""
+    made, before, limit, late = method(name), np.inf, _longest(budget), 0
+    with budget.apart():
+        warmed(replace(setup, integrator=made))
+    for step in step_ladder(setup.record_period_s, 1):
+        words = f"{name}, step {step:.3g} s"
+        budget.tell(f"reference: {words}")
+        try:
+            run = timed(replace(setup, integrator=made, step_s=step), Limit(limit))
+        except OvertimeError:
+            late += 1
+            if late == _LATE:
+                return
+            continue  # steps that are too long may bring forth a motion that takes longer
+        if run.q is not None:
+            times, distance = _distance(t, q, run)
+            size = float(np.log10(np.maximum(distance[1:], 1e-17)).mean())
+            refined = bool(distance[1] < _ORDERLY and size > before - _STAGNANT)
+            refined |= bool(distance.max() < _ENOUGH[setup.engine])
+            yield words, times, distance, refined
+            before = size if distance[1] < _ORDERLY else np.inf
+            if 2 * run.time_s > limit:
+                return
+
+
+def _distance(t: np.ndarray, q: np.ndarray, run: Run) -> tuple[np.ndarray, np.ndarray]:
+    """Times that the records share with those of a run, (k,), and the largest distance over joints there, (k,)."""
+    place = common(run.t, t)
+    met = place >= 0
+    return t[place[met]], np.abs(np.asarray(run.q)[met] - q[place[met]]).max(axis=1)
+
+
+def _passes(t: np.ndarray, distance: np.ndarray, level: float) -> float | None:
+    """The first time at which a distance passes a level, by its logarithm between records; None if it never does."""
+    above = np.flatnonzero(distance > level)
+    if not len(above):
+        return None
+    i = int(above[0])
+    low, high = np.log(np.maximum(distance[[i - 1, i]], 1e-17))
+    part = (np.log(level) - low) / (high - low)
+    return float(t[i - 1] + np.clip(part, 0.0, 1.0) * (t[i] - t[i - 1]))

@@ -1,0 +1,253 @@
+"""What a digit costs: error against time and evaluations of every method that can take a motion, and of other programs.
+
+error = max over joints and records of |q − q_ref|
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import floor, isfinite, log10
+from typing import Any, ClassVar, final
+
+from robot_dyn.effects.plant import Plant
+from robot_dyn.errors import QueryError, RobotDynError
+from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, STIFF
+from robot_dyn.integrate.methods import METHODS, as_method
+from robot_dyn.queries.dynamics import Dynamics
+from robot_dyn.queries.units import units
+from robot_dyn.result import Result, reported
+from robot_dyn.seconds import in_words
+from robot_dyn.simulation.compiled.choice import choose
+from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.results.acting import acting
+from robot_dyn.simulation.setup.options import setup_of, starts
+from robot_dyn.simulation.setup.setup import Setup
+from robot_dyn.studies.budget import Budget
+from robot_dyn.studies.environment import environment
+from robot_dyn.studies.work_precision_diagram.beyond import Beyond, beyond
+from robot_dyn.studies.work_precision_diagram.candidate import own, recorded, whole
+from robot_dyn.studies.work_precision_diagram.ladder import COMPILED, INTERPRETED, Ladder, Point, Price
+from robot_dyn.studies.work_precision_diagram.measured import measured
+from robot_dyn.studies.work_precision_diagram.peers import found
+from robot_dyn.studies.work_precision_diagram.reference_run import Reference, reference
+from robot_dyn.validate import function, instance, integer, number, truth
+
+# In this order, should the budget end: first what is most used and what costs least.
+_FIRST = ("DOP853", "rk4", "order_8", "explicit_euler", "Rosenbrock", "gauss_6", "gauss_4", "midpoint")
+_MOST_REPEATS, _MOST_DIGITS = 1000, 20
+_ASKED = 6  # digits, of the sentence
+_SAID = ("rk4", "rk4 (without events)", "explicit_euler")
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class WorkPrecision(Result):
+    """Error against work of the methods for one motion.
+
+    Attributes:
+        robot: Its name.
+        acting: What acts, in words.
+        unit: Of errors, "rad", "m" or both.
+        duration_s: That was asked for, in [s].
+        reference: What errors are measured against, and up to when.
+        ladders: The runs of each method in each engine, and of each program.
+        left_out: What was left out, and why.
+        environment: Versions and processor.
+        budget_s: That was allowed, in [s].
+        spent_s: That was spent, without compiling, in [s].
+        interrupted: Whether it was ended by the user.
+        beyond: Of chaotic motion, energy and the way back over all of the duration, by method; else nothing.
+    """
+
+    columns: ClassVar[tuple[str, ...]] = (
+        "method", "engine", "events", "by", "setting", "steps", "evaluations", "error", "energy", "time_s", "repeats",
+        "believed", "on_front",
+    )  # fmt: skip
+    robot: str
+    acting: tuple[str, ...]
+    unit: str
+    duration_s: float
+    reference: Reference
+    ladders: tuple[Ladder, ...]
+    left_out: tuple[str, ...]
+    environment: dict[str, str] = field(repr=False)
+    budget_s: float
+    spent_s: float
+    interrupted: bool = False
+    beyond: tuple[Beyond, ...] = ()
+
+    @property
+    def front(self) -> tuple[tuple[Ladder, Point], ...]:
+        """The runs that no other one beats in error and time, from coarse to fine (Pareto front).
+
+        Those below the error of the reference do not take part.
+        """
+        found = [(p.time_s, p.error, ladder, p) for ladder in self.ladders for p in ladder.points if p.believed]
+        front: list[tuple[Ladder, Point]] = []
+        for _, error, ladder, point in sorted(found, key=lambda each: each[:2]):
+            if isfinite(error) and (not front or error < front[-1][1].error):
+                front.append((ladder, point))
+        return tuple(front)
+
+    @reported
+    def rows(self) -> list[Mapping[str, Any]]:
+        """The runs, one after the other: what their ladder is, what was measured, and whether no other one beats it."""
+        front = {id(point) for _, point in self.front}
+        known = [vars(each) | vars(p) | {"on_front": id(p) in front} for each in self.ladders for p in each.points]
+        return [{key: run[key] for key in self.columns} for run in known]
+
+    def digits(self, error: float) -> list[tuple[Ladder, Price]]:
+        """What an error costs by each method that can tell, in time, the cheapest first.
+
+        Args:
+            error: In [rad] or [m].
+
+        Raises:
+            QueryError: If it is not positive.
+        """
+        error = number("error", error, above=0)
+        prices = [(ladder, price) for ladder in self.ladders if (price := ladder.price(error)) is not None]
+        return sorted(prices, key=lambda each: each[1].value)
+
+    @reported
+    def sentence(self) -> str:
+        """What 6 digits cost, or as many as were reached, in a sentence."""
+        best = min((p.error for ladder in self.ladders for p in ladder.points if p.believed), default=1.0)
+        return self.sentence_of(min(_ASKED, floor(-log10(max(best, self.reference.error)))))
+
+    def sentence_of(self, digits: int) -> str:
+        """What so many digits cost, in a sentence.
+
+        Args:
+            digits: Errors of at most 10^−digits.
+
+        Raises:
+            QueryError: If it is not a whole number from 0 to 20.
+        """
+        digits = integer("digits", digits, most=_MOST_DIGITS)
+        prices = self.digits(10.0**-digits)
+        measured = [each for each in prices if not each[1].extrapolated]
+        if not measured:
+            return f"{digits} digits of q were reached by no run"
+        said, programs = [], set[str]()
+        own = [ladder for ladder, _ in measured if not ladder.peer]
+        best = [measured[0][0], *own[:1], *[ladder for ladder in own if ladder.events][:1]]
+        for ladder, price in prices:
+            program = ladder.method.split(" ")[0] if ladder.peer else ladder.name
+            asked = ladder.peer or ladder.name in _SAID or ladder in best
+            if program not in programs and asked:  # of each program its best method
+                said.append((ladder, price))
+                programs.add(program)
+        parts = [
+            f"{ladder.name} would take {in_words(price.value)} (extrapolated)"
+            if price.extrapolated
+            else f"{ladder.name} {in_words(price.value)}"
+            for ladder, price in said
+        ]
+        return f"{digits} digits of q over {self.reference.horizon_s:g} s: {'; '.join(parts)}"
+
+
+def work_precision(
+    what: Setup | Plant | Dynamics,
+    q0: Any = None,
+    v0: Any = None,
+    *,
+    duration_s: float | None = None,
+    controller: Any = None,
+    methods: Sequence[Any] | None = None,
+    peers: bool = True,
+    budget_s: float = 30.0,
+    repeats: int = 9,
+    on_progress: Callable[[float, str], object] | None = None,
+) -> WorkPrecision:
+    """Error against time and evaluations of all methods for one motion.
+
+    Method, step, tolerances, record period, error estimate and events of a setup are not used. Its engine is:
+    "auto" stands for both.
+
+    Args:
+        what: What moves: a setup, or a plant or robot with a start.
+        q0: Position at the start, (n,), in [rad] or [m]; required unless `what` is a setup.
+        v0: Velocity at the start, (n,), in [rad/s] or [m/s]; 0, or that of the setup, unless given.
+        duration_s: In [s]; that of the setup, or 1, unless given. Chaotic motion is cut earlier.
+        controller: As of a setup.
+        methods: Names of `rd.method`, or methods; all of these unless given.
+        peers: Whether other programs that are installed and can do the motion run too.
+        budget_s: Time to spend, compiling not counted, in [s].
+        repeats: How often a run is timed at most, while the budget lasts.
+        on_progress: Called with the time spent, in [s], and with what is being run.
+
+    Raises:
+        QueryError: If an argument is wrong.
+        HorizonError: If the motion has no reference.
+    """
+    given = {"duration_s": duration_s, "controller": controller}
+    setup = setup_of("work_precision", what, starts(q0, v0) | {k: x for k, x in given.items() if x is not None})
+    made = [as_method(each) for each in (_ordered(METHODS) if methods is None else _several(methods))]
+    if any(each.name == AUTO for each in made):
+        raise QueryError(f"methods: {AUTO!r} is one of {EXPLICIT!r} and {STIFF!r}; name these")
+    truth("peers", peers)
+    integer("repeats", repeats, least=1, most=_MOST_REPEATS)
+    budget = Budget(number("budget_s", budget_s, above=0), function("on_progress", on_progress, "(spent, what)"))
+    setup, engines, left_out = _engines(whole(setup))
+    asked, everything = setup.duration_s, setup
+    setup, exact = reference(setup, budget)
+    made, unable = _able(setup, made)
+    variants = [(engines[0], True)] + [(engines[0], False)] * switches(setup) + [(each, True) for each in engines[1:]]
+    candidates = [own(setup, each, engine, events) for engine, events in variants for each in made]
+    with budget.apart():  # other programs are loaded, and build their models
+        others, refused = found(setup) if peers else ([], [])
+    place = len(made)  # programs in machine code come before what is interpreted, which takes longest
+    candidates[place:place] = others
+    walked, interrupted = measured(candidates, exact, budget, repeats)
+    ladders = tuple(each.ladder(exact.error) for each in walked if each.rungs)
+    left_out += unable + refused + [f"{each.name}: {each.ended}" for each in walked if not each.rungs]
+    left_out += ["what was to come when it was interrupted"] * interrupted
+    cut = exact.parted_s is not None and not interrupted
+    later = beyond(everything, exact.horizon_s, ladders, {x.name: x for x in made}, budget) if cut else ()
+    dynamics: Any = setup.plant.dynamics
+    types = getattr(dynamics, "joint_types", (None,))
+    return WorkPrecision(
+        getattr(dynamics, "name", type(dynamics).__name__), acting(setup), units("q", types), asked, exact, ladders,
+        tuple(left_out), environment(), budget.seconds, budget.spent, interrupted, later,
+    )  # fmt: skip
+
+
+def switches(setup: Setup) -> bool:
+    """Whether effects have thresholds at which steps end."""
+    return any(effect.thresholds(setup.plant.dynamics.n) for effect in setup.plant.effects)
+
+
+def _engines(setup: Setup) -> tuple[Setup, tuple[str, ...], list[str]]:
+    """The setup in the first of the engines that it asks for and that can run it, all of these, and why not others."""
+    if setup.engine != "auto":
+        return setup, (setup.engine,), []
+    compiled = replace(recorded(setup, setup.duration_s), engine=COMPILED)
+    try:
+        choose(compiled, StateEquation(setup.plant, setup.controller))
+    except (ImportError, RobotDynError) as error:
+        return replace(setup, engine=INTERPRETED), (INTERPRETED,), [f"machine code: {error}"]
+    return replace(setup, engine=COMPILED), (COMPILED, INTERPRETED), []
+
+
+def _able(setup: Setup, made: list[Any]) -> tuple[list[Any], list[str]]:
+    """The methods that take the setup, and why not the others."""
+    able, why = [], []
+    for each in made:
+        try:
+            able.append(replace(setup, integrator=each).integrator)
+        except QueryError as error:
+            why.append(f"{each.name}: {error}")
+    return able, why
+
+
+def _several(methods: Any) -> tuple[Any, ...]:
+    """Methods that are given as a list, each once."""
+    methods = instance("methods", methods, tuple | list, "give a list of names or methods, such as ['DOP853', 'rk4']")
+    return tuple(each for k, each in enumerate(methods) if each not in methods[:k])
+
+
+def _ordered(names: Iterable[str]) -> tuple[str, ...]:
+    names = tuple(name for name in names if name != AUTO)
+    return (*(name for name in _FIRST if name in names), *(name for name in names if name not in _FIRST))

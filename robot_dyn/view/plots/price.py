@@ -1,0 +1,47 @@
+"""What runs took, beside their plots: method, steps, evaluations, estimated error, time, and the price of a digit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from robot_dyn.queries.units import units
+from robot_dyn.seconds import in_words
+from robot_dyn.simulation.results.origin import joint_types
+from robot_dyn.simulation.results.trajectory import Trajectory
+
+_NONE = "–"
+
+
+def price(named: Sequence[tuple[str, Trajectory]]) -> dict[str, Any]:
+    """A table: the names of the runs, and rows of a heading and a text for each run; those of none are left out."""
+    columns = [dict(_rows(run)) for _, run in named]
+    headings = dict.fromkeys(heading for column in columns for heading in column)
+    rows = [[heading, *(column.get(heading, _NONE) for column in columns)] for heading in headings]
+    return {"runs": [name for name, _ in named], "rows": rows}
+
+
+def _rows(run: Trajectory) -> Iterator[tuple[str, str]]:
+    s, unit = run.statistics, units("q", joint_types(run))
+    yield "method", f"{s.method}, step {s.step_s:.4g} s" if s.step_s else s.method
+    yield "engine", s.engine
+    yield "steps", str(s.steps)
+    yield "evaluations", str(s.evaluations)
+    yield f"estimated error of q [{unit}]", "not estimated" if run.error is None else str(run.error)
+    yield "time of the loop", in_words(s.wall_s)
+    if s.companion_evaluations:
+        yield "error estimate", f"{s.companion_evaluations} evaluations, {in_words(s.companions_s)}"
+    if run.accuracy is not None:
+        yield from _accuracy(run)
+
+
+def _accuracy(run: Trajectory) -> Iterator[tuple[str, str]]:
+    """What was asked for, and what one digit more or less would cost, its time in proportion to the evaluations."""
+    of = run.accuracy
+    assert of is not None
+    at = f", at rtol {of.rtol:.1e}" if of.rtol else ""
+    yield "accuracy asked for", f"{of.asked:.1e}{at}"
+    yield "pilots and check", f"{of.pilots} and {of.check} evaluations"
+    for name, evaluations in (("a digit more", of.digit_more), ("a digit less", of.digit_less)):
+        part = evaluations / max(of.run, 1)
+        yield name, f"about {evaluations:.0f} evaluations, {in_words(part * run.statistics.wall_s)}"

@@ -1,0 +1,165 @@
+"""Value objects: all that are public compare and hash without raising, copy and pickle, and cannot be changed."""
+
+from __future__ import annotations
+
+import pickle
+from copy import copy, deepcopy
+from dataclasses import FrozenInstanceError, fields, is_dataclass
+from functools import cache
+from inspect import isabstract, isclass
+from typing import Any
+
+import numpy as np
+import pytest
+
+import robot_dyn as rd
+from robot_dyn.studies.work_precision_diagram.reference_run import Reference
+from tests.short_stress import short_stress
+
+ARM = rd.load("planar_2r")
+Q = np.array([0.3, -0.4])
+PLAN = rd.quintic(Q, Q + 1, 1.0)
+LINE = rd.line([0.1, 0.2, 0.3], [0.4, 0.2, 0.1], 1.0, rotation=np.eye(3))
+CLASSES = {name for name in rd.__all__ if isclass(thing := getattr(rd, name)) and not isabstract(thing)}
+NO_VALUES = {"Dynamics", "ModelWarning", "PrecisionWarning", "RobotDynError"}  # for types, warned of or raised
+HELD = {  # of values that are made by functions, or held by others
+    "CartesianReference", "Compiled", "CompiledPlant", "Couplings", "Edits", "ErrorEstimate", "ExplicitRungeKutta",
+    "Gauss", "Ledger", "Outcome", "SinglyDiagonallyImplicit", "Statistics", "TaskDynamics", "Worst",
+}  # fmt: skip
+NAMES = sorted(CLASSES - NO_VALUES | HELD)
+
+
+def height(t: float, q: np.ndarray, v: np.ndarray) -> float:
+    return q[0]
+
+
+@cache
+def values() -> dict[str, Any]:
+    """One of each public class, by its name, and of the values that they hold; made when the first is asked for."""
+    plant = rd.Plant(ARM, [rd.ViscousFriction([0.1, 0.2])])
+    options: Any = {"duration_s": 0.05, "controller": rd.PD(PLAN, 10.0, 1.0), "integrator": "rk4", "step_s": 0.01}
+    setup = rd.Setup(plant, Q, **options)
+    run, runs = rd.simulate(setup), rd.rollouts(setup, q0=[Q, Q + 0.1], params={"kp": [1.0, 2.0]})
+    spring, damper = rd.joint_stops([-1.0, -1.0], [1.0, 1.0])
+    strut = rd.LineSpringDamper("tip", None, stiffness=9.0, damping=1.0, length=0.3)
+    loop = rd.Loop(
+        rd.Multirate(rd.PD(PLAN, [1.0, 2.0], 1.0, 0.01), rd.PD(PLAN, 1.0, 1.0, 0.02)),
+        [rd.Noise([0.1, 0.2]), rd.Quantisation(0.1)], [rd.Differences(), rd.LowPass(9.0)],
+        rd.RateLimit([1.0, 2.0]), 1.5,
+    )  # fmt: skip
+    made = [
+        rd.Event(height), rd.Threshold(0, 0.5, "upper stop", "touched", "left"),
+        rd.Adaptive(), rd.Ball(100), rd.compare(ARM, samples=2), rd.Payload("tip", 1.0), ARM, rd.Lagrangian(ARM), plant,
+        rd.PD(PLAN, [1.0, 2.0], 1.0), rd.PID(PLAN, 1.0, 1.0, 1.0), rd.PDGravity(ARM, PLAN, 1.0, 1.0),
+        rd.FeedForward(ARM, PLAN, 1.0, 1.0), rd.ComputedTorque(ARM, PLAN, 1.0, 1.0),
+        rd.OperationalSpace(ARM, "tip", LINE, 1.0, 1.0, posture=Q, rows=(0, 2)), rd.EffortLimit([1.0, 2.0]),
+        rd.ExternalWrench("tip", np.ones(6)), spring, damper, rd.RegularisedCoulombFriction([0.1, 0.2]), strut,
+        *strut.parts, rd.Spring([1.0, 2.0]), rd.ViscousFriction([1.0, 2.0]), PLAN,
+        rd.DryFriction([1.0, 2.0], 2.0, 0.1), rd.RigidStops(-1.0, [1.0, 2.0], 0.5),
+        rd.ActuatorLag([0.1, 0.2]), rd.LuGreFriction(9.0, 1.0, 1.0, [1.0, 2.0], 2.0, 0.1),
+        rd.DahlFriction(9.0, [1.0, 2.0], 1.5), rd.CarriedPayload(rd.Payload("tip", 1.0)),
+        rd.RigidBacklash([0.1, 0.0], 0.1, 3.0, 0.5, 0.2),
+        rd.SeriesElastic([9.0, 0.0], 0.1, 3.0, 0.1, 0.2, 0.01),
+        rd.Samples([0.0, 1.0, 2.0], np.ones((3, 2))), LINE,
+        loop, loop.controller, *loop.position, *loop.velocity, *loop.actuation,
+        setup, run, runs, run.ledger, run.error, run.statistics, run.outcome, ARM.couplings, ARM.edits,
+        rd.task_dynamics(ARM, Q, Q, "tip", rows=(0, 2)), rd.method("rk4"), rd.method("gauss_4"), rd.method("sdirk_3"),
+        rd.WorkPrecision("arm", (), "rad", 1.0, Reference(Q, Q, 1e-12, ("a", "b"), 1.0), (), (), {}, 1.0, 1.0),
+        rd.prove(rd.Setup(plant, Q), 0.01), rd.advise(setup), rd.Cost("arm", (), (), (), {}, 1.0, 1.0),
+        rd.certify(rd.load("pendulum"), samples=100, repeats=1), rd.check("pendulum"),
+        (stressed := short_stress(rd.load("pendulum"))), stressed.worst[0],
+    ]  # fmt: skip
+    named: dict[str, Any] = {type(each).__name__: each for each in made}
+    return named | {"Compiled": rd.Compiled(ARM), "CompiledPlant": rd.Compiled(plant)}
+
+
+def test_every_public_class_is_looked_at() -> None:
+    assert sorted(values()) == NAMES
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_values_compare_and_hash_and_so_do_their_copies(name: str) -> None:
+    value = values()[name]
+    assert (value == value, value != value) == (True, False)
+    assert (value == object()) is False and (value == None) is False  # noqa: E711
+    for other in (copy(value), deepcopy(value), pickle.loads(pickle.dumps(value))):
+        assert type(other) is type(value)
+        equal = value == other
+        assert equal in (True, False)
+        assert not equal or hash(other) == hash(value)
+        assert len({value, other}) == 2 - equal
+        for field in fields(value):
+            same(getattr(other, field.name), getattr(value, field.name))
+
+
+def same(one: Any, other: Any) -> None:
+    """The same type and, of arrays, the same numbers, read-only in both."""
+    assert type(one) is type(other)
+    if isinstance(one, dict):
+        for key in other:
+            same(one[key], other[key])
+    elif isinstance(one, np.ndarray):
+        np.testing.assert_array_equal(one, other)
+        assert not one.flags.writeable and not other.flags.writeable
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_values_cannot_be_changed(name: str) -> None:
+    value = values()[name]
+    assert is_dataclass(value)
+    for field in fields(value):
+        with pytest.raises(FrozenInstanceError):
+            setattr(value, field.name, getattr(value, field.name))
+        with pytest.raises(FrozenInstanceError):
+            delattr(value, field.name)
+
+
+def test_values_keep_copies_of_what_they_are_given() -> None:
+    """What the caller does to an array afterwards changes nothing, and the array of the caller stays writeable."""
+    x, six, points, three = np.array([0.3, 0.4]), np.ones(6), np.ones((3, 2)), np.ones(3)
+    times, about = np.array([0.0, 1.0, 2.0]), {"author": "me"}
+    made: list[tuple[Any, tuple[str, ...]]] = [
+        (rd.PD(PLAN, x, x), ("kp", "kd")),
+        (rd.ComputedTorque(ARM, PLAN, x, x), ("kp", "kd")),
+        (rd.PID(PLAN, x, x, x, x), ("kp", "ki", "kd", "effort_limit")),
+        (rd.ViscousFriction(x), ("damping",)),
+        (rd.RegularisedCoulombFriction(x), ("friction",)),
+        (rd.Spring(x, x), ("stiffness", "rest")),
+        (rd.joint_stops(-x, x, x)[0], ("upper", "stiffness")),
+        (rd.EffortLimit(x), ("limit",)),
+        (rd.DryFriction(x, x, x), ("level", "static", "stribeck_velocity")),
+        (rd.RigidStops(-x, x, x), ("upper", "restitution")),
+        (rd.ExternalWrench("tip", six), ("wrench",)),
+        (
+            rd.LineSpringDamper("tip", None, three, three, stiffness=1.0, damping=1.0, length=1.0),
+            ("point", "other_point"),
+        ),
+        (rd.Samples(times, points), ("breaks", "coefficients")),
+        (rd.Setup(rd.Plant(ARM), x, x, about=about), ("q0", "v0", "about")),
+    ]
+    before = [[deepcopy(getattr(value, name)) for name in names] for value, names in made]
+    for array in (x, six, points, three, times):
+        array += 7.0
+    about["author"] = "you"
+    for (value, names), kept in zip(made, before, strict=True):
+        for name, old in zip(names, kept, strict=True):
+            np.testing.assert_array_equal(getattr(value, name), old)
+
+
+def test_a_users_own_arrays_stay_as_they_are() -> None:
+    """Copies of a controller or an effect of one's own have read-only arrays only where it has."""
+
+    class Own(rd.Stateless):
+        n = 2
+
+        def __init__(self) -> None:
+            self.gain, self.fixed = np.ones(2), np.ones(2)
+            self.fixed.setflags(write=False)
+
+        def torque(self, t, q, v, z):
+            return -self.gain * q
+
+    own = Own()
+    for made in (copy(own), deepcopy(own)):
+        assert made.gain.flags.writeable and own.gain.flags.writeable
+        assert not made.fixed.flags.writeable

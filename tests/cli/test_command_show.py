@@ -1,0 +1,99 @@
+"""Commands that show a run: what they write, and what they say where they cannot."""
+
+from __future__ import annotations
+
+import re
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+import robot_dyn as rd
+from robot_dyn.cli.commands import demo
+from robot_dyn.errors import RobotDynError
+from robot_dyn.view.plots.plots import PLOTS
+from tests.browser import opened
+from tests.command import run, said
+
+PROGRAMS = {"scipy": "SciPy", "mujoco": "MuJoCo", "pydrake": "Drake", "heyoka": "heyoka"}
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory) -> Path:
+    swing = rd.simulate(rd.load("planar_2r"), q0=[0.4, -0.7], duration_s=0.2, estimate_error=False)
+    return rd.save_run(swing, tmp_path_factory.mktemp("run") / "run.npz")
+
+
+@pytest.mark.long
+def test_the_demo_ends_with_a_replay_a_plot_and_a_run(tmp_path, browser) -> None:
+    """It shows arm and cross-check, then names four files that are there; the page opens with the network off.
+
+    Last comes what 1e-8 rad takes, here and by the programs that are installed; those that are not are named. Where
+    the machine is busy, the budget may end before a run reaches that.
+    """
+    text = said("demo", "--output", tmp_path / "new" / "demo")
+    assert "M, mass matrix [" in text and "1 of 1 agree" in text and "finished at t = 1.5 s" in text
+    files, _, price = text.partition("Now look:")[2].partition("What 1e-8 rad takes here: 1 s of the same arm")
+    named = [Path(line.split()[0]) for line in files.splitlines() if line.strip()]
+    assert [path.name for path in named] == ["panda.html", "panda.png", "panda.npz", "panda.toml"]
+    assert all(path.stat().st_size > 100 for path in named)
+    assert re.search(r"\n  robot_dyn.*: ([\d.]+ [µm]?s|reached by no run)", price)
+    for module, program in PROGRAMS.items():
+        installed = find_spec(module) is not None
+        assert bool(re.search(rf"\n  {program}.*: (.* times as long|reached by no run)", price)) is installed
+        assert (f"left out: {module}: is not installed" in price) is not installed
+    assert rd.load_run(named[2]).outcome.ending == "finished"
+    with opened(browser, named[0], offline=True) as view:
+        assert view.complaints == []
+        assert view.ask("replay.duration") == 1.5
+
+
+def test_the_price_needs_no_other_program(monkeypatch) -> None:
+    """Without any, and where there is no reference, the demo says so and goes on."""
+    swing = rd.Setup(rd.Plant(rd.load("pendulum")), [0.3], duration_s=0.2, engine="compiled")
+    monkeypatch.setattr("robot_dyn.studies.work_precision_diagram.peers.find_spec", lambda name: None)
+    lines = list(demo._price(swing))
+    assert re.match(r"  robot_dyn.*: ([\d.]+ [µm]?s|reached by no run)", lines[2])
+    assert [line for line in lines if "left out" in line] == [
+        f"  left out: {name}: is not installed" for name in PROGRAMS
+    ]
+
+    def refuse(*_: object, **__: object) -> None:
+        raise RobotDynError("no reference")
+
+    monkeypatch.setattr(rd, "work_precision", refuse)
+    assert list(demo._price(swing))[2:] == ["left out: no reference"]
+
+
+def test_a_plot_is_written_beside_the_run_unless_told(file, tmp_path) -> None:
+    assert "run.png" in said("plot", file)
+    assert file.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
+    said("plot", file, "-o", tmp_path / "two.svg", "--show", "joints", "--show", "phase", "--dark")
+    assert "<svg" in (tmp_path / "two.svg").read_text(encoding="utf-8")
+
+
+def test_help_names_every_plot() -> None:
+    text = said("plot", "--help")
+    assert all(name in text.replace("\n", " ") for name in PLOTS)
+
+
+@pytest.mark.parametrize(
+    ("args", "text"),
+    [
+        (["--show", "jonts"], "no plot 'jonts'; nearest: joints"),
+        (["--joint", "elbo"], "no joint 'elbo'"),
+        (["-o", "out.bmp"], "'.bmp' is not the suffix of a plot; end the name with .png, .svg, .pdf"),
+        (["-o", "none/out.png"], "there is no folder"),
+        (["--show", "tracking"], "it followed no reference"),
+    ],
+)
+def test_plots_without_meaning_are_refused_in_one_line(file, args: list[str], text: str) -> None:
+    done = run("plot", file, "--force", *args)
+    assert done.returncode == 2
+    assert text in done.stderr and done.stderr.count("\n") == 1
+
+
+def test_a_demo_that_cannot_write_says_so(tmp_path) -> None:
+    (tmp_path / "file").write_text("")
+    done = run("demo", "--output", tmp_path / "file" / "demo")
+    assert done.returncode == 2 and "name a folder that can be written" in done.stderr

@@ -1,0 +1,180 @@
+"""The commands simulate, explain and scene, as a user meets them."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import robot_dyn as rd
+from robot_dyn.scene.starters import starter, starters
+from tests.command import refusal, started
+
+COMMAND = [sys.executable, "-c", "from robot_dyn.cli import main; main()"]
+DOCUMENT = (Path(__file__).parents[2] / "docs" / "json.md").read_text(encoding="utf-8")
+
+
+def run(*arguments: object) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([*COMMAND, *map(str, arguments)], capture_output=True, text=True, timeout=120, check=False)
+
+
+@pytest.fixture
+def scene(tmp_path) -> Path:
+    path = tmp_path / "scene.toml"
+    path.write_text(starter("cart_pole").replace("4.0", "0.2", 1), encoding="utf-8")
+    return path
+
+
+def test_simulate_prints_a_summary_and_keeps_the_run(scene, tmp_path) -> None:
+    done = run("simulate", scene, "-o", tmp_path / "run.npz", "--csv", tmp_path / "run.csv")
+    assert done.returncode == 0, done.stderr
+    for said in (
+        "finished at t = 0.2 s",
+        "effects: gravity 9.807 m/s², viscous_friction, spring, external_wrench\n",
+        "energy ledger",
+        "error of q [m or rad]",
+    ):
+        assert said in done.stdout
+    assert rd.load_run(tmp_path / "run.npz").summary in done.stdout
+    assert (tmp_path / "run.csv").is_file()
+
+
+@pytest.mark.parametrize(
+    ("outputs", "message"),
+    [
+        (["-o", "scene.toml"], r"scene\.toml: '\.toml' is not the suffix of a run file; end the name with \.npz"),
+        (["-o", "run.txt"], r"run\.txt: '\.txt' is not the suffix of a run file.*"),
+        (["-o", "run.npz", "--csv", "run.npz"], r"run\.npz: '\.npz' is not the suffix of a table.*"),
+        (["-o", "link.npz", "--force"], r"link\.npz: is the same file as .*scene\.toml, which would be lost.*"),
+        (["-o", "run.npz", "--csv", "to_run.csv"], r"to_run\.csv: is the same file as run\.npz.*"),
+        (["-o", "none/run.npz"], r"none/run\.npz: there is no folder .*/none; make it first.*"),
+        (["-o", "old.npz"], r"old\.npz: exists; add --force to replace it.*"),
+        (["--csv", "old.npz.csv"], r"old\.npz\.csv: exists; add --force.*"),
+        (["--csv", "other.csv", "--force"], r"other\.csv: is not a table of a run, so it is not replaced.*"),
+        (["-o", "pipe.npz", "--force"], r"pipe\.npz: is not a regular file.*"),
+        (["-o", "."], r"\.: is a folder.*"),
+    ],
+)
+def test_an_output_that_would_destroy_something_is_refused_before_the_run(
+    scene, tmp_path, monkeypatch, outputs: list[str], message: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(rd, "simulate", None)
+    (tmp_path / "link.npz").symlink_to(scene)
+    (tmp_path / "to_run.csv").symlink_to("run.npz")
+    (tmp_path / "old.npz").write_bytes(b"")
+    (tmp_path / "old.npz.csv").write_bytes(b"")
+    (tmp_path / "other.csv").write_text("x,y")
+    os.mkfifo(tmp_path / "pipe.npz")
+
+    def state() -> dict[str, tuple[int, ...]]:
+        status = {path.name: path.lstat() for path in tmp_path.iterdir()}
+        return {name: (each.st_mode, each.st_ino, each.st_size, each.st_mtime_ns) for name, each in status.items()}
+
+    before = state()
+    assert re.fullmatch(message, refusal(["simulate", scene, *outputs]))
+    assert state() == before
+
+
+def test_force_replaces(scene, tmp_path) -> None:
+    for name in ("run.npz", "run.csv"):
+        (tmp_path / name).touch()
+    done = run("simulate", scene, "-o", tmp_path / "run.npz", "--csv", tmp_path / "run.csv", "--force")
+    assert done.returncode == 0, done.stderr
+    assert rd.load_run(tmp_path / "run.npz").t[-1] == 0.2 and (tmp_path / "run.csv").stat().st_size > 1000
+
+
+@pytest.mark.skipif(os.name != "posix", reason="/dev/full, pipes and descriptors of POSIX")
+@pytest.mark.parametrize(("redirection", "code"), [("| head -0", 0), ("> /dev/full", 2), (">&-", 2)])
+def test_a_run_is_written_whatever_becomes_of_the_output(scene, tmp_path, redirection: str, code: int) -> None:
+    """The files come first; what cannot be printed is said in one line."""
+    command = (
+        f'set -o pipefail; "{COMMAND[0]}" -c "{COMMAND[2]}" simulate {scene} -o {tmp_path / "run.npz"} {redirection}'
+    )
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == code
+    assert rd.load_run(tmp_path / "run.npz").t[-1] == 0.2
+    assert done.stderr.count("\n") == 1 and ("standard output cannot be written" in done.stderr) == (code == 2)
+
+
+def test_document_has_the_keys_that_are_promised(scene) -> None:
+    document = json.loads(run("simulate", scene, "--json").stdout)
+    section = DOCUMENT.split("## `robot-dyn simulate")[1].split("\n## ")[0]
+    promised = {
+        key
+        for line in section.splitlines()
+        if line.startswith("| `")
+        for key in re.findall(r"`(\w+)`", line.split("|")[1])
+    }
+    assert set(document) == promised
+
+
+def test_explain_shows_the_equation(scene) -> None:
+    done = run("explain", scene)
+    assert done.returncode == 0
+    assert "N = ∂V/∂q − τ_viscous_friction" in done.stdout
+
+
+def test_scene_prints_starters() -> None:
+    assert run("scene").stdout.split() == list(starters())
+    assert run("scene", "pendulum").stdout == starter("pendulum")
+    wrong = run("scene", "pendulun")
+    assert wrong.returncode == 2
+    assert "nearest: pendulum" in wrong.stderr
+
+
+def test_a_scene_with_a_mistake_is_an_error_of_one_line(scene) -> None:
+    scene.write_text(scene.read_text().replace("hinge", "hing"))
+    done = run("simulate", scene)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert re.fullmatch(r"robot-dyn: error: .*scene\.toml: .*'hing'.*nearest: hinge.*\n", done.stderr)
+
+
+def test_a_run_that_diverges_says_when_and_what_to_do(scene) -> None:
+    scene.write_text(
+        'robot = "planar_2r"\nduration_s = 1.0\nmethod = "explicit_euler"\nstep_s = 0.1\n'
+        '[[effect]]\nkind = "spring"\nstiffness_N_m_per_rad = 1e5\nrest_rad = 1.0\n'
+    )
+    done = run("simulate", scene)
+    assert done.returncode == 1
+    assert re.search(r"diverged at t = .*joint_\d.*smaller step", done.stdout)
+
+
+WATCHED = """
+import sys
+from robot_dyn.cli import main
+from robot_dyn.simulation.run.fixed_step import FixedStep
+
+advance, calls = FixedStep._advance, []
+
+def watched(self):
+    calls.append(1)
+    if len(calls) == 20:
+        print("at work", file=sys.stderr, flush=True)
+    return advance(self)
+
+FixedStep._advance = watched
+main()
+"""
+
+
+def test_ctrl_c_ends_a_run_and_keeps_it(scene, tmp_path) -> None:
+    text = 'robot = "planar_2r"\nduration_s = 9000.0\nmethod = "rk4"\nstep_s = 1e-3\nengine = "interpreted"\n'
+    scene.write_text(text + "[start]\nq = [0.4, -0.7]\n")  # it would run for many minutes
+    output = tmp_path / "run.npz"
+    with started("simulate", scene, "-o", output, code=WATCHED) as process:
+        assert process.stderr is not None
+        assert process.stderr.readline() == "at work\n"
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+    assert process.returncode == 130, err
+    assert "stopped at t = " in out
+    assert "Traceback" not in err
+    assert len(rd.load_run(output).t) > 1

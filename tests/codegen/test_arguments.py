@@ -1,0 +1,124 @@
+"""What goes into a compiled query, and where its answer goes: it is that of Robot, or of the plant, all the same."""
+
+from __future__ import annotations
+
+import pickle
+
+import numpy as np
+import pytest
+
+import robot_dyn as rd
+from robot_dyn.codegen.trace.symbolic import TraceError
+from robot_dyn.effects.effect import Active
+from robot_dyn.errors import QueryError
+
+ARM = rd.load("planar_2r")
+FAST = rd.Compiled(ARM)
+PUSHED = rd.Plant(
+    ARM, [rd.ViscousFriction(0.3), rd.ExternalWrench("tip", [1.0, 0, 2, 0, -0.5, 0], start_s=0.2, end_s=0.6)]
+)
+PLANT = rd.Compiled(PUSHED)
+FAR = 2 * np.pi * 40_000
+
+
+def state(far: bool) -> list[np.ndarray]:
+    q = np.array([0.3, -0.8])
+    return [q + FAR if far else q, np.array([0.5, 0.4]), np.array([1.0, -2.0])]
+
+
+@pytest.mark.parametrize("far", [False, True])
+@pytest.mark.parametrize("alias", [0, 1, 2])
+@pytest.mark.parametrize("name", ["forward_dynamics", "inverse_dynamics"])
+def test_an_answer_may_take_the_place_of_an_argument(name: str, alias: int, far: bool) -> None:
+    """Also where the kernel gives up and another way is gone: 1e-9, a turn of 40 000 leaves that much of an angle."""
+    right = getattr(ARM, name)(*state(far))
+    given = state(far)
+    np.testing.assert_allclose(getattr(FAST, name)(*given, out=given[alias]), right, rtol=1e-9, atol=1e-9)
+    rows = [np.tile(x, (20, 1)) for x in state(far)]
+    np.testing.assert_allclose(getattr(FAST, name)(*rows, out=rows[alias])[7], right, rtol=1e-9, atol=1e-9)
+    timed = state(far)
+    plain = getattr(PUSHED, name)(0.3, *state(far))
+    np.testing.assert_allclose(getattr(PLANT, name)(0.3, *timed, out=timed[alias]), plain, rtol=1e-9, atol=1e-9)
+
+
+def test_an_error_names_the_joint_though_the_answer_was_to_go_there() -> None:
+    q, v, tau = state(False)
+    q[1] = np.nan
+    with pytest.raises(QueryError, match=f"q must be finite, got nan for joint '{ARM.joint_names[1]}'"):
+        FAST.forward_dynamics(q, v, tau, out=q)
+
+
+@pytest.mark.parametrize("count", [3, 20])
+def test_times_broadcast_like_any_argument(count: int) -> None:
+    """Times (B,) go with states (B, n); a time (B, 1) with states (B, n) gives (B, B, n), however many they are."""
+    t = np.linspace(0.0, 1.0, count)
+    q, v, u = (np.tile(x, (count, 1)) for x in state(False))
+    each = np.array([PUSHED.forward_dynamics(float(time), q[0], v[0], u[0]) for time in t])
+    np.testing.assert_allclose(PLANT.forward_dynamics(t, q, v, u), each, rtol=1e-11)
+    square = PLANT.forward_dynamics(t[:, None], q, v, u)
+    np.testing.assert_allclose(square, np.broadcast_to(each[:, None], (count, count, 2)), rtol=1e-11)
+
+
+@pytest.mark.parametrize("count", [3, 20])
+def test_one_odd_state_of_a_timed_batch_is_told_or_answered(count: int) -> None:
+    t, (q, v, u) = np.linspace(0.0, 1.0, count), (np.tile(x, (count, 1)) for x in state(False))
+    v[1] = 1e8  # doubtful: the interpreted plant answers
+    each = np.array([PUSHED.forward_dynamics(float(t[i]), q[i], v[i], u[i]) for i in range(count)])
+    np.testing.assert_allclose(PLANT.forward_dynamics(t, q, v, u), each, rtol=1e-9)
+    q[2, 0] = np.nan
+    with pytest.raises(QueryError, match="q must be finite, got nan for joint"):
+        PLANT.forward_dynamics(t, q, v, u)
+
+
+@pytest.mark.parametrize("count", [3, 20])
+def test_arrays_of_other_kinds_are_taken_or_refused(count: int) -> None:
+    rows = [np.tile(x, (count, 1)) for x in state(False)]
+    right = ARM.forward_dynamics(*rows)
+    masked = [np.ma.masked_array(x) for x in rows]
+    np.testing.assert_allclose(FAST.forward_dynamics(*masked), right, rtol=1e-12)
+    locked = np.empty((count, 2))
+    locked.flags.writeable = False
+    with pytest.raises(QueryError, match="read-only"):
+        FAST.forward_dynamics(*rows, out=locked)
+    raw = np.zeros(16 * count + 1, np.uint8)[1:].view(np.float64).reshape(count, 2)  # no multiple of 8 bytes
+    np.testing.assert_allclose(FAST.forward_dynamics(*rows, out=raw), right, rtol=1e-12)
+    for t in (10**400, None, "now"):
+        with pytest.raises(QueryError, match="t must be a time"):
+            PLANT.forward_dynamics(t, *rows)
+
+
+def test_a_plant_that_was_used_can_be_pickled() -> None:
+    right = PLANT.forward_dynamics(0.3, *state(False))
+    again = pickle.loads(pickle.dumps(PLANT))
+    np.testing.assert_array_equal(again.forward_dynamics(0.3, *state(False)), right)
+
+
+class Odd(Active):
+    """An effect that does what no trace can follow."""
+
+    def __init__(self, does) -> None:
+        self.does = does
+
+    @property
+    def name(self) -> str:
+        return "odd"
+
+    def torque(self, dynamics, t, q, v):
+        return self.does(q, v)
+
+
+@pytest.mark.parametrize(
+    "does",
+    [lambda q, v: None, lambda q, v: v[q > 0], lambda q, v: np.sort(np.concatenate([q, v] * 4))[:2]],
+    ids=["None", "index", "branches"],
+)
+def test_an_effect_that_cannot_be_traced_is_named(does) -> None:
+    with pytest.raises(TraceError, match="effect odd cannot be compiled"):
+        rd.Compiled(rd.Plant(ARM, [Odd(does)])).torque(0.0, *state(False)[:2])
+
+
+def test_one_sided_stops_are_compiled_exactly() -> None:
+    """No digit of the stop that is not there, 1e9 away, is in the torque of the one that is."""
+    plant = rd.Plant(ARM, [*rd.joint_stops(-3.0, np.inf)])
+    q, v = np.array([-3.05, -2.9]), np.array([0.2, -0.1])
+    np.testing.assert_allclose(rd.Compiled(plant).torque(0.0, q, v), plant.torque(0.0, q, v), rtol=1e-13)

@@ -1,0 +1,239 @@
+"""The cache of compiled kernels: what comes back is what was kept, whole, and by nobody else; or nothing comes back."""
+
+from __future__ import annotations
+
+import os
+import stat
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from robot_dyn.codegen.store import cache
+from robot_dyn.codegen.store.cache import CacheWarning, Store, key
+from robot_dyn.errors import QueryError
+from tests.codegen.entries import KEY, OTHER, PAYLOAD, as_root, assert_gone, posix
+
+
+@pytest.mark.parametrize("payload", [b"", b"\n", PAYLOAD, os.urandom(100_000)], ids=["empty", "line", "text", "random"])
+@pytest.mark.parametrize("about", ["", "panda: M", "two\nlines", "é" * 1000, "\udcff"])
+def test_what_is_kept_comes_back(store: Store, payload: bytes, about: str) -> None:
+    assert store.load(KEY) is None
+    store.save(KEY, payload, about)
+    assert store.load(KEY) == payload
+    assert store.load(OTHER) is None
+    store.save(KEY, payload[::-1], about)
+    assert store.load(KEY) == payload[::-1]
+
+
+@posix
+def test_only_this_user_can_enter_or_write(store: Store, kept: Path) -> None:
+    assert [stat.S_IMODE(path.stat().st_mode) for path in (store.folder.parent, store.folder)] == [0o700, 0o700]
+    assert stat.S_IMODE(kept.stat().st_mode) == 0o600
+    assert list(store.folder.iterdir()) == [kept]
+
+
+def test_a_flipped_bit_anywhere_is_found(store: Store, kept: Path) -> None:
+    """In the format, the digest, the key, the label and the payload: every byte of the entry."""
+    whole = kept.read_bytes()
+    for at in range(len(whole)):
+        kept.write_bytes(whole[:at] + bytes([whole[at] ^ (1 << at % 8)]) + whole[at + 1 :])
+        assert store.load(KEY) is None, at
+        assert not kept.exists()
+    kept.write_bytes(whole)
+    assert store.load(KEY) == PAYLOAD
+
+
+def test_an_entry_of_any_other_length_is_refused(store: Store, kept: Path) -> None:
+    whole = kept.read_bytes()
+    for length in range(len(whole)):
+        kept.write_bytes(whole[:length])
+        assert store.load(KEY) is None, length
+        assert not kept.exists()
+    kept.write_bytes(whole + b"\0")
+    assert_gone(store, kept)
+
+
+def test_an_entry_under_another_key_is_refused(store: Store, kept: Path) -> None:
+    """Whole and one's own, but for another robot."""
+    moved = store.folder / f"{OTHER}.kernel"
+    kept.rename(moved)
+    assert store.load(OTHER) is None
+    assert not moved.exists()
+
+
+def test_an_entry_of_another_format_is_refused(store: Store, kept: Path, monkeypatch) -> None:
+    monkeypatch.setattr(cache, "_MAGIC", b"robot_dyn kernel 2\n")
+    assert_gone(store, kept)
+
+
+@posix
+def test_a_link_is_not_followed_and_its_target_stays(store: Store, kept: Path, tmp_path: Path) -> None:
+    target = kept.rename(tmp_path / "target")
+    kept.symlink_to(target)
+    assert_gone(store, kept)
+    assert target.exists()
+
+
+@posix
+@pytest.mark.parametrize("mode", [0o620, 0o602, 0o666])
+def test_an_entry_that_others_can_write_is_refused(store: Store, kept: Path, mode: int) -> None:
+    kept.chmod(mode)
+    assert_gone(store, kept)
+
+
+@as_root
+def test_an_entry_of_another_user_is_refused(store: Store, kept: Path) -> None:
+    os.chown(kept, 12345, -1)
+    assert_gone(store, kept)
+
+
+@posix
+@pytest.mark.parametrize("written", [False, True])
+def test_a_pipe_neither_blocks_nor_serves(store: Store, kept: Path, written: bool) -> None:
+    """Without a writer, and with a whole entry in it."""
+    entry = kept.read_bytes()
+    kept.unlink()
+    os.mkfifo(kept, 0o600)
+    pipe = os.open(kept, os.O_RDWR)
+    if written:
+        os.write(pipe, entry)
+    else:
+        os.close(pipe)
+    assert_gone(store, kept)
+    if written:
+        os.close(pipe)
+
+
+def test_a_folder_in_the_place_of_an_entry_is_left(store: Store, kept: Path) -> None:
+    kept.unlink()
+    kept.mkdir()
+    assert store.load(KEY) is None
+    with pytest.warns(CacheWarning, match="cannot be written"):
+        store.save(KEY, PAYLOAD)
+    assert list(store.folder.iterdir()) == [kept]
+
+
+def age(store: Store, name: str, seconds: float) -> None:
+    """Make the entry or file look unused for that long."""
+    path = store.folder / name
+    then = time.time() - seconds
+    os.utime(path, (then, then))
+
+
+def test_the_entries_not_used_for_longest_go(tmp_path: Path) -> None:
+    """Four entries of 1000 bytes and less than 200 of heading fit; reading one makes it young."""
+    store = Store(tmp_path / "kernels", most_bytes=4800)
+    keys = [key(str(number)) for number in range(6)]
+    for number, name in enumerate(keys[:4]):
+        store.save(name, bytes(1000))
+        age(store, f"{name}.kernel", 100 - number)
+    assert store.load(keys[0]) is not None
+    for name in keys[4:]:
+        store.save(name, bytes(1000))
+    assert {entry.key for entry in store.entries()} == {keys[0], *keys[3:]}
+    assert sum(entry.size for entry in store.entries()) <= store.most_bytes
+
+
+def test_the_entry_just_written_stays_whatever_the_clock_says(tmp_path: Path) -> None:
+    store = Store(tmp_path / "kernels", most_bytes=2000)
+    store.save(KEY, bytes(1000))
+    age(store, f"{KEY}.kernel", -1e6)
+    store.save(OTHER, bytes(1000))
+    assert [entry.key for entry in store.entries()] == [OTHER]
+
+
+def test_an_entry_larger_than_the_cache_is_not_kept(store: Store, kept: Path) -> None:
+    small = Store(store.folder, most_bytes=1000)
+    small.save(OTHER, bytes(1000))
+    assert [entry.key for entry in small.entries()] == [KEY]
+
+
+def test_entries_say_what_they_are(store: Store) -> None:
+    store.save(KEY, PAYLOAD, "panda: forward dynamics")
+    age(store, f"{KEY}.kernel", 100)
+    store.save(OTHER, b"", "two\n lines, a bell \a and é")
+    first, second = store.entries()
+    assert (first.key, first.about) == (OTHER, "two lines, a bell ? and é")
+    assert (second.key, second.about) == (KEY, "panda: forward dynamics")
+    assert second.size == (store.folder / f"{KEY}.kernel").stat().st_size
+    assert first.used - second.used == pytest.approx(100, abs=10)  # [s], between the two saves
+
+
+def test_damaged_entries_are_listed_fit_for_a_terminal(store: Store, kept: Path) -> None:
+    kept.write_bytes(b"a\nb\nc\n\x1b[31mred\xff\nd")
+    assert [entry.about for entry in store.entries()] == ["?[31mred�"]
+    kept.write_bytes(b"")
+    assert [entry.about for entry in store.entries()] == [""]
+
+
+def test_clearing_removes_entries_and_nothing_else(store: Store, kept: Path) -> None:
+    store.save(OTHER, PAYLOAD)
+    others = [store.folder / name for name in ("notes.txt", f"{KEY}.kernel.bak", f"{KEY}x.kernel", "x.kernel")]
+    for path in others:
+        path.write_bytes(b"mine")
+    assert store.clear() == 2
+    assert set(store.folder.iterdir()) == set(others)
+    assert store.clear() == 0
+
+
+def test_what_a_killed_writer_left_is_removed_after_an_hour(store: Store, kept: Path) -> None:
+    young, old = (store.folder / f"{KEY}{name}.unfinished" for name in ("abc_1234", "abc_5678"))
+    for path in (young, old):
+        path.write_bytes(b"half")
+    age(store, old.name, 4000)
+    assert len(store.entries()) == 1
+    store.save(OTHER, PAYLOAD)
+    assert young.exists()
+    assert not old.exists()
+
+
+WORKER = """
+import sys
+from pathlib import Path
+from robot_dyn.codegen.store.cache import Store, key
+store = Store(Path(sys.argv[1]), most_bytes=3_000_000)
+payloads = {key(str(n)): bytes([n]) * 500_000 for n in range(4)}
+found = 0
+for turn in range(40):
+    for name, payload in payloads.items():
+        store.save(name, payload, f"turn {turn}")
+        back = store.load(name)
+        assert back in (None, payload), "torn"
+        found += back is not None
+    if turn % 10 == 9:
+        store.clear()
+    store.entries()
+print(found)
+"""
+
+
+def test_processes_that_write_at_once_never_see_half_an_entry(tmp_path: Path) -> None:
+    """Four of them write, read, list, evict and clear; a warning or a torn entry would fail the child."""
+    folder = str(tmp_path / "kernels")
+    command = [sys.executable, "-W", "error", "-c", WORKER, folder]
+    children = [subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) for _ in range(4)]
+    for child in children:
+        out, err = child.communicate(timeout=120)
+        assert (child.returncode, err) == (0, b"")
+        assert int(out) > 80  # of 160 readings: else nothing was tried
+    assert not [path for path in Path(folder).iterdir() if path.suffix != ".kernel"]
+
+
+def test_keys_of_different_parts_differ() -> None:
+    """Moving a border, adding an empty part or taking bytes for text makes another key."""
+    lists = [(), ("",), ("", ""), ("ab", "c"), ("a", "bc"), ("abc",), (b"abc",), (b"ab", "c"), ("c", "ab"), ("\udcff",)]
+    lists += [("absc",), (b"absc",), ("a", "b" + "s" + "\0" * 7 + "\1c"), (b"a", "b")]
+    assert len({key(*parts) for parts in lists}) == len(lists)
+    assert key("é") == key("é")
+    assert key() == "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855"  # SHA-256 of nothing, FIPS 180-4
+
+
+@pytest.mark.parametrize("name", ["", "a", KEY[:-1], KEY + "0", KEY.upper(), KEY + "\n", "../" + KEY, "/etc/passwd"])
+def test_what_is_no_key_is_refused(store: Store, name: str) -> None:
+    """It would become the name of a file."""
+    for call in (lambda: store.load(name), lambda: store.save(name, b"")):
+        with pytest.raises(QueryError, match="64 hexadecimal digits"):
+            call()

@@ -1,0 +1,85 @@
+"""What compiled code depends on is in its key, and what is taken from the inside of NumPy is looked at."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import robot_dyn as rd
+from robot_dyn.codegen.llvm import numpy_array
+from robot_dyn.codegen.llvm.numpy_array import ArrayStructureError, check_structure
+from robot_dyn.codegen.store.identity import digest, digest_of, sources_of_the_writer, traced_sources
+
+ROOT = Path(rd.__file__).parent
+
+
+def test_an_edited_module_is_another_key(tmp_path: Path) -> None:
+    """Any file, however deep; another name of a file; and nothing that is not Python."""
+    below = tmp_path / "compiled" / "llvm"
+    below.mkdir(parents=True)
+    (below / "tanh.py").write_text("x = 1")
+
+    def now() -> str:
+        return digest_of(tmp_path, tmp_path.rglob("*.py"))
+
+    digests = [now()]
+    (tmp_path / "notes.txt").write_text("one")
+    assert now() == digests[0]
+    (below / "tanh.py").write_text("x = 2")
+    digests.append(now())
+    (below / "tanh.py").rename(below / "sinh.py")
+    digests.append(now())
+    assert len(set(digests)) == 3
+
+
+def test_sources_are_in_the_keys_of_kernels_programs_and_equations(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A kernel's are those of the writer, a program's all that may be traced."""
+    kernel = sources_of_the_writer(), {path.name for path in (ROOT / "codegen/llvm").glob("*.py")}
+    assert len(kernel[0]) == 64
+    assert {"writer.py", "sincos.py"} <= kernel[1]
+    texts: list[list[str]] = []
+    monkeypatch.setattr("robot_dyn.codegen.kernel.digest", lambda of: texts.append(of) or digest(of))
+    rd.Compiled(rd.load("planar_2r"), cache=False).M([0.1, 0.2])
+    assert texts
+    assert all(kernel[0] in each for each in texts)
+
+
+def test_an_edit_of_a_plot_changes_no_key() -> None:
+    """Of a program: all that may be traced, and no room above the simulation, which none of it can import."""
+    traced = {path.relative_to(ROOT).as_posix() for path in traced_sources()}
+    assert {
+        "effects/friction.py",
+        "arithmetic.py",
+        "simulation/dynamics/state_equation.py",
+        "codegen/trace/symbolic.py",
+    } <= traced
+    assert not {each for each in traced if each.startswith(("view/", "cli/", "scene/", "accuracy/", "stress_test/"))}
+    assert any(path.name == "plots.py" or "plot" in path.name for path in (ROOT / "view").rglob("*.py"))
+
+
+def test_numpy_keeps_its_fields_where_they_are_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    """PyArrayObject of NumPy 2.2 to 2.4; where a field stands elsewhere, no machine code reads an array."""
+    check_structure.__wrapped__()
+    for name in numpy_array.OFFSETS:
+        elsewhere = numpy_array.OFFSETS[name] + 8  # of lengths, the strides
+        monkeypatch.setattr(numpy_array, "OFFSETS", numpy_array.OFFSETS | {name: elsewhere})
+        with pytest.raises(
+            ArrayStructureError, match=rf"NumPy {np.__version__} does not keep {name} .* 2\.2 to 2\.4 do"
+        ):
+            check_structure.__wrapped__()
+        monkeypatch.undo()
+
+
+def test_machine_code_needs_no_numba() -> None:
+    """Neither of a robot nor of a run."""
+    code = (
+        "import sys, robot_dyn as rd\n"
+        "rd.Compiled(rd.load('planar_2r'), cache=False).forward_dynamics([0.1, 0.2], [0.3, 0.4], [0.5, 0.6])\n"
+        "rd.simulate(rd.load('planar_2r'), [0.1, 0.2], engine='compiled', duration_s=0.1)\n"
+        "assert 'numba' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)

@@ -1,0 +1,194 @@
+"""Independent joint control: PD, PID and its states, and what every controller refuses."""
+
+from __future__ import annotations
+
+import importlib
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import robot_dyn as rd
+from robot_dyn.control.computed_torque import ComputedTorque, FeedForward
+from robot_dyn.control.controller import ControlError, Controller
+from robot_dyn.control.independent_joint import PD, PID, gains_from
+from robot_dyn.control.reference import hold, quintic
+
+NONE = np.zeros(0)  # no states
+Q, V, T = np.array([0.4, -0.9, 1.3]), np.array([-0.7, 0.2, 1.1]), 0.6
+MOTION = quintic([0.1, -0.2, 0.3], [1.0, -1.4, 2.0], 1.5)
+KP, KI, KD = np.array([30.0, 20.0, 10.0]), np.array([12.0, 9.0, 4.0]), 5.0
+
+
+def test_pd_is_a_spring_and_a_damper() -> None:
+    q_d, v_d, _ = MOTION.at(T)
+    np.testing.assert_allclose(PD(MOTION, KP, KD).torque(T, Q, V, NONE), KP * (q_d - Q) + KD * (v_d - V), rtol=1e-15)
+
+
+def test_pid_below_its_limit_is_pd_and_the_integral_of_the_error() -> None:
+    controller, z = PID(MOTION, KP, KI, KD, effort_limit=1e3), np.array([0.3, -0.2, 0.9])
+    q_d = MOTION.at(T)[0]
+    expected = PD(MOTION, KP, KD).torque(T, Q, V, NONE) + z
+    np.testing.assert_allclose(controller.torque(T, Q, V, z), expected, rtol=1e-15)
+    np.testing.assert_allclose(controller.state_rate(T, Q, V, z), KI * (q_d - Q), rtol=1e-15)
+    assert controller.state_size == 3
+
+
+def test_pid_above_its_limit_gives_the_limit_and_lets_the_excess_flow_back() -> None:
+    limit, z = np.array([2.0, 1.0, np.inf]), np.array([40.0, -50.0, 3.0])
+    controller = PID(MOTION, KP, KI, KD, effort_limit=limit, tracking_time_s=0.25)
+    desired = PD(MOTION, KP, KD).torque(T, Q, V, NONE) + z
+    np.testing.assert_allclose(controller.torque(T, Q, V, z), [2.0, -1.0, desired[2]], rtol=1e-15)
+    expected = KI * (MOTION.at(T)[0] - Q) - np.array([desired[0] - 2, desired[1] + 1, 0]) / 0.25
+    np.testing.assert_allclose(controller.state_rate(T, Q, V, z), expected, rtol=1e-14)
+
+
+def test_gains_place_the_poles_of_a_joint() -> None:
+    """M ë + kd ė + kp e = 0 has the poles ω (−ζ ± i √(1 − ζ²)); np.roots is good to 1e-14 of them."""
+    kp, kd = gains_from([2.0, 0.3], [7.0, 30.0], 0.6)
+    for M, kp_i, kd_i, omega in zip([2.0, 0.3], kp, kd, [7.0, 30.0], strict=True):
+        np.testing.assert_allclose(
+            np.sort(np.roots([M, kd_i, kp_i])), omega * np.array([-0.6 - 0.8j, -0.6 + 0.8j]), rtol=1e-14
+        )
+    assert gains_from(1.0, 10.0) == (100.0, 20.0)
+
+
+MASS, PUSH = 0.8, 3.0  # [kg m²], [N m]
+
+
+def one_joint(controller: Controller, until: float, *, push: float = PUSH, limit: float = np.inf, at=None):
+    """Motion (t, q, v, z) of M a = τ + push from rest, with a drive that gives no more than its limit."""
+
+    def rate(t: float, x: np.ndarray) -> np.ndarray:
+        q, v, z = x[:1], x[1:2], x[2:]
+        tau = np.clip(controller.torque(t, q, v, z), -limit, limit)
+        return np.concatenate([v, (tau + push) / MASS, controller.state_rate(t, q, v, z)])
+
+    x0 = np.zeros(2 + controller.state_size)
+    run = solve_ivp(rate, (0, until), x0, method="DOP853", rtol=1e-10, atol=1e-12, t_eval=at)
+    assert run.success
+    return run.t, *run.y
+
+
+def test_pid_removes_a_constant_disturbance_and_pd_does_not() -> None:
+    """Closed form: M s³ + kd s² + kp s + ki = 0 gives e(t) = Σ c_i e^{s_i t}; PD is left with push/kp."""
+    kp, ki, kd = 40.0, 60.0, 9.0
+    t, q, _, z = one_joint(PID(hold([0.0]), kp, ki, kd), 12.0, at=np.linspace(0, 12, 50))
+    s = np.roots([MASS, kd, kp, ki])
+    c = np.linalg.solve(np.vander(s, increasing=True).T, [0, 0, PUSH / MASS])  # q, v, a at t = 0
+    np.testing.assert_allclose(q, (np.exp(np.outer(t, s)) @ c).real, atol=1e-9)  # 1e-10 a step, some hundred steps
+    assert abs(q[-1]) < 1e-8
+    np.testing.assert_allclose(z[-1], -PUSH, rtol=1e-6)  # the integral carries the push
+    assert one_joint(PD(hold([0.0]), kp, kd), 12.0)[1][-1] == pytest.approx(PUSH / kp, rel=1e-8)
+
+
+def test_the_integral_of_a_blocked_joint_settles() -> None:
+    """At a held error z tends to L + T_t ki e − kp e as 1 − e^{−t/T_t}; unguarded it grows as ki e t."""
+    limit, time, e = 5.0, 0.4, 2.0
+    blocked = PID(hold([e]), 40.0, 60.0, 9.0, effort_limit=limit, tracking_time_s=time)
+    free = PID(hold([e]), 40.0, 60.0, 9.0)
+    still = np.zeros(1)
+    for controller, expected in [
+        (blocked, (limit + time * 60 * e - 40 * e) * (1 - np.exp(-3 / time))),
+        (free, 60 * e * 3),
+    ]:
+        run = solve_ivp(
+            lambda t, z, c=controller: c.state_rate(t, still, still, z), (0, 3), [0.0], rtol=1e-10, atol=1e-12
+        )
+        np.testing.assert_allclose(run.y[0, -1], expected, rtol=1e-8)
+
+
+def test_anti_windup_bounds_the_integral_and_the_overshoot() -> None:
+    """A step that saturates the drive: z ≤ L + kd v_max, and less than 10 % overshoot; above 50 % without a guard.
+
+    While the error is positive z falls wherever z > L + T_t ki e − kp e + kd v, which kp ≥ T_t ki keeps below L + kd v.
+    """
+    kp, ki, kd, limit, step = 40.0, 30.0, 9.0, 5.0, 2.0
+    guarded = PID(hold([step]), kp, ki, kd, effort_limit=limit)
+    assert guarded.tracking_time_s == pytest.approx(np.sqrt(kd / ki))
+    assert kp >= np.sqrt(kd / ki) * ki
+    _, q, v, z = one_joint(guarded, 8.0, push=0.0, limit=limit)
+    q_free = one_joint(PID(hold([step]), kp, ki, kd), 8.0, push=0.0, limit=limit)[1]
+    assert z.max() <= limit + kd * v.max()
+    assert q.max() < 1.1 * step
+    assert q_free.max() > 1.5 * step
+    assert abs(q[-1] - step) < 1e-3 * step
+
+
+def test_sampled_states_tend_to_the_continuous_ones() -> None:
+    """The rule z ← z + period · rate is of first order: a quarter of the period, a quarter of the error."""
+    errors = []
+    for period in (0.008, 0.002):
+        controller, x, z = PID(hold([1.0]), 40.0, 60.0, 9.0, period_s=period), np.zeros(2), np.zeros(1)
+        for k in range(round(0.8 / period)):
+            q, v, t = x[:1], x[1:], k * period
+            a = (controller.torque(t, q, v, z)[0] + PUSH) / MASS
+            z = controller.next_state(t, q, v, z)
+            x = x + period * np.array([x[1] + period * a / 2, a])  # exact for a held torque
+        continuous = one_joint(PID(hold([1.0]), 40.0, 60.0, 9.0), 0.8)
+        errors.append([x[0] - continuous[1][-1], z[0] - continuous[3][-1]])
+    np.testing.assert_allclose(np.divide(*errors), 4, rtol=0.15)  # the next order: period · ω is some 5 %
+
+
+def test_a_stateless_controller_has_no_states() -> None:
+    controller = PD(MOTION, 1.0, 1.0, period_s=0.01)
+    assert controller.state_size == 0
+    assert controller.next_state(T, Q, V, NONE).shape == (0,)
+    assert controller.n == 3
+
+
+ROBOT = rd.load("planar_2r")
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: PD(MOTION, -1.0, 1.0), "kp must not be negative"),
+        (lambda: PD(MOTION, 1.0, [1.0, 2.0]), r"kd must be one number or of shape \(3,\), got \(2,\)"),
+        (lambda: PD(MOTION, "stiff", 1.0), "kp must be real numbers"),
+        (lambda: PD(MOTION, 1.0, np.inf), "kd must be finite"),
+        (lambda: PD(MOTION, 1.0, 1.0, period_s=-0.1), "period_s must be a positive number of seconds"),
+        (lambda: PD([0.0], 1.0, 1.0), "reference must be a PiecewisePolynomial"),
+        (lambda: PID(MOTION, 1.0, -1.0, 1.0), "ki must not be negative"),
+        (lambda: PID(MOTION, 1.0, 1.0, 1.0, effort_limit=0.0), "effort_limit must be positive"),
+        (lambda: PID(MOTION, 1.0, 1.0, 1.0, effort_limit="no"), "effort_limit must be real numbers"),
+        (lambda: PID(MOTION, 1.0, 1.0, 1.0, tracking_time_s=0.0), "tracking_time_s must be positive"),
+        (lambda: ComputedTorque(ROBOT, MOTION, 1.0, 1.0), "the model has 2 joints, the reference 3"),
+        (lambda: FeedForward(ROBOT, hold([0.0, 0.0]), 1.0, [1.0]), r"kd must be one number or of shape \(2,\)"),
+        (lambda: gains_from(0.0, 1.0), "inertia_diagonal and frequency must be positive"),
+        (lambda: PD(MOTION, 1.0, 1.0, period_s=[]), r"period_s must be one number, got shape \(0,\)"),
+        (lambda: gains_from([1.0, 2.0], [1.0, 2.0, 3.0]), "shapes do not match"),
+    ],
+)
+def test_controllers_without_meaning_are_refused(make, message: str) -> None:
+    with pytest.raises(ControlError, match=message):
+        make()
+
+
+KEPT_OUT = ("robot_dyn.effects", "robot_dyn.simulation", "robot_dyn.integrate", "robot_dyn.codegen", "scipy")
+
+
+def test_control_never_sees_the_plant() -> None:
+    """In a fresh process: importing all of control brings neither effects nor simulation, and no scipy.
+
+    That the names looked for are those of modules is held by importing them.
+    """
+    for name in KEPT_OUT:
+        importlib.import_module(name)
+    code = (
+        "import sys, pathlib, importlib, robot_dyn.control as control\n"
+        "for file in pathlib.Path(control.__file__).parent.glob('*.py'):\n"
+        "    importlib.import_module(f'robot_dyn.control.{file.stem}')\n"
+        f"print(*[m for m in sys.modules if m.startswith({KEPT_OUT})])"
+    )
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert out.stdout.strip() == ""
+
+
+@pytest.mark.parametrize("gain", [{"joint_1": 5.0}, "urdf", None])
+def test_gains_by_joint_name_are_refused(gain) -> None:
+    """A controller such as PD knows no names of joints, so that nothing could resolve them later."""
+    with pytest.raises(ControlError, match="kp must be real numbers, one or of shape"):
+        PD(MOTION, gain, KD)

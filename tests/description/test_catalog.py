@@ -1,0 +1,154 @@
+"""The catalog: names, paths and package:// addresses → files; each name loads or is refused with its reason."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import warnings
+from pathlib import Path
+
+import pytest
+
+import robot_dyn as rd
+from robot_dyn.description import catalog
+from robot_dyn.errors import CatalogError, DescriptionError, ModelWarning
+
+URDF = Path(__file__).parents[2] / "urdf"
+REFUSED = {
+    "alex_psyonic_hands": "mimics 'index_q1', which is not defined",
+    "hector": "no joint moves",
+    "iris_simple": "no joint moves",
+    "ur3_empty": "has no name",
+}
+
+
+@pytest.fixture
+def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder that holds the package `arms`, and a working directory elsewhere."""
+    monkeypatch.delenv("ROS_PACKAGE_PATH", raising=False)
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    (tmp_path / "ws" / "arms" / "urdf").mkdir(parents=True)
+    shutil.copy(URDF / "pendulum.urdf", tmp_path / "ws" / "arms" / "urdf")
+    return tmp_path / "ws"
+
+
+def test_names_are_sorted_and_hold_the_well_known_and_the_own_robots():
+    names = rd.list_robots()
+    assert list(names) == sorted(set(names))
+    assert {"panda", "ur5", "kinova", "xarm7", "talos_left_arm"} <= set(names)
+    assert {path.stem for path in URDF.glob("*.urdf")} <= set(names)
+    assert set(REFUSED) <= set(names)
+
+
+@pytest.mark.parametrize("name", rd.list_robots())
+def test_every_name_loads_or_says_why_not(name: str):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ModelWarning)
+        if name in REFUSED:
+            with pytest.raises(DescriptionError, match=REFUSED[name]) as refusal:
+                rd.load(name)
+            assert str(refusal.value).startswith(str(catalog.find(name)))
+        else:
+            robot = rd.load(name)
+            assert robot.n == len(robot.joint_names) > 0
+            assert robot.description.source == str(catalog.find(name))
+
+
+@pytest.mark.parametrize("name", ["human", "romeo", "massless_tip"])
+def test_a_robot_with_findings_warns_once_and_says_how_many_and_where(name: str):
+    with pytest.warns(ModelWarning) as caught:
+        robot = rd.load(name)
+    first, *others = robot.findings
+    more = f" (the first of {1 + len(others)} findings; all of them: Robot.findings, robot-dyn info)" if others else ""
+    assert [str(w.message) for w in caught] == [f"{robot.name}: {first}{more}"]
+    assert {w.filename for w in caught} == {__file__}
+
+
+@pytest.mark.parametrize(("wrong", "near"), [("ur6", "ur5"), ("Panda", "panda"), ("pendulm", "pendulum")])
+def test_unknown_name_is_answered_with_the_nearest(wrong: str, near: str):
+    with pytest.raises(CatalogError, match=rf"no robot '{wrong}'; nearest: .*\b{near}\b"):
+        rd.load(wrong)
+
+
+@pytest.mark.parametrize("wrong", ["nowhere/arm.urdf", "arm.urdf", "/nowhere/arm"])
+def test_missing_file_is_named_with_the_place_that_was_looked_in(wrong: str, package: Path):
+    with pytest.raises(CatalogError, match=rf"no file {wrong}; looked for /.*arm"):
+        rd.load(wrong)
+
+
+def test_path_may_be_text_or_path_absolute_or_relative_or_of_the_home_folder(
+    package: Path, monkeypatch: pytest.MonkeyPatch
+):
+    file = package / "arms" / "urdf" / "pendulum.urdf"
+    monkeypatch.setenv("HOME", str(package))
+    relative = os.path.relpath(file)
+    for name in (
+        file,
+        str(file),
+        relative,
+        Path(relative),
+        Path("~/arms/urdf/pendulum.urdf"),
+        "~/arms/urdf/pendulum.urdf",
+    ):
+        assert rd.load(name).description.text == file.read_bytes()
+
+
+def test_folder_is_no_robot(package: Path):
+    with pytest.raises(DescriptionError, match="is a folder"):
+        rd.load(package)
+
+
+ADDRESS = "package://arms/urdf/pendulum.urdf"
+
+
+def test_package_in_a_named_folder(package: Path):
+    file = package / "arms" / "urdf" / "pendulum.urdf"
+    for folders in ([package], (str(package),), iter([package.parent, package])):
+        assert catalog.find(ADDRESS, folders) == file
+    assert rd.load(ADDRESS, package_dirs=[package]).name == "pendulum"
+
+
+def test_package_above_the_working_directory(package: Path, monkeypatch: pytest.MonkeyPatch):
+    deep = package / "arms" / "urdf" / "deep"
+    deep.mkdir()
+    for place in (package, package / "arms", deep):
+        monkeypatch.chdir(place)
+        assert rd.load(ADDRESS).n == 1
+
+
+def test_package_above_the_file(package: Path):
+    file = package / "arms" / "urdf" / "pendulum.urdf"
+    assert catalog.resolve(ADDRESS, file) == file
+    assert catalog.resolve("package://arms/urdf/pendulum.urdf", package / "other" / "robot.urdf") == file
+
+
+def test_package_in_the_ros_package_path(package: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("ROS_PACKAGE_PATH", os.pathsep.join(["", "/nowhere", str(package)]))
+    assert rd.load(ADDRESS).n == 1
+
+
+def test_named_folder_comes_before_those_above_and_these_before_the_ros_path(
+    package: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    first, last = tmp_path / "first", tmp_path / "last"
+    for other in (first, last):
+        shutil.copytree(package, other)
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(last))
+    monkeypatch.chdir(package)
+    assert catalog.find(ADDRESS, [first]).is_relative_to(first)
+    assert catalog.find(ADDRESS).is_relative_to(package)
+
+
+def test_missing_package_lists_the_places_tried(package: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("ROS_PACKAGE_PATH", "/nowhere")
+    with pytest.raises(CatalogError) as refusal:
+        rd.load("package://legs/urdf/leg.urdf", package_dirs=[package])
+    message = str(refusal.value)
+    for place in (package, Path.cwd(), package.parent, "/nowhere", "'legs'", "package_dirs", "ROS_PACKAGE_PATH"):
+        assert str(place) in message
+    with pytest.raises(CatalogError, match=r"no file for package://arms/urdf/leg\.urdf"):
+        rd.load("package://arms/urdf/leg.urdf", package_dirs=[package])
+    for empty in ("package://", "package:///", "package://arms"):
+        with pytest.raises(CatalogError, match="no file for package://"):
+            rd.load(empty, package_dirs=[package])

@@ -1,0 +1,137 @@
+"""Mass and inertia of single links: as edits of a robot, and as sweep parameters of rollouts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
+
+import robot_dyn as rd
+from robot_dyn.errors import EditError, QueryError, RobotDynError
+from robot_dyn.simulation.results.origin import robot_of
+
+TREE = rd.load("skew_tree")
+LINK = "left_lower"
+INERTIA = np.array([[0.021, 0.002, -0.001], [0.002, 0.034, 0.003], [-0.001, 0.003, 0.028]])
+STATES = np.random.default_rng(7).normal(size=(3, TREE.n))
+
+
+def edited(robot: rd.Robot, link: str, mass: float | None = None, inertia: np.ndarray | None = None) -> rd.Robot:
+    """The robot of a file in which the numbers of a link are written over; with the edits of the robot."""
+    file = etree.fromstring(robot.description.xml)
+    inertial = next(each for each in file.iterfind("link") if each.get("name") == link).find("inertial")
+    if mass is not None:
+        inertial.find("mass").set("value", repr(float(mass)))
+    if inertia is not None:
+        for key, (i, j) in {"xx": (0, 0), "xy": (0, 1), "xz": (0, 2), "yy": (1, 1), "yz": (1, 2), "zz": (2, 2)}.items():
+            inertial.find("inertia").set(f"i{key}", repr(float(inertia[i, j])))
+    made = rd.Robot.from_text(etree.tostring(file, encoding="unicode"))
+    return rd.Robot(made.description, robot.edits)
+
+
+def test_a_link_with_another_mass_and_inertia_is_that_of_an_edited_file() -> None:
+    """By both roads, in M, C, N and inverse dynamics, with a factor on all masses and a payload besides."""
+    more = {"mass_scale": 1.3, "payload": rd.Payload("left_tool", 0.7, (0.1, 0.0, 0.2))}
+    ours = TREE.with_(masses={LINK: 2.7}, inertias={LINK: INERTIA}, **more)
+    theirs = edited(TREE, LINK, 2.7, INERTIA).with_(**more)
+    q, v, a = STATES
+    for ask in (lambda x: x.M(q), lambda x: x.C(q, v), lambda x: x.N(q), lambda x: x.inverse_dynamics(q, v, a)):
+        expected = ask(theirs)
+        np.testing.assert_allclose(ask(ours), expected, rtol=1e-14, atol=1e-14)
+        np.testing.assert_allclose(ask(rd.Lagrangian(ours)), expected, rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(ask(rd.Compiled(ours)), expected, rtol=1e-12, atol=1e-12)
+    assert np.abs(ours.M(q) - TREE.with_(**more).M(q)).max() > 0.01
+    assert ours.total_mass == pytest.approx(theirs.total_mass, rel=1e-14)
+
+
+def setup(robot: rd.Robot, model: rd.Robot | None = None) -> rd.Setup:
+    plan = rd.quintic(STATES[0], STATES[0] + 0.4, 0.2)
+    control = None if model is None else rd.ComputedTorque(model, plan, 50.0, 9.0)
+    return rd.Setup(
+        rd.Plant(robot, [rd.ViscousFriction(0.3)]), STATES[0], STATES[1], duration_s=0.2, controller=control,
+        integrator="rk4", step_s=1e-3, record_period_s=0.02, estimate_error=False,
+    )  # fmt: skip
+
+
+def test_masses_and_inertias_of_links_are_sweep_parameters() -> None:
+    """Each run is that of a robot loaded from a file with these numbers; two links and an inertia at once."""
+    masses, torso = np.array([1.1, 2.9]), np.array([4.0, 7.5])
+    inertias = np.stack([INERTIA, 1.7 * INERTIA])
+    params = {f"{LINK}.mass": masses, f"{LINK}.inertia": inertias, "torso.mass": torso}
+    runs = rd.rollouts(setup(TREE), params=params)
+    for k in range(2):
+        robot = edited(edited(TREE, LINK, masses[k], inertias[k]), "torso", torso[k])
+        alone = rd.simulate(setup(robot), engine="interpreted")
+        np.testing.assert_allclose(runs.q[k], alone.q, atol=1e-12)
+        one = runs[k]
+        np.testing.assert_allclose(one.a, alone.a, atol=1e-9)
+        np.testing.assert_allclose(one.ledger.kinetic, alone.ledger.kinetic, rtol=1e-10)
+    assert np.abs(runs.q[1] - runs.q[0]).max() > 1e-4
+
+
+def test_the_links_of_a_controllers_model_are_its_own() -> None:
+    values = np.array([1.1, 2.9])
+    runs = rd.rollouts(setup(TREE, TREE), params={f"model.{LINK}.mass": values})
+    for k, mass in enumerate(values):
+        alone = rd.simulate(setup(TREE, edited(TREE, LINK, mass)), engine="interpreted")
+        np.testing.assert_allclose(runs.q[k], alone.q, atol=1e-12)
+
+
+def test_two_parameters_of_one_size_are_not_taken_for_each_other() -> None:
+    """Machine code of one that was swept before is not that of another: of one joint, and of two links."""
+    swing = rd.load("pendulum")
+    base = replace(setup(TREE), plant=rd.Plant(swing), q0=[1.0], v0=[0.0])
+    for name, values, change in (
+        ("armature", [0.1, 0.3], lambda x: swing.with_(armature=x)),
+        ("mass_scale", [0.5, 1.3], lambda x: swing.with_(mass_scale=x)),
+        ("rod.mass", [0.5, 1.3], lambda x: swing.with_(masses={"rod": x})),
+    ):
+        runs = rd.rollouts(base, params={name: values})
+        for k, x in enumerate(values):
+            alone = rd.simulate(replace(base, plant=rd.Plant(change(x))), engine="interpreted")
+            np.testing.assert_allclose(runs.q[k], alone.q, atol=1e-13)
+
+
+def test_other_masses_are_kept_in_run_files(tmp_path) -> None:
+    run = rd.simulate(setup(TREE.with_(masses={LINK: 2.7}, inertias={LINK: INERTIA})))
+    again = rd.load_run(rd.save_run(run, tmp_path / "run"))
+    assert run.acting is not None and f"mass 2.7 kg of {LINK}" in run.acting
+    expected = TREE.with_(masses={LINK: 2.7}, inertias={LINK: INERTIA})
+    np.testing.assert_array_equal(robot_of(again).M(STATES[0]), expected.M(STATES[0]))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"masses": {LINK: 0.0}}, "mass of 'left_lower' must be positive"),
+        (
+            {"masses": {"left_lowr": 1.0}},
+            "no link 'left_lowr' of which the file states a mass; nearest: left_lower",
+        ),
+        ({"masses": 2.0}, "masses must give values by link name"),
+        ({"inertias": {LINK: np.diag([1.0, 1.0, 3.0])}}, "no body has it, its inertia breaks the triangle inequality"),
+        ({"inertias": {LINK: np.diag([1.0, -1.0, 1.0])}}, "no body has it, its inertia is indefinite"),
+        ({"inertias": {LINK: INERTIA + np.triu(INERTIA)}}, "must be symmetric"),
+        ({"inertias": {LINK: 1.0}}, r"shape \(3, 3\)"),
+    ],
+)
+def test_numbers_that_no_link_has_are_refused(change, message: str) -> None:
+    with pytest.raises(EditError, match=message):
+        TREE.with_(**change)
+
+
+@pytest.mark.parametrize(
+    ("params", "message"),
+    [
+        ({f"{LINK}.mass": [1.0, 0.0]}, "left_lower.mass must be positive"),
+        ({"left_lowr.mass": [1.0]}, "no 'left_lowr.mass'; nearest: left_lower.mass"),
+        ({f"{LINK}.inertia": [np.diag([1.0, 1.0, 3.0])]}, "no body has it"),
+        ({f"{LINK}.inertia": [1.0]}, "left_lower.inertia"),
+    ],
+)
+def test_swept_numbers_that_no_link_has_are_refused(params, message: str) -> None:
+    with pytest.raises(RobotDynError, match=message) as found:
+        rd.rollouts(setup(TREE), params=params)
+    assert isinstance(found.value, QueryError | EditError)

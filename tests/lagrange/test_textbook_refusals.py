@@ -1,0 +1,117 @@
+"""What the textbook tools refuse, each with its reason and remedy: energies, particles, bodies and solids."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+from typing import Any, cast
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from robot_dyn.description.inertia import MassProperties, combined
+from robot_dyn.description.solids import box, cylinder, from_density
+from robot_dyn.errors import OverflowedError, QueryError, RobotDynError, SingularError
+from robot_dyn.lagrange.euler_lagrange import euler_lagrange
+from robot_dyn.lagrange.generalized_force import generalized_force, lagrangian_of_particles
+from robot_dyn.lagrange.rigid_body import angular_momentum, body_acceleration, body_wrench, world_wrench
+
+BODY = box(1.7, 0.3, 0.5, 0.8)
+PENDULUM = euler_lagrange(lambda t, q, v: v[0] ** 2 / 2, lambda t, q: -9.81 * ca.cos(q[0]), 1)
+NAN, ZERO = np.array([np.nan]), np.zeros(1)
+
+
+def unit_mass(t, q, v):
+    return ca.sumsqr(v) / 2
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: euler_lagrange(unit_mass, None, 0), "n, the number of coordinates, must be a whole number"),
+        (lambda: euler_lagrange(lambda t, q, v: q[3], None, 1), r"K\(t, q, v\) cannot be evaluated .*casadi.sin"),
+        (lambda: euler_lagrange(lambda t, q, v: v, None, 2), r"K\(t, q, v\) must have shape \(1, 1\), got \(2, 1\)"),
+        (lambda: euler_lagrange(lambda t, q, v: "½ m v²", None, 1), "cannot be evaluated"),
+        (lambda: euler_lagrange(lambda t, q, v: ca.SX.sym("m") * v[0] ** 2, None, 1), "cannot be evaluated"),
+        (lambda: euler_lagrange(unit_mass, lambda t, q: math.cos(q[0]), 1), "not finite; use casadi.sin"),
+        (lambda: euler_lagrange(unit_mass, cast(Any, lambda t: t), 1), r"V\(t, q\) cannot be evaluated"),
+        (lambda: PENDULUM.M(0.0, [1.0, 2.0], ZERO), r"q must have shape \(1,\) or \(..., 1\), got \(2,\)"),
+        (lambda: PENDULUM.M(0.0, NAN, ZERO), "q must be finite, got nan"),
+        (lambda: PENDULUM.bias(np.inf, ZERO, ZERO), "t must be finite, got inf"),
+        (lambda: PENDULUM.forward_dynamics(0.0, ZERO, ZERO, "much"), "Q must be an array of real numbers"),
+        (lambda: PENDULUM.bias(0.0, np.zeros((2, 1)), np.zeros((3, 1))), "batch axes of v"),
+        (lambda: PENDULUM.inverse_dynamics(np.zeros(2), ZERO, ZERO, np.zeros((3, 1))), "batch axes of a"),
+        (lambda: generalized_force(lambda t, q: [q], 2), r"position 0 must have shape \(3, 1\)"),
+        (lambda: generalized_force(lambda t, q: [], 2), "one particle at least"),
+        (lambda: generalized_force(lambda t, q: q[7], 2), "cannot be evaluated"),
+        (lambda: generalized_force(lambda t, q: [q], 3)(0.0, np.zeros(3), np.zeros((2, 3))), "forces must have shape"),
+        (lambda: lagrangian_of_particles([1.0, 2.0], lambda t, q: [q], 3), "2 masses but 1 positions"),
+        (lambda: lagrangian_of_particles([-1.0], lambda t, q: [q], 3), "masses must be positive"),
+        (lambda: MassProperties(0.0, np.zeros(3), np.eye(3)), "mass must be positive"),
+        (lambda: MassProperties(1.0, np.zeros(3), np.diag([1.0, 1.0, 3.0])), "triangle inequality"),
+        (lambda: MassProperties(1.0, np.zeros(3), np.triu(np.ones((3, 3)))), "symmetric"),
+        (lambda: MassProperties(cast(Any, np.ones(2)), np.zeros(3), np.eye(3)), "mass must be one number"),
+        (lambda: BODY.moved(2 * np.eye(3), np.zeros(3)), "R must be a rotation"),
+        (lambda: BODY.moved(-np.eye(3), np.zeros(3)), "R must be a rotation"),
+        (lambda: combined([]), "no bodies"),
+        (lambda: box(1.0, 0.1, -0.2, 0.3), "ly must be positive"),
+        (lambda: box(1.0, 1e200, 0.2, 0.3), "inertia must be finite"),
+        (lambda: cylinder(np.nan, 0.1, 0.2), "mass must be finite"),
+        (lambda: from_density(lambda x: x, np.zeros(3), np.ones(3)), r"must be one number or of shape"),
+        (lambda: from_density(lambda x: x[:, 0] - 1, np.zeros(3), np.ones(3)), "must not be negative"),
+        (lambda: from_density(lambda x: 0.0, np.zeros(3), np.ones(3)), "no centre of mass"),
+        (lambda: from_density(lambda x: 1.0, np.ones(3), np.ones(3)), "lower < upper"),
+        (lambda: from_density(lambda x: 1.0, np.zeros(3), np.ones(3), points=0), "points must be"),
+        (lambda: from_density(lambda x: 1.0, np.zeros(3), np.ones(3), chart=cast(Any, lambda u: u)), "chart must map"),
+        (lambda: body_wrench(BODY, np.zeros(3), np.zeros(6)), r"twist must have shape \(6,\)"),
+        (lambda: world_wrench(BODY, np.zeros((3, 3)), np.zeros(3), np.zeros(6)), "R must be a rotation"),
+        (lambda: angular_momentum(BODY, np.stack([np.eye(3)] * 2), np.zeros((3, 3))), "batch axes do not match"),
+        (
+            lambda: body_acceleration(MassProperties(1.0, np.zeros(3), np.diag([0, 1.0, 1.0])), np.ones(6), np.ones(6)),
+            "inertia is singular",
+        ),
+    ],
+)
+def test_bad_input_is_refused(make, message: str) -> None:
+    with pytest.raises(QueryError, match=message):
+        make()
+
+
+def test_no_coriolis_matrix_for_terms_linear_in_v() -> None:
+    """A charge in a magnetic field, K = ½ v² + B × q · v / 2: b is gyroscopic, and M alone does not give it."""
+    charge = euler_lagrange(lambda t, q, v: unit_mass(t, q, v) + q[0] * v[1] - q[1] * v[0], None, 2)
+    with pytest.raises(RobotDynError, match=r"linear.*use bias\(t, q, v\)"):
+        charge.C(0.0, [0.1, 0.2], [0.3, 0.4])
+    np.testing.assert_allclose(charge.bias(0.0, [0.1, 0.2], [0.3, 0.4]), [-0.8, 0.6], rtol=1e-15)
+
+
+def test_singular_states_are_named() -> None:
+    """Polar coordinates at r = 0 have no inertia in the angle; 1/q has no value at 0."""
+    polar = euler_lagrange(lambda t, q, v: (v[0] ** 2 + (q[0] * v[1]) ** 2) / 2, None, 2)
+    with pytest.raises(SingularError, match=r"q\[1\].*other coordinates"):
+        polar.forward_dynamics(0.0, [0.0, 1.0], [1.0, 1.0], [0.0, 0.0])
+    newton = euler_lagrange(unit_mass, lambda t, q: -1 / q[0], 1)
+    with pytest.raises(OverflowedError, match="singular at this state"):
+        newton.forward_dynamics(0.0, [0.0], [1.0], [0.0])
+    with pytest.raises(OverflowedError, match="too large"):
+        body_wrench(BODY, np.full(6, 1e200), np.zeros(6))
+
+
+def test_batches_are_the_states_one_by_one() -> None:
+    rng = np.random.default_rng(4)
+    arm = euler_lagrange(lambda t, q, v: (1 + t**2) * (2 + ca.cos(q[1])) * v[0] ** 2 + v[1] ** 2, None, 2)
+    t, q, v = rng.normal(size=(4, 1)), rng.normal(size=(4, 3, 2)), rng.normal(size=(3, 2))
+    got = arm.bias(t, q, v)
+    assert got.shape == (4, 3, 2)
+    one_by_one = [[arm.bias(t[i, 0], q[i, j], v[j]) for j in range(3)] for i in range(4)]
+    np.testing.assert_array_equal(got, one_by_one)
+    assert arm.M(0.0, np.zeros((0, 2)), np.zeros(2)).shape == (0, 2, 2)
+    assert arm.energy(0.0, q, v).shape == (4, 3)
+
+
+def test_casadi_is_imported_when_it_is_used() -> None:
+    code = "import sys, robot_dyn.lagrange.generalized_force; print('casadi' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"

@@ -1,0 +1,149 @@
+"""What is said of a mistake in a scene: its line, the key as people count, what it must be, and the keys there are."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+from rich.table import Table
+
+import robot_dyn as rd
+from robot_dyn.cli import terminal
+from robot_dyn.errors import RobotDynError, escaped
+from robot_dyn.scene.lines import line_of
+from robot_dyn.scene.scene import SceneError
+from robot_dyn.scene.starters import starter, starters
+from tests.command import refusal
+
+BASE = 'robot = "cart_pole"\nduration_s = 1.0\n'
+GRAVITY = '[[effect]]\nkind = "gravity"\n'
+PD = '[control]\nkind = "pd"\nfrequency_rad_per_s = 3\n'
+
+MISTAKES = {
+    GRAVITY + '\n[[effect]]\nkind = "sprng"\n': r"line 6: effect 2 \(sprng\): kind: no kind 'sprng'; nearest: spring",
+    '[[effect]]\nkin = "gravity"\n': "line 3: effect 1: has no kind; give one of gravity, lock, .*actuator_lag",
+    GRAVITY + '[[effect]]\nkind = "spring"\nstiffness_N_m_per_rad = 1.0\nrest = 1\n': (
+        r"line 8: 'rest' is not a key of effect 2 \(spring\); nearest: rest_rad; keys: kind, .*, rest_rad"
+    ),
+    "color = 3\n": "line 3: 'color' is not a key of a scene; .*duration_s, .*",
+    '[[effect]]\nkind = "spring"\n': r"line 3: effect 1 \(spring\): stiffness_N_m_per_rad: is missing; give it",
+    '[start]\nq = "x"\n': (
+        "line 4: start: q: must be a number, a list of numbers or a table of numbers by joint, got 'x'"
+    ),
+    '[start]\nq = [1.0, "x"]\n': "line 4: start: q 2: must be a number, got 'x'.*",
+    'start = {q = {hinge = "x"}}\n': "line 3: start: q: hinge: must be a number, got 'x'.*",
+    "[start]\nq = [1, 2, 3]\n": r"line 3: start: q must be .*\(2,\).*",
+    GRAVITY
+    + "acceleration_m_s2 = [0, 0]\n": r"line 5: effect 1 \(gravity\): acceleration_m_s2: must have 3 entries, got 2",
+    GRAVITY + "acceleration_m_s2 = [\n0,\n0, 0, 0]\n": r"line 5: .*: must have 3 entries, got 4",
+    'engine = "fast"\n': "line 3: engine: must be 'auto', 'interpreted' or 'compiled', got 'fast'",
+    'estimate_error = "maybe"\n': "line 3: estimate_error: must be true or false, got 'maybe'",
+    "start = 3\n": "line 3: start: must be a table, got 3",
+    "effect = 3\n": "line 3: effect: must be a list, got 3",
+    PD + "[control.model]\nmass = 3\n": "line 7: 'mass' is not a key of control: model; nearest: mass_scale; .*",
+    PD
+    + "[[control.model.effects]]\nkind = 'gravity'\n"
+    + "[[control.model.effects]]\nkind = 'payload'\nframe = 'x'\nmass_kg = -2": (
+        r"line 11: control: model: effects 2 \(payload\): mass_kg: must not be negative, got -2"
+    ),
+    PD + "[reference]\nkind = 'via_points'\ntimes_s = [1, 2]\npoints = [\n[1, 2],\n[1, 'b']]\n": (
+        "line 9: reference: points 2, 2: must be a number, got 'b'"
+    ),
+    GRAVITY + "[[effect]]\nkind = 'spring'\nstiffness_N_m_per_rad = {hing = 1}\n": (
+        r"line 5: effect 2 \(spring\): stiffness: no joint 'hing' .*; nearest: hinge"
+    ),
+    "x = \ny = 3": "line 3, column 5: is not TOML: .*",
+    "x = [1, 2": "is not TOML: Unclosed array .*",
+    "x = " + "9" * 5000: "is not TOML: .*",
+    "x = " + "[" * 5000: ".*nested too deeply; correct the file",
+    "x = " + "[" * 90 + "]" * 90: r"line 3: 'x' is not a key of a scene; .*",
+    "'\x1b[31m' = 3\n": "line 3, column 2: is not TOML: .*",
+    '"\\u001b[31m\\u202e" = 3\n': r"line 3: '\\+x1b\[31m\\+u202e' is not a key of a scene; .*",
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_is_told_as_people_count(tmp_path: Path, mistake: str) -> None:
+    (tmp_path / "scene.toml").write_text(BASE + mistake, encoding="utf-8")
+    with pytest.raises(SceneError) as caught:
+        rd.read_scene(tmp_path / "scene.toml")
+    told = str(caught.value)
+    assert told.isprintable() and len(told) < 500
+    assert re.fullmatch(f".*/scene.toml: (?:{MISTAKES[mistake]})", told), told
+    for voice in ("input", "extra", "pydantic", "none is not", "should"):
+        assert voice not in told.lower(), told
+
+
+@pytest.mark.parametrize("name", starters())
+def test_the_line_of_a_key_is_that_which_states_it(name: str) -> None:
+    text = starter(name)
+    lines = text.splitlines()
+
+    def check(value: Any, path: tuple[Any, ...]) -> None:
+        if isinstance(value, dict):
+            for key, below in value.items():
+                line = line_of(text, (*path, key))
+                assert line is not None and re.search(rf"\b{key}\b", lines[line - 1]), (*path, key)
+                check(below, (*path, key))
+        elif isinstance(value, list) and value and isinstance(value[0], dict):
+            assert [line_of(text, (*path, k)) for k in range(len(value))] == [
+                number for number, line in enumerate(lines, 1) if line.startswith(f"[[{path[-1]}]]")
+            ]
+            for k, below in enumerate(value):
+                check(below, (*path, k))
+
+    check(tomllib.loads(text), ())
+
+
+def test_a_scene_is_read_within_bounds(tmp_path: Path) -> None:
+    (tmp_path / "long.toml").write_text("#" * 2**20 + "\n")
+    with pytest.raises(SceneError, match="is larger than 1 MiB"):
+        rd.read_scene(tmp_path / "long.toml")
+    os.mkfifo(tmp_path / "pipe.toml")
+    for path in (tmp_path / "pipe.toml", "/dev/zero", tmp_path):
+        assert "is a folder" in refusal(["simulate", path]) or "is not a regular file" in refusal(["simulate", path])
+
+
+def test_a_long_name_of_a_robot_is_cut(tmp_path: Path) -> None:
+    (tmp_path / "scene.toml").write_text(BASE.replace("cart_pole", "a" * 20_000))
+    assert len(refusal(["simulate", tmp_path / "scene.toml"])) < 400
+    assert len(refusal(["info", "b" * 20_000])) < 400
+    assert len(refusal(["info", "b/" * 20_000])) < 400
+
+
+# --- control characters
+
+
+def test_messages_hold_no_control_characters() -> None:
+    """One line, whatever a file put into it; what people write stays as it is."""
+    text = "line\nnext\x1b[31m\x9b\x7f\u202e\u2028\ud800\t end"
+    assert str(RobotDynError(text)) == escaped(text) == r"line\nnext\x1b[31m\x9b\x7f\u202e\u2028\ud800\t end"
+    fine = "Ṁ − 2C, τ ≤ 3 N m, 名前, é\u00a0!"
+    assert str(RobotDynError(fine)) == fine
+
+
+def test_tables_and_documents_hold_no_control_characters(capsys) -> None:
+    """What a terminal would execute is shown instead; a document is the same to a program."""
+    evil = "x\x1b[31m\x9b\x07\x7f\u202e\U000e0001"
+    table = Table(evil, box=None)
+    table.add_row(evil)
+    terminal.say(table, evil, "τ", table)
+    terminal.say_json({evil: [evil, "τ"]})
+    terminal.tell(evil + "\n")
+    out, err = capsys.readouterr()
+    assert all(letter.isprintable() or letter == "\n" for letter in out + err)
+    shown = r"x\x1b[31m\x9b\x07\x7f\u202e\U000e0001"
+    assert out.count(shown) == out.count(r"x\x1b") == 5 and err == shown + r"\n" + "\n" and out.count("τ") == 2
+    assert json.loads(out[out.index("{") :]) == {evil: [evil, "τ"]}
+
+
+def test_a_name_of_a_file_is_told_escaped(tmp_path: Path) -> None:
+    """XML cannot hold ESC, but C1 controls, which are CSI in one character, and marks that turn the text around."""
+    text = (Path(__file__).parents[2] / "urdf" / "pendulum.urdf").read_text(encoding="utf-8")
+    (tmp_path / "arm.urdf").write_text(text.replace('name="pivot"', 'name="x\x9b\u202e"'), encoding="utf-8")
+    assert refusal(["info", tmp_path / "arm.urdf"]).isprintable()

@@ -1,0 +1,299 @@
+"""The compiled engine is the interpreted one: same steps, same runs, same ends; and the choice between them is told."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from dataclasses import dataclass, replace
+from inspect import getattr_static
+from typing import final
+
+import numpy as np
+import pytest
+
+import robot_dyn as rd
+from robot_dyn.codegen.trace.right_angles import completed
+from robot_dyn.codegen.trace.symbolic import TraceError
+from robot_dyn.control.controller import Stateless
+from robot_dyn.effects.effect import Active
+from robot_dyn.errors import QueryError
+from robot_dyn.integrate.methods import FIXED_STEP
+from robot_dyn.queries.dynamics import Dynamics
+from robot_dyn.simulation.compiled.choice import choose
+from robot_dyn.simulation.compiled.machine import MachineError
+from robot_dyn.simulation.compiled.traced import SymbolicDynamics
+from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from tests.long import long
+
+ARM = rd.load("planar_2r")
+UR5 = completed(rd.load("ur5"))[0]  # its file states right angles with too few digits
+Q, V = np.array([0.4, -0.7]), np.array([0.3, 0.5])
+REFERENCE = rd.via_points([0.05, 0.1, 0.2], [Q, Q + 0.3, Q - 0.2], kind="cubic")
+CONTROLLERS = {
+    "none": None,
+    "PD": rd.PD(rd.hold(Q), 40.0, [4.0, 3.0]),
+    "PD, sampled": rd.PD(REFERENCE, 40.0, 4.0, period_s=0.01),
+    "PID": rd.PID(REFERENCE, 40.0, 30.0, 4.0, effort_limit=3.0),
+    "PID, sampled": rd.PID(REFERENCE, 40.0, 30.0, 4.0, effort_limit=[3.0, np.inf], period_s=0.004),
+    "PD and gravity": rd.PDGravity(ARM, REFERENCE, 40.0, 4.0),
+    "feed forward": rd.FeedForward(ARM, REFERENCE, 40.0, 4.0),
+    "computed torque": rd.ComputedTorque(ARM.with_(gravity=(0.0, 0.0, -9.0)), REFERENCE, 40.0, 9.0),
+}
+LINK = ARM.frame_names[-1]
+EFFECTS = {
+    "viscous friction": [rd.ViscousFriction([0.3, 0.1])],
+    "dry friction": [rd.RegularisedCoulombFriction(0.4, 0.1)],
+    "spring": [rd.Spring([3.0, 1.0], 0.2)],
+    "stops": rd.joint_stops([-0.5, -0.75], [0.45, 2.0], 1e3, 1e2),
+    "effort limit": [rd.EffortLimit([2.0, np.inf])],
+    "wrench": [rd.ExternalWrench(LINK, [3, 2, 1, 0.1, 0.2, 0.3], "body", start_s=0.04, end_s=0.13)],
+    "two wrenches": [
+        rd.ExternalWrench(LINK, [3, 2, 1, 0.1, 0.2, 0.3]),
+        rd.ExternalWrench(LINK, [0, 2, 1, 0.1, 0.2, 0.3], "world", start_s=0.1),
+    ],
+}
+WHOLE = [name for name in FIXED_STEP if name not in ("linearly_implicit_euler", "sdirk_3")]
+SOME = ("semi_implicit_euler", "rk4", "gauss_4", "rosenbrock_5")  # one of each kind
+
+
+def both(**options) -> tuple[rd.Trajectory, rd.Trajectory]:
+    """A run in machine code and the same interpreted."""
+    plant = rd.Plant(options.pop("robot", ARM), options.pop("effects", ()))
+    setup = rd.Setup(plant, **{"q0": Q, "v0": V, "duration_s": 0.25, "integrator": "rk4", "step_s": 1e-3} | options)
+    return rd.simulate(setup, engine="compiled"), rd.simulate(setup, engine="interpreted")
+
+
+def check_equal(ours: rd.Trajectory, theirs: rd.Trajectory, tolerance: float) -> None:
+    """All that a run tells, each array by its own size."""
+    assert ours.outcome == theirs.outcome
+    assert ours.statistics.steps == theirs.statistics.steps
+    np.testing.assert_array_equal(ours.t, theirs.t)
+    pairs = [(getattr(ours, name), getattr(theirs, name)) for name in ("q", "v", "a", "u")]
+    pairs += [(ours.ledger.kinetic, theirs.ledger.kinetic), (ours.ledger.potential, theirs.ledger.potential)]
+    assert list(ours.power) == list(theirs.power) and list(ours.ledger.work) == list(theirs.ledger.work)
+    pairs += [(ours.power[name], theirs.power[name]) for name in ours.power]
+    pairs += [(ours.ledger.work[name], theirs.ledger.work[name]) for name in ours.power]
+    for mine, other in pairs:
+        assert mine.shape == other.shape
+        np.testing.assert_allclose(mine, other, rtol=0, atol=tolerance * (1 + np.abs(other).max()))
+    assert (ours.error is None) == (theirs.error is None)
+    if ours.error is not None and theirs.error is not None:
+        assert (ours.error.note, ours.error.resolved_until) == (theirs.error.note, theirs.error.resolved_until)
+        np.testing.assert_array_equal(ours.error.t, theirs.error.t)
+        np.testing.assert_allclose(ours.error.error, theirs.error.error, rtol=1e-3, atol=1e-11)
+
+
+@pytest.mark.parametrize("name", [*SOME, *long(name for name in WHOLE if name not in SOME)])
+def test_each_method_makes_the_interpreted_step(name: str) -> None:
+    """One step from equal states: the machine's own check, 1e-13 of the state's size, and a run of 60 steps."""
+    ours, theirs = both(integrator=rd.method(name), duration_s=0.06, controller=CONTROLLERS["PD"])
+    check_equal(ours, theirs, 1e-12)  # 60 steps of rounding, amplified by the gains
+    assert ours.statistics.engine == "compiled" and ", compiled\n" in ours.summary
+    assert theirs.statistics.engine.startswith("interpreted")
+    np.testing.assert_allclose(ours.q[1], theirs.q[1], rtol=1e-13)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["PD, sampled", "computed torque", "PID, sampled", *long(["none", "PD", "PID", "PD and gravity", "feed forward"])],
+)
+def test_each_controller_drives_the_same_run(name: str) -> None:
+    """Memory, ticks and the breaks of a reference included; a cubic spline's acceleration jumps where it ends."""
+    ours, theirs = both(controller=CONTROLLERS[name])
+    check_equal(ours, theirs, 1e-11)
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_each_effect_acts_alike(name: str) -> None:
+    ours, theirs = both(effects=EFFECTS[name], controller=CONTROLLERS["PD"])
+    check_equal(ours, theirs, 1e-11)
+    for link, wrench in theirs.wrenches.items():
+        np.testing.assert_allclose(ours.wrenches[link], wrench, atol=1e-11)
+
+
+@pytest.mark.parametrize("method", ["rk4", *long(["gauss_4"])])
+def test_six_joints_under_all_at_once(method: str) -> None:
+    q = np.array([0.3, -0.6, 0.4, -1.2, 0.5, 1.1])
+    effects = [rd.ViscousFriction(0.5), rd.EffortLimit("urdf"), rd.ExternalWrench("tool0", [5, 3, 1, 0.1, 0.2, 0.3])]
+    controller = rd.ComputedTorque(UR5, rd.quintic(q, q + 0.4, 0.1), 100.0, 20.0)
+    options = {"q0": q, "v0": 0 * q, "robot": UR5, "effects": effects, "controller": controller, "duration_s": 0.12}
+    check_equal(*both(integrator=rd.method(method), **options), 1e-11)
+
+
+@pytest.mark.parametrize("period", [0.0, 0.0025, 0.01, 0.07])
+def test_samples_lie_at_the_record_period(period: float) -> None:
+    check_equal(*both(record_period_s=period), 1e-12)
+
+
+@pytest.mark.parametrize("method", [*long([rd.method("sdirk_3")]), rd.method("linearly_implicit_euler")])
+def test_other_methods_take_the_rate_in_machine_code(method) -> None:
+    """Their steps depend on rounding through tolerances and Jacobians by differences."""
+    ours, theirs = both(integrator=method, controller=CONTROLLERS["PID"], duration_s=0.1)
+    assert ours.statistics.engine.startswith("compiled (the equation of motion")
+    np.testing.assert_allclose(ours.q, theirs.q, atol=1e-9)
+    np.testing.assert_allclose(ours.u, theirs.u, atol=1e-6)
+    assert ours.outcome == theirs.outcome
+
+
+DIVERGING = {
+    "a number overflows": {"controller": rd.PD(rd.hold(Q), 1e9, 1e7)},
+    "energy grows": {
+        "controller": rd.PD(rd.hold(Q), 3e4, 0.0),
+        "integrator": "rk4",
+        "step_s": 0.05,
+        "duration_s": 20.0,
+    },
+    "stages are not found": {"controller": rd.PD(rd.hold(Q), 1e7, 0.0), "integrator": rd.method("gauss_2")},
+    "a tick asks for no finite torque": {"controller": rd.PD(rd.hold(Q), 1e9, 1e7, period_s=0.01)},
+}
+
+
+@pytest.mark.parametrize("name", DIVERGING)
+def test_a_run_that_diverges_ends_alike(name: str) -> None:
+    """Up to rounding, which an explosion multiplies: the same ending, within a few steps, and the same advice."""
+    ours, theirs = both(estimate_error=False, **DIVERGING[name])
+    assert ours.outcome.ending == theirs.outcome.ending == "diverged"
+    assert ours.outcome.t == pytest.approx(theirs.outcome.t, abs=0.011)
+    assert ours.outcome.advice.split(";")[-1].split("at t")[0] == theirs.outcome.advice.split(";")[-1].split("at t")[0]
+    assert np.isfinite(ours.q).all() and abs(len(ours.t) - len(theirs.t)) <= 11
+
+
+def test_progress_is_told_and_an_interrupt_keeps_the_samples() -> None:
+    seen: list[float] = []
+
+    def progress(t: float) -> None:
+        seen.append(t)
+        if len(seen) == 2:
+            raise KeyboardInterrupt
+
+    setup = rd.Setup(rd.Plant(ARM), Q, duration_s=400.0, record_period_s=0.1, engine="compiled", integrator="rk4")
+    run = rd.simulate(setup, on_progress=progress)
+    assert run.outcome.ending == "stopped" and run.error is None
+    assert 0 < run.t[-1] <= run.outcome.t == seen[-1] < 400.0
+    assert len(run.t) == len(np.arange(0, run.t[-1] + 0.05, 0.1))
+    assert np.isfinite(run.q).all()
+
+
+@final
+@dataclass(frozen=True)
+class Elsewhere(Stateless):
+    """A controller written elsewhere, which traces nonetheless."""
+
+    n: int = 2
+    period_s: float = 0.0
+
+    def torque(self, t, q, v, z):
+        return -4.0 * q if t < 0.05 else 0 * q
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Table(Active):
+    """An effect that looks its torque up, which symbols cannot."""
+
+    def torque(self, dynamics, t, q, v):
+        return np.array([0.1, 0.2])[int(10 * t) % 2] * v
+
+
+def test_an_undeclared_controller_runs_interpreted_unless_it_is_asked_for() -> None:
+    setup = rd.Setup(rd.Plant(ARM), Q, controller=Elsewhere(), duration_s=0.1, estimate_error=False, integrator="rk4")
+    run = rd.simulate(setup)
+    assert run.statistics.engine.startswith("interpreted (Elsewhere declares no thresholds")
+    assert run.statistics.engine in run.summary
+    check_equal(rd.simulate(setup, engine="compiled"), run, 1e-12)
+
+
+def test_a_reference_that_jumps_between_rests() -> None:
+    """Steps end at the jump, so that both engines see the same constant on either side."""
+    jump = rd.PiecewisePolynomial([0, 0.1, 0.2], [[Q], [Q + 1]])
+    setup = rd.Setup(
+        rd.Plant(ARM), Q, duration_s=0.2, controller=rd.PD(jump, 10.0, 1.0), estimate_error=False, integrator="rk4"
+    )
+    run = rd.simulate(replace(setup, engine="interpreted"))
+    assert np.abs(run.q[-1] - Q).max() > 0.01
+    check_equal(rd.simulate(setup, engine="compiled"), run, 1e-12)
+
+
+def test_what_cannot_be_compiled_is_named() -> None:
+    with pytest.raises(TraceError, match=r"effect table cannot be compiled .*engine='interpreted'"):
+        rd.simulate(rd.Plant(ARM, [Table()]), q0=Q, engine="compiled")
+    with pytest.raises(QueryError, match="no engine 'fast'; nearest: auto"):
+        rd.Setup(rd.Plant(ARM), Q, engine="fast")
+
+
+def test_auto_compiles_where_it_pays(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Evaluations times their cost: a second of motion is short, an hour is not."""
+    monkeypatch.setenv("ROBOT_DYN_CACHE", "off")
+    setup = rd.Setup(rd.Plant(ARM.with_(mass_scale=1.01)), Q, duration_s=1.0, integrator="rk4")
+    assert choose(setup, StateEquation(setup.plant, None))[1] == "interpreted (short: compiling does not pay)"
+    long = replace(setup, duration_s=3600.0)
+    machine, words = choose(long, StateEquation(setup.plant, None))
+    assert machine is not None and words == "compiled"
+
+
+def test_auto_compiles_what_is_asked_for_again_as_often_as_compiling_takes(monkeypatch) -> None:
+    """Each run has 8000 evaluations; three of them as many as compiling takes, loop included."""
+    monkeypatch.setenv("ROBOT_DYN_CACHE", "off")
+    setup = rd.Setup(rd.Plant(ARM.with_(mass_scale=1.02)), Q, duration_s=1.0, integrator="rk4")
+    said = [choose(setup, StateEquation(setup.plant, None))[1] for _ in range(3)]
+    assert said[0] == "interpreted (short: compiling does not pay)"
+    assert said[2] == "compiled"
+
+
+SHORT = """
+import robot_dyn as rd, sys
+arm = rd.load("planar_2r")
+run = rd.simulate(arm, [0.4, -0.7], [0.3, 0.9], duration_s=0.2, integrator="rk4", engine=sys.argv[1])
+print(run.statistics.engine, *run.q[-1].tolist(), run.error.final, sep=";")
+"""
+
+
+def test_a_second_process_takes_the_machine_code_of_the_store_for_a_short_run(tmp_path) -> None:
+    """Which is within the estimates of what is interpreted before anything is there."""
+
+    def run(engine: str) -> tuple[str, np.ndarray, float]:
+        place, code = os.environ | {"ROBOT_DYN_CACHE": str(tmp_path / "store")}, [sys.executable, "-c", SHORT, engine]
+        said, *q, error = subprocess.run(code, check=True, env=place, capture_output=True, text=True).stdout.split(";")
+        return said, np.array(q, float), float(error)
+
+    before, made, after = run("auto"), run("compiled"), run("auto")
+    assert before[0] == "interpreted (short: compiling does not pay)"
+    assert [made[0], after[0]] == ["compiled", "compiled"]
+    assert np.array_equal(made[1], after[1])
+    assert np.abs(before[1] - after[1]).max() <= before[2] + after[2]
+
+
+def test_a_machine_that_disagrees_is_refused(monkeypatch) -> None:
+    """The interpreted equation has another gravity than the compiled one: the self check refuses it."""
+    from robot_dyn.simulation.compiled import making
+
+    setup = rd.Setup(rd.Plant(ARM), Q)
+    made = making.machine(StateEquation(setup.plant, None), rd.method("rk4"))
+    made.check(setup)
+    equations = replace(made.equations, checked={})
+    other = replace(
+        made, equation=StateEquation(rd.Plant(ARM.with_(gravity=(0.0, 0.0, -9.80664))), None), equations=equations
+    )
+    with pytest.raises(
+        MachineError, match=r"differs from the interpreted one by .* allowed: take engine='interpreted'"
+    ):
+        other.check(setup)
+
+
+def test_interpreted_runs_import_no_compiler(tmp_path) -> None:
+    """Where no machine code is in the store."""
+    code = (
+        "import sys, robot_dyn as rd, numpy as np;"
+        "rd.simulate(rd.Plant(rd.load('planar_2r')), q0=[0.1, 0.2], duration_s=0.05);"
+        "assert not {'casadi', 'llvmlite'} & set(sys.modules), 'imported'"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, env=os.environ | {"ROBOT_DYN_CACHE": str(tmp_path)})
+
+
+def test_symbols_are_a_dynamics_by_their_class() -> None:
+    """From Python 3.12 on, a check of a protocol sees attributes of the class alone, none that `__getattr__` makes."""
+    names = [name for name in vars(Dynamics) if not name.startswith("_")] + ["n", "joint_names"]
+    assert {"M", "C", "N", "forward_dynamics"} < set(names)
+    for name in names:
+        getattr_static(SymbolicDynamics, name)

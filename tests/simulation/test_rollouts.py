@@ -1,0 +1,565 @@
+"""Rollouts: each run of a batch is the run that it is by itself, whatever the others do and whoever does it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import robot_dyn as rd
+from robot_dyn.codegen.trace.symbolic import TraceError
+from robot_dyn.effects.effect import Active
+from robot_dyn.errors import QueryError
+from robot_dyn.simulation.rollouts import pool
+from tests.command import refusal, said
+
+ARM = rd.load("planar_2r")
+Q, V = np.array([0.4, -0.7]), np.array([0.3, 0.5])
+REFERENCE = rd.quintic(Q, Q + 0.5, 0.1, start_s=0.05)
+PLANT = rd.Plant(ARM, [rd.ViscousFriction([0.3, 0.1]), rd.RegularisedCoulombFriction(0.2, 0.1), rd.EffortLimit(30.0)])
+SETUP = rd.Setup(
+    PLANT,
+    Q,
+    V,
+    0.2,
+    rd.PD(REFERENCE, 40.0, [4.0, 3.0]),
+    integrator="rk4",
+    step_s=2e-3,
+    record_period_s=0.01,
+)
+PID = replace(SETUP, controller=rd.PID(REFERENCE, 40.0, 30.0, 4.0, effort_limit=3.0, period_s=0.004))
+ARM_TIP, INERTIA = "tip", ((0.01, 0.0, 0.0), (0.0, 0.02, 0.001), (0.0, 0.001, 0.03))
+NOMINAL = ARM.with_(payload=rd.Payload(ARM_TIP, 1.0))
+EVERYTHING = ("q", "v", "u", "energy", "work")
+
+
+def starts(count: int, spread: float = 0.3) -> np.ndarray:
+    return Q + spread * np.random.default_rng(3).normal(size=(count, 2))
+
+
+def arrays(runs: rd.Rollouts) -> list[np.ndarray]:
+    """All arrays of numbers of a batch, by run."""
+    given = [runs.q, runs.v, runs.u, runs.kinetic, runs.potential, *(runs.work or {}).values(), runs.ended]
+    return [x for x in given if x is not None]
+
+
+@pytest.mark.parametrize("setup", [SETUP, PID, replace(SETUP, integrator=rd.method("gauss_2"))])
+def test_each_run_is_that_of_simulate(setup: rd.Setup) -> None:
+    """To rounding: B = 1, B of one tile and a bit more."""
+    for count in (1, 70):
+        q0 = starts(count)
+        runs = rd.rollouts(setup, q0, record=EVERYTHING)
+        assert len(runs) == count and not runs.diverged.any()
+        for i in {0, count // 2, count - 1}:
+            alone = rd.simulate(setup, q0=q0[i], estimate_error=False)
+            np.testing.assert_allclose(runs.t, alone.t, rtol=1e-15)
+            pairs = [(runs.q, alone.q), (runs.v, alone.v), (runs.u, alone.u)]
+            pairs += [(runs.kinetic, alone.ledger.kinetic), (runs.potential, alone.ledger.potential)]
+            pairs += [(runs.work[name], work) for name, work in alone.ledger.work.items()]
+            for ours, theirs in pairs:
+                assert ours[i].shape == theirs.shape
+                np.testing.assert_allclose(ours[i], theirs, rtol=0, atol=1e-11 * (1 + np.abs(theirs).max()))
+            assert runs.outcome(i) == alone.outcome
+
+
+def test_threads_change_nothing() -> None:
+    """150 runs are three tiles: bit for bit the same from one thread, from two and from three."""
+    q0 = starts(150)
+    first = rd.rollouts(SETUP, q0, record=EVERYTHING, threads=1)
+    for threads in (2, 3):
+        for x, y in zip(arrays(first), arrays(rd.rollouts(SETUP, q0, record=EVERYTHING, threads=threads)), strict=True):
+            np.testing.assert_array_equal(x, y)
+
+
+@pytest.mark.parametrize("method", ["rk4", "gauss_2"])
+def test_a_run_that_diverges_leaves_the_others_as_they_are(method: str) -> None:
+    """Bit for bit; its own samples are those of simulate up to its end, then nan."""
+    setup = replace(SETUP, integrator=rd.method(method), record_period_s=0.0)
+    q0, v0 = starts(40), np.broadcast_to(V, (40, 2)).copy()
+    wild = [3, 17]
+    quiet = rd.rollouts(setup, q0, v0, record=EVERYTHING)
+    v0[wild] = 1e5, 3e7
+    runs = rd.rollouts(setup, q0, v0, record=EVERYTHING)
+    others = np.setdiff1d(np.arange(40), wild)
+    np.testing.assert_array_equal(runs.q[others], quiet.q[others])
+    np.testing.assert_array_equal(runs.v[others], quiet.v[others])
+    assert sorted(np.flatnonzero(runs.diverged)) == wild and not quiet.diverged.any()
+    for i in wild:
+        alone = rd.simulate(setup, q0=q0[i], v0=v0[i], estimate_error=False)
+        assert alone.outcome.ending == runs.outcome(i).ending == "diverged"
+        assert runs.ended[i] == pytest.approx(alone.outcome.t, abs=0.01)
+        later = runs.t > runs.ended[i] + 1e-9
+        assert later.any() and np.isnan(runs.q[i, later]).all() and np.isnan(runs.u[i, later]).all()
+        assert np.isnan(runs.kinetic[i, later]).all() and np.isfinite(runs.q[i, 0]).all()
+        assert runs.ended[i] < 0.2 and "smaller step" in runs.outcome(i).advice
+    assert "2 diverged" in runs.summary
+
+
+@pytest.mark.parametrize("engine", ["interpreted", "compiled"])
+def test_a_run_that_overflows_ends_at_the_step_at_which_simulate_ends_it(engine: str) -> None:
+    """Velocities square from step to step: from 1e100 to 1e308 it is one or two of them. Rounding moves no end."""
+    rng, h = np.random.default_rng(2), 0.02
+    q0, v0 = rng.normal(size=(12, 2)), 30.0 * rng.normal(size=(12, 2))
+    setup = rd.Setup(SETUP.plant, q0[0], v0[0], duration_s=40 * h, integrator="explicit_euler", step_s=h, engine=engine)
+    runs = rd.rollouts(replace(setup, engine="auto"), q0, v0)
+    wild = np.flatnonzero(runs.diverged)
+    assert len(set(np.rint(runs.ended[wild] / h))) > 2
+    for i in wild:
+        alone = rd.simulate(setup, q0=q0[i], v0=v0[i], estimate_error=False)
+        assert (alone.outcome.ending, alone.outcome.t) == (runs.outcome(i).ending, runs.outcome(i).t)
+
+
+def test_a_run_beyond_the_range_of_a_tile_is_done_by_itself() -> None:
+    """A free joint that starts at 2e5 rad: the tile's sine is no longer exact there, the C library's is."""
+    spinner = replace(SETUP, plant=rd.Plant(ARM), controller=None)
+    q0 = starts(3)
+    q0[1] = 2e5, 0.3
+    runs = rd.rollouts(spinner, q0, record=EVERYTHING)
+    alone = rd.simulate(spinner, q0=q0[1], estimate_error=False)
+    np.testing.assert_allclose(runs.q[1], alone.q, rtol=0, atol=1e-8)  # 1 ulp of 2e5 rad is 3e-11
+    np.testing.assert_allclose(runs.kinetic[1], alone.ledger.kinetic, rtol=0, atol=1e-8)
+
+
+def test_values_that_differ_from_run_to_run() -> None:
+    """Each run with its own gains and friction is the run of a setup with these."""
+    rng = np.random.default_rng(5)
+    params = {"kp": rng.uniform(20, 60, 5), "kd": rng.uniform(2, 5, (5, 2))}
+    params |= {"viscous_friction.damping": rng.uniform(0, 1, (5, 2)), "effort_limit.limit": rng.uniform(5, 30, 5)}
+    runs = rd.rollouts(SETUP, params=params, record=EVERYTHING)
+    for i in range(5):
+        kp, kd, damping, limit = (x[i] for x in params.values())
+        effects = [rd.ViscousFriction(damping), PLANT.effects[1], rd.EffortLimit(limit)]
+        setup = replace(SETUP, plant=rd.Plant(ARM, effects), controller=rd.PD(REFERENCE, kp, kd), estimate_error=False)
+        alone = rd.simulate(setup)
+        np.testing.assert_allclose(runs.q[i], alone.q, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(runs.u[i], alone.u, rtol=0, atol=1e-11)
+        for name, work in alone.ledger.work.items():
+            np.testing.assert_allclose(runs.work[name][i], work, rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize("model", [False, True])
+def test_masses_of_payloads_that_differ_from_run_to_run(model: bool) -> None:
+    """Each run is that of a plant whose robot carries this mass; the controller's model keeps what it was given."""
+
+    def setup(mass: float) -> rd.Setup:
+        loaded = ARM.with_(payload=rd.Payload(ARM_TIP, mass, (0.05, 0.02, 0.0), INERTIA))
+        controller = rd.PDGravity(NOMINAL, REFERENCE, 40.0, 4.0) if model else SETUP.controller
+        return replace(SETUP, plant=rd.Plant(loaded, PLANT.effects), controller=controller, estimate_error=False)
+
+    rng = np.random.default_rng(6)
+    params = {f"payload_mass:{ARM_TIP}": rng.uniform(0, 3, 70), "viscous_friction.damping": rng.uniform(0, 1, 70)}
+    runs = rd.rollouts(setup(1.0), params=params, record=EVERYTHING)
+    for i in (0, 40, 69):
+        mass, damping = (x[i] for x in params.values())
+        alone = setup(mass)
+        plant = rd.Plant(alone.plant.dynamics, [rd.ViscousFriction(damping), *PLANT.effects[1:]])
+        alone = rd.simulate(replace(alone, plant=plant))
+        for ours, theirs in ((runs.q, alone.q), (runs.u, alone.u), (runs.potential, alone.ledger.potential)):
+            np.testing.assert_allclose(ours[i], theirs, rtol=0, atol=1e-11 * (1 + np.abs(theirs).max()))
+
+
+def test_a_mass_beyond_the_range_of_the_tile() -> None:
+    """A run that turns too far for the sine of a tile is run by itself, with the mass that is its own."""
+    loaded = ARM.with_(payload=rd.Payload(ARM_TIP, 1.0))
+    q0, masses = starts(3), np.array([0.5, 1.5, 2.5])
+    q0[1, 0] += 2 * np.pi * 40_000
+    free = replace(SETUP, plant=rd.Plant(loaded), controller=None, estimate_error=False)
+    runs = rd.rollouts(free, q0, params={f"payload_mass:{ARM_TIP}": masses})
+    for i in range(3):
+        own = rd.Plant(ARM.with_(payload=rd.Payload(ARM_TIP, masses[i])))
+        alone = rd.simulate(replace(free, plant=own), q0=q0[i])
+        np.testing.assert_allclose(runs.q[i], alone.q, rtol=0, atol=1e-8)  # 1 ulp of 2e5 rad is 3e-11
+
+
+def test_only_what_is_asked_for_is_recorded() -> None:
+    runs = rd.rollouts(SETUP, starts(2), record=["v"])
+    assert runs.q is None and runs.u is None and runs.kinetic is None and runs.work is None
+    np.testing.assert_array_equal(runs.v, rd.rollouts(SETUP, starts(2)).v)
+
+
+@pytest.mark.parametrize("period", [0.0, 0.005, 0.03, 0.5])
+def test_samples_lie_where_those_of_simulate_do(period: float) -> None:
+    setup = replace(SETUP, record_period_s=period, estimate_error=False)
+    runs, alone = rd.rollouts(setup, starts(2)), rd.simulate(setup, q0=starts(2)[1])
+    np.testing.assert_allclose(runs.t, alone.t, rtol=1e-15)
+    np.testing.assert_allclose(runs.q[1], alone.q, rtol=0, atol=1e-12)
+
+
+def assert_alike(ours: np.ndarray, theirs: np.ndarray) -> None:
+    """To rounding of what a tile and a single state compute."""
+    assert ours.shape == theirs.shape
+    np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-10 * (1 + np.abs(theirs).max()))
+
+
+@pytest.mark.parametrize("setup", [SETUP, PID, replace(SETUP, integrator=rd.method("gauss_2"))])
+@pytest.mark.parametrize("record", [EVERYTHING, ("q", "v")])
+def test_a_run_of_a_batch_is_the_trajectory_of_simulate(setup: rd.Setup, record: tuple[str, ...]) -> None:
+    """In all that was recorded or follows from it; what neither tells is nan, and nothing is in its place."""
+    params = {"viscous_friction.damping": np.array([[0.3, 0.1], [0.7, 0.2], [0.0, 0.4]])}
+    runs = rd.rollouts(setup, starts(3), params=params, record=record)
+    effects = [rd.ViscousFriction(params["viscous_friction.damping"][-1]), *PLANT.effects[1:]]
+    alone = rd.simulate(setup, q0=starts(3)[-1], plant=rd.Plant(ARM, effects), estimate_error=False)
+    run = runs[-1]
+    for name in ("t", "q", "v", "desired", "deviation"):
+        assert_alike(getattr(run, name), getattr(alone, name))
+    everything, follows = record == EVERYTHING, not setup.controller.state_size
+    for ours, theirs, known in (
+        (run.u, alone.u, everything or follows),
+        (run.a, alone.a, everything or follows),
+        (run.power["control"], alone.power["control"], everything or follows),
+        (run.power["viscous_friction"], alone.power["viscous_friction"], True),
+        (run.ledger.kinetic, alone.ledger.kinetic, True),
+        (run.ledger.potential, alone.ledger.potential, True),
+        (run.ledger.work["control"], alone.ledger.work["control"], everything),
+    ):
+        assert_alike(ours, theirs) if known else np.testing.assert_array_equal(ours, np.full_like(theirs, np.nan))
+    assert run.power.keys() == alone.power.keys() == run.ledger.work.keys()
+    assert run.outcome == alone.outcome and run.statistics.steps == alone.statistics.steps
+    assert run.error is None and "not estimated (a run of rollouts)" in run.summary
+    assert_alike(run.extremes, alone.extremes)
+    assert ("was not recorded" in run.summary) is not everything
+    assert {name: run.about[name] for name in alone.about} == alone.about
+
+
+def test_runs_are_numbered_as_lists_are() -> None:
+    runs = rd.rollouts(SETUP, starts(5), params={"kp": np.arange(5.0)})
+    np.testing.assert_array_equal(runs[-2].q, runs.q[3])
+    some = runs[1:4]
+    assert len(some) == 3 and some.params["kp"][0, 0] == 1.0 and len(list(runs)) == 5
+    np.testing.assert_array_equal(some[0].u, runs[1].u)
+    with pytest.raises(IndexError, match="no run 5: runs are numbered from 0 to 4"):
+        runs[5]
+    with pytest.raises(QueryError, match="no run in"):
+        runs[2:2]
+    with pytest.raises(QueryError, match="a whole number or a slice"):
+        runs["first"]
+    with pytest.raises(QueryError, match="a whole number or a slice, got True"):
+        runs[True]
+    with pytest.raises(QueryError, match="if q and v were recorded"):
+        rd.rollouts(SETUP, starts(2), record=["q"])[0]
+
+
+def test_a_run_of_a_slice_has_the_noise_that_it_had() -> None:
+    """Noise is of the number of a run in its batch, whatever its number in a slice, a slice of one, or backwards."""
+    loop = rd.Loop(rd.PD(REFERENCE, 40.0, 4.0, period_s=4e-3), position=[rd.Noise(0.01)])
+    runs = rd.rollouts(replace(SETUP, controller=loop), [Q] * 6)
+    for some in (runs[2:5], runs[1:][1:4], runs[::-2]):
+        for i in range(3):
+            alone = rd.simulate(some.setup_of(i), estimate_error=False, engine="compiled")
+            np.testing.assert_allclose(alone.q, some.q[i], rtol=0, atol=1e-12)  # other noise moves q by 1e-3
+
+
+@pytest.mark.parametrize("method", ["rk4", "gauss_2"])
+def test_a_diverged_run_names_its_joint_its_time_and_what_to_do(method: str) -> None:
+    """The joint that moved fastest in its last sample; each run its own. Nothing cuts their steps."""
+    plant = rd.Plant(ARM, PLANT.effects[:2])
+    setup = replace(SETUP, plant=plant, integrator=rd.method(method), record_period_s=0.0)
+    v0 = np.array([V, [1e5, 3e7], V, [3e7, 1e4]])
+    runs = rd.rollouts(setup, starts(4), v0)
+    for i in (1, 3):
+        advice, fastest = runs.outcome(i).advice, np.argmax(np.abs(runs[i].v[-1]))
+        assert (
+            f"the fastest joint is '{ARM.joint_names[fastest]}'" in advice
+            and "take a smaller step than 0.002 s" in advice
+        )
+        assert runs[i].outcome == runs.outcome(i)
+        assert np.isfinite(runs[i].q).all() and runs[i].t[-1] <= runs.ended[i] + 1e-12
+    assert not runs.outcome(0).advice and f"run 1 diverged at t = {runs.ended[1]:g} s; " in runs.summary
+
+
+@pytest.mark.parametrize("command", [("replay", "--html", "page.html"), ("plot",)], ids=lambda command: command[0])
+def test_commands_say_what_a_file_of_rollouts_is(command: tuple[str, ...], tmp_path: Path, monkeypatch) -> None:
+    """Not that it is damaged; what they advise makes a file that they take."""
+    monkeypatch.chdir(tmp_path)
+    rd.save_rollouts(rd.rollouts(SETUP, starts(3), V), "runs.npz")
+    text = refusal((command[0], "runs.npz", *command[1:]))
+    assert "is a file of rollouts" in text and "simulate again" not in text
+    rd.save_run(rd.load_rollouts("runs.npz")[0], "run.npz")
+    assert "written: " in said(command[0], "run.npz", *command[1:])
+    with pytest.raises(rd.RobotDynError, match=r"is a file of one run, not of rollouts; rd.load_run reads it"):
+        rd.load_rollouts("run.npz")
+
+
+@pytest.mark.parametrize("record", [EVERYTHING, ("q", "v"), ("u",)])
+def test_rollouts_are_saved_and_read(record: tuple[str, ...], tmp_path: Path) -> None:
+    """Bit for bit, and a file that was cut short, or is of another kind, is refused."""
+    v0 = np.tile(V, (4, 1))
+    v0[2] = 1e5, 3e7
+    runs = rd.rollouts(SETUP, starts(4), v0, params={"kp": np.arange(4.0)}, record=record)
+    path = rd.save_rollouts(runs, tmp_path / "runs")
+    back = rd.load_rollouts(path)
+    for x, y in zip(arrays(runs), arrays(back), strict=True):
+        np.testing.assert_array_equal(x, y)
+    assert back.setup is None and [back.outcome(i) for i in range(4)] == [runs.outcome(i) for i in range(4)]
+    assert back.about["urdf"] == runs.about["urdf"] and back.params["kp"][3, 0] == 3.0
+    with pytest.raises(
+        rd.RobotDynError, match=r"is a file of rollouts, which are many runs; rd.load_rollouts reads it"
+    ):
+        rd.load_run(path)
+    path.write_bytes(path.read_bytes()[:-100])
+    with pytest.raises(rd.RobotDynError, match="is not a complete run file"):
+        rd.load_rollouts(path)
+    with pytest.raises(rd.RobotDynError, match=r"there is no such file; write one with rd\.save_rollouts"):
+        rd.load_rollouts(tmp_path / "none.npz")
+    with pytest.raises(rd.RobotDynError, match="got Rollouts; save_rollouts takes"):
+        rd.save_run(runs, path)
+
+
+@pytest.mark.parametrize("read", [False, True])
+def test_a_run_of_a_batch_is_saved_drawn_and_replayed(read: bool, tmp_path: Path) -> None:
+    """With what it has: torques and energies that nobody recorded are not drawn."""
+    runs = rd.rollouts(PID, starts(2))
+    runs = rd.load_rollouts(rd.save_rollouts(runs, tmp_path / "runs")) if read else runs
+    run = runs[1]
+    again = rd.load_run(rd.save_run(run, tmp_path / "run"))
+    np.testing.assert_array_equal(again.q, run.q)
+    assert rd.save_replay(run, tmp_path / "run").stat().st_size > 10_000
+    assert rd.plot(run).axes
+    for name in ("torques", "energy"):
+        with pytest.raises(rd.RobotDynError, match="not recorded; add"):
+            rd.plot(run, name)
+
+
+def test_progress_of_a_batch() -> None:
+    """Times that grow from the start to the end of the run; what it raises ends the batch."""
+    setup, seen = replace(SETUP, duration_s=3.0), []
+    rd.rollouts(setup, starts(200), threads=1, on_progress=seen.append)
+    assert seen[-1] == 3.0 and seen == sorted(seen) and seen[0] >= 0
+
+    def enough(t: float) -> None:
+        raise ValueError("enough")
+
+    with pytest.raises(ValueError, match="enough"):
+        rd.rollouts(replace(SETUP, duration_s=100.0), starts(200), threads=1, on_progress=enough)
+
+
+class Table(Active):
+    def torque(self, dynamics, t, q, v):
+        return np.array([0.1, 0.2])[int(10 * t) % 2] * v
+
+
+def test_what_has_no_meaning_is_refused() -> None:
+    bad = starts(4)
+    bad[2, 1] = np.nan
+    for message, options in {
+        "q0 must be finite, got nan for joint": {"q0": bad},
+        r"q0 must have shape \(2,\)": {"q0": np.zeros((4, 3))},
+        "one number of runs": {"q0": starts(4), "v0": np.zeros((3, 2))},
+        r"one number of runs, .*'kp': \(3,\)": {"q0": starts(4), "params": {"kp": np.ones(3)}},
+        "one number of runs, B ≥ 1: ": {"q0": np.zeros((0, 2))},
+        r"mass_scale must have shape \(B,\) or \(B, 1\), got \(\)": {"params": {"mass_scale": 1.1}},
+        "params: no 'kq'; nearest: k": {"params": {"kq": np.ones(3)}},
+        "params: no 'viscous_friction.damp'; nearest: viscous_friction.damping": {
+            "params": {"viscous_friction.damp": np.ones(3)}
+        },
+        "params: kp must not be negative": {"params": {"kp": [-1.0]}},
+        r"params: no 'payload_mass:elbow': the arm carries no payload; add one, as robot.with_\(payload=": {
+            "params": {"payload_mass:elbow": np.ones(3)}
+        },
+        "no record 'torque'": {"record": ("torque",)},
+        "threads .* must be a whole number, from 1": {"threads": 0},
+        r"at most .* samples of 4 runs takes .*e-0\d GiB, more than 9.31e-08 GiB: take a longer record_period_s": {
+            "q0": starts(4),
+            "most_bytes": 100,
+        },
+    }.items():
+        with pytest.raises(QueryError, match=message):
+            rd.rollouts(SETUP, **options)
+    with pytest.raises(TraceError, match="effect table"):
+        rd.rollouts(replace(SETUP, plant=rd.Plant(ARM, [Table()])))
+
+
+def test_runs_of_chosen_steps_are_those_of_simulate() -> None:
+    """One after the other on each thread: gains and stops that differ, events included, to rounding of two engines."""
+    stops = rd.joint_stops([-1.0, -1.0], [0.4, 1.0], 1e4)
+    setup = replace(
+        SETUP, plant=rd.Plant(ARM, [rd.ViscousFriction(0.5), *stops]), integrator=rd.Adaptive(), step_s=None,
+        record_period_s=0.05,
+    )  # fmt: skip
+    upper, kp, q0 = np.array([[0.4, 1.0], [0.3, 0.8], [0.35, 0.9]]), np.array([20.0, 30.0, 40.0]), starts(3)
+    params = {"joint_stops.upper": upper, "kp": kp}
+    runs = rd.rollouts(setup, q0, params=params, record=("q", "v", "u", "energy", "work"), threads=2)
+    for i in range(3):
+        stops = rd.joint_stops([-1.0, -1.0], upper[i], 1e4)
+        plant, law = rd.Plant(ARM, [rd.ViscousFriction(0.5), *stops]), replace(setup.controller, kp=kp[i])
+        own = replace(setup, plant=plant, controller=law, q0=q0[i], estimate_error=False, engine="interpreted")
+        theirs = rd.simulate(own)
+        np.testing.assert_array_equal(runs.t, theirs.t)
+        np.testing.assert_allclose(runs.q[i], theirs.q, atol=1e-9)  # steps differ where errors are near the tolerance
+        np.testing.assert_allclose(runs.u[i], theirs.u, atol=1e-6)
+        np.testing.assert_allclose(runs.kinetic[i], theirs.ledger.kinetic, atol=1e-7)
+        assert runs.work["joint_stops"][i] == pytest.approx(theirs.ledger.work["joint_stops"], abs=1e-7)
+    assert not runs.diverged.any() and "one after the other" in runs.statistics.engine
+
+
+def test_a_batch_of_the_engine_that_is_named_is_that_of_simulate() -> None:
+    """Interpreted, to the last bit; also of a part that cannot be compiled."""
+    for effects in (PLANT.effects, [Table()]):
+        setup = replace(SETUP, plant=rd.Plant(ARM, effects), engine="interpreted", estimate_error=False)
+        runs = rd.rollouts(setup, starts(2), params={"kp": [40.0, 30.0]}, record=("q", "u"))
+        alone = rd.simulate(setup, q0=starts(2)[1], controller=replace(setup.controller, kp=30.0))
+        np.testing.assert_array_equal(runs.q[1], alone.q)
+        np.testing.assert_array_equal(runs.u[1], alone.u)
+        assert runs.statistics.engine.startswith("interpreted")
+
+
+def test_a_joint_strikes_its_stops_in_a_batch_as_it_does_alone() -> None:
+    """Stiff stops, steps as long as the contact: runs without cuts are others. To rounding, and what events make of it.
+
+    The runs that stay between the stops are those of lock step, bit for bit.
+    """
+    plant = rd.Plant(ARM.with_(gravity=(0.0, 0.0, 0.0)), rd.joint_stops(-0.1, 0.5, 1e5, 0.0))
+    setup = rd.Setup(plant, Q, duration_s=1.0, integrator="rk4", step_s=2e-3, estimate_error=False)
+    q0, v0 = np.tile([0.2, 0.15], (70, 1)), np.full((70, 2), [0.05, -0.1])
+    strikes = [2, 65]
+    v0[strikes] = [[2.0, -1.4], [-0.8, 2.4]]
+    runs, uncut = (rd.rollouts(setup, q0, v0, record=EVERYTHING, cuts=cuts) for cuts in (True, False))
+    for i in strikes:
+        alone = rd.simulate(setup, q0=q0[i], v0=v0[i])
+        assert len(alone.events) > 5 and runs.outcome(i) == alone.outcome and runs.steps[i] == alone.statistics.steps
+        np.testing.assert_allclose(runs.q[i], alone.q, rtol=0, atol=1e-11)
+        np.testing.assert_allclose(runs.kinetic[i], alone.ledger.kinetic, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(runs.work["control"][i], alone.ledger.work["control"], rtol=0, atol=1e-11)
+        assert np.abs(uncut.q[i] - alone.q).max() > 1e-3
+    others = np.setdiff1d(np.arange(70), strikes)
+    for x, y in zip(arrays(runs), arrays(uncut), strict=True):
+        np.testing.assert_array_equal(x[others], y[others])
+    assert "2 of them made again with steps cut at thresholds" in runs.statistics.engine
+    assert "cuts=False: no step ends at lower stop, upper stop" in uncut.summary and "cuts" not in runs.summary
+
+
+def test_a_joint_that_starts_from_rest_has_not_reversed() -> None:
+    """Bristles under a steady push, away from v = 0: lock step makes these runs, and they are those of simulate."""
+    plant = rd.Plant(ARM.with_(gravity=(0.0, 0.0, 0.0)), [rd.LuGreFriction(1.0, 1.0, 0.1, 0.2, 0.3, 0.1)])
+    push = rd.PD(rd.hold(Q + 3.0), [20.0, 0.8], 0.0)
+    setup = rd.Setup(plant, Q, duration_s=0.2, controller=push, integrator="rk4", estimate_error=False)
+    runs = rd.rollouts(setup, starts(3, 0.01))
+    assert "made again" not in runs.statistics.engine
+    np.testing.assert_allclose(runs.q[2], rd.simulate(setup, q0=starts(3, 0.01)[2]).q, rtol=0, atol=1e-13)
+
+
+def test_levels_that_differ_from_run_to_run() -> None:
+    """Also where a run has none, and where the setup has none: each run is cut at its own."""
+    arm, stops = ARM.with_(gravity=(0.0, 0.0, 0.0)), rd.joint_stops([-1.0, -1.0], [0.4, 1.0], 0.0, 0.0)
+    setup = rd.Setup(rd.Plant(arm, stops), Q, V, 0.5, integrator="rk4", record_period_s=0.1, estimate_error=False)
+    stiffness, upper = np.array([0.0, 1e4, 1e4]), np.array([[0.5, 1.0], [0.5, 1.0], [0.45, 0.6]])
+    runs = rd.rollouts(setup, params={"joint_stops.stiffness": stiffness, "joint_stops.upper": upper})
+    for i in range(3):
+        plant = rd.Plant(arm, rd.joint_stops([-1.0, -1.0], upper[i], stiffness[i], 0.0))
+        alone = rd.simulate(setup, plant=plant)
+        assert bool(alone.events) is bool(stiffness[i])
+        np.testing.assert_allclose(runs.q[i], alone.q, rtol=0, atol=1e-11)
+
+
+def test_samples_between_the_ends_of_steps_are_those_of_simulate() -> None:
+    """A period that the run does not hold a whole number of times: where steps are cut at its multiples, else not."""
+    bristles = rd.LuGreFriction(100.0, 1.0, 0.05, 0.2, 0.3, 0.05)  # steps in (q, p) end nowhere for them
+    for effects, method in ((PLANT.effects, "rk4"), (PLANT.effects[:2], "rk4"), ([bristles], "gauss_4")):
+        of = {"duration_s": 0.123, "record_period_s": 0.0101, "integrator": rd.method(method)}
+        setup = replace(SETUP, plant=rd.Plant(ARM, effects), **of)
+        runs, alone = rd.rollouts(setup, starts(2)), rd.simulate(setup, q0=starts(2)[1], estimate_error=False)
+        np.testing.assert_allclose(runs.t, alone.t, rtol=1e-15)
+        np.testing.assert_allclose(runs.q[1], alone.q, rtol=0, atol=1e-12)
+
+
+def test_events_end_the_runs_of_a_batch_as_they_end_single_ones(tmp_path: Path) -> None:
+    """A terminal event: the time to rounding, samples up to it, and the words; also from a file."""
+    down = rd.Event(lambda t, q, v: q[0] - 0.35, name="down", terminal=True)
+    setup = replace(SETUP, controller=None, events=[down], estimate_error=False, duration_s=0.3)
+    q0 = np.array([[0.4, -0.7], [0.5, -0.7], [3.0, 0.2]])
+    for method in ("rk4", "DOP853"):
+        runs = rd.rollouts(setup, q0, 0 * q0, integrator=rd.method(method) if method == "rk4" else method)
+        back = rd.load_rollouts(rd.save_rollouts(runs, tmp_path / method))
+        for i in range(3):
+            alone = rd.simulate(runs.setup, q0=q0[i], v0=[0.0, 0.0])
+            assert runs.outcome(i).ending == alone.outcome.ending == "finished" and back.outcome(i) == runs.outcome(i)
+            assert runs.outcome(i).advice == alone.outcome.advice
+            assert runs.ended[i] == pytest.approx(alone.outcome.t, abs=1e-12)
+            before = runs.t < runs.ended[i] if runs.ended[i] < 0.3 else runs.t <= 0.3
+            np.testing.assert_allclose(runs.q[i, before], alone.q[: before.sum()], rtol=0, atol=1e-11)
+            assert np.isnan(runs.q[i, ~before]).all()
+        assert "'down'" in runs.outcome(0).advice and not runs.outcome(2).advice
+        assert "; 0 diverged, 0 stopped, 2 ended by an event" in runs.summary
+
+
+def test_payloads_come_and_go_in_a_batch_as_they_do_alone() -> None:
+    """By RK4, which ends steps there: to rounding, gravity swept."""
+    body = rd.CarriedPayload(rd.Payload(ARM_TIP, 0.7), 0.05, 0.12)
+    setup = rd.Setup(rd.Plant(ARM, [body]), Q, V, 0.2, integrator="rk4", record_period_s=0.01, estimate_error=False)
+    g = np.array([[0.0, 0.0, -9.8], [1.0, 0.0, -1.6]])
+    runs = rd.rollouts(setup, params={"gravity": g}, record=EVERYTHING)
+    for i in range(2):
+        alone = rd.simulate(setup, plant=rd.Plant(ARM.with_(gravity=tuple(g[i])), [body]))
+        np.testing.assert_allclose(runs.q[i], alone.q, rtol=0, atol=1e-12)
+        for name, work in alone.ledger.work.items():
+            np.testing.assert_allclose(runs.work[name][i], work, rtol=0, atol=1e-10)
+
+
+def test_a_heavy_arm_gains_no_energy_where_it_starts() -> None:
+    """An arm of tons at 6e4 J: its potential at the start is no gain, in lock step as in simulate."""
+    heavy = ARM.with_(mass_scale=2000.0)
+    setup = rd.Setup(rd.Plant(heavy), [1.5, 0.2], duration_s=0.2, integrator="rk4", estimate_error=False)
+    runs = rd.rollouts(setup, record=EVERYTHING)
+    assert runs.potential[0, 0] > 1e4 and not runs.diverged.any()
+    assert runs.outcome(0) == rd.simulate(setup).outcome
+
+
+@pytest.mark.parametrize("effects", [PLANT.effects[:2], PLANT.effects])
+def test_an_interrupt_ends_the_batch_and_keeps_what_there_is(effects, monkeypatch) -> None:
+    """Also of runs that were to be made again: theirs are kept up to the step in which they may pass a threshold."""
+
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    short = replace(SETUP, plant=rd.Plant(ARM, effects))
+    setup = replace(short, duration_s=100.0, record_period_s=10.0)
+    rd.rollouts(short, starts(1))  # compiled before
+    wait, calls = pool.wait, []
+
+    def once(*args, **options):
+        calls.append(1)
+        return interrupted() if len(calls) == 1 else wait(*args, **options)
+
+    monkeypatch.setattr(pool, "wait", once)
+    runs = rd.rollouts(setup, starts(200), threads=2)
+    assert runs.stopped.any() and not runs.diverged.any()
+    i = int(np.flatnonzero(runs.stopped)[-1])
+    assert runs.outcome(i).ending == "stopped" and runs.ended[i] < 100.0
+    assert runs.t[-1] < 100.0 or np.isnan(runs.q[i, runs.t > runs.ended[i]]).all()
+    assert len(effects) == 3 or runs.t[-1] < 100.0
+    assert f"{runs.stopped.sum()} stopped by an interrupt, the first at t = " in runs.summary
+
+
+def test_a_run_that_was_not_begun_has_its_start(monkeypatch) -> None:
+    """An interrupt before the first of runs that are made one after the other: each is a trajectory of one sample."""
+    wait, calls = pool.wait, []
+
+    def once(*args, **options):
+        calls.append(1)
+        if len(calls) == 1:
+            raise KeyboardInterrupt
+        return wait(*args, **options)
+
+    setup = replace(SETUP, integrator=rd.method("DOP853"), step_s=None)
+    rd.rollouts(setup, starts(1))  # compiled before
+    monkeypatch.setattr(pool, "wait", once)
+    runs = rd.rollouts(setup, starts(200), record=EVERYTHING, threads=2)
+    idle = np.flatnonzero(runs.stopped & (runs.ended == 0.0))
+    assert len(idle)
+    run = runs[int(idle[-1])]
+    np.testing.assert_array_equal(run.q, starts(200)[idle[-1:]])
+    assert run.summary.startswith("stopped at t = 0 s, 1 samples; interrupted")
+
+
+def test_params_are_held_to_what_their_effect_takes() -> None:
+    """A coefficient that the effect itself refuses, or one of two effects alike, is refused before anything runs."""
+    with pytest.raises(rd.RobotDynError, match="velocity_scale"):
+        rd.rollouts(SETUP, starts(2), params={"regularised_coulomb_friction.velocity_scale": np.zeros(2)})
+    two = replace(SETUP, plant=rd.Plant(ARM, [rd.ViscousFriction(0.3), rd.ViscousFriction(0.1)]))
+    with pytest.raises(QueryError, match=r"several effects of the plant; give 'viscous_friction 1\.damping' and 'visc"):
+        rd.rollouts(two, starts(2), params={"viscous_friction.damping": np.ones(2)})
+    for params in ([1], {3: np.ones(2)}):
+        with pytest.raises(QueryError, match="params must give values by name"):
+            rd.rollouts(SETUP, starts(2), params=params)

@@ -1,0 +1,262 @@
+"""Run files: what is written is read back whole, or refused."""
+
+from __future__ import annotations
+
+import csv
+import functools
+import json
+import os
+import tracemalloc
+import zipfile
+from dataclasses import fields, is_dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import robot_dyn as rd
+from robot_dyn.scene.starters import starter
+from robot_dyn.simulation.results import archive
+from robot_dyn.simulation.results.run_file import RunFileError
+from robot_dyn.simulation.run.outcome import Ending, Outcome
+from robot_dyn.simulation.table import export_csv
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    path = tmp_path_factory.mktemp("scene") / "scene.toml"
+    path.write_text(starter("cart_pole").replace("4.0", "0.2", 1), encoding="utf-8")
+    return rd.simulate(rd.read_scene(path))
+
+
+def assert_same(after, before) -> None:
+    """The same values in every field, mapping and array, to the bit, NaN included."""
+    assert type(after) is type(before)
+    if is_dataclass(before):
+        for field in fields(before):
+            assert_same(getattr(after, field.name), getattr(before, field.name))
+    elif isinstance(before, dict):
+        assert list(after) == list(before)
+        for key, value in before.items():
+            assert_same(after[key], value)
+    elif isinstance(before, np.ndarray):
+        assert after.dtype == before.dtype
+        np.testing.assert_array_equal(after, before)
+    else:
+        assert after == before
+
+
+def test_a_run_comes_back_as_it_was(run, tmp_path) -> None:
+    """Every array to the bit, every text."""
+    back = rd.load_run(rd.save_run(run, tmp_path / "run"))
+    assert_same(replace(back, about=back.about | {"source": run.about["source"]}), run)
+    assert back.summary == run.summary
+
+
+def test_a_run_file_needs_nothing_else(run, tmp_path) -> None:
+    """The URDF, the edits, the scene and the versions travel with the numbers."""
+    about = rd.load_run(rd.save_run(run, tmp_path / "run.npz")).about
+    assert "<robot" in about["urdf"]
+    assert 'kind = "spring"' in about["scene"]
+    assert "pin 4" in about["versions"]
+    assert "gravity" in about["edits"]
+
+
+@pytest.mark.parametrize("keep", [0.0, 0.3, 0.99])
+def test_a_truncated_file_is_refused(run, tmp_path, keep: float) -> None:
+    path = rd.save_run(run, tmp_path / "run.npz")
+    whole = path.read_bytes()
+    path.write_bytes(whole[: int(keep * len(whole))])
+    with pytest.raises(RunFileError, match="is not a complete run file"):
+        rd.load_run(path)
+
+
+def test_other_files_are_refused(tmp_path) -> None:
+    with pytest.raises(RunFileError, match="no such file"):
+        rd.load_run(tmp_path / "none.npz")
+    np.savez(tmp_path / "other.npz", x=np.ones(3))
+    with pytest.raises(RunFileError, match="is not a complete run file"):
+        rd.load_run(tmp_path / "other.npz")
+    (tmp_path / "text.npz").write_text("hello")
+    with pytest.raises(RunFileError, match="is not a complete run file"):
+        rd.load_run(tmp_path / "text.npz")
+
+
+def test_a_table_has_names_units_and_all_samples(run, tmp_path) -> None:
+    rows = list(csv.reader(export_csv(run, tmp_path / "run.csv").read_text(encoding="utf-8").splitlines()))
+    assert rows[0][:2] == ["t [s]", "q slide [m]"]
+    assert len(rows) == 1 + len(run.t)
+    assert [float(row[0]) for row in rows[1:]] == run.t.tolist()
+    assert [float(row[2]) for row in rows[1:]] == run.q[:, 1].tolist()
+
+
+def test_a_damaged_file_is_refused_or_whole(run, tmp_path) -> None:
+    """Any byte may be wrong: the file is refused, or what is read is what was written."""
+    path = rd.save_run(run, tmp_path / "run.npz")
+    whole = path.read_bytes()
+    for i in range(0, len(whole), max(1, len(whole) // 300)):
+        path.write_bytes(whole[:i] + bytes([whole[i] ^ 0xFF]) + whole[i + 1 :])
+        try:
+            back = rd.load_run(path)
+        except RunFileError:
+            continue
+        assert np.array_equal(back.q, run.q)
+
+
+def test_a_folder_is_no_target(run, tmp_path) -> None:
+    with pytest.raises(RunFileError, match="is a folder"):
+        rd.save_run(run, tmp_path)
+
+
+def resaved(run, path, *, digest: bool = True, **changes):
+    """A run file with members changed, or left out if None; the digest is that of what it holds, or of the run."""
+    with np.load(rd.save_run(run, path)) as file:
+        arrays = dict(file)
+    for name, change in changes.items():
+        x = change(arrays.get(name, np.zeros(0)))
+        arrays = {key: y for key, y in (arrays | {name: x}).items() if y is not None}
+    if digest:
+        del arrays["sha256"]
+        with path.open("wb") as stream:
+            archive.write(stream, arrays)
+    else:
+        np.savez(path, **arrays)
+    return path
+
+
+def said(text: np.ndarray, **changes) -> np.ndarray:
+    """The text of a run file with other entries; paths are separated by two underscores."""
+    about = json.loads(str(text))
+    for path, value in changes.items():
+        *tables, key = path.split("__")
+        functools.reduce(dict.__getitem__, tables, about)[key] = value
+    return np.array(json.dumps(about))
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "message"),
+    [
+        ("t", lambda t: t[:5], r"member '\w+' holds float64 .*m = 5"),
+        ("t", lambda t: t[::-1].copy(), "the times of member 't'"),
+        ("t", lambda t: np.where(t > 0.1, np.nan, t), "member 't' .*nan"),
+        ("t", lambda _: None, "'t' is missing"),
+        ("q", lambda q: q[:, :1], "member 'q' holds"),
+        ("q", lambda q: q.astype(complex), "member 'q' is not an array"),
+        ("q", lambda q: q.astype(str), "member 'q' holds str"),
+        ("q", lambda q: q.astype(np.float32), "member 'q' holds float32"),
+        ("q", lambda q: np.where(q > 0, np.inf, q), "member 'q' of a run that did not diverge holds nan or inf"),
+        ("ledger/kinetic", lambda K: K[:5], "member 'ledger/kinetic' holds"),
+        ("power/control", lambda _: None, "have different names"),
+        ("desired", lambda _: np.zeros(3), "member 'desired' holds"),
+        ("deviation", lambda _: np.zeros((2, 2)), "member 'deviation' holds"),
+        ("at_stop", lambda _: np.zeros((10, 2), bool), "member 'at_stop' holds"),
+        ("wrenches/tip", lambda _: np.full((3, 7), np.nan), "member 'wrenches/tip' .*nan"),
+        ("wrenches/tip", lambda _: np.zeros((3, 6)), "member 'wrenches/tip' holds"),
+        ("novelty", lambda _: np.zeros(3), "'novelty' is not known to this version"),
+        ("error/error", lambda _: None, "'error/error' is missing"),
+        ("deviation", lambda _: np.zeros((21, 2)), "member 'deviation' of joints needs 'desired'"),
+        ("t", lambda t: 1e300 * t, "the times of member 't' are not those of a run"),
+        ("t", lambda t: t - 1.0, "the times of member 't' are not those of a run"),
+        ("error/t", lambda t: 1e308 + 0 * t, "the times of member 'error/t' are not those of a run"),
+        ("wrenches/tip", lambda _: np.zeros((0, 7)), "the times of member 'wrenches/tip' are not those of a run"),
+        ("about", lambda _: None, "'about' is missing"),
+        ("about", lambda text: np.array("[" * 100_000), "'about' is not the JSON"),
+        ("about", lambda text: np.array([str(text)]), "'about' holds .*not one text"),
+        ("about", lambda text: said(text, format=3), "it has format 3, this version reads 4; simulate again"),
+        ("about", lambda text: said(text, format="3"), "it has format '3'"),
+        ("about", lambda text: said(text, format={"a": 3}), "it has format {'a': 3}"),
+        ("wanted", lambda _: np.zeros((21, 2)), "'wanted' is not known to this version"),
+        ("about", lambda text: said(text, novelty=3), "'novelty' is not known to this version"),
+        ("about", lambda text: said(text, about__urdf=3), "'about/urdf' holds 3, not str"),
+        ("about", lambda text: said(text, about__urdf="\ud800"), "'about/urdf' holds half a character"),
+        ("about", lambda text: said(text, joint_names="ab"), "member 'q' holds"),
+        ("about", lambda text: said(text, joint_names=[1, 2]), "'joint_names/0' holds 1, not str"),
+        (
+            "about",
+            lambda text: said(text, outcome__ending="done"),
+            "'outcome/ending' holds 'done', not finished or diverged",
+        ),
+        ("about", lambda text: said(text, outcome__t=float("nan")), "'outcome/t' holds nan, not a time"),
+        ("about", lambda text: said(text, outcome=None), "'outcome' holds None, not a table"),
+        ("about", lambda text: said(text, statistics__steps=1.5), "'statistics/steps' holds 1.5, not int"),
+        ("about", lambda text: said(text, statistics__wall_s=10**400), "'statistics/wall_s' holds 1"),
+        ("about", lambda text: said(text, statistics__wall_s=True), "'statistics/wall_s' holds True, not float"),
+    ],
+)
+def test_members_that_do_not_fit_together_are_refused_by_name(run, tmp_path, name: str, change, message: str) -> None:
+    """Also where the digest is right: it finds damage, not a program that writes nonsense."""
+    path = resaved(run, tmp_path / "run.npz", **{name: change})
+    with pytest.raises(RunFileError, match=f"is not a complete run file: .*{message}"):
+        rd.load_run(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("q", lambda q: q[:, ::-1].copy()),
+        ("t", lambda t: t * 2),
+        ("u", lambda u: u + 1e-300),
+        ("about", lambda text: said(text, statistics__steps=7)),
+        ("at_stop", lambda _: np.zeros((21, 2), bool)),
+    ],
+)
+def test_a_changed_member_that_fits_is_told_by_the_digest(run, tmp_path, name: str, change) -> None:
+    path = resaved(run, tmp_path / "run.npz", digest=False, **{name: change})
+    with pytest.raises(RunFileError, match="SHA-256 is not that of its contents"):
+        rd.load_run(path)
+
+
+def test_exchanged_members_are_told_by_the_digest(run, tmp_path) -> None:
+    path = resaved(run, tmp_path / "run.npz", digest=False, q=lambda _: run.v, v=lambda _: run.q)
+    with pytest.raises(RunFileError, match="SHA-256 is not that of its contents"):
+        rd.load_run(path)
+
+
+def test_a_run_that_diverged_keeps_its_nans(run, tmp_path) -> None:
+    """What a diverged run ends with may be anything; so a run that NumPy wrote again by itself still loads."""
+    end = replace(run, outcome=Outcome(Ending.DIVERGED, 0.2, "smaller step"), q=np.where(run.q > 0, np.nan, run.q))
+    path = rd.save_run(end, tmp_path / "run.npz")
+    np.testing.assert_array_equal(rd.load_run(path).q, end.q)
+    with np.load(path) as file:
+        np.savez(tmp_path / "again.npz", **dict(file))
+    np.testing.assert_array_equal(rd.load_run(tmp_path / "again.npz").q, end.q)
+
+
+@pytest.mark.parametrize("change", [{"q": np.zeros(3)}, {"power": {}}, {"joint_names": ("a", "\ud800")}, {"t": [0.0]}])
+def test_what_would_not_be_read_is_not_written(run, tmp_path, change) -> None:
+    with pytest.raises(RunFileError, match="cannot be written"):
+        rd.save_run(replace(run, **change), tmp_path / "run.npz")
+    with pytest.raises(RunFileError, match=r"takes the Trajectory of rd\.simulate, got dict"):
+        rd.save_run({}, tmp_path / "run.npz")  # type: ignore[arg-type]
+    assert not list(tmp_path.iterdir())
+
+
+def test_sizes_are_known_before_anything_is_inflated(run, tmp_path) -> None:
+    """8 GiB of zeros are 8 MiB in a file; a member that says less than it holds is read no further than it says."""
+    path = rd.save_run(run, tmp_path / "run.npz")
+    with pytest.raises(RunFileError, match=r"holds .* GiB, more than .* raise max_bytes"):
+        rd.load_run(path, max_bytes=1000)
+    data = np.lib.format.header_data_from_array_1_0(np.zeros(0)) | {"shape": (2**20 // 8,)}
+    with zipfile.ZipFile(path, "a", zipfile.ZIP_DEFLATED) as file, file.open("power/bomb.npy", "w") as member:
+        np.lib.format.write_array_header_1_0(member, data)
+        for _ in range(64):
+            member.write(bytes(2**20))
+    tracemalloc.start()
+    with pytest.raises(RunFileError, match="'power/bomb' is not an array"):
+        rd.load_run(path)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 8 * 2**20
+
+
+@pytest.mark.parametrize("kind", ["folder", "pipe", "/dev/zero", "/dev/null"])
+def test_only_regular_files_are_read(tmp_path, kind: str) -> None:
+    path = tmp_path / "run.npz"
+    if kind == "folder":
+        path.mkdir()
+    elif kind == "pipe":
+        os.mkfifo(path)
+    else:
+        path = Path(kind)
+    with pytest.raises(RunFileError, match="is a folder" if kind == "folder" else "is not a regular file"):
+        rd.load_run(path)

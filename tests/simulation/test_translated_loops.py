@@ -1,0 +1,306 @@
+"""Loops and steppers as machine code are the plain functions, bit for bit: the same rates, called by either."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+import robot_dyn as rd
+from robot_dyn.arithmetic import FLOAT64
+from robot_dyn.codegen.loops.call import MachineFunction
+from robot_dyn.codegen.loops.source import SubsetError
+from robot_dyn.codegen.primitives import INSTEAD
+from robot_dyn.errors import MachineCodeError
+from robot_dyn.integrate.adaptive import ADAPTIVE
+from robot_dyn.integrate.integrator import PlainMethod, Stepper
+from robot_dyn.integrate.methods import FIXED_STEP, method
+from robot_dyn.integrate.primitives import evaluate
+from robot_dyn.simulation.compiled.choice import choose
+from robot_dyn.simulation.compiled.making import machine
+from robot_dyn.simulation.dynamics.loop_state import Ended, Now
+from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.observation.levels import levels
+from robot_dyn.simulation.observation.observation import observation_of
+from robot_dyn.simulation.run.fixed_step import rules_of, runs_of, samples_at_most
+from robot_dyn.simulation.run.prepared import prepared
+from robot_dyn.simulation.run.time_loop import Records, time_loop
+from robot_dyn.simulation.setup.plan import plan_of
+from robot_dyn.simulation.setup.setup import Setup
+from tests.estimates.scenes import arms
+from tests.long import long
+
+ARM = rd.load("planar_2r")
+PLAIN = [name for name in FIXED_STEP if method(name).plain]
+Q0, V0 = np.array([0.31, -0.73]), np.array([0.9, -1.7])
+SAMPLED = rd.Loop(
+    rd.PD(rd.hold([0.4, -0.2]), [9.0, 5.0], [0.7, 0.4], 0.03), actuation=rd.Noise(0.2), actuation_delay=0.5
+)  # fmt: skip
+CONTINUOUS = rd.PD(rd.hold([0.4, -0.2]), [9.0, 5.0], [0.7, 0.4])
+SMOOTH = [rd.ViscousFriction([0.3, 0.2]), rd.RegularisedCoulombFriction([0.2, 0.1], 0.05)]
+BOUNDED = [*rd.joint_stops([-0.5, -0.9], [0.6, 0.8], 900.0, 4.0), rd.ViscousFriction([0.1, 0.2])]
+BODY = rd.CarriedPayload(rd.Payload("tip", 0.3, (0.1, 0.0, 0.05)), 0.2, 0.4)
+
+
+def numbers(value: Any, name: str = "") -> Iterator[tuple[str, np.ndarray]]:
+    """All arrays in nested named tuples."""
+    if isinstance(value, np.ndarray):
+        yield name, value
+    elif isinstance(value, tuple):
+        for i, each in enumerate(value):
+            yield from numbers(each, f"{name}.{getattr(value, '_fields', range(99))[i]}")
+
+
+def assert_same_bits(ours: Any, theirs: Any, without: tuple[str, ...] = ()) -> None:
+    """Every array, signs of zeros included; a nan is a nan."""
+    for (name, x), (_, y) in zip(numbers(ours), numbers(theirs), strict=True):
+        if name not in without:
+            np.testing.assert_array_equal(x, y, err_msg=name, strict=True)
+            if x.dtype == float:
+                here = ~np.isnan(x)
+                np.testing.assert_array_equal(np.signbit(x[here]), np.signbit(y[here]), err_msg=name)
+
+
+def both(setup: Setup) -> tuple[Any, Any]:
+    """A run by machine code, and by Python with the same rates of machine code."""
+    equation = StateEquation(setup.plant, setup.controller, False, setup.events)
+    code, _ = choose(setup, equation)
+    assert code is not None
+    runs = [prepared(setup, equation, each) for each in (code, replace(code, loop=None))]
+    for each in runs:
+        room = each.runs._replace(y=0, own=0, alive=0, scale=0, energy=0, keys=0), each.stepper.work
+        for _, x in numbers(room):  # what is not written yet
+            x[...] = 0
+        each.record()
+    return runs[0], runs[1]
+
+
+def setup(what: list[Any], name: Any, **options: Any) -> Setup:
+    """A run that keeps no estimate."""
+    options = {"duration_s": 0.6, "record_period_s": 0.02, **options}
+    return Setup(rd.Plant(ARM, what), Q0, V0, integrator=name, engine="compiled", estimate_error=False, **options)
+
+
+@pytest.mark.parametrize("sampled", [*long([False]), True], ids=["continuous", "sampled"])
+@pytest.mark.parametrize("name", PLAIN)
+def test_a_fixed_step_gives_the_same_bits(name: str, sampled: bool) -> None:
+    """Each array after 300 steps: samples, ticks with noise and delay, a payload, states of the stepper."""
+    more = {"controller": SAMPLED} if sampled else {}
+    of = method(name)
+    effects = SMOOTH if of.canonical or of.nonsmooth else [*SMOOTH, BODY]
+    ours, theirs = both(setup(effects, name, step_s=0.002, **more))
+    assert ours.time == theirs.time == 0.6
+    assert_same_bits((ours.runs, ours.stepper.work), (theirs.runs, theirs.stepper.work))
+    rows = int(ours.now[Now.ROW])
+    kept = [1, 2, 4] if of.nonsmooth else [1, 2, 3, 4]  # its rates at samples are found afterwards
+    for mine, other in ((ours.records[i], theirs.records[i]) for i in kept):
+        assert_same_bits(mine[:rows], other[:rows])
+
+
+REST = [*product([ADAPTIVE[1], "gauss_4", "rosenbrock_5"], [False, True]), (ADAPTIVE[0], False), ("rk4", True)]
+
+
+@pytest.mark.parametrize(("name", "sampled"), [(ADAPTIVE[0], True), ("rk4", False), *long(REST)])
+def test_a_run_with_events_gives_the_same_bits(name: str, sampled: bool) -> None:
+    """Stops met and left many times, samples between steps, events of the user's own."""
+    more: dict[str, Any] = {"controller": SAMPLED} if sampled else {}
+    events = [rd.Event(lambda t, q, v: q[0] - 0.2, name="level")]
+    ours, theirs = both(setup(BOUNDED, name, duration_s=3.0, events=events, **more))
+    assert len(ours.events) == len(theirs.events) > 3
+    assert_same_bits((ours.runs, ours.stepper.work, ours.control), (theirs.runs, theirs.stepper.work, theirs.control))
+    assert_same_bits(ours.switches._replace(functions=0), theirs.switches._replace(functions=0))
+    rows = int(ours.now[Now.ROW])
+    assert_same_bits(*(tuple(x[:rows] for x in each.kept[:3]) for each in (ours, theirs)))
+
+
+def test_modes_of_dry_friction_and_rigid_stops_give_the_same_bits() -> None:
+    """Sticking, sliding, impacts: the right-hand side changes at each."""
+    effects = [rd.DryFriction([0.4, 0.2]), rd.RigidStops([-0.8, -1.2], [0.7, 1.0], 0.5)]
+    ours, theirs = both(setup(effects, "DOP853", duration_s=2.0))
+    assert len(ours.events) == len(theirs.events) > 5
+    assert_same_bits((ours.runs, ours.stepper.work, ours.control), (theirs.runs, theirs.stepper.work, theirs.control))
+
+
+HELD = [rd.DryFriction([0.4, 0.2], [0.7, 0.3]), rd.RigidStops([-0.8, -1.2], [0.7, 1.0], [0.5, 0.8])]
+GEAR = [rd.RigidBacklash([0.02, 0.0], 0.003, 8.0, 0.4), *HELD]
+SOFT = [*HELD, *rd.joint_stops([-0.75, -9.0], [0.6, 9.0], 900.0, 4.0), BODY]
+
+
+@pytest.mark.parametrize(
+    ("name", "what", "controller"),
+    [
+        ("DOP853", GEAR, CONTINUOUS),
+        ("DOP853", SOFT, SAMPLED),
+        ("rk4", GEAR, SAMPLED),
+        ("rosenbrock_5", HELD, CONTINUOUS),
+    ],
+    ids=["a gear", "soft stops and a payload", "a gear, sampled", "stiff"],
+)
+def test_all_that_ends_a_mode_gives_the_same_bits(name: str, what: list[Any], controller: rd.Controller) -> None:
+    """Impacts and the bounces behind them, jumps over thresholds of other effects, a payload, and the events told."""
+    events = [rd.Event(lambda t, q, v: v[0] - 0.3, name="speed")]
+    ours, theirs = both(setup(what, name, duration_s=1.0, controller=controller, events=events))
+    assert ours.events == theirs.events
+    assert sum("strikes" in each.name for each in ours.events) > 2
+    assert_same_bits((ours.runs, ours.stepper.work, ours.control), (theirs.runs, theirs.stepper.work, theirs.control))
+    assert_same_bits(ours.switches._replace(functions=0), theirs.switches._replace(functions=0))
+    assert_same_bits(
+        ours.switching.modes.holding, theirs.switching.modes.holding, (".log.rows",)
+    )  # since the last return
+
+
+def test_a_loop_is_compiled_once_for_arms_of_any_number_of_joints() -> None:
+    """One joint or two, one threshold or four: no array has a type of its own."""
+    made = [setup([*HELD, *rd.joint_stops([-0.5, -0.9], [0.6, 0.8], 900.0)], "rk4", step_s=0.01)]
+    rail = rd.Plant(arms()["rail"], [rd.RigidStops(0.0, 5.0), *rd.joint_stops([0.1], [9.0], 900.0)])
+    made.append(replace(made[0], plant=rail, q0=[0.3], v0=[0.0]))
+    loops = []
+    for each in made:
+        equation = StateEquation(each.plant, None)
+        code, _ = choose(each, equation)
+        assert code is not None
+        prepared(each, equation, code).record()
+        loops.append((code.loop, {id(entry) for entry in code.loop._known.values()}))
+    assert loops[0] == loops[1]
+
+
+def test_the_end_of_a_mode_is_no_end_of_a_call_of_machine_code() -> None:
+    """Hundreds of impacts, of sticking and of sliding: the loop returns for progress and for room alone."""
+    made = setup(HELD, "DOP853", duration_s=6.0, controller=rd.PD(rd.hold([1.4, -1.9]), [60.0, 30.0], [0.1, 0.1]))
+    equation = StateEquation(made.plant, made.controller)
+    run, calls = prepared(made, equation, choose(made, equation)[0]), []
+    inner = run.advance
+    run.advance = lambda *given: calls.append(inner(*given)) or calls[-1]
+    events = len(run.record().events)
+    assert events > 100
+    assert len(calls) <= 4 + events // 20
+    assert set(calls) <= {Ended.PAUSED, Ended.DONE}
+
+
+@pytest.mark.parametrize(
+    ("name", "controller"),
+    [("rk4", CONTINUOUS), ("gauss_4", SAMPLED), *long((name, SAMPLED) for name in PLAIN if name != "gauss_4")],
+)
+def test_lanes_in_lock_step_give_the_same_bits(name: str, controller: rd.Controller) -> None:
+    """64 runs, of which some diverge, with ticks or with instants at every third step, and samples; 100 steps."""
+    W, of = 64, method(name)
+    made = setup(SMOOTH, name, duration_s=0.2, step_s=0.002, controller=controller)
+    equation = StateEquation(made.plant, made.controller, of.canonical)
+    equation = equation if of.nonsmooth else equation.in_a_mode
+    code = machine(equation, of, lanes=W, kept=("u", "energy"), jacobian=of.needs_jacobian, nonsmooth=of.nonsmooth)
+    n, m, plan = 2, equation.size, plan_of(made)
+    rng = np.random.default_rng(3)
+    starts = np.stack([equation.start(q, v) for q, v in rng.normal(size=(W, 2, 2))]).T
+    starts[n, 5] = 1e200  # overflows at once
+    of_levels = levels(made.plant.dynamics, made.plant.effects, made.controller, W)
+    rules = rules_of(equation, False, 1e100, apart=0 if equation.sampled else 3)
+    results = []
+    for interpreted in (False, True):
+        runs = runs_of(equation, starts, code.own({}), n + 2, np.arange(W))
+        stepper = of.stepper(FLOAT64, m, n, m, W)
+        for _, x in numbers((stepper.work, runs.made, runs.command, runs.u, runs.energies, runs.size)):
+            x[...] = 0
+        rows = samples_at_most(made, plan.counts)
+        records = Records(
+            np.arange(m), np.zeros((rows, 2), np.int64), np.zeros((rows, m, W)), np.zeros((rows, n + 2, W)),
+            np.empty((0, m + 2)), np.empty((1 + 3 * n, 0)),
+            observation_of(np.vstack([starts[: 2 * n], np.full((n, W), np.nan)]), of_levels),
+        )  # fmt: skip
+        now, clock = np.zeros(len(Now), np.int64), np.array([0.0, 0.02, 1e-12])
+        now[Now.BUDGET] = 10**6
+        advance: Any = time_loop(stepper.step) if interpreted else code.advance()
+        functions = code.in_python if interpreted else code.equations.functions
+        with np.errstate(all="ignore"):
+            ended = advance(
+                functions, plan, runs, records, rules, stepper.coefficients, stepper.work, now, clock,
+                np.zeros(1, np.int64),
+            )  # fmt: skip
+        assert ended == Ended.DONE
+        results.append((runs, records, now, clock, stepper.work))
+    assert results[0][0].why[5] != 0
+    assert_same_bits(results[0], results[1])
+
+
+def test_the_loops_are_translated_as_they_stand() -> None:
+    """No loop has a text of its own for machine code."""
+    of = method("rk4").stepper(FLOAT64, 2, 1, 2)
+    assert MachineFunction(time_loop(of.step), INSTEAD, lambda: None, "").function.__name__ == "advance"
+
+
+class Weights(NamedTuple):
+    half: float
+
+
+class Work(NamedTuple):
+    K: np.ndarray
+
+
+def heun(f, c, t, h, y, p, own, after, work, lost):
+    """A step of the subset, over entries."""
+    evaluate(f.rate, t, y, p, own, work.K[0])
+    for e in range(len(y)):
+        for b in range(y.shape[1]):
+            after[e, b] = y[e, b] + h * work.K[0, e, b]
+    evaluate(f.rate, t + h, after, p, own, work.K[1])
+    for e in range(len(y)):
+        for b in range(y.shape[1]):
+            after[e, b] = y[e, b] + c.half * h * (work.K[0, e, b] + work.K[1, e, b])
+    return 2
+
+
+def heun_by_arrays(f, c, t, h, y, p, own, after, work, lost):
+    """The same as NumPy has it, which is outside the subset."""
+    evaluate(f.rate, t, y, p, own, work.K[0])
+    after[...] = y + h * work.K[0, : len(y)]
+    evaluate(f.rate, t + h, after, p, own, work.K[1])
+    after[...] = y + (work.K[0, : len(y)] + work.K[1, : len(y)]) * (c.half * h)
+    return 2
+
+
+def heun_that_errs(f, c, t, h, y, p, own, after, work, lost):
+    """It takes one entry too many."""
+    evaluate(f.rate, t, y, p, own, work.K[0])
+    for e in range(len(y) + 1):
+        after[e, 0] = y[e, 0] + h * work.K[0, e, 0]
+    return 1
+
+
+@dataclass(frozen=True)
+class Heun(PlainMethod):
+    of: Any
+    name = "heun"
+    order = 2
+    evaluations_per_step = 2
+
+    def stepper(self, kind, m, n, rows, runs=1, widths=None):
+        return Stepper(self.of, Weights(0.5), Work(np.zeros((2, rows, runs), kind.dtype)))
+
+
+def test_a_step_of_the_users_own_is_machine_code_or_the_summary_says_why_not() -> None:
+    """Both take the compiled equation; a step in arrays runs in Python, and says the line and what to write."""
+    options: dict[str, Any] = {"engine": "compiled", "step_s": 2e-3, "duration_s": 0.4, "estimate_error": False}
+    made = [rd.simulate(rd.Plant(ARM, SMOOTH), Q0, V0, integrator=Heun(of), **options) for of in (heun, heun_by_arrays)]
+    np.testing.assert_allclose(made[0].q, made[1].q, rtol=0, atol=1e-13)  # rounding of another order
+    assert made[0].statistics.engine == "compiled"
+    said = made[1].statistics.engine
+    line = heun_by_arrays.__code__.co_firstlineno + 3
+    assert "the equation of motion; steps in Python" in said
+    assert f"line {line}, in heun_by_arrays: an operation on what is not a number is not translated; write it" in said
+    assert said in made[1].summary
+    with pytest.raises(SubsetError, match=f"line {line}, in heun_by_arrays"):
+        rd.rollouts(
+            rd.Plant(ARM, SMOOTH), [Q0] * 3, [V0] * 3, integrator=Heun(heun_by_arrays), step_s=2e-3, duration_s=0.1
+        )
+
+
+def test_a_step_that_errs_ends_the_run_with_its_line() -> None:
+    """Not as a run that diverged."""
+    with pytest.raises(MachineCodeError, match=r"heun_that_errs, line \d+: an index is out of range"):
+        rd.simulate(
+            rd.Plant(ARM, SMOOTH), Q0, V0, integrator=Heun(heun_that_errs), engine="compiled", step_s=2e-3,
+            duration_s=0.4, estimate_error=False,
+        )  # fmt: skip

@@ -1,0 +1,361 @@
+"""A second call of one setup computes what depends on the run alone; what waits until it is read is what it would be.
+
+Nothing is kept of parts that may change between two calls, and nothing of their runs waits.
+"""
+
+from __future__ import annotations
+
+import gc
+import pickle
+import sys
+from collections import Counter
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from copy import copy, deepcopy
+from dataclasses import dataclass, fields, is_dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import robot_dyn as rd
+from robot_dyn.simulation.compiled.machine import Machine
+from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.observation.remarks import Kind
+from robot_dyn.simulation.results.trajectory import Trajectory
+from robot_dyn.simulation.run.outcome import Ending
+
+ARM = rd.load("planar_2r")
+Q, V = np.array([0.3, -0.4]), np.array([0.5, -0.2])
+PLAN = rd.quintic(Q, Q + 0.4, 0.2)
+NAMES = [each.name for each in fields(Trajectory)]
+WITHOUT_TIMES = [name for name in NAMES if name != "statistics"]
+
+
+@cache
+def setups() -> dict[str, rd.Setup]:
+    """Setups of values: levels that are passed, ticks, thresholds, states, what comes and goes, an open ledger."""
+    plant = rd.Plant(ARM, [rd.ViscousFriction(0.3), rd.EffortLimit([4.0, 2.0])])
+    sampled = rd.PD(PLAN, [60.0, 30.0], [6.0, 3.0], period_s=0.01)
+    stops = rd.joint_stops([-0.5, -0.5], [0.5, 0.5], 2e3, 0.1)
+    held = [rd.DryFriction([1.5, 0.5]), rd.RigidStops(-0.6, 0.6)]
+    tool = rd.CarriedPayload(rd.Payload("tip", 0.5), 0.05, 0.12)
+    pid = rd.PID(PLAN, 60.0, 20.0, 6.0)
+    compiled: dict[str, Any] = {"engine": "compiled", "duration_s": 0.2}
+    short: dict[str, Any] = {
+        "engine": "interpreted",
+        "duration_s": 0.2,
+        "integrator": "DOP853",
+        "record_period_s": 0.02,
+    }
+    return {
+        "free swing": rd.Setup(rd.Plant(ARM), Q, V, integrator="DOP853", **compiled),
+        "computed torque": rd.Setup(
+            plant, Q, V, controller=rd.ComputedTorque(ARM, PLAN, 90.0, 15.0), **compiled, about={"author": "me"}
+        ),
+        "sampled, rk4": rd.Setup(plant, Q, V, controller=sampled, integrator="rk4", **compiled),
+        "steps too long": rd.Setup(
+            rd.Plant(ARM), Q, 10 * V, 1.0, integrator="rk4", step_s=0.05, engine="interpreted"
+        ),
+        "stops": rd.Setup(rd.Plant(ARM, [*stops, rd.Spring(3.0)]), Q, 10 * V, estimate_error=False, **short),
+        "held": rd.Setup(rd.Plant(ARM, held), Q, 4 * V, estimate_error=False, **short),
+        "payload": rd.Setup(rd.Plant(ARM, [tool]), Q, V, estimate_error=False, **short),
+        "pid, lag": rd.Setup(
+            rd.Plant(ARM, [rd.ActuatorLag(0.02), rd.ExternalWrench("tip", [1, 2, 3, 0, 0, 1])]), Q, V,
+            controller=pid, estimate_error=False, **short,
+        ),
+    }  # fmt: skip
+
+
+def assert_same(one: Any, other: Any) -> None:
+    """The same types and bits, all through."""
+    assert type(one) is type(other)
+    if isinstance(one, np.ndarray):
+        assert (one.dtype, one.shape) == (other.dtype, other.shape)
+        assert np.ascontiguousarray(one).tobytes() == np.ascontiguousarray(other).tobytes()
+    elif isinstance(one, dict):
+        assert list(one) == list(other)
+        for key in one:
+            assert_same(one[key], other[key])
+    elif is_dataclass(one):
+        for each in fields(one):
+            assert_same(getattr(one, each.name), getattr(other, each.name))
+    elif isinstance(one, tuple):
+        assert len(one) == len(other)
+        for pair in zip(one, other, strict=True):
+            assert_same(*pair)
+    else:
+        assert one == other or one != one
+
+
+def assert_same_run(one: Trajectory, other: Trajectory) -> None:
+    """But for what they took of the clock."""
+    for name in WITHOUT_TIMES:
+        assert_same(getattr(one, name), getattr(other, name))
+
+
+def at_once(setup: rd.Setup) -> Trajectory:
+    """Its run as it would be if a part of it might change: of that nothing is kept, and nothing waits."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(rd.Setup, "is_value", False)
+        run = rd.simulate(replace(setup))
+    assert vars(run).keys() == set(NAMES)
+    return run
+
+
+def test_the_setups_leave_something_to_read() -> None:
+    runs = {name: rd.simulate(setup) for name, setup in setups().items()}
+    kinds = {remark.kind for run in runs.values() for remark in run.remarks}
+    assert kinds >= {Kind.EFFORT_REACHED, Kind.STOP_REACHED, Kind.JUMPS}
+    assert runs["steps too long"].ledger.cause and runs["pid, lag"].wrenches and runs["stops"].at_stop is not None
+    assert all(runs[name].events for name in ("computed torque", "stops", "held", "payload"))
+
+
+def test_fields_that_were_not_read_are_listed() -> None:
+    """As `run.` and tab asks for them, and as those of a run whose fields were all computed at once."""
+    run = rd.simulate(setups()["free swing"])
+    assert "q" not in vars(run)
+    assert {*NAMES} <= {*dir(run)} and "_source" not in dir(run)
+    assert dir(run) == dir(at_once(setups()["free swing"]))
+
+
+@pytest.mark.parametrize("name", setups())
+def test_what_is_read_late_is_what_it_would_be_at_once_in_whatever_order(name: str) -> None:
+    setup = setups()[name]
+    reference, rng = at_once(setup), np.random.default_rng(3)
+    assert reference.outcome.ending is Ending.FINISHED
+    orders = [NAMES, NAMES[::-1], list(rng.permutation(NAMES))]
+    for order in orders:
+        run = rd.simulate(setup)
+        assert "remarks" not in vars(run) and "ledger" not in vars(run)
+        for field in order:
+            getattr(run, field)
+        assert_same_run(run, reference)
+        assert vars(run).keys() == set(NAMES)  # what it was read from is let go
+    assert rd.simulate(setup).summary.split("time:")[0] == reference.summary.split("time:")[0]
+
+
+@pytest.mark.parametrize("name", setups())
+def test_runs_of_one_setup_do_not_share_what_they_change(name: str) -> None:
+    setup = replace(setups()[name])  # of which nothing is kept yet
+    first = rd.simulate(setup)
+    with ThreadPoolExecutor(3) as pool:
+        for run in pool.map(lambda _: rd.simulate(setup), range(6)):
+            assert_same_run(run, first)
+
+
+def test_threads_that_read_one_run_read_the_same() -> None:
+    """What is summed up at the end, such as chatter, is so once."""
+    setup, rng = setups()["sampled, rk4"], np.random.default_rng(5)
+    reference = at_once(setup)
+    for _ in range(5):
+        run = rd.simulate(setup)
+        with ThreadPoolExecutor(4) as pool:
+            names = [name for _ in range(4) for name in rng.permutation(NAMES).tolist()]
+            read = list(pool.map(lambda name, run=run: getattr(run, name), names))
+        for name, value in zip(names, read, strict=True):
+            assert value is getattr(run, name)
+        assert_same_run(run, reference)
+
+
+@pytest.mark.parametrize("events", [(), (rd.Event(lambda t, q, v: q[0] - 0.35),)])
+def test_what_is_kept_does_not_grow_with_the_runs(events: tuple[rd.Event, ...]) -> None:
+    """Also where machine code is chosen anew for each run, as it is with events, and the mode changes in it."""
+    setup = replace(setups()["computed torque"], events=events, estimate_error=False)
+
+    def held() -> int:
+        gc.collect()
+        return sum(isinstance(each, Machine | StateEquation) for each in gc.get_objects())
+
+    for _ in range(2):
+        assert rd.simulate(setup).events
+    before = held()
+    for _ in range(4):
+        rd.simulate(setup)
+    assert held() == before
+
+
+def calls(function: Callable[[], object]) -> Counter[str]:
+    """How often each function was called, by its name; those of C together."""
+    found: Counter[str] = Counter()
+
+    def count(frame: Any, event: str, argument: Any) -> None:
+        if event in ("call", "c_call"):
+            found[frame.f_code.co_qualname if event == "call" else "C"] += 1
+
+    sys.setprofile(count)
+    try:
+        function()
+    finally:
+        sys.setprofile(None)
+    return found
+
+
+# Of Python and C: some 1000 without an estimate and 2100 with one, about a third of each in the words of arguments.
+# They were 6000 to 11 000 when a call computed anew what depends on its setup alone.
+@pytest.mark.parametrize("name, estimates, most", [
+    ("free swing", False, 1800), ("free swing", True, 3600), ("computed torque", False, 1800),
+    ("computed torque", True, 3600),
+])  # fmt: skip
+def test_a_second_call_computes_nothing_that_depends_on_the_setup_alone(name: str, estimates: bool, most: int) -> None:
+    setup = replace(setups()[name], estimate_error=estimates)
+    rd.simulate(setup)
+    found = calls(lambda: rd.simulate(setup))
+    alone = {
+        "choose", "structure", "parameters", "levels", "_plan", "cuts", "undeclared", "is_value", "Switching.at",
+        "StateEquation.energies", "rules_of", "observations_of",
+    }  # fmt: skip
+    late = {
+        "remarks",
+        "ledger",
+        "origin",
+        "Observer.close",
+        "deviation_of",
+        "acting",
+        "wrenches",
+        "at_stop",
+        "unstable",
+    }
+    assert not (alone | late) & found.keys()
+    assert sum(found.values()) < most
+
+
+class Driven(rd.Stateless):
+    """A controller whose gain may be set, and so may change between two calls."""
+
+    n = 2  # pyright: ignore[reportAssignmentType, reportIncompatibleMethodOverride]
+
+    def __init__(self) -> None:
+        self.gain = 1.0
+
+    def torque(self, t, q, v, z):
+        return -self.gain * q
+
+
+class Pushed(rd.Active):
+    """An effect whose times may change between two calls."""
+
+    def __init__(self, times: tuple[float, ...]) -> None:
+        self.times = times
+
+    @property
+    def switches(self):
+        return self.times
+
+    def torque(self, dynamics, t, q, v):
+        return np.array([1.0 if any(t > each for each in self.times) else 0.0, 0.0]) + 0 * q
+
+
+@pytest.mark.parametrize("engine", ["interpreted", "auto"])
+def test_parts_that_change_between_two_calls_are_seen(engine: str) -> None:
+    controller, effect = Driven(), Pushed((0.05,))
+    options: Any = {"duration_s": 0.1, "engine": engine, "integrator": "DOP853", "estimate_error": False}
+    setup = rd.Setup(rd.Plant(ARM, [effect]), Q, V, controller=controller, **options)
+    before = rd.simulate(setup)
+    controller.gain, effect.times = 7.0, (0.0321,)
+    after = rd.simulate(setup)
+    again = rd.simulate(rd.Plant(ARM, [effect]), Q, V, controller=controller, **options)
+    assert_same_run(after, again)
+    assert (0.0321 in after.t, 0.0321 in before.t) == (True, False)  # steps end at the switch, as it is now
+    assert abs(after.u - before.u).max() > 1.0
+
+
+def test_nothing_waits_of_a_run_with_parts_of_the_users_own() -> None:
+    """What they raise, `simulate` raises; what they have become later tells nothing of the run."""
+    run = rd.simulate(ARM, Q, V, controller=Driven(), duration_s=0.05, integrator="DOP853", estimate_error=False)
+    assert vars(run).keys() == set(NAMES)
+
+    class Stores(rd.Dissipative, rd.Stateful):
+        def state_size(self, n):
+            return 1
+
+        def torque(self, dynamics, t, q, v, z):  # pyright: ignore[reportIncompatibleMethodOverride]
+            return -v
+
+        def state_rate(self, dynamics, t, q, v, u, z):
+            return np.zeros(1)
+
+        def stored_energy(self, dynamics, t, q, z):
+            if t > 0.02:
+                raise LookupError("of the user's own")
+            return 0.0
+
+    with pytest.raises(LookupError, match="own"):
+        rd.simulate(rd.Plant(ARM, [Stores()]), Q, V, duration_s=0.05, integrator="DOP853", estimate_error=False)
+
+
+def test_a_robot_that_warns_warns_in_each_run_and_in_none_of_what_is_read() -> None:
+    arm = ARM.warn_below(15.9)  # of the 16 of a float: the start has fewer
+    control = rd.PD(PLAN, 10.0, 1.0, period_s=0.01)
+    changes: dict[str, Any] = {"plant": rd.Plant(arm), "controller": control, "estimate_error": False}
+    counts = []
+    with pytest.warns(rd.PrecisionWarning):  # so do the checks of the setup, and of its machine code
+        setup = replace(setups()["sampled, rk4"], **changes)
+        rd.simulate(setup)
+    for _ in range(2):
+        with pytest.warns(rd.PrecisionWarning) as told:
+            run = rd.simulate(setup)
+        counts.append(len(told))
+        _ = run.summary  # warnings are errors here
+    assert counts[0] == counts[1] > 5
+
+
+def test_nothing_waits_of_a_run_that_did_not_finish() -> None:
+    plant = rd.Plant(ARM, [rd.ViscousFriction(1e4)])
+    run = rd.simulate(plant, Q, V, duration_s=0.1, integrator="rk4", engine="interpreted", estimate_error=False)
+    assert run.outcome.ending is Ending.DIVERGED and vars(run).keys() == set(NAMES)
+
+
+def test_a_text_that_is_added_to_a_setup_later_is_none_of_the_run() -> None:
+    setup = replace(setups()["free swing"], about={"author": "me"}, estimate_error=False)
+    run = rd.simulate(setup)
+    setup.about["author"] = "you"
+    assert run.about["author"] == "me"
+
+
+@pytest.mark.parametrize("name", ["computed torque", "sampled, rk4"])
+def test_what_was_not_read_is_copied_pickled_and_saved_with_the_run(name: str, tmp_path: Path) -> None:
+    setup = setups()[name]
+    reference = at_once(setup)
+    for made in (copy, deepcopy, lambda run: pickle.loads(pickle.dumps(run)), replace):
+        assert_same_run(made(rd.simulate(setup)), reference)
+    back = rd.load_run(rd.save_run(rd.simulate(setup), tmp_path / "run.npz"))
+    assert back.remarks == reference.remarks and back.summary.split("time:")[0] == reference.summary.split("time:")[0]
+
+
+def test_a_setup_that_has_run_is_copied_and_pickled_without_what_is_kept_with_it() -> None:
+    setup = setups()["computed torque"]
+    run = rd.simulate(setup)
+    assert setup.known
+    for made in (copy, deepcopy, lambda each: pickle.loads(pickle.dumps(each)), replace):
+        other = made(setup)
+        assert vars(other).keys() <= {each.name for each in fields(setup)} | {"undeclared", "is_value", "equation"}
+        assert_same_run(rd.simulate(other), run)
+
+
+def test_setups_of_parts_of_the_library_are_values() -> None:
+    """And those of a user's own class, or of a function, are not: even where it is frozen, its code may be another."""
+
+    @dataclass(frozen=True)
+    class Own(rd.Active):
+        gain: float = 1.0
+
+        def thresholds(self, n):
+            return ()
+
+        def torque(self, dynamics, t, q, v):
+            return self.gain * v
+
+    assert all(setup.is_value for setup in setups().values())
+    base = setups()["free swing"]
+    for other in ({"plant": rd.Plant(ARM, [Own()])}, {"controller": lambda t, q, v: -q}, {"controller": Driven()}):
+        assert not replace(base, **other, engine="interpreted").is_value
+
+
+def test_an_attribute_that_is_no_field_is_none_of_an_unread_run() -> None:
+    run = rd.simulate(setups()["free swing"])
+    with pytest.raises(AttributeError, match=r"Trajectory.*remark_s"):
+        run.remark_s  # noqa: B018 # pyright: ignore
+    assert not hasattr(run, "_source_of") and "remarks" not in vars(run)

@@ -1,0 +1,255 @@
+"""What effects and algorithms cost: counts that are those of the programs run, parts that add up, reasons in words."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import robot_dyn as rd
+from robot_dyn.codegen.parameters import parameters
+from robot_dyn.codegen.trace.from_casadi import program_of
+from robot_dyn.errors import QueryError, RobotDynError
+from robot_dyn.result import json_text
+from robot_dyn.scene.starters import starter
+from robot_dyn.simulation.compiled.making import machine, machine_of_constants
+from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.studies.budget import Budget
+from robot_dyn.studies.costs import step_cost
+from robot_dyn.studies.costs.alternative import Alternative, Pair, Version, Way, in_turns
+from robot_dyn.studies.costs.query_cost import QueryCost
+
+ARM = rd.load("planar_2r")
+Q, V = np.array([0.4, -0.7]), np.array([0.3, 0.5])
+FRICTION, SPRING = rd.ViscousFriction([0.3, 0.2]), rd.Spring([3.0, 2.0], [0.1, -0.2])
+TINY: dict[str, Any] = {"budget_s": 1e-9, "repeats": 1}  # nothing is timed
+
+
+def setup(*effects: Any, **options: Any) -> rd.Setup:
+    return rd.Setup(rd.Plant(ARM, effects), Q, V, 0.1, **options)
+
+
+def compiled(of: rd.Setup) -> dict[str, int]:
+    """Instructions of the programs that `simulate` runs, by name."""
+    made = machine(StateEquation(of.plant, of.controller), rd.method("rk4"))
+    return {name: len(program) for name, program in made.equations.programs.items()}
+
+
+CONTROLLERS = {
+    "none": None, "continuous": rd.PD(rd.hold(Q), 10.0, 1.0), "sampled": rd.PD(rd.hold(Q), 10.0, 1.0, period_s=0.01),
+    "states": rd.PID(rd.hold(Q), 10.0, 2.0, 1.0, period_s=0.01),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("control", CONTROLLERS)
+def test_counts_are_those_of_the_programs_that_are_run(control: str) -> None:
+    """Four evaluations and, where control is sampled, a tick; without a part, those of a setup made without it."""
+    controller = CONTROLLERS[control]
+    given = setup(FRICTION, SPRING, controller=controller)
+    found = rd.cost(given, **TINY)
+    without = {
+        "viscous_friction": setup(SPRING, controller=controller),
+        "spring": setup(FRICTION, controller=controller),
+        "gravity": rd.Setup(rd.Plant(ARM.with_(gravity=(0, 0, 0)), given.plant.effects), Q, V, 0.1, controller),
+    } | ({"control": setup(FRICTION, SPRING)} if controller else {})
+    assert {each.what for each in found.alternatives if each.group == "parts"} == {*without, step_cost.EVERYTHING}
+    for name, other in without.items():
+        row = found.of(name)
+        for version, of in ((row.first, given), (row.second, other)):
+            counts = compiled(of)
+            assert version.instructions == 4 * counts["rate"] + counts.get("tick", 0)
+    bare = compiled(rd.Setup(rd.Plant(ARM.with_(gravity=(0, 0, 0))), Q, V))
+    assert found.of(step_cost.EVERYTHING).second.instructions == 4 * bare["rate"]
+
+
+def test_viscous_friction_costs_what_is_counted_by_hand() -> None:
+    """Of two joints: b v, its torque from the sum, and τᵀ v of the ledger, −(b₁v₁)v₁ − (b₂v₂)v₂: some sign each.
+
+    2 products b v and 2 sums; 2 products and 1 sum of the power: 7, and at most 3 changes of sign.
+    """
+    added = rd.cost(setup(FRICTION), **TINY).parts["viscous_friction"]
+    assert added % 4 == 0 and 7 <= added // 4 <= 10
+
+
+@pytest.mark.parametrize("control", CONTROLLERS)
+def test_what_is_off_costs_nothing_and_parts_add_up(control: str) -> None:
+    """All on = rigid bodies + each part + what several share; a part never adds to a setup that is without it."""
+    given = setup(FRICTION, SPRING, *rd.joint_stops(-1.0, 1.0), controller=CONTROLLERS[control])
+    found = rd.cost(given, **TINY)
+    whole = found.of(step_cost.EVERYTHING)
+    assert whole.second.instructions + sum(found.parts.values()) + found.shared == whole.first.instructions
+    assert all(count > 0 for count in found.parts.values())
+    assert abs(found.shared) <= sum(found.parts.values()) / 10
+    again = rd.cost(replace(given, plant=rd.Plant(ARM, [SPRING, *given.plant.effects[2:]])), **TINY)
+    assert again.of(step_cost.EVERYTHING).first.instructions == found.of("viscous_friction").second.instructions
+    assert "viscous_friction" not in again.parts
+
+
+def test_algorithms_are_counted_from_the_kernels_of_compiled() -> None:
+    """The least of each formulation is that of the kernel of the same query."""
+    arm = rd.load("ur5")
+    pairs = {name: make() for name, make in QueryCost(arm).pairs()}
+    own: Any = rd.Compiled(arm)
+    count = {name: len(own.engine.kernels[name].program) for name in ("C", "coriolis_torque", "forward_dynamics")}
+    derivatives = len(own.engine.kernels["forward_dynamics_derivatives"].program)
+    matrix = pairs["Coriolis matrix"]
+    assert (matrix.first.instructions, matrix.second.instructions) == (count["C"], count["coriolis_torque"])
+    forward = pairs["forward dynamics"]
+    assert min(forward.first.instructions, forward.second.instructions) == count["forward_dynamics"]
+    differences = pairs["derivatives of forward dynamics"].alternative()
+    assert differences.first.instructions == 36 * count["forward_dynamics"]
+    assert differences.second.instructions == derivatives
+    angles = pairs["right angles of the file"]
+    assert angles.first.instructions > angles.second.instructions == count["forward_dynamics"]
+    rest = pairs["C(q, v) v in forward dynamics"]
+    assert rest.first.instructions == count["forward_dynamics"] > rest.second.instructions
+    floats = pairs["numbers of forward dynamics"]
+    assert floats.first.instructions == floats.second.instructions
+
+
+def test_forward_dynamics_without_coriolis_torque_is_that_at_rest() -> None:
+    """FD(q, v, τ + C v) = FD(q, 0, τ): what is counted as off computes the right side, to rounding of M⁻¹ τ."""
+    cost = QueryCost(ARM)
+    made = cost.at_rest
+    q, v, tau = np.random.default_rng(3).normal(size=(3, 2))
+    theirs = ARM.forward_dynamics(q, v, tau + ARM.coriolis_torque(q, v))
+    np.testing.assert_allclose(made(q, v, tau).full().ravel(), theirs, rtol=1e-12, atol=1e-12)
+    assert len(program_of(made)) == cost._coriolis_torque().second.instructions
+
+
+def test_machine_code_of_constants_has_no_inputs_and_the_numbers_of_its_robot() -> None:
+    """Two robots that differ in gravity alone: nothing kept of the first is taken for the second."""
+    for gravity in ((0.0, 0.0, -9.81), (0.0, 0.0, -3.7)):
+        plant = rd.Plant(ARM.with_(gravity=gravity), [FRICTION])
+        equation = StateEquation(plant, None)
+        made = machine_of_constants(equation, rd.method("rk4"))
+        assert made.parameters.size == 0 < sum(each.size for each in parameters(ARM, plant.effects, None))
+        y, out = np.array([*Q, *V, 0.0, 0.0]), np.empty((8, 1))
+        made.in_python.rate(0.0, y, np.array([0.0, 1.0]), np.zeros((1, 1)), out)
+        theirs = plant.forward_dynamics(0.0, Q, V, np.zeros(2))
+        np.testing.assert_allclose(out[2:4, 0], theirs, rtol=1e-12)
+
+
+def test_what_cannot_be_done_is_said_with_the_reason() -> None:
+    coupled = rd.cost(rd.load("mimic_chain"), np.full(rd.load("mimic_chain").n, 0.3), **TINY)
+    assert any("joints are coupled" in each for each in coupled.left_out)
+    assert any("right angles of the file: the file states none" in each for each in coupled.left_out)
+
+    class Odd(rd.Dissipative):
+        def torque(self, dynamics: Any, t: float, q: Any, v: Any) -> Any:
+            return -np.array([float(x) for x in v])
+
+    odd = rd.cost(setup(Odd()), **TINY)
+    assert any("parts: effect odd cannot be compiled" in each for each in odd.left_out)
+    assert odd.sentence == "no step was counted" and odd.of("forward dynamics")
+    with pytest.raises(QueryError, match="no cost of 'wind'; known: Coriolis matrix"):
+        odd.of("wind")
+
+
+def test_long_programs_are_counted_and_not_timed(monkeypatch) -> None:
+    monkeypatch.setattr("robot_dyn.studies.costs.query_cost._MOST_TIMED", 30)
+    found = rd.cost(setup(), budget_s=20.0, repeats=1)
+    row = found.of("forward dynamics")
+    assert row.first.instructions > 30 and row.first.time_s is None
+    why = f"time of forward dynamics, M, Cholesky: {row.first.instructions} instructions, more than 30, take long"
+    assert any(each.startswith(why) for each in found.left_out)
+
+
+def test_the_page_has_the_counts_of_today(tmp_path) -> None:
+    """Those of the parts; `python scripts/cost.py` makes its table and figure."""
+    scene = tmp_path / "scene.toml"
+    scene.write_text(starter("panda_computed_torque"), encoding="utf-8")
+    pairs = step_cost.pairs_of_parts(rd.read_scene(scene))
+    counted = {each.what: f"{each.first.instructions} / {each.second.instructions}" for each in pairs}
+    page = (Path(__file__).parents[2] / "docs" / "accuracy_and_time.md").read_text(encoding="utf-8")
+    told = re.findall(r"^\|[^|]*\| (\w+) \| on / off \| (\d+ / \d+) \|", page, flags=re.MULTILINE)
+    assert dict(told) == counted
+
+
+def test_a_budget_that_ends_says_what_was_not_timed() -> None:
+    found = rd.cost(setup(), **TINY)
+    assert all(each.time_ratio is None and each.first.repeats == 0 for each in found.alternatives)
+    assert "time of everything, on: the budget of 1e-09 s ended" in found.left_out
+
+
+def test_times_are_medians_of_turns_and_what_fails_is_left_out() -> None:
+    """Of runs that take 1, 2, … each turn; twice the factor is twice the time and the instructions."""
+    said: list[str] = []
+
+    def runs(name: str, *times: float) -> Way:
+        left = [0.0, *times]  # the first loads
+
+        def run() -> float:
+            said.append(name)
+            return left.pop(0)
+
+        return Way(name, 10, run)
+
+    def broken() -> float:
+        raise RobotDynError("no such code")
+
+    pair = Pair("algorithms", "sum", "state", runs("a", 5.0, 1.0, 3.0), runs("b", 1.0, 1.0, 1.0).named("b", 2))
+    bad = Pair("algorithms", "bad", "state", Way("x", 1, broken), Way("y", 1, broken))
+    assert in_turns([pair, bad], Budget(1e3), 3) == ["time of bad, x: no such code", "time of bad, y: no such code"]
+    found = pair.alternative()
+    assert found.first == Version("a", 10, 3.0, 1.0, 3)
+    assert found.second == Version("b", 20, 2.0, 0.0, 3)
+    assert said == ["a", "a", "b", "b", "a", "b", "a", "b"]
+    assert found.instructions_ratio == 0.5
+    assert (found.time_ratio, found.time_ratio_spread, found.time_between_s) == (1.5, 0.5, None)
+    assert pair.first.times == [5.0, 1.0, 3.0] and bad.alternative().time_ratio is None
+
+
+def test_ratios_are_of_the_same_turn_and_a_difference_lost_in_them_is_not_told() -> None:
+    """A machine that is slow in some turns slows both: the ratio has no spread. Noise of either sign is no time."""
+    slow = np.array([1.0, 7.0, 2.0, 9.0])
+    pair = Pair("algorithms", "sum", "state", *(Way(x, 1, float) for x in "ab"))
+    pair.first.times, pair.second.times = (3 * slow).tolist(), slow.tolist()
+    assert (pair.alternative().time_ratio, pair.alternative().time_ratio_spread) == (3.0, 0.0)
+    assert pair.alternative().time_between_s == 2 * np.median(slow)
+    pair.first.times = (slow + np.array([0.1, -0.1, 0.2, -0.2])).tolist()
+    assert pair.alternative().time_between_s is None
+
+
+def test_json_csv_and_figure_hold_the_alternatives(tmp_path) -> None:
+    result = rd.cost(setup(FRICTION, controller=CONTROLLERS["sampled"]), budget_s=0.5, repeats=2)
+    read = json.loads(json_text(result))
+    kept = [
+        Alternative(
+            x["group"],
+            x["what"],
+            x["per"],
+            Version(**x["first"]),
+            Version(**x["second"]),
+            x["time_ratio"],
+            x["time_ratio_spread"],
+            x["time_between_s"],
+        )
+        for x in read["alternatives"]
+    ]
+    assert tuple(kept) == result.alternatives
+    assert read["sentence"] == result.sentence and read["parts"] == result.parts
+    assert kept[0].time_ratio is not None
+    with open(rd.save_result(result, tmp_path / "table.csv"), encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [int(row["first_instructions"]) for row in rows] == [each.first.instructions for each in kept]
+    assert rd.save_result(result, tmp_path / "plot", theme="dark").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"budget_s": 0.0}, "budget_s must be"),
+        ({"repeats": 0}, "repeats must be"),
+        ({"q0": [0.1]}, "q0 must have shape"),
+    ],
+)
+def test_mistakes_are_told(wrong: dict[str, Any], message: str) -> None:
+    with pytest.raises(QueryError, match=message):
+        rd.cost(setup(), **wrong)

@@ -1,0 +1,302 @@
+"""Error against work: orders, the front, the reference and its horizon, what is believed and what is extrapolated."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from dataclasses import replace
+from fractions import Fraction
+from importlib import import_module
+from itertools import islice
+
+import numpy as np
+import pytest
+from scipy.special import ellipj, ellipk
+
+import robot_dyn as rd
+from robot_dyn.errors import QueryError
+from robot_dyn.integrate.explicit import ExplicitRungeKutta
+from robot_dyn.integrate.tableau import ButcherTableau
+from robot_dyn.result import json_text
+from robot_dyn.seconds import in_words
+from robot_dyn.studies.budget import Budget, Limit
+from robot_dyn.studies.work_precision_diagram.beyond import beyond
+from robot_dyn.studies.work_precision_diagram.candidate import Candidate, own, recorded, whole
+from robot_dyn.studies.work_precision_diagram.ladder import Ladder, Point
+from robot_dyn.studies.work_precision_diagram.measured import Rung, Walk, measured
+from robot_dyn.studies.work_precision_diagram.peers import found
+from robot_dyn.studies.work_precision_diagram.reference_run import HorizonError, Reference, reference
+from tests.long import long
+
+UNTIL_DONE = Limit(math.inf)
+
+
+def swing(duration_s: float = 0.3) -> rd.Setup:
+    """A double pendulum with friction, interpreted: smooth, of two joints, at a general state."""
+    plant = rd.Plant(rd.load("planar_2r"), [rd.ViscousFriction([0.3, 0.2])])
+    return rd.Setup(plant, [0.4, 0.9], [0.3, -0.5], duration_s, engine="interpreted")
+
+
+@pytest.fixture(scope="module")
+def smooth() -> tuple[rd.Setup, Reference]:
+    return reference(whole(swing()), Budget(1e3))
+
+
+def ladder(candidate: Candidate, truth: Reference, first: int, last: int) -> Ladder:
+    """The rungs from `first` to `last`, whatever time they take."""
+    walk = Walk(candidate)
+    for setting in islice(candidate.settings(), first, last):
+        run = candidate.run(setting, UNTIL_DONE)
+        walk.rungs.append(Rung(setting, run, truth.distance(run), [run.time_s]))
+    return walk.ladder(truth.error)
+
+
+@pytest.mark.parametrize(
+    ("name", "first", "last"),
+    [("rk4", 0, 3), *long([("explicit_euler", 3, 6), ("midpoint", 1, 4), ("gauss_4", 0, 3), ("rosenbrock_5", 0, 4)])],
+)
+def test_measured_orders_are_those_of_the_methods(smooth, name: str, first: int, last: int) -> None:
+    """Slope = p + O(h).
+
+    With a motion of some 5 rad/s and h ≤ 20 ms the second term of the error is 0.1 of the first, and half of that at
+    half the step, so that a slope is off by log2(1.1 / 1.05) < 0.1; 0.25 leaves room for its factor.
+    """
+    setup, truth = smooth
+    found = ladder(own(setup, rd.method(name), "interpreted"), truth, first, last)
+    assert found.measured_order == pytest.approx(rd.method(name).order, abs=0.25)
+
+
+def test_a_wrong_coefficient_shows_in_the_measured_order(smooth) -> None:
+    """Weights (1, 2, 3, 0)/6 in place of (1, 2, 2, 1)/6 add up to 1, but Σ b c = 5/12 is not 1/2: order 1."""
+    setup, truth = smooth
+    half, sixth = Fraction(1, 2), Fraction(1, 6)
+    wrong = ButcherTableau(((), (half,), (0, half), (0, 0, 1)), (sixth, 2 * sixth, 3 * sixth, 0), (0, half, half, 1), 4)
+    found = ladder(own(setup, ExplicitRungeKutta("rk4", wrong), "interpreted"), truth, 2, 5)
+    assert found.measured_order is not None and found.measured_order < 1.5
+
+
+def test_the_reference_is_the_closed_form_of_a_pendulum() -> None:
+    """sin(q/2) = k sn(K(k) − ω t, k), released at rest: the reference is within its own error of it, as is claimed.
+
+    The functions of SciPy err by some roundings, so that 1e-14 is added.
+    """
+    arm, q0 = rd.load("pendulum"), 1.2
+    omega = math.sqrt(arm.N([math.pi / 2])[0] / arm.M([0.0])[0, 0])
+    if arm.N([0.1])[0] < 0:
+        pytest.fail("q = 0 must hang down")
+    setup, truth = reference(recorded(whole(rd.Setup(rd.Plant(arm), [q0], engine="interpreted")), 1.0), Budget(1e3))
+    k = math.sin(q0 / 2)
+    sn, *_ = ellipj(ellipk(k * k) - omega * truth.t, k * k)
+    assert np.abs(truth.q[:, 0] - 2 * np.arcsin(k * sn)).max() <= truth.error + 1e-14
+    assert truth.error < 1e-12 and truth.horizon_s == setup.duration_s == 1.0
+
+
+def test_chaotic_motion_is_cut_where_references_part() -> None:
+    """Up to the horizon other runs agree to 1e-6, a thousand times the distance at which it is cut; later they do not.
+
+    They are of order 8 with two steps.
+    """
+    setup = rd.Setup(rd.Plant(rd.load("planar_2r")), [2.4, 0.9], [0.3, -0.5], 60.0, engine="compiled")
+    cut, truth = reference(whole(setup), Budget(1e3))
+    assert truth.parted_s is not None and truth.lost_s is not None
+    assert truth.horizon_s == cut.duration_s <= truth.parted_s < truth.lost_s < 40.0
+    runs = [
+        rd.simulate(setup, integrator="order_8", step_s=step, record_period_s=1.0, estimate_error=False)
+        for step in (1e-3, 5e-4)
+    ]
+    apart = np.abs(runs[0].q - runs[1].q).max(axis=1)
+    assert apart[runs[0].t <= truth.horizon_s].max() < 1e-6 < 1.0 < apart.max()
+    assert truth.error < 1e-8
+
+
+def test_beyond_the_horizon_energy_and_the_way_back_judge() -> None:
+    """Two joints there and back: a method of higher order comes back nearer; with friction nothing comes back."""
+    rubbed, methods = swing(2.0), {name: rd.method(name) for name in ("rk4", "order_8")}
+    setup = replace(rubbed, plant=rd.Plant(rubbed.plant.dynamics))
+    made = [
+        Ladder(name, "interpreted", True, order, "step", (Point(step, 1, 1, 1e-3, 0.0, 1e-6, 1, True),), "", 0.0)
+        for name, order, step in (("rk4", 4, 0.02), ("order_8", 8, 0.02))
+    ]
+    other = Ladder("MuJoCo RK4", "", True, 4, "step", made[0].points, "", 0.0)
+    rk4, order_8 = beyond(setup, 1.0, [*made, other], methods, Budget(1e3))
+    assert (rk4.name, order_8.name) == ("rk4", "order_8")
+    assert 1e-10 < order_8.returned < 1e-2 * rk4.returned < 1e-2  # swung through, where both magnify what they err
+    assert order_8.energy < 1e-2 * rk4.energy < 1e-4
+    assert [each.returned for each in beyond(rubbed, 1.0, made, methods, Budget(1e3))] == [None, None]
+    assert beyond(setup, 1.0, made, methods, Budget(1e-6)) == ()  # no run is short enough
+
+
+def test_an_accuracy_of_the_setup_is_not_used() -> None:
+    """It would choose the method, which differs from run to run here."""
+    (only,) = rd.work_precision(replace(swing(0.1), accuracy=1e-6), methods=["rk4"], repeats=1).ladders
+    assert only.points
+
+
+def test_a_motion_without_reference_is_refused() -> None:
+    with pytest.raises(HorizonError, match=r"no run of 0\.3 s ends by DOP853 or Rosenbrock"):
+        rd.work_precision(replace(swing(), controller=lambda t, q, v: v * (np.nan if t > 0.1 else 1.0)))
+
+
+def points(*errors: float, believed: bool = True, each_s: float = 1e-3) -> tuple[Point, ...]:
+    """Runs that take 1, 2, 4, … times as many steps and as long."""
+    return tuple(
+        Point(0.1 / 2**k, 10 * 2**k, 40 * 2**k, e, e, each_s * 2**k, 3, believed) for k, e in enumerate(errors)
+    )
+
+
+def invented(*ladders: Ladder, floor: float = 1e-12) -> rd.WorkPrecision:
+    truth = Reference(np.zeros(2), np.zeros((2, 1)), floor, ("one", "other"), 1.0)
+    return rd.WorkPrecision("arm", (), "rad", 1.0, truth, ladders, (), {"processor": "P"}, 1.0, 1.0)
+
+
+def of(name: str, runs: tuple[Point, ...], order: int = 4, floor: float = 1e-12, engine: str = "compiled") -> Ladder:
+    return Ladder(name, engine, True, order, "step", runs, "", floor)
+
+
+def test_no_run_beats_one_of_the_front_and_each_other_is_beaten() -> None:
+    rng = np.random.default_rng(5)
+    runs = [
+        tuple(
+            Point(1.0, 9, 9, float(e), 0.0, float(t), 1, bool(e > 1e-9))
+            for e, t in 10.0 ** rng.uniform(-12, 0, (30, 2))
+        )
+        for _ in range(3)
+    ]
+    front = [p for _, p in invented(*(of(str(k), each) for k, each in enumerate(runs))).front]
+    assert len(front) > 3
+    believed = [p for each in runs for p in each if p.believed]
+    for p in believed:
+        beaten = any(o.error <= p.error and o.time_s <= p.time_s and o is not p for o in believed)
+        assert beaten != (p in front)
+    assert all(p.believed for p in front)
+
+
+def test_errors_below_that_of_the_reference_are_not_believed(smooth) -> None:
+    """DOP853 at 1e-13 ends nearer to the reference than the two runs of that are to each other: it takes no part."""
+    setup, truth = smooth
+    coarse = replace(truth, error=1e-6)
+    found = ladder(own(setup, rd.method("DOP853"), "interpreted"), coarse, 0, 12)
+    assert [p.believed for p in found.points] == [p.error > 1e-6 for p in found.points]
+    assert not found.points[-1].believed and found.points[0].believed
+    assert all(p.error > 1e-6 for _, p in invented(found, floor=1e-6).front)
+    assert found.price(1e-7) is None
+
+
+def test_points_near_the_error_of_the_reference_do_not_count_for_the_order() -> None:
+    """Errors of order 4 that end at a floor of 1e-9 have a median slope below 4, unless those near it are left out."""
+    errors = [1e-2 / 16**k + 1e-9 for k in range(18)]
+    assert of("rk4", points(*errors), floor=1e-9).measured_order == pytest.approx(4, abs=0.02)
+    assert of("rk4", points(*errors), floor=1e-13).measured_order == pytest.approx(0, abs=0.02)
+
+
+def test_prices_are_interpolated_between_runs_and_extrapolated_by_the_order() -> None:
+    found = of("rk4", points(1e-2, 1e-2 / 16, 1e-2 / 256))
+    between, beyond = found.price(1e-2 / 64), found.price(1e-2 / 256 / 10**4)
+    assert between is not None and beyond is not None
+    assert (between.value, between.extrapolated) == (pytest.approx(1e-3 * 2**1.5), False)
+    assert (beyond.value, beyond.extrapolated) == (pytest.approx(4e-3 * 10), True)
+
+
+def test_an_error_that_finer_runs_exceed_again_was_not_reached() -> None:
+    price = of("rk4", points(1e-2, 1e-8, 1e-3, 1e-6)).price(1e-5)
+    assert price is not None and price.value > 4e-3
+
+
+def test_the_sentence_marks_what_is_extrapolated() -> None:
+    fast, slow = of("DOP853", points(1e-3, 1e-5, 1e-7, 1e-9)), of("explicit_euler", points(1e-2, 5e-3, 2.5e-3), order=1)
+    peer = of("Other RK", points(1e-4, 1e-6, 1e-8, each_s=0.5), engine="")
+    said = invented(fast, slow, peer).sentence
+    assert said == "6 digits of q over 1 s: DOP853 2.8 ms; Other RK 1 s; explicit_euler would take 10 s (extrapolated)"
+    quick = of("Other RK", points(1e-4, 1e-6, 1e-8), engine="")
+    assert invented(fast, quick).sentence == "6 digits of q over 1 s: Other RK 2 ms; DOP853 2.8 ms"
+    assert invented(slow).sentence_of(3) == "3 digits of q were reached by no run"
+    assert in_words(0.00031) == "310 µs" and in_words(7200.0) == "2 h"
+
+
+def test_events_keep_the_order_at_a_stop() -> None:
+    """A stop is a kink of the second derivative: RK4 keeps its order where steps end there.
+
+    Where they do not, it errs a hundred times as much, or more.
+    """
+    plant = rd.Plant(rd.load("pendulum"), [rd.ViscousFriction(0.1), *rd.joint_stops(-1.0, 1.0, 1e3, 10.0)])
+    setup, truth = reference(whole(rd.Setup(plant, [0.98], [2.0], 0.06, engine="interpreted")), Budget(1e3))
+    with_events, without = (
+        ladder(own(setup, rd.method("rk4"), "interpreted", events), truth, 2, 5) for events in (True, False)
+    )
+    assert with_events.measured_order == pytest.approx(4, abs=0.3)
+    assert without.points[-1].error > 100 * with_events.points[-1].error
+    assert without.name == "rk4 (interpreted, without events)"
+
+
+def test_mujoco_makes_the_same_error_by_the_same_method() -> None:
+    """RK4 on the same equations with the same step differs by rounding alone: errors of 1e-4 agree to 1e-6 of that."""
+    import_module("mujoco")
+    arm = rd.load("panda").with_(lock={"panda_finger_joint1": 0.0})
+    q0 = [0.3, 0.6, -0.4, -1.2, 0.5, 1.1, 0.2]
+    setup, truth = reference(whole(rd.Setup(rd.Plant(arm), q0, duration_s=0.2, engine="compiled")), Budget(1e3))
+    peers, _ = found(setup)
+    theirs = {each.method: each for each in peers}
+    assert {"SciPy DOP853 + pin.aba", "MuJoCo RK4", "MuJoCo Euler", "MuJoCo implicitfast"} <= theirs.keys()
+    ours = ladder(own(setup, rd.method("rk4"), "compiled"), truth, 0, 2)
+    same = ladder(theirs["MuJoCo RK4"], truth, 0, 2)
+    for a, b in zip(ours.points, same.points, strict=True):
+        assert b.error == pytest.approx(a.error, rel=1e-6) and b.evaluations == a.evaluations
+    assert ladder(theirs["SciPy DOP853 + pin.aba"], truth, 8, 9).points[0].error < 1e-9
+
+
+def test_programs_that_cannot_do_a_scene_are_left_out_with_the_reason() -> None:
+    peers, why = found(recorded(whole(swing()), 0.5))
+    assert not peers and "free motion" in why[0]
+
+
+def test_a_program_that_cannot_be_imported_is_left_out(monkeypatch) -> None:
+    def broken(_: object) -> list[Candidate]:
+        raise ImportError("no library")
+
+    monkeypatch.setattr("robot_dyn.studies.work_precision_diagram.peers.PEERS", {"scipy": broken})
+    setup = recorded(whole(rd.Setup(rd.Plant(rd.load("pendulum")), [0.3])), 0.1)
+    assert found(setup) == ([], ["scipy: cannot be imported (no library)"])
+
+
+def test_json_and_csv_hold_the_runs(tmp_path) -> None:
+    result = rd.work_precision(swing(0.1), methods=["rk4", "DOP853"], repeats=1)
+    read = json.loads(json_text(result))
+    kept = [Point(**{key: x for key, x in row.items() if key in Point.__annotations__}) for row in read["rows"]]
+    assert kept == [p for each in result.ladders for p in each.points]
+    assert read["sentence"] == result.sentence and read["reference"]["error"] == result.reference.error
+    with open(rd.save_result(result, tmp_path / "runs.csv"), encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row["error"]) for row in rows] == [p.error for p in kept]
+    assert [int(row["evaluations"]) for row in rows] == [p.evaluations for p in kept]
+    marked = [row["on_front"] for row in read["rows"]]
+    assert [row["on_front"] == "True" for row in rows] == marked and any(marked)
+    assert rd.save_result(result, tmp_path / "plot").read_bytes().startswith(b"\x89PNG")
+
+
+def test_evaluations_are_counted_exactly() -> None:
+    """RK4 takes four a step and steps end at the records: 25 of them, or two, four, … times as many."""
+    result = rd.work_precision(swing(0.1), methods=["rk4"], repeats=1)
+    (only,) = result.ladders
+    assert [(p.steps, p.evaluations) for p in only.points[:3]] == [(25, 100), (50, 200), (100, 400)]
+
+
+def test_a_budget_that_ends_says_what_was_left_out(smooth) -> None:
+    setup, truth = smooth
+    (walk,), _ = measured([own(setup, rd.method("rk4"), "interpreted")], truth, Budget(1e-9), 1)
+    assert not walk.rungs and walk.ended == "the budget of 1e-09 s ended"
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"methods": ["rk5"]}, "nearest: rk4"),
+        ({"methods": "rk4"}, "give a list"),
+        ({"budget_s": -1.0}, "budget_s"),
+        ({"repeats": 0}, "repeats"),
+        ({"peers": 1}, "peers"),
+    ],
+)
+def test_wrong_options_are_refused(wrong: dict[str, object], message: str) -> None:
+    with pytest.raises(QueryError, match=message):
+        rd.work_precision(swing(0.1), **wrong)

@@ -1,0 +1,163 @@
+"""Plots: what stands on the axes is what the run holds, under the joints' names and with units."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import robot_dyn as rd
+from robot_dyn.errors import QueryError
+from robot_dyn.view.plots.plots import PlotError, plot, save_plot
+from tests.plotted import cart_pole, cells, lines, ur5
+
+
+@pytest.fixture(scope="module")
+def run():
+    return ur5()
+
+
+@pytest.fixture(scope="module")
+def cart():
+    return cart_pole()
+
+
+def test_positions_and_velocities_are_the_runs(run) -> None:
+    figure = plot(run, "joints")
+    for symbol, values in (("q", run.q), ("v", run.v)):
+        for axes, column in zip(cells(figure, symbol), values.T, strict=True):
+            (line,) = lines(axes, "actual")
+            np.testing.assert_array_equal(line.get_xdata(), run.t)
+            np.testing.assert_array_equal(line.get_ydata(), column)
+    assert [axes.get_title(loc="left") for axes in cells(figure, "q")] == list(run.joint_names)
+
+
+def test_desired_positions_are_dashed(run, cart) -> None:
+    for axes, column in zip(cells(plot(run, "joints"), "q"), run.desired.T, strict=True):
+        (line,) = lines(axes, "desired")
+        assert line.is_dashed()
+        np.testing.assert_array_equal(line.get_ydata(), column)
+    assert not any(lines(axes, "desired") for axes in plot(cart, "joints").axes)
+
+
+def test_units_are_those_of_each_joint(run, cart) -> None:
+    """The URDF in the run tells which joint slides; a run without one leaves it open."""
+    figure = plot(cart)
+    assert [axes.get_ylabel() for axes in cells(figure, "q")] == ["q [m]", "q [rad]"]
+    assert [axes.get_ylabel() for axes in cells(figure, "u")] == ["u [N]", "u [N m]"]
+    assert {axes.get_xlabel() for axes in cells(figure, "v")} >= {"t [s]", "q [m]", "q [rad]"}
+    assert "q [rad or m]" in {axes.get_ylabel() for axes in plot(replace(cart, about={})).axes}
+
+
+def test_every_axis_has_a_unit(run) -> None:
+    for axes in plot(run).axes:
+        assert "[" in axes.get_ylabel()
+        shares = not axes.get_xlabel()  # the axis below has the numbers and the unit
+        assert shares or "[" in axes.get_xlabel()
+
+
+def test_limits_are_drawn_at_plus_and_minus_the_limit(run) -> None:
+    limits = np.array([50.0, 60.0, np.inf, 20.0, 0.0, np.nan])  # 0 and nan: none is known
+    for axes, limit in zip(cells(plot(run, "torques", limits=limits), "u"), limits, strict=True):
+        levels = [line.get_ydata()[0] for line in lines(axes, "_limit")]
+        assert levels == ([-limit, limit] if 0 < limit < np.inf else [])
+        assert all(line.is_dashed() for line in lines(axes, "_limit"))
+
+
+def test_limits_are_the_urdfs_unless_given(run) -> None:
+    drawn = [lines(axes, "_limit")[1].get_ydata()[0] for axes in cells(plot(run, "torques"), "u")]
+    np.testing.assert_array_equal(drawn, rd.load("ur5").effort_limit)
+
+
+def test_a_far_limit_does_not_flatten_the_torque(run) -> None:
+    """Peak / limit decides: near limits are in sight, of far ones the title tells the part used."""
+    peak = np.abs(run.u).max(axis=0)
+    near, far = (cells(plot(run, "torques", limits=factor * peak), "u") for factor in (2.0, 100.0))
+    for axes, limit in zip(near, 2 * peak, strict=True):
+        assert axes.get_ylim()[0] < -limit and limit < axes.get_ylim()[1]
+        assert axes.get_title(loc="left").endswith("50% used")
+    assert all(axes.get_ylim()[1] < 10 * top for axes, top in zip(far, peak, strict=True))
+
+
+def test_the_energy_ledger_is_the_runs(cart) -> None:
+    stores, work, residual = plot(cart, "energy").axes
+    ledger = cart.ledger
+    np.testing.assert_array_equal(lines(stores, "K")[0].get_ydata(), ledger.kinetic)
+    np.testing.assert_array_equal(lines(stores, "E − E(0)")[0].get_ydata(), ledger.energy - ledger.energy[0])
+    for name, values in ledger.work.items():
+        np.testing.assert_array_equal(lines(work, f"W {name}")[0].get_ydata(), values)
+    assert residual.get_yscale() == "log"
+    drawn = residual.lines[0].get_ydata()
+    np.testing.assert_array_equal(drawn[drawn > 0], np.abs(ledger.residual)[ledger.residual != 0])
+
+
+def test_tracking_is_the_deviation_with_its_rms(run, cart) -> None:
+    figure = plot(run, "tracking")
+    for axes, column in zip(figure.axes, run.deviation.T, strict=True):
+        np.testing.assert_array_equal(axes.lines[0].get_ydata(), column)
+    assert any(f"rms {run.tracking_error:.2e} rad" in text.get_text() for text in figure.texts)
+    frame = plot(replace(run, desired=None, deviation=run.deviation[:, :3]), "tracking")
+    assert [axes.get_title(loc="left") for axes in frame.axes] == ["frame, x", "frame, y", "frame, z"]
+    assert {axes.get_ylabel() for axes in frame.axes} == {"error [m]"}
+    with pytest.raises(PlotError, match="no reference"):
+        plot(cart, "tracking")
+
+
+def test_phase_is_velocity_over_position(cart) -> None:
+    for i, axes in enumerate(plot(cart, "phase").axes):
+        np.testing.assert_array_equal(
+            lines(axes, "path")[0].get_xydata(), np.column_stack([cart.q[:, i], cart.v[:, i]])
+        )
+
+
+def test_error_growth_is_veiled_where_it_is_not_resolved(run) -> None:
+    error = replace(run.error, resolved_until=0.1, note="not resolved")
+    (axes,) = plot(replace(run, error=error), "error_growth").axes
+    (veil,) = axes.patches
+    assert veil.get_x() == pytest.approx(0.1) and axes.get_yscale() == "log"
+    np.testing.assert_array_equal(axes.lines[0].get_xdata(), error.t)
+    assert not plot(replace(run, error=replace(error, resolved_until=0.3)), "error_growth").axes[0].patches
+    with pytest.raises(PlotError, match="no estimate"):
+        plot(replace(run, error=None), "error_growth")
+
+
+def test_plots_that_do_not_apply_are_left_out(cart) -> None:
+    headings = " ".join(text.get_text() for text in plot(replace(cart, error=None)).texts)
+    assert "Energy" in headings and "Tracking" not in headings and "Error of" not in headings
+
+
+def test_asked_joints_alone_are_shown(run) -> None:
+    figure = plot(run, "joints", "torques", "tracking", only=["elbow_joint"])
+    assert {axes.get_title(loc="left").split(",")[0] for axes in figure.axes} == {"elbow_joint", ""}
+    np.testing.assert_array_equal(figure.axes[0].lines[0].get_ydata(), run.q[:, 2])
+
+
+def test_unknown_names_are_refused_with_the_nearest(run) -> None:
+    for asked, advice in ((["torque"], "no plot 'torque'; nearest: torques"), (["x"], "known: joints, torques")):
+        with pytest.raises(QueryError, match=advice):
+            plot(run, *asked)
+    with pytest.raises(QueryError, match="no joint 'elbow'; nearest: elbow_joint"):
+        plot(run, only=["elbow"])
+    with pytest.raises(QueryError, match="no theme"):
+        plot(run, theme="blue")  # type: ignore[arg-type]
+    with pytest.raises(QueryError, match=r"limits must have shape \(6,\) or .*, got \(2,\)"):
+        plot(run, limits=np.ones(2))
+
+
+def test_names_are_drawn_letter_by_letter(run, tmp_path) -> None:
+    """No mathematics, no hidden labels, no letters that the font lacks; a long name keeps both its ends."""
+    names = (r"$\frac", "_first", "a_b^{c$x$", "関節", "arm_" + "x" * 200 + "_end", "per%cent #1")
+    sources = {r"_$\sum$": run.ledger.kinetic, "control": run.ledger.kinetic}
+    hostile = replace(run, joint_names=names, ledger=replace(run.ledger, work=sources), about={})
+    save_plot(hostile, tmp_path / "names.png", dpi=40)  # warnings are errors
+    titles = [axes.get_title(loc="left") for axes in cells(plot(hostile, "joints"), "q")]
+    assert titles[:3] == list(names[:3]) and titles[3] in ("関節", r"\u95a2\u7bc0") and titles[5] == names[5]
+    assert titles[4].startswith("arm_x") and titles[4].endswith("x_end") and "…" in titles[4]
+    legends = [
+        text.get_text()
+        for axes in plot(hostile, "energy").axes
+        if axes.get_legend()
+        for text in axes.get_legend().texts
+    ]
+    assert r"W _$\sum$" in legends
