@@ -66,7 +66,7 @@ from robot_dyn.errors import RobotDynError as RobotDynError
 from robot_dyn.integrate.adaptive import Adaptive as Adaptive
 from robot_dyn.integrate.methods import method as method
 from robot_dyn.lagrange.euler_lagrange import euler_lagrange as euler_lagrange
-from robot_dyn.lagrange.manipulator import Lagrangian as Lagrangian
+from robot_dyn.lagrange.lagrangian import Lagrangian as Lagrangian
 from robot_dyn.model.loading import load as load
 from robot_dyn.model.robot import Robot as Robot
 from robot_dyn.queries.dynamics import Dynamics as Dynamics
@@ -75,10 +75,10 @@ from robot_dyn.simulation.dynamics.linearise import linearise as linearise
 from robot_dyn.simulation.results.run_file import load_run as load_run
 from robot_dyn.simulation.results.run_file import save_run as save_run
 from robot_dyn.simulation.results.trajectory import Trajectory as Trajectory
-from robot_dyn.simulation.rollouts.rollout import rollouts as rollouts
-from robot_dyn.simulation.rollouts.rollout_result import Rollouts as Rollouts
-from robot_dyn.simulation.rollouts.rollouts_file import load_rollouts as load_rollouts
-from robot_dyn.simulation.rollouts.rollouts_file import save_rollouts as save_rollouts
+from robot_dyn.simulation.rollouts.file import load_rollouts as load_rollouts
+from robot_dyn.simulation.rollouts.file import save_rollouts as save_rollouts
+from robot_dyn.simulation.rollouts.result import Rollouts as Rollouts
+from robot_dyn.simulation.rollouts.rollouts import rollouts as rollouts
 from robot_dyn.simulation.setup.event import Event as Event
 from robot_dyn.simulation.setup.setup import Setup as Setup
 from robot_dyn.simulation.simulate import simulate as simulate

@@ -34,9 +34,9 @@ def arms() -> list[str]:
     return found
 
 
-def digits(made: Document, quantity: str, road: str) -> tuple[float, float] | None:
+def digits(made: Document, quantity: str, implementation: str) -> tuple[float, float] | None:
     """At the worst of the random states, and at the worst that was found."""
-    found = [each for each in made["digits"] if (each["quantity"], each["road"]) == (quantity, road)]
+    found = [each for each in made["digits"] if (each["quantity"], each["road"]) == (quantity, implementation)]
     return (found[0]["random"], found[0]["searched"]) if found else None
 
 
@@ -45,7 +45,7 @@ def of_robots(documents: dict[str, Document]) -> None:
     print(f"\n| robot | joints | κ, typical | κ, searched | {' | '.join(ROADS)} | decimals |")
     print("|---|--:|--:|--:|" + "--:|" * (len(ROADS) + 1))
     for name, made in sorted(documents.items(), key=lambda each: (len(each[1]["joints"]), each[0])):
-        found = [digits(made, FORWARD, road) for road in ROADS]
+        found = [digits(made, FORWARD, implementation) for implementation in ROADS]
         cells = ["—" if each is None else f"{each[0]:.1f} → {each[1]:.1f}" for each in found]
         of, decimals = made["condition"], made["decimals"].get(FORWARD)
         kappa = [f"{of[key]:.3g}" if of[key] and of[key] < 1e15 else "∞" for key in ("typical", "searched")]
@@ -58,18 +58,18 @@ def of_quantities(documents: dict[str, Document]) -> None:
     print("\n| quantity | road | median of typical | worst random | searched | robot | worse than random |")
     print("|---|---|--:|--:|--:|---|--:|")
     for quantity in ("M", "C", "N", "inverse_dynamics", FORWARD):
-        for road in ROADS:
-            found = {name: each for name, made in documents.items() if (each := digits(made, quantity, road))}
+        for implementation in ROADS:
+            found = {name: each for name, made in documents.items() if (each := digits(made, quantity, implementation))}
             if found:
                 name = min(found, key=lambda name: found[name][1])
                 typical = sorted(
                     each["typical"] for made in documents.values() for each in made["digits"]
-                    if (each["quantity"], each["road"]) == (quantity, road)
+                    if (each["quantity"], each["road"]) == (quantity, implementation)
                 )  # fmt: skip
                 worse = sum(searched < random for random, searched in found.values())
                 median, at_random = typical[len(typical) // 2], min(x for x, _ in found.values())
-                print(f"| {quantity} | {road} | {median:.1f} | {at_random:.1f} | {found[name][1]:.1f} | {name}"
-                      f" | {worse} of {len(found)} |")  # fmt: skip
+                print(f"| {quantity} | {implementation} | {median:.1f} | {at_random:.1f} | {found[name][1]:.1f}"
+                      f" | {name} | {worse} of {len(found)} |")  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -32,7 +32,7 @@ def _run() -> Any:
     import warnings
 
     from robot_dyn.cli.app import app
-    from robot_dyn.cli.commands import ask, check, demo, keep, price, prove, run, show, stress  # noqa: F401
+    from robot_dyn.cli.commands import ask, cache, check, demo, price, prove, run, show, stress  # noqa: F401
     from robot_dyn.cli.terminal import failed, finish, open_streams, tell
     from robot_dyn.errors import RobotDynError, RobotDynWarning
 

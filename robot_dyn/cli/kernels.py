@@ -28,7 +28,7 @@ def formulation_table(answer: Document) -> Iterator[Any]:
     for name, row in answer.items():
         counts = dict(row["instructions"])
         own = counts.pop(row["served_by"], None)
-        others = ", ".join(f"{road} {count}" for road, count in counts.items())
+        others = ", ".join(f"{implementation} {count}" for implementation, count in counts.items())
         rows.append([name, row["served_by"], "" if own is None else str(own), others])
     yield "compiled"
     headings = ("quantity", "served by", "instructions", "others")

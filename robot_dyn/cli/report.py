@@ -16,7 +16,7 @@ from robot_dyn.effects.hold import Hold
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import QueryError, nearest
 from robot_dyn.lagrange.breakdown import breakdown
-from robot_dyn.lagrange.manipulator import Lagrangian
+from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.model.gravity import gravity_acts, no_torque
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.quantity import PLANT, C, M

@@ -7,13 +7,13 @@ from math import isfinite
 from typing import Any
 
 from robot_dyn.cli.terminal import table
-from robot_dyn.seconds import in_words
+from robot_dyn.seconds import format_duration
 from robot_dyn.studies.certificate.certificate import Certificate, Held
-from robot_dyn.studies.costs.alternative import Alternative
+from robot_dyn.studies.costs.ab_comparison import ABComparison
 from robot_dyn.studies.costs.cost import Cost
 from robot_dyn.studies.stress_test.finding import Judged, Limit, Worst
 from robot_dyn.studies.stress_test.result import Stress
-from robot_dyn.studies.work_precision_diagram.ladder import Ladder
+from robot_dyn.studies.work_precision_diagram.tolerance_ladder import ToleranceLadder
 from robot_dyn.studies.work_precision_diagram.work_precision import WorkPrecision
 
 _DIGITS = (3, 6, 9)
@@ -47,13 +47,13 @@ def cost_rows(result: Cost) -> Iterator[list[str]]:
         yield ["" if again else each.per, *_cells(each)]
 
 
-def _cells(each: Alternative) -> Iterator[str]:
+def _cells(each: ABComparison) -> Iterator[str]:
     first, second = each.first, each.second
     yield each.what
     yield f"{first.name} / {second.name}"
     yield f"{first.instructions} / {second.instructions}"
     yield f"{each.instructions_ratio:.3g}" if isfinite(each.instructions_ratio) else "—"
-    yield " / ".join("—" if of.time_s is None else in_words(of.time_s) for of in (first, second))
+    yield " / ".join("—" if of.time_s is None else format_duration(of.time_s) for of in (first, second))
     yield "—" if each.time_ratio is None else f"{each.time_ratio:.2f} ± {each.time_ratio_spread:.2f}"
 
 
@@ -74,7 +74,7 @@ def _certificate(result: Certificate) -> Iterator[Any]:
         f"κ of M scaled to a unit diagonal: typical {of.typical:.3g}, largest at random {of.random:.3g}, searched"
         f" {of.searched:.3g}{lose}"
     )
-    if lost := [f"{road} {digits:+.1f}" for road, digits in result.lost.items()]:
+    if lost := [f"{implementation} {digits:+.1f}" for implementation, digits in result.lost.items()]:
         yield f"digits of inverse less those of forward dynamics, at the worst states: {', '.join(lost)}"
     if result.right_angles:
         yield (
@@ -95,7 +95,7 @@ def _digit_rows(result: Certificate, given: bool) -> Iterator[list[str]]:
 def _held(each: Held, given: bool) -> list[str]:
     own = ["—" if each.given is None else f"{each.given:.1f}"] if given else []
     worst = [f"{each.random:.1f}", f"{each.searched:.1f}"]
-    return [each.road, *own, f"{each.typical:.1f}", str(each.samples), *worst, in_words(each.time_s)]
+    return [each.implementation, *own, f"{each.typical:.1f}", str(each.samples), *worst, format_duration(each.time_s)]
 
 
 def _work_precision(result: WorkPrecision) -> Iterator[Any]:
@@ -131,7 +131,7 @@ def _ladder_rows(result: WorkPrecision, columns: list[int]) -> Iterator[list[str
         error = f"{finest.error:.1e}" if finest.error > floor else f"< {floor:.0e}"
         order = "—" if each.order is None else str(each.order)
         seen = "—" if each.measured_order is None else f"{each.measured_order:.1f}"
-        yield [each.name, order, seen, *cells, error if isfinite(finest.error) else "—", in_words(finest.time_s)]
+        yield [each.name, order, seen, *cells, error if isfinite(finest.error) else "—", format_duration(finest.time_s)]
 
 
 def _beyond(result: WorkPrecision) -> Iterator[Any]:
@@ -194,7 +194,7 @@ def programs(result: WorkPrecision, error: float) -> Iterator[str]:
             ladder, price = best[program]
             name = f"{_OWN} {ladder.name}" if program == _OWN else ladder.name
             times = f", {float(f'{price.value / own[1].value:.2g}'):g} times as long" if own and program != _OWN else ""
-            yield f"  {name}: {in_words(price.value)}{times}{' (extrapolated)' if price.extrapolated else ''}"
+            yield f"  {name}: {format_duration(price.value)}{times}{' (extrapolated)' if price.extrapolated else ''}"
         else:
             ended = dict.fromkeys(each.ended for each in result.ladders if _program(each) == program)
             yield f"  {program}: reached by no run ({'; '.join(ended)})"
@@ -202,11 +202,11 @@ def programs(result: WorkPrecision, error: float) -> Iterator[str]:
     yield from (f"  left out: {each}" for each in result.left_out)
 
 
-def _program(ladder: Ladder) -> str:
+def _program(ladder: ToleranceLadder) -> str:
     """The program that a ladder is of."""
     return ladder.method.split(" ")[0] if ladder.peer else _OWN
 
 
 def _price(seconds: float, extrapolated: bool, least: bool) -> str:
-    words = f"({in_words(seconds)})" if extrapolated else in_words(seconds)
+    words = f"({format_duration(seconds)})" if extrapolated else format_duration(seconds)
     return f"{words}{' *' if least else ''}"

@@ -14,8 +14,8 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.errors import RobotDynError
+from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.magnitude import Magnitudes, magnitudes
-from robot_dyn.lagrange.manipulator import Lagrangian
 from robot_dyn.lagrange.scale import (
     acceleration_entries,
     derivative_entries,

@@ -18,8 +18,8 @@ from robot_dyn.cross_check.agreement import Agreement, Comparison, Pair, worst_b
 from robot_dyn.cross_check.second_reading import second_reading
 from robot_dyn.description.inertial_parameters import parameter_names
 from robot_dyn.errors import SingularError
+from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.magnitude import Magnitudes, magnitudes
-from robot_dyn.lagrange.manipulator import Lagrangian
 from robot_dyn.lagrange.recursions.articulated_body import articulated_body
 from robot_dyn.lagrange.scale import acceleration_norm, diagonal_scale, mass_norm, solved_tolerance
 from robot_dyn.model.robot import Robot
@@ -127,9 +127,9 @@ def _forward_pairs(robot: Robot, own: Lagrangian, state: dict[str, np.ndarray], 
     q, v, tau = (state[name] for name in ("q", "v", "tau"))
     size, pairs = magnitudes(own.linkage, q), []
     try:
-        roads = {"forward_dynamics": own.forward_dynamics(q, v, tau)}
+        implementations = {"forward_dynamics": own.forward_dynamics(q, v, tau)}
         if robot.couplings.trivial:
-            roads["forward_dynamics (articulated body)"] = articulated_body(own.linkage, q, v, tau)
+            implementations["forward_dynamics (articulated body)"] = articulated_body(own.linkage, q, v, tau)
     except SingularError:
         return []
     M = own.M(q)
@@ -137,7 +137,7 @@ def _forward_pairs(robot: Robot, own: Lagrangian, state: dict[str, np.ndarray], 
     a, C, N = robot.forward_dynamics(q, v, tau), own.C(q, v), own.N(q)
     of_torque = FORWARD_DYNAMICS.terms(size, {"v": np.abs(v), "tau": np.abs(tau)})
     terms = acceleration_norm(M, (tau, C @ v, N), of_torque)
-    for quantity, b in roads.items():
+    for quantity, b in implementations.items():
         weight = np.abs(a - b) * np.sqrt(np.diagonal(M))
         joint = int(np.argmax(weight))  # names the joint; the error is that of the whole vector, in the norm of M
         error = mass_norm(M, a - b)

@@ -105,28 +105,37 @@ def stepper(m: int, rows: int, bounded: int) -> ControlledStepper:
     return ControlledStepper(begin, step, error, accept, dense, coefficients(), work, _ERROR_ORDER)
 
 
-def begin(f: Any, c: Coefficients, t: Any, y: Array, p: Array, own: Array, work: Work) -> int:
+def begin(f: Any, c: Coefficients, t: Any, y: Array, p: Array, run_parameters: Array, work: Work) -> int:
     """The first stage."""
-    evaluate(f.rate, t, y, p, own, work.K[0])
+    evaluate(f.rate, t, y, p, run_parameters, work.K[0])
     return 1
 
 
 def stage(
-    f: Any, c: Coefficients, i: int, t: Any, h: Any, y: Array, p: Array, own: Array, x: Array, work: Work
+    f: Any, c: Coefficients, i: int, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, x: Array, work: Work
 ) -> None:
     """Stage i, its state in x."""
     combination(x, y, h, c.a[i], work.K, i)
-    evaluate(f.rate, t + c.c[i] * h, x, p, own, work.K[i])
+    evaluate(f.rate, t + c.c[i] * h, x, p, run_parameters, work.K[i])
     subtract(work.K[i], work.K[0])
 
 
 def step(
-    f: Any, c: Coefficients, t: Any, h: Any, y: Array, p: Array, own: Array, after: Array, work: Work, lost: Array
+    f: Any,
+    c: Coefficients,
+    t: Any,
+    h: Any,
+    y: Array,
+    p: Array,
+    run_parameters: Array,
+    after: Array,
+    work: Work,
+    lost: Array,
 ) -> int:
     """A trial; see `ControlledStepper`."""
     lost[0] = 0
     for i in range(1, _STAGES):
-        stage(f, c, i, t, h, y, p, own, after, work)
+        stage(f, c, i, t, h, y, p, run_parameters, after, work)
     combination(after, y, h, c.b, work.K, _STAGES)
     return _STAGES - 1
 
@@ -143,19 +152,23 @@ def error(c: Coefficients, h: Any, y: Array, after: Array, work: Work, rtol: flo
     return abs(h) * large * large / np.sqrt(large * large + 0.01 * small * small)
 
 
-def accept(f: Any, c: Coefficients, t: Any, h: Any, y: Array, p: Array, own: Array, after: Array, work: Work) -> int:
+def accept(
+    f: Any, c: Coefficients, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Work
+) -> int:
     """The rate at the end; see `ControlledStepper`."""
-    evaluate(f.rate, t + h, after, p, own, work.last)
+    evaluate(f.rate, t + h, after, p, run_parameters, work.last)
     return 1
 
 
-def dense(f: Any, c: Coefficients, t: Any, h: Any, y: Array, p: Array, own: Array, after: Array, work: Work) -> int:
+def dense(
+    f: Any, c: Coefficients, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Work
+) -> int:
     """The dense output, from three further stages; see `ControlledStepper`."""
     F = work.F
     copy(work.K[_STAGES], work.last)
     subtract(work.K[_STAGES], work.K[0])
     for i in range(_STAGES + 1, _EXTENDED):
-        stage(f, c, i, t, h, y, p, own, F[0], work)
+        stage(f, c, i, t, h, y, p, run_parameters, F[0], work)
     copy(F[0], after)
     subtract(F[0], y)
     combination(F[1], work.zero, h, c.b, work.K, 1)

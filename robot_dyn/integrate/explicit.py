@@ -27,15 +27,15 @@ class Stages(NamedTuple):
 
 
 def explicit_step(
-    f: RightSide, tableau: Coefficients, t: Any, h: Any, y: Array, p: Array, own: Array, after: Array, work: Stages,
-    lost: Array,
+    f: RightSide, tableau: Coefficients, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array,
+    work: Stages, lost: Array,
 ) -> int:  # fmt: skip
     """A step of an explicit Runge–Kutta method; arguments as of `Stepper`."""
     K, s = work.K, len(tableau.c)
-    evaluate(f.rate, t, y, p, own, K[0])
+    evaluate(f.rate, t, y, p, run_parameters, K[0])
     for i in range(1, s):
         combination(after, y, h, tableau.a[i], K, i)
-        evaluate(f.rate, t + tableau.c[i] * h, after, p, own, K[i])
+        evaluate(f.rate, t + tableau.c[i] * h, after, p, run_parameters, K[i])
     combination(after, y, h, tableau.b, K, s)
     return s
 
@@ -77,11 +77,20 @@ class Start(NamedTuple):
 
 
 def semi_implicit_step(
-    f: RightSide, start: Start, t: Any, h: Any, y: Array, p: Array, own: Array, after: Array, work: Stages, lost: Array
+    f: RightSide,
+    start: Start,
+    t: Any,
+    h: Any,
+    y: Array,
+    p: Array,
+    run_parameters: Array,
+    after: Array,
+    work: Stages,
+    lost: Array,
 ) -> int:
     """A step of semi-implicit Euler; arguments as of `Stepper`."""
     n = start.n
-    evaluate(f.rate, t, y, p, own, work.K[0])
+    evaluate(f.rate, t, y, p, run_parameters, work.K[0])
     combination(after, y, h, start.b, work.K, 1)
     combination(after[:n], y[:n], h, start.b, after[n : 2 * n].reshape((1, n, y.shape[1])), 1)
     return 1

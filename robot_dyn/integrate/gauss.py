@@ -68,8 +68,8 @@ class Increments(NamedTuple):
 
 
 def gauss_step(
-    f: RightSide, tableau: Coefficients, t: Any, h: Any, y: Array, p: Array, own: Array, after: Array, work: Increments,
-    lost: Array,
+    f: RightSide, tableau: Coefficients, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array,
+    work: Increments, lost: Array,
 ) -> int:  # fmt: skip
     """A step of a Gauss method; arguments as of `Stepper`."""
     Z, m, s = work.Z, len(y), len(tableau.c)
@@ -79,7 +79,7 @@ def gauss_step(
     while going > 0 and rounds < MOST_ITERATIONS:
         for i in range(s):
             combination(after, y, tableau.one, tableau.a[i], Z, s)
-            evaluate(f.rate, t + tableau.c[i] * h, after, p, own, work.K[0])
+            evaluate(f.rate, t + tableau.c[i] * h, after, p, run_parameters, work.K[0])
             np.multiply(work.K[0, :m], h, work.new[i])
         going = settle(Z, work.new, y, work.least, work.stale, work.state, work.epsilon)
         rounds += 1

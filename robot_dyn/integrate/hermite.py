@@ -61,10 +61,19 @@ def step_of(inner: Callable[..., int]) -> Callable[..., int]:
     """The step of a method, of its coefficients and arrays among these."""
 
     def step(
-        f: Any, c: Numbers, t: Any, h: Any, y: Array, p: Array, own: Array, after: Array, work: Work, lost: Array
+        f: Any,
+        c: Numbers,
+        t: Any,
+        h: Any,
+        y: Array,
+        p: Array,
+        run_parameters: Array,
+        after: Array,
+        work: Work,
+        lost: Array,
     ) -> int:
         lost[0] = 0
-        return inner(f, c.method, t, h, y, p, own, after, work.method, lost)
+        return inner(f, c.method, t, h, y, p, run_parameters, after, work.method, lost)
 
     return step
 
@@ -72,9 +81,9 @@ def step_of(inner: Callable[..., int]) -> Callable[..., int]:
 _known_step = cache(step_of)  # machine code is made once for a function
 
 
-def begin(f: Any, c: Numbers, t: Any, y: Array, p: Array, own: Array, work: Work) -> int:
+def begin(f: Any, c: Numbers, t: Any, y: Array, p: Array, run_parameters: Array, work: Work) -> int:
     """The rate at the start."""
-    evaluate(f.rate, t, y, p, own, work.K[0])
+    evaluate(f.rate, t, y, p, run_parameters, work.K[0])
     return 1
 
 
@@ -83,13 +92,17 @@ def error(c: Numbers, h: Any, y: Array, after: Array, work: Work, rtol: float, a
     return 0.0
 
 
-def accept(f: Any, c: Numbers, t: Any, h: Any, y: Array, p: Array, own: Array, after: Array, work: Work) -> int:
+def accept(
+    f: Any, c: Numbers, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Work
+) -> int:
     """The rate at the end."""
-    evaluate(f.rate, t + h, after, p, own, work.last)
+    evaluate(f.rate, t + h, after, p, run_parameters, work.last)
     return 1
 
 
-def dense(f: Any, c: Numbers, t: Any, h: Any, y: Array, p: Array, own: Array, after: Array, work: Work) -> int:
+def dense(
+    f: Any, c: Numbers, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Work
+) -> int:
     """The cubic."""
     F = work.F
     copy(work.K[1], work.last)

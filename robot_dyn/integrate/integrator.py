@@ -166,7 +166,7 @@ class Integrator(ABC):
         K, J = np.empty((1, rows, 1), kind.dtype), np.empty((m + 1, m, 1), kind.dtype)
 
         def step(
-            f: RightSide, _: Any, t: Any, h: Any, y: Array, p: Array, own: Array, after: Array, work: Latest,
+            f: RightSide, _: Any, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Latest,
             lost: Array,
         ) -> int:  # fmt: skip
             evaluations = 0
@@ -174,7 +174,7 @@ class Integrator(ABC):
             def one(t: Any, x: Array) -> Array:
                 nonlocal evaluations
                 evaluations += 1
-                evaluate(f.rate, t, x[:, None], p, own, K[0])
+                evaluate(f.rate, t, x[:, None], p, run_parameters, K[0])
                 return K[0, :m, 0].copy()
 
             def rate(t: Any, x: Array) -> Array:
@@ -183,7 +183,7 @@ class Integrator(ABC):
                 )
 
             def derivatives(t: Any, x: Array) -> Array:
-                evaluate(f.jacobian, t, x[:, None], p, own, J)
+                evaluate(f.jacobian, t, x[:, None], p, run_parameters, J)
                 return J[:, :, 0].copy()
 
             exact = derivatives if self.needs_jacobian else None
@@ -216,10 +216,10 @@ class PlainMethod(Integrator):
         step, coefficients, work = self.stepper(kind, m, system.n, m, x.shape[1])
         after, lost = np.empty_like(x), np.zeros(x.shape[1], np.int64)
 
-        def rate(t: Any, x: Array, p: Any, own: Any, out: Array) -> None:
+        def rate(t: Any, x: Array, p: Any, run_parameters: Any, out: Array) -> None:
             out[...] = system.rate(t, x.T.reshape(y.shape)).reshape(-1, m).T
 
-        def jacobian(t: Any, x: Array, p: Any, own: Any, out: Array) -> None:
+        def jacobian(t: Any, x: Array, p: Any, run_parameters: Any, out: Array) -> None:
             made = system.derivatives(t, x.T.reshape(y.shape), t + h)
             out[...] = np.moveaxis(made.reshape(m + 1, -1, m), 1, 2)
 

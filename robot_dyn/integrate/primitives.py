@@ -20,7 +20,7 @@ NOISE = 1e3  # roundings of the largest entry that an increment may keep, as whe
 GOING, SETTLED, LOST = 1, 0, 2  # an iteration: not yet ended; at rounding; overflowed
 
 
-def evaluate(function: Any, t: Any, y: Array, p: Array, own: Array, out: Array) -> None:
+def evaluate(function: Any, t: Any, y: Array, p: Array, run_parameters: Array, out: Array) -> None:
     """Write a function of (t, y, p, own) into `out`; in machine code the function is an address.
 
     Args:
@@ -28,10 +28,10 @@ def evaluate(function: Any, t: Any, y: Array, p: Array, own: Array, out: Array) 
         t: Time.
         y: State, (m, W).
         p: Numbers that all runs share, (P,).
-        own: Numbers of each run, (O, W).
+        run_parameters: Numbers of each run, (O, W).
         out: Where the result goes, (r, W).
     """
-    function(t, y, p, own, out)
+    function(t, y, p, run_parameters, out)
 
 
 def combination(x: Array, y: Array, h: Any, weights: Array, K: Array, count: int) -> None:
@@ -108,14 +108,14 @@ def settle(Z: Array, new: Array, y: Array, least: Array, stale: Array, state: Ar
     """
     going = state == GOING
     new = _exact(new)
-    change, own, size = (np.abs(_middle(x)).max(axis=0) for x in (new - Z, new, y[None]))
+    change, run_parameters, size = (np.abs(_middle(x)).max(axis=0) for x in (new - Z, new, y[None]))
     Z[..., going] = new[..., going]
-    shrinks = ((change < least) & (change > epsilon * own)).any(axis=0)
+    shrinks = ((change < least) & (change > epsilon * run_parameters)).any(axis=0)
     least[:, going] = np.minimum(least, change)[:, going]
     stale[going] = np.where(shrinks, 0, stale + 1)[going]
     # an increment of some power of epsilon between 1/2 and 1 is rounding of Φ: far below any error that matters
     slack = NOISE * epsilon * np.maximum(1.0, size.max(axis=0))
-    rounding = (change <= slack + epsilon ** (2 / 3) * (size + own)).all(axis=0)
+    rounding = (change <= slack + epsilon ** (2 / 3) * (size + run_parameters)).all(axis=0)
     largest = change.max(axis=0)
     ended = (largest == 0) | ((stale >= PATIENCE) & rounding)
     state[going] = np.where(~np.isfinite(largest), LOST, np.where(ended, SETTLED, GOING))[going]

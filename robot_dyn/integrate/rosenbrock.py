@@ -114,22 +114,22 @@ class Linear(NamedTuple):
     error: Array
 
 
-def begin(f: RightSide, table: Numbers, t: Any, y: Array, p: Array, own: Array, work: Linear) -> int:
+def begin(f: RightSide, table: Numbers, t: Any, y: Array, p: Array, run_parameters: Array, work: Linear) -> int:
     """What depends on t and y alone: f and its derivatives."""
-    evaluate(f.rate, t, y, p, own, work.K[0])
-    differentiate(f, t, y, p, own, work)
+    evaluate(f.rate, t, y, p, run_parameters, work.K[0])
+    differentiate(f, t, y, p, run_parameters, work)
     return 1
 
 
-def differentiate(f: RightSide, t: Any, y: Array, p: Array, own: Array, work: Linear) -> None:
+def differentiate(f: RightSide, t: Any, y: Array, p: Array, run_parameters: Array, work: Linear) -> None:
     """The derivatives at t and y."""
-    evaluate(f.jacobian, t, y, p, own, work.J)
+    evaluate(f.jacobian, t, y, p, run_parameters, work.J)
     work.at[0] = t
     copy(work.y, y)
 
 
 def stages(
-    f: RightSide, table: Numbers, t: Any, h: Any, y: Array, p: Array, own: Array, after: Array, work: Linear,
+    f: RightSide, table: Numbers, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Linear,
     lost: Array,
 ) -> int:  # fmt: skip
     """The step from there."""
@@ -139,7 +139,7 @@ def stages(
     for i in range(len(table.m)):
         if i > 0:
             combination(after, y, table.one, table.a[i], U, i)
-            evaluate(f.rate, t + table.alpha[i] * h, after, p, own, K[2])
+            evaluate(f.rate, t + table.alpha[i] * h, after, p, run_parameters, K[2])
         combination(work.known, work.zero, h_gamma, table.f[i], K, 3 if i > 0 else 2)
         combination(U[i], work.known, table.gamma, table.c[i], U, i)
         solve(work.A, work.rows, U[i])
@@ -148,16 +148,16 @@ def stages(
 
 
 def rosenbrock_step(
-    f: RightSide, table: Numbers, t: Any, h: Any, y: Array, p: Array, own: Array, after: Array, work: Linear,
+    f: RightSide, table: Numbers, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Linear,
     lost: Array,
 ) -> int:  # fmt: skip
     """A step of a Rosenbrock method; arguments as of `Stepper`."""
-    first = begin(f, table, t, y, p, own, work)
-    return first + stages(f, table, t, h, y, p, own, after, work, lost)
+    first = begin(f, table, t, y, p, run_parameters, work)
+    return first + stages(f, table, t, h, y, p, run_parameters, after, work, lost)
 
 
 def trial(
-    f: RightSide, table: Numbers, t: Any, h: Any, y: Array, p: Array, own: Array, after: Array, work: Linear,
+    f: RightSide, table: Numbers, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Linear,
     lost: Array,
 ) -> int:  # fmt: skip
     """A step from `begin`, or from the end of the last one; see `ControlledStepper`."""
@@ -165,8 +165,8 @@ def trial(
     for e in range(len(y)):
         known &= work.y[e, 0] == y[e, 0]
     if not known:
-        differentiate(f, t, y, p, own, work)
-    return stages(f, table, t, h, y, p, own, after, work, lost)
+        differentiate(f, t, y, p, run_parameters, work)
+    return stages(f, table, t, h, y, p, run_parameters, after, work, lost)
 
 
 def error(table: Numbers, h: Any, y: Array, after: Array, work: Linear, rtol: float, atol: float) -> float:
@@ -176,15 +176,15 @@ def error(table: Numbers, h: Any, y: Array, after: Array, work: Linear, rtol: fl
 
 
 def accept(
-    f: RightSide, table: Numbers, t: Any, h: Any, y: Array, p: Array, own: Array, after: Array, work: Linear
+    f: RightSide, table: Numbers, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Linear
 ) -> int:
     """The rate at the end; see `ControlledStepper`."""
-    evaluate(f.rate, t + h, after, p, own, work.last)
+    evaluate(f.rate, t + h, after, p, run_parameters, work.last)
     return 1
 
 
 def dense(
-    f: RightSide, table: Numbers, t: Any, h: Any, y: Array, p: Array, own: Array, after: Array, work: Linear
+    f: RightSide, table: Numbers, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Linear
 ) -> int:
     """The polynomial between; see `ControlledStepper`."""
     F = work.F

@@ -85,7 +85,7 @@ def control_of(stepper: ControlledStepper, rtol: float, atol: float, longest: fl
 
 
 def first_step(
-    f: Any, t: float, end: float, y: Array, p: Array, own: Array, after: Array, work: Any, control: Array
+    f: Any, t: float, end: float, y: Array, p: Array, run_parameters: Array, after: Array, work: Any, control: Array
 ) -> int:
     """The length of the first step, from the rate at its start and after a short step of Euler's; 1 evaluation.
 
@@ -99,7 +99,7 @@ def first_step(
     h = min(h, abs(end - t), control[At.LONGEST])
     signed = h if end >= t else -h
     combination(after, y, signed, _ONE, work.K, 1)
-    evaluate(f.rate, t + signed, after, p, own, work.last)
+    evaluate(f.rate, t + signed, after, p, run_parameters, work.last)
     subtract(work.last, work.K[0])
     steepest = max(slope, norm(work.last[:k], x, x, rtol, atol) / h)
     other = (0.01 / steepest) ** control[At.EXPONENT] if 1e-15 < steepest < np.inf else max(1e-6, 1e-3 * h)
@@ -138,14 +138,14 @@ def chosen_step(step: Callable[..., int], error: Callable[..., float]) -> Callab
     """
 
     def choose(
-        f: Any, c: Any, t: float, end: float, y: Array, p: Array, own: Array, after: Array, work: Any, lost: Array,
-        control: Array, mesh: Array,
+        f: Any, c: Any, t: float, end: float, y: Array, p: Array, run_parameters: Array, after: Array, work: Any,
+        lost: Array, control: Array, mesh: Array,
     ) -> tuple[int, int]:  # fmt: skip
         end = following(mesh, control, t, end)
         if control[At.RTOL] + control[At.ATOL] == 0.0:
             control[At.END], control[At.TAKEN] = end, end - t
             h = end - t
-            made = step(f, c, t, h, y, p, own, after, work, lost)
+            made = step(f, c, t, h, y, p, run_parameters, after, work, lost)
             return made, Choice.TAKEN if lost[0] == 0 and finite(after) else Choice.TOO_SMALL
         left, evaluations, rejected = abs(end - t), 0, False
         wanted = min(control[At.NEXT], control[At.LONGEST])
@@ -156,7 +156,7 @@ def chosen_step(step: Callable[..., int], error: Callable[..., float]) -> Callab
             if h < least and not reaches:
                 return evaluations, Choice.TOO_SMALL
             signed = h if end >= t else -h
-            evaluations += step(f, c, t, signed, y, p, own, after, work, lost)
+            evaluations += step(f, c, t, signed, y, p, run_parameters, after, work, lost)
             e = error(c, signed, y, after, work, control[At.RTOL], control[At.ATOL]) if lost[0] == 0 else np.inf
             if e <= 1.0:
                 break

@@ -73,14 +73,15 @@ class Work(NamedTuple):
 
 
 def time_step(
-    f: RightSide, rows: Problem, t: Any, h: Any, y: Array, p: Array, own: Array, after: Array, work: Work, lost: Array
+    f: RightSide, rows: Problem, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Work,
+    lost: Array,
 ) -> int:  # fmt: skip
     """A step; arguments as of `Stepper`. The places of the step before are where the solution starts."""
     n, m, made = len(work.M), len(y), work.made
     copy(work.y[:m], y)
     for b in range(y.shape[1]):
         work.y[m, b], lost[b] = h, 0
-    evaluate(f.step, t + h / 2, work.y, p, own, made)
+    evaluate(f.step, t + h / 2, work.y, p, run_parameters, made)
     copy(after, made[:m])
     alone = False
     for b in range(y.shape[1]):

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import final
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.lagrange.manipulator import Lagrangian
+from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.summand import coriolis_matrix, gravity_torque, mass_matrix, of_links
 from robot_dyn.validate import joint_values
 

@@ -15,8 +15,8 @@ import numpy as np
 
 from robot_dyn.errors import QueryError
 from robot_dyn.lagrange.exact import RESOLUTION, Exact, entry_units
+from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.magnitude import magnitudes
-from robot_dyn.lagrange.manipulator import Lagrangian
 from robot_dyn.lagrange.scale import acceleration_norm, solved_norm, solved_tolerance
 from robot_dyn.queries.quantity import FORWARD_DYNAMICS, INVERSE_DYNAMICS, MOST_DIGITS, C, M, N, Quantity, by_name
 from robot_dyn.validate import choice, shaped

@@ -17,7 +17,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import Arithmetic, Array, Ball, midpoint, radius
 from robot_dyn.errors import UndecidedError
-from robot_dyn.lagrange.manipulator import Lagrangian
+from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.scale import diagonal_scale, floored, joint_units, mass_norm, scaled, solved_norm
 from robot_dyn.lagrange.tree import Described
 from robot_dyn.queries.quantity import CORIOLIS_TORQUE, MOST_DIGITS, M, N, Quantity

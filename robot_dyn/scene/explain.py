@@ -21,7 +21,7 @@ from robot_dyn.scene.loop import BLOCKS
 from robot_dyn.scene.scene import Scene
 from robot_dyn.scene.schema import Part
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.results.origin import edits_of_machine_code
+from robot_dyn.simulation.results.provenance import edits_of_machine_code
 from robot_dyn.simulation.setup.setup import Setup
 
 _TERMS = {kind_of(part): part.term for part in ACTING}
@@ -112,14 +112,14 @@ def _machine_code(setup: Setup) -> Iterator[str]:
 
 def _of_tick(control: Control, setup: Setup) -> Iterator[str]:
     """What a tick costs, and what of it are the loop and the slow controller."""
-    from robot_dyn.simulation.compiled.making import machine
+    from robot_dyn.simulation.compiled.build import compiled_equation
 
     controller: Any = setup.controller
     inside: Any = controller.controller if control.loops else controller
     inside = inside if control.slow is None else inside.fast
     try:
         counts = [
-            len(machine(StateEquation(setup.plant, each).in_a_mode, None).equations.programs["tick"])
+            len(compiled_equation(StateEquation(setup.plant, each).in_a_mode, None).equations.programs["tick"])
             for each in dict.fromkeys((controller, inside))
         ]
     except RobotDynError:  # the reason is told of the acceleration, or the run is interpreted

@@ -24,8 +24,8 @@ from robot_dyn.scene.complaint import complaint, located, where
 from robot_dyn.scene.control import AnyReference, Control, Hold, Sampled, ViaPoints
 from robot_dyn.scene.declared import Acting
 from robot_dyn.scene.effects import AnyEffect, Edit, kinds
-from robot_dyn.scene.own_effects import Makers, OwnEffect, check_makers, own_or
 from robot_dyn.scene.schema import NotNegative, Part, PerJoint, PlacedError, Positive, Truth, per_joint, placed
+from robot_dyn.scene.user_effects import Makers, OwnEffect, check_makers, own_or
 from robot_dyn.simulation.setup.setup import STEP_S, Setup
 
 MAX_BYTES = 2**20

@@ -16,20 +16,20 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, STIFF
 from robot_dyn.integrate.time_stepping import TimeStepping
 from robot_dyn.queries.dynamics import Dynamics
-from robot_dyn.simulation.compiled.choice import choose, most_interpreted
-from robot_dyn.simulation.diagnostics.observed import observer_of
+from robot_dyn.simulation.compiled.engine_choice import choose, most_interpreted
+from robot_dyn.simulation.derived import Results
+from robot_dyn.simulation.diagnostics.step_remarks import observer_of
 from robot_dyn.simulation.dynamics.declarations import named
-from robot_dyn.simulation.estimate.accuracy import run_to
 from robot_dyn.simulation.estimate.estimate import estimate
+from robot_dyn.simulation.estimate.requested_accuracy import run_to
 from robot_dyn.simulation.observation.observer import Observer
 from robot_dyn.simulation.observation.remarks import Remark
-from robot_dyn.simulation.results.error import ErrorEstimate, no_estimate
+from robot_dyn.simulation.results.error_estimate import ErrorEstimate, no_estimate
 from robot_dyn.simulation.results.trajectory import Statistics, Trajectory
-from robot_dyn.simulation.results_of_run import Results
 from robot_dyn.simulation.run.event_run import TooLongError
+from robot_dyn.simulation.run.make_run import prepared
 from robot_dyn.simulation.run.outcome import Ending, Outcome
-from robot_dyn.simulation.run.prepared import prepared
-from robot_dyn.simulation.run.record import Record
+from robot_dyn.simulation.run.recording import Recording
 from robot_dyn.simulation.run.stiffness import StiffError
 from robot_dyn.simulation.run.switched_run import AccumulationError
 from robot_dyn.simulation.setup.options import Options, setup_of, starts, takes_options
@@ -39,7 +39,7 @@ from robot_dyn.validate import function
 from robot_dyn.values import derived, kept
 
 if TYPE_CHECKING:
-    from robot_dyn.simulation.compiled.machine import Machine
+    from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
 
 
 @takes_options
@@ -78,7 +78,9 @@ def simulate(
     finished, setup = perf_counter(), ran.setup
     record, error, spent, companions = _with_estimate(ran, on_progress)
     estimated = perf_counter()
-    results = Results(setup, record, ran.observer, error, dict(setup.about), ran.machine is not None, ran.said)
+    results = Results(
+        setup, record, ran.observer, error, dict(setup.about), ran.compiled_equation is not None, ran.said
+    )
     waits = setup.is_value and record.outcome.ending is Ending.FINISHED
     names = () if waits else (each.name for each in fields(Trajectory) if each.name != "statistics")
     read = {name: getattr(results, name) for name in names}
@@ -97,7 +99,7 @@ class _Ran(NamedTuple):
 
     Attributes:
         setup: Of the method that made it.
-        machine, engine: As of `choose`.
+        compiled_equation, engine: As of `choose`.
         observer: What saw it.
         record: What it left behind.
         ready: When it began, on the clock, put later by what it compiled.
@@ -105,10 +107,10 @@ class _Ran(NamedTuple):
     """
 
     setup: Setup
-    machine: Machine | None
+    compiled_equation: CompiledStateEquation | None
     engine: str
     observer: Observer
-    record: Record
+    record: Recording
     ready: float
     said: tuple[Remark, ...]
 
@@ -117,18 +119,34 @@ def _by_choice(setup: Setup, on_progress: Callable[[float], object] | None) -> _
     """The run of a setup: begun again where another engine, or another method, turns out to be the one for it."""
     seen, said, chooses = 0, (), setup.integrator.name == AUTO
     while True:
-        machine, engine = _chosen(setup, seen)
+        compiled_equation, engine = _chosen(setup, seen)
         ready = perf_counter()
         observer = observer_of(setup)
-        most = inf if seen else most_interpreted(setup, setup.equation, machine)  # else what cannot compile never ends
+        most = (
+            inf if seen else most_interpreted(setup, setup.equation, compiled_equation)
+        )  # else what cannot compile never ends
         try:
             run = prepared(
-                setup, setup.equation, machine, on_progress=on_progress, observer=observer, most=most, chooses=chooses
+                setup,
+                setup.equation,
+                compiled_equation,
+                on_progress=on_progress,
+                observer=observer,
+                most=most,
+                chooses=chooses,
             )
-            before = _spent_on_loops(machine)
+            before = _spent_on_loops(compiled_equation)
             record = run.record()
             observer.end()
-            return _Ran(setup, machine, engine, observer, record, ready + _spent_on_loops(machine) - before, said)
+            return _Ran(
+                setup,
+                compiled_equation,
+                engine,
+                observer,
+                record,
+                ready + _spent_on_loops(compiled_equation) - before,
+                said,
+            )
         except TooLongError as found:
             seen = found.evaluations
         except StiffError as found:
@@ -145,7 +163,7 @@ def _nonsmooth(setup: Setup) -> Setup:
     return replace(setup, integrator=TimeStepping())
 
 
-def _chosen(setup: Setup, seen: float) -> tuple[Machine | None, str]:
+def _chosen(setup: Setup, seen: float) -> tuple[CompiledStateEquation | None, str]:
     """As of `choose`, which chooses machine code once; that of events is compared with them before each run."""
     found = setup.known.get(choose) or choose(setup, setup.equation, seen)
     if found[0] is not None and not setup.events:
@@ -155,7 +173,7 @@ def _chosen(setup: Setup, seen: float) -> tuple[Machine | None, str]:
 
 def _with_estimate(
     ran: _Ran, on_progress: Callable[[float], object] | None
-) -> tuple[Record, ErrorEstimate | None, int, int]:
+) -> tuple[Recording, ErrorEstimate | None, int, int]:
     """The record of a run, stopped if its estimate is; its estimated error, with evaluations and number of companions.
 
     None where no error is estimated.
@@ -165,9 +183,9 @@ def _with_estimate(
         return record, None, 0, 0
     at_the_end = None if on_progress is None else lambda _: on_progress(record.outcome.t)
 
-    def companion(pace: Any, of: Setup) -> Record:
+    def companion(pace: Any, of: Setup) -> Recording:
         nonlocal spent, companions
-        made = prepared(of, setup.equation, ran.machine, pace, at_the_end, samples=False).record()
+        made = prepared(of, setup.equation, ran.compiled_equation, pace, at_the_end, samples=False).record()
         if made.outcome.ending is Ending.STOPPED:
             raise KeyboardInterrupt
         spent, companions = spent + made.evaluations, companions + 1
@@ -183,9 +201,9 @@ def _with_estimate(
     return record, error, spent, companions
 
 
-def _spent_on_loops(machine: Machine | None) -> float:
+def _spent_on_loops(compiled_equation: CompiledStateEquation | None) -> float:
     """On the clock of what is compiled in the first call of a loop, which is no time of the run."""
-    if machine is None:
+    if compiled_equation is None:
         return 0.0
     from robot_dyn.codegen.loops.call import spent_on_loops
 

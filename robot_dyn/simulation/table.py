@@ -12,10 +12,10 @@ import numpy as np
 from robot_dyn.errors import shown
 from robot_dyn.files import Kind, save, target
 from robot_dyn.queries.units import unit
-from robot_dyn.simulation.results.origin import joint_types
+from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.run_file import RunFileError
 from robot_dyn.simulation.results.trajectory import Trajectory
-from robot_dyn.simulation.rollouts.rollout_result import Rollouts
+from robot_dyn.simulation.rollouts.result import Rollouts
 
 TABLE = Kind("a table of a run", ".csv", b"t [s]")
 RUNS = Kind("a table of runs", ".csv", b"run,")

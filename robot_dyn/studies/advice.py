@@ -36,7 +36,7 @@ from robot_dyn.simulation.dynamics.stability import (
     worst,
 )
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.results.error import Verdict
+from robot_dyn.simulation.results.error_estimate import Verdict
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.setup.options import Options, setup_of, starts, takes_options

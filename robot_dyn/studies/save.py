@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 from robot_dyn import files
 from robot_dyn.result import Result, json_text
-from robot_dyn.studies.certificate import certificate_diagram
+from robot_dyn.studies.certificate import diagram as certificate_diagram
 from robot_dyn.studies.certificate.certificate import Certificate
-from robot_dyn.studies.costs import cost_diagram
+from robot_dyn.studies.costs import diagram as cost_diagram
 from robot_dyn.studies.costs.cost import Cost
 from robot_dyn.studies.sheet import ResultError
 from robot_dyn.studies.work_precision_diagram import diagram

@@ -15,7 +15,7 @@ import numpy as np
 from robot_dyn.description.packages import searched
 from robot_dyn.errors import QueryError, RobotDynError
 from robot_dyn.simulation.observation.remarks import lines
-from robot_dyn.simulation.results.origin import robot_of
+from robot_dyn.simulation.results.provenance import robot_of
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.spatial import homogeneous
 from robot_dyn.validate import instance, truth

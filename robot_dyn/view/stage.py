@@ -15,8 +15,8 @@ from typing import final
 import numpy as np
 
 from robot_dyn.errors import QueryError, nearest
+from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.linkage import BASE, Body, Linkage, Pose
-from robot_dyn.lagrange.manipulator import Lagrangian
 from robot_dyn.model.robot import Robot
 from robot_dyn.spatial import homogeneous
 from robot_dyn.view import commands

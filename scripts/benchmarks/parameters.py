@@ -16,11 +16,11 @@ import robot_dyn as rd
 from benchmarks.measure import Effort, arms, row, table
 from robot_dyn.codegen.trace.right_angles import completed
 from robot_dyn.integrate.methods import method
-from robot_dyn.simulation.compiled.machine import Machine
-from robot_dyn.simulation.compiled.making import machine, machine_of_constants
+from robot_dyn.simulation.compiled.build import compiled_equation, machine_of_constants
+from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.events.transfers import Transfers
-from robot_dyn.simulation.rollouts.batch import LANES, Batch
+from robot_dyn.simulation.events.payload_events import PayloadEvents
+from robot_dyn.simulation.rollouts.lock_step import LANES, Batch
 from robot_dyn.simulation.run.fixed_step import FixedStep
 from robot_dyn.simulation.run.watch import Watch
 from robot_dyn.simulation.setup.size import MOST_BYTES
@@ -55,11 +55,11 @@ def parameters(effort: Effort) -> None:
         again = perf_counter() - began
         made = {
             "constants": machine_of_constants(_equation(setup), _rk4(setup)),
-            "inputs": machine(_equation(setup), _rk4(setup)),
+            "inputs": compiled_equation(_equation(setup), _rk4(setup)),
         }
         lanes = {
             "constants": machine_of_constants(_equation(setup), _rk4(setup), lanes=LANES),
-            "inputs": machine(_equation(setup), _rk4(setup), lanes=LANES, kept=()),
+            "inputs": compiled_equation(_equation(setup), _rk4(setup), lanes=LANES, kept=()),
         }
         counts = {kind: len(each.equations.programs["rate"]) for kind, each in made.items()}
         alone = _ratio({kind: _one(setup, each) for kind, each in made.items()}, effort)
@@ -79,10 +79,10 @@ def _rk4(setup: rd.Setup) -> Any:
     return setup.integrator
 
 
-def _one(setup: rd.Setup, made: Machine) -> Any:
+def _one(setup: rd.Setup, made: CompiledStateEquation) -> Any:
     def run() -> float:
         functions, equation = (made.equations.functions, made.parameters), made.equation
-        watch, transfers = Watch(setup, equation), Transfers(equation)
+        watch, transfers = Watch(setup, equation), PayloadEvents(equation)
         advance = FixedStep(watch, transfers, lambda _: functions, Fraction(1), made.advance())
         began = perf_counter()
         advance.record()
@@ -91,7 +91,7 @@ def _one(setup: rd.Setup, made: Machine) -> Any:
     return run
 
 
-def _many(setup: rd.Setup, made: Machine) -> Any:
+def _many(setup: rd.Setup, made: CompiledStateEquation) -> Any:
     starts = np.tile(READY, (8 * LANES, 1))
 
     def run() -> float:

@@ -9,7 +9,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.errors import EffectError
-from robot_dyn.simulation.results.error import Verdict
+from robot_dyn.simulation.results.error_estimate import Verdict
 from tests.effects.test_effect_states import MASS, SLIDER, Ramp
 
 ARM = rd.load("planar_2r")

@@ -14,7 +14,7 @@ import numpy as np
 
 import robot_dyn as rd
 from robot_dyn.codegen.parameters import with_parameters
-from robot_dyn.simulation.diagnostics.observed import KINDS
+from robot_dyn.simulation.diagnostics.step_remarks import KINDS
 from robot_dyn.simulation.observation.remarks import Kind, Remark
 from tests.batches.scenes import Batch, batch
 

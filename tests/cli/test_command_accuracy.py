@@ -76,7 +76,7 @@ def test_mistakes_are_told_in_one_line_before_the_work(scene, tmp_path, monkeypa
 
 WATCHED = """
 import sys
-from robot_dyn.studies import measured
+from robot_dyn.studies.work_precision_diagram import measured
 from robot_dyn.cli import main
 
 walk = measured._walk

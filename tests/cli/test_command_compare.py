@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from robot_dyn.lagrange.manipulator import Lagrangian
+from robot_dyn.lagrange.lagrangian import Lagrangian
 from tests.command import MAIN, ROOT, document, refusal, run, said, spawn
 
 
@@ -55,7 +55,7 @@ def test_compare_says_where_the_roads_disagree(monkeypatch: pytest.MonkeyPatch):
 
 
 def test_a_process_of_compare_exits_with_1_when_the_roads_disagree():
-    wrong = "from robot_dyn.lagrange.manipulator import Lagrangian as L; N = L.N; L.N = lambda self, q: N(self, q) + 1"
+    wrong = "from robot_dyn.lagrange.lagrangian import Lagrangian as L; N = L.N; L.N = lambda self, q: N(self, q) + 1"
     done = spawn("compare", "pendulum", "--samples", "1", code=f"{wrong}\n{MAIN}")
     assert (done.returncode, done.stderr) == (1, b"") and b"DISAGREE" in done.stdout
 

@@ -71,7 +71,7 @@ def test_mistakes_are_told_in_one_line_before_the_work(scene, tmp_path, monkeypa
 
 WATCHED = """
 import sys
-from robot_dyn.studies import cost
+from robot_dyn.studies.costs import cost
 from robot_dyn.cli import main
 
 turns = cost.in_turns

@@ -14,9 +14,10 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.codegen.store.definition import definition
-from robot_dyn.simulation.compiled import making, programs
-from robot_dyn.simulation.compiled.making import machine
-from robot_dyn.simulation.compiled.recent import Recent
+from robot_dyn.simulation.compiled import build
+from robot_dyn.simulation.compiled import programs
+from robot_dyn.simulation.compiled.build import compiled_equation
+from robot_dyn.simulation.compiled.lru_by_identity import LRUByIdentity
 from robot_dyn.simulation.compiled.structure import structure
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from tests.codegen.test_kernel import Memory
@@ -306,10 +307,10 @@ def test_numbers_that_a_controller_follows_and_knows_are_no_structure() -> None:
 
 def in_another_process(module: Any, store: Memory, monkeypatch: pytest.MonkeyPatch) -> str:
     """The rate of an arm with this effect, by the programs of the store if they are there."""
-    monkeypatch.setattr(making, "_equations", Recent())
-    monkeypatch.setattr(programs, "_symbols", Recent())
+    monkeypatch.setattr(build, "_equations", LRUByIdentity())
+    monkeypatch.setattr(programs, "_symbols", LRUByIdentity())
     monkeypatch.setattr(programs, "default_store", lambda: store)
-    made = machine(StateEquation(rd.Plant(ARM, [module.Drag()]), None), rd.method("rk4"))
+    made = compiled_equation(StateEquation(rd.Plant(ARM, [module.Drag()]), None), rd.method("rk4"))
     return str(made.equations.programs["rate"])
 
 

@@ -15,7 +15,7 @@ from robot_dyn.codegen import waiting
 from robot_dyn.codegen.loops.call import MachineFunction
 from robot_dyn.codegen.primitives import INSTEAD
 from robot_dyn.codegen.waiting import told
-from robot_dyn.simulation.compiled.choice import choose
+from robot_dyn.simulation.compiled.engine_choice import choose
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 
 

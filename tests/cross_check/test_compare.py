@@ -11,8 +11,8 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.cross_check.compare import compare, random_state
 from robot_dyn.errors import DescriptionError, ModelWarning, QueryError
+from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.linkage import Linkage
-from robot_dyn.lagrange.manipulator import Lagrangian
 from tests.long import robots
 
 REFUSED = {"alex_psyonic_hands", "hector", "iris_simple", "ur3_empty"}  # a mimic of nothing; nothing moves; no link

@@ -10,7 +10,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.errors import DescriptionError, ModelWarning
-from robot_dyn.simulation.results.origin import origin, robot_of
+from robot_dyn.simulation.results.provenance import origin, robot_of
 from tests.foreign import macros, markup, robots
 from tests.foreign.files import Foreign
 

@@ -10,7 +10,7 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 import robot_dyn as rd
 from robot_dyn.errors import EditError, QueryError, RobotDynError
-from robot_dyn.simulation.results.origin import robot_of
+from robot_dyn.simulation.results.provenance import robot_of
 
 TREE = rd.load("skew_tree")
 LINK = "left_lower"

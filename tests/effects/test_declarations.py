@@ -16,12 +16,12 @@ from robot_dyn.control.controller import Controller
 from robot_dyn.control.digital_loop.block import Block
 from robot_dyn.effects.effect import Effect
 from robot_dyn.errors import EffectError, TraceError
-from robot_dyn.simulation.compiled.choice import choose
-from robot_dyn.simulation.compiled.machine import MachineError
+from robot_dyn.simulation.compiled.compiled_state_equation import MachineError
+from robot_dyn.simulation.compiled.engine_choice import choose
 from robot_dyn.simulation.dynamics.declarations import undeclared
 from robot_dyn.simulation.dynamics.smoothness import LOOKS
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.results.error import Verdict
+from robot_dyn.simulation.results.error_estimate import Verdict
 from robot_dyn.simulation.results.trajectory import Trajectory
 
 ARM = rd.load("planar_2r")

@@ -14,7 +14,7 @@ from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
 from statistics import fmean
 
-from robot_dyn.simulation.estimate.accuracy import AccuracyError
+from robot_dyn.simulation.estimate.requested_accuracy import AccuracyError
 from tests.estimates.asked import Answer, answer
 from tests.estimates.held import FAMILIES, meet
 from tests.estimates.judge import FAR, LEAST, MOST, judge

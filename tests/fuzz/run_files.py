@@ -20,7 +20,7 @@ import robot_dyn as rd
 from robot_dyn.errors import RobotDynError
 from robot_dyn.scene.starters import starter
 from robot_dyn.simulation.results import archive
-from robot_dyn.simulation.results.origin import robot_of
+from robot_dyn.simulation.results.provenance import robot_of
 from robot_dyn.simulation.table import export_csv
 from robot_dyn.view.document import document
 from robot_dyn.view.plots.plots import PLOTS, PlotError, _view

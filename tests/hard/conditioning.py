@@ -54,7 +54,7 @@ def states(n: int, seed: int) -> list[dict[str, np.ndarray]]:
     return [{"q": q, "v": v, "a": a, "tau": tau} for q in (rng.uniform(-1, 1, n), 1e-6 * rng.uniform(0.5, 1, n))]
 
 
-def roads(robot: rd.Robot, compiled: bool) -> dict[str, Any]:
+def implementations(robot: rd.Robot, compiled: bool) -> dict[str, Any]:
     """What is held to the balls."""
     known: dict[str, Any] = {"Lagrangian": rd.Lagrangian(robot)}
     if not any("below 1e-12 kg" in each for each in robot.findings):
@@ -65,7 +65,7 @@ def roads(robot: rd.Robot, compiled: bool) -> dict[str, Any]:
 class Error(NamedTuple):
     """What a road errs by in units of its law, n u or n u κ; absolutely; and what was said."""
 
-    road: str
+    implementation: str
     quantity: str
     error: float
     relative: float
@@ -84,16 +84,16 @@ def errors(
             x = midpoint(exact[quantity.name])
             assert np.max(radius(exact[quantity.name])) <= 1e-30 * max(1.0, np.max(np.abs(x)))
             scale = diagonal_scale(x) if quantity.definite else quantity.terms(size, absolute)
-            for road, engine in engines.items():
+            for implementation, engine in engines.items():
                 error = scaled(quantity.ask(engine, state) - x, floored(np.asarray(scale))).max()
-                yield Error(road, quantity.name, float(error) / (robot.n * U), float(error))
+                yield Error(implementation, quantity.name, float(error) / (robot.n * U), float(error))
         inertia = midpoint(exact["M"])
         a = midpoint(FORWARD_DYNAMICS.ask(truth, state))
         torques = state["tau"], midpoint(exact["coriolis_torque"]), midpoint(exact["N"])
         loss = robot.n * U * unit_diagonal_condition(inertia)
         whole = acceleration_norm(inertia, torques, FORWARD_DYNAMICS.terms(size, absolute))
         near = next((each for each in robot.findings if "nearly singular" in each), "")
-        for road, engine in engines.items():
+        for implementation, engine in engines.items():
             if not hasattr(engine, FORWARD_DYNAMICS.name):
                 continue
             with warnings.catch_warnings(record=True) as said:
@@ -103,20 +103,24 @@ def errors(
                 except SingularError as refusal:
                     error, near = float("nan"), str(refusal) if SOLVED * loss > FEW else ""  # else it has no right to
             words = str(said[0].message) if said else near
-            yield Error(road, FORWARD_DYNAMICS.name, error / loss, error, words)
+            yield Error(implementation, FORWARD_DYNAMICS.name, error / loss, error, words)
 
 
 def rows(case: str, robot: rd.Robot, engines: dict[str, Any], at: list[dict[str, np.ndarray]]) -> Iterator[Row]:
     """Of each road the worst of M, C, C v, N and inverse dynamics, and forward dynamics."""
     found = list(errors(robot, engines, at))
-    for road in engines:
-        own = [each for each in found if each.road == road]
+    for implementation in engines:
+        own = [each for each in found if each.implementation == implementation]
         solved = [each for each in own if each.quantity == FORWARD_DYNAMICS.name]
-        yield Row(case, f"{road}: M, C, C v, N, ID, in n u", max(x.error for x in own if x not in solved), SUMS)
+        yield Row(
+            case, f"{implementation}: M, C, C v, N, ID, in n u", max(x.error for x in own if x not in solved), SUMS
+        )
         worst = max(solved, key=lambda each: np.nan_to_num(each.error, nan=np.inf))
-        yield Row(case, f"{road}: FD, in n u κ", worst.error, SOLVED, worst.said if np.isnan(worst.error) else "")
+        yield Row(
+            case, f"{implementation}: FD, in n u κ", worst.error, SOLVED, worst.said if np.isnan(worst.error) else ""
+        )
         if worst.relative > FEW:
-            yield Row(case, f"{road}: FD, relative to its terms", worst.relative, FEW, worst.said)
+            yield Row(case, f"{implementation}: FD, relative to its terms", worst.relative, FEW, worst.said)
     if "Pinocchio" not in engines:
         lost = next(each for each in robot.findings if "below 1e-12 kg" in each)
         yield Row(case, "Pinocchio: left out", float("nan"), SUMS, lost)
@@ -128,7 +132,7 @@ def _chain(name: str, seed: int) -> Iterator[Row]:
     except DescriptionError as refusal:
         yield Row(name, "refused", float("nan"), 0.0, str(refusal).replace(f"{FOLDER}/", "urdf/hard/"))
         return
-    yield from rows(name, robot, roads(robot, name in COMPILED), states(robot.n, seed))
+    yield from rows(name, robot, implementations(robot, name in COMPILED), states(robot.n, seed))
 
 
 CASES = [Case(name, partial(_chain, name), name in LONG) for name in CHAINS | LONG]

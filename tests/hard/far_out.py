@@ -42,20 +42,20 @@ def loaded(name: str) -> rd.Robot:
     return completed(rd.load(name))[0]
 
 
-def roads(robot: rd.Robot) -> Roads:
+def implementations(robot: rd.Robot) -> Roads:
     """Of a robot whose right angles are written out in full."""
     engines = {"Pinocchio": robot, "Lagrangian": rd.Lagrangian(robot), "machine code": rd.Compiled(robot)}
     return Roads(robot, engines, rd.Lagrangian(robot, rd.Ball(BITS)))
 
 
-def error(of: Roads, road: str, quantity: Quantity, state: dict[str, np.ndarray]) -> float:
+def error(of: Roads, implementation: str, quantity: Quantity, state: dict[str, np.ndarray]) -> float:
     """In units of n u of the terms added."""
     size = magnitudes(rd.Lagrangian(of.robot).linkage, state["q"])
     x = midpoint(quantity.ask(of.truth, state))
     absolute = {key: np.abs(value) for key, value in state.items()}
     with np.errstate(over="ignore"):  # of the terms where v² overflows, and every road refuses
         scale = diagonal_scale(x) if quantity.definite else quantity.terms(size, absolute)
-    difference = quantity.ask(of.engines[road], state) - x
+    difference = quantity.ask(of.engines[implementation], state) - x
     return float(scaled(difference, floored(np.asarray(scale))).max() / (of.robot.n * U))
 
 
@@ -67,33 +67,37 @@ def general(n: int, seed: int) -> np.ndarray:
 
 def far_angles(name: str, far: float, seed: int) -> Iterator[Row]:
     """M and N at angles of any size, which are reduced exactly."""
-    of = roads(loaded(name))
+    of = implementations(loaded(name))
     q = far * general(of.robot.n, seed)[0]
-    for road in of.engines:
-        found = max(error(of, road, quantity, {"q": q}) for quantity in (M, N))
-        yield Row(f"{name}: q of {far:g} rad", f"{road}: M, N, in n u", found, SUMS)
+    for implementation in of.engines:
+        found = max(error(of, implementation, quantity, {"q": q}) for quantity in (M, N))
+        yield Row(f"{name}: q of {far:g} rad", f"{implementation}: M, N, in n u", found, SUMS)
 
 
 def fast(name: str, speed: float, seed: int) -> Iterator[Row]:
     """Inverse dynamics at velocities of any size whose squares are finite."""
-    of = roads(loaded(name))
+    of = implementations(loaded(name))
     q, v, a = general(of.robot.n, seed)
-    for road in of.engines:
+    for implementation in of.engines:
         found, said = float("nan"), ""
         try:
-            found = error(of, road, INVERSE_DYNAMICS, {"q": q, "v": speed * v, "a": a})
+            found = error(of, implementation, INVERSE_DYNAMICS, {"q": q, "v": speed * v, "a": a})
         except RobotDynError as refusal:
             said = str(refusal)
         finite = speed * speed < 1e307
         if finite or said:
-            yield Row(f"{name}: v of {speed:g} rad/s", f"{road}: ID, in n u", found, SUMS, "" if finite else said)
+            yield Row(
+                f"{name}: v of {speed:g} rad/s", f"{implementation}: ID, in n u", found, SUMS, "" if finite else said
+            )
         else:
-            yield Row(f"{name}: v of {speed:g} rad/s", f"{road}: answers where v² overflows", float("nan"), SUMS)
+            yield Row(
+                f"{name}: v of {speed:g} rad/s", f"{implementation}: answers where v² overflows", float("nan"), SUMS
+            )
 
 
 def spoilt(name: str, bad: float, seed: int) -> Iterator[Row]:
     """A row without an answer leaves the others as they are."""
-    yield from beside(name, roads(loaded(name)), bad, seed)
+    yield from beside(name, implementations(loaded(name)), bad, seed)
 
 
 def beside(name: str, of: Roads, bad: float, seed: int) -> Iterator[Row]:
@@ -107,7 +111,7 @@ def beside(name: str, of: Roads, bad: float, seed: int) -> Iterator[Row]:
     asked = [("M", ()), ("inverse_dynamics", (v, tau)), ("forward_dynamics", (v, 10 * tau))]
     if of.robot.joint_without_inertia is not None:
         asked.pop()
-    for road, engine in of.engines.items():
+    for implementation, engine in of.engines.items():
         changed, named = 0, 0
         for query, rest in asked:
             ask = getattr(engine, query)
@@ -115,8 +119,8 @@ def beside(name: str, of: Roads, bad: float, seed: int) -> Iterator[Row]:
             changed += int(np.sum(made[others] != whole[others])) + int(np.sum(~np.isnan(made[SPOILT])))
             named += _is_named(partial(ask, marred, *rest))
         case = f"{name}: a row with {bad}"
-        yield Row(case, f"{road}: entries of other rows with other bits", changed, 0)
-        yield Row(case, f"{road}: queries that do not name the row", len(asked) - named, 0)
+        yield Row(case, f"{implementation}: entries of other rows with other bits", changed, 0)
+        yield Row(case, f"{implementation}: queries that do not name the row", len(asked) - named, 0)
     yield Row(case, "machine code: entries of out that were touched", _touched(of.engines["machine code"], marred), 0)
 
 

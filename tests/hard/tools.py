@@ -75,7 +75,7 @@ def batches(robot: rd.Robot, seed: int) -> Iterator[Row]:
     given, name = states(robot.n, seed), robot.name
     one, two = rd.Compiled(robot), rd.Compiled(robot, threads=2)
     engines = {"Pinocchio": robot, "Lagrangian": rd.Lagrangian(robot), "machine code": one}
-    for road, engine in engines.items():
+    for implementation, engine in engines.items():
         worst = 0.0
         for quantity in queries(robot):
             whole = quantity.ask(engine, given)
@@ -83,7 +83,7 @@ def batches(robot: rd.Robot, seed: int) -> Iterator[Row]:
                 state = {key: x[k] for key, x in given.items()}
                 apart = part(robot, quantity, state, whole[k], quantity.ask(engine, state))
                 worst = max(worst, apart / (condition(robot, state["q"]) * U))
-        yield Row(f"{name}: batch and single", f"{road}: difference in κ u", worst, 4)
+        yield Row(f"{name}: batch and single", f"{implementation}: difference in κ u", worst, 4)
     other = sum(int(np.sum(quantity.ask(one, given) != quantity.ask(two, given))) for quantity in queries(robot))
     yield Row(f"{name}: one thread and two", "machine code: entries with other bits", other, 0)
 

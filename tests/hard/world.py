@@ -79,9 +79,9 @@ ARMS = [
 Column = Callable[[str, rd.Robot, int], Iterator[Row]]
 
 
-def roads(name: str, robot: rd.Robot, seed: int) -> Iterator[Row]:
+def implementations(name: str, robot: rd.Robot, seed: int) -> Iterator[Row]:
     """All roads against balls."""
-    engines = conditioning.roads(robot, compiled=True)
+    engines = conditioning.implementations(robot, compiled=True)
     found = list(conditioning.errors(robot, engines, conditioning.states(robot.n, seed)))
     sums = max(each.error for each in found if each.quantity != FORWARD_DYNAMICS.name)
     yield Row(name, "roads: M … ID, n u", sums, conditioning.SUMS)
@@ -92,15 +92,17 @@ def roads(name: str, robot: rd.Robot, seed: int) -> Iterator[Row]:
 
 def far(name: str, robot: rd.Robot, seed: int) -> Iterator[Row]:
     """M and N at 1e16 rad or m."""
-    of = far_out.roads(robot)
+    of = far_out.implementations(robot)
     q = 1e16 * far_out.general(robot.n, seed)[0]
-    worst = max(far_out.error(of, road, quantity, {"q": q}) for road in of.engines for quantity in (M, N))
+    worst = max(
+        far_out.error(of, implementation, quantity, {"q": q}) for implementation in of.engines for quantity in (M, N)
+    )
     yield Row(name, "1e16 rad: M, N, n u", worst, conditioning.SUMS)
 
 
 def rows_of_a_batch(name: str, robot: rd.Robot, seed: int) -> Iterator[Row]:
     """A row of NaN; a batch against its states; two threads."""
-    found = list(far_out.beside(name, far_out.roads(robot), np.nan, seed))
+    found = list(far_out.beside(name, far_out.implementations(robot), np.nan, seed))
     yield Row(name, "NaN in a row: other bits, rows not named", sum(row.found for row in found), 0.0)
     found = list(tools.batches(robot, seed))
     single = max(row.found for row in found if row.allowed)
@@ -155,7 +157,7 @@ def sampled(name: str, robot: rd.Robot, seed: int) -> Iterator[Row]:
             yield replace(row, case=name, measure=f"PD: {row.measure}")
 
 
-COLUMNS: tuple[Column, ...] = (roads, far, rows_of_a_batch, swing, held, sampled)
+COLUMNS: tuple[Column, ...] = (implementations, far, rows_of_a_batch, swing, held, sampled)
 
 
 def arm(name: str, seed: int) -> Iterator[Row]:

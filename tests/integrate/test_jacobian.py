@@ -10,11 +10,11 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.integrate.integrator import System
-from robot_dyn.simulation.compiled import making
+from robot_dyn.simulation.compiled import build
+from robot_dyn.simulation.compiled.compiled_state_equation import MachineError
 from robot_dyn.simulation.compiled.jacobian_check import by_differences
-from robot_dyn.simulation.compiled.machine import MachineError
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.setup.plan import plan_of
+from robot_dyn.simulation.setup.segment_table import segment_table
 
 HAS_LONGDOUBLE = np.finfo(np.longdouble).nmant > 52
 ARM = rd.load("planar_2r")
@@ -39,10 +39,10 @@ def equation_of(made: rd.Setup) -> StateEquation:
 
 def exact_jacobian(made: rd.Setup, t: float, y: np.ndarray) -> np.ndarray:
     """∂f/∂y_j for each j, then ∂f/∂t, of machine code."""
-    machine = making.machine(equation_of(made), None, jacobian=True)
+    machine = build.compiled_equation(equation_of(made), None, jacobian=True)
     out, m = np.empty((len(y) + 1, len(y), 1)), len(y)
-    p, own = plan_of(made).parameters[0], machine.own({})
-    machine.in_python.jacobian(t, np.ascontiguousarray(y)[:, None], p, own, out)
+    p, run_parameters = segment_table(made).parameters[0], machine.run_parameters({})
+    machine.in_python.jacobian(t, np.ascontiguousarray(y)[:, None], p, run_parameters, out)
     assert out.shape == (m + 1, m, 1)
     return out[:, :, 0]
 
@@ -76,7 +76,7 @@ def test_it_knows_how_the_reference_moves(t: float) -> None:
 def test_it_is_held_to_differences_of_the_interpreted_equation() -> None:
     """What is off in one entry by 1e-3 of the column is seen; rounding is not."""
     made = setup()
-    equation, p = equation_of(made), plan_of(made).parameters[0]
+    equation, p = equation_of(made), segment_table(made).parameters[0]
     J = exact_jacobian(made, 0.37, STATE)
     assert by_differences(equation, 0.37, STATE, None, p, J) < 1
     for column in (1, 3, 5, len(STATE)):
@@ -86,12 +86,12 @@ def test_it_is_held_to_differences_of_the_interpreted_equation() -> None:
 
 
 def test_wrong_machine_code_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    made = making.machine(equation_of(setup()), None, jacobian=True)
+    made = build.compiled_equation(equation_of(setup()), None, jacobian=True)
     wrong = replace(made, equations=replace(made.equations, checked={}))
     functions = made.in_python
 
-    def jacobian(t: float, y: Any, p: Any, own: Any, out: np.ndarray) -> None:
-        functions.jacobian(t, y, p, own, out)
+    def jacobian(t: float, y: Any, p: Any, run_parameters: Any, out: np.ndarray) -> None:
+        functions.jacobian(t, y, p, run_parameters, out)
         out[2 * 10 + 3] *= 1.01
 
     monkeypatch.setitem(wrong.__dict__, "in_python", functions._replace(jacobian=jacobian))
@@ -101,9 +101,9 @@ def test_wrong_machine_code_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_it_is_made_only_for_methods_that_need_it() -> None:
     equation = equation_of(setup())
-    assert "jacobian" not in making.machine(equation, rd.method("rk4")).equations.programs
-    assert making.machine(equation, None).in_python.jacobian == 0
-    assert "jacobian" in making.machine(equation, None, jacobian=True).equations.programs
+    assert "jacobian" not in build.compiled_equation(equation, rd.method("rk4")).equations.programs
+    assert build.compiled_equation(equation, None).in_python.jacobian == 0
+    assert "jacobian" in build.compiled_equation(equation, None, jacobian=True).equations.programs
 
 
 def test_runs_in_lock_step_have_each_their_own() -> None:
@@ -112,13 +112,13 @@ def test_runs_in_lock_step_have_each_their_own() -> None:
     made, lanes = setup(controller=law), 16
     rng = np.random.default_rng(3)
     damping = rng.uniform(0.1, 9.0, (lanes, 2))
-    machine = making.machine(
+    machine = build.compiled_equation(
         equation_of(made), None, lanes=lanes, kept=(), swept=("viscous_friction.damping",), jacobian=True
     )
     m = machine.equation.size
     y, out = rng.normal(size=(m, lanes)), np.empty((m + 1, m, lanes))
-    own = machine.own({"viscous_friction.damping": damping})
-    machine.in_python.jacobian(0.37, y, plan_of(made).parameters[0], own, out)
+    run_parameters = machine.run_parameters({"viscous_friction.damping": damping})
+    machine.in_python.jacobian(0.37, y, segment_table(made).parameters[0], run_parameters, out)
     for b in (0, 7, 15):
         effects = rd.ViscousFriction(damping[b]), *EFFECTS[1:]
         alone = exact_jacobian(replace(made, plant=rd.Plant(ARM, effects)), 0.37, y[:, b])

@@ -16,9 +16,9 @@ from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.integrate.integrator import IntegrationError, System
 from robot_dyn.integrate.primitives import factor, solve
 from robot_dyn.integrate.rosenbrock import ROSENBROCK_5
-from robot_dyn.simulation.compiled import making
+from robot_dyn.simulation.compiled import build
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.setup.plan import plan_of
+from robot_dyn.simulation.setup.segment_table import segment_table
 
 HAS_LONGDOUBLE = np.finfo(np.longdouble).nmant > 52
 NUMBERS = ROSENBROCK_5.table.numbers(FLOAT64, 1)
@@ -240,12 +240,12 @@ def test_both_engines_make_the_same_steps() -> None:
     plant, h = rd.Plant(ARM, [rd.ViscousFriction([1e3, 1e4]), rd.Spring(1e4)]), 0.01
     options: dict[str, Any] = {"controller": law, "integrator": "rosenbrock_5", "step_s": h, "duration_s": h}
     setup, equation = rd.Setup(plant, **START, **options), StateEquation(plant, law)
-    machine, m = making.machine(equation, None, jacobian=True), equation.size
-    p, own = plan_of(setup).parameters[0], machine.own({})
+    machine, m = build.compiled_equation(equation, None, jacobian=True), equation.size
+    p, run_parameters = segment_table(setup).parameters[0], machine.run_parameters({})
 
     def exact(t: Any, y: np.ndarray) -> np.ndarray:
         out = np.empty((m + 1, m, 1))
-        machine.in_python.jacobian(float(t), np.ascontiguousarray(y)[:, None], p, own, out)
+        machine.in_python.jacobian(float(t), np.ascontiguousarray(y)[:, None], p, run_parameters, out)
         return out[:, :, 0]
 
     interpreted = System(lambda t, y: equation.rate(t, y, None)[0], 2, exact=exact)
@@ -315,6 +315,6 @@ def test_runs_in_lock_step_are_those_of_simulate() -> None:
     assert runs.q is not None
     assert not runs.diverged.any()
     for i in (0, 35, 69):
-        own = rd.Plant(ARM, [friction, rd.ViscousFriction(damping[i])])
-        alone = rd.simulate(own, starts[i], **options, engine="compiled", estimate_error=False)
+        run_parameters = rd.Plant(ARM, [friction, rd.ViscousFriction(damping[i])])
+        alone = rd.simulate(run_parameters, starts[i], **options, engine="compiled", estimate_error=False)
         np.testing.assert_allclose(runs.q[i], alone.q, rtol=0, atol=1e-13)

@@ -200,7 +200,7 @@ def test_a_step_solves_problems_that_newtons_method_does_not() -> None:
     m, lost = 2 * n + 1, np.zeros(runs, np.int64)
     y, after = np.zeros((m, runs)), np.zeros((m, runs))
 
-    def gave_up(t, x, p, own, out):
+    def gave_up(t, x, p, run_parameters, out):
         out[m + rows.changed] = 1.0
         for b, (M, *vectors) in enumerate(given):
             out[m + rows.M : m + rows.p, b] = M[np.triu_indices(n)]

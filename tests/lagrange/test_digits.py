@@ -156,7 +156,9 @@ def test_queries_warn_below_the_digits_that_are_set_and_answer_the_same() -> Non
     assert pickle.loads(pickle.dumps(strict)) == strict != robot == strict.warn_below(None)
 
 
-QUANTITY_FILE = rd.load.__code__.co_filename.replace("loading.py", "quantity.py")  # where `ask` calls the engine
+QUANTITY_FILE = rd.load.__code__.co_filename.replace(
+    "model/loading.py", "queries/quantity.py"
+)  # where `ask` calls the engine
 
 
 def test_states_without_an_answer_are_not_warned_of() -> None:

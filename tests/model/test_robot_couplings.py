@@ -70,10 +70,12 @@ def test_couplings_are_read_only():
 
 
 @pytest.mark.parametrize("road", ["Pinocchio", "Lagrangian", "machine code"])
-def test_where_rounding_hides_the_joints_that_follow_the_state_is_refused(road: str) -> None:
+def test_where_rounding_hides_the_joints_that_follow_the_state_is_refused(implementation: str) -> None:
     """Half of 3e6 rad is known to 1e-9 rad, half of 1e15 rad to 0.1 rad, with as few digits of M; balls know both."""
     robot = rd.load("mimic_chain")
-    engine = {"Pinocchio": robot, "Lagrangian": rd.Lagrangian(robot), "machine code": rd.Compiled(robot)}[road]
+    engine = {"Pinocchio": robot, "Lagrangian": rd.Lagrangian(robot), "machine code": rd.Compiled(robot)}[
+        implementation
+    ]
     q = np.full((19, 2), 0.3)
     q[5], q[7] = 3e6, 1e15
     truth = rd.Lagrangian(robot, rd.Ball(200))

@@ -11,7 +11,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.errors import QueryError, RobotDynError, SceneError
-from robot_dyn.simulation.estimate.accuracy import AccuracyError
+from robot_dyn.simulation.estimate.requested_accuracy import AccuracyError
 from tests.estimates.asked import FAMILIES, answer, asked_scene
 from tests.estimates.held import meet
 from tests.estimates.truth import truth

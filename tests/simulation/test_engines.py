@@ -20,9 +20,9 @@ from robot_dyn.effects.effect import Active
 from robot_dyn.errors import QueryError
 from robot_dyn.integrate.methods import FIXED_STEP
 from robot_dyn.queries.dynamics import Dynamics
-from robot_dyn.simulation.compiled.choice import choose
-from robot_dyn.simulation.compiled.machine import MachineError
-from robot_dyn.simulation.compiled.traced import SymbolicDynamics
+from robot_dyn.simulation.compiled.compiled_state_equation import MachineError
+from robot_dyn.simulation.compiled.engine_choice import choose
+from robot_dyn.simulation.compiled.trace import SymbolicDynamics
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from tests.long import long
 
@@ -266,10 +266,10 @@ def test_a_second_process_takes_the_machine_code_of_the_store_for_a_short_run(tm
 
 def test_a_machine_that_disagrees_is_refused(monkeypatch) -> None:
     """The interpreted equation has another gravity than the compiled one: the self check refuses it."""
-    from robot_dyn.simulation.compiled import making
+    from robot_dyn.simulation.compiled import build
 
     setup = rd.Setup(rd.Plant(ARM), Q)
-    made = making.machine(StateEquation(setup.plant, None), rd.method("rk4"))
+    made = build.compiled_equation(StateEquation(setup.plant, None), rd.method("rk4"))
     made.check(setup)
     equations = replace(made.equations, checked={})
     other = replace(

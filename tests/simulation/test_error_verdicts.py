@@ -12,8 +12,8 @@ from scipy.integrate import solve_ivp
 import robot_dyn as rd
 from robot_dyn.effects.effect import Active
 from robot_dyn.errors import QueryError
-from robot_dyn.simulation.results import origin
-from robot_dyn.simulation.results.error import Verdict
+from robot_dyn.simulation.results import provenance as origin
+from robot_dyn.simulation.results.error_estimate import Verdict
 from tests.estimates.judge import FAR, LEAST, MOST, judge
 from tests.estimates.scenes import FAMILIES, arms
 from tests.estimates.switching import scene_of_all
@@ -327,7 +327,7 @@ def test_code_that_acts_between_steps_is_looked_at_there(method) -> None:
 
 
 def test_the_summary_tells_an_estimate_from_a_bound_and_the_time_it_covers() -> None:
-    from robot_dyn.simulation.results.error import ErrorEstimate
+    from robot_dyn.simulation.results.error_estimate import ErrorEstimate
 
     t, error = np.array([0.0, 0.008]), np.array([0.0, 2e-9])
     assert str(ErrorEstimate(t, error, 0.008)) == "2.0e-09 (order seen)"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from robot_dyn.simulation.observation.levels import Level, Levels
+from robot_dyn.simulation.observation.guard_levels import GuardLevels, Level
 from robot_dyn.simulation.observation.observation import observation_of, observe, observed
 from robot_dyn.simulation.observation.remarks import Kind
 
@@ -20,7 +20,7 @@ def motion() -> np.ndarray:
     return x
 
 
-def seen(motion: np.ndarray, levels: Levels, every: int = 1):
+def seen(motion: np.ndarray, levels: GuardLevels, every: int = 1):
     """What is observed of the motion, the controller acting at the start of each so many steps."""
     of = observation_of(motion[0], levels)
     for k, x in enumerate(motion[1:]):
@@ -34,7 +34,7 @@ def test_extremes_and_visits_are_those_of_all_steps(motion: np.ndarray) -> None:
     levels = [Level(Kind.BEYOND, row, side, 0.0) for row in range(3 * N) for side in (1, -1)]
     bounds = np.array([[each.side * size for size in rng.uniform(3, 12, W)] for each in levels])
     bounds[3, 1] = np.nan
-    of = seen(motion, Levels(tuple(levels), bounds, bounds))
+    of = seen(motion, GuardLevels(tuple(levels), bounds, bounds))
     low, high = np.nanmin(motion, axis=0), np.nanmax(motion, axis=0)
     np.testing.assert_array_equal(of.extremes, np.stack([low, high]).reshape(2, 3, N, W).transpose(3, 1, 0, 2))
     visited = 0
@@ -67,7 +67,7 @@ def test_chatter_is_ten_reversals_in_a_row(every: int) -> None:
         if every * len(u) >= STEPS
         else np.append(np.repeat(u, every, axis=0), u[-1:].repeat(STEPS - every * len(u), 0), axis=0)
     )
-    of = seen(motion, Levels((), np.empty((0, W)), np.empty((0, W))), every)
+    of = seen(motion, GuardLevels((), np.empty((0, W)), np.empty((0, W))), every)
     change = np.diff(u, axis=0)
     for joint in range(N):
         for b in range(W):

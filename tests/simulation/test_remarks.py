@@ -12,7 +12,7 @@ import robot_dyn as rd
 from robot_dyn.cli import report
 from robot_dyn.result import json_text
 from robot_dyn.simulation.observation import observer as observers
-from robot_dyn.simulation.observation.levels import NO_LEVELS
+from robot_dyn.simulation.observation.guard_levels import NO_LEVELS
 from robot_dyn.simulation.observation.observation import observation_of
 from robot_dyn.simulation.observation.observer import CHUNK, Observer
 from robot_dyn.simulation.observation.remarks import Kind, lines

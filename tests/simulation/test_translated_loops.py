@@ -20,16 +20,16 @@ from robot_dyn.integrate.adaptive import ADAPTIVE
 from robot_dyn.integrate.integrator import PlainMethod, Stepper
 from robot_dyn.integrate.methods import FIXED_STEP, method
 from robot_dyn.integrate.primitives import evaluate
-from robot_dyn.simulation.compiled.choice import choose
-from robot_dyn.simulation.compiled.making import machine
+from robot_dyn.simulation.compiled.build import compiled_equation
+from robot_dyn.simulation.compiled.engine_choice import choose
 from robot_dyn.simulation.dynamics.loop_state import Ended, Now
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.observation.levels import levels
+from robot_dyn.simulation.observation.guard_levels import levels
 from robot_dyn.simulation.observation.observation import observation_of
 from robot_dyn.simulation.run.fixed_step import rules_of, runs_of, samples_at_most
-from robot_dyn.simulation.run.prepared import prepared
+from robot_dyn.simulation.run.make_run import prepared
 from robot_dyn.simulation.run.time_loop import Records, time_loop
-from robot_dyn.simulation.setup.plan import plan_of
+from robot_dyn.simulation.setup.segment_table import segment_table
 from robot_dyn.simulation.setup.setup import Setup
 from tests.estimates.scenes import arms
 from tests.long import long
@@ -72,7 +72,7 @@ def both(setup: Setup) -> tuple[Any, Any]:
     assert code is not None
     runs = [prepared(setup, equation, each) for each in (code, replace(code, loop=None))]
     for each in runs:
-        room = each.runs._replace(y=0, own=0, alive=0, scale=0, energy=0, keys=0), each.stepper.work
+        room = each.runs._replace(y=0, run_parameters=0, alive=0, scale=0, energy=0, keys=0), each.stepper.work
         for _, x in numbers(room):  # what is not written yet
             x[...] = 0
         each.record()
@@ -191,8 +191,10 @@ def test_lanes_in_lock_step_give_the_same_bits(name: str, controller: rd.Control
     made = setup(SMOOTH, name, duration_s=0.2, step_s=0.002, controller=controller)
     equation = StateEquation(made.plant, made.controller, of.canonical)
     equation = equation if of.nonsmooth else equation.in_a_mode
-    code = machine(equation, of, lanes=W, kept=("u", "energy"), jacobian=of.needs_jacobian, nonsmooth=of.nonsmooth)
-    n, m, plan = 2, equation.size, plan_of(made)
+    code = compiled_equation(
+        equation, of, lanes=W, kept=("u", "energy"), jacobian=of.needs_jacobian, nonsmooth=of.nonsmooth
+    )
+    n, m, plan = 2, equation.size, segment_table(made)
     rng = np.random.default_rng(3)
     starts = np.stack([equation.start(q, v) for q, v in rng.normal(size=(W, 2, 2))]).T
     starts[n, 5] = 1e200  # overflows at once
@@ -200,7 +202,7 @@ def test_lanes_in_lock_step_give_the_same_bits(name: str, controller: rd.Control
     rules = rules_of(equation, False, 1e100, apart=0 if equation.sampled else 3)
     results = []
     for interpreted in (False, True):
-        runs = runs_of(equation, starts, code.own({}), n + 2, np.arange(W))
+        runs = runs_of(equation, starts, code.run_parameters({}), n + 2, np.arange(W))
         stepper = of.stepper(FLOAT64, m, n, m, W)
         for _, x in numbers((stepper.work, runs.made, runs.command, runs.u, runs.energies, runs.size)):
             x[...] = 0
@@ -239,31 +241,31 @@ class Work(NamedTuple):
     K: np.ndarray
 
 
-def heun(f, c, t, h, y, p, own, after, work, lost):
+def heun(f, c, t, h, y, p, run_parameters, after, work, lost):
     """A step of the subset, over entries."""
-    evaluate(f.rate, t, y, p, own, work.K[0])
+    evaluate(f.rate, t, y, p, run_parameters, work.K[0])
     for e in range(len(y)):
         for b in range(y.shape[1]):
             after[e, b] = y[e, b] + h * work.K[0, e, b]
-    evaluate(f.rate, t + h, after, p, own, work.K[1])
+    evaluate(f.rate, t + h, after, p, run_parameters, work.K[1])
     for e in range(len(y)):
         for b in range(y.shape[1]):
             after[e, b] = y[e, b] + c.half * h * (work.K[0, e, b] + work.K[1, e, b])
     return 2
 
 
-def heun_by_arrays(f, c, t, h, y, p, own, after, work, lost):
+def heun_by_arrays(f, c, t, h, y, p, run_parameters, after, work, lost):
     """The same as NumPy has it, which is outside the subset."""
-    evaluate(f.rate, t, y, p, own, work.K[0])
+    evaluate(f.rate, t, y, p, run_parameters, work.K[0])
     after[...] = y + h * work.K[0, : len(y)]
-    evaluate(f.rate, t + h, after, p, own, work.K[1])
+    evaluate(f.rate, t + h, after, p, run_parameters, work.K[1])
     after[...] = y + (work.K[0, : len(y)] + work.K[1, : len(y)]) * (c.half * h)
     return 2
 
 
-def heun_that_errs(f, c, t, h, y, p, own, after, work, lost):
+def heun_that_errs(f, c, t, h, y, p, run_parameters, after, work, lost):
     """It takes one entry too many."""
-    evaluate(f.rate, t, y, p, own, work.K[0])
+    evaluate(f.rate, t, y, p, run_parameters, work.K[0])
     for e in range(len(y) + 1):
         after[e, 0] = y[e, 0] + h * work.K[0, e, 0]
     return 1

@@ -21,7 +21,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.simulation.compiled.machine import Machine
+from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.observation.remarks import Kind
 from robot_dyn.simulation.results.trajectory import Trajectory
@@ -167,7 +167,7 @@ def test_what_is_kept_does_not_grow_with_the_runs(events: tuple[rd.Event, ...]) 
 
     def held() -> int:
         gc.collect()
-        return sum(isinstance(each, Machine | StateEquation) for each in gc.get_objects())
+        return sum(isinstance(each, CompiledStateEquation | StateEquation) for each in gc.get_objects())
 
     for _ in range(2):
         assert rd.simulate(setup).events

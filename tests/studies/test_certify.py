@@ -15,10 +15,10 @@ from robot_dyn.lagrange.digits import QUANTITIES
 from robot_dyn.lagrange.recursions.articulated_body import articulated_body
 from robot_dyn.queries.quantity import FORWARD_DYNAMICS, INVERSE_DYNAMICS, C, M, N
 from robot_dyn.studies.certificate.certificate import Certificate
-from robot_dyn.studies.certificate.certificate_diagram import draw
-from robot_dyn.studies.certificate.counting import Counting
-from robot_dyn.studies.certificate.road import Road, roads
-from robot_dyn.studies.certificate.worst_state import random_states
+from robot_dyn.studies.certificate.diagram import draw
+from robot_dyn.studies.certificate.digit_count import Counting
+from robot_dyn.studies.certificate.implementation import Implementation, implementations
+from robot_dyn.studies.certificate.worst_case_search import random_states
 from tests.long import long
 
 GIVEN = {"q": [0.3, -1.1], "v": [0.5, 0.4], "a": [0.2, 0.9], "tau": [1.0, -2.0]}
@@ -30,19 +30,23 @@ def made() -> Certificate:
     return rd.certify(rd.load("planar_2r"), **GIVEN, **QUICK)
 
 
-def road(robot: rd.Robot, name: str) -> Road:
-    return next(each for each in roads(robot)[0] if each.name == name)
+def implementation(robot: rd.Robot, name: str) -> Implementation:
+    return next(each for each in implementations(robot)[0] if each.name == name)
 
 
 def test_each_road_has_the_digits_of_its_numbers(made: Certificate) -> None:
     """Rounding is 6e-8, 1.1e-16 and 5e-20; what two joints compute takes less than 3 digits."""
     whole = {"float32": 7.2, "longdouble": 19.3}
     for each in made.digits:
-        most = 20.0 if each.road.startswith("balls") else whole.get(each.road.removeprefix("Lagrangian, "), 15.95)
+        most = (
+            20.0
+            if each.implementation.startswith("balls")
+            else whole.get(each.implementation.removeprefix("Lagrangian, "), 15.95)
+        )
         assert most - 3 < each.searched <= each.random <= each.typical <= min(most + 1.5, 20), each
         assert each.given is not None and most - 2 < each.given <= 20
     assert {each.quantity for each in made.digits} == QUANTITIES.keys()
-    assert {each.road for each in made.digits} == {
+    assert {each.implementation for each in made.digits} == {
         "Pinocchio", "Lagrangian, float32", "Lagrangian, float64", "Lagrangian, longdouble", "articulated body",
         "machine code", "balls, 128 bits",
     }  # fmt: skip
@@ -92,9 +96,9 @@ def test_the_search_finds_worse_than_ten_thousand_random_states(quantity, name: 
     """Of two seeds: those that it began with, and others. In M of planar_2r the worst entry is one that is constant."""
     robot, rng = rd.load(name), np.random.default_rng(1)
     counting = Counting(robot, random_states(robot, 10_000, rng), None, rng)
-    found = counting.count(road(robot, "machine code"), quantity)
+    found = counting.count(implementation(robot, "machine code"), quantity)
     others = Counting(robot, random_states(robot, 10_000, np.random.default_rng(2)), None, rng)
-    errors = others._errors(road(robot, "machine code"), quantity, others.states)
+    errors = others._errors(implementation(robot, "machine code"), quantity, others.states)
     assert found.samples == 10_000
     assert found.searched < found.random < found.typical
     assert found.searched < -log10(np.nanmax(errors))
@@ -117,7 +121,7 @@ class Moved:
 def test_a_road_with_a_wrong_entry_has_the_digits_before_it(digits: int) -> None:
     robot, rng = rd.load("planar_2r"), np.random.default_rng(1)
     counting = Counting(robot, random_states(robot, 100, rng), None, rng)
-    found = counting.count(Road("moved", robot, Moved(robot, 10.0**-digits), (M,)), M)
+    found = counting.count(Implementation("moved", robot, Moved(robot, 10.0**-digits), (M,)), M)
     assert found.typical == pytest.approx(digits, abs=0.01)
     assert found.searched == pytest.approx(digits, abs=0.02)
 
@@ -136,7 +140,7 @@ def test_machine_code_is_judged_by_its_right_angles_and_the_file_by_its_own() ->
     """UR5 states 1.57079632679: 5e-12 of a right angle."""
     robot, rng = rd.load("ur5"), np.random.default_rng(0)
     counting = Counting(robot, random_states(robot, 100, rng), None, rng)
-    assert counting.count(road(robot, "machine code"), M).searched > 14
+    assert counting.count(implementation(robot, "machine code"), M).searched > 14
     assert 10 < counting.right_angles["M"] < 12
 
 
@@ -157,7 +161,7 @@ def test_a_joint_without_inertia_is_named_and_the_rest_is_counted() -> None:
 def test_coupled_joints_and_joints_that_slide_are_counted(name: str, left_out: tuple[str, ...]) -> None:
     found = rd.certify(rd.load(name), **QUICK)
     assert found.left_out == left_out
-    assert min(each.searched for each in found.digits if "float32" not in each.road) > 12
+    assert min(each.searched for each in found.digits if "float32" not in each.implementation) > 12
 
 
 def test_the_same_seed_counts_the_same(made: Certificate) -> None:

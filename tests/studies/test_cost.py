@@ -18,11 +18,11 @@ from robot_dyn.codegen.trace.from_casadi import program_of
 from robot_dyn.errors import QueryError, RobotDynError
 from robot_dyn.result import json_text
 from robot_dyn.scene.starters import starter
-from robot_dyn.simulation.compiled.making import machine, machine_of_constants
+from robot_dyn.simulation.compiled.build import compiled_equation, machine_of_constants
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.studies.budget import Budget
 from robot_dyn.studies.costs import step_cost
-from robot_dyn.studies.costs.alternative import Alternative, Pair, Version, Way, in_turns
+from robot_dyn.studies.costs.ab_comparison import ABComparison, Pair, Version, Way, in_turns
 from robot_dyn.studies.costs.query_cost import QueryCost
 
 ARM = rd.load("planar_2r")
@@ -37,7 +37,7 @@ def setup(*effects: Any, **options: Any) -> rd.Setup:
 
 def compiled(of: rd.Setup) -> dict[str, int]:
     """Instructions of the programs that `simulate` runs, by name."""
-    made = machine(StateEquation(of.plant, of.controller), rd.method("rk4"))
+    made = compiled_equation(StateEquation(of.plant, of.controller), rd.method("rk4"))
     return {name: len(program) for name, program in made.equations.programs.items()}
 
 
@@ -221,7 +221,7 @@ def test_json_csv_and_figure_hold_the_alternatives(tmp_path) -> None:
     result = rd.cost(setup(FRICTION, controller=CONTROLLERS["sampled"]), budget_s=0.5, repeats=2)
     read = json.loads(json_text(result))
     kept = [
-        Alternative(
+        ABComparison(
             x["group"],
             x["what"],
             x["per"],

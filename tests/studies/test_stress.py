@@ -18,7 +18,7 @@ from robot_dyn.cli.studies import lines
 from robot_dyn.integrate.methods import FIXED_STEP
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.studies.budget import Budget
-from robot_dyn.studies.certificate.worst_state import random_states
+from robot_dyn.studies.certificate.worst_case_search import random_states
 from robot_dyn.studies.stress_test import confirm, runs, steps
 from robot_dyn.studies.stress_test.finding import Judged
 from robot_dyn.studies.stress_test.loads import payload_limit

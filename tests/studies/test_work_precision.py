@@ -19,14 +19,14 @@ from robot_dyn.errors import QueryError
 from robot_dyn.integrate.explicit import ExplicitRungeKutta
 from robot_dyn.integrate.tableau import ButcherTableau
 from robot_dyn.result import json_text
-from robot_dyn.seconds import in_words
+from robot_dyn.seconds import format_duration
 from robot_dyn.studies.budget import Budget, Limit
-from robot_dyn.studies.work_precision_diagram.beyond import beyond
-from robot_dyn.studies.work_precision_diagram.candidate import Candidate, own, recorded, whole
-from robot_dyn.studies.work_precision_diagram.ladder import Ladder, Point
 from robot_dyn.studies.work_precision_diagram.measured import Rung, Walk, measured
+from robot_dyn.studies.work_precision_diagram.method_under_test import MethodUnderTest, own, recorded, whole
+from robot_dyn.studies.work_precision_diagram.past_horizon import beyond
 from robot_dyn.studies.work_precision_diagram.peers import found
 from robot_dyn.studies.work_precision_diagram.reference_run import HorizonError, Reference, reference
+from robot_dyn.studies.work_precision_diagram.tolerance_ladder import Point, ToleranceLadder
 from tests.long import long
 
 UNTIL_DONE = Limit(math.inf)
@@ -43,7 +43,7 @@ def smooth() -> tuple[rd.Setup, Reference]:
     return reference(whole(swing()), Budget(1e3))
 
 
-def ladder(candidate: Candidate, truth: Reference, first: int, last: int) -> Ladder:
+def ladder(candidate: MethodUnderTest, truth: Reference, first: int, last: int) -> ToleranceLadder:
     """The rungs from `first` to `last`, whatever time they take."""
     walk = Walk(candidate)
     for setting in islice(candidate.settings(), first, last):
@@ -115,10 +115,12 @@ def test_beyond_the_horizon_energy_and_the_way_back_judge() -> None:
     rubbed, methods = swing(2.0), {name: rd.method(name) for name in ("rk4", "order_8")}
     setup = replace(rubbed, plant=rd.Plant(rubbed.plant.dynamics))
     made = [
-        Ladder(name, "interpreted", True, order, "step", (Point(step, 1, 1, 1e-3, 0.0, 1e-6, 1, True),), "", 0.0)
+        ToleranceLadder(
+            name, "interpreted", True, order, "step", (Point(step, 1, 1, 1e-3, 0.0, 1e-6, 1, True),), "", 0.0
+        )
         for name, order, step in (("rk4", 4, 0.02), ("order_8", 8, 0.02))
     ]
-    other = Ladder("MuJoCo RK4", "", True, 4, "step", made[0].points, "", 0.0)
+    other = ToleranceLadder("MuJoCo RK4", "", True, 4, "step", made[0].points, "", 0.0)
     rk4, order_8 = beyond(setup, 1.0, [*made, other], methods, Budget(1e3))
     assert (rk4.name, order_8.name) == ("rk4", "order_8")
     assert 1e-10 < order_8.returned < 1e-2 * rk4.returned < 1e-2  # swung through, where both magnify what they err
@@ -145,13 +147,15 @@ def points(*errors: float, believed: bool = True, each_s: float = 1e-3) -> tuple
     )
 
 
-def invented(*ladders: Ladder, floor: float = 1e-12) -> rd.WorkPrecision:
+def invented(*ladders: ToleranceLadder, floor: float = 1e-12) -> rd.WorkPrecision:
     truth = Reference(np.zeros(2), np.zeros((2, 1)), floor, ("one", "other"), 1.0)
     return rd.WorkPrecision("arm", (), "rad", 1.0, truth, ladders, (), {"processor": "P"}, 1.0, 1.0)
 
 
-def of(name: str, runs: tuple[Point, ...], order: int = 4, floor: float = 1e-12, engine: str = "compiled") -> Ladder:
-    return Ladder(name, engine, True, order, "step", runs, "", floor)
+def of(
+    name: str, runs: tuple[Point, ...], order: int = 4, floor: float = 1e-12, engine: str = "compiled"
+) -> ToleranceLadder:
+    return ToleranceLadder(name, engine, True, order, "step", runs, "", floor)
 
 
 def test_no_run_beats_one_of_the_front_and_each_other_is_beaten() -> None:
@@ -211,7 +215,7 @@ def test_the_sentence_marks_what_is_extrapolated() -> None:
     quick = of("Other RK", points(1e-4, 1e-6, 1e-8), engine="")
     assert invented(fast, quick).sentence == "6 digits of q over 1 s: Other RK 2 ms; DOP853 2.8 ms"
     assert invented(slow).sentence_of(3) == "3 digits of q were reached by no run"
-    assert in_words(0.00031) == "310 µs" and in_words(7200.0) == "2 h"
+    assert format_duration(0.00031) == "310 µs" and format_duration(7200.0) == "2 h"
 
 
 def test_events_keep_the_order_at_a_stop() -> None:
@@ -251,7 +255,7 @@ def test_programs_that_cannot_do_a_scene_are_left_out_with_the_reason() -> None:
 
 
 def test_a_program_that_cannot_be_imported_is_left_out(monkeypatch) -> None:
-    def broken(_: object) -> list[Candidate]:
+    def broken(_: object) -> list[MethodUnderTest]:
         raise ImportError("no library")
 
     monkeypatch.setattr("robot_dyn.studies.work_precision_diagram.peers.PEERS", {"scipy": broken})

@@ -10,7 +10,7 @@ import pinocchio as pin  # pyright: ignore[reportMissingImports]
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.seconds import in_words
+from robot_dyn.seconds import format_duration
 from tests.browser import opened, until
 
 UR5_Q = np.array([0.3, -1.1, 0.9, -0.6, 1.2, 0.4])
@@ -289,7 +289,7 @@ def test_the_price_of_a_run_stands_beside_its_plots(browser, tmp_path) -> None:
         assert told["steps"] == [str(run.statistics.steps), "30"]
         assert told["evaluations"] == [str(run.statistics.evaluations), "120"]
         assert told["estimated error of q [rad]"] == [str(run.error), "not estimated"]
-        assert told["time of the loop"] == [in_words(each.statistics.wall_s) for each in (run, coarse)]
+        assert told["time of the loop"] == [format_duration(each.statistics.wall_s) for each in (run, coarse)]
         assert told["a digit more"][0].startswith(f"about {accuracy.digit_more:.0f} evaluations, ")
         assert told["a digit less"] == [told["a digit less"][0], "–"]
         boxes = json.loads(view.ask(box))

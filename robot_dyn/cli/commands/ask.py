@@ -38,13 +38,13 @@ def info(
     from robot_dyn.cli import kernels, report
 
     loaded = arguments.load(robot, lock, package_dir, xacro, quiet=True)  # the findings are shown below
-    roads = {"compiled": kernels.formulations(loaded)} if compiled else {}
+    implementations = {"compiled": kernels.formulations(loaded)} if compiled else {}
     if as_json:
-        say_json(report.info(loaded) | roads)
+        say_json(report.info(loaded) | implementations)
         return
     say(*report.info_tables(loaded))
     if compiled:
-        say(*kernels.formulation_table(roads["compiled"]))
+        say(*kernels.formulation_table(implementations["compiled"]))
 
 
 @app.command()

@@ -1,8 +1,8 @@
-"""Functions (t, y, p, own, out) of a state equation as machine code, of one run or of W in lock step.
+"""Functions (t, y, p, run_parameters, out) of a state equation as machine code, of one run or of W in lock step.
 
-Number k of run b is y[k W + b]; t and p are shared, and so are those of `own` that are one number for all runs. A run
-with an angle beyond the range of the vectors' sine and cosine is computed once more with the C library's, so that no
-run depends on the others.
+Number k of run b is y[k W + b]; t and p are shared, and so are those of `run_parameters` that are one number for all
+runs. A run with an angle beyond the range of the vectors' sine and cosine is computed once more with the C library's,
+so that no run depends on the others.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from robot_dyn.codegen.llvm.writer import Writer
 from robot_dyn.codegen.program import Program
 
 SIDE = 8  # runs in a vector: a 512-bit register, or two or four smaller ones
-Own = Mapping[int, tuple[int, bool]]  # of each number of `own`: its row, or where it stands once
+Own = Mapping[int, tuple[int, bool]]  # of each number of `run_parameters`: its row, or where it stands once
 _NOTHING: Mapping[int, int] = MappingProxyType({})
 _ARGUMENTS = [F64, *[F64.as_pointer()] * 4]
 
@@ -51,8 +51,8 @@ def write_function(module: Any, name: str, program: Program, runs: int, shared: 
         name: Of the function.
         program: What it computes.
         runs: 1 or a multiple of SIDE.
-        shared: Of those numbers of `own` that are the same for all runs, where in it each stands once; the others come
-            row by row in their order.
+        shared: Of those numbers of `run_parameters` that are the same for all runs, where in it each stands once; the
+            others come row by row in their order.
     """
 
     def body(writer: Writer, given: list[list[Any]]) -> Computed:
@@ -84,8 +84,8 @@ def write_step(
     m = first.inputs[1]
 
     def body(writer: Writer, given: list[list[Any]]) -> Computed:
-        t, y, p, own = given
-        known = writer.write(first, [t, y[:m], p, own])
+        t, y, p, run_parameters = given
+        known = writer.write(first, [t, y[:m], p, run_parameters])
         found = _repeated(writer, second, [t, known.results, [], y[m:]], passes)
         after = writer.write(third, [t, y[:m], [], [*found, *known.results]])
         doubt = writer.builder.fcmp_ordered(">", found[-1], writer.vectors.constant(0.0))
@@ -100,8 +100,8 @@ def _write(
     module: Any, name: str, inputs: tuple[int, ...], body: Body, runs: int, shared: Mapping[int, int]
 ) -> None:  # fmt: skip
     rows = [k for k in range(inputs[-1]) if k not in shared]
-    own = {k: (row, False) for row, k in enumerate(rows)} | {k: (at, True) for k, at in shared.items()}
-    any_angle = _any_angle(module, f"{name}_any_angle", inputs, body, runs, own)
+    run_parameters = {k: (row, False) for row, k in enumerate(rows)} | {k: (at, True) for k, at in shared.items()}
+    any_angle = _any_angle(module, f"{name}_any_angle", inputs, body, runs, run_parameters)
     function = ir.Function(module, ir.FunctionType(ir.VoidType(), _ARGUMENTS), name)
     if runs > 1:
         align_stack(function)
@@ -112,7 +112,7 @@ def _write(
     at = builder.phi(I64)
     at.add_incoming(ir.Constant(I64, 0), before)
     writer = Writer(builder, F64, min(SIDE, runs))
-    made = body(writer, _inputs(writer.vectors, function.args, inputs, runs, at, own))
+    made = body(writer, _inputs(writer.vectors, function.args, inputs, runs, at, run_parameters))
 
     def store(which: Iterable[int]) -> None:
         for k in which:
@@ -137,11 +137,11 @@ def _repeated(writer: Writer, program: Program, given: list[list[Any]], passes: 
     before, again, done = builder.block, builder.append_basic_block(), builder.append_basic_block()
     builder.branch(again)
     builder.position_at_end(again)
-    count, own = builder.phi(I64), [builder.phi(vectors.type) for _ in given[-1]]
-    results = writer.write(program, [*given[:-1], own]).results
+    count, run_parameters = builder.phi(I64), [builder.phi(vectors.type) for _ in given[-1]]
+    results = writer.write(program, [*given[:-1], run_parameters]).results
     after = builder.add(count, ir.Constant(I64, 1))
-    first, following = [ir.Constant(I64, 0), *given[-1]], [after, *results[-1 - len(own) : -1]]
-    for phi, start, value in zip([count, *own], first, following, strict=True):
+    first, following = [ir.Constant(I64, 0), *given[-1]], [after, *results[-1 - len(run_parameters) : -1]]
+    for phi, start, value in zip([count, *run_parameters], first, following, strict=True):
         phi.add_incoming(start, before)
         phi.add_incoming(value, builder.block)
     goes_on = vectors.any(builder.fcmp_ordered(">", results[-1], vectors.constant(0.0)))
@@ -151,7 +151,7 @@ def _repeated(writer: Writer, program: Program, given: list[list[Any]], passes: 
     return results
 
 
-def _any_angle(module: Any, name: str, inputs: tuple[int, ...], body: Body, runs: int, own: Own) -> Any:
+def _any_angle(module: Any, name: str, inputs: tuple[int, ...], body: Body, runs: int, run_parameters: Own) -> Any:
     """The same for the runs from a number on that share a vector, and stored of those alone whose bit is set."""
     side = min(SIDE, runs)
     shape = ir.FunctionType(ir.VoidType(), [*_ARGUMENTS, I64, ir.IntType(side)])
@@ -163,7 +163,7 @@ def _any_angle(module: Any, name: str, inputs: tuple[int, ...], body: Body, runs
     *arguments, at, bits = function.args
     writer = Writer(builder, F64, side, any_angle=True)
     mask = builder.bitcast(bits, wide(I1, side))
-    made = body(writer, _inputs(writer.vectors, arguments, inputs, runs, at, own))
+    made = body(writer, _inputs(writer.vectors, arguments, inputs, runs, at, run_parameters))
     for k, value in enumerate(made.results):
         place = _place(writer.vectors, arguments[-1], k, runs, at)
         builder.store(builder.select(mask, value, builder.load(place, align=8)), place, align=8)
@@ -171,7 +171,9 @@ def _any_angle(module: Any, name: str, inputs: tuple[int, ...], body: Body, runs
     return function
 
 
-def _inputs(vectors: Vectors, arguments: Any, inputs: tuple[int, ...], runs: int, at: Any, own: Own) -> list[list[Any]]:
+def _inputs(
+    vectors: Vectors, arguments: Any, inputs: tuple[int, ...], runs: int, at: Any, run_parameters: Own
+) -> list[list[Any]]:
     """The vectors of t, y, p and own, of the runs from `at` on."""
     t, y, p, numbers, _ = arguments
     _, m, shared, each = inputs
@@ -188,7 +190,7 @@ def _inputs(vectors: Vectors, arguments: Any, inputs: tuple[int, ...], runs: int
         [_spread(vectors, t)],
         [of_each(y, k) for k in range(m)],
         [one(p, k) for k in range(shared)],
-        [(one if own[k][1] else of_each)(numbers, own[k][0]) for k in range(each)],
+        [(one if run_parameters[k][1] else of_each)(numbers, run_parameters[k][0]) for k in range(each)],
     ]
 
 

@@ -24,8 +24,8 @@ from robot_dyn.codegen.trace.origins import slid
 from robot_dyn.codegen.trace.symbol import symbol
 from robot_dyn.codegen.trace.symbolic import Symbolic, array_of, column, inputs
 from robot_dyn.lagrange.christoffel import christoffel
+from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.linkage import Linkage
-from robot_dyn.lagrange.manipulator import Lagrangian
 from robot_dyn.lagrange.recursions.articulated_body import articulated_body
 from robot_dyn.lagrange.recursions.composite_body import composite_body
 from robot_dyn.lagrange.recursions.kinetic_energy import kinetic_energy

@@ -39,11 +39,22 @@ def refusal(method: PlainMethod, equation: StateEquation, lanes: int) -> SubsetE
     made = method.stepper(FLOAT64, m, n, m + n, lanes)
     if (made.step.__module__ or "").startswith("robot_dyn."):
         return None
-    y, own, lost = np.zeros((m, lanes)), np.zeros((1, lanes)), np.zeros(lanes, np.int64)
+    y, run_parameters, lost = np.zeros((m, lanes)), np.zeros((1, lanes)), np.zeros(lanes, np.int64)
     step = MachineFunction(made.step, INSTEAD, lambda: None, "")
     functions = Functions(*[0] * len(Functions._fields))
     try:
-        step.check(functions, made.coefficients, 0.0, 1.0, y, np.zeros(2), own, np.zeros((m, lanes)), made.work, lost)
+        step.check(
+            functions,
+            made.coefficients,
+            0.0,
+            1.0,
+            y,
+            np.zeros(2),
+            run_parameters,
+            np.zeros((m, lanes)),
+            made.work,
+            lost,
+        )
     except SubsetError as error:
         return error
     return None

@@ -12,13 +12,13 @@ import numpy as np
 from robot_dyn.control.operational_space import OperationalSpace, task_dynamics
 from robot_dyn.errors import RobotDynError
 from robot_dyn.simulation.observation.remarks import Kind, Remark
-from robot_dyn.simulation.run.record import Record
+from robot_dyn.simulation.run.recording import Recording
 from robot_dyn.simulation.setup.setup import Setup
 
 _MOST = 2000  # states that are looked at
 
 
-def damped(setup: Setup, record: Record) -> Iterator[Remark]:
+def damped(setup: Setup, record: Recording) -> Iterator[Remark]:
     """A remark for each frame whose task is damped at a sample or at the end of a step."""
     controller, n = setup.controller, setup.plant.dynamics.n
     if controller is None:
@@ -27,8 +27,8 @@ def damped(setup: Setup, record: Record) -> Iterator[Remark]:
     tasks = [each for each in parts if isinstance(each, OperationalSpace)]
     if not tasks:
         return
-    t, first = np.unique(np.concatenate([record.t, record.walked.t]), return_index=True)
-    q = np.concatenate([record.y[:, :n], record.walked.y[:, :n]])[first]
+    t, first = np.unique(np.concatenate([record.t, record.step_log.t]), return_index=True)
+    q = np.concatenate([record.y[:, :n], record.step_log.y[:, :n]])[first]
     t, q = (each[np.isfinite(q).all(axis=1)] for each in (t, q))
     rows = np.unique(np.linspace(0, len(t) - 1, min(len(t), _MOST)).astype(int))
     for task in tasks:

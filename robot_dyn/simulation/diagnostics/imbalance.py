@@ -13,12 +13,12 @@ from robot_dyn.arithmetic import Array
 from robot_dyn.effects.effect import Conservative
 from robot_dyn.errors import RobotDynError
 from robot_dyn.foreign import call
-from robot_dyn.simulation.diagnostics.between import cut_alike, stepped_over
+from robot_dyn.simulation.diagnostics.missed_events import cut_alike, stepped_over
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.results.ledger import largest
 from robot_dyn.simulation.results.samples import columns, ledger
 from robot_dyn.simulation.run.outcome import Ending
-from robot_dyn.simulation.run.record import Record
+from robot_dyn.simulation.run.recording import Recording
 from robot_dyn.simulation.setup.setup import Setup
 
 _LOOKS = 100  # at samples
@@ -27,7 +27,7 @@ _UNBOOKED = 1e-3  # of the powers
 _FINER, _TIGHTER = 4, 100  # times as short steps, as small a tolerance
 
 
-def cause(setup: Setup, equation: StateEquation, run: Record, contradicts: bool) -> str:
+def cause(setup: Setup, equation: StateEquation, run: Recording, contradicts: bool) -> str:
     """Why the ledger of a run does not close, and what to do.
 
     Args:
@@ -44,12 +44,12 @@ def cause(setup: Setup, equation: StateEquation, run: Record, contradicts: bool)
     doubt = "do not trust the estimate, " if contradicts else ""
     if method.controls_error:
         return f"{doubt}the tolerance is too loose; take rtol = {method.rtol / _TIGHTER:.0e}"
-    missed = stepped_over(setup, equation, run.walked, 0.0) or cut_alike(setup, run)
+    missed = stepped_over(setup, equation, run.step_log, 0.0) or cut_alike(setup, run)
     why = "the steps are too long for the motion" if missed is None else f"{missed.why}, at t = {missed.t:.4g} s"
     return f"{doubt}{why}; take step_s = {setup.taken_step_s / _FINER:.0e}"
 
 
-def _unbooked(equation: StateEquation, run: Record) -> str:
+def _unbooked(equation: StateEquation, run: Recording) -> str:
     """What changes the energy beside the powers, at the sample where it does most; empty if that is not the cause.
 
     A sample at which dE/dt jumps, as at a stop, tells nothing. Payloads that come and go change what the energy is of.

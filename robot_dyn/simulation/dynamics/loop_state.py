@@ -13,7 +13,7 @@ class Ended(IntEnum):
 
     DONE = 0
     PAUSED = 1  # its budget of steps is spent
-    DOUBTFUL = 2  # the next step is to be looked at; y is the state before it
+    NEEDS_REVIEW = 2  # the next step is to be looked at; y is the state before it
     TICK = 3  # the controller asks for no finite torque
     GAINS = 4  # energy may grow without a source; y is the state after the step
     TOO_SMALL = 5  # no step that floats can tell from none is within the tolerance
@@ -87,7 +87,7 @@ class Runs(NamedTuple):
     """W runs: their states (m, W), own numbers (O, W), and what is known of each (W,); the rest is room to work.
 
     Attributes:
-        y, own: State, and numbers of each run: first what a sampled controller holds.
+        y, run_parameters: State, and numbers of each run: first what a sampled controller holds.
         after, made, command, u, energies, size, lost: y⁺, a sample, a tick, the actuation, K and V, Σ |y⁺|, stages
             not found.
         alive, why, ended: 1 while it goes on; then the reason and the time.
@@ -98,7 +98,7 @@ class Runs(NamedTuple):
     """
 
     y: Array
-    own: Array
+    run_parameters: Array
     after: Array
     made: Array
     command: Array

@@ -17,7 +17,7 @@ from robot_dyn.simulation.dynamics.declarations import named
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.dynamics.state_equation import StateEquation
-    from robot_dyn.simulation.run.record import Path
+    from robot_dyn.simulation.run.recording import Path
     from robot_dyn.simulation.setup.setup import Setup
 
 _IN_LAYER = 4  # steps within |v| < v_s that show a method's order

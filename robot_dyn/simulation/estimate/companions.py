@@ -19,8 +19,8 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.simulation.results.error import ErrorEstimate, Verdict, no_estimate
-from robot_dyn.simulation.run.record import Path
+from robot_dyn.simulation.results.error_estimate import ErrorEstimate, Verdict, no_estimate
+from robot_dyn.simulation.run.recording import Path
 
 ROUNDED = "what rounding leaves of q, as the motion magnifies it, is more than"
 PUSH = 4.0  # units of rounding by which a start is moved, to see what the motion makes of rounding
@@ -166,6 +166,6 @@ def carried(run: Path, pushed: np.ndarray, n: int) -> np.ndarray:
     return np.fmax(pushed, growth * walk)
 
 
-def meaningless(walked: Path, n: int) -> float:
+def meaningless(step_log: Path, n: int) -> float:
     """Difference of companions that tells nothing: a tenth of the motion of a run, at most 0.1 rad or m."""
-    return _LOST * min(1.0, max(float(np.ptp(walked.y[:, :n], axis=0).max()), 1e-6))
+    return _LOST * min(1.0, max(float(np.ptp(step_log.y[:, :n], axis=0).max()), 1e-6))

@@ -16,7 +16,7 @@ import numpy as np
 from robot_dyn.coefficients import with_values
 from robot_dyn.integrate.adaptive import LEAST_RTOL, Adaptive
 from robot_dyn.integrate.integrator import Integrator
-from robot_dyn.simulation.diagnostics.between import cut_alike, stepped_over
+from robot_dyn.simulation.diagnostics.missed_events import cut_alike, stepped_over
 from robot_dyn.simulation.diagnostics.stiffness import damped_oscillation
 from robot_dyn.simulation.dynamics.smoothness import first_kink
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
@@ -31,8 +31,8 @@ from robot_dyn.simulation.estimate.companions import (
     meaningless,
     rounding,
 )
-from robot_dyn.simulation.results.error import ErrorEstimate, Verdict, no_estimate
-from robot_dyn.simulation.run.record import Path, Record
+from robot_dyn.simulation.results.error_estimate import ErrorEstimate, Verdict, no_estimate
+from robot_dyn.simulation.run.recording import Path, Recording
 from robot_dyn.simulation.setup.schedule import LEAST_STEPS
 from robot_dyn.simulation.setup.setup import Setup
 
@@ -42,10 +42,10 @@ _FAR_TURN = 1.0  # [rad] in a step: beyond, longer steps may meet the same angle
 _BLIND_TURN = np.pi  # [rad] in a step: beyond, shorter ones may, too
 _FAR_PUSH = 1000 * PUSH  # of what a short step adds to q, rounding may lose all until v has grown
 
-Companion = Callable[[Any, Setup], Record]  # of a factor of the steps, or of a mesh
+Companion = Callable[[Any, Setup], Recording]  # of a factor of the steps, or of a mesh
 
 
-def estimate(setup: Setup, equation: StateEquation, run: Record, companion: Companion) -> ErrorEstimate:
+def estimate(setup: Setup, equation: StateEquation, run: Recording, companion: Companion) -> ErrorEstimate:
     """The estimated error of a run.
 
     Args:
@@ -62,8 +62,8 @@ def estimate(setup: Setup, equation: StateEquation, run: Record, companion: Comp
             " step_s / 4, or with integrator='DOP853'"
         )
     n = equation.plant.dynamics.n
-    kink, why = first_kink(setup, equation, run.walked)
-    estimated = Estimated(run.shared, n, kink, rounding(run.shared, n), meaningless(run.walked, n))
+    kink, why = first_kink(setup, equation, run.step_log)
+    estimated = Estimated(run.shared, n, kink, rounding(run.shared, n), meaningless(run.step_log, n))
     method: Any = setup.integrator
     if method.controls_error:
         made = _by_refinement(setup, method, run, estimated, companion)
@@ -73,7 +73,7 @@ def estimate(setup: Setup, equation: StateEquation, run: Record, companion: Comp
                 f"the energy ledger does not close: {motion}, which {method.name} damps in steps longer than"
                 f" {1 / abs(motion.eigenvalue):.0e} s, so that runs with other steps do not show it; take shorter ones"
             )
-        made = _by_steps(setup, method, estimated, companion, _turn(equation, run.walked))
+        made = _by_steps(setup, method, estimated, companion, _turn(equation, run.step_log))
         made = _until_alike(setup, run, made)
     return _advised(setup, _looked_between(setup, equation, run, made), why)
 
@@ -104,7 +104,7 @@ def _by_steps(
     return shorter if shorter.resolved_until >= made.resolved_until else made
 
 
-def _until_alike(setup: Setup, run: Record, made: ErrorEstimate) -> ErrorEstimate:
+def _until_alike(setup: Setup, run: Recording, made: ErrorEstimate) -> ErrorEstimate:
     """The estimate up to where each companion cuts its steps as the run does, so that all make the same one or two."""
     alike = cut_alike(setup, run)
     if alike is None or alike.t >= made.resolved_until:
@@ -113,7 +113,7 @@ def _until_alike(setup: Setup, run: Record, made: ErrorEstimate) -> ErrorEstimat
 
 
 def _by_refinement(
-    setup: Setup, method: Adaptive, run: Record, estimated: Estimated, companion: Companion
+    setup: Setup, method: Adaptive, run: Recording, estimated: Estimated, companion: Companion
 ) -> ErrorEstimate:
     """From half as long steps; where something may switch unseen, from a tenth of the tolerance as well.
 
@@ -156,18 +156,18 @@ def _pushed(setup: Setup, units: float = PUSH) -> Setup:
     return with_values(setup, {"q0": q0, "v0": v0})
 
 
-def _turn(equation: StateEquation, walked: Path) -> float:
+def _turn(equation: StateEquation, step_log: Path) -> float:
     """Largest angle by which a joint turns in a step, in [rad]; joints that slide do not count."""
     dynamics = equation.plant.dynamics
     kinds = getattr(dynamics, "joint_types", ("revolute",) * dynamics.n)
     turns = np.array([kind != "prismatic" for kind in kinds])
-    steps = np.maximum(1, np.diff(walked.key))[:, None]
-    return float((np.abs(np.diff(walked.y[:, : dynamics.n], axis=0)) / steps)[:, turns].max(initial=0.0))
+    steps = np.maximum(1, np.diff(step_log.key))[:, None]
+    return float((np.abs(np.diff(step_log.y[:, : dynamics.n], axis=0)) / steps)[:, turns].max(initial=0.0))
 
 
-def _looked_between(setup: Setup, equation: StateEquation, run: Record, made: ErrorEstimate) -> ErrorEstimate:
+def _looked_between(setup: Setup, equation: StateEquation, run: Recording, made: ErrorEstimate) -> ErrorEstimate:
     """The estimate up to where something acted between two steps only, if that matters beside it."""
-    missed = stepped_over(setup, equation, run.walked, made.final)
+    missed = stepped_over(setup, equation, run.step_log, made.final)
     if missed is None or missed.t >= made.resolved_until:
         return made
     return replace(made, resolved_until=missed.t, note=missed.why)

@@ -81,20 +81,20 @@ def approaches(y: Array, after: Array, h: float, before: Array, last: Array, rul
     return False
 
 
-def remember(t: float, y: Array, p: Array, own: Array, switches: Switches) -> None:
+def remember(t: float, y: Array, p: Array, run_parameters: Array, switches: Switches) -> None:
     """The functions at the start of a segment, or behind an event: what they did before says nothing."""
     if has_functions(switches):
-        evaluate(switches.functions, t, y, p, own, switches.then)
+        evaluate(switches.functions, t, y, p, run_parameters, switches.then)
         for i in range(len(switches.then)):
             switches.before[i], switches.change[i] = switches.then[i, 0], np.inf
 
 
-def nears(t: float, y: Array, p: Array, own: Array, switches: Switches) -> bool:
+def nears(t: float, y: Array, p: Array, run_parameters: Array, switches: Switches) -> bool:
     """Whether a function may pass its level in the step that ends at t: it comes near it, by its latest changes."""
     if not has_functions(switches):
         return False
     E, found = len(switches.exact), switches.asked > 0
-    evaluate(switches.functions, t, y, p, own, switches.then)
+    evaluate(switches.functions, t, y, p, run_parameters, switches.then)
     for e in range(E, len(switches.rows) - switches.asked):
         i = switches.rows[e]
         x0, x1, change = switches.before[i], switches.then[i, 0], switches.change[i]
@@ -109,7 +109,7 @@ def first_event(
     f: Functions, t: float, h: float, y: Array, p: Array, runs: Runs, F: Array, switches: Switches
 ) -> tuple[int, float]:
     """The switching function that changes sign first within a step, and θ; −1 without any."""
-    event, first, b, own = -1, NONE, switches.b, runs.own
+    event, first, b, run_parameters = -1, NONE, switches.b, runs.run_parameters
     for e in range(len(switches.exact)):
         if not switches.active[e]:
             continue
@@ -130,20 +130,20 @@ def first_event(
     before, x = 0.0, runs.last
     for i in range(1, _LOOKS + 1 if has_functions(switches) else 0):
         theta = i / _LOOKS
-        values(f, t, h, theta, y, p, own, F, x, switches)
+        values(f, t, h, theta, y, p, run_parameters, F, x, switches)
         for g in range(len(switches.exact), len(switches.rows)):
             if passed(switches, g) and before < first:
                 low, high = before, theta
                 for _ in range(_HALVINGS):
                     middle = (low + high) / 2
-                    values(f, t, h, middle, y, p, own, F, x, switches)
+                    values(f, t, h, middle, y, p, run_parameters, F, x, switches)
                     if passed(switches, g):
                         high = middle
                     else:
                         low = middle
                 if high < first:
                     event, first = g, high
-                values(f, t, h, theta, y, p, own, F, x, switches)
+                values(f, t, h, theta, y, p, run_parameters, F, x, switches)
         if event >= 0 and first <= theta:
             break
         before = theta
@@ -166,12 +166,12 @@ def passed(switches: Switches, g: int) -> bool:
 
 
 def values(
-    f: Functions, t: float, h: float, theta: float, y: Array, p: Array, own: Array, F: Array, x: Array,
+    f: Functions, t: float, h: float, theta: float, y: Array, p: Array, run_parameters: Array, F: Array, x: Array,
     switches: Switches,
 ) -> None:  # fmt: skip
     """The switching functions that are no coordinates, within a step."""
     between(y, F, theta, x)
-    evaluate(switches.functions, t + theta * h, x, p, own, switches.then)
+    evaluate(switches.functions, t + theta * h, x, p, run_parameters, switches.then)
 
 
 def settle_sides(switches: Switches) -> None:
@@ -181,7 +181,7 @@ def settle_sides(switches: Switches) -> None:
             switches.sides[g] = np.sign(gap(switches, g))
 
 
-def same_sides(t: float, y: Array, p: Array, own: Array, switches: Switches) -> bool:
+def same_sides(t: float, y: Array, p: Array, run_parameters: Array, switches: Switches) -> bool:
     """Whether all that has a threshold is on its side of it still, behind a jump; takes the sides of other functions.
 
     False where something lies on its level: where it goes from there is not known here.
@@ -190,7 +190,7 @@ def same_sides(t: float, y: Array, p: Array, own: Array, switches: Switches) -> 
         if not switches.sides[e] * (y[switches.rows[e], 0] - switches.levels[e]) > 0.0:
             return False
     if has_functions(switches):
-        evaluate(switches.functions, t, y, p, own, switches.then)
+        evaluate(switches.functions, t, y, p, run_parameters, switches.then)
         for g in range(len(switches.exact), len(switches.rows)):
             if g >= len(switches.rows) - switches.asked:
                 switches.sides[g] = np.sign(gap(switches, g))
@@ -214,10 +214,10 @@ def correction(
         left, slope = runs.after[row, 0] - switches.levels[event], work.last[row, 0]
     else:  # its slope from the dense output of the whole step
         theta = h / whole
-        values(f, t, whole, theta + _NEAR, y, p, runs.own, work.F, runs.last, switches)
+        values(f, t, whole, theta + _NEAR, y, p, runs.run_parameters, work.F, runs.last, switches)
         slope = gap(switches, event)
-        values(f, t, whole, theta - _NEAR, y, p, runs.own, work.F, runs.last, switches)
+        values(f, t, whole, theta - _NEAR, y, p, runs.run_parameters, work.F, runs.last, switches)
         slope = (slope - gap(switches, event)) / (2 * _NEAR * whole)
-        evaluate(switches.functions, t + h, runs.after, p, runs.own, switches.then)
+        evaluate(switches.functions, t + h, runs.after, p, runs.run_parameters, switches.then)
         left = gap(switches, event)
     return -left / slope if slope != 0.0 else 0.0

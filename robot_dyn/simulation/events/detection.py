@@ -117,27 +117,36 @@ def detecting(step: Callable[..., int]) -> Callable[..., int]:
     """
 
     def detecting_step(
-        f: Any, c: Any, t: float, h: float, y: Array, p: Array, own: Array, after: Array, work: Detecting, lost: Array
+        f: Any,
+        c: Any,
+        t: float,
+        h: float,
+        y: Array,
+        p: Array,
+        run_parameters: Array,
+        after: Array,
+        work: Detecting,
+        lost: Array,
     ) -> int:
         of = work.switches
         if of.left[0] == 0:
             copy(after, y)
             return 0
         if t <= p[0]:  # the first step of a segment: the controller may have acted
-            start(f, t, y, p, own, of)
-        evaluations = step(f, c, t, h, y, p, own, after, work.method, lost)
-        return evaluations + detect(f, t, h, y, p, own, after, of)
+            start(f, t, y, p, run_parameters, of)
+        evaluations = step(f, c, t, h, y, p, run_parameters, after, work.method, lost)
+        return evaluations + detect(f, t, h, y, p, run_parameters, after, of)
 
     return detecting_step
 
 
-def start(f: Any, t: float, y: Array, p: Array, own: Array, of: LockStep) -> None:
+def start(f: Any, t: float, y: Array, p: Array, run_parameters: Array, of: LockStep) -> None:
     """Rates and values at the start of a segment, and the sides at that of the run."""
     E = of.coordinates
     if E > 0:
-        evaluate(f.rate, t, y, p, own, of.rate)
+        evaluate(f.rate, t, y, p, run_parameters, of.rate)
     if len(of.values) > 0:
-        evaluate(f.events, t, y, p, own, of.values)
+        evaluate(f.events, t, y, p, run_parameters, of.values)
     for e in range(len(of.rows)):
         row = of.rows[e]
         for b in range(len(of.until)):
@@ -148,13 +157,13 @@ def start(f: Any, t: float, y: Array, p: Array, own: Array, of: LockStep) -> Non
                     of.sides[e, b] = np.sign(of.rate[row, b])
 
 
-def detect(f: Any, t: float, h: float, y: Array, p: Array, own: Array, after: Array, of: LockStep) -> int:
+def detect(f: Any, t: float, h: float, y: Array, p: Array, run_parameters: Array, after: Array, of: LockStep) -> int:
     """Mark the runs that may pass a level in the step from y to y⁺, or move without bound; evaluations."""
     E, n = of.coordinates, of.positions
     if E > 0:
-        evaluate(f.rate, t + h, after, p, own, of.next_rate)
+        evaluate(f.rate, t + h, after, p, run_parameters, of.next_rate)
     if len(of.values) > 0:
-        evaluate(f.events, t + h, after, p, own, of.next_values)
+        evaluate(f.events, t + h, after, p, run_parameters, of.next_values)
     for e in range(len(of.rows)):
         row = of.rows[e]
         for b in range(len(of.until)):

@@ -114,7 +114,7 @@ class Holding(NamedTuple):
         places: Where the mode stands among the own numbers.
         held, direction: As of `Mode`, of all coordinates, (N,).
         contact: As of `Mode`, (n,).
-        own: Own numbers of the equation in which nothing is held and parts switch by themselves, (O, 1).
+        run_parameters: Own numbers of the equation in which nothing is held and parts switch by themselves, (O, 1).
         held_actuation: How many of them are the actuation in zero-order hold, the first ones.
         impacts, strikes, latest: Times of the latest impacts, which coordinates struck, (I,) and (I, N); their number.
         changes, changed: Times of the latest changes of the mode, (C,), and the number of all changes, (1,).
@@ -128,7 +128,7 @@ class Holding(NamedTuple):
     held: Array
     direction: Array
     contact: Array
-    own: Array
+    run_parameters: Array
     held_actuation: int
     impacts: Array
     strikes: Array
@@ -172,8 +172,8 @@ def bodies(f: Any, t: float, y: Array, p: Array, of: Holding) -> None:
     laws, room, n = of.laws, of.room, of.laws.n
     for first in of.places.direction:
         for i in range(n):
-            of.own[first + i, 0] = np.sign(y[n + i, 0])
-    evaluate(f.bodies, t, y, p, of.own, room.out)
+            of.run_parameters[first + i, 0] = np.sign(y[n + i, 0])
+    evaluate(f.bodies, t, y, p, of.run_parameters, room.out)
     for i in range(n):
         for j in range(n):
             room.M[i, j] = room.whole[i, j] = room.out[i * n + j, 0]
@@ -221,12 +221,12 @@ def move_motors(of: Holding, y: Array) -> None:
             y[laws.motors[k], 0] = y[laws.speeds[joint], 0]
 
 
-def write_mode(of: Holding, own: Array) -> None:
+def write_mode(of: Holding, run_parameters: Array) -> None:
     """Write the mode where the own numbers of the run have it."""
     for i in range(of.laws.n):
         for first in of.places.held:
-            own[first + i, 0] = of.held[i]
+            run_parameters[first + i, 0] = of.held[i]
         for first in of.places.direction:
-            own[first + i, 0] = of.direction[i]
+            run_parameters[first + i, 0] = of.direction[i]
         for first in of.places.contact:
-            own[first + i, 0] = of.contact[i]
+            run_parameters[first + i, 0] = of.contact[i]

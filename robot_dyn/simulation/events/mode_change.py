@@ -45,13 +45,13 @@ def end_mode(
         of: The mode.
         guard: Number of the guard that has passed its level.
     """
-    if not change(f, t, runs.y, p, runs.own, of, guard):
+    if not change(f, t, runs.y, p, runs.run_parameters, of, guard):
         return Ended.UNSETTLED
-    write_mode(of, runs.own)
+    write_mode(of, runs.run_parameters)
     if accumulates(of, t):
         return Ended.ACCUMULATED
     guards(of, runs.y, switches)
-    if not same_sides(t, runs.y, p, runs.own, switches):
+    if not same_sides(t, runs.y, p, runs.run_parameters, switches):
         return Ended.CHANGED
     return Ended.DONE if of.log.filled[0] <= of.log.room else Ended.PAUSED
 
@@ -73,13 +73,13 @@ def width(laws: Laws) -> int:
     return REACTIONS + 1 + 2 * len(laws.lower)
 
 
-def change(f: Any, t: float, y: Array, p: Array, own: Array, of: Holding, guard: int) -> bool:
+def change(f: Any, t: float, y: Array, p: Array, run_parameters: Array, of: Holding, guard: int) -> bool:
     """The state behind an event, in a mode of its own from there on; whether it was found.
 
     `guard` is −1 where another event than the end of the mode changes the state.
     """
     laws, room, n, N = of.laws, of.room, of.laws.n, len(of.laws.rows)
-    copy(of.own[: of.held_actuation], own[: of.held_actuation])
+    copy(of.run_parameters[: of.held_actuation], run_parameters[: of.held_actuation])
     snap(laws, y, 0, n)
     for i in range(n):
         room.struck[i] = 0.0
@@ -164,11 +164,11 @@ def guards(of: Holding, y: Array, switches: Switches) -> None:
         watch(switches, e + REACTIONS, slides, 0.0, of.direction[i])
         e += REACTIONS + 1
         for s in range(len(laws.lower)):
-            own = not held and (s == 0 or i < laws.n)  # ends of gaps are in each
+            run_parameters = not held and (s == 0 or i < laws.n)  # ends of gaps are in each
             for side in range(2):
                 level = laws.lower[s, i] if side == 0 else laws.upper[s, i]
                 leaves = x == level and v == 0.0  # then its velocity is watched until it turns
-                watch(switches, e, own and not leaves, level, 1.0 if side == 0 else -1.0)
+                watch(switches, e, run_parameters and not leaves, level, 1.0 if side == 0 else -1.0)
                 e += 1
 
 

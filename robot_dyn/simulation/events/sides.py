@@ -23,7 +23,7 @@ class Sides(NamedTuple):
 
     Attributes:
         sides: Those that are known, as of `Switches` without guards and events asked for, (T, K).
-        own: Own numbers of the run on them, behind the actuation in zero-order hold, (P, K).
+        run_parameters: Own numbers of the run on them, behind the actuation in zero-order hold, (P, K).
         known: How many are filled, (1,); 0 where functions of Python change with the sides.
         directions: Of the events asked for, (G,).
         terminal: Whether they end the run, (G,).
@@ -32,7 +32,7 @@ class Sides(NamedTuple):
     """
 
     sides: Array
-    own: Array
+    run_parameters: Array
     known: Array
     directions: Array
     terminal: Array
@@ -78,9 +78,9 @@ def take_numbers(runs: Runs, switches: Switches, of: Sides, holding: Holding, he
             at = e if e < switches.thresholds else e + switches.guards
             same = same and of.sides[e, k] == switches.sides[at]
         if same:
-            for i in range(len(of.own)):
-                runs.own[held + i, 0] = of.own[i, k]
-            write_mode(holding, runs.own)
+            for i in range(len(of.run_parameters)):
+                runs.run_parameters[held + i, 0] = of.run_parameters[i, k]
+            write_mode(holding, runs.run_parameters)
             return True
     return False
 
@@ -89,5 +89,5 @@ def keep_numbers(of: Sides, sides: np.ndarray, parameters: np.ndarray) -> None:
     """Keep the numbers on sides that were not known; once there is no room, Python is asked each time."""
     k = int(of.known[0])
     if k < _KNOWN and not (sides == of.sides[:, :k].T).all(axis=1).any():
-        of.sides[:, k], of.own[:, k] = sides, parameters
+        of.sides[:, k], of.run_parameters[:, k] = sides, parameters
         of.known[0] += 1

@@ -17,7 +17,7 @@ from robot_dyn.aligned import aligned
 from robot_dyn.arithmetic import Array
 from robot_dyn.integrate.primitives import enclose
 from robot_dyn.simulation.observation.chatter import Chatter, Episode, chatters_of, close_all, tick
-from robot_dyn.simulation.observation.levels import Level, Levels
+from robot_dyn.simulation.observation.guard_levels import GuardLevels, Level
 from robot_dyn.values import Value, read_only
 
 _NONE: Mapping[int, Observation] = MappingProxyType({})
@@ -47,13 +47,13 @@ class Observation(NamedTuple):
     latest: Array
 
 
-def observation_of(start: Array, levels: Levels) -> Observation:
+def observation_of(start: Array, levels: GuardLevels) -> Observation:
     """Of W runs that have not begun, from q, v, u at 0 s, (3n, W); nan where u is not known before the first tick."""
     (of,) = observations_of(start, levels, 1)
     return of
 
 
-def observations_of(start: Array, levels: Levels, tiles: int) -> list[Observation]:
+def observations_of(start: Array, levels: GuardLevels, tiles: int) -> list[Observation]:
     """As of `observation_of`, of runs in tiles of one size, each of which is in lock step."""
     rows, W = start.shape[0], start.shape[1] // tiles
 
@@ -84,7 +84,7 @@ def observations_of(start: Array, levels: Levels, tiles: int) -> list[Observatio
     ]
 
 
-NOTHING = observation_of(np.empty((3, 0)), Levels((), *np.empty((2, 0, 0))))  # of no run: nothing is observed
+NOTHING = observation_of(np.empty((3, 0)), GuardLevels((), *np.empty((2, 0, 0))))  # of no run: nothing is observed
 
 
 def observe(of: Observation, began: float, t: float, q: Array, v: Array, u: Array, acted: bool) -> None:
@@ -195,7 +195,7 @@ class Observed(Value):
 
 
 def observed(
-    parts: Iterable[Observation], levels: Levels, again: Mapping[int, Observation] = _NONE, instants: int = 0
+    parts: Iterable[Observation], levels: GuardLevels, again: Mapping[int, Observation] = _NONE, instants: int = 0
 ) -> Observed:
     """What was observed of runs that have ended.
 

@@ -11,7 +11,7 @@ from typing import final
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.simulation.observation.levels import NO_LEVELS, Levels
+from robot_dyn.simulation.observation.guard_levels import NO_LEVELS, GuardLevels
 from robot_dyn.simulation.observation.observation import Observation, Observed, observe, observed
 
 CHUNK = 16384  # columns looked at together: with fewer, the calls of NumPy cost more than what they do
@@ -38,7 +38,7 @@ class Observer:
         canonical: Whether steps are in (q, p).
     """
 
-    def __init__(self, start: Observation, levels: Levels = NO_LEVELS, canonical: bool = False) -> None:
+    def __init__(self, start: Observation, levels: GuardLevels = NO_LEVELS, canonical: bool = False) -> None:
         self.n, self.canonical = len(start.low) // 3, canonical
         self.columns, self.filled, self._chunk = np.empty((1 + 3 * self.n, CHUNK + _PAD)), 0, CHUNK
         self.seen = np.zeros(2 * self.n)

@@ -18,8 +18,8 @@ from robot_dyn.errors import RobotDynError, shorten
 from robot_dyn.files import Kind, save, target
 from robot_dyn.reading import file_path, reading
 from robot_dyn.simulation.results.archive import Archive, ArchiveError, Header, write
-from robot_dyn.simulation.results.members import MEMBERS, Member, check_headers, member
-from robot_dyn.simulation.results.origin import packed, unpacked
+from robot_dyn.simulation.results.provenance import packed, unpacked
+from robot_dyn.simulation.results.schema import MEMBERS, Member, check_headers, member
 from robot_dyn.simulation.results.serialise import Arrays, SerialError, build, take_apart
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.run.outcome import Ending

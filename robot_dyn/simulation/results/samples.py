@@ -10,7 +10,7 @@ import numpy as np
 from robot_dyn.errors import RobotDynError
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.results.ledger import Ledger
-from robot_dyn.simulation.run.record import Record
+from robot_dyn.simulation.run.recording import Recording
 
 
 def columns(equation: StateEquation, t: np.ndarray, y: np.ndarray, made: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -31,7 +31,7 @@ def columns(equation: StateEquation, t: np.ndarray, y: np.ndarray, made: np.ndar
     return q, v, a, u, y[:, works:], made[:, works:m], made[:, m + n :]
 
 
-def ledger(equation: StateEquation, record: Record) -> Ledger:
+def ledger(equation: StateEquation, record: Recording) -> Ledger:
     """The energy ledger at the samples of a run."""
     m, works = equation.size, equation.size - len(equation.sources)
     E, work = record.made[:, -2:], dict(zip(equation.sources, record.y[:, works:m].T, strict=True))

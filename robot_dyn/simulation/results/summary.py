@@ -9,7 +9,7 @@ from robot_dyn.queries.units import units
 from robot_dyn.simulation.events.occurrence import Occurrence
 from robot_dyn.simulation.observation.remarks import lines as said
 from robot_dyn.simulation.results.ledger import largest
-from robot_dyn.simulation.results.origin import joint_types
+from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.run.outcome import Ending
 

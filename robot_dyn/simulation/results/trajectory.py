@@ -12,7 +12,7 @@ import numpy as np
 from robot_dyn.errors import QueryError, shown
 from robot_dyn.simulation.events.occurrence import Occurrence
 from robot_dyn.simulation.observation.remarks import Remark
-from robot_dyn.simulation.results.error import ErrorEstimate
+from robot_dyn.simulation.results.error_estimate import ErrorEstimate
 from robot_dyn.simulation.results.ledger import Ledger
 from robot_dyn.simulation.results.tracking import root_mean_square
 from robot_dyn.simulation.run.outcome import Outcome

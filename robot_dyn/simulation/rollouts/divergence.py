@@ -7,8 +7,8 @@ import numpy as np
 from robot_dyn.simulation.diagnostics.divergence import explained
 from robot_dyn.simulation.diagnostics.unstable_loop import unstable
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.rollouts.rollout_result import Rollouts
-from robot_dyn.simulation.rollouts.rollout_run import setup_of
+from robot_dyn.simulation.rollouts.result import Rollouts
+from robot_dyn.simulation.rollouts.run import setup_of
 from robot_dyn.simulation.setup.setup import Setup
 
 _JUDGED = 8  # runs of a batch: each loop is linearised about a start of its own

@@ -10,21 +10,21 @@ import numpy as np
 
 from robot_dyn.codegen.parameters import over_runs, with_parameters
 from robot_dyn.coefficients import with_values
-from robot_dyn.simulation.compiled.choice import machine_of
-from robot_dyn.simulation.compiled.machine import Machine
-from robot_dyn.simulation.compiled.making import with_numbers
-from robot_dyn.simulation.diagnostics.observed import observer_of
+from robot_dyn.simulation.compiled.build import with_numbers
+from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
+from robot_dyn.simulation.compiled.engine_choice import machine_of
+from robot_dyn.simulation.diagnostics.step_remarks import observer_of
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.observation.levels import Levels, levels
+from robot_dyn.simulation.observation.guard_levels import GuardLevels, levels
 from robot_dyn.simulation.observation.observation import Observation, Observed, observation_of, observed
-from robot_dyn.simulation.results.origin import origin
+from robot_dyn.simulation.results.provenance import origin
 from robot_dyn.simulation.results.samples import columns
 from robot_dyn.simulation.results.trajectory import Statistics
 from robot_dyn.simulation.rollouts.pool import in_threads
-from robot_dyn.simulation.rollouts.rollout_result import Rollouts
+from robot_dyn.simulation.rollouts.result import Rollouts
+from robot_dyn.simulation.run.make_run import prepared
 from robot_dyn.simulation.run.outcome import Ending, Outcome
-from robot_dyn.simulation.run.prepared import prepared
-from robot_dyn.simulation.run.record import Record
+from robot_dyn.simulation.run.recording import Recording
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.setup.size import check_batch
 
@@ -63,20 +63,20 @@ class OneByOne:
 
     def __init__(
         self, setup: Setup, q0: np.ndarray, v0: np.ndarray, sweep: dict[str, np.ndarray], recorded: tuple[str, ...],
-        of: Levels, numbers: Sequence[int] | None = None,
+        of: GuardLevels, numbers: Sequence[int] | None = None,
     ) -> None:  # fmt: skip
         self.setup, self.q0, self.v0, self.sweep, self.recorded, self.levels = setup, q0, v0, sweep, recorded, of
         self.numbers = range(len(q0)) if numbers is None else numbers
         self.compiled = setup.engine != "interpreted"
-        self.machine: Machine | None = None
+        self.compiled_equation: CompiledStateEquation | None = None
         if self.compiled:
             whole = StateEquation(setup.plant, setup.controller, setup.integrator.canonical, setup.events)
-            self.machine = machine_of(setup, whole, tuple(sweep))
-            self.machine.check(setup)
+            self.compiled_equation = machine_of(setup, whole, tuple(sweep))
+            self.compiled_equation.check(setup)
         self.made: list[Single | None] = [None] * len(q0)
         self.stop = np.zeros(1, np.int64)
 
-    def _of(self, run: int) -> tuple[Setup, StateEquation, Machine | None]:
+    def _of(self, run: int) -> tuple[Setup, StateEquation, CompiledStateEquation | None]:
         """The setup of a run, its state equation, and its machine code, which is that of all."""
         plant, controller = self.setup.plant, self.setup.controller
         if self.sweep:
@@ -86,11 +86,11 @@ class OneByOne:
         own = {"plant": plant, "controller": controller, "q0": self.q0[run], "v0": self.v0[run]}
         setup = with_values(self.setup, own)
         equation = StateEquation(plant, controller, setup.integrator.canonical, setup.events)
-        if self.machine is None:
+        if self.compiled_equation is None:
             return setup, equation, None
-        if self.machine.equation.limited != equation.limited or setup.finds_events != self.setup.finds_events:
+        if self.compiled_equation.equation.limited != equation.limited or setup.finds_events != self.setup.finds_events:
             return setup, equation, machine_of(setup, equation, tuple(self.sweep))
-        return setup, equation, with_numbers(self.machine, equation.in_a_mode)  # only numbers differ
+        return setup, equation, with_numbers(self.compiled_equation, equation.in_a_mode)  # only numbers differ
 
     def run(self, threads: int, on_progress: Callable[[float], object] | None = None) -> None:
         """All runs; Ctrl-C ends them, and an error of `on_progress`, which is told the mean of the times reached."""
@@ -107,13 +107,13 @@ class OneByOne:
     def _run(self, i: int) -> None:
         if self.stop[0]:
             return
-        setup, equation, machine = self._of(i)
+        setup, equation, compiled_equation = self._of(i)
         observer = observer_of(setup, self.levels.of_runs([i]))
-        run = prepared(setup, equation, machine, observer=observer)
+        run = prepared(setup, equation, compiled_equation, observer=observer)
         run.stop = self.stop
         self.made[i] = self._kept(equation, run.record(), observer.observation)
 
-    def _kept(self, equation: StateEquation, record: Record, observation: Observation) -> Single:
+    def _kept(self, equation: StateEquation, record: Recording, observation: Observation) -> Single:
         """What is recorded of a run; not the sample at an event that ended it, which no other run has."""
         outcome = record.outcome
         early = outcome.ending is Ending.FINISHED and outcome.t < self.setup.duration_s

@@ -9,20 +9,20 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 
 from robot_dyn.queries.units import unit
-from robot_dyn.simulation.diagnostics.observed import KINDS, Units, against, of_reference, of_steps, units_of
 from robot_dyn.simulation.diagnostics.reference_remarks import at_rest, held, jumps
+from robot_dyn.simulation.diagnostics.step_remarks import KINDS, Units, against, of_reference, of_steps, units_of
 from robot_dyn.simulation.diagnostics.unstable_loop import unstable
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.observation.chatter import Episode
 from robot_dyn.simulation.observation.observation import Observed
 from robot_dyn.simulation.observation.remarks import Kind, Remark
-from robot_dyn.simulation.results.origin import joint_types
+from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.tracking import deviation_of, root_mean_square
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.values import Value, read_only
 
 if TYPE_CHECKING:
-    from robot_dyn.simulation.rollouts.rollout_result import Rollouts
+    from robot_dyn.simulation.rollouts.result import Rollouts
 
 OF_REFERENCES = Kind.JUMPS, Kind.HELD
 

@@ -34,7 +34,7 @@ from robot_dyn.simulation.events.holding import Holding
 from robot_dyn.simulation.events.sides import Sides, goes_on
 from robot_dyn.simulation.observation.observation import Observation
 from robot_dyn.simulation.run.time_loop import act, acts, conserve, show
-from robot_dyn.simulation.setup.plan import Plan
+from robot_dyn.simulation.setup.segment_table import SegmentTable
 
 _EARLY = 1e-9  # of a period: a sample at the end of a segment belongs to the next one
 _ROOTS = 6  # steps made anew for an event, at most
@@ -48,7 +48,7 @@ class Kept(NamedTuple):
     Attributes:
         t, y, made: Times of samples (R,), the states (R, m, 1), and what else a sample holds (R, d, 1).
         shared_t, shared: States that companion runs share, (S,) and (S, m).
-        walked_t, walked: The ends of steps, (K,), and the states at the first of them, (k, m).
+        step_log_t, step_log: The ends of steps, (K,), and the states at the first of them, (k, m).
         columns, observation: As of `time_loop.Records`.
     """
 
@@ -57,8 +57,8 @@ class Kept(NamedTuple):
     made: Array
     shared_t: Array
     shared: Array
-    walked_t: Array
-    walked: Array
+    step_log_t: Array
+    step_log: Array
     columns: Array
     observation: Observation
 
@@ -109,10 +109,10 @@ def event_loop(
                 copy(after, y)
                 copy(work.last, work.K[0])
                 return evaluations, 0.0, 0.0, 0.0
-            evaluations += step(f, c, t, h, y, p, runs.own, after, work, runs.lost)
+            evaluations += step(f, c, t, h, y, p, runs.run_parameters, after, work, runs.lost)
             if control[At.RTOL] + control[At.ATOL] > 0.0:  # 0 for steps of a fixed length
                 e = error(c, h, y, after, work, control[At.RTOL], control[At.ATOL])
-            evaluations += accept(f, c, t, h, y, p, runs.own, after, work)
+            evaluations += accept(f, c, t, h, y, p, runs.run_parameters, after, work)
             shift = correction(f, t, h, whole, y, p, runs, work, switches, event)
             if not abs(shift) > _SHORT * h:
                 return evaluations, h, shift, e
@@ -122,18 +122,18 @@ def event_loop(
         return evaluations, h, 0.0, e
 
     def advance(
-        f: Functions, plan: Plan, runs: Runs, kept: Kept, times: Times, rules: Rules, c: Any, work: Any,
+        f: Functions, table: SegmentTable, runs: Runs, kept: Kept, times: Times, rules: Rules, c: Any, work: Any,
         switches: Switches, sides: Sides, holding: Holding, now: Array, control: Array, stop: Array,
     ) -> int:  # fmt: skip
-        last = len(plan.counts) - 1
-        own, y, after = runs.own, runs.y, runs.after
+        last = len(table.counts) - 1
+        run_parameters, y, after = runs.run_parameters, runs.y, runs.after
         while now[Now.SEGMENT] <= last:
             s = now[Now.SEGMENT]
-            start, p = plan.starts[s], plan.parameters[s]
-            if plan.transfers[s] == 1:
+            start, p = table.starts[s], table.parameters[s]
+            if table.transfers[s] == 1:
                 return Ended.TRANSFER
             if now[Now.STEP] == 0:
-                if plan.ticks[s] > 0 and not act(f, runs, rules, start, plan.at_ticks[s], plan.ticks[s]):
+                if table.ticks[s] > 0 and not act(f, runs, rules, start, table.at_ticks[s], table.ticks[s]):
                     return Ended.TICK
                 node(f, runs, kept, times, now, start, p)
                 times.reached[0] = start
@@ -141,28 +141,30 @@ def event_loop(
             if s == last:
                 now[Now.SEGMENT] += 1
                 continue
-            end = plan.starts[s + 1]
+            end = table.starts[s + 1]
             if now[Now.STEP] == 1:  # at the start of a segment, and behind an event
-                now[Now.EVALUATIONS] += begin(f, c, times.reached[0], y, p, own, work)
+                now[Now.EVALUATIONS] += begin(f, c, times.reached[0], y, p, run_parameters, work)
                 if not finite(work.K[0]):
                     return Ended.NOT_FINITE
-                remember(times.reached[0], y, p, own, switches)
+                remember(times.reached[0], y, p, run_parameters, switches)
                 if control[At.NEXT] == 0.0 and control[At.RTOL] + control[At.ATOL] > 0.0:
-                    now[Now.EVALUATIONS] += first_step(f, times.reached[0], end, y, p, own, after, work, control)
+                    now[Now.EVALUATIONS] += first_step(
+                        f, times.reached[0], end, y, p, run_parameters, after, work, control
+                    )
                 now[Now.STEP] = 2
             while times.reached[0] < end:
                 t = times.reached[0]
-                made, found = choose(f, c, t, end, y, p, own, after, work, runs.lost, control, times.mesh)
+                made, found = choose(f, c, t, end, y, p, run_parameters, after, work, runs.lost, control, times.mesh)
                 now[Now.EVALUATIONS] += made
                 if found != 0:
                     return Ended.TOO_SMALL
                 h, t1 = control[At.TAKEN], control[At.END]
-                now[Now.EVALUATIONS] += accept(f, c, t, h, y, p, own, after, work)
+                now[Now.EVALUATIONS] += accept(f, c, t, h, y, p, run_parameters, after, work)
                 has_dense, event, theta, rest = False, -1, NONE, 0.0
                 if len(switches.sides) > 0:
-                    near = nears(t1, after, p, own, switches)
+                    near = nears(t1, after, p, run_parameters, switches)
                     if near or approaches(y, after, h, work.K[0], work.last, rules, switches):
-                        now[Now.EVALUATIONS] += dense(f, c, t, h, y, p, own, after, work)
+                        now[Now.EVALUATIONS] += dense(f, c, t, h, y, p, run_parameters, after, work)
                         event, theta = first_event(f, t, h, y, p, runs, work.F, switches)
                         has_dense = event < 0
                     if event >= 0:
@@ -172,14 +174,14 @@ def event_loop(
                             return Ended.TOO_SMALL
                         if e > 1.0:
                             control[At.NEXT] = shortened(h, e, control)
-                            remember(t, y, p, own, switches)
+                            remember(t, y, p, run_parameters, switches)
                             continue
                         t1 = t + (h + rest)
                         control[At.NEXT] = max(control[At.NEXT], abs(control[At.TAKEN]))  # the cut is no error
                         switches.sides[event] = -switches.sides[event]
                 if h > 0.0 and asked(times, now, t1, end):
                     if not has_dense:
-                        now[Now.EVALUATIONS] += dense(f, c, t, h, y, p, own, after, work)
+                        now[Now.EVALUATIONS] += dense(f, c, t, h, y, p, run_parameters, after, work)
                     inside(f, runs, kept, times, now, t, h, t1, end, p, work.F)
                 copy(y, after)
                 if event >= 0:
@@ -193,7 +195,7 @@ def event_loop(
                 now[Now.STEPS] += 1
                 now[Now.BUDGET] -= 1
                 walk(runs, kept, now, t1)
-                show(runs, kept, rules, work.last, now, t, t1, t == start and acts(rules, plan.ticks[s]))
+                show(runs, kept, rules, work.last, now, t, t1, t == start and acts(rules, table.ticks[s]))
                 if event >= 0:
                     now[Now.EVENT] = event
                     now[Now.STEP] = 1
@@ -281,7 +283,7 @@ def keep(f: Functions, runs: Runs, kept: Kept, now: Array, t: float, y: Array, p
     row = now[Now.ROW]
     kept.t[row] = t
     copy(kept.y[row], y)
-    evaluate(f.sample, t, y, p, runs.own, kept.made[row])
+    evaluate(f.sample, t, y, p, runs.run_parameters, kept.made[row])
     now[Now.ROW] += 1
 
 
@@ -296,10 +298,10 @@ def share(kept: Kept, now: Array, t: float, y: Array) -> None:
 def walk(runs: Runs, kept: Kept, now: Array, t: float) -> None:
     """Keep the end of a step, while there is room."""
     row = now[Now.WALKED]
-    if row < len(kept.walked_t):
-        kept.walked_t[row] = t
-        if row < len(kept.walked):
-            copy(kept.walked[row], runs.y[:, 0])
+    if row < len(kept.step_log_t):
+        kept.step_log_t[row] = t
+        if row < len(kept.step_log):
+            copy(kept.step_log[row], runs.y[:, 0])
         now[Now.WALKED] += 1
 
 

@@ -26,20 +26,20 @@ from robot_dyn.simulation.events.holding import Places
 from robot_dyn.simulation.events.mode_change import end_mode, without_modes
 from robot_dyn.simulation.events.modes import NOTHING_HELD, modes_of
 from robot_dyn.simulation.events.occurrence import Occurrence
+from robot_dyn.simulation.events.payload_events import PayloadEvents
 from robot_dyn.simulation.events.switching import Switching
-from robot_dyn.simulation.events.transfers import Transfers
 from robot_dyn.simulation.observation.observation import NOTHING
 from robot_dyn.simulation.observation.observer import Observer
 from robot_dyn.simulation.run.event_loop import Kept, Times, event_loop
 from robot_dyn.simulation.run.fixed_step import rules_alone, runs_of
 from robot_dyn.simulation.run.outcome import Ending, Outcome
-from robot_dyn.simulation.run.record import MOST_SHARED, Path, Record
+from robot_dyn.simulation.run.recording import MOST_SHARED, Path, Recording
 from robot_dyn.simulation.run.state_functions import interpreted, system
 from robot_dyn.simulation.run.stiffness import FIRST_LOOK, changes_over
 from robot_dyn.simulation.run.switched_run import Made, SwitchedRun, TerminalEvent
 from robot_dyn.simulation.run.watch import DivergedError, Watch, one_step
-from robot_dyn.simulation.setup.plan import plan_of
 from robot_dyn.simulation.setup.schedule import nodes
+from robot_dyn.simulation.setup.segment_table import segment_table
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.setup.size import samples as most_samples
 from robot_dyn.values import copied, kept
@@ -91,7 +91,7 @@ class EventRun(SwitchedRun):
     first = 200
 
     def __init__(
-        self, watch: Watch, transfers: Transfers, made: Made, mesh: np.ndarray | None,
+        self, watch: Watch, transfers: PayloadEvents, made: Made, mesh: np.ndarray | None,
         places: Places, machine_code: Advance | None = None,
         on_progress: Callable[[float], object] | None = None, observer: Observer | None = None,
         in_python: Functions | None = None, samples: bool = True, most: float = inf,
@@ -99,7 +99,7 @@ class EventRun(SwitchedRun):
     ) -> None:  # fmt: skip
         setup, equation, self.most, self._look = watch.setup, watch.equation, most, FIRST_LOOK if chooses else 0
         self.chooses = chooses
-        self.watch, self.transfers, self.plan, self.in_python = watch, transfers, plan_of(setup), in_python
+        self.watch, self.transfers, self.table, self.in_python = watch, transfers, segment_table(setup), in_python
         self.setup, self.equation, self.made, self.samples = setup, equation, made, samples
         self.on_progress, self.observer, self.compiled = on_progress, observer, machine_code is not None
         n, m = equation.plant.dynamics.n, equation.size
@@ -107,17 +107,17 @@ class EventRun(SwitchedRun):
         self.start = equation.start(setup.q0, setup.v0)
         self.stepper, self.control = _method(setup, equation)
         self.functions, parameters = made(equation)
-        own = np.concatenate([np.full(held, np.nan), parameters])[:, None]
+        run_parameters = np.concatenate([np.full(held, np.nan), parameters])[:, None]
         self.bodies = self.functions.bodies
         modes = None
         if equation.impulses:
-            modes = modes_of(equation, own.copy(), places, _ACCUMULATED, _BRIEF * setup.duration_s)
+            modes = modes_of(equation, run_parameters.copy(), places, _ACCUMULATED, _BRIEF * setup.duration_s)
             modes.start(self.start)
         alone = thresholds and modes is None and not transfers.any
         self.switching = kept(setup, _switching) if alone else Switching(equation, modes=modes)
         if not thresholds:
             self.switching = Switching(equation, self.switching.quantities, modes)
-        self.runs = runs_of(equation, self.start[:, None], own, m + n + 2)
+        self.runs = runs_of(equation, self.start[:, None], run_parameters, m + n + 2)
         self.runs.energy[0], self.runs.scale[0] = self.watch.energy, self.watch.scale
         of = self.stepper
         self.advance = machine_code or event_loop(
@@ -126,7 +126,7 @@ class EventRun(SwitchedRun):
         self.rules = kept(setup, rules_alone)
         self.times = _times(setup, mesh, samples)
         compared = self.times.compared
-        S, rows = len(self.plan.counts), int(most_samples(setup)) + 2 if samples else 0
+        S, rows = len(self.table.counts), int(most_samples(setup)) + 2 if samples else 0
         states = 0 if compared == inf else _COMPARED + S + 2
         shown = (np.empty((1 + 3 * n, 0)), NOTHING) if observer is None else (observer.columns, observer.observation)
         self.kept = Kept(
@@ -138,7 +138,7 @@ class EventRun(SwitchedRun):
             known = copied(kept(setup, _switches))
             self.switches = known._replace(functions=events, b=np.zeros(degree + 1), stack=room(degree))
         else:
-            self.switches = self.switching.at(0.0, self.start, degree, events, own[:n, 0] if held else None)
+            self.switches = self.switching.at(0.0, self.start, degree, events, run_parameters[:n, 0] if held else None)
         self.events: list[Occurrence] = []
         self.log = event_log(n, 0, _BRIEF * setup.duration_s) if modes is None else modes.holding.log
         self._forget_sides()
@@ -150,7 +150,7 @@ class EventRun(SwitchedRun):
         """The time reached, in [s]."""
         return float(self.times.reached[0])
 
-    def record(self) -> Record:
+    def record(self) -> Recording:
         """Run to the end, however the run ends."""
         try:
             with np.errstate(all="ignore"):  # what overflows ends the run
@@ -167,7 +167,7 @@ class EventRun(SwitchedRun):
 
     def _room(self, budget: int) -> int:
         self._widen()
-        rest = len(self.kept.walked_t) - int(self.now[Now.WALKED]) or budget
+        rest = len(self.kept.step_log_t) - int(self.now[Now.WALKED]) or budget
         if self._look:
             rest = min(rest, self._until_look())
         return min(rest, super()._room(budget))
@@ -177,22 +177,22 @@ class EventRun(SwitchedRun):
         steps = int(self.now[Now.STEPS])
         if steps >= self._look:
             self._look *= 2
-            held = self.runs.own[: self.rules.held, 0] if self.rules.held else None
-            ends = self.kept.walked_t[: int(self.now[Now.WALKED])]
+            held = self.runs.run_parameters[: self.rules.held, 0] if self.rules.held else None
+            ends = self.kept.step_log_t[: int(self.now[Now.WALKED])]
             changes_over(self.setup, self.switching.on(self.switches.sides), ends, self.y, held)
         return self._look - steps
 
     def _widen(self) -> None:
         """Room for as many more ends of steps, where it is used up."""
-        kept, rows = self.kept, len(self.kept.walked_t)
+        kept, rows = self.kept, len(self.kept.step_log_t)
         if self.now[Now.WALKED] == rows:
-            states = max(len(kept.walked), min(2 * rows, MOST_SHARED))
+            states = max(len(kept.step_log), min(2 * rows, MOST_SHARED))
             wider = np.empty(2 * rows), np.empty((states, self.equation.size))
-            wider[0][:rows], wider[1][: len(kept.walked)] = kept.walked_t, kept.walked
-            self.kept = kept._replace(walked_t=wider[0], walked=wider[1])
+            wider[0][:rows], wider[1][: len(kept.step_log)] = kept.step_log_t, kept.step_log
+            self.kept = kept._replace(step_log_t=wider[0], step_log=wider[1])
 
     def _advance(self) -> Ended:
-        arguments = self.functions, self.plan, self.runs, self.kept, self.times, self.rules
+        arguments = self.functions, self.table, self.runs, self.kept, self.times, self.rules
         modes = self.switching.modes
         holding = NOTHING_HELD if modes is None else modes.holding
         made = self.stepper.coefficients, self.stepper.work, self.switches, self.sides, holding
@@ -211,8 +211,8 @@ class EventRun(SwitchedRun):
         """A step of a method of fixed step that was not found: DivergedError with the words for it."""
         s, t, y = int(self.now[Now.SEGMENT]), self.time, self.y
         equation = self.switching.on(self.switches.sides)
-        p, functions = self.plan.parameters[s], interpreted(equation, self.watch)
-        right_side = system(functions, equation, p, self.runs.own[: self.rules.held])
+        p, functions = self.table.parameters[s], interpreted(equation, self.watch)
+        right_side = system(functions, equation, p, self.runs.run_parameters[: self.rules.held])
         h = float(self.control[At.TAKEN])
         one_step(self.setup.integrator, right_side, t, y, h, self.watch)
         raise self.watch.diverged(t, y, "a number overflowed")
@@ -234,9 +234,9 @@ class EventRun(SwitchedRun):
             self._transfer(int(self.now[Now.SEGMENT]))
         elif ended is Ended.TICK:
             s = int(self.now[Now.SEGMENT])
-            y, held = self.watch.tick(float(self.plan.starts[s]), y)
-            self.runs.y[:, 0], self.runs.own[: self.rules.held, 0] = y, held
-            self.plan.ticks[s] = 0
+            y, held = self.watch.tick(float(self.table.starts[s]), y)
+            self.runs.y[:, 0], self.runs.run_parameters[: self.rules.held, 0] = y, held
+            self.table.ticks[s] = 0
         elif ended is Ended.GAINS:
             self.watch.look(t, y)
         elif ended is Ended.TOO_SMALL and not self.setup.integrator.controls_error:
@@ -256,22 +256,22 @@ class EventRun(SwitchedRun):
         if self.samples and not (row and self.kept.t[row - 1] == t):
             functions = self.in_python or self.functions
             self.kept.t[row], self.kept.y[row] = t, self.runs.y
-            functions.sample(t, self.runs.y, self.plan.parameters[s], self.runs.own, self.kept.made[row])
+            functions.sample(t, self.runs.y, self.table.parameters[s], self.runs.run_parameters, self.kept.made[row])
             self.now[Now.ROW] += 1
 
-    def _record(self, outcome: Outcome) -> Record:
+    def _record(self, outcome: Outcome) -> Recording:
         kept = self.kept
-        rows, shared, walked = (int(self.now[i]) for i in (Now.ROW, Now.SHARED, Now.WALKED))
+        rows, shared, step_log = (int(self.now[i]) for i in (Now.ROW, Now.SHARED, Now.WALKED))
         if self.samples and not rows:  # interrupted, or without a tick, at once
             kept.t[0], kept.y[0, :, 0], kept.made[0], rows = 0.0, self.start, np.nan, 1
-        ends = kept.walked_t[:walked]
-        states = np.vstack([self.start, kept.walked[: min(walked, len(kept.walked))]])
+        ends = kept.step_log_t[:step_log]
+        states = np.vstack([self.start, kept.step_log[: min(step_log, len(kept.step_log))]])
         path = Path(np.full(len(states), -1), np.append(0.0, ends)[: len(states)], states)
         if self.setup.integrator.controls_error:
             common = Path(np.arange(shared), kept.shared_t[:shared], kept.shared[:shared])
         else:
             common = _on(nodes(self.setup.segments), path)
-        return Record(
+        return Recording(
             outcome, kept.t[:rows], kept.y[:rows, :, 0], kept.made[:rows, :, 0], common, path,
             int(self.now[Now.STEPS]), int(self.now[Now.EVALUATIONS]), float(self.runs.peak[0]), tuple(self.events),
             ends,

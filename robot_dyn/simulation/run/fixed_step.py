@@ -20,21 +20,21 @@ from robot_dyn.foreign import is_mistake
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.simulation.dynamics.loop_state import Ended, Functions, Now, Rules, Runs
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.events.transfers import Transfers
+from robot_dyn.simulation.events.payload_events import PayloadEvents
 from robot_dyn.simulation.observation.observation import NOTHING
 from robot_dyn.simulation.observation.observer import Observer
-from robot_dyn.simulation.run.followed import Followed
+from robot_dyn.simulation.run.driver import Driver
 from robot_dyn.simulation.run.outcome import Ending, Outcome
-from robot_dyn.simulation.run.record import MOST_SHARED, Path, Record
+from robot_dyn.simulation.run.recording import MOST_SHARED, Path, Recording
 from robot_dyn.simulation.run.state_functions import interpreted, sample, system
 from robot_dyn.simulation.run.time_loop import WATCHED, Records, acts, time_loop
 from robot_dyn.simulation.run.watch import LARGEST, DivergedError, Watch, one_step, overflowed
-from robot_dyn.simulation.setup.plan import plan_of
 from robot_dyn.simulation.setup.schedule import ON_STEP, paced
+from robot_dyn.simulation.setup.segment_table import segment_table
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.values import kept
 
-_DOUBTFUL = 1e6  # of Σ |y| in machine code, which does not see that M becomes singular
+_NEEDS_REVIEW = 1e6  # of Σ |y| in machine code, which does not see that M becomes singular
 
 _FIRST = np.zeros(1, np.int64)
 
@@ -43,7 +43,7 @@ Made = Callable[[StateEquation], tuple[Functions, np.ndarray]]
 
 
 @final
-class FixedStep(Followed):
+class FixedStep(Driver):
     """A run on its way.
 
     Args:
@@ -59,7 +59,7 @@ class FixedStep(Followed):
     first = 1000
 
     def __init__(
-        self, watch: Watch, transfers: Transfers, made: Made, pace: Fraction,
+        self, watch: Watch, transfers: PayloadEvents, made: Made, pace: Fraction,
         machine_code: Advance | None = None, on_progress: Callable[[float], object] | None = None,
         observer: Observer | None = None,
     ) -> None:  # fmt: skip
@@ -69,20 +69,20 @@ class FixedStep(Followed):
         self.transfers, self.made, self.events = transfers, made, []
         self.functions, parameters = made(equation)
         self.on_progress, self.observer = on_progress, observer
-        self.segments, self.plan, self.watch = paced(setup.segments, pace), plan_of(setup, pace), watch
+        self.segments, self.table, self.watch = paced(setup.segments, pace), segment_table(setup, pace), watch
         n, m = equation.plant.dynamics.n, equation.size
         held = n if equation.sampled else 0
         self.start = equation.start(setup.q0, setup.v0)
-        own = np.concatenate([np.full(held, np.nan), parameters])[:, None]
-        self.runs = runs_of(equation, self.start[:, None], own, m + n + 2)
+        run_parameters = np.concatenate([np.full(held, np.nan), parameters])[:, None]
+        self.runs = runs_of(equation, self.start[:, None], run_parameters, m + n + 2)
         self.runs.energy[0], self.runs.scale[0] = self.watch.energy, self.watch.scale
         self.stepper = method.stepper(FLOAT64, m, n, m + n, 1, equation.widths)
         self.advance = machine_code or time_loop(self.stepper.step)
         every, thin = self._shared(pace)
-        largest = _DOUBTFUL if self.compiled else LARGEST
+        largest = _NEEDS_REVIEW if self.compiled else LARGEST
         self.rules = kept(setup, rules_alone)._replace(largest=largest, every=every, thin=thin)
-        rows = samples_at_most(setup, self.plan.counts) if pace == 1 else 1
-        states = int((-(-self.plan.counts // every)).sum()) // thin + 2
+        rows = samples_at_most(setup, self.table.counts) if pace == 1 else 1
+        states = int((-(-self.table.counts // every)).sum()) // thin + 2
         shown = (np.empty((1 + 3 * n, 0)), NOTHING) if observer is None else (observer.columns, observer.observation)
         self.records = Records(
             np.arange(m), np.empty((rows, 2), np.int64), np.empty((rows, m, 1)), np.empty((rows, m + n + 2, 1)),
@@ -93,7 +93,7 @@ class FixedStep(Followed):
 
     def _shared(self, pace: Fraction) -> tuple[int, int]:
         """Steps between states that companions share, and how many of these to one that is kept."""
-        counts = self.plan.counts
+        counts = self.table.counts
         few = self.setup.steps <= MOST_SHARED
         thin = 1 if few else 30 * ceil(self.setup.steps / MOST_SHARED)  # steps of 2, 3 and 5 meet at every 30th
         among = 2 * ceil(len(counts) / MOST_SHARED) if len(counts) > MOST_SHARED else 1
@@ -102,17 +102,17 @@ class FixedStep(Followed):
     @property
     def time(self) -> float:
         """The time reached, in [s]."""
-        s, k = min(int(self.now[Now.SEGMENT]), len(self.plan.starts) - 1), int(self.now[Now.STEP])
-        if k == self.plan.counts[s]:
-            return float(self.plan.starts[min(s + 1, len(self.plan.starts) - 1)])
-        return float(self.plan.starts[s] + k * self.plan.lengths[s])
+        s, k = min(int(self.now[Now.SEGMENT]), len(self.table.starts) - 1), int(self.now[Now.STEP])
+        if k == self.table.counts[s]:
+            return float(self.table.starts[min(s + 1, len(self.table.starts) - 1)])
+        return float(self.table.starts[s] + k * self.table.lengths[s])
 
     @property
     def y(self) -> np.ndarray:
         """The state reached."""
         return self.runs.y[:, 0].copy()
 
-    def record(self) -> Record:
+    def record(self) -> Recording:
         """Run to the end, however the run ends."""
         try:
             with np.errstate(all="ignore"):
@@ -126,13 +126,13 @@ class FixedStep(Followed):
 
     def _advance(self) -> Ended:
         _, coefficients, work = self.stepper
-        arguments = self.functions, self.plan, self.runs, self.records, self.rules, coefficients, work
+        arguments = self.functions, self.table, self.runs, self.records, self.rules, coefficients, work
         try:
             return Ended(self.advance(*arguments, self.now, self.clock, self.stop))
         except RobotDynError as error:  # of a step; y is the state before it
             if is_mistake(error):
                 raise
-            return Ended.DOUBTFUL
+            return Ended.NEEDS_REVIEW
 
     def _judge(self, ended: Ended) -> None:
         """Do a doubtful step, tick or look at the energy by the interpreted equation."""
@@ -141,31 +141,31 @@ class FixedStep(Followed):
         s, t, y = int(self.now[Now.SEGMENT]), self.time, self.y
         if ended is Ended.TICK:
             y, held = self.watch.tick(t, y)
-            self.runs.y[:, 0], self.runs.own[: self.rules.held, 0] = y, held
-            self.plan.ticks[s] = 0
+            self.runs.y[:, 0], self.runs.run_parameters[: self.rules.held, 0] = y, held
+            self.table.ticks[s] = 0
         elif ended is Ended.TRANSFER:
             self.runs.y[:, 0], happened = self.transfers.over(t, y)
             self.events += happened
             self.equation = self.watch.equation = self.transfers.equation
-            self.functions, self.runs.own[self.rules.held :, 0] = self.made(self.equation)
-            self.plan.transfers[s] = 0
-        elif ended is Ended.DOUBTFUL:
+            self.functions, self.runs.run_parameters[self.rules.held :, 0] = self.made(self.equation)
+            self.table.transfers[s] = 0
+        elif ended is Ended.NEEDS_REVIEW:
             self._step(s, t, y)
         else:
             self.watch.look(t, y)
 
     def _step(self, s: int, t: float, y: np.ndarray) -> None:
         """One step by the interpreted equation."""
-        h, method, observer = float(self.plan.lengths[s]), cast(Integrator, self.setup.integrator), self.observer
+        h, method, observer = float(self.table.lengths[s]), cast(Integrator, self.setup.integrator), self.observer
         seen = None if observer is None else observer.seen
-        functions, p = interpreted(self.equation, self.watch), self.plan.parameters[s]
+        functions, p = interpreted(self.equation, self.watch), self.table.parameters[s]
         if method.nonsmooth:
             self.runs.y[:, 0] = y = self._jump(functions, t, h, p)
         else:
-            right_side = system(functions, self.equation, p, self.runs.own, seen)
+            right_side = system(functions, self.equation, p, self.runs.run_parameters, seen)
             self.runs.y[:, 0] = y = one_step(method, right_side, t, y, h, self.watch)
         if observer is not None:
-            ticked = self.now[Now.STEP] == 0 and acts(self.rules, int(self.plan.ticks[s]))
+            ticked = self.now[Now.STEP] == 0 and acts(self.rules, int(self.table.ticks[s]))
             observer.step(t, t + h, y, ticked or not self.equation.sampled)
         self.now[Now.STEP] += 1
         self.now[Now.STEPS] += 1
@@ -175,7 +175,7 @@ class FixedStep(Followed):
     def _jump(self, functions: Functions, t: float, h: float, p: Array) -> Array:
         """The state behind a step in which velocities may jump."""
         (step, coefficients, work), runs = self.stepper, self.runs
-        arguments = functions, coefficients, t, h, runs.y, p, runs.own, runs.after, work, runs.lost
+        arguments = functions, coefficients, t, h, runs.y, p, runs.run_parameters, runs.after, work, runs.lost
         self.watch.answer(t, self.y, lambda: step(*arguments))
         if runs.lost[0] or overflowed(runs.after):
             raise self.watch.diverged(t, self.y, "a number overflowed")
@@ -183,7 +183,7 @@ class FixedStep(Followed):
 
     def _times(self, places: np.ndarray) -> np.ndarray:
         """Times of (segment, step), in [s]."""
-        return self.plan.starts[places[:, 0]] + places[:, 1] * self.plan.lengths[places[:, 0]]
+        return self.table.starts[places[:, 0]] + places[:, 1] * self.table.lengths[places[:, 0]]
 
     def _keys(self, places: np.ndarray) -> np.ndarray:
         """Steps of the setup before (segment, step)."""
@@ -197,7 +197,7 @@ class FixedStep(Followed):
         for t, y, made in zip(self._times(kept.place[:rows]), kept.y[:rows, :, 0], kept.made[:rows, :, 0], strict=True):
             sample(self.equation, float(t), y, made[held].copy() if self.equation.sampled else None, made)
 
-    def _record(self, outcome: Outcome) -> Record:
+    def _record(self, outcome: Outcome) -> Recording:
         rows, m, kept = int(self.now[Now.ROW]), self.equation.size, self.records
         if not rows:  # interrupted, or without a tick, at once
             kept.place[0], kept.y[0, :, 0], kept.made[0] = 0, self.start, np.nan
@@ -207,7 +207,7 @@ class FixedStep(Followed):
         shared = kept.shared[: int(self.now[Now.SHARED])]
         at = shared[:, m:].astype(np.int64)
         path = Path(self._keys(at), self._times(at), shared[:, :m])
-        return Record(
+        return Recording(
             outcome, self._times(kept.place[:rows]), kept.y[:rows, :, 0], kept.made[:rows, :, 0], path, path,
             int(self.now[Now.STEPS]), int(self.now[Now.EVALUATIONS]), float(self.runs.peak[0]), tuple(self.events),
         )  # fmt: skip
@@ -230,7 +230,9 @@ def rules_of(
     )  # fmt: skip
 
 
-def runs_of(equation: StateEquation, y: np.ndarray, own: np.ndarray, made: int, numbers: np.ndarray = _FIRST) -> Runs:
+def runs_of(
+    equation: StateEquation, y: np.ndarray, run_parameters: np.ndarray, made: int, numbers: np.ndarray = _FIRST
+) -> Runs:
     """Runs at the states y (m, W) with their own numbers (O, W), of these numbers in a batch (W,)."""
     m, W = y.shape
     held, states = equation.plant.dynamics.n if equation.sampled else 0, equation.state_size
@@ -239,7 +241,7 @@ def runs_of(equation: StateEquation, y: np.ndarray, own: np.ndarray, made: int, 
     start, after = aligned((2, m, W))
     start[...] = y
     return Runs(
-        start, np.array(own, order="C"), after, np.empty((made, W)),
+        start, np.array(run_parameters, order="C"), after, np.empty((made, W)),
         np.empty((held + states, W)), np.empty((equation.plant.dynamics.n, W)), np.empty((2, W)), np.empty(W),
         np.zeros(W, np.int64), np.ones(W, np.int64), np.zeros(W, np.int64), np.zeros(W), np.zeros((m, W)),
         np.zeros(W), np.ones(W), np.zeros(W), keys,

@@ -33,36 +33,40 @@ def interpreted(equation: StateEquation, watch: Watch) -> Functions:
     """
     n, m = equation.plant.dynamics.n, equation.size
 
-    def rate(t: float, y: Array, p: Array, own: Array, out: Array) -> None:
-        made, u = equation.rate(min(max(t, p[0]), p[1]), _state(y), own[:n, 0].copy() if equation.sampled else None)
+    def rate(t: float, y: Array, p: Array, run_parameters: Array, out: Array) -> None:
+        made, u = equation.rate(
+            min(max(t, p[0]), p[1]), _state(y), run_parameters[:n, 0].copy() if equation.sampled else None
+        )
         out[:m, 0], out[m:, 0] = made, u
 
-    def tick(t: float, y: Array, p: Array, own: Array, out: Array) -> None:
+    def tick(t: float, y: Array, p: Array, run_parameters: Array, out: Array) -> None:
         after, held = watch.tick(t, _state(y))
         out[:n, 0], out[n:, 0] = held, after[2 * n : 2 * n + equation.state_size]
 
-    def energy(t: float, y: Array, p: Array, own: Array, out: Array) -> None:
+    def energy(t: float, y: Array, p: Array, run_parameters: Array, out: Array) -> None:
         x = _state(y)
         q, v, _, _ = watch.answer(t, x, lambda: equation.state(x))
         out[:, 0] = watch.answer(t, x, lambda: equation.energies(t, q, v))
 
-    def sampled(t: float, y: Array, p: Array, own: Array, out: Array) -> None:
-        sample(equation, min(max(t, p[0]), p[1]), _state(y), own[:n, 0] if equation.sampled else None, out[:, 0])
+    def sampled(t: float, y: Array, p: Array, run_parameters: Array, out: Array) -> None:
+        sample(
+            equation, min(max(t, p[0]), p[1]), _state(y), run_parameters[:n, 0] if equation.sampled else None, out[:, 0]
+        )
 
-    def jacobian(t: float, y: Array, p: Array, own: Array, out: Array) -> None:
+    def jacobian(t: float, y: Array, p: Array, run_parameters: Array, out: Array) -> None:
         end = p[1] if t - p[0] < p[1] - t else p[0]
-        out[:, :, 0] = system(functions, equation, p, own, exact=False).derivatives(t, y[:, 0], end)
+        out[:, :, 0] = system(functions, equation, p, run_parameters, exact=False).derivatives(t, y[:, 0], end)
 
-    def step(t: float, x: Array, p: Array, own: Array, out: Array) -> None:
-        held = own[:n, 0].copy() if equation.sampled else None
+    def step(t: float, x: Array, p: Array, run_parameters: Array, out: Array) -> None:
+        held = run_parameters[:n, 0].copy() if equation.sampled else None
         made = stepped(equation, min(max(t, p[0]), p[1]), _state(x), held)
         out[: len(made), 0] = made
 
     def of_behind(t: float, x: Array, p: Array, found: Array, out: Array) -> None:
         out[:, 0] = behind(equation, x[:, 0], found[:, 0])
 
-    def of_bodies(t: float, y: Array, p: Array, own: Array, out: Array) -> None:
-        held = own[:n, 0].copy() if equation.sampled else None
+    def of_bodies(t: float, y: Array, p: Array, run_parameters: Array, out: Array) -> None:
+        held = run_parameters[:n, 0].copy() if equation.sampled else None
         out[:, 0] = bodies(equation, min(max(t, p[0]), p[1]), _state(y), held)
 
     functions = Functions(rate, tick, energy, sampled, jacobian, 0, step, of_behind, bodies=of_bodies)
@@ -73,8 +77,8 @@ def in_modes(equation: StateEquation, watch: Watch) -> Functions:
     """The same in the mode that the last 3n own numbers are: held, direction and contact."""
     known: dict[bytes, Functions] = {}
 
-    def of(own: Array) -> Functions:
-        numbers = own[len(own) - 3 * equation.plant.dynamics.n :, 0]
+    def of(run_parameters: Array) -> Functions:
+        numbers = run_parameters[len(run_parameters) - 3 * equation.plant.dynamics.n :, 0]
         key = numbers.tobytes()
         if key not in known:
             mode = Mode(*numbers.copy().reshape(3, -1))
@@ -82,8 +86,8 @@ def in_modes(equation: StateEquation, watch: Watch) -> Functions:
         return known[key]
 
     def forwarded(name: str) -> Callable[..., None]:
-        def function(t: float, y: Array, p: Array, own: Array, out: Array) -> None:
-            getattr(of(own), name)(t, y, p, own, out)
+        def function(t: float, y: Array, p: Array, run_parameters: Array, out: Array) -> None:
+            getattr(of(run_parameters), name)(t, y, p, run_parameters, out)
 
         return function
 
@@ -117,7 +121,7 @@ def system(
     functions: Functions,
     equation: StateEquation,
     p: Array,
-    own: Array,
+    run_parameters: Array,
     seen: Array | None = None,
     exact: bool = True,
 ) -> System:
@@ -127,7 +131,7 @@ def system(
         functions: Of the state equation, in Python.
         equation: The state equation.
         p: Of the segment.
-        own: u of a sampled controller, in zero-order hold, (n, 1), or nothing, (0, 1).
+        run_parameters: u of a sampled controller, in zero-order hold, (n, 1), or nothing, (0, 1).
         seen: Where the velocity and the actuation of each evaluation are written, (2n,).
         exact: Whether derivatives are those of the functions, if they have them.
     """
@@ -137,13 +141,13 @@ def system(
     def rate(t: Any, y: Array) -> Array:
         if y.ndim > 1:  # an implicit method asks for its Jacobian
             return np.array([rate(t, row) for row in y.reshape(-1, m)]).reshape(y.shape)
-        evaluate(functions.rate, float(t), np.ascontiguousarray(y)[:, None], p, own, out)
+        evaluate(functions.rate, float(t), np.ascontiguousarray(y)[:, None], p, run_parameters, out)
         if seen is not None:
             seen[:n], seen[n:] = out[:n, 0], out[m:, 0]
         return out[:m, 0].copy()
 
     def derivatives(t: Any, y: Array) -> Array:
-        evaluate(functions.jacobian, float(t), np.ascontiguousarray(y)[:, None], p, own, J)
+        evaluate(functions.jacobian, float(t), np.ascontiguousarray(y)[:, None], p, run_parameters, J)
         return J[:, :, 0].copy()
 
     return System(rate, n, equation.widths, derivatives if exact and functions.jacobian else None)

@@ -21,13 +21,13 @@ from robot_dyn.simulation.events.holding import Holding, part, write_mode
 from robot_dyn.simulation.events.mode_change import change
 from robot_dyn.simulation.events.modes import Modes
 from robot_dyn.simulation.events.occurrence import Occurrence
+from robot_dyn.simulation.events.payload_events import PayloadEvents
 from robot_dyn.simulation.events.sides import Sides, keep_numbers, sides_of
 from robot_dyn.simulation.events.switching import Switching
-from robot_dyn.simulation.events.transfers import Transfers
 from robot_dyn.simulation.observation.remarks import Kind, Remark
-from robot_dyn.simulation.run.followed import Followed
+from robot_dyn.simulation.run.driver import Driver
 from robot_dyn.simulation.run.watch import DivergedError, Watch
-from robot_dyn.simulation.setup.plan import Plan
+from robot_dyn.simulation.setup.segment_table import SegmentTable
 from robot_dyn.simulation.setup.setup import STEP_S, Setup
 from robot_dyn.threshold import Threshold
 
@@ -54,13 +54,13 @@ class TerminalEvent(Exception):  # noqa: N818
         self.t = t
 
 
-class SwitchedRun(Followed):
+class SwitchedRun(Driver):
     """A run whose equation switches at events.
 
     Attributes:
         setup, equation, watch, transfers: Of the run, with what it carries now.
         made: As of `EventRun`.
-        plan, runs, rules, control, switches, sides: What the loop takes.
+        table, runs, rules, control, switches, sides: What the loop takes.
         switching: Its switching functions, and its modes.
         functions, in_python: Of the state equation on the sides that the run is on; as Python calls them, if that is
             machine code.
@@ -75,9 +75,9 @@ class SwitchedRun(Followed):
     setup: Setup
     equation: StateEquation
     watch: Watch
-    transfers: Transfers
+    transfers: PayloadEvents
     made: Made
-    plan: Plan
+    table: SegmentTable
     runs: Runs
     rules: Rules
     control: Array
@@ -125,27 +125,30 @@ class SwitchedRun(Followed):
         switching = self.switching
         if switching.thresholds or switching.dropped or self.transfers.any:
             functions, parameters = self.made(switching.on(self.switches.sides))
-            self.functions, self.runs.own[self.rules.held :, 0] = functions._replace(bodies=self.bodies), parameters
+            self.functions, self.runs.run_parameters[self.rules.held :, 0] = (
+                functions._replace(bodies=self.bodies),
+                parameters,
+            )
             if self.in_python is not None:  # else functions change with the sides
                 keep_numbers(self.sides, switching.of_thresholds(self.switches.sides), parameters)
         if switching.modes is not None:
-            write_mode(switching.modes.holding, self.runs.own)
+            write_mode(switching.modes.holding, self.runs.run_parameters)
         if not self.compiled:
             self.functions = self._lenient(self.functions)
 
     def _forget_sides(self) -> None:
         """Room for the numbers of the run on sides of its thresholds; none is known."""
-        count, own = len(self.switching.thresholds), len(self.runs.own) - self.rules.held
+        count, run_parameters = len(self.switching.thresholds), len(self.runs.run_parameters) - self.rules.held
         asked = np.array([[each.direction, each.terminal] for each in self.setup.events], float).reshape(-1, 2)
         restarts = self.setup.integrator.needs_jacobian
-        self.sides = sides_of(count, own, asked[:, 0].copy(), asked[:, 1] > 0, restarts, self.log)
+        self.sides = sides_of(count, run_parameters, asked[:, 0].copy(), asked[:, 1] > 0, restarts, self.log)
 
     def _lenient(self, functions: Functions) -> Functions:
         """The functions in Python, with a rate that is nan where a trial step goes too far: a shorter one is tried."""
 
-        def rate(t: float, y: Array, p: Array, own: Array, out: Array) -> None:
+        def rate(t: float, y: Array, p: Array, run_parameters: Array, out: Array) -> None:
             try:
-                functions.rate(t, y, p, own, out)
+                functions.rate(t, y, p, run_parameters, out)
             except (OverflowedError, NotFiniteError) as error:
                 self.met, out[...] = error, np.nan
 
@@ -165,7 +168,7 @@ class SwitchedRun(Followed):
         dropped = self.switching.dropped | {(each.joint, each.of_actuation)}
         self.switching = Switching(self.equation, dropped, self.switching.modes)
         self._forget_sides()
-        held = self.runs.own[: self.rules.held, 0] if self.rules.held else None
+        held = self.runs.run_parameters[: self.rules.held, 0] if self.rules.held else None
         self._watch_anew(last.t, held)
 
     def _end_mode(self, ended: Ended, t: float, y: np.ndarray) -> None:
@@ -178,25 +181,28 @@ class SwitchedRun(Followed):
         if ended is Ended.ACCUMULATED:
             guard = int(self.now[Now.EVENT]) - self.switches.thresholds
             self._accumulated(t, y, modes.holding, modes.joint(guard))
-        self._watch_anew(t, self.runs.own[: self.rules.held, 0] if self.rules.held else None)
+        self._watch_anew(t, self.runs.run_parameters[: self.rules.held, 0] if self.rules.held else None)
         self._change_mode()
 
     def _transfer(self, s: int) -> None:
         """Go on with what is carried from the start of a segment on."""
-        t, held = float(self.plan.starts[s]), self.runs.own[: self.rules.held, 0] if self.rules.held else None
+        t, held = (
+            float(self.table.starts[s]),
+            self.runs.run_parameters[: self.rules.held, 0] if self.rules.held else None,
+        )
         self.runs.y[:, 0], happened = self.transfers.over(t, self.y)
         self.equation = self.watch.equation = self.transfers.equation
         self._keep(*happened)
         functions, parameters = self.made(self.equation)
         self.bodies = functions.bodies
         if (modes := self.switching.modes) is not None:
-            own = np.concatenate([np.full(self.rules.held, np.nan), parameters])[:, None]
-            modes = Modes(self.equation, modes.holding._replace(own=own))
-            self._settle(modes, self.in_python or functions, t, self.plan.parameters[s])
+            run_parameters = np.concatenate([np.full(self.rules.held, np.nan), parameters])[:, None]
+            modes = Modes(self.equation, modes.holding._replace(run_parameters=run_parameters))
+            self._settle(modes, self.in_python or functions, t, self.table.parameters[s])
         self.switching = Switching(self.equation, self.switching.dropped, modes)
         self._forget_sides()
         self._tell()
-        self.plan.transfers[s] = 0
+        self.table.transfers[s] = 0
         self._watch_anew(t, held)
         if self.setup.integrator.needs_jacobian:
             self.control[At.NEXT] = 0.0
@@ -207,7 +213,7 @@ class SwitchedRun(Followed):
         holding, y = modes.holding, self.runs.y
         part(holding.laws, y)
         with np.errstate(all="ignore"):
-            found = change(functions, t, y, p, self.runs.own, holding, -1)
+            found = change(functions, t, y, p, self.runs.run_parameters, holding, -1)
         if not found:
             raise not_found(holding.room.whole[:, : len(holding.room.load)], holding.room.load)
 

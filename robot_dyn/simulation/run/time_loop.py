@@ -17,7 +17,7 @@ from robot_dyn.integrate.primitives import below, copy, evaluate, sizes
 from robot_dyn.simulation.dynamics.loop_state import Ended, Functions, Now, Rules, Runs, Why
 from robot_dyn.simulation.observation.observation import Observation, observe, observe_actuation, observe_motion
 from robot_dyn.simulation.run.philox import draw
-from robot_dyn.simulation.setup.plan import Plan
+from robot_dyn.simulation.setup.segment_table import SegmentTable
 
 WATCHED = 64  # steps between looks at the energy
 RUNAWAY = 1e3  # times all the energy there was, that may come from nowhere
@@ -52,23 +52,23 @@ def time_loop(step: Callable[..., int]) -> Callable[..., int]:
     """
 
     def advance(
-        functions: Functions, plan: Plan, runs: Runs, records: Records, rules: Rules, coefficients: Any, work: Any,
-        now: Array, clock: Array, stop: Array,
+        functions: Functions, table: SegmentTable, runs: Runs, records: Records, rules: Rules, coefficients: Any,
+        work: Any, now: Array, clock: Array, stop: Array,
     ) -> int:  # fmt: skip
-        last = len(plan.counts) - 1
+        last = len(table.counts) - 1
         if not rules.alone:
-            own_energy(functions, runs, plan.parameters[0])
+            own_energy(functions, runs, table.parameters[0])
             if rules.apart > 0 and rules.held == 0:
-                show_actuation(functions, runs, records.observation, 0.0, plan.parameters[0], False)
+                show_actuation(functions, runs, records.observation, 0.0, table.parameters[0], False)
         while now[Now.SEGMENT] <= last:
             s = now[Now.SEGMENT]
-            start, h, p = plan.starts[s], plan.lengths[s], plan.parameters[s]
-            if plan.transfers[s] == 1:
+            start, h, p = table.starts[s], table.lengths[s], table.parameters[s]
+            if table.transfers[s] == 1:
                 return Ended.TRANSFER
-            tick, at_tick = plan.ticks[s], plan.at_ticks[s]
+            tick, at_tick = table.ticks[s], table.at_ticks[s]
             if now[Now.STEP] == 0 and tick > 0 and not act(functions, runs, rules, start, at_tick, tick):
                 return Ended.TICK
-            while now[Now.STEP] < plan.counts[s]:
+            while now[Now.STEP] < table.counts[s]:
                 k = now[Now.STEP]
                 t = start + k * h
                 share(runs, records, rules, now, s == last)
@@ -79,10 +79,10 @@ def time_loop(step: Callable[..., int]) -> Callable[..., int]:
                 if s == last:
                     now[Now.STEP] += 1
                     continue
-                y, own, after, lost = runs.y, runs.own, runs.after, runs.lost
-                now[Now.EVALUATIONS] += step(functions, coefficients, t, h, y, p, own, after, work, lost)
+                y, run_parameters, after, lost = runs.y, runs.run_parameters, runs.after, runs.lost
+                now[Now.EVALUATIONS] += step(functions, coefficients, t, h, y, p, run_parameters, after, work, lost)
                 if not take(runs, rules, t):
-                    return Ended.DOUBTFUL
+                    return Ended.NEEDS_REVIEW
                 now[Now.STEP] += 1
                 now[Now.STEPS] += 1
                 now[Now.BUDGET] -= 1
@@ -107,13 +107,13 @@ def act(functions: Functions, runs: Runs, rules: Rules, t: float, p: Array, numb
     n, held, z = rules.n, rules.held, rules.states
     if rules.deviates > 0:
         draw(runs.y, 2 * n + z - rules.deviates, rules.deviates, runs.keys, (number - 1) // rules.instants)
-    evaluate(functions.tick, t, runs.y, p, runs.own, runs.command)
+    evaluate(functions.tick, t, runs.y, p, runs.run_parameters, runs.command)
     sizes(runs.command, runs.size)
     if rules.alone and not runs.size[0] < np.inf:
         return False
-    copy(runs.own[:held], runs.command[:held])
+    copy(runs.run_parameters[:held], runs.command[:held])
     copy(runs.y[2 * n : 2 * n + z], runs.command[held:])
-    erase_ended(runs.own[:held], runs)
+    erase_ended(runs.run_parameters[:held], runs)
     return True
 
 
@@ -145,7 +145,7 @@ def sample(
     for j in range(len(records.which)):
         copy(records.y[row, j, base : base + W], runs.y[records.which[j]])
     if len(runs.made) > 0:
-        evaluate(functions.sample, t, runs.y, p, runs.own, runs.made)
+        evaluate(functions.sample, t, runs.y, p, runs.run_parameters, runs.made)
         erase_ended(runs.made, runs)
         copy(records.made[row, :, base : base + W], runs.made)
     now[Now.ROW] += 1
@@ -165,7 +165,7 @@ def take(runs: Runs, rules: Rules, t: float) -> bool:
     copy(runs.y, runs.after)
     if ill:
         erase_ended(runs.y, runs)
-        erase_ended(runs.own[: rules.held], runs)
+        erase_ended(runs.run_parameters[: rules.held], runs)
     return True
 
 
@@ -174,7 +174,7 @@ def conserve(functions: Functions, runs: Runs, rules: Rules, t: float, p: Array)
 
     E − E(0) − Σ W beyond a thousand times all energy there was is not an error of a step: the steps are unstable.
     """
-    evaluate(functions.energy, t, runs.y, p, runs.own, runs.energies)
+    evaluate(functions.energy, t, runs.y, p, runs.run_parameters, runs.energies)
     ended = False
     for b in range(len(runs.size)):
         runs.peak[b] = max(runs.peak[b], runs.energies[0, b])
@@ -189,13 +189,13 @@ def conserve(functions: Functions, runs: Runs, rules: Rules, t: float, p: Array)
             ended = True
     if ended:
         erase_ended(runs.y, runs)
-        erase_ended(runs.own[: rules.held], runs)
+        erase_ended(runs.run_parameters[: rules.held], runs)
     return True
 
 
 def own_energy(functions: Functions, runs: Runs, p: Array) -> None:
     """E(0) of each run in lock step, and its scale."""
-    evaluate(functions.energy, 0.0, runs.y, p, runs.own, runs.energies)
+    evaluate(functions.energy, 0.0, runs.y, p, runs.run_parameters, runs.energies)
     for b in range(len(runs.size)):
         K, V = runs.energies[0, b], runs.energies[1, b]
         runs.energy[b], runs.scale[b] = K + V, 1.0 + abs(K) + abs(V)
@@ -259,7 +259,7 @@ def show_lanes(
         v = latest[:n]
         erase_ended(v, runs)
     if rules.apart == 0:
-        observe(of, began, t, q, v, runs.own[:n], acted)
+        observe(of, began, t, q, v, runs.run_parameters[:n], acted)
         return
     observe_motion(of, began, t, q, v)
     if now[Now.STEPS] % rules.apart == 0:
@@ -270,6 +270,6 @@ def show_actuation(functions: Functions, runs: Runs, of: Observation, t: float, 
     """Observe the actuation in the state reached."""
     if of.low.shape[1] == 0:
         return
-    evaluate(functions.actuation, t, runs.y, p, runs.own, runs.u)
+    evaluate(functions.actuation, t, runs.y, p, runs.run_parameters, runs.u)
     erase_ended(runs.u, runs)
     observe_actuation(of, t, runs.u, acted)

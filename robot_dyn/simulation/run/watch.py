@@ -13,7 +13,7 @@ from robot_dyn.foreign import is_mistake
 from robot_dyn.integrate.integrator import IntegrationError, Integrator, System
 from robot_dyn.simulation.dynamics.fastest_motion import fastest
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.events.transfers import Transfers
+from robot_dyn.simulation.events.payload_events import PayloadEvents
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.values import kept
 
@@ -49,7 +49,7 @@ def overflowed(y: Array) -> bool:
 
 def _start(setup: Setup) -> tuple[float, float]:
     """Kinetic and potential energy at the start."""
-    energies = Transfers(setup.equation).equation.energies
+    energies = PayloadEvents(setup.equation).equation.energies
     K, V = (float(x[0]) for x in energies(np.zeros(1), setup.q0[None], setup.v0[None]))
     return K, V
 

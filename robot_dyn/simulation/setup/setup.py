@@ -18,7 +18,7 @@ from robot_dyn.integrate.adaptive import AUTO, Adaptive
 from robot_dyn.integrate.methods import as_method
 from robot_dyn.simulation.dynamics.declarations import is_value, undeclared
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.setup.asked import asked
+from robot_dyn.simulation.setup.accuracy import asked
 from robot_dyn.simulation.setup.checks import check_model, check_parts
 from robot_dyn.simulation.setup.event import Event
 from robot_dyn.simulation.setup.schedule import LEAST_STEPS, ON_STEP, Segment, cuts, near, nodes, steps_on

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, final
 
 from robot_dyn.errors import QueryError
 from robot_dyn.result import Result, reported
-from robot_dyn.seconds import in_words
+from robot_dyn.seconds import format_duration
 from robot_dyn.validate import choice
 
 
@@ -20,7 +20,7 @@ class Held:
 
     Attributes:
         quantity: Its name.
-        road: Program or formulation, and numbers.
+        implementation: Program or formulation, and numbers.
         given: At the state that was given; None if none was.
         typical: Median of random states.
         random: At the worst of them.
@@ -32,7 +32,7 @@ class Held:
     """
 
     quantity: str
-    road: str
+    implementation: str
     given: float | None
     typical: float
     random: float
@@ -102,18 +102,20 @@ class Certificate(Result):
     seed: int
     interrupted: bool = False
 
-    def of(self, quantity: str, road: str) -> Held:
+    def of(self, quantity: str, implementation: str) -> Held:
         """The digits of one quantity by one road.
 
         Raises:
             QueryError: If they were not counted.
         """
         choice("quantity", quantity, self.quantities)
-        choice("road", road, self.roads)
+        choice("road", implementation, self.implementations)
         for each in self.digits:
-            if (each.quantity, each.road) == (quantity, road):
+            if (each.quantity, each.implementation) == (quantity, implementation):
                 return each
-        raise QueryError(f"{road!r} does not answer {quantity}; look at the quantities of each road in digits")
+        raise QueryError(
+            f"{implementation!r} does not answer {quantity}; look at the quantities of each road in digits"
+        )
 
     @property
     def rows(self) -> Iterator[Mapping[str, Any]]:
@@ -124,9 +126,16 @@ class Certificate(Result):
     @reported
     def lost(self) -> dict[str, float]:
         """By road, digits of inverse dynamics less those of forward dynamics, at the worst states."""
-        found = {(each.quantity, each.road): each.searched for each in self.digits if each.samples > 1}
-        pairs = ((road, ("inverse_dynamics", road), ("forward_dynamics", road)) for road in self.roads)
-        return {road: found[one] - found[two] for road, one, two in pairs if one in found and two in found}
+        found = {(each.quantity, each.implementation): each.searched for each in self.digits if each.samples > 1}
+        pairs = (
+            (implementation, ("inverse_dynamics", implementation), ("forward_dynamics", implementation))
+            for implementation in self.implementations
+        )
+        return {
+            implementation: found[one] - found[two]
+            for implementation, one, two in pairs
+            if one in found and two in found
+        }
 
     @property
     def quantities(self) -> tuple[str, ...]:
@@ -134,9 +143,9 @@ class Certificate(Result):
         return tuple(dict.fromkeys(each.quantity for each in self.digits))
 
     @property
-    def roads(self) -> tuple[str, ...]:
+    def implementations(self) -> tuple[str, ...]:
         """That were looked at."""
-        return tuple(dict.fromkeys(each.road for each in self.digits))
+        return tuple(dict.fromkeys(each.implementation for each in self.digits))
 
     @reported
     def sentence(self) -> str:
@@ -145,7 +154,7 @@ class Certificate(Result):
             return "no digits were counted"
         quantity = self.quantities[-1]
         parts = [
-            f"{each.road} {each.searched:.1f} in {in_words(each.time_s)}"
+            f"{each.implementation} {each.searched:.1f} in {format_duration(each.time_s)}"
             for each in sorted(self._of(quantity), key=lambda each: each.time_s)
         ]
         return f"digits of {quantity} at the worst state found: {'; '.join(parts)}"

@@ -18,14 +18,14 @@ import numpy as np
 from robot_dyn.arithmetic import Ball
 from robot_dyn.errors import QueryError
 from robot_dyn.lagrange.digits import QUANTITIES
-from robot_dyn.lagrange.manipulator import Lagrangian
+from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.scale import unit_diagonal_conditions
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.quantity import MOST_DIGITS, M, Quantity
 from robot_dyn.studies.certificate.certificate import Certificate, Condition, Held
-from robot_dyn.studies.certificate.counting import Counting
-from robot_dyn.studies.certificate.road import Road, asked, roads
-from robot_dyn.studies.certificate.worst_state import Batch, Search, random_states, row
+from robot_dyn.studies.certificate.digit_count import Counting
+from robot_dyn.studies.certificate.implementation import Implementation, asked, implementations
+from robot_dyn.studies.certificate.worst_case_search import Batch, Search, random_states, row
 from robot_dyn.studies.environment import environment
 from robot_dyn.studies.timing import in_turns
 from robot_dyn.validate import function, instance, integer, joint_values
@@ -75,13 +75,13 @@ def certify(
     rng = np.random.default_rng(seed)
     states = random_states(robot, samples, rng)
     tell(0.0, "machine code")
-    found, left_out = roads(robot)
+    found, left_out = implementations(robot)
     counting, held, interrupted = Counting(robot, states, given, rng), list[Held](), False
     asked_for = [each for each in QUANTITIES.values() if each in found[0].quantities]
     try:
         for k, quantity in enumerate(asked_for):
             held += _quantity(
-                counting, quantity, [road for road in found if quantity in road.quantities], repeats, left_out,
+                counting, quantity, [each for each in found if quantity in each.quantities], repeats, left_out,
                 lambda part, what, k=k: tell((k + part) / len(asked_for), what),
             )  # fmt: skip
     except KeyboardInterrupt:
@@ -109,22 +109,24 @@ def _given(robot: Robot, q: Any, v: Any, a: Any, tau: Any) -> dict[str, np.ndarr
 
 
 def _quantity(
-    counting: Counting, quantity: Quantity, found: list[Road], repeats: int, left_out: list[str],
+    counting: Counting, quantity: Quantity, found: list[Implementation], repeats: int, left_out: list[str],
     tell: Callable[[float, str], object],
 ) -> list[Held]:  # fmt: skip
     """The digits and times of one quantity by each road, and by balls; `left_out` takes those without an answer."""
     counted = {}
-    for k, road in enumerate(found):
-        tell(k / len(found), f"{quantity.name}: {road.name}")
+    for k, implementation in enumerate(found):
+        tell(k / len(found), f"{quantity.name}: {implementation.name}")
         try:
-            counted[road.name] = counting.count(road, quantity)
+            counted[implementation.name] = counting.count(implementation, quantity)
         except QueryError as error:
             left_out.append(str(error))
     state = counting.given or row(counting.states, 0)
     balls = Lagrangian(counting.robot, Ball(counting.truth(counting.robot, quantity, state).bits))
-    proven = Road(f"balls, {balls.dtype.bits} bits", counting.robot, balls, (quantity,))
+    proven = Implementation(f"balls, {balls.dtype.bits} bits", counting.robot, balls, (quantity,))
     calls = {
-        road.name: road.call(quantity, state) for road in (*found, proven) if road.name in counted or road is proven
+        implementation.name: implementation.call(quantity, state)
+        for implementation in (*found, proven)
+        if implementation.name in counted or implementation is proven
     }
     tell(1.0, f"{quantity.name}: times")
     times = in_turns(calls, repeats, _AT_LEAST_S)

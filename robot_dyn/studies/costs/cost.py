@@ -11,13 +11,13 @@ from robot_dyn.errors import RobotDynError
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.result import Result, reported
-from robot_dyn.seconds import in_words
+from robot_dyn.seconds import format_duration
 from robot_dyn.simulation.results.acting import acting
 from robot_dyn.simulation.setup.options import setup_of, starts
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.studies.budget import Budget
 from robot_dyn.studies.costs import step_cost
-from robot_dyn.studies.costs.alternative import Alternative, Pair, Version, in_turns
+from robot_dyn.studies.costs.ab_comparison import ABComparison, Pair, Version, in_turns
 from robot_dyn.studies.costs.query_cost import QueryCost
 from robot_dyn.studies.environment import environment
 from robot_dyn.validate import choice, function, integer, number
@@ -47,14 +47,14 @@ class Cost(Result):
     )  # fmt: skip
     robot: str
     acting: tuple[str, ...]
-    alternatives: tuple[Alternative, ...]
+    alternatives: tuple[ABComparison, ...]
     left_out: tuple[str, ...]
     environment: dict[str, str] = field(repr=False)
     budget_s: float
     spent_s: float
     interrupted: bool = False
 
-    def of(self, what: str) -> Alternative:
+    def of(self, what: str) -> ABComparison:
         """The two versions of what differs, such as "gravity" or "forward dynamics".
 
         Raises:
@@ -91,7 +91,7 @@ class Cost(Result):
         if whole is None:
             return "no step was counted"
         on, off = whole.first, whole.second
-        time = "" if on.time_s is None else f", {in_words(on.time_s)}"
+        time = "" if on.time_s is None else f", {format_duration(on.time_s)}"
         made = [
             f"rigid bodies {off.instructions}",
             *(f"{name} {count}".replace(" -", " −") for name, count in self.parts.items()),

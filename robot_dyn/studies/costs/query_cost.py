@@ -24,7 +24,7 @@ from robot_dyn.codegen.trace.right_angles import completed
 from robot_dyn.codegen.trace.trace import Trace
 from robot_dyn.errors import QueryError, RobotDynError
 from robot_dyn.model.robot import Robot
-from robot_dyn.studies.costs.alternative import Pair, Way
+from robot_dyn.studies.costs.ab_comparison import Pair, Way
 from robot_dyn.studies.timing import seconds
 
 STATES = 1024  # side by side

@@ -22,17 +22,17 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import RobotDynError
 from robot_dyn.integrate.methods import method
 from robot_dyn.model.robot import Robot
-from robot_dyn.simulation.compiled.machine import Machine
-from robot_dyn.simulation.compiled.making import machine, machine_of_constants
+from robot_dyn.simulation.compiled.build import compiled_equation, machine_of_constants
+from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.events.transfers import Transfers
-from robot_dyn.simulation.rollouts.batch import LANES, Batch
+from robot_dyn.simulation.events.payload_events import PayloadEvents
+from robot_dyn.simulation.rollouts.lock_step import LANES, Batch
 from robot_dyn.simulation.run.fixed_step import FixedStep
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.run.watch import Watch
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.setup.size import MOST_BYTES
-from robot_dyn.studies.costs.alternative import Pair, Way
+from robot_dyn.studies.costs.ab_comparison import Pair, Way
 
 RUNS = 4096  # side by side
 PER_STEP, PER_RUN = "step of RK4", "step of RK4 and run"
@@ -107,7 +107,7 @@ def numbers(setup: Setup) -> Pair:
 def side_by_side(setup: Setup) -> Pair:
     """One run, and many of them side by side on one thread."""
     short = _short(setup, _STEPS_OF_MANY)
-    made = machine(_equation(short), short.integrator, lanes=LANES, kept=())
+    made = compiled_equation(_equation(short), short.integrator, lanes=LANES, kept=())
     starts = np.tile(short.q0, (RUNS, 1)), np.tile(short.v0, (RUNS, 1))
 
     def run() -> float:
@@ -123,19 +123,19 @@ def side_by_side(setup: Setup) -> Pair:
 def one_run(setup: Setup) -> Way:
     """A step of one run."""
     short = _short(setup, _STEPS)
-    return _alone(short, machine(_equation(short), short.integrator))
+    return _alone(short, compiled_equation(_equation(short), short.integrator))
 
 
-def instructions(made: Machine) -> int:
+def instructions(made: CompiledStateEquation) -> int:
     """Of a step, what the method itself adds apart."""
     programs = made.equations.programs
     return _EVALUATIONS * len(programs["rate"]) + (len(programs["tick"]) if "tick" in programs else 0)
 
 
-def _alone(short: Setup, made: Machine) -> Way:
+def _alone(short: Setup, made: CompiledStateEquation) -> Way:
     def run() -> float:
         functions, equation = (made.equations.functions, made.parameters), made.equation
-        watch, transfers = Watch(short, equation), Transfers(equation)
+        watch, transfers = Watch(short, equation), PayloadEvents(equation)
         steps = FixedStep(watch, transfers, lambda _: functions, Fraction(1), made.advance())
         began = process_time()
         record = steps.record()

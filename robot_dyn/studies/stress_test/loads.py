@@ -16,15 +16,15 @@ from robot_dyn.description.edits import Payload
 from robot_dyn.effects.actuator import EffortLimit
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import RobotDynError
-from robot_dyn.lagrange.manipulator import Lagrangian
+from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.quantity import CORIOLIS_TORQUE, N
 from robot_dyn.simulation.observation.remarks import Kind
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.simulate import simulate
 from robot_dyn.studies.budget import Budget
-from robot_dyn.studies.certificate.road import asked
-from robot_dyn.studies.certificate.worst_state import Batch
+from robot_dyn.studies.certificate.implementation import asked
+from robot_dyn.studies.certificate.worst_case_search import Batch
 from robot_dyn.studies.stress_test.confirm import BEYOND, WITHIN
 from robot_dyn.studies.stress_test.finding import Limit
 from robot_dyn.studies.stress_test.work import Work

@@ -14,9 +14,9 @@ from robot_dyn.lagrange.digits import digits_of
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.quantity import FORWARD_DYNAMICS, INVERSE_DYNAMICS, Quantity
 from robot_dyn.studies.budget import Budget
-from robot_dyn.studies.certificate.counting import Counting, Found
-from robot_dyn.studies.certificate.road import Road, roads
-from robot_dyn.studies.certificate.worst_state import Batch
+from robot_dyn.studies.certificate.digit_count import Counting, Found
+from robot_dyn.studies.certificate.implementation import Implementation, implementations
+from robot_dyn.studies.certificate.worst_case_search import Batch
 from robot_dyn.studies.stress_test.finding import Worst
 from robot_dyn.studies.stress_test.work import Work
 from robot_dyn.studies.stress_test.worst import KEPT, listed, shrunk_state
@@ -30,31 +30,31 @@ def lost_digits(robot: Robot, states: Batch, rng: np.random.Generator, work: Wor
     """The roads in float64, one after the other."""
     asked = (INVERSE_DYNAMICS, FORWARD_DYNAMICS)
     names = tuple(f"digits lost in {quantity.name}" for quantity in asked)
-    known = work.do("roads, machine code among them", lambda _: roads(robot), names)
+    known = work.do("roads, machine code among them", lambda _: implementations(robot), names)
     if known is None:
         return
     found, left_out = known
     work.left_out += left_out
     counting = Counting(robot, states, None, rng)
     for quantity in asked:
-        for road in found:
-            if quantity in road.quantities and road.name not in _OTHER_NUMBERS:
-                made = _lost(counting, road, quantity, work)
+        for implementation in found:
+            if quantity in implementation.quantities and implementation.name not in _OTHER_NUMBERS:
+                made = _lost(counting, implementation, quantity, work)
                 if made is not None:
                     yield made
 
 
-def _lost(counting: Counting, road: Road, quantity: Quantity, work: Work) -> Worst | None:
+def _lost(counting: Counting, implementation: Implementation, quantity: Quantity, work: Work) -> Worst | None:
     """What one road loses; None for lack of time."""
-    name = f"digits lost in {quantity.name} by {road.name}"
-    made = work.do(name, lambda budget: _counted(counting, road, quantity, budget))
+    name = f"digits lost in {quantity.name} by {implementation.name}"
+    made = work.do(name, lambda budget: _counted(counting, implementation, quantity, budget))
     if made is None:
         return None
     lost = _OF_FLOAT64 - made.searched
 
     def losses(batch: Batch) -> np.ndarray:
         state = {name: batch[name][0] for name in quantity.arguments}
-        return np.array([_OF_FLOAT64 - digits_of(counting.judged(road, quantity, state))])
+        return np.array([_OF_FLOAT64 - digits_of(counting.judged(implementation, quantity, state))])
 
     at, least = {name: made.state[name] for name in quantity.arguments}, KEPT * lost if lost > 0 else -np.inf
     small = work.do(
@@ -62,17 +62,17 @@ def _lost(counting: Counting, road: Road, quantity: Quantity, work: Work) -> Wor
     )
     state, minimal = small or (at, lost)
     typical, random = _OF_FLOAT64 - made.typical, _OF_FLOAT64 - made.random
-    note = f"{road.name}: {made.searched:.1f} digits hold, {made.typical:.1f} typically"
+    note = f"{implementation.name}: {made.searched:.1f} digits hold, {made.typical:.1f} typically"
     what = f"digits lost in {quantity.name}"
     return Worst(what, "", "digits", typical, random, max(lost, minimal), minimal, listed(state), note)
 
 
-def _counted(counting: Counting, road: Road, quantity: Quantity, budget: Budget) -> Found:
+def _counted(counting: Counting, implementation: Implementation, quantity: Quantity, budget: Budget) -> Found:
     """The fewest digits of some searches."""
-    made = counting.count(road, quantity, budget.check)
+    made = counting.count(implementation, quantity, budget.check)
     for _ in range(_ROUNDS - 1):
         if made.searched < made.random:
             break
-        again = counting.count(road, quantity, budget.check)
+        again = counting.count(implementation, quantity, budget.check)
         made = again if again.searched < made.searched else made
     return made

@@ -19,7 +19,7 @@ from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.simulate import simulate
 from robot_dyn.studies.budget import Budget
-from robot_dyn.studies.certificate.worst_state import Batch
+from robot_dyn.studies.certificate.worst_case_search import Batch
 from robot_dyn.studies.stress_test.confirm import LEAST, says
 from robot_dyn.studies.stress_test.finding import Judged
 from robot_dyn.studies.stress_test.scenes import scenes

@@ -23,8 +23,8 @@ from robot_dyn.integrate.methods import method
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.quantity import M
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.studies.certificate.road import asked
-from robot_dyn.studies.certificate.worst_state import Batch
+from robot_dyn.studies.certificate.implementation import asked
+from robot_dyn.studies.certificate.worst_case_search import Batch
 
 FAMILIES = ("swing", "friction", "dry friction", "stops", "rigid stops", "PD", "sampled PD")
 _METHODS = ("explicit_euler", "semi_implicit_euler", "midpoint", "rk4", "order_8", "gauss_4", "sdirk_3")

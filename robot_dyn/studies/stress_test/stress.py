@@ -10,7 +10,7 @@ import numpy as np
 
 from robot_dyn.model.robot import Robot
 from robot_dyn.studies.budget import Budget
-from robot_dyn.studies.certificate.worst_state import random_states
+from robot_dyn.studies.certificate.worst_case_search import random_states
 from robot_dyn.studies.environment import environment
 from robot_dyn.studies.stress_test.finding import Judged, Limit, Worst
 from robot_dyn.studies.stress_test.gains import gain_limit

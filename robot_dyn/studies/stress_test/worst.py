@@ -16,8 +16,8 @@ from robot_dyn.lagrange.scale import unit_diagonal_conditions
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.quantity import M, N
 from robot_dyn.studies.budget import Budget
-from robot_dyn.studies.certificate.road import asked
-from robot_dyn.studies.certificate.worst_state import Batch, Search
+from robot_dyn.studies.certificate.implementation import asked
+from robot_dyn.studies.certificate.worst_case_search import Batch, Search
 from robot_dyn.studies.stress_test.finding import Worst
 from robot_dyn.studies.stress_test.shrink import shrunk
 from robot_dyn.studies.stress_test.work import Work

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from robot_dyn.studies.sheet import Colours, ResultError, legend, sheet, styled
-from robot_dyn.studies.work_precision_diagram.ladder import INTERPRETED, Ladder, Point
+from robot_dyn.studies.work_precision_diagram.tolerance_ladder import INTERPRETED, Point, ToleranceLadder
 from robot_dyn.studies.work_precision_diagram.work_precision import WorkPrecision
 from robot_dyn.view.plots.figure import THEMES
 
@@ -98,7 +98,7 @@ def _caption(result: WorkPrecision) -> str:
     )
 
 
-def _shown(ladder: Ladder) -> list[Point]:
+def _shown(ladder: ToleranceLadder) -> list[Point]:
     return [p for p in ladder.points if p.error < _MOST_ERROR]
 
 
@@ -112,7 +112,7 @@ def _axes(axes: Any, result: WorkPrecision, colours: Colours, x: str, title: str
 
 
 def _curve(
-    axes: Any, ladder: Ladder, colours: Colours, x: Callable[[Point], Any], y: Callable[[Point], float],
+    axes: Any, ladder: ToleranceLadder, colours: Colours, x: Callable[[Point], Any], y: Callable[[Point], float],
     size: float, dashed: bool = False,
 ) -> None:  # fmt: skip
     """The runs of a ladder; those that are not believed are hollow."""
@@ -130,7 +130,7 @@ def _curve(
         axes.scatter([xs[k] for k in at], [ys[k] for k in at], **shape, **faced)
 
 
-def _look(ladder: Ladder, colours: Colours) -> tuple[str, str]:
+def _look(ladder: ToleranceLadder, colours: Colours) -> tuple[str, str]:
     if ladder.peer:
         return colours["ink"], _PEERS.get(ladder.method, ".")
     hue, marker = _LOOK.get(ladder.method, (4, "."))
@@ -159,7 +159,7 @@ def _believed(axes: Any, result: WorkPrecision, colours: Colours, words: bool) -
         axes.annotate(f"error of the reference, {error:.0e}: not believed below ", **at, color=colours["ink"])
 
 
-def _legend(figure: Any, first: list[Ladder], without: list[Ladder], colours: Colours) -> None:
+def _legend(figure: Any, first: list[ToleranceLadder], without: list[ToleranceLadder], colours: Colours) -> None:
     from matplotlib.lines import Line2D
 
     handles = []

@@ -11,9 +11,15 @@ from typing import final
 
 from robot_dyn.errors import RobotDynError
 from robot_dyn.studies.budget import Budget, Limit, OvertimeError
-from robot_dyn.studies.work_precision_diagram.candidate import Candidate, Run
-from robot_dyn.studies.work_precision_diagram.ladder import COMPILED, INTERPRETED, Ladder, Point, ladder_name
+from robot_dyn.studies.work_precision_diagram.method_under_test import MethodUnderTest, Run
 from robot_dyn.studies.work_precision_diagram.reference_run import Reference
+from robot_dyn.studies.work_precision_diagram.tolerance_ladder import (
+    COMPILED,
+    INTERPRETED,
+    Point,
+    ToleranceLadder,
+    ladder_name,
+)
 
 _PART = {COMPILED: 1 / 400, INTERPRETED: 1 / 150, "": 1 / 200}  # of the budget, for one run
 _SHORT = 1 / 3000  # of the budget: runs that are timed again before the longer ones
@@ -38,7 +44,7 @@ class Rung:
 class Walk:
     """A candidate on its ladder."""
 
-    candidate: Candidate
+    candidate: MethodUnderTest
     rungs: list[Rung] = field(default_factory=list)
     ended: str = ""
 
@@ -51,7 +57,7 @@ class Walk:
         """Time that a run may take, in [s]."""
         return _PART[self.candidate.engine] * budget.seconds
 
-    def ladder(self, floor: float) -> Ladder:
+    def ladder(self, floor: float) -> ToleranceLadder:
         """What was found, with errors above `floor` believed."""
         of = self.candidate
         points = tuple(
@@ -61,11 +67,11 @@ class Walk:
             )
             for each in self.rungs
         )  # fmt: skip
-        return Ladder(of.method, of.engine, of.events, of.order, of.by, points, self.ended, floor)
+        return ToleranceLadder(of.method, of.engine, of.events, of.order, of.by, points, self.ended, floor)
 
 
 def measured(
-    candidates: Iterable[Candidate], reference: Reference, budget: Budget, repeats: int
+    candidates: Iterable[MethodUnderTest], reference: Reference, budget: Budget, repeats: int
 ) -> tuple[list[Walk], bool]:
     """The ladders of all candidates, each run timed so often at most, and whether Ctrl-C ended them."""
     walks = [Walk(each) for each in candidates]

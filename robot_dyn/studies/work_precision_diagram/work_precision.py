@@ -17,20 +17,26 @@ from robot_dyn.integrate.methods import METHODS, as_method
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import units
 from robot_dyn.result import Result, reported
-from robot_dyn.seconds import in_words
-from robot_dyn.simulation.compiled.choice import choose
+from robot_dyn.seconds import format_duration
+from robot_dyn.simulation.compiled.engine_choice import choose
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.results.acting import acting
 from robot_dyn.simulation.setup.options import setup_of, starts
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.studies.budget import Budget
 from robot_dyn.studies.environment import environment
-from robot_dyn.studies.work_precision_diagram.beyond import Beyond, beyond
-from robot_dyn.studies.work_precision_diagram.candidate import own, recorded, whole
-from robot_dyn.studies.work_precision_diagram.ladder import COMPILED, INTERPRETED, Ladder, Point, Price
 from robot_dyn.studies.work_precision_diagram.measured import measured
+from robot_dyn.studies.work_precision_diagram.method_under_test import own, recorded, whole
+from robot_dyn.studies.work_precision_diagram.past_horizon import Beyond, beyond
 from robot_dyn.studies.work_precision_diagram.peers import found
 from robot_dyn.studies.work_precision_diagram.reference_run import Reference, reference
+from robot_dyn.studies.work_precision_diagram.tolerance_ladder import (
+    COMPILED,
+    INTERPRETED,
+    Point,
+    Price,
+    ToleranceLadder,
+)
 from robot_dyn.validate import function, instance, integer, number, truth
 
 # In this order, should the budget end: first what is most used and what costs least.
@@ -69,7 +75,7 @@ class WorkPrecision(Result):
     unit: str
     duration_s: float
     reference: Reference
-    ladders: tuple[Ladder, ...]
+    ladders: tuple[ToleranceLadder, ...]
     left_out: tuple[str, ...]
     environment: dict[str, str] = field(repr=False)
     budget_s: float
@@ -78,13 +84,13 @@ class WorkPrecision(Result):
     beyond: tuple[Beyond, ...] = ()
 
     @property
-    def front(self) -> tuple[tuple[Ladder, Point], ...]:
+    def front(self) -> tuple[tuple[ToleranceLadder, Point], ...]:
         """The runs that no other one beats in error and time, from coarse to fine (Pareto front).
 
         Those below the error of the reference do not take part.
         """
         found = [(p.time_s, p.error, ladder, p) for ladder in self.ladders for p in ladder.points if p.believed]
-        front: list[tuple[Ladder, Point]] = []
+        front: list[tuple[ToleranceLadder, Point]] = []
         for _, error, ladder, point in sorted(found, key=lambda each: each[:2]):
             if isfinite(error) and (not front or error < front[-1][1].error):
                 front.append((ladder, point))
@@ -97,7 +103,7 @@ class WorkPrecision(Result):
         known = [vars(each) | vars(p) | {"on_front": id(p) in front} for each in self.ladders for p in each.points]
         return [{key: run[key] for key in self.columns} for run in known]
 
-    def digits(self, error: float) -> list[tuple[Ladder, Price]]:
+    def digits(self, error: float) -> list[tuple[ToleranceLadder, Price]]:
         """What an error costs by each method that can tell, in time, the cheapest first.
 
         Args:
@@ -140,9 +146,9 @@ class WorkPrecision(Result):
                 said.append((ladder, price))
                 programs.add(program)
         parts = [
-            f"{ladder.name} would take {in_words(price.value)} (extrapolated)"
+            f"{ladder.name} would take {format_duration(price.value)} (extrapolated)"
             if price.extrapolated
-            else f"{ladder.name} {in_words(price.value)}"
+            else f"{ladder.name} {format_duration(price.value)}"
             for ladder, price in said
         ]
         return f"{digits} digits of q over {self.reference.horizon_s:g} s: {'; '.join(parts)}"
@@ -200,9 +206,9 @@ def work_precision(
         others, refused = found(setup) if peers else ([], [])
     place = len(made)  # programs in machine code come before what is interpreted, which takes longest
     candidates[place:place] = others
-    walked, interrupted = measured(candidates, exact, budget, repeats)
-    ladders = tuple(each.ladder(exact.error) for each in walked if each.rungs)
-    left_out += unable + refused + [f"{each.name}: {each.ended}" for each in walked if not each.rungs]
+    step_log, interrupted = measured(candidates, exact, budget, repeats)
+    ladders = tuple(each.ladder(exact.error) for each in step_log if each.rungs)
+    left_out += unable + refused + [f"{each.name}: {each.ended}" for each in step_log if not each.rungs]
     left_out += ["what was to come when it was interrupted"] * interrupted
     cut = exact.parted_s is not None and not interrupted
     later = beyond(everything, exact.horizon_s, ladders, {x.name: x for x in made}, budget) if cut else ()

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from robot_dyn.queries.units import units
-from robot_dyn.seconds import in_words
-from robot_dyn.simulation.results.origin import joint_types
+from robot_dyn.seconds import format_duration
+from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.trajectory import Trajectory
 
 _NONE = "–"
@@ -28,9 +28,9 @@ def _rows(run: Trajectory) -> Iterator[tuple[str, str]]:
     yield "steps", str(s.steps)
     yield "evaluations", str(s.evaluations)
     yield f"estimated error of q [{unit}]", "not estimated" if run.error is None else str(run.error)
-    yield "time of the loop", in_words(s.wall_s)
+    yield "time of the loop", format_duration(s.wall_s)
     if s.companion_evaluations:
-        yield "error estimate", f"{s.companion_evaluations} evaluations, {in_words(s.companions_s)}"
+        yield "error estimate", f"{s.companion_evaluations} evaluations, {format_duration(s.companions_s)}"
     if run.accuracy is not None:
         yield from _accuracy(run)
 
@@ -44,4 +44,4 @@ def _accuracy(run: Trajectory) -> Iterator[tuple[str, str]]:
     yield "pilots and check", f"{of.pilots} and {of.check} evaluations"
     for name, evaluations in (("a digit more", of.digit_more), ("a digit less", of.digit_less)):
         part = evaluations / max(of.run, 1)
-        yield name, f"about {evaluations:.0f} evaluations, {in_words(part * run.statistics.wall_s)}"
+        yield name, f"about {evaluations:.0f} evaluations, {format_duration(part * run.statistics.wall_s)}"

@@ -12,24 +12,24 @@ from typing import Any
 from robot_dyn.errors import shorten
 from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.studies.work_precision_diagram.candidate import Candidate
+from robot_dyn.studies.work_precision_diagram.method_under_test import MethodUnderTest
 from robot_dyn.studies.work_precision_diagram.peers import drake, heyoka, mujoco, scipy
 from robot_dyn.studies.work_precision_diagram.peers.free_motion import FreeMotion, PeerError
 
 # By the module that each needs.
-PEERS: dict[str, Callable[[FreeMotion], list[Candidate]]] = {
+PEERS: dict[str, Callable[[FreeMotion], list[MethodUnderTest]]] = {
     "scipy": scipy.candidates, "mujoco": mujoco.candidates, "pydrake": drake.candidates, "heyoka": heyoka.candidates,
 }  # fmt: skip
 
 
-def found(setup: Setup) -> tuple[list[Candidate], list[str]]:
+def found(setup: Setup) -> tuple[list[MethodUnderTest], list[str]]:
     """The candidates of other programs for a setup, and which are left out, with the reason."""
     robot: Any = setup.plant.dynamics
     installed = [name for name in PEERS if find_spec(name)]
     if setup.plant.effects or setup.controller is not None or not isinstance(robot, Robot):
         why = "only the free motion of an arm under gravity is the same there"
         return [], [f"other programs ({', '.join(installed)}): {why}"]
-    made: list[Candidate] = []
+    made: list[MethodUnderTest] = []
     left_out = [f"{name}: is not installed" for name in PEERS if name not in installed]
     motion = FreeMotion(setup, robot)
     for name in installed:

@@ -10,11 +10,11 @@ import numpy as np
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 from robot_dyn.studies.budget import Limit
-from robot_dyn.studies.work_precision_diagram.candidate import Candidate, Run, tolerances
+from robot_dyn.studies.work_precision_diagram.method_under_test import MethodUnderTest, Run, tolerances
 from robot_dyn.studies.work_precision_diagram.peers.free_motion import FreeMotion, PeerError, bare_urdf
 
 
-def candidates(motion: FreeMotion) -> list[Candidate]:
+def candidates(motion: FreeMotion) -> list[MethodUnderTest]:
     """Its default method at growing accuracy."""
     framework, parsing, tree, analysis, mathematics = (
         import_module(f"pydrake.{name}")
@@ -73,4 +73,4 @@ def candidates(motion: FreeMotion) -> list[Candidate]:
         steps = integrator.get_num_steps_taken()
         return motion.run(q, v, steps, integrator.get_num_derivative_evaluations(), spent)
 
-    return [Candidate("Drake runge_kutta3", "", True, 3, "tolerance", tolerances, run)]
+    return [MethodUnderTest("Drake runge_kutta3", "", True, 3, "tolerance", tolerances, run)]

@@ -13,7 +13,7 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.results.ledger import Ledger
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.studies.work_precision_diagram.candidate import Run
+from robot_dyn.studies.work_precision_diagram.method_under_test import Run
 
 _SAME = 1e-9  # of the largest entry of M and N: two programs with the same arm agree to rounding
 _STATES = 3

@@ -10,17 +10,17 @@ from typing import Any
 import numpy as np
 
 from robot_dyn.codegen.program import Kind, Program
-from robot_dyn.simulation.compiled.choice import choose
+from robot_dyn.simulation.compiled.engine_choice import choose
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.studies.budget import Limit
-from robot_dyn.studies.work_precision_diagram.candidate import Candidate, Run
-from robot_dyn.studies.work_precision_diagram.ladder import COMPILED
+from robot_dyn.studies.work_precision_diagram.method_under_test import MethodUnderTest, Run
 from robot_dyn.studies.work_precision_diagram.peers.free_motion import FreeMotion, PeerError
+from robot_dyn.studies.work_precision_diagram.tolerance_ladder import COMPILED
 
 _TOLERANCES = (1e-6, 1e-10, 1e-14)  # each is compiled by itself, which takes many seconds
 
 
-def candidates(motion: FreeMotion) -> list[Candidate]:
+def candidates(motion: FreeMotion) -> list[MethodUnderTest]:
     """Its Taylor method."""
     hy: Any = import_module("heyoka")
     setup, n = motion.setup, motion.robot.n
@@ -47,7 +47,7 @@ def candidates(motion: FreeMotion) -> list[Candidate]:
         limit(motion.times[-1])
         return motion.run(y[:, :n], y[:, n:], steps, None, spent)
 
-    return [Candidate("heyoka, Taylor", "", True, None, "tolerance", lambda: iter(_TOLERANCES), run, warm)]
+    return [MethodUnderTest("heyoka, Taylor", "", True, None, "tolerance", lambda: iter(_TOLERANCES), run, warm)]
 
 
 def _in_heyoka(hy: Any, program: Program, y: list[Any], parameters: np.ndarray) -> list[Any]:

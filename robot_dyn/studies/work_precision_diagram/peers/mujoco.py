@@ -11,7 +11,7 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 from robot_dyn.model.robot import Robot
 from robot_dyn.studies.budget import Limit
-from robot_dyn.studies.work_precision_diagram.candidate import Candidate, Run, step_ladder
+from robot_dyn.studies.work_precision_diagram.method_under_test import MethodUnderTest, Run, step_ladder
 from robot_dyn.studies.work_precision_diagram.peers.free_motion import FreeMotion, PeerError, bare_urdf
 
 STEP_S = 1e-3
@@ -64,7 +64,7 @@ def mujoco_model(
     return model
 
 
-def candidates(motion: FreeMotion) -> list[Candidate]:
+def candidates(motion: FreeMotion) -> list[MethodUnderTest]:
     """Its three methods."""
     module: Any = import_module("mujoco")
     model = mujoco_model(module, motion.robot, bare=True)
@@ -86,7 +86,7 @@ def candidates(motion: FreeMotion) -> list[Candidate]:
     return [_candidate(motion, module, name) for name in _METHODS]
 
 
-def _candidate(motion: FreeMotion, module: Any, name: str) -> Candidate:
+def _candidate(motion: FreeMotion, module: Any, name: str) -> MethodUnderTest:
     option, order, each = _METHODS[name]
     model = mujoco_model(module, motion.robot, bare=True)
     model.opt.integrator = getattr(module.mjtIntegrator, option)
@@ -111,4 +111,4 @@ def _candidate(motion: FreeMotion, module: Any, name: str) -> Candidate:
         lost = any(warning.number for warning in data.warning)
         return motion.run(q * np.nan if lost else q, v, count * records, each * count * records, spent)
 
-    return Candidate(f"MuJoCo {name}", "", True, order, "step", lambda: step_ladder(period, order), run)
+    return MethodUnderTest(f"MuJoCo {name}", "", True, order, "step", lambda: step_ladder(period, order), run)

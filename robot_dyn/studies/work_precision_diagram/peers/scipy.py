@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from robot_dyn.studies.budget import Limit
-from robot_dyn.studies.work_precision_diagram.candidate import Candidate, Run, tolerances
+from robot_dyn.studies.work_precision_diagram.method_under_test import MethodUnderTest, Run, tolerances
 from robot_dyn.studies.work_precision_diagram.peers.free_motion import FreeMotion, PeerError
 
 _LEAST = 3e-14  # SciPy's own bound
 
 
-def candidates(motion: FreeMotion) -> list[Candidate]:
+def candidates(motion: FreeMotion) -> list[MethodUnderTest]:
     """DOP853 of `solve_ivp`."""
     pin: Any = import_module("pinocchio")
     from scipy.integrate import solve_ivp
@@ -40,4 +40,4 @@ def candidates(motion: FreeMotion) -> list[Candidate]:
         y = found.y if found.status == 0 else np.full((2 * n, len(times)), np.nan)
         return motion.run(y[:n].T, y[n:].T, None, found.nfev, spent)
 
-    return [Candidate("SciPy DOP853 + pin.aba", "", True, 8, "tolerance", tolerances, run)]
+    return [MethodUnderTest("SciPy DOP853 + pin.aba", "", True, 8, "tolerance", tolerances, run)]

@@ -13,7 +13,7 @@ from robot_dyn.arithmetic import FLOAT64, Array
 from robot_dyn.codegen.dynamics import CompiledDynamics
 from robot_dyn.errors import RobotDynError
 from robot_dyn.lagrange.digits import QUANTITIES
-from robot_dyn.lagrange.manipulator import Lagrangian
+from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.recursions.articulated_body import articulated_body
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.batch import answered
@@ -41,7 +41,7 @@ class ArticulatedBody:
 
 @final
 @dataclass(frozen=True, eq=False)
-class Road:
+class Implementation:
     """One way.
 
     Attributes:
@@ -80,27 +80,27 @@ def asked(engine: Any, quantity: Quantity, states: dict[str, np.ndarray]) -> np.
     return np.concatenate([answer(*(x[part] for x in rows), errors="nan") for part in parts])
 
 
-def roads(robot: Robot) -> tuple[list[Road], list[str]]:
+def implementations(robot: Robot) -> tuple[list[Implementation], list[str]]:
     """Those of a robot, and what is left out and why."""
     every = tuple(QUANTITIES.values())
     left_out: list[str] = []
     if robot.joint_without_inertia is not None:
         left_out.append(f"forward dynamics: joint {robot.joint_without_inertia!r} carries no inertia")
         every = tuple(each for each in every if not each.solves)
-    found = [Road("Pinocchio", robot, robot, every)]
+    found = [Implementation("Pinocchio", robot, robot, every)]
     for name in ("float32", "float64", "longdouble"):
-        found.append(Road(f"Lagrangian, {name}", robot, Lagrangian(robot, getattr(np, name)), every))
+        found.append(Implementation(f"Lagrangian, {name}", robot, Lagrangian(robot, getattr(np, name)), every))
     if not robot.couplings.trivial:
         left_out.append("articulated bodies: they take no coupled joints")
     elif FORWARD_DYNAMICS in every:
-        found.append(Road("articulated body", robot, ArticulatedBody(Lagrangian(robot)), (FORWARD_DYNAMICS,)))
+        found.append(Implementation("articulated body", robot, ArticulatedBody(Lagrangian(robot)), (FORWARD_DYNAMICS,)))
     try:
         compiled = CompiledDynamics(robot)
         state = {name: np.full(robot.n, 0.3) for name in ("q", "v", "a", "tau")}
         for each in every:
             each.ask(compiled, state)
         served = tuple(each for each in every if compiled.served_by(each.name) != "Pinocchio")
-        found.append(Road("machine code", compiled.robot, compiled, served))
+        found.append(Implementation("machine code", compiled.robot, compiled, served))
     except (ImportError, RobotDynError) as error:
         left_out.append(f"machine code: {error}")
     return found, left_out

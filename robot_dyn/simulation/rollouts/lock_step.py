@@ -20,24 +20,24 @@ from robot_dyn.codegen.trace.right_angles import robot_of
 from robot_dyn.coefficients import with_values
 from robot_dyn.effects.plant import Plant
 from robot_dyn.integrate.integrator import PlainMethod
-from robot_dyn.simulation.compiled.machine import Machine
+from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
 from robot_dyn.simulation.dynamics.loop_state import Ended, Now, Runs, Why
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.events.detection import Detecting
-from robot_dyn.simulation.observation.levels import levels
+from robot_dyn.simulation.observation.guard_levels import levels
 from robot_dyn.simulation.observation.observation import observations_of, observed
-from robot_dyn.simulation.results.origin import origin
+from robot_dyn.simulation.results.provenance import origin
 from robot_dyn.simulation.results.trajectory import Statistics
 from robot_dyn.simulation.rollouts.one_by_one import OneByOne, Single, said
 from robot_dyn.simulation.rollouts.pool import in_threads
-from robot_dyn.simulation.rollouts.rollout_result import Rollouts
+from robot_dyn.simulation.rollouts.result import Rollouts
 from robot_dyn.simulation.rollouts.thresholds import Thresholds
 from robot_dyn.simulation.run.fixed_step import rules_of, runs_of, samples_at_most
 from robot_dyn.simulation.run.outcome import Ending, Outcome
 from robot_dyn.simulation.run.time_loop import Records
 from robot_dyn.simulation.run.watch import LARGEST, diverged_advice
-from robot_dyn.simulation.setup.plan import plan_of
 from robot_dyn.simulation.setup.schedule import ON_STEP
+from robot_dyn.simulation.setup.segment_table import segment_table
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.setup.size import check_batch
 
@@ -56,12 +56,18 @@ class Batch:
     """The tiles of a batch and what they record: time by row by run, so that a tile writes whole vectors."""
 
     def __init__(
-        self, setup: Setup, machine: Machine, q0: np.ndarray, v0: np.ndarray,
+        self, setup: Setup, compiled_equation: CompiledStateEquation, q0: np.ndarray, v0: np.ndarray,
         sweep: dict[str, np.ndarray], recorded: tuple[str, ...], kept: tuple[str, ...], most: int,
         thresholds: Thresholds | None = None,
     ) -> None:  # fmt: skip
-        equation, n = machine.equation, machine.equation.plant.dynamics.n
-        self.setup, self.machine, self.recorded, self.kept, self.values = setup, machine, recorded, kept, sweep
+        equation, n = compiled_equation.equation, compiled_equation.equation.plant.dynamics.n
+        self.setup, self.compiled_equation, self.recorded, self.kept, self.values = (
+            setup,
+            compiled_equation,
+            recorded,
+            kept,
+            sweep,
+        )
         self.q0, self.v0, self.y, self.thresholds = q0, v0, _starts(equation, q0, v0), thresholds
         self.levels = levels(equation.plant.dynamics, *over_runs(equation.plant, equation.controller, sweep), len(q0))
         self.columns = [*range(n)] * ("q" in recorded)
@@ -72,12 +78,12 @@ class Batch:
         tiles = -(-len(self.y) // LANES)
         width, more = tiles * LANES, sum({"u": n, "v": n, "energy": 2}[name] for name in kept)
         check_batch(setup, len(self.y), len(self.columns) + more, most)
-        self.plan, self.apart = plan_of(setup), 0
-        steps = int(self.plan.counts[:-1].sum())
-        if "actuation" in machine.equations.programs:
+        self.table, self.apart = segment_table(setup), 0
+        steps = int(self.table.counts[:-1].sum())
+        if "actuation" in compiled_equation.equations.programs:
             self.apart = 1 if equation.sampled else max(1, steps // _INSTANTS)
         self.instants = steps // self.apart if self.apart > 1 else 0
-        most = samples_at_most(setup, self.plan.counts)
+        most = samples_at_most(setup, self.table.counts)
         self.out_y, self.made = np.empty((most, len(self.columns), width)), np.empty((most, more, width))
         numbers = np.minimum(np.arange(width), len(self.y) - 1)
         start = np.vstack([q0[numbers].T, v0[numbers].T, np.full((n, width), np.nan)])
@@ -143,54 +149,56 @@ class Batch:
 
     def _runs(self, tile: int) -> Runs:
         """The runs of a tile at their start; a tile that is not full repeats a run."""
-        equation, index = self.machine.equation, self._numbers(tile)
-        own = self.machine.own({name: values[index] for name, values in self.values.items()})
-        return runs_of(equation, self.y[index].T, own, self.made.shape[1], index)
+        equation, index = self.compiled_equation.equation, self._numbers(tile)
+        run_parameters = self.compiled_equation.run_parameters(
+            {name: values[index] for name, values in self.values.items()}
+        )
+        return runs_of(equation, self.y[index].T, run_parameters, self.made.shape[1], index)
 
     def _numbers(self, tile: int) -> np.ndarray:
         """The numbers of the runs in a tile."""
         return np.minimum(np.arange(tile * LANES, (tile + 1) * LANES), len(self.y) - 1)
 
     def _tile(self, tile: int) -> None:
-        equation, n = self.machine.equation, self.machine.equation.plant.dynamics.n
-        own, runs = slice(tile * LANES, (tile + 1) * LANES), self._runs(tile)
+        equation, n = self.compiled_equation.equation, self.compiled_equation.equation.plant.dynamics.n
+        run_parameters, runs = slice(tile * LANES, (tile + 1) * LANES), self._runs(tile)
         method = cast(PlainMethod, self.setup.integrator)
-        advance = self.machine.advance()
+        advance = self.compiled_equation.advance()
         assert advance is not None
         rows = equation.size | 1  # odd: stages a power of two apart would share the sets of a cache
         stepper = method.stepper(FLOAT64, equation.size, n, rows, LANES)
-        functions, now = self.machine.equations.functions, np.zeros(len(Now), dtype=np.int64)
+        functions, now = self.compiled_equation.equations.functions, np.zeros(len(Now), dtype=np.int64)
         now[Now.BUDGET] = np.iinfo(np.int64).max
         records = Records(
             np.array(self.columns, np.int64), np.empty((len(self.out_y), 2), np.int64), self.out_y, self.made,
             np.empty((0, equation.size + 2)), np.empty((1 + 3 * n, 0)), self.observations[tile],
         )  # fmt: skip
-        rules = rules_of(equation, False, LARGEST, base=own.start, apart=self.apart)
+        rules = rules_of(equation, False, LARGEST, base=run_parameters.start, apart=self.apart)
         work = stepper.work
         if self.thresholds is not None:
             positions = 0 if equation.canonical else n
             switches = self.thresholds.lanes(self._numbers(tile), equation.size, positions)
-            self.until[own] = switches.until
-            work = Detecting(work, work.K, switches._replace(until=self.until[own]))
+            self.until[run_parameters] = switches.until
+            work = Detecting(work, work.K, switches._replace(until=self.until[run_parameters]))
         ended = advance(
-            functions, self.plan, runs, records, rules, stepper.coefficients, work, now, self.clocks[tile], self.stop
+            functions, self.table, runs, records, rules, stepper.coefficients, work, now, self.clocks[tile], self.stop
         )
         self.unfinished[tile], self.evaluations[tile] = ended != Ended.DONE, now[Now.EVALUATIONS]
         with self.lock:
             if now[Now.ROW] > len(self.place):
                 self.place = records.place[: now[Now.ROW]]
-        self.why[own], self.last[:, own] = runs.why, runs.last
-        self.ended[own] = np.where(runs.why > 0, runs.ended, self.setup.duration_s)
+        self.why[run_parameters], self.last[:, run_parameters] = runs.why, runs.last
+        self.ended[run_parameters] = np.where(runs.why > 0, runs.ended, self.setup.duration_s)
         if ended != Ended.DONE:
-            reached = self.plan.starts[now[Now.SEGMENT]] + now[Now.STEP] * self.plan.lengths[now[Now.SEGMENT]]
-            self.ended[own] = np.where(runs.why > 0, runs.ended, reached)
+            reached = self.table.starts[now[Now.SEGMENT]] + now[Now.STEP] * self.table.lengths[now[Now.SEGMENT]]
+            self.ended[run_parameters] = np.where(runs.why > 0, runs.ended, reached)
             for array in (self.out_y, self.made):
-                array[int(now[Now.ROW]) :, :, own] = np.nan
+                array[int(now[Now.ROW]) :, :, run_parameters] = np.nan
 
     def _result(self) -> Rollouts:
-        B, equation, n = len(self.y), self.machine.equation, self.machine.equation.plant.dynamics.n
+        B, equation, n = len(self.y), self.compiled_equation.equation, self.compiled_equation.equation.plant.dynamics.n
         segment, step = self.place.T
-        t = self.plan.starts[segment] + step * self.plan.lengths[segment]
+        t = self.table.starts[segment] + step * self.table.lengths[segment]
         self._write_again(t)
         why, ended = self.why[:B], self.ended[:B].copy()
         diverged, advice, steps = why > 0, self._advice(why), self._steps(ended)
@@ -234,7 +242,7 @@ class Batch:
 
     def _advice(self, why: np.ndarray) -> list[str]:
         """Why runs diverged and what to do; nothing for the others."""
-        advice, equation = [""] * len(why), self.machine.equation
+        advice, equation = [""] * len(why), self.compiled_equation.equation
         for run in np.flatnonzero(why).tolist():
             fastest = equation.fastest_joint(self.last[:, run])
             advice[run] = diverged_advice(_REASONS[Why(why[run])], fastest, self.setup)
@@ -242,15 +250,15 @@ class Batch:
 
     def _steps(self, ended: np.ndarray) -> np.ndarray:
         """Number of steps of each run up to its end."""
-        plan = self.plan
-        lengths = np.where(plan.lengths > 0, plan.lengths, 1.0)
-        segment = np.maximum(np.searchsorted(plan.starts[:-1], ended, side="right") - 1, 0)
-        before = np.cumsum(plan.counts) - plan.counts
-        return before[segment] + np.rint((ended - plan.starts[segment]) / lengths[segment]).astype(np.int64)
+        table = self.table
+        lengths = np.where(table.lengths > 0, table.lengths, 1.0)
+        segment = np.maximum(np.searchsorted(table.starts[:-1], ended, side="right") - 1, 0)
+        before = np.cumsum(table.counts) - table.counts
+        return before[segment] + np.rint((ended - table.starts[segment]) / lengths[segment]).astype(np.int64)
 
     def _statistics(self) -> Statistics:
         """Of the batch; its steps and evaluations are those of one run to the end."""
-        method, steps = self.setup.integrator, int(self.plan.counts[:-1].sum())
+        method, steps = self.setup.integrator, int(self.table.counts[:-1].sum())
         runs = f"compiled, {len(self.y)} runs side by side"
         if self.again:
             runs += f", {len(self.again)} of them made again with steps cut at thresholds"

@@ -38,7 +38,7 @@ class Level:
     limit: float
 
 
-class Levels(NamedTuple):
+class GuardLevels(NamedTuple):
     """L levels of W runs.
 
     Attributes:
@@ -51,15 +51,15 @@ class Levels(NamedTuple):
     limits: Array
     bounds: Array
 
-    def of_runs(self, numbers: Any) -> Levels:
+    def of_runs(self, numbers: Any) -> GuardLevels:
         """Those of some of the runs."""
-        return Levels(self.levels, self.limits[:, numbers], self.bounds[:, numbers])
+        return GuardLevels(self.levels, self.limits[:, numbers], self.bounds[:, numbers])
 
 
-NO_LEVELS = Levels((), np.empty((0, 1)), np.empty((0, 1)))
+NO_LEVELS = GuardLevels((), np.empty((0, 1)), np.empty((0, 1)))
 
 
-def levels(dynamics: Any, effects: Iterable[Effect], controller: Controller | None, W: int = 1) -> Levels:
+def levels(dynamics: Any, effects: Iterable[Effect], controller: Controller | None, W: int = 1) -> GuardLevels:
     """All levels of a plant under a controller, whose coefficients may be arrays over W runs, (W, n) or (W, 1)."""
     n, found = dynamics.n, []
     for kind, row, side, bounds, part in _bounds(dynamics, tuple(effects), controller):
@@ -72,10 +72,10 @@ def levels(dynamics: Any, effects: Iterable[Effect], controller: Controller | No
                 level = Level(kind, row * n + joint, side, float(limits[known][0]))
                 found.append((level, limits, side * slack + limits))
     if not found:
-        return Levels((), np.empty((0, W)), np.empty((0, W)))
+        return GuardLevels((), np.empty((0, W)), np.empty((0, W)))
     of, *arrays = zip(*sorted(found, key=lambda each: each[0].row), strict=True)
     limits, bounds = (np.array([np.broadcast_to(x, W) for x in each]) for each in arrays)
-    return Levels(of, limits, bounds)
+    return GuardLevels(of, limits, bounds)
 
 
 def _bounds(

@@ -40,7 +40,7 @@ class Version:
 
 @final
 @dataclass(frozen=True)
-class Alternative:
+class ABComparison:
     """Two versions beside each other.
 
     Attributes:
@@ -104,7 +104,7 @@ class Way:
 @final
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """Two ways, to be measured; attributes as of `Alternative`."""
+    """Two ways, to be measured; attributes as of `ABComparison`."""
 
     group: str
     what: str
@@ -112,12 +112,12 @@ class Pair:
     first: Way
     second: Way
 
-    def alternative(self) -> Alternative:
+    def alternative(self) -> ABComparison:
         """What was found."""
         turns = min(len(self.first.times), len(self.second.times))
         first, second = self.first.times_s[:turns], self.second.times_s[:turns]
         low, between, high = np.percentile(first - second, _QUARTILES).tolist() if turns else (0.0, 0.0, 0.0)
-        return Alternative(
+        return ABComparison(
             self.group, self.what, self.per, self.first.version(), self.second.version(), *_middle(first / second),
             between if low * high > 0 else None,
         )  # fmt: skip

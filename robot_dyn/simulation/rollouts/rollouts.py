@@ -24,14 +24,14 @@ from robot_dyn.errors import QueryError, nearest, shown
 from robot_dyn.integrate.adaptive import AUTO, EXPLICIT
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.queries.dynamics import Dynamics
-from robot_dyn.simulation.compiled.making import machine
+from robot_dyn.simulation.compiled.build import compiled_equation
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.results.loads import frame_of
-from robot_dyn.simulation.results.origin import edits_of_machine_code
-from robot_dyn.simulation.rollouts.batch import LANES, Batch
+from robot_dyn.simulation.results.link_wrenches import frame_of
+from robot_dyn.simulation.results.provenance import edits_of_machine_code
 from robot_dyn.simulation.rollouts.divergence import causes
+from robot_dyn.simulation.rollouts.lock_step import LANES, Batch
 from robot_dyn.simulation.rollouts.one_by_one import one_by_one
-from robot_dyn.simulation.rollouts.rollout_result import Rollouts
+from robot_dyn.simulation.rollouts.result import Rollouts
 from robot_dyn.simulation.rollouts.thresholds import Thresholds, thresholds
 from robot_dyn.simulation.setup.checks import check_stops
 from robot_dyn.simulation.setup.options import Options, setup_of, takes_options
@@ -156,7 +156,7 @@ def _side_by_side(
     equation = StateEquation(setup.plant, setup.controller, setup.integrator.canonical)
     asked = {"u": "u" in recorded, "v": equation.canonical and "v" in recorded, "energy": "energy" in recorded}
     kept = tuple(name for name, yes in asked.items() if yes)
-    made = machine(
+    made = compiled_equation(
         equation,
         cast(Integrator, setup.integrator),
         lanes=LANES,

@@ -18,8 +18,9 @@ from robot_dyn.errors import TraceError
 from robot_dyn.integrate import hermite
 from robot_dyn.integrate.adaptive import STEPPERS
 from robot_dyn.integrate.integrator import Integrator
-from robot_dyn.simulation.compiled.equations import Equations
-from robot_dyn.simulation.compiled.machine import Machine
+from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
+from robot_dyn.simulation.compiled.functions import Equations
+from robot_dyn.simulation.compiled.lru_by_identity import LRUByIdentity
 from robot_dyn.simulation.compiled.programs import (
     Identified,
     Traces,
@@ -29,7 +30,6 @@ from robot_dyn.simulation.compiled.programs import (
     stored,
     traced,
 )
-from robot_dyn.simulation.compiled.recent import Recent
 from robot_dyn.simulation.compiled.structure import changeable
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.events.detection import detecting
@@ -39,10 +39,10 @@ from robot_dyn.simulation.run.time_loop import time_loop
 
 _MOST_INSTRUCTIONS = 100_000  # some ten seconds of compiling
 
-_equations = Recent()
+_equations = LRUByIdentity()
 
 
-def machine(
+def compiled_equation(
     equation: StateEquation,
     method: Integrator | None,
     *,
@@ -53,7 +53,7 @@ def machine(
     cuts: bool = False,
     detects: bool = False,
     nonsmooth: bool = False,
-) -> Machine:
+) -> CompiledStateEquation:
     """The machine of a state equation, from the latest ones if it is among them; not compiled yet.
 
     Args:
@@ -76,14 +76,14 @@ def machine(
 
 def existing(
     made: Identified, what: Traces, method: Integrator | None, cuts: bool, programs: Programs | None = None
-) -> Machine | None:
+) -> CompiledStateEquation | None:
     """The machine of a single run if its code is in this process or in the store; or None.
 
     Args:
         made: Its state equation.
         what: What is traced of it.
-        method: As of `machine`.
-        cuts: As of `machine`.
+        method: As of `compiled_equation`.
+        cuts: As of `compiled_equation`.
         programs: Those in the store, if they are known.
     """
     if _equations.known(made.objects, (made.described, 1, (), what)) is None:
@@ -116,31 +116,31 @@ def _equations_of(
 def _with_loop(
     made: Identified, equations: Equations, method: Any, lanes: int = 1, cuts: bool = False, detects: bool = False,
     swept: tuple[str, ...] = (),
-) -> Machine:  # fmt: skip
+) -> CompiledStateEquation:  # fmt: skip
     """The machine of these equations with the loop of a method; without one where its step cannot be machine code."""
     found = None if method is None else _loop(method, made.equation, cuts, lanes, detects)
     if isinstance(found, SubsetError):
-        return Machine(made.equation, equations, made.known, None, swept, str(found))
-    return Machine(made.equation, equations, made.known, found, swept)
+        return CompiledStateEquation(made.equation, equations, made.known, None, swept, str(found))
+    return CompiledStateEquation(made.equation, equations, made.known, found, swept)
 
 
-def with_numbers(made: Machine, equation: StateEquation) -> Machine:
+def with_numbers(made: CompiledStateEquation, equation: StateEquation) -> CompiledStateEquation:
     """The machine of an equation that differs from the compiled one in parameters alone, swept ones among them."""
     robot, plant = robot_to_compile(equation.plant.dynamics), equation.plant
     own = equation if robot is plant.dynamics else replace(equation, plant=Plant(robot, plant.effects))
     return replace(made, equation=own, known=parameters(robot, plant.effects, equation.controller, made.swept))
 
 
-def machine_of_constants(equation: StateEquation, method: Integrator, *, lanes: int = 1) -> Machine:
+def machine_of_constants(equation: StateEquation, method: Integrator, *, lanes: int = 1) -> CompiledStateEquation:
     """The machine of a state equation whose numbers are constants of the code: none of them can be changed.
 
     Args:
-        equation: As of `machine`.
+        equation: As of `compiled_equation`.
         method: One whose steps are machine code too.
         lanes: Runs in lock step, of which no sample is kept.
 
     Raises:
-        TraceError: As of `machine`.
+        TraceError: As of `compiled_equation`.
     """
     robot = robot_to_compile(equation.plant.dynamics)
     own = replace(equation, plant=Plant(robot, equation.plant.effects))
@@ -149,13 +149,13 @@ def machine_of_constants(equation: StateEquation, method: Integrator, *, lanes: 
     made = _loop(method, own, False, lanes)
     if isinstance(made, SubsetError):
         raise made
-    return Machine(own, Equations(programs, lanes, robot.name), (), made)
+    return CompiledStateEquation(own, Equations(programs, lanes, robot.name), (), made)
 
 
 def _shared(
     equation: StateEquation, known: tuple[Parameter, ...], lanes: int, swept: tuple[str, ...]
 ) -> dict[int, int]:
-    """Where the numbers stand that all runs in lock step share: behind those of each run, as `Machine.own` has them."""
+    """Where the numbers stand that all runs in lock step share: behind those of each run."""
     if lanes == 1:
         return {}
     held = equation.plant.dynamics.n * equation.sampled
@@ -184,7 +184,7 @@ def loop_of(method: Any, cuts: bool, detects: bool = False, holds: bool = False)
     Args:
         method: An `Integrator` or `Adaptive`.
         cuts: Whether steps are chosen, or cut at events.
-        detects: As of `machine`.
+        detects: As of `compiled_equation`.
         holds: Whether something may hold joints.
     """
     from robot_dyn.simulation.compiled.loop import loop

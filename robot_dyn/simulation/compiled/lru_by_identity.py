@@ -11,7 +11,7 @@ _MOST = 64  # values that are kept
 
 
 @final
-class Recent:
+class LRUByIdentity:
     """Values by hashable keys and by the identity of objects, for as long as all of these live; the latest ones."""
 
     def __init__(self) -> None:

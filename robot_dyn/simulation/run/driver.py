@@ -16,7 +16,7 @@ from robot_dyn.simulation.observation.observer import Observer
 _PAUSE_S = 0.1  # between looks at the keyboard
 
 
-class Followed(ABC):
+class Driver(ABC):
     """A run on its way.
 
     Attributes:

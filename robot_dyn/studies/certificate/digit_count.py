@@ -11,12 +11,12 @@ import numpy as np
 from robot_dyn.errors import QueryError
 from robot_dyn.lagrange.digits import digits_of
 from robot_dyn.lagrange.exact import NOTHING, Exact, Scale, Truth, entry_units, in_joint_units
-from robot_dyn.lagrange.manipulator import Lagrangian
+from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.scale import diagonal_scale, floored, solved_norm
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.quantity import CORIOLIS_TORQUE, M, N, Quantity
-from robot_dyn.studies.certificate.road import Road, asked
-from robot_dyn.studies.certificate.worst_state import Batch, Search, row
+from robot_dyn.studies.certificate.implementation import Implementation, asked
+from robot_dyn.studies.certificate.worst_case_search import Batch, Search, row
 
 FEWER = 250  # random states for each one that balls judge, where no other numbers are fine enough; 8 at least
 _SIDE_BY_SIDE = 8  # states of a batch that machine code answers at once: as in the search, so in the judgement
@@ -56,11 +56,13 @@ class Counting:
         self._sizes: dict[Quantity, float] = {}
         self._fine: dict[tuple[Robot, Quantity], np.ndarray] = {}
 
-    def count(self, road: Road, quantity: Quantity, check: Callable[[], object] = lambda: None) -> Found:
+    def count(
+        self, implementation: Implementation, quantity: Quantity, check: Callable[[], object] = lambda: None
+    ) -> Found:
         """The digits of one road.
 
         Args:
-            road: The road.
+            implementation: The road.
             quantity: Of which they are counted.
             check: Called before each batch of states; what it raises ends the counting.
 
@@ -70,24 +72,24 @@ class Counting:
 
         def errors(states: Batch) -> np.ndarray:
             check()
-            return self._errors(road, quantity, states)
+            return self._errors(implementation, quantity, states)
 
         states = self.states
         search = Search(states, self._rng)
-        if road.fine is None:
+        if implementation.fine is None:
             states = {name: x[: max(len(x) // FEWER, 8)] for name, x in states.items()}
             search = Search(states, self._rng, parents=4, children=4, generations=3)
         known = errors(states)
         if np.isnan(known).all():
-            raise QueryError(f"{quantity.name} by {road.name}: no random state has a finite answer")
+            raise QueryError(f"{quantity.name} by {implementation.name}: no random state has a finite answer")
         at = row(states, int(np.nanargmax(known)))
         worst, _ = search.worst(errors, known, quantity.arguments)
         check()
-        judged = [(self.judged(road, quantity, state), state) for state in (at, row(worst, 0))]
+        judged = [(self.judged(implementation, quantity, state), state) for state in (at, row(worst, 0))]
         searched, state = max(judged, key=lambda each: each[0])
-        given = None if self.given is None else digits_of(self.judged(road, quantity, self.given))
+        given = None if self.given is None else digits_of(self.judged(implementation, quantity, self.given))
         typical = digits_of(float(np.nanmedian(known)))
-        self._of_file(road, quantity, state)
+        self._of_file(implementation, quantity, state)
         return Found(given, typical, digits_of(judged[0][0]), digits_of(searched), len(known), state)
 
     def truth(self, robot: Robot, quantity: Quantity, state: dict[str, np.ndarray]) -> Truth:
@@ -97,25 +99,27 @@ class Counting:
         self.bits = max(self.bits, truth.bits)
         return truth
 
-    def judged(self, road: Road, quantity: Quantity, state: dict[str, np.ndarray]) -> float:
+    def judged(self, implementation: Implementation, quantity: Quantity, state: dict[str, np.ndarray]) -> float:
         """The error at a state, by balls."""
         several = {name: np.tile(x, (_SIDE_BY_SIDE, 1)) for name, x in state.items()}
-        return self.truth(road.robot, quantity, state).error(road.ask(quantity, several)[0])
+        return self.truth(implementation.robot, quantity, state).error(implementation.ask(quantity, several)[0])
 
-    def _errors(self, road: Road, quantity: Quantity, states: Batch) -> np.ndarray:
+    def _errors(self, implementation: Implementation, quantity: Quantity, states: Batch) -> np.ndarray:
         """Errors at states (S, n); NaN where there is no answer."""
-        if road.fine is None:
-            answers = road.ask(quantity, states)
+        if implementation.fine is None:
+            answers = implementation.ask(quantity, states)
             rows = (row(states, k) for k in range(len(answers)))
-            return np.array([self.truth(road.robot, quantity, x).error(y) for x, y in zip(rows, answers, strict=True)])
-        key = (road.robot, quantity)
+            return np.array(
+                [self.truth(implementation.robot, quantity, x).error(y) for x, y in zip(rows, answers, strict=True)]
+            )
+        key = (implementation.robot, quantity)
         if states is not self.states:
-            fine = asked(road.fine, quantity, states)
+            fine = asked(implementation.fine, quantity, states)
         elif key in self._fine:
             fine = self._fine[key]
         else:
-            fine = self._fine[key] = asked(road.fine, quantity, states)
-        error = (road.ask(quantity, states) - fine).astype(float)
+            fine = self._fine[key] = asked(implementation.fine, quantity, states)
+        error = (implementation.ask(quantity, states) - fine).astype(float)
         relative = self._scale(quantity, states, fine).relative(error)
         return relative.reshape(len(error), -1).max(axis=1)
 
@@ -143,11 +147,11 @@ class Counting:
             self._sizes[quantity] = size if size > NOTHING else 1.0
         return self._sizes[quantity]
 
-    def _of_file(self, road: Road, quantity: Quantity, state: dict[str, np.ndarray]) -> None:
+    def _of_file(self, implementation: Implementation, quantity: Quantity, state: dict[str, np.ndarray]) -> None:
         """What the float64 of the file's decimals leaves at a state, and what right angles do."""
         truth = self.truth(self.robot, quantity, state)
         both = [(self.decimals, self._rounded.at(quantity, state, self._typical(quantity)))]
-        if road.robot is not self.robot:
-            both.append((self.right_angles, self.truth(road.robot, quantity, state)))
+        if implementation.robot is not self.robot:
+            both.append((self.right_angles, self.truth(implementation.robot, quantity, state)))
         for table, other in both:
             table[quantity.name] = min(digits_of(truth.error(other.values)), table.get(quantity.name, np.inf))

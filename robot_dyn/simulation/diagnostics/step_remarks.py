@@ -15,7 +15,7 @@ from robot_dyn.queries.units import unit
 from robot_dyn.simulation.diagnostics.creep import creeping
 from robot_dyn.simulation.diagnostics.reference_remarks import held, jumps
 from robot_dyn.simulation.observation.chatter import Episode
-from robot_dyn.simulation.observation.levels import Level, Levels, levels
+from robot_dyn.simulation.observation.guard_levels import GuardLevels, Level, levels
 from robot_dyn.simulation.observation.observation import Observation, Observed, Visit, observation_of
 from robot_dyn.simulation.observation.observer import Observer
 from robot_dyn.simulation.observation.remarks import Kind, Remark
@@ -29,7 +29,7 @@ _HIDDEN = 0.1  # of the range of a quantity: what the samples beside a window le
 _ROUNDING = 1e-9  # of a quantity: a smaller range is noise
 
 
-def observer_of(setup: Setup, of: Levels | None = None) -> Observer:
+def observer_of(setup: Setup, of: GuardLevels | None = None) -> Observer:
     """An observer of a run that has not begun, for its levels unless others are given."""
     if of is not None:
         return Observer(_observation(setup, of), of, setup.equation.canonical)
@@ -37,12 +37,12 @@ def observer_of(setup: Setup, of: Levels | None = None) -> Observer:
     return Observer(copied(start), of, setup.equation.canonical)
 
 
-def _beginning(setup: Setup) -> tuple[Levels, Observation]:
+def _beginning(setup: Setup) -> tuple[GuardLevels, Observation]:
     of = levels(setup.plant.dynamics, setup.plant.effects, setup.controller)
     return of, _observation(setup, of)
 
 
-def _observation(setup: Setup, of: Levels) -> Observation:
+def _observation(setup: Setup, of: GuardLevels) -> Observation:
     """Of the start; nan for what u is not known before the first tick."""
     equation, u = setup.equation, np.full(len(setup.q0), np.nan)
     if not equation.sampled:

@@ -24,8 +24,8 @@ from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.simulate import simulate
 from robot_dyn.studies.budget import Budget, Limit, OvertimeError
-from robot_dyn.studies.work_precision_diagram.candidate import ATOL, recorded
-from robot_dyn.studies.work_precision_diagram.ladder import Ladder, Point
+from robot_dyn.studies.work_precision_diagram.method_under_test import ATOL, recorded
+from robot_dyn.studies.work_precision_diagram.tolerance_ladder import Point, ToleranceLadder
 
 _PART = 0.02  # of the budget, for one run
 
@@ -50,7 +50,7 @@ class Beyond:
 
 
 def beyond(
-    setup: Setup, horizon_s: float, ladders: Iterable[Ladder], made: Mapping[str, Any], budget: Budget
+    setup: Setup, horizon_s: float, ladders: Iterable[ToleranceLadder], made: Mapping[str, Any], budget: Budget
 ) -> tuple[Beyond, ...]:
     """What can be said of each method beyond the horizon.
 
@@ -75,14 +75,14 @@ def beyond(
     return tuple(found.values())
 
 
-def _with(setup: Setup, method: Any, ladder: Ladder, point: Point) -> Setup:
+def _with(setup: Setup, method: Any, ladder: ToleranceLadder, point: Point) -> Setup:
     setup = replace(recorded(setup, setup.duration_s), engine=ladder.engine)
     if ladder.by == "tolerance":
         return replace(setup, integrator=replace(method, rtol=point.setting, atol=ATOL * point.setting))
     return replace(setup, integrator=method, step_s=point.setting)
 
 
-def _of(setup: Setup, ladder: Ladder, point: Point, longest: float) -> Beyond:
+def _of(setup: Setup, ladder: ToleranceLadder, point: Point, longest: float) -> Beyond:
     there = _run(setup, longest)
     returned = None
     if setup.controller is None and all(isinstance(each, Conservative) for each in setup.plant.effects):

@@ -15,7 +15,7 @@ from robot_dyn.errors import QueryError
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.results.acting import acting
 from robot_dyn.simulation.results.ledger import Ledger
-from robot_dyn.simulation.results.loads import at_stop, wrenches
+from robot_dyn.simulation.results.link_wrenches import at_stop, wrenches
 from robot_dyn.simulation.results.samples import columns
 from robot_dyn.simulation.results.tracking import deviation_of
 from robot_dyn.simulation.results.trajectory import Trajectory
@@ -24,7 +24,7 @@ from robot_dyn.simulation.run.state_functions import sample
 from robot_dyn.simulation.setup.setup import Setup
 
 if TYPE_CHECKING:
-    from robot_dyn.simulation.rollouts.rollout_result import Rollouts
+    from robot_dyn.simulation.rollouts.result import Rollouts
 
 
 def trajectory(runs: Rollouts, run: int) -> Trajectory:

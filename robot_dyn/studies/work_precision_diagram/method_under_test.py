@@ -19,11 +19,11 @@ from robot_dyn.coefficients import with_values
 from robot_dyn.effects.plant import Plant
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.model.robot import Robot
-from robot_dyn.simulation.compiled.choice import choose
+from robot_dyn.simulation.compiled.engine_choice import choose
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.results.samples import ledger
+from robot_dyn.simulation.run.make_run import prepared
 from robot_dyn.simulation.run.outcome import Ending
-from robot_dyn.simulation.run.prepared import prepared
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.setup.size import MOST_CUT
 from robot_dyn.studies.budget import Limit
@@ -61,11 +61,11 @@ class Run:
 
 @final
 @dataclass(frozen=True, eq=False)
-class Candidate:
+class MethodUnderTest:
     """A method with a ladder of settings.
 
     Attributes:
-        method, engine, events, order, by: As of `Ladder`.
+        method, engine, events, order, by: As of `ToleranceLadder`.
         settings: From coarse to fine.
         run: Runs one of them, within a limit of time.
         warm: Loads what its runs need.
@@ -131,7 +131,7 @@ def common(t: np.ndarray, of: np.ndarray) -> np.ndarray:
     return np.where(np.abs(of[place] - t) <= _ON_TIME * of[-1], place, -1)
 
 
-def own(setup: Setup, made: Any, engine: str, events: bool = True) -> Candidate:
+def own(setup: Setup, made: Any, engine: str, events: bool = True) -> MethodUnderTest:
     """A method of this library, or of the same kind.
 
     Args:
@@ -151,7 +151,7 @@ def own(setup: Setup, made: Any, engine: str, events: bool = True) -> Candidate:
             changed = replace(setup, integrator=replace(made, rtol=rtol, atol=ATOL * rtol), engine=engine)
             return timed(changed, limit, events)
 
-        return Candidate(made.name, engine, events, order, "tolerance", tolerances, tight, warm)
+        return MethodUnderTest(made.name, engine, events, order, "tolerance", tolerances, tight, warm)
 
     def steps() -> Iterator[float]:
         before = 0
@@ -167,7 +167,7 @@ def own(setup: Setup, made: Any, engine: str, events: bool = True) -> Candidate:
     def short(step: float, limit: Limit) -> Run:
         return timed(replace(setup, integrator=made, step_s=step, engine=engine), limit, events)
 
-    return Candidate(made.name, engine, events, made.order, "step", steps, short, warm)
+    return MethodUnderTest(made.name, engine, events, made.order, "step", steps, short, warm)
 
 
 def tolerances() -> Iterator[float]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from robot_dyn.seconds import in_words
-from robot_dyn.studies.costs.alternative import Alternative
+from robot_dyn.seconds import format_duration
+from robot_dyn.studies.costs.ab_comparison import ABComparison
 from robot_dyn.studies.costs.cost import Cost
 from robot_dyn.studies.costs.step_cost import EVERYTHING
 from robot_dyn.studies.sheet import Colours, ResultError, lines, sheet, styled
@@ -70,14 +70,14 @@ def _draw_parts(axes: Any, parts: list[tuple[str, int, float | None]], colours: 
     places = range(len(parts))
     axes.barh(places, [count for _, count, _ in parts], 2 * _BAR, color=colours["lines"][0])
     for place, (_, count, spent) in enumerate(parts):
-        time = "" if spent is None else f", {'−' * (spent < 0)}{in_words(abs(spent))}"
+        time = "" if spent is None else f", {'−' * (spent < 0)}{format_duration(abs(spent))}"
         said = f" {count} ({100 * count / whole:.1f} %){time}".replace("-", "−")
         axes.text(max(count, 0), place, said, va="center", fontsize=8, color=colours["ink"], parse_math=False)
     _named(axes, [name for name, _, _ in parts], colours)
     axes.set_xlim(min(0, *(count for _, count, _ in parts)), 1.45 * max(count for _, count, _ in parts) or 1)
 
 
-def _draw_ratios(axes: Any, others: list[Alternative], colours: Colours) -> None:
+def _draw_ratios(axes: Any, others: list[ABComparison], colours: Colours) -> None:
     from matplotlib.ticker import NullFormatter
 
     styled(axes, colours, "ratio, first / second", "Alternatives: instructions in blue, time in orange")

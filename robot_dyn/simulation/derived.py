@@ -11,7 +11,7 @@ import numpy as np
 from robot_dyn.simulation.diagnostics.damped_task import damped
 from robot_dyn.simulation.diagnostics.divergence import explained
 from robot_dyn.simulation.diagnostics.imbalance import cause
-from robot_dyn.simulation.diagnostics.observed import remarks
+from robot_dyn.simulation.diagnostics.step_remarks import remarks
 from robot_dyn.simulation.diagnostics.stiffness import bounded_by_stability
 from robot_dyn.simulation.diagnostics.unstable_loop import unstable
 from robot_dyn.simulation.events.occurrence import Occurrence
@@ -19,15 +19,15 @@ from robot_dyn.simulation.observation.observation import Observed
 from robot_dyn.simulation.observation.observer import Observer
 from robot_dyn.simulation.observation.remarks import Remark
 from robot_dyn.simulation.results.acting import acting
-from robot_dyn.simulation.results.error import ErrorEstimate
+from robot_dyn.simulation.results.error_estimate import ErrorEstimate
 from robot_dyn.simulation.results.ledger import Ledger
-from robot_dyn.simulation.results.loads import at_stop, frame_of, wrenches
-from robot_dyn.simulation.results.origin import edits_of_machine_code, origin
+from robot_dyn.simulation.results.link_wrenches import at_stop, frame_of, wrenches
+from robot_dyn.simulation.results.provenance import edits_of_machine_code, origin
 from robot_dyn.simulation.results.samples import columns, ledger
 from robot_dyn.simulation.results.tracking import deviation_of
 from robot_dyn.simulation.results.trajectory import Accuracy, leak
 from robot_dyn.simulation.run.outcome import Ending, Outcome
-from robot_dyn.simulation.run.record import Record
+from robot_dyn.simulation.run.recording import Recording
 from robot_dyn.simulation.setup.setup import Setup
 
 
@@ -48,7 +48,7 @@ class Results:
     """
 
     setup: Setup
-    record: Record
+    record: Recording
     observer: Observer
     error: ErrorEstimate | None
     own: dict[str, str]

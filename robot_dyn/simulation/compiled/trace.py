@@ -1,12 +1,12 @@
-"""The state equation in symbols: the lines of `StateEquation` traced to functions of (t, y, p, own).
+"""The state equation in symbols: the lines of `StateEquation` traced to functions of (t, y, p, run_parameters).
 
     rate = (y', u),   tick = (u, z⁺),   energy = (K, V),   sample = what is kept beside the state
     bodies = (M, loads), where something may hold joints
     in lock step rate = y', and actuation = u where it changes between ticks
     jacobian = (∂y'/∂y₁, …, ∂y'/∂y_m, ∂y'/∂t)
 
-p holds what all runs share on a segment: its ends, and the polynomials of the references; `own` what is each run's own:
-what a sampled controller holds, and the parameters.
+p holds what all runs share on a segment: its ends, and the polynomials of the references. `run_parameters` differ from
+run to run: what a sampled controller holds, and the parameters.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from robot_dyn.simulation.dynamics.bodies import bodies as bodies_of
 from robot_dyn.simulation.dynamics.moreau_jean import behind, problem, solution
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.setup.event import Event
-from robot_dyn.simulation.setup.plan import BOUNDS, lengths, polynomials
+from robot_dyn.simulation.setup.segment_table import BOUNDS, lengths, polynomials
 
 Bodies = Callable[[Any, Part], SymbolicDynamics]
 
@@ -58,7 +58,7 @@ def trace(
     n, held = equation.plant.dynamics.n, equation.plant.dynamics.n * equation.sampled
     followed = polynomials(equation.controller)
     sizes = 1, equation.size, BOUNDS + sum(map(lengths, followed)), held + sum(each.size for each in known)
-    (t, ts), (y, ys), (p, ps), (own, owns) = (
+    (t, ts), (y, ys), (p, ps), (run_parameters, owns) = (
         inputs(name, size) for name, size in zip(("t", "y", "p", "own"), sizes, strict=True)
     )
     state, time = ys.view(Symbols), np.minimum(np.maximum(ts.view(Symbols), ps[:1]), ps[1:2])[0]
@@ -96,10 +96,10 @@ def trace(
             changing, _ = symbolic.rate(free, state, held_here)
             J = ca.jacobian(column(changing), ca.vertcat(y, unbounded))
             columns["jacobian"] = ca.vec(ca.substitute(J, unbounded, column(time)))
-        given: dict[str, list[Any]] = {name: [t, y, p, own] for name in columns}
+        given: dict[str, list[Any]] = {name: [t, y, p, run_parameters] for name in columns}
         if nonsmooth:
             del columns["rate"]
-            for name, (arguments, x) in _of_step(symbolic, time, [t, p, own], held_here).items():
+            for name, (arguments, x) in _of_step(symbolic, time, [t, p, run_parameters], held_here).items():
                 given[name], columns[name] = arguments, x
     return {name: ca.Function("f", given[name], [ca.cse(ca.densify(x))]) for name, x in columns.items()}
 
@@ -108,7 +108,7 @@ def _of_step(
     symbolic: StateEquation, time: Any, shared: list[Any], held: Array | None
 ) -> dict[str, tuple[list[Any], Any]]:
     """Arguments and column of `problem`, `newton` and `behind`."""
-    n, (t, p, own) = symbolic.plant.dynamics.n, shared
+    n, (t, p, run_parameters) = symbolic.plant.dynamics.n, shared
     x, xs = inputs("x", symbolic.size + 1)
     nothing = ca.SX.sym("nothing", 0)
     given = problem(symbolic, time, xs.view(Symbols), held)
@@ -120,7 +120,7 @@ def _of_step(
         behind(symbolic, xs.view(Symbols), solveds.view(Symbols)),
     )
     return {
-        "problem": ([t, x, p, own], column(given)),
+        "problem": ([t, x, p, run_parameters], column(given)),
         "newton": ([t, known, nothing, place], column(step[0])),
         "behind": ([t, x, nothing, solved], column(step[1])),
     }

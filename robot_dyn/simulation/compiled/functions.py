@@ -12,7 +12,7 @@ from robot_dyn.codegen.program import Programs
 from robot_dyn.codegen.store.cache import default_store
 from robot_dyn.codegen.store.identity import digest, sources_of_the_writer
 from robot_dyn.convex import PASSES
-from robot_dyn.simulation.compiled.states import States
+from robot_dyn.simulation.compiled.checked_states import States
 from robot_dyn.simulation.dynamics.loop_state import Functions
 
 STEP = "problem", "newton", "behind"  # programs of one function; the last is one by itself, too

@@ -60,7 +60,7 @@ class Price:
 
 @final
 @dataclass(frozen=True)
-class Ladder:
+class ToleranceLadder:
     """Runs of one method.
 
     Attributes:

@@ -19,7 +19,7 @@ from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.setup.size import segments
 
 if TYPE_CHECKING:
-    from robot_dyn.simulation.compiled.machine import Machine
+    from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
 
 # Interpreted, an evaluation takes some 0.1 ms: these take about as long as imports, trace and LLVM, 1 to 2 s; half of
 # it without the time loop, which is compiled once for a version of this library.
@@ -29,7 +29,7 @@ _GUESSED = 10  # evaluations in a step of an implicit method, beside those of it
 _PER_SECOND, _PER_SEGMENT = 1000, 17  # evaluations of an adaptive method: for each second, at least for each segment
 
 
-def choose(setup: Setup, equation: StateEquation, seen: float = 0) -> tuple[Machine | None, str]:
+def choose(setup: Setup, equation: StateEquation, seen: float = 0) -> tuple[CompiledStateEquation | None, str]:
     """The machine that runs a setup, or None for the interpreted engine; and words for the summary.
 
     Args:
@@ -51,23 +51,23 @@ def choose(setup: Setup, equation: StateEquation, seen: float = 0) -> tuple[Mach
         found = _existing(setup, made, what)
         if found is None and not asked and not _is_worthwhile(setup, made, what, seen):
             return None, _interpreted(setup, "short: compiling does not pay")
-        machine = _checked(setup, equation, found)
-        return machine, _label(machine)
+        compiled_equation = _checked(setup, equation, found)
+        return compiled_equation, _label(compiled_equation)
     except (ImportError, RobotDynError) as error:
         if asked:
             raise
         return None, _interpreted(setup, str(error))
 
 
-def most_interpreted(setup: Setup, equation: StateEquation, machine: Machine | None) -> float:
+def most_interpreted(setup: Setup, equation: StateEquation, compiled_equation: CompiledStateEquation | None) -> float:
     """Evaluations after which a run is begun again in machine code: a count that was guessed too low."""
-    guessed = setup.engine == "auto" and machine is None and setup.integrator.controls_error
+    guessed = setup.engine == "auto" and compiled_equation is None and setup.integrator.controls_error
     if not guessed or undeclared(setup.plant, setup.controller):  # what is not compiled would never end
         return inf
     return _COMPILED / _in_all(setup, equation.size)
 
 
-def _checked(setup: Setup, equation: StateEquation, found: Machine | None) -> Machine:
+def _checked(setup: Setup, equation: StateEquation, found: CompiledStateEquation | None) -> CompiledStateEquation:
     """The machine that was found, or another, once it has been compared."""
     if found is not None:
         found.check(setup)
@@ -78,26 +78,28 @@ def _checked(setup: Setup, equation: StateEquation, found: Machine | None) -> Ma
     return made
 
 
-def machine_of(setup: Setup, equation: StateEquation, swept: tuple[str, ...] = ()) -> Machine:
-    """The machine code of a run by itself, not checked yet; `swept` as of `machine`.
+def machine_of(setup: Setup, equation: StateEquation, swept: tuple[str, ...] = ()) -> CompiledStateEquation:
+    """The machine code of a run by itself, not checked yet; `swept` as of `compiled_equation`.
 
     Raises:
         TraceError: If a part cannot be compiled; names it.
     """
-    from robot_dyn.simulation.compiled.making import machine
+    from robot_dyn.simulation.compiled.build import compiled_equation
 
     code, (_, jacobian, nonsmooth) = _code(setup, equation), _traces(setup)
-    return machine(code, _plain(setup), swept=swept, jacobian=jacobian, cuts=setup.finds_events, nonsmooth=nonsmooth)
+    return compiled_equation(
+        code, _plain(setup), swept=swept, jacobian=jacobian, cuts=setup.finds_events, nonsmooth=nonsmooth
+    )
 
 
-def _existing(setup: Setup, made: Identified, what: Traces) -> Machine | None:
+def _existing(setup: Setup, made: Identified, what: Traces) -> CompiledStateEquation | None:
     """The machine code that this process has, or the store."""
     programs = None
-    if "robot_dyn.simulation.compiled.making" not in sys.modules:  # to import it takes ten times as long as to ask
+    if "robot_dyn.simulation.compiled.build" not in sys.modules:  # to import it takes ten times as long as to ask
         programs = stored(made, what)
         if programs is None:
             return None
-    from robot_dyn.simulation.compiled.making import existing
+    from robot_dyn.simulation.compiled.build import existing
 
     return existing(made, what, _plain(setup), setup.finds_events, programs)
 
@@ -114,7 +116,7 @@ def _is_worthwhile(setup: Setup, made: Identified, what: Traces, seen: float) ->
 
 def _has_loop(setup: Setup) -> bool:
     """Whether the time loop is in the store."""
-    from robot_dyn.simulation.compiled.making import loop_of
+    from robot_dyn.simulation.compiled.build import loop_of
 
     method = _plain(setup)
     return (
@@ -144,10 +146,10 @@ def _interpreted(setup: Setup, why: str = "") -> str:
     return f"interpreted ({'; '.join(words)})" if words else "interpreted"
 
 
-def _label(machine: Machine) -> str:
-    if machine.loop is not None:
+def _label(compiled_equation: CompiledStateEquation) -> str:
+    if compiled_equation.loop is not None:
         return "compiled"
-    why = f": {machine.refused}" if machine.refused else ""
+    why = f": {compiled_equation.refused}" if compiled_equation.refused else ""
     return f"compiled (the equation of motion; steps in Python{why})"
 
 

@@ -22,7 +22,7 @@ _MOST_KEPT = 1000  # segments: to compute more of them takes little of the time 
 BOUNDS = 2  # numbers of p before the reference: time is kept between them, so that switches act as between them
 
 
-class Plan(NamedTuple):
+class SegmentTable(NamedTuple):
     """Segments without ticks or switches inside, S of them; the last is the end of the run, of no length.
 
     Attributes:
@@ -42,7 +42,7 @@ class Plan(NamedTuple):
     at_ticks: Array
 
 
-def plan_of(setup: Setup, pace: Fraction = Fraction(1)) -> Plan:
+def segment_table(setup: Setup, pace: Fraction = Fraction(1)) -> SegmentTable:
     """The segments of a setup, with steps `pace` times as long, and its end, for one run, which changes it."""
     if pace != 1 or len(setup.segments) > _MOST_KEPT:
         return _plan(setup, pace)
@@ -50,7 +50,7 @@ def plan_of(setup: Setup, pace: Fraction = Fraction(1)) -> Plan:
     return plan._replace(ticks=plan.ticks.copy(), transfers=plan.transfers.copy())
 
 
-def _plan(setup: Setup, pace: Fraction = Fraction(1)) -> Plan:
+def _plan(setup: Setup, pace: Fraction = Fraction(1)) -> SegmentTable:
     segments = paced(setup.segments, pace)
     counts = np.array([each.steps for each in segments])
     starts, ends = (np.array([getattr(each, name) for each in segments]) for name in ("start", "end"))
@@ -61,7 +61,7 @@ def _plan(setup: Setup, pace: Fraction = Fraction(1)) -> Plan:
     starts = np.append(starts, setup.duration_s)
     unbounded = np.broadcast_to([-np.inf, np.inf], (len(starts), BOUNDS))
     at_ticks = np.ascontiguousarray(np.hstack([unbounded, *(_at_times(each, starts) for each in followed)]))
-    return Plan(
+    return SegmentTable(
         starts,
         np.append((ends - starts[:-1]) / counts, 0.0),
         np.append(counts, 1).astype(np.int64),

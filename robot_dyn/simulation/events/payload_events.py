@@ -22,7 +22,7 @@ Carried = tuple[bool, ...]
 
 
 @final
-class Transfers:
+class PayloadEvents:
     """What a run carries.
 
     Args:

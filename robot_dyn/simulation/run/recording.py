@@ -31,7 +31,7 @@ class Path:
 
 @final
 @dataclass(frozen=True, eq=False)
-class Record:
+class Recording:
     """The states of a run.
 
     Attributes:
@@ -40,7 +40,7 @@ class Record:
         y: States of the state equation, (k, m).
         made: What follows from them: y', u, K and V, (k, m + n + 2).
         shared: States at which runs of other steps are compared.
-        walked: States at the ends of all steps; the same, unless the method chooses its steps.
+        step_log: States at the ends of all steps; the same, unless the method chooses its steps.
         steps: Number of steps.
         evaluations: Of the equation of motion.
         kinetic_peak: Largest kinetic energy that is known, beside that of the samples, in [J].
@@ -53,7 +53,7 @@ class Record:
     y: np.ndarray
     made: np.ndarray
     shared: Path
-    walked: Path
+    step_log: Path
     steps: int
     evaluations: int
     kinetic_peak: float

@@ -15,7 +15,7 @@ from robot_dyn.queries.units import units
 from robot_dyn.simulation.observation.observation import Observed
 from robot_dyn.simulation.observation.remarks import Remark
 from robot_dyn.simulation.observation.remarks import lines as said
-from robot_dyn.simulation.results.origin import joint_types
+from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.trajectory import Statistics, Trajectory
 from robot_dyn.simulation.rollouts.overview import Overview, of_some, overview
 from robot_dyn.simulation.run.outcome import Ending, Outcome
@@ -114,7 +114,7 @@ class Rollouts(Value):
             QueryError: If q or v was not recorded, a slice has no runs, or `run` is neither a whole number nor a slice.
             IndexError: If there is no run of that number.
         """
-        from robot_dyn.simulation.rollouts.rollout_run import trajectory
+        from robot_dyn.simulation.rollouts.run import trajectory
 
         if isinstance(run, slice):
             taken = range(len(self))[run]
@@ -149,7 +149,7 @@ class Rollouts(Value):
         Raises:
             QueryError: If there is no run of that number, or the runs were read from a file.
         """
-        from robot_dyn.simulation.rollouts.rollout_run import setup_of
+        from robot_dyn.simulation.rollouts.run import setup_of
 
         if self.setup is None:
             raise QueryError("runs that were read from a file have no setup; make them again, and keep the result")

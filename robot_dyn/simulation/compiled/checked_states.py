@@ -9,10 +9,10 @@ import numpy as np
 
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.run.event_run import TooLongError
+from robot_dyn.simulation.run.make_run import prepared
 from robot_dyn.simulation.run.outcome import Ending
-from robot_dyn.simulation.run.prepared import prepared
-from robot_dyn.simulation.run.record import Path
-from robot_dyn.simulation.setup.plan import plan_of
+from robot_dyn.simulation.run.recording import Path
+from robot_dyn.simulation.setup.segment_table import segment_table
 from robot_dyn.simulation.setup.setup import Setup
 
 _RANDOM = 4
@@ -31,9 +31,9 @@ class States(NamedTuple):
 
 def random_states(setup: Setup, size: int) -> States:
     """Random states of that size at random segments of a run."""
-    rng, plan = np.random.default_rng(20), plan_of(setup)
-    segments = rng.integers(len(plan.counts) - 1, size=_RANDOM)
-    return States(plan.starts[segments] + plan.lengths[segments], rng.normal(size=(_RANDOM, size)))
+    rng, table = np.random.default_rng(20), segment_table(setup)
+    segments = rng.integers(len(table.counts) - 1, size=_RANDOM)
+    return States(table.starts[segments] + table.lengths[segments], rng.normal(size=(_RANDOM, size)))
 
 
 def states_of(setup: Setup) -> States:
@@ -73,6 +73,6 @@ def _first_second(setup: Setup) -> Path:
             continue
         if record.outcome.ending is Ending.STOPPED:
             raise KeyboardInterrupt
-        return record.walked
+        return record.step_log
     equation = StateEquation(setup.plant, setup.controller, setup.integrator.canonical, setup.events)
     return Path(np.zeros(1, np.int64), np.zeros(1), equation.start(setup.q0, setup.v0)[None])

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from robot_dyn.simulation.results.archive import ArchiveError, Header
-from robot_dyn.simulation.results.members import OF_ROLLOUTS, check_headers
 from robot_dyn.simulation.results.run_file import (
     MAX_BYTES,
     ROLLOUTS_FORMAT,
@@ -18,8 +17,9 @@ from robot_dyn.simulation.results.run_file import (
     read_whole,
     write_whole,
 )
+from robot_dyn.simulation.results.schema import OF_ROLLOUTS, check_headers
 from robot_dyn.simulation.results.serialise import Arrays, build
-from robot_dyn.simulation.rollouts.rollout_result import Rollouts
+from robot_dyn.simulation.rollouts.result import Rollouts
 
 
 def save_rollouts(runs: Rollouts, path: str | Path) -> Path:

@@ -23,7 +23,7 @@ from robot_dyn.model.robot import Robot
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.results.trajectory import Trajectory
-    from robot_dyn.simulation.rollouts.rollout_result import Rollouts
+    from robot_dyn.simulation.rollouts.result import Rollouts
     from robot_dyn.simulation.setup.setup import Setup
 
 

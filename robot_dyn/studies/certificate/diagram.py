@@ -35,11 +35,18 @@ def draw(result: Certificate, theme: str = "light") -> Figure:
         styled(axes, colours, "time of a query [µs]", _WORDS.get(quantity, quantity), "" if k else "digits")
         for each in result.digits:
             if each.quantity == quantity:
-                _mark(axes, each, colours["lines"][_hue(result, each.road, colours)], colours)
+                _mark(axes, each, colours["lines"][_hue(result, each.implementation, colours)], colours)
         axes.axhline(result.decimals[quantity], color=colours["ink"], linewidth=0.9, linestyle=(0, (6, 3)))
     handles = [
-        Line2D([], [], color=colours["lines"][_hue(result, road, colours)], marker="o", linewidth=3, label=lines(road))
-        for road in result.roads
+        Line2D(
+            [],
+            [],
+            color=colours["lines"][_hue(result, implementation, colours)],
+            marker="o",
+            linewidth=3,
+            label=lines(implementation),
+        )
+        for implementation in result.implementations
     ]
     handles.append(Line2D([], [], color=colours["ink"], linestyle="--", label="decimals of the file as float64"))
     legend(figure, handles, colours)
@@ -66,5 +73,5 @@ def _mark(axes: Any, each: Held, colour: str, colours: Colours) -> None:
         axes.plot([t], [each.given], marker="x", color=colours["ink"], markersize=6)
 
 
-def _hue(result: Certificate, road: str, colours: Colours) -> int:
-    return result.roads.index(road) % len(colours["lines"])
+def _hue(result: Certificate, implementation: str, colours: Colours) -> int:
+    return result.implementations.index(implementation) % len(colours["lines"])

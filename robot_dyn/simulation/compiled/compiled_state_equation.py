@@ -20,15 +20,15 @@ from robot_dyn.control.controller import Controller
 from robot_dyn.effects.effect import Effect
 from robot_dyn.errors import RobotDynError
 from robot_dyn.foreign import because
-from robot_dyn.simulation.compiled.equations import STEP, Equations
+from robot_dyn.simulation.compiled.checked_states import States, random_states, some, states_of
+from robot_dyn.simulation.compiled.functions import STEP, Equations
 from robot_dyn.simulation.compiled.jacobian_check import DIFFERENCES, by_differences
-from robot_dyn.simulation.compiled.states import States, random_states, some, states_of
 from robot_dyn.simulation.dynamics.bodies import bodies
 from robot_dyn.simulation.dynamics.loop_state import Functions
 from robot_dyn.simulation.dynamics.moreau_jean import stepped
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.run.state_functions import sample
-from robot_dyn.simulation.setup.plan import plan_of
+from robot_dyn.simulation.setup.segment_table import segment_table
 from robot_dyn.simulation.setup.setup import Setup
 
 _LANES = 4  # runs in lock step that are compared
@@ -43,7 +43,7 @@ class MachineError(RobotDynError):
 
 @final
 @dataclass(frozen=True, eq=False)
-class Machine:
+class CompiledStateEquation:
     """A state equation as machine code.
 
     Attributes:
@@ -98,7 +98,7 @@ class Machine:
         changes = bool(plant.equation_of_motion.payloads)
         return self.with_parts(plant.effects, equation.controller, plant.dynamics if changes else None)
 
-    def own(self, swept: Mapping[str, np.ndarray]) -> np.ndarray:
+    def run_parameters(self, swept: Mapping[str, np.ndarray]) -> np.ndarray:
         """The numbers of W runs, (O, W): what is held, then row by row what is swept, (W, size) each, then the others.
 
         A single run has all of them row by row.
@@ -145,20 +145,20 @@ class Machine:
     def _compare(self, setup: Setup, states: States) -> None:
         rng, n, m = np.random.default_rng(20), self.equation.plant.dynamics.n, self.equation.size
         W = self.equations.runs
-        plan, held = plan_of(setup), n * self.equation.sampled
+        table, held = segment_table(setup), n * self.equation.sampled
         made = {name: np.empty((self.equations.programs.results(name), W)) for name in self.equations.programs}
         swept = {each.name: np.tile(each.value.ravel(), (W, 1)) for each in self.known if each.name in self.swept}
-        own = self.own(swept)
+        run_parameters = self.run_parameters(swept)
         for i, at in enumerate(states.t.tolist()):
-            p = plan.parameters[int(np.searchsorted(plan.starts[:-1], at, side="right")) - 1]
+            p = table.parameters[int(np.searchsorted(table.starts[:-1], at, side="right")) - 1]
             t, y = min(max(at, p[0]), p[1]), np.ascontiguousarray(states.y[(i + np.arange(W)) % len(states.y)].T)
-            own[:held] = rng.normal(size=(held, W))
+            run_parameters[:held] = rng.normal(size=(held, W))
             for name, out in made.items():
                 if name not in STEP:
-                    getattr(self.in_python, name)(t, y, p, own, out)
+                    getattr(self.in_python, name)(t, y, p, run_parameters, out)
             try:
                 for lane in range(min(W, _LANES)):
-                    self._compare_lane(t, y, p, own, made, lane)
+                    self._compare_lane(t, y, p, run_parameters, made, lane)
             except RobotDynError:
                 raise
             except Exception as error:  # of changeable code
@@ -166,37 +166,43 @@ class Machine:
                 raise MachineError(f"{parts} raises at t = {round(t, 9):g} s ({because(error)})") from error
             if "jacobian" in made:
                 J = made["jacobian"][:, 0].reshape(m + 1, m)
-                worst = by_differences(self.equation, t, y[:, 0], own[:n, 0] if held else None, p, J)
+                worst = by_differences(self.equation, t, y[:, 0], run_parameters[:n, 0] if held else None, p, J)
                 if not worst <= 1:
                     raise self._differs("Jacobian", worst * DIFFERENCES, DIFFERENCES, t)
 
     def _compare_lane(
-        self, t: float, y: np.ndarray, p: np.ndarray, own: np.ndarray, made: Mapping[str, np.ndarray], lane: int
+        self,
+        t: float,
+        y: np.ndarray,
+        p: np.ndarray,
+        run_parameters: np.ndarray,
+        made: Mapping[str, np.ndarray],
+        lane: int,
     ) -> None:
         """What the functions made of one run, beside what the equation makes of it."""
         n = self.equation.plant.dynamics.n
         ours, held = (
             {name: out[:, lane] for name, out in made.items()},
-            own[:n, lane] if self.equation.sampled else None,
+            run_parameters[:n, lane] if self.equation.sampled else None,
         )
         pairs = [*self._pairs(t, y[:, lane], held, ours)]
         if "problem" in made and not lane:
-            pairs += self._of_step(t, y, p, own, min(self.equations.runs, _LANES))
+            pairs += self._of_step(t, y, p, run_parameters, min(self.equations.runs, _LANES))
         allowed = _AGREES * max(1.0, float(np.linalg.cond(self.equation.plant.M(y[:n, lane]))))
         worst = max(_difference(mine, theirs, y[:, lane]) for mine, theirs in pairs)
         if not worst <= allowed:
             raise self._differs("state equation", worst, allowed, t)
 
     def _of_step(
-        self, t: float, y: np.ndarray, p: np.ndarray, own: np.ndarray, lanes: int
+        self, t: float, y: np.ndarray, p: np.ndarray, run_parameters: np.ndarray, lanes: int
     ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """y⁺, v⁺ and its places by a step of time stepping, run by run, beside what the equation gives."""
         n, m, W = self.equation.plant.dynamics.n, self.equation.size, y.shape[1]
         x = np.vstack([y, np.full((1, W), _LENGTH), np.zeros((n, W))])
         out = np.empty((m + 2 * n + 1 + self.equations.programs.results("problem"), W))
-        self.in_python.step(t, x, p, own, out)
+        self.in_python.step(t, x, p, run_parameters, out)
         for lane in range(lanes):
-            theirs = stepped(self.equation, t, x[:, lane], own[:n, lane] if self.equation.sampled else None)
+            theirs = stepped(self.equation, t, x[:, lane], run_parameters[:n, lane] if self.equation.sampled else None)
             yield out[:m, lane], theirs[:m]
             yield out[m : m + 2 * n, lane], theirs[m : m + 2 * n]
 
@@ -246,8 +252,8 @@ class Machine:
 def _callable(address: int) -> Callable[..., None]:
     function = _FUNCTION(address)
 
-    def call(t: float, y: np.ndarray, p: np.ndarray, own: np.ndarray, out: np.ndarray) -> None:
-        function(t, y.ctypes.data, p.ctypes.data, own.ctypes.data, out.ctypes.data)
+    def call(t: float, y: np.ndarray, p: np.ndarray, run_parameters: np.ndarray, out: np.ndarray) -> None:
+        function(t, y.ctypes.data, p.ctypes.data, run_parameters.ctypes.data, out.ctypes.data)
 
     return call
 

@@ -19,7 +19,7 @@ from robot_dyn.foreign import call
 from robot_dyn.simulation.dynamics.declarations import named
 from robot_dyn.simulation.dynamics.smoothness import LOOKS, extremes
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.run.record import Path, Record
+from robot_dyn.simulation.run.recording import Path, Recording
 from robot_dyn.simulation.setup.schedule import LEAST_STEPS
 from robot_dyn.simulation.setup.setup import Setup
 
@@ -53,7 +53,7 @@ def stepped_over(setup: Setup, equation: StateEquation, path: Path, error: float
     return min((each for each in found if each is not None), key=lambda each: each.t, default=None)
 
 
-def cut_alike(setup: Setup, run: Record) -> Missed | None:
+def cut_alike(setup: Setup, run: Recording) -> Missed | None:
     """The first time from which a run of fixed steps and its companions make the same few steps between switches.
 
     That is where a joint switches and switches back within a few steps, or switches in the last step of the run.
@@ -65,7 +65,7 @@ def cut_alike(setup: Setup, run: Record) -> Missed | None:
             why = f"joint {each.joint!r} switches and switches back within {LEAST_STEPS} steps"
             found.append(Missed(before[each.joint], why))
         before[each.joint] = each.t
-    end = float(run.walked.t[-1])
+    end = float(run.step_log.t[-1])
     late = [(t, joint) for joint, t in before.items() if joint and end - h < t < end]
     found += [Missed(t, f"joint {joint!r} switches in the last step") for t, joint in late]
     return min(found, key=lambda each: each.t, default=None)
