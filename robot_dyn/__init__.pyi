@@ -1,4 +1,7 @@
-# The public names and where they live: type checkers read this file, and __init__.py does.
+# The public names and where they live: type checkers read this file, and public_names does.
+from robot_dyn import control as control
+from robot_dyn import effects as effects
+from robot_dyn import integrate as integrate
 from robot_dyn.arithmetic import Ball as Ball
 from robot_dyn.arithmetic import midpoint as midpoint
 from robot_dyn.arithmetic import radius as radius
