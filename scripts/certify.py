@@ -5,11 +5,12 @@ Each is `rd.certify`. With --keep FILE what is found stays there, a line of JSON
 
 from __future__ import annotations
 
-import argparse
 import json
 import warnings
 from pathlib import Path
 from typing import Any
+
+from benchmarks.measure import command_line
 
 import robot_dyn as rd
 from robot_dyn.result import plain
@@ -74,9 +75,8 @@ def of_quantities(documents: dict[str, Document]) -> None:
 
 if __name__ == "__main__":
     warnings.simplefilter("ignore", rd.ModelWarning)
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__, "one robot and 100 states: to see that it works")
     parser.add_argument("robots", nargs="*", help=f"names; all with up to {MOST_JOINTS} joints if none")
-    parser.add_argument("--quick", action="store_true", help="one robot and 100 states: to see that it works")
     parser.add_argument("--keep", type=Path, help="file of what is found, a line for each robot")
     options = parser.parse_args()
     lines = options.keep.read_text().splitlines() if options.keep and options.keep.exists() else []

@@ -14,7 +14,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.coefficients import JOINTS, check_coefficients, declared, with_values
+from robot_dyn.coefficients import check_coefficients, declared, with_values
 from robot_dyn.control.reference import Reference
 from robot_dyn.errors import ControlError, shown
 from robot_dyn.queries.dynamics import Dynamics
@@ -60,10 +60,7 @@ class Controller(Value, ABC):
 
     def __post_init__(self) -> None:
         check_coefficients(self, ControlError)
-        for name, each in declared(type(self)).items():
-            if each.shapes == JOINTS and np.shape(getattr(self, name)) not in ((), (self.n,)):
-                shape = np.shape(getattr(self, name))
-                raise ControlError(f"{name} must be one number or of shape ({self.n},), got {shape}")
+        check_joints(self, self.n)
         object.__setattr__(self, "period_s", duration("period_s", self.period_s, zero=True, error=ControlError))
 
     @property
@@ -213,3 +210,30 @@ def check_model(model: Any) -> None:
     """ControlError if it is not the dynamics of an arm."""
     if isinstance(model, type) or not isinstance(model, Dynamics):
         raise ControlError(f"model: give a robot, such as rd.load('ur5'), got {shown(model)}")
+
+
+def check_joints(part: Any, n: int, where: str = "") -> None:
+    """ControlError if a coefficient of joints is neither one number nor one for each of n joints."""
+    for name, each in declared(type(part)).items():
+        shape = np.shape(getattr(part, name))
+        if each.of_joints and shape not in ((), (n,)):
+            raise ControlError(f"{where}{name} must be one number or of shape ({n},), got {shape}")
+
+
+def check_sampled(name: str, controller: Any) -> None:
+    """ControlError if it is not a sampled controller that a loop may hold."""
+    if not isinstance(controller, Controller):
+        raise ControlError(f"{name} must be a controller, such as rd.PD(…, period_s=1e-3), got {shown(controller)}")
+    if controller.outermost:
+        raise ControlError(
+            f"{name} must not be a {type(controller).__name__}: give the controller in it, and put the loop around all"
+        )
+    if not controller.period_s > 0:
+        raise ControlError(f"{name} acts continuously, and a loop samples: give {controller.name} a period_s")
+
+
+def nested(of: Controller, attribute: str, label: str) -> tuple[Nested, ...]:
+    """A controller that is an attribute of another, and what is in it."""
+    part: Controller = getattr(of, attribute)
+    below = (Nested(f"{attribute}.{path}", f"{label}{inner}", each) for path, inner, each in part.parts)
+    return Nested(attribute, label, part), *below

@@ -14,11 +14,10 @@ from dataclasses import dataclass, field, replace
 from math import inf
 from typing import Any, final
 
-from robot_dyn.coefficients import coefficient, with_values
+from robot_dyn.coefficients import coefficient
 from robot_dyn.description.edits import Payload
-from robot_dyn.effects.effect import Effect
+from robot_dyn.effects.effect import Timed
 from robot_dyn.errors import EditError, EffectError
-from robot_dyn.threshold import smooth
 from robot_dyn.validate import instance, truth
 
 _START = coefficient("s", shapes=((),), swept=False)
@@ -27,7 +26,7 @@ _END = coefficient("s", shapes=((),), infinite=True, swept=False)
 
 @final
 @dataclass(frozen=True, eq=False)
-class CarriedPayload(Effect):
+class CarriedPayload(Timed):
     """A payload that is carried for start_s ≤ t < end_s; a run has it from the start where start_s is not after 0.
 
     In the energy ledger its work is the energy that the body has as it comes, less what it takes with it; the kinetic
@@ -48,33 +47,16 @@ class CarriedPayload(Effect):
     carried: bool | None = field(default=None, init=False, repr=False)
 
     term = "a rigid body on a link, in M, C and N while it is carried"
-    thresholds = smooth
 
     def __post_init__(self) -> None:
         instance("payload", self.payload, Payload, "give one, as rd.Payload('tool0', 1.5)", error=EffectError)
         truth("at_rest", self.at_rest, error=EffectError)
         super().__post_init__()
-        if not self.start_s < self.end_s:
-            raise EffectError(f"end_s must lie after start_s, got {self.start_s} and {self.end_s}")
 
     def on(self, dynamics: Any) -> CarriedPayload:
         if self.carried is None:
-            robot_with(dynamics, [self], [True])  # so that an unknown link is told now
+            robot_with(dynamics, [self], [True])  # so that an unknown link is reported now
         return self
-
-    @property
-    def switches(self) -> tuple[float, ...]:
-        return self.start_s, self.end_s
-
-
-def in_hand(effect: CarriedPayload, t: float) -> bool:
-    """Whether it is carried at a time in [s], behind a switch at that time."""
-    return effect.start_s <= t < effect.end_s
-
-
-def known(effect: CarriedPayload, carried: bool) -> CarriedPayload:
-    """The effect while it is carried, or not."""
-    return with_values(effect, {"carried": carried})
 
 
 def robot_with(dynamics: Any, effects: Sequence[CarriedPayload], carried: Sequence[bool]) -> Any:

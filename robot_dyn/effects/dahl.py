@@ -15,8 +15,8 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.coefficients import coefficient
-from robot_dyn.effects.effect import Dissipative, Stateful
-from robot_dyn.effects.lugre import reversals
+from robot_dyn.effects.effect import Dissipative
+from robot_dyn.effects.lugre import Bristles
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.threshold import Threshold
 
@@ -25,7 +25,7 @@ _SLOW = 1e-6  # of the deflection f_c/σ, in a second: where a joint moves to an
 
 @final
 @dataclass(frozen=True, eq=False)
-class DahlFriction(Stateful, Dissipative):
+class DahlFriction(Bristles, Dissipative):
     """Dry friction with a state for each joint, the deflection z of bristles: τ = −σ z.
 
     z' = |w|^α sign(w) v with w = 1 − (σ z/f_c) sign(v). The bristles store ½ σ z², of which they give back a part; it
@@ -47,10 +47,7 @@ class DahlFriction(Stateful, Dissipative):
     def thresholds(self, n: int) -> tuple[Threshold, ...]:
         stiffness = np.broadcast_to(self.bristle_stiffness, n)
         slow = np.divide(_SLOW * self.coulomb, stiffness, out=np.zeros(n), where=stiffness > 0)
-        return reversals(stiffness, slow, n)
-
-    def state_size(self, n: int) -> int:
-        return n
+        return self.reversals(slow, n)
 
     def state_rate(self, dynamics: Dynamics, t: float, q: Array, v: Array, u: Array, z: Array) -> Array:
         reached = self.bristle_stiffness * z / self.coulomb
@@ -63,6 +60,3 @@ class DahlFriction(Stateful, Dissipative):
         self, dynamics: Dynamics, t: float, q: Array, v: Array, z: Array
     ) -> Array:
         return -self.bristle_stiffness * z
-
-    def stored_energy(self, dynamics: Dynamics, t: float, q: Array, z: Array) -> Array:
-        return (self.bristle_stiffness * z**2 / 2).sum(axis=-1)

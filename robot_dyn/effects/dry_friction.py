@@ -9,6 +9,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.coefficients import coefficient, with_values
+from robot_dyn.effects.effect import require
 from robot_dyn.effects.set_valued import Interval, Mode, SetValued
 from robot_dyn.errors import EffectError
 from robot_dyn.queries.dynamics import Dynamics
@@ -48,12 +49,7 @@ class DryFriction(SetValued):
         super().__post_init__()
         if self.stribeck_velocity is not None and self.static is None:
             raise EffectError("stribeck_velocity: has no effect without static, the friction of rest; give both")
-        try:
-            less = self.static is not None and np.any(np.less(self.static, self.level))
-        except (TypeError, ValueError):  # by name, or of other numbers of joints: checked when the joints are known
-            return
-        if less:
-            raise EffectError(f"static must not be less than level, got {self.static} and {self.level}")
+        require("static must not be less than level", np.greater_equal, self.static, self.level)
 
     def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
         direction = np.sign(v) if self._direction is None else self._direction

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from math import inf
 from typing import Any, ClassVar
@@ -17,9 +17,10 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.coefficients import check_coefficients, declared
-from robot_dyn.errors import EffectError
+from robot_dyn.errors import EffectError, QueryError
 from robot_dyn.queries.dynamics import Dynamics
-from robot_dyn.threshold import Threshold
+from robot_dyn.threshold import Threshold, smooth
+from robot_dyn.validate import rows
 from robot_dyn.values import Value
 
 
@@ -193,3 +194,48 @@ class Bound(Effect, ABC):
     @abstractmethod
     def actuation(self, u: Array) -> Array:
         """What is left of the actuation u, (..., n), in [N m] or [N]; same shape and unit."""
+
+
+class Timed(Effect):
+    """An effect that is smooth but acts only from its field `start_s` until its field `end_s`, in [s]."""
+
+    start_s: float
+    end_s: float
+
+    thresholds = smooth
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require("end_s must lie after start_s", lambda start, end: start < end, self.start_s, self.end_s)
+
+    @property
+    def switches(self) -> tuple[float, ...]:
+        return self.start_s, self.end_s
+
+    def acts(self, t: Any) -> Array:
+        """Whether it acts at times t (...,), at `start_s` already and at `end_s` no longer."""
+        t = rows("t", t)
+        return (self.start_s <= t) & (t < self.end_s)
+
+
+def require(message: str, relation: Callable[..., Any], *values: Any) -> None:
+    """Raise an EffectError unless coefficients satisfy a relation for every joint.
+
+    Values by joint name or "urdf" are checked when a plant knows the joints, as are different numbers of joints.
+    """
+    if not all(isinstance(x, float | np.ndarray) for x in values):
+        return
+    try:
+        satisfied = np.all(relation(*values))
+    except ValueError:  # of different numbers of joints
+        return
+    if not satisfied:
+        raise EffectError(f"{message}, got {' and '.join(map(str, values))}")
+
+
+def check_frame(effect: Effect, dynamics: Any, frame: str) -> None:
+    """Raise an EffectError if the arm has no such frame."""
+    try:
+        dynamics.placement(np.zeros(dynamics.n), frame)
+    except QueryError as error:
+        raise EffectError(f"{effect.name}: {error}") from None

@@ -7,16 +7,14 @@ Its arguments are not checked: floats, balls or symbols. [Murray, Li, Sastry 199
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import count
 from typing import Any, final
 
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.convex import LARGE
 from robot_dyn.effects.carried_payload import CarriedPayload
 from robot_dyn.effects.effect import Bound, Conservative, Drive, Effect, Force, Stateful
 from robot_dyn.effects.set_valued import SetValued, settled
@@ -233,45 +231,6 @@ class EquationOfMotion:
             if drive.coupled:
                 added[list(drive.driven(n))] = drive.added_inertia(n)
         return added * np.eye(n)
-
-    def in_a_step(self, q: Array, v: Array) -> tuple[Array, Array, Array, list[Array]]:
-        """For a step of time stepping with the middle q: friction at most, bounds of v⁺, and the shares of effects.
-
-        Shares are those of each of several effects with friction in it, and of each of several with bounds, (n,).
-        """
-        rub, stop = [[x for x in self.set_valued if getattr(x, of)] for of in ("rubs", "stops")]
-        levels, bounds = [x.friction(v) for x in rub], [x.bounds(q, v) for x in stop]
-        friction = sum(levels, start=0 * v)
-        lower, upper = 0 * v - np.inf, 0 * v + np.inf
-        for low, high in bounds:
-            lower, upper = np.maximum(lower, low), np.minimum(upper, high)
-        shares: list[Array] = []
-        if len(rub) > 1:
-            shares += [np.where(friction > 0, level / np.where(friction > 0, friction, 1.0), 0 * v) for level in levels]
-        if len(stop) > 1:
-            left = 1 + 0 * v
-            for low, high in bounds:
-                below = np.logical_and(low > -LARGE, low >= lower)
-                touches = np.logical_or(below, np.logical_and(high < LARGE, high <= upper))
-                shares.append(np.where(touches, left, 0 * v))
-                left = left - shares[-1]
-        return friction, lower, upper, shares
-
-    def impulses_of(self, rubbing: Array, stopping: Array, shares: Array) -> Iterator[Array]:
-        """The impulse of each set-valued effect, from those of all friction and of all stops, by shares in a row."""
-        n = len(rubbing)
-        rub, stop = (sum(getattr(x, of) for x in self.set_valued) for of in ("rubs", "stops"))
-        each_n = (shares[k * n : (k + 1) * n] for k in count())
-        of_rub = [next(each_n) for _ in range(rub)] if rub > 1 else [np.ones(n)]
-        of_stop = [next(each_n) for _ in range(stop)] if stop > 1 else [np.ones(n)]
-        rubs, stops = iter(of_rub), iter(of_stop)
-        for each in self.set_valued:
-            impulse = 0 * rubbing
-            if each.rubs:
-                impulse = impulse + next(rubs) * rubbing
-            if each.stops:
-                impulse = impulse + next(stops) * stopping
-            yield impulse
 
     def momentum_rate(self, q: Array, v: Array, total: Array) -> Array:
         """The rate of the momentum p = M v under the total torque."""

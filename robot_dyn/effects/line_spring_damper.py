@@ -14,8 +14,8 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array, apply, sqrt, transpose
 from robot_dyn.coefficients import coefficient
-from robot_dyn.effects.effect import Conservative, Dissipative, Effect
-from robot_dyn.errors import EffectError, QueryError
+from robot_dyn.effects.effect import Conservative, Dissipative, Effect, check_frame
+from robot_dyn.errors import EffectError
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.spatial import hat
 from robot_dyn.threshold import smooth
@@ -56,10 +56,7 @@ class _Line(Effect):
 
     def on(self, dynamics: Any) -> Effect:
         for frame in self._frames:
-            try:
-                dynamics.placement(np.zeros(dynamics.n), frame)
-            except QueryError as error:
-                raise EffectError(f"{self.name}: {error}") from None
+            check_frame(self, dynamics, frame)
         return self
 
     def _line(self, dynamics: Dynamics, q: Array) -> tuple[Array, Array]:

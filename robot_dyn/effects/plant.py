@@ -11,7 +11,8 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.arithmetic import FLOAT64, Arithmetic, Array
-from robot_dyn.effects.carried_payload import CarriedPayload, in_hand, known, robot_with
+from robot_dyn.coefficients import with_values
+from robot_dyn.effects.carried_payload import CarriedPayload, robot_with
 from robot_dyn.effects.effect import Bound, Conservative, Effect, Force, Stateful
 from robot_dyn.effects.equation_of_motion import EquationOfMotion
 from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFriction
@@ -77,7 +78,7 @@ class Plant:
         t, payloads = number("t", t), self._comes_and_goes
         if not payloads:
             return self
-        held = [each.payload for each in payloads if in_hand(each, t)]
+        held = [each.payload for each in payloads if each.acts(t)]
         robot: Any = self.dynamics
         others = [each for each in self.effects if each not in payloads]
         return Plant(robot.with_(payload=held), others)
@@ -192,7 +193,7 @@ class Plant:
 def carrying(plant: Plant, carried: Sequence[bool]) -> Plant:
     """The plant of a run with these of its payloads in its bodies; its other effects are the same."""
     payloads = plant.equation_of_motion.payloads
-    of = {each: known(each, taken) for each, taken in zip(payloads, carried, strict=True)}
+    of = {each: with_values(each, {"carried": taken}) for each, taken in zip(payloads, carried, strict=True)}
     effects = [of[each] if isinstance(each, CarriedPayload) else each for each in plant.effects]
     return Plant(robot_with(plant.dynamics, payloads, carried), effects)
 

@@ -10,8 +10,9 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.coefficients import coefficient, with_values
+from robot_dyn.effects.effect import require
+from robot_dyn.effects.joint_limit import LOWER, UPPER
 from robot_dyn.effects.set_valued import Interval, Mode, SetValued
-from robot_dyn.errors import EffectError
 from robot_dyn.queries.dynamics import Dynamics
 
 _NEAR = 4e-15  # of a stop, or in its unit: as close as rounding leaves an event
@@ -31,8 +32,8 @@ class RigidStops(SetValued):
         restitution: e, a scalar or (n,), 0 to 1; 0 unless given.
     """
 
-    lower: Any = field(metadata=coefficient("rad", symbol="Lower stop", infinite=True, elsewhere=-inf, stated="lower"))
-    upper: Any = field(metadata=coefficient("rad", symbol="Upper stop", infinite=True, elsewhere=inf, stated="upper"))
+    lower: Any = field(metadata=LOWER)
+    upper: Any = field(metadata=UPPER)
     restitution: Any = field(default=0.0, metadata=coefficient(symbol="e", least=0))
 
     held: Any = field(default=None, init=False, repr=False, metadata=coefficient(swept=False))
@@ -42,16 +43,8 @@ class RigidStops(SetValued):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if isinstance(self.restitution, float | np.ndarray) and np.any(np.greater(self.restitution, 1)):
-            raise EffectError(f"restitution must not be greater than 1, got {self.restitution}")
-        if isinstance(self.lower, str) or isinstance(self.upper, str):  # checked when the joints are known
-            return
-        try:
-            crossed = not np.all(np.less(self.lower, self.upper))
-        except (TypeError, ValueError):  # by name, or of other numbers of joints: so are these
-            return
-        if crossed:
-            raise EffectError(f"lower stops must lie below upper ones, got {self.lower} and {self.upper}")
+        require("restitution must not be greater than 1", lambda e: e <= 1, self.restitution)
+        require("lower stops must lie below upper ones", np.less, self.lower, self.upper)
 
     def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
         return 0 * v

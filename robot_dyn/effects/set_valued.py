@@ -10,13 +10,14 @@ equation of motion is smooth; where a torque would leave its interval, or a velo
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import count
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.convex import not_found
+from robot_dyn.convex import LARGE, not_found
 from robot_dyn.effects.effect import Dissipative
 from robot_dyn.effects.settling import settle, settling
 from robot_dyn.threshold import smooth
@@ -110,3 +111,44 @@ def settled(
     if not found:
         raise not_found(M, load)
     return a, Mode(held, direction)
+
+
+def in_a_step(effects: Sequence[SetValued], q: Array, v: Array) -> tuple[Array, Array, Array, list[Array]]:
+    """For a step of time stepping with the middle q: friction at most, bounds of v⁺, and the shares of effects.
+
+    Shares are those of each of several effects with friction in it, and of each of several with bounds, (n,).
+    """
+    rub, stop = [[x for x in effects if getattr(x, of)] for of in ("rubs", "stops")]
+    levels, bounds = [x.friction(v) for x in rub], [x.bounds(q, v) for x in stop]
+    friction = sum(levels, start=0 * v)
+    lower, upper = 0 * v - np.inf, 0 * v + np.inf
+    for low, high in bounds:
+        lower, upper = np.maximum(lower, low), np.minimum(upper, high)
+    shares: list[Array] = []
+    if len(rub) > 1:
+        shares += [np.where(friction > 0, level / np.where(friction > 0, friction, 1.0), 0 * v) for level in levels]
+    if len(stop) > 1:
+        left = 1 + 0 * v
+        for low, high in bounds:
+            below = np.logical_and(low > -LARGE, low >= lower)
+            touches = np.logical_or(below, np.logical_and(high < LARGE, high <= upper))
+            shares.append(np.where(touches, left, 0 * v))
+            left = left - shares[-1]
+    return friction, lower, upper, shares
+
+
+def impulses_of(effects: Sequence[SetValued], rubbing: Array, stopping: Array, shares: Array) -> Iterator[Array]:
+    """The impulse of each set-valued effect, from those of all friction and of all stops, by shares in a row."""
+    n = len(rubbing)
+    rub, stop = (sum(getattr(x, of) for x in effects) for of in ("rubs", "stops"))
+    each_n = (shares[k * n : (k + 1) * n] for k in count())
+    of_rub = [next(each_n) for _ in range(rub)] if rub > 1 else [np.ones(n)]
+    of_stop = [next(each_n) for _ in range(stop)] if stop > 1 else [np.ones(n)]
+    rubs, stops = iter(of_rub), iter(of_stop)
+    for each in effects:
+        impulse = 0 * rubbing
+        if each.rubs:
+            impulse = impulse + next(rubs) * rubbing
+        if each.stops:
+            impulse = impulse + next(stops) * stopping
+        yield impulse

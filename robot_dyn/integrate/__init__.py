@@ -6,7 +6,7 @@ The public names are those of `__init__.pyi`, imported when first used.
     methods                        the list of methods by name
     explicit, gauss, implicit, rosenbrock, time_stepping    the families with fixed steps
     adaptive, dop853, step_control, controlled_steps        methods that choose their steps
-    tableau, rodas                 coefficients as data
+    tableau, rosenbrock_table      coefficients as data
     primitives, fixed_point, differences                    what steps are made of
     hermite, bernstein             dense output, and where it passes a level
 """

@@ -23,7 +23,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.integrate.primitives import combination, copy, evaluate, norm, subtract
-from robot_dyn.integrate.step_control import ControlledStepper
+from robot_dyn.integrate.step_control import ControlledStepper, rate_at_end, rate_at_start
 
 _STAGES, _EXTENDED, _DEGREE, _ERROR_ORDER = 12, 16, 7, 8
 
@@ -102,13 +102,7 @@ def stepper(m: int, rows: int, bounded: int) -> ControlledStepper:
         np.zeros((_EXTENDED, rows, 1)), np.zeros((rows, 1)), np.zeros((_DEGREE, m, 1)),
         np.zeros((2, bounded, 1)), np.zeros((m, 1)),
     )  # fmt: skip
-    return ControlledStepper(begin, step, error, accept, dense, coefficients(), work, _ERROR_ORDER)
-
-
-def begin(f: Any, c: Coefficients, t: Any, y: Array, p: Array, run_parameters: Array, work: Work) -> int:
-    """The first stage."""
-    evaluate(f.rate, t, y, p, run_parameters, work.K[0])
-    return 1
+    return ControlledStepper(rate_at_start, step, error, rate_at_end, dense, coefficients(), work, _ERROR_ORDER)
 
 
 def stage(
@@ -121,17 +115,9 @@ def stage(
 
 
 def step(
-    f: Any,
-    c: Coefficients,
-    t: Any,
-    h: Any,
-    y: Array,
-    p: Array,
-    run_parameters: Array,
-    after: Array,
-    work: Work,
+    f: Any, c: Coefficients, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Work,
     lost: Array,
-) -> int:
+) -> int:  # fmt: skip
     """A trial; see `ControlledStepper`."""
     lost[0] = 0
     for i in range(1, _STAGES):
@@ -150,14 +136,6 @@ def error(c: Coefficients, h: Any, y: Array, after: Array, work: Work, rtol: flo
     if large == 0.0:
         return 0.0
     return abs(h) * large * large / np.sqrt(large * large + 0.01 * small * small)
-
-
-def accept(
-    f: Any, c: Coefficients, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Work
-) -> int:
-    """The rate at the end; see `ControlledStepper`."""
-    evaluate(f.rate, t + h, after, p, run_parameters, work.last)
-    return 1
 
 
 def dense(

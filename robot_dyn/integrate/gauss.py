@@ -18,7 +18,14 @@ from robot_dyn.aligned import aligned
 from robot_dyn.arithmetic import Arithmetic, Array
 from robot_dyn.errors import OverflowedError, QueryError
 from robot_dyn.integrate.fixed_point import enclose_fixed_point, unit_roundoff
-from robot_dyn.integrate.integrator import IntegrationError, PlainMethod, RightSide, Stepper, System
+from robot_dyn.integrate.integrator import (
+    IntegrationError,
+    PlainMethod,
+    RightSide,
+    Stepper,
+    System,
+    arithmetic_like,
+)
 from robot_dyn.integrate.primitives import GOING, MOST_ITERATIONS, SETTLED, combination, evaluate, settle
 from robot_dyn.integrate.tableau import ButcherTableau, Coefficients, Surd, combine
 from robot_dyn.validate import integer
@@ -141,7 +148,8 @@ class Gauss(PlainMethod):
 
     def _enclosed(self, system: System, t: Any, y: Array, h: Any, Z: Array) -> Array:
         """The step in balls, from approximate increments (s, m, B): around them lies a solution of the stages."""
-        kind, a, b, c = self.tableau.numbers(y)
+        kind = arithmetic_like(y)
+        a, b, c, *_ = self.tableau.arrays(kind)
         h, times = kind.number(h), [t + node * kind.number(h) for node in c]
 
         def update(x: Array) -> Array:

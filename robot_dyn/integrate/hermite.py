@@ -16,8 +16,8 @@ import numpy as np
 
 from robot_dyn.arithmetic import FLOAT64, Array
 from robot_dyn.integrate.integrator import Integrator
-from robot_dyn.integrate.primitives import combination, copy, evaluate, subtract
-from robot_dyn.integrate.step_control import ControlledStepper
+from robot_dyn.integrate.primitives import combination, copy, subtract
+from robot_dyn.integrate.step_control import ControlledStepper, rate_at_end, rate_at_start
 
 
 class Numbers(NamedTuple):
@@ -54,24 +54,18 @@ def stepper(method: Integrator, m: int, n: int, rows: int, widths: Array | None)
     K, last, F = np.zeros((2, rows, 1)), np.zeros((rows, 1)), np.zeros((3, m, 1))
     work = Work(inner.work, K, last, F, np.zeros((0, m, 1)), np.zeros((m, 1)))
     step = (_known_step if method.plain else step_of)(inner.step)
-    return ControlledStepper(begin, step, error, accept, dense, Numbers(inner.coefficients, *np.eye(2)), work, 1)
+    return ControlledStepper(
+        rate_at_start, step, error, rate_at_end, dense, Numbers(inner.coefficients, *np.eye(2)), work, 1
+    )
 
 
 def step_of(inner: Callable[..., int]) -> Callable[..., int]:
     """The step of a method, of its coefficients and arrays among these."""
 
     def step(
-        f: Any,
-        c: Numbers,
-        t: Any,
-        h: Any,
-        y: Array,
-        p: Array,
-        run_parameters: Array,
-        after: Array,
-        work: Work,
+        f: Any, c: Numbers, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Work,
         lost: Array,
-    ) -> int:
+    ) -> int:  # fmt: skip
         lost[0] = 0
         return inner(f, c.method, t, h, y, p, run_parameters, after, work.method, lost)
 
@@ -81,23 +75,9 @@ def step_of(inner: Callable[..., int]) -> Callable[..., int]:
 _known_step = cache(step_of)  # machine code is made once for a function
 
 
-def begin(f: Any, c: Numbers, t: Any, y: Array, p: Array, run_parameters: Array, work: Work) -> int:
-    """The rate at the start."""
-    evaluate(f.rate, t, y, p, run_parameters, work.K[0])
-    return 1
-
-
 def error(c: Numbers, h: Any, y: Array, after: Array, work: Work, rtol: float, atol: float) -> float:
     """None is known."""
     return 0.0
-
-
-def accept(
-    f: Any, c: Numbers, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Work
-) -> int:
-    """The rate at the end."""
-    evaluate(f.rate, t + h, after, p, run_parameters, work.last)
-    return 1
 
 
 def dense(

@@ -36,6 +36,13 @@ class IntegrationError(RobotDynError):
         self.t = t
 
 
+def singular(method: Integrator, t: Any, h: Any) -> IntegrationError:
+    """The error of a step whose linear systems have no solution."""
+    return IntegrationError(
+        f"{method.name}: 1 − h γ J is singular for the step {float(h)} at t = {float(t)}: take a smaller step", t
+    )
+
+
 @final
 @dataclass(frozen=True, eq=False)
 class System:
@@ -220,8 +227,8 @@ class PlainMethod(Integrator):
             out[...] = system.rate(t, x.T.reshape(y.shape)).reshape(-1, m).T
 
         def jacobian(t: Any, x: Array, p: Any, run_parameters: Any, out: Array) -> None:
-            made = system.derivatives(t, x.T.reshape(y.shape), t + h)
-            out[...] = np.moveaxis(made.reshape(m + 1, -1, m), 1, 2)
+            derivatives = system.derivatives(t, x.T.reshape(y.shape), t + h)
+            out[...] = np.moveaxis(derivatives.reshape(m + 1, -1, m), 1, 2)
 
         step(RightSide(rate, jacobian), coefficients, t, h, x, None, None, after, work, lost)
         return after.T.reshape(y.shape), lost, work

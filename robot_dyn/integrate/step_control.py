@@ -76,6 +76,20 @@ class ControlledStepper(NamedTuple):
     error_order: int
 
 
+def rate_at_start(f: Any, c: Any, t: Any, y: Array, p: Array, run_parameters: Array, work: Any) -> int:
+    """Write the rate into work.K[0]: the `begin` of a method that needs nothing else."""
+    evaluate(f.rate, t, y, p, run_parameters, work.K[0])
+    return 1
+
+
+def rate_at_end(
+    f: Any, c: Any, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Any
+) -> int:
+    """Write the rate at the end of a step into work.last: the `accept` of every method here."""
+    evaluate(f.rate, t + h, after, p, run_parameters, work.last)
+    return 1
+
+
 def control_of(stepper: ControlledStepper, rtol: float, atol: float, longest: float) -> np.ndarray:
     """The choice of steps before the first."""
     control = np.zeros(len(At))

@@ -18,13 +18,11 @@ from typing import Any, ClassVar, final
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.coefficients import declared, with_values
-from robot_dyn.control.controller import Controller, Nested
+from robot_dyn.coefficients import with_values
+from robot_dyn.control.controller import Controller, Nested, check_joints, check_sampled, nested
 from robot_dyn.control.digital_loop.block import Block
 from robot_dyn.control.digital_loop.delay import Instant, delay, instants
-from robot_dyn.control.digital_loop.differences import Differences
 from robot_dyn.control.digital_loop.tick import tick
-from robot_dyn.control.nested import check_sampled, nested
 from robot_dyn.errors import ControlError, shown
 from robot_dyn.threshold import smooth
 from robot_dyn.validate import integer
@@ -85,12 +83,10 @@ class Loop(Controller):
 
     def _check_blocks(self, period_s: float) -> None:
         for line, i, block in self.blocks:
-            if isinstance(block, Differences) and (line, i) != ("velocity", 0):
-                raise ControlError(f"{line}: Differences may only be the first block of velocity; move it there")
-            for name, each in declared(type(block)).items():
-                shape = np.shape(getattr(block, name))
-                if each.of_joints and shape not in ((), (self.n,)):
-                    raise ControlError(f"{line}: {name} must be one number or of shape ({self.n},), got {shape}")
+            if block.differentiates and (line, i) != ("velocity", 0):
+                kind = type(block).__name__
+                raise ControlError(f"{line}: {kind} may only be the first block of velocity; move it there")
+            check_joints(block, self.n, f"{line}: ")
             block.check(period_s)
 
     @property
@@ -105,13 +101,13 @@ class Loop(Controller):
 
     @property
     def parts(self) -> tuple[Nested, ...]:
-        made = [*nested(self, "controller", "")]
+        parts = [*nested(self, "controller", "")]
         for line in LINES:
             names = [block.name for block in getattr(self, line)]
             for i, (name, block) in enumerate(zip(names, getattr(self, line), strict=True)):
                 number = f" {names[: i + 1].count(name)}" if names.count(name) > 1 else ""
-                made.append(Nested(f"{line}.{i}", f"{line}.{name}{number}.", block))
-        return tuple(made)
+                parts.append(Nested(f"{line}.{i}", f"{line}.{name}{number}.", block))
+        return tuple(parts)
 
     @property
     def task_frame(self) -> str | None:
@@ -155,8 +151,8 @@ class Loop(Controller):
 
     @property
     def differs(self) -> bool:
-        """Whether the velocity is that of differences."""
-        return bool(self.velocity) and isinstance(self.velocity[0], Differences)
+        """Whether the velocity is derived from the measured position."""
+        return bool(self.velocity) and self.velocity[0].differentiates
 
     @cached_property
     def places(self) -> dict[str, slice]:
@@ -209,8 +205,8 @@ class Loop(Controller):
 
 
 def _blocks(line: str, given: Any) -> tuple[Block, ...]:
-    """The blocks that are meant: several, or one."""
-    made = (given,) if isinstance(given, Block) else given
-    if not isinstance(made, tuple | list) or not all(isinstance(each, Block) for each in made):
+    """The blocks of a line, given as several or as one."""
+    blocks = (given,) if isinstance(given, Block) else given
+    if not isinstance(blocks, tuple | list) or not all(isinstance(each, Block) for each in blocks):
         raise ControlError(f"{line} must be blocks, such as [rd.Quantisation(1e-4)], got {shown(given)}")
-    return tuple(made)
+    return tuple(blocks)

@@ -14,8 +14,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.coefficients import with_values
-from robot_dyn.control.controller import Controller, Nested
-from robot_dyn.control.nested import check_sampled, nested
+from robot_dyn.control.controller import Controller, Nested, check_sampled, nested
 from robot_dyn.errors import ControlError
 from robot_dyn.threshold import smooth
 
