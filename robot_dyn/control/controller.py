@@ -111,14 +111,14 @@ class Controller(Value, ABC):
         return np.inf
 
     def thresholds(self) -> tuple[Threshold, ...]:
-        """Levels of its `demand`, where its formulas pass from one smooth one to another; `beyond` says to which.
+        """Levels of its `demand`, where its formulas pass from one smooth one to another; `on_side` says to which.
 
         () if they are smooth everywhere; a class that does not define this declares nothing, as of `Effect`.
         Where it acts continuously, steps of integration end where one is passed.
         """
         return ()
 
-    def beyond(self, sides: Mapping[Threshold, int]) -> Controller:
+    def on_side(self, sides: Mapping[Threshold, int]) -> Controller:
         """The controller as it is with each threshold passed (1) or not (−1), smooth wherever q, v and z are."""
         return self
 

@@ -110,7 +110,7 @@ class PID(Controller):
     def thresholds(self) -> tuple[Threshold, ...]:
         return limits_reached(self.effort_limit, self._middle, self.n)
 
-    def beyond(self, sides: Mapping[Threshold, int]) -> PID:
+    def on_side(self, sides: Mapping[Threshold, int]) -> PID:
         limit, middle = piece(self.effort_limit, self.n, sides)
         return with_values(self, {"effort_limit": limit, "_middle": middle})
 

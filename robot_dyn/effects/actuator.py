@@ -44,7 +44,7 @@ class EffortLimit(Bound):
     def thresholds(self, n: int) -> tuple[Threshold, ...]:
         return limits_reached(self.limit, self._middle, n)
 
-    def beyond(self, n: int, sides: Mapping[Threshold, int]) -> EffortLimit:
+    def on_side(self, n: int, sides: Mapping[Threshold, int]) -> EffortLimit:
         limit, middle = piece(self.limit, n, sides)
         return with_values(self, {"limit": limit, "_middle": middle})
 

@@ -80,13 +80,13 @@ class Effect(Value):
     def thresholds(self, n: int) -> tuple[Threshold, ...]:
         """Where it switches from one smooth formula to another, on an arm of n joints; () if it is smooth everywhere.
 
-        A step of integration ends where one is passed; `beyond` says what the effect is on either side. A class that
+        A step of integration ends where one is passed; `on_side` says what the effect is on either side. A class that
         does not define this declares nothing: it runs interpreted unless machine code is asked for, and error estimates
         do not rest on the order of a method. Levels of the actuation are for bounds: of what reaches them.
         """
         return ()
 
-    def beyond(self, n: int, sides: Mapping[Threshold, int]) -> Effect:
+    def on_side(self, n: int, sides: Mapping[Threshold, int]) -> Effect:
         """The effect as it is with each threshold passed (1) or not (−1), a smooth function wherever q and v are."""
         return self
 

@@ -71,7 +71,7 @@ class _JointStops(Effect):
             if abs(level) < _NOWHERE and acts[i]
         )
 
-    def beyond(self, n: int, sides: Mapping[Threshold, int]) -> Effect:
+    def on_side(self, n: int, sides: Mapping[Threshold, int]) -> Effect:
         """A stop that is not touched lies nowhere; the depth of a touched one continues to both sides, as a spring."""
         lower, upper = np.broadcast_to(self.lower, n).copy(), np.broadcast_to(self.upper, n).copy()
         for joint in {each.joint for each in sides}:

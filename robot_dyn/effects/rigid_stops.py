@@ -67,7 +67,7 @@ class RigidStops(SetValued):
         lower, upper = (touching(level, side) for level, side in zip(self._levels(q), (-1, 1), strict=True))
         return np.where(q <= lower, -1, np.where(q >= upper, 1, 0))
 
-    def beyond_by(self, q: np.ndarray) -> np.ndarray:
+    def penetration(self, q: np.ndarray) -> np.ndarray:
         """How far each joint is beyond a stop, more than by rounding, (n,); 0 for the others."""
         lower, upper = self._levels(q)
         depth = np.maximum(lower - q, q - upper)

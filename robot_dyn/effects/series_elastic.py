@@ -71,7 +71,7 @@ class SeriesElastic(GearedMotor, Dissipative):
             if gaps[k] > 0
         )
 
-    def beyond(self, n: int, sides: Mapping[Threshold, int]) -> SeriesElastic:
+    def on_side(self, n: int, sides: Mapping[Threshold, int]) -> SeriesElastic:
         if self.backlash is None:
             return self
         side = np.zeros(n)
