@@ -17,7 +17,7 @@ def public_names(spec: Any) -> tuple[Callable[[str], Any], Callable[[], list[str
         spec: Its `__spec__`. Lines of the stub are such as `from robot_dyn.model.robot import Robot as Robot`; a room
             that is public itself is `from robot_dyn import effects as effects`.
     """
-    stub = spec.loader.get_data(f"{spec.submodule_search_locations[0]}/__init__.pyi").decode()
+    stub = spec.loader.get_data(spec.origin.removesuffix(".py") + ".pyi").decode()
     lines = (line.split() for line in stub.splitlines() if line.startswith("from "))
     homes = {name: module for _, module, _, name, *_ in lines}
     names = sorted(homes)

@@ -1,4 +1,4 @@
-"""A payload that the arm picks up and drops: M, C and N have its body for start_s ≤ t < end_s.
+"""A payload that the arm picks up and drops: M, C and N include its body for start_s ≤ t < end_s.
 
     picked up at rest            (M + ΔM) v⁺ = M v⁻
     picked up at the hand's speed, or dropped     v⁺ = v⁻
@@ -27,16 +27,16 @@ _END = coefficient("s", shapes=((),), infinite=True, swept=False)
 @final
 @dataclass(frozen=True, eq=False)
 class CarriedPayload(Timed):
-    """A payload that is carried for start_s ≤ t < end_s; a run has it from the start where start_s is not after 0.
+    """A payload that is carried for start_s ≤ t < end_s; from the start of a run if start_s ≤ 0.
 
-    In the energy ledger its work is the energy that the body has as it comes, less what it takes with it; the kinetic
-    energy that is lost where it is picked up at rest is the work of `pick_up`.
+    In the energy ledger its work is the energy that the body brings, less what it takes away; the kinetic energy that
+    is lost when it is picked up at rest is the work of `pick_up`.
 
     Attributes:
         payload: The body and its link.
-        start_s: When it is picked up, in [s].
-        end_s: When it is dropped, in [s].
-        at_rest: Whether it rests until it is picked up; if not, it moves with the link by then.
+        start_s: Time at which it is picked up, in [s].
+        end_s: Time at which it is dropped, in [s].
+        at_rest: Whether it is at rest until it is picked up; otherwise it moves with the link by then.
     """
 
     payload: Payload
@@ -60,10 +60,10 @@ class CarriedPayload(Timed):
 
 
 def robot_with(dynamics: Any, effects: Sequence[CarriedPayload], carried: Sequence[bool]) -> Any:
-    """The robot with all these payloads, those that are not carried without mass.
+    """Return the robot with all these payloads, massless where they are not carried.
 
     Raises:
-        EffectError: If the dynamics is no robot, or has no such link.
+        EffectError: If the dynamics is not a robot, or has no such link.
     """
     if not hasattr(dynamics, "with_"):
         raise EffectError(f"carried_payload: needs a Robot, got {type(dynamics).__name__}; give rd.Plant(robot, …)")

@@ -1,4 +1,4 @@
-"""Joint stops as one-sided spring and damper: τ = k (δ₋ − δ₊) − c (δ₋ + δ₊) v, with δ the depth beyond a stop.
+"""Joint stops as one-sided spring and damper: τ = k (δ₋ − δ₊) − c (δ₋ + δ₊) v, with δ the depth past a stop.
 
 The damping grows with the depth, so that the torque is continuous at contact [Hunt, Crossley 1975]. Soft stops are
 overrun by about v √(M/k); for rigid ones see `rigid_stops`.
@@ -20,7 +20,7 @@ from robot_dyn.errors import EffectError
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.threshold import Threshold
 
-_NOWHERE = 1e9  # a stop that does not exist: no depth can be reached there
+_NOWHERE = 1e9  # position of a stop that does not exist
 _LOWER_STOP, _UPPER_STOP = ("lower stop", "left", "touched"), ("upper stop", "touched", "left")
 LOWER = coefficient("rad", symbol="Lower stop", infinite=True, elsewhere=-inf, stated="lower")
 UPPER = coefficient("rad", symbol="Upper stop", infinite=True, elsewhere=inf, stated="upper")
@@ -39,7 +39,7 @@ class _JointStops(Effect):
             stop = getattr(self, name)
             if not isinstance(stop, np.ndarray):
                 return  # by name, or as the file states: checked when the joints are known
-            # A stop that does not exist lies where no depth can be reached, and inf − inf is avoided.
+            # finite also where there is no stop: inf − inf is avoided
             stop = np.clip(stop, -_NOWHERE, _NOWHERE)
             stop.setflags(write=False)
             object.__setattr__(self, name, stop)
@@ -72,7 +72,7 @@ class _JointStops(Effect):
         )
 
     def on_side(self, n: int, sides: Mapping[Threshold, int]) -> Effect:
-        """A stop that is not touched lies nowhere; the depth of a touched one continues to both sides, as a spring."""
+        """Without the stops that are not touched; the depth at a touched one continues to both sides, as a spring."""
         lower, upper = np.broadcast_to(self.lower, n).copy(), np.broadcast_to(self.upper, n).copy()
         for joint in {each.joint for each in sides}:
             lower[joint], upper[joint] = -_NOWHERE, _NOWHERE

@@ -43,7 +43,9 @@ class _Line(Effect):
         for name, frame in zip(("frame", "other_frame"), self._frames, strict=False):
             instance(name, frame, str, "give the name of a frame", error=EffectError)
         if self.frame == self.other_frame:
-            raise EffectError(f"both points are fixed to {self.frame!r}, so their distance is constant: name another")
+            raise EffectError(
+                f"both points are fixed to {self.frame!r}, so their distance is constant: name another frame"
+            )
         super().__post_init__()
 
     @property

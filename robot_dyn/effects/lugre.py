@@ -20,7 +20,7 @@ from robot_dyn.effects.effect import Active, Stateful, require
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.threshold import Threshold
 
-_SLOW = 1e-6  # of v_s: where a joint moves to and fro more slowly, the bend matters to no digit
+_SLOW = 1e-6  # of v_s: no digit depends on reversals of slower motion
 _REVERSAL = "velocity", "turns positive", "turns negative"
 
 
@@ -46,9 +46,9 @@ class Bristles(Stateful):
 class LuGreFriction(Bristles, Active):
     """Dry friction with a state for each joint, the deflection z of bristles: τ = −(σ₀ z + σ₁ z' + σ₂ v).
 
-    z' = v − σ₀ |v| z / g(v) and g(v) = f_c + (f_s − f_c) exp(−(v/v_s)²). The bristles store ½ σ₀ z² and give it back,
+    z' = v − σ₀ |v| z / g(v) and g(v) = f_c + (f_s − f_c) exp(−(v/v_s)²). The bristles store ½ σ₀ z² and return it,
     so that its power may be positive; it is passive where σ₂ ≥ σ₁ (f_s / f_c − 1) [Barahanov, Ortega 2000]. Its rate
-    bends where v = 0, where steps end, and is stiff: bristles settle within g / (σ₀ |v|) seconds.
+    has a kink at v = 0, where steps end, and is stiff: bristles settle within g / (σ₀ |v|) seconds.
 
     Attributes:
         bristle_stiffness: σ₀, a scalar or (n,), in [N m/rad] or [N/m], not negative.

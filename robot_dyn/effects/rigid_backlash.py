@@ -28,17 +28,17 @@ class RigidBacklash(GearedMotor, SetValued):
 
     A run starts in the middle of the gap, δ = 0, with motors that move with their joints. The actuation u of such a
     joint is the torque of its motor behind the gear, n times that at the rotor. Steps end where an end of the gap is
-    struck or left. States are δ of each of these joints, then δ̇, θ̇ and the impulse of the contact in the latest step.
+    reached or left. States are δ of each of these joints, then δ̇, θ̇ and the impulse of the contact in the latest step.
 
-    In the energy ledger the work of the control is done on the motors, which store ½ n² J θ̇². The rotors turn about
-    the axes of their joints alone: that they move with the arm is left out.
+    In the energy ledger the work of the control is done on the motors, which store ½ n² J θ̇². The motion of the rotors
+    with the arm is neglected.
 
     Attributes:
         gap: β, to each side, a scalar or (n,), in [rad] or [m], not negative; joints of gap 0 are driven directly.
         inertia: J of the rotor, in [kg m²], or [kg] for a prismatic joint, positive.
-        ratio: n of the gear; 1 unless given.
-        restitution: e, a scalar or (n,), 0 to 1; 0 unless given.
-        viscous: b of the motor behind the gear, in [N m s/rad] or [N s/m], not negative; 0 unless given.
+        ratio: n of the gear; 1 by default.
+        restitution: e, a scalar or (n,), 0 to 1; 0 by default.
+        viscous: b of the motor behind the gear, in [N m s/rad] or [N s/m], not negative; 0 by default.
     """
 
     gap: Any = field(metadata=coefficient("rad", symbol="β", least=0))

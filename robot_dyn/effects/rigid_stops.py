@@ -1,4 +1,4 @@
-"""Rigid joint stops: a joint never passes them; it bounces off with a restitution, or comes to rest and is held."""
+"""Rigid joint stops: a joint never passes them; it bounces with a restitution, or comes to rest and is held."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ _NEAR = 4e-15  # of a stop, or in its unit: as close as rounding leaves an event
 @final
 @dataclass(frozen=True, eq=False)
 class RigidStops(SetValued):
-    """Stops that are not passed: lower ≤ q ≤ upper, with Newton's law v⁺ = −e v⁻ for each one that is struck.
+    """Stops that are never passed: lower ≤ q ≤ upper, with Newton's law v⁺ = −e v⁻ for each one that is struck.
 
-    All that strike or touch at one time are solved together, and no impact adds energy. At rest at a stop the torque
-    is any that pushes away from it. [Moreau 1988; Glocker, Set-Valued Force Laws, 2001]
+    Simultaneous impacts and contacts are solved together, and no impact adds energy. At rest at a stop the torque may
+    have any size, directed away from it. [Moreau 1988; Glocker, Set-Valued Force Laws, 2001]
 
     Attributes:
         lower: Position of the lower stop, −inf for none, a scalar or (n,), in [rad] or [m]; "urdf" for the file's.
         upper: Position of the upper stop, inf for none, above the lower one.
-        restitution: e, a scalar or (n,), 0 to 1; 0 unless given.
+        restitution: e, a scalar or (n,), 0 to 1; 0 by default.
     """
 
     lower: Any = field(metadata=LOWER)
@@ -57,24 +57,24 @@ class RigidStops(SetValued):
         return Interval(np.where(side > 0, -inf, 0.0), np.where(side < 0, inf, 0.0))
 
     def bounds(self, q: Array, v: Array) -> tuple[Array, Array]:
-        # Newton's law where a joint approaches; one that leaves is turned round at most, so that r (v + v⁺) / 2 is 0
+        # Newton's law where a joint approaches; one that leaves is reversed at most, so that r (v + v⁺) / 2 is 0
         back = -self.restitution * v
         lower = np.where(q <= self.lower + 0 * q, np.minimum(back, -v), 0 * v - inf)
         return lower, np.where(q >= self.upper + 0 * q, np.maximum(back, -v), 0 * v + inf)
 
     def touched(self, q: np.ndarray) -> np.ndarray:
-        """−1 for each joint at its lower stop, to rounding, or beyond it, 1 at the upper one, 0 elsewhere, (n,)."""
+        """−1 for each joint at its lower stop, to rounding, or past it, 1 at the upper one, 0 elsewhere, (n,)."""
         lower, upper = (touching(level, side) for level, side in zip(self._levels(q), (-1, 1), strict=True))
         return np.where(q <= lower, -1, np.where(q >= upper, 1, 0))
 
     def penetration(self, q: np.ndarray) -> np.ndarray:
-        """How far each joint is beyond a stop, more than by rounding, (n,); 0 for the others."""
+        """Depth of each joint past a stop if it is more than rounding, (n,); 0 for the others."""
         lower, upper = self._levels(q)
         depth = np.maximum(lower - q, q - upper)
         return np.where(depth > _near(np.where(q < lower, lower, upper)), depth, 0.0)
 
     def snapped(self, q: np.ndarray) -> np.ndarray:
-        """The same position with each joint that touches a stop exactly there."""
+        """Return the position with each joint that touches a stop exactly there."""
         lower, upper = self._levels(q)
         side = self.touched(q)
         return np.where(side < 0, lower, np.where(side > 0, upper, q))

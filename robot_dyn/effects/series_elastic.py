@@ -3,7 +3,7 @@
     n² J θ̈ = u − k δ − d δ̇ − b θ̇,     τ = k δ + d δ̇
 
 θ is the motor's angle behind the gear, u its torque there, n times that of the motor. The rotor turns about the joint's
-axis alone: that it moves with the arm is left out. [Spong 1987; Albu-Schäffer, Ott, Hirzinger 2007]
+axis alone: its motion with the arm is neglected. [Spong 1987; Albu-Schäffer, Ott, Hirzinger 2007]
 """
 
 from __future__ import annotations
@@ -33,18 +33,18 @@ class SeriesElastic(GearedMotor, Dissipative):
     δ = θ − q is the deflection of the spring, θ the angle of the motor behind the gear; states are δ of each of these
     joints, then θ̇. A run starts with relaxed springs, δ = 0, and motors that move with their joints. The actuation u
     of such a joint is the torque of its motor behind the gear, n times that at the rotor. With a backlash β the spring
-    has no torque while |δ| ≤ β; the damper acts there, too.
+    has no torque while |δ| ≤ β; the damper acts there as well.
 
     In the energy ledger the work of the control is done on the motors, and what the motors and springs store is
-    ½ n² J θ̇² + ½ k δ². The rotors turn about the axes of their joints alone: that they move with the arm is left out.
+    ½ n² J θ̇² + ½ k δ². The motion of the rotors with the arm is neglected.
 
     Attributes:
         stiffness: k, a scalar or (n,), in [N m/rad] or [N/m], not negative; joints of stiffness 0 are driven directly.
         inertia: J of the rotor, in [kg m²], or [kg] for a prismatic joint, positive.
-        ratio: n of the gear; 1 unless given.
-        damping: d of the spring, in [N m s/rad] or [N s/m], not negative; 0 unless given.
-        friction: b of the motor behind the gear, in [N m s/rad] or [N s/m], not negative; 0 unless given.
-        backlash: β, to each side, in [rad] or [m], not negative; 0 unless given.
+        ratio: n of the gear; 1 by default.
+        damping: d of the spring, in [N m s/rad] or [N s/m], not negative; 0 by default.
+        friction: b of the motor behind the gear, in [N m s/rad] or [N s/m], not negative; 0 by default.
+        backlash: β, to each side, in [rad] or [m], not negative; 0 by default.
     """
 
     stiffness: Any = field(metadata=coefficient("N m/rad", symbol="k", least=0))

@@ -27,7 +27,7 @@ class ExternalWrench(Timed, Active):
     Attributes:
         frame: The link.
         wrench: F = (force, torque), (6,), in [N] and [N m].
-        expressed_in: "world_aligned": at the frame's origin, base axes; "body": its own axes; "world": at the base.
+        expressed_in: "world_aligned": at the frame's origin, base axes; "body": its axes; "world": at the base.
         start_s: When it starts, in [s].
         end_s: When it ends, in [s]; it acts for start_s ≤ t < end_s.
     """

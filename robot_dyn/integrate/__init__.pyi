@@ -10,6 +10,8 @@ from robot_dyn.integrate.implicit import SinglyDiagonallyImplicit as SinglyDiago
 from robot_dyn.integrate.integrator import IntegrationError as IntegrationError
 from robot_dyn.integrate.integrator import Integrator as Integrator
 from robot_dyn.integrate.integrator import PlainMethod as PlainMethod
+from robot_dyn.integrate.integrator import RightSide as RightSide
+from robot_dyn.integrate.integrator import Stepper as Stepper
 from robot_dyn.integrate.integrator import System as System
 from robot_dyn.integrate.methods import method as method
 from robot_dyn.integrate.rosenbrock import Rosenbrock as Rosenbrock

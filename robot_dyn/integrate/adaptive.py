@@ -25,13 +25,13 @@ from robot_dyn.validate import choice, function, instance, number, numbers, rows
 
 EXPLICIT, STIFF, AUTO = "DOP853", "Rosenbrock", "auto"
 ADAPTIVE = (EXPLICIT, STIFF, AUTO)
-LEAST_RTOL = 100 * np.finfo(float).eps  # SciPy's bound; below it rounding is taken for local error
+LEAST_RTOL = 100 * np.finfo(float).eps  # SciPy's bound; below it rounding dominates the local error
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """The course of y from t0 to where the run ended, at every time between by the method's own interpolation.
+    """The solution y from t0 to the end of the run, at every time between by the interpolation of the method.
 
     Attributes:
         times: Ends of the steps, shape (k,), the first is t0.
@@ -142,10 +142,10 @@ class Adaptive:
             stop: A function of (t, y); the run stops where it first changes sign, if it is given.
 
         Returns:
-            The solution up to where the run ended; a run that fails says so in its status and keeps what it has.
+            The solution up to the end of the run; one that fails has its steps until then, and a status that says so.
 
         Raises:
-            QueryError: If y0, t0 or t1 is unfit, or the method is to be chosen.
+            QueryError: If y0, t0 or t1 is not valid, or the method is auto.
         """
         steps = self.steps(system, t0, y0, t1, stop)
         times, states, pieces = [steps.t], [steps.y], []

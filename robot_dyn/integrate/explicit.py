@@ -133,7 +133,7 @@ RK4 = ExplicitRungeKutta(
 
 @cache
 def order_8() -> ExplicitRungeKutta:
-    """The method of order 8 with 12 stages of Dormand and Prince, at a fixed step.
+    """Return the method of order 8 with 12 stages of Dormand and Prince, at a fixed step.
 
     Its coefficients are SciPy's, rounded to float64: in longdouble they bound the accuracy of a step to some 1e-16 h.
 

@@ -26,7 +26,7 @@ class LinearlyImplicitEuler(Integrator):
     """Rosenbrock's method of one stage: y⁺ = y + h k with (1 − h J) k = f(t + h, y), J at (t + h, y).
 
     One step of Newton's method on the implicit Euler method, and equal to it where f is linear in y. L-stable. f at
-    t + h rather than t: what forces a stiff system is then followed without a lag.
+    t + h rather than t: a stiff system then follows its forcing without a lag.
 
     Source: Hairer and Wanner, Solving Ordinary Differential Equations II, 2nd ed., 1996, IV.7.
     """
@@ -52,7 +52,7 @@ class LinearlyImplicitEuler(Integrator):
 class SinglyDiagonallyImplicit(Integrator):
     """The diagonally implicit Runge–Kutta method of a tableau with equal a_ii = γ, by simplified Newton iteration.
 
-    All stages and rounds share one matrix, 1 − h γ J, with J at (t, y). The rounds go on until rounding ends them,
+    All stages and rounds share one matrix, 1 − h γ J, with J at (t, y). The rounds continue until rounding ends them,
     MOST_ITERATIONS (100) at most.
 
     Raises:
@@ -76,7 +76,7 @@ class SinglyDiagonallyImplicit(Integrator):
         h = _step_of(self, y, h)
         a, b, c, *_ = self.tableau.arrays(arithmetic_like(y))
         h_gamma = h * a[0, 0]
-        try:  # the inverse, for it serves many rounds, and Newton's iteration corrects its rounding
+        try:  # the inverse: it is used in many rounds, and Newton's iteration corrects its rounding
             inverse = np.linalg.inv(np.eye(y.shape[-1], dtype=y.dtype) - h_gamma * system.jacobian(t, y))
         except np.linalg.LinAlgError:
             raise singular(self, t, h) from None

@@ -53,14 +53,14 @@ class Linear(NamedTuple):
 
 
 def begin(f: RightSide, table: Numbers, t: Any, y: Array, p: Array, run_parameters: Array, work: Linear) -> int:
-    """What depends on t and y alone: f and its derivatives."""
+    """Evaluate what depends on t and y alone: f and its derivatives."""
     evaluate(f.rate, t, y, p, run_parameters, work.K[0])
     differentiate(f, t, y, p, run_parameters, work)
     return 1
 
 
 def differentiate(f: RightSide, t: Any, y: Array, p: Array, run_parameters: Array, work: Linear) -> None:
-    """The derivatives at t and y."""
+    """Evaluate the derivatives at t and y."""
     evaluate(f.jacobian, t, y, p, run_parameters, work.J)
     work.at[0] = t
     copy(work.y, y)
@@ -70,7 +70,7 @@ def stages(
     f: RightSide, table: Numbers, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Linear,
     lost: Array,
 ) -> int:  # fmt: skip
-    """The step from there."""
+    """Write the step, from these derivatives."""
     K, U, h_gamma = work.K, work.U, h * table.gamma
     factor(work.A, work.J, h_gamma, work.rows, lost)
     combination(K[1][: len(y)], work.zero, h, table.last, work.J, len(work.J))
@@ -98,7 +98,7 @@ def trial(
     f: RightSide, table: Numbers, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Linear,
     lost: Array,
 ) -> int:  # fmt: skip
-    """A step from `begin`, or from the end of the last one; see `ControlledStepper`."""
+    """Write a trial step, with the derivatives of `begin` where t and y are the same; see `ControlledStepper`."""
     known = work.at[0] == t
     for e in range(len(y)):
         known &= work.y[e, 0] == y[e, 0]
@@ -108,7 +108,7 @@ def trial(
 
 
 def error(table: Numbers, h: Any, y: Array, after: Array, work: Linear, rtol: float, atol: float) -> float:
-    """The norm of the last u_i, which the method of an order less is without; see `ControlledStepper`."""
+    """Return the norm of the last u_i, which the method of lower order lacks; see `ControlledStepper`."""
     k = work.error.shape[1]
     return norm(work.U[len(work.U) - 1][:k], y[:k], after[:k], rtol, atol)
 
@@ -130,8 +130,8 @@ def dense(
 class Rosenbrock(PlainMethod):
     """The Rosenbrock method of a table, in floats.
 
-    J is that of the start of a step: where the rate bends within less than a step changes, as dry friction of a narrow
-    layer does when a joint comes to rest, a step does not see the bend ahead, and v chatters about 0 by h |a|. The
+    J is that of the start of a step: where the rate bends within a step, as regularised dry friction does when a joint
+    comes to rest, the step does not account for the bend, and v chatters about 0 by h |a|. The
     order rests on an exact J, which machine code has; differences err by u^(2/3) = 4e-11 of it.
     """
 
@@ -156,7 +156,7 @@ class Rosenbrock(PlainMethod):
         return Stepper(rosenbrock_step, self.table.numbers(kind, m), self._work(kind, m, rows, runs, m))
 
     def controlled(self, m: int, rows: int, bounded: int) -> ControlledStepper:
-        """The method with control of its error, as `dop853.stepper`."""
+        """Return the method with control of its error, as `dop853.stepper`."""
         table, work = self.table.numbers(FLOAT64, m), self._work(FLOAT64, m, rows, 1, bounded)
         return ControlledStepper(begin, trial, error, rate_at_end, dense, table, work, self.order)
 

@@ -25,7 +25,7 @@ class Numbers(NamedTuple):
         f: Weights of f at the start, of h ∂f/∂t, and of the latest f, for each stage, (s, 3).
         dense: Weights of the polynomial between, (3, s), as of `between`.
         gamma, one: γ and 1.
-        last: The weights that choose ∂f/∂t of the m + 1 derivatives, (m + 1,).
+        last: The weights that select ∂f/∂t of the m + 1 derivatives, (m + 1,).
     """
 
     a: Array
@@ -48,10 +48,10 @@ class RosenbrockTable:
         gamma: γ = γ_ii.
         a, c: One row a stage, of the entries before it.
         m: Weights.
-        alpha: α_i, where a stage is in time.
+        alpha: α_i, the time of each stage.
         gammas: γ_i = Σ_j γ_ij, the weights of ∂f/∂t.
         dense: h_0, h_1, h_2, weights of the polynomial between.
-        order: That the source states; its conditions are checked in the tests.
+        order: As in the source; its conditions are checked in the tests.
     """
 
     gamma: float
@@ -64,7 +64,7 @@ class RosenbrockTable:
     order: int
 
     def numbers(self, kind: Arithmetic, size: int) -> Numbers:
-        """The coefficients as arrays, for states of so many entries."""
+        """Return the coefficients as arrays, for states of `size` entries."""
         s, dtype = len(self.m), kind.dtype
         a, c = (np.array([[*row, *[0.0] * (s - len(row))] for row in each], dtype) for each in (self.a, self.c))
         m, alpha = (np.array(each, dtype) for each in (self.m, self.alpha))

@@ -53,10 +53,10 @@ class ButcherTableau:
     """Coefficients a, b, c of a Runge–Kutta method, exact where they are fractions or surds.
 
     Attributes:
-        a: One row a stage; a row may end early, its further entries are zero.
+        a: One row for each stage; entries that a row lacks are zero.
         b: Weights, Σ b_i = 1.
         c: Nodes, c_i = Σ_j a_ij.
-        order: Order of convergence that the source states; not checked here, but measured in the tests.
+        order: Order of convergence, as in the source; the tests measure it.
 
     Raises:
         QueryError: If the lengths do not fit, or a sum is off by more than rounding.
@@ -84,7 +84,7 @@ class ButcherTableau:
         return all(len(row) <= i for i, row in enumerate(self.a))
 
     def arrays(self, kind: Arithmetic) -> Coefficients:
-        """The coefficients in an arithmetic, with their zeros."""
+        """Return the coefficients in an arithmetic, zeros included."""
         known = self._arrays.get(kind.dtype)
         if known is not None:
             return known

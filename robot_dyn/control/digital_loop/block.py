@@ -35,8 +35,8 @@ class Block(Value, ABC):
     and with symbols in place of these where they are compiled, as of `Controller`.
 
     Attributes:
-        term: Its equation in a few signs.
-        linear: Whether it acts on small signals; one that does not is left out where a loop is linearised.
+        term: Its equation in short.
+        linear: Whether it acts on small signals; otherwise it is left out of linearised loops.
         rounds: Whether its output jumps where its input does not; a class that does not define it declares nothing.
         random: Whether its states are standard normal deviates, drawn again at each tick.
         differentiates: Whether it derives the velocity from the measured position, as the first block of velocity.
@@ -57,27 +57,27 @@ class Block(Value, ABC):
         return name_of(type(self))
 
     def check(self, period_s: float) -> None:
-        """ControlError if it has no meaning at a period."""
+        """Raise a ControlError if it is not defined for a period."""
 
     def state_size(self, n: int) -> int:
         """Number of its states."""
         return 0
 
     def start(self, x: Array, period_s: float) -> Array:
-        """The states after x at all times, (state_size(n),)."""
+        """Return the states after a constant signal x, (state_size(n),)."""
         return x[:0]
 
     @abstractmethod
     def output(self, x: Array, s: Array, period_s: float) -> Array:
-        """The signal behind it, (n,)."""
+        """Return the output signal, (n,)."""
 
     def next_state(self, x: Array, s: Array, period_s: float) -> Array:
-        """Its states after the tick, (state_size(n),)."""
+        """Return its states after the tick, (state_size(n),)."""
         return s
 
 
 def name_of(kind: type[Block]) -> str:
-    """The name of a class of blocks in small letters, as "low_pass"."""
+    """The name of a class of blocks in snake case, as "low_pass"."""
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", kind.__name__).lower()
 
 
@@ -104,13 +104,11 @@ class Quantisation(Block):
 class Noise(Block):
     """Normal noise, independent from tick to tick and from joint to joint: y = x + σ ξ.
 
-    The standard normal deviates ξ of the counter (seed, run, tick, channel) are drawn by the time loop of a run, which
-    knows the tick: see `robot_dyn.simulation.run.philox`.
-
     Attributes:
         deviation: σ, the standard deviation, a scalar or (n,), in the unit of the signal, not negative.
     """
 
+    # the deviates ξ of the counter (seed, run, tick, channel): the time loop, which knows the tick, draws them
     term = "y = x + σ ξ"
     linear, rounds, random = False, False, True
 
@@ -158,8 +156,8 @@ class RateLimit(Block):
 class Differences(Block):
     """Backward difference of a signal over the period T: y_k = (x_k − x_{k−1}) / T.
 
-    At the first tick it is 0. As the first block of the velocity of a `Loop` it takes the measured position, behind
-    all blocks of that. A quantised position makes it a multiple of Δ/T.
+    At the first tick it is 0. As the first block of the velocity of a `Loop` it takes the measured position, after
+    the blocks of that. A quantised position makes it a multiple of Δ/T.
     """
 
     term = "y = (x − x₋)/T"

@@ -1,9 +1,9 @@
-"""The loop of a real controller: what is measured comes late and rounded, and what is asked for acts late and limited.
+"""The loop of a real controller: measurements are late and rounded, and commands act late and limited.
 
     q, v at t_k − τ_m ─ blocks ─► q̂, v̂ ─ controller at t_k ─► blocks ─► u from t_k + τ_u on
 
-All of it is a map of the states z of a sampled controller: z holds what is on its way, and the states of the blocks.
-A delay that is no whole number of periods makes a second instant in each, at which z passes it on.
+All of it is a map of the states z of a sampled controller: z holds the signals in delays, and the states of blocks.
+A delay that is not a whole number of periods adds a second instant to each period.
 [Åström, Wittenmark, Computer-Controlled Systems, 3rd ed., 1997, sec. 2.3 and ch. 9]
 """
 
@@ -36,9 +36,9 @@ class Loop(Controller):
     """A sampled controller with delays, and blocks between it and the arm.
 
     Delays are in periods T. The controller computes at t_k = k T, with the reference of that time and what was measured
-    at t_k − measurement_delay · T; its torque acts from t_k + actuation_delay · T on. Before the start the arm has been
-    where it starts, with the velocity it has there, and the torque is 0 until the first one acts. The actuation of a
-    run is the torque that acts.
+    at t_k − measurement_delay · T; its torque acts from t_k + actuation_delay · T on. Before the start the arm is
+    measured at its initial position and velocity, and the torque is 0 until the first one acts. The actuation of a run
+    is the torque that acts.
 
     Attributes:
         controller: A sampled controller, whose period is that of the loop.
@@ -46,9 +46,9 @@ class Loop(Controller):
         velocity: Blocks of the measured velocity; `Differences` as the first takes the position behind its blocks.
         actuation: Blocks of the torque, in the order from the controller to the joints.
         measurement_delay: Of position and velocity, in periods, not negative.
-        actuation_delay: Of the torque, time to compute it and on its way, in periods, not negative.
+        actuation_delay: Of the torque, from the start of its computation, in periods, not negative.
         seed: Of noise, a whole number.
-        run: Number of the run whose noise it is; `rollouts` counts on from it.
+        run: Number of the run, which selects its noise; `rollouts` counts up from it.
 
     Raises:
         ControlError: If the controller is continuous, or a loop itself, or a block or delay is not allowed.
@@ -91,7 +91,7 @@ class Loop(Controller):
 
     @property
     def blocks(self) -> Iterator[tuple[str, int, Block]]:
-        """Line, number and block of each."""
+        """Each block, with its line and number."""
         return ((line, i, block) for line in LINES for i, block in enumerate(getattr(self, line)))
 
     @cached_property
@@ -146,7 +146,7 @@ class Loop(Controller):
 
     @cached_property
     def ticks(self) -> tuple[Instant, ...]:
-        """In each period, the first at its start."""
+        """The instants of each period, the first at its start."""
         return instants(self.measurement_delay, self.actuation_delay)
 
     @property
@@ -156,7 +156,7 @@ class Loop(Controller):
 
     @cached_property
     def places(self) -> dict[str, slice]:
-        """Where z has what."""
+        """Places of the states in z, by name."""
         n, several = self.n, len(self.ticks) > 1
         measured = n if self.differs else 2 * n
         whole = int(self.measurement_delay), int(self.actuation_delay)
