@@ -1,4 +1,7 @@
-# The public names and where they live: type checkers read this file, and __init__.py does.
+# The public names and where they live: type checkers read this file, and public_names does.
+from robot_dyn import control as control
+from robot_dyn import effects as effects
+from robot_dyn import integrate as integrate
 from robot_dyn.arithmetic import Ball as Ball
 from robot_dyn.arithmetic import midpoint as midpoint
 from robot_dyn.arithmetic import radius as radius
@@ -12,13 +15,13 @@ from robot_dyn.control.computed_torque import PDGravity as PDGravity
 from robot_dyn.control.controller import Controller as Controller
 from robot_dyn.control.controller import Stateless as Stateless
 from robot_dyn.control.digital_loop.block import Block as Block
-from robot_dyn.control.digital_loop.differences import Differences as Differences
+from robot_dyn.control.digital_loop.block import Differences as Differences
+from robot_dyn.control.digital_loop.block import Noise as Noise
+from robot_dyn.control.digital_loop.block import Quantisation as Quantisation
+from robot_dyn.control.digital_loop.block import RateLimit as RateLimit
 from robot_dyn.control.digital_loop.loop import Loop as Loop
 from robot_dyn.control.digital_loop.low_pass import LowPass as LowPass
 from robot_dyn.control.digital_loop.multirate import Multirate as Multirate
-from robot_dyn.control.digital_loop.noise import Noise as Noise
-from robot_dyn.control.digital_loop.quantisation import Quantisation as Quantisation
-from robot_dyn.control.digital_loop.rate_limit import RateLimit as RateLimit
 from robot_dyn.control.independent_joint import PD as PD
 from robot_dyn.control.independent_joint import PID as PID
 from robot_dyn.control.independent_joint import gains_from as gains_from

@@ -6,7 +6,6 @@ the imports as text, so that it can be compared with the sources.
 
 from __future__ import annotations
 
-import argparse
 import ast
 import sys
 import tomllib
@@ -15,6 +14,7 @@ from io import BytesIO
 from itertools import product
 from pathlib import Path
 
+from benchmarks.measure import PICTURES, command_line
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -23,7 +23,7 @@ from PIL import Image
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "robot_dyn"
-PICTURE = ROOT / "docs" / "pictures" / "architecture.png"
+PICTURE = PICTURES / "architecture.png"
 Imports = set[tuple[str, str]]  # (importing room, imported room)
 Place = tuple[float, float]
 DARK, UPWARD, FILL = "#1f3b57", "#c0392b", "#eef3f8"
@@ -57,8 +57,8 @@ def executed(node: ast.AST) -> Iterator[ast.AST]:
 
 
 def public_homes() -> dict[str, str]:
-    """The module of each public name, `robot_dyn.x.y`, as `robot_dyn/__init__.py` tells type checkers."""
-    tree = ast.parse((PACKAGE / "__init__.py").read_text(encoding="utf-8"))
+    """The module of each public name, `robot_dyn.x.y`, as `robot_dyn/__init__.pyi` lists them."""
+    tree = ast.parse((PACKAGE / "__init__.pyi").read_text(encoding="utf-8"))
     nodes = (node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module)
     return {each.name: str(node.module) for node in nodes for each in node.names}
 
@@ -150,11 +150,7 @@ def drawn(pairs: Imports) -> Figure:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument(
-        "--quick", action="store_true", help="write no file, and fail if the picture shows other imports"
-    )
-    quick = parser.parse_args().quick
+    quick = command_line(__doc__, "write no file, and fail if the picture shows other imports").parse_args().quick
     pairs = imports()
     print(text(pairs))
     figure = drawn(pairs)

@@ -11,8 +11,7 @@ work_precision.py.
 
 from __future__ import annotations
 
-import argparse
-from pathlib import Path
+from collections.abc import Callable
 
 from benchmarks import (
     energy,
@@ -29,62 +28,38 @@ from benchmarks import (
     sticking,
     stiff,
 )
-from benchmarks.measure import Effort
+from benchmarks.measure import Effort, command_line
 
 from robot_dyn.studies.environment import environment
 
-PICTURES = Path(__file__).parents[1] / "docs" / "pictures"
-SUBJECTS = (
-    "queries", "first", "compiled", "rollouts", "parameters", "growth", "iftomm", "stiff", "sticking", "precision",
-    "energy", "estimates", "proofs",
-)  # fmt: skip
+SUBJECTS: dict[str, tuple[Callable[[Effort], None], ...]] = {
+    "queries": (queries.queries, queries.lagrangian, queries.right_angles, queries.startup),
+    "first": (first_run.first_run,),
+    "compiled": (kernels.kernels, kernels.from_python, kernels.threads, kernels.first_use),
+    "rollouts": (rollouts.one_step, rollouts.thousands, rollouts.sticking),
+    "parameters": (parameters.parameters,),
+    "growth": (growth.growth, growth.memory),
+    "iftomm": (iftomm.iftomm,),
+    "stiff": (stiff.stiff,),
+    "sticking": (sticking.sticking,),
+    "precision": (precision.precision,),
+    "energy": (energy.energy,),
+    "estimates": (estimates.estimates,),
+    "proofs": (proofs.proofs,),
+}
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", nargs="*", help=f"of {', '.join(SUBJECTS)}; all if none")
-    parser.add_argument("--quick", action="store_true", help="short loops: to see that it runs, not for figures")
+    parser = command_line(__doc__, "short loops: to see that it runs, not for figures")
+    parser.add_argument("what", nargs="*", help=f"of {', '.join(SUBJECTS)}; all unless given")
     options = parser.parse_args()
     if unknown := set(options.what) - set(SUBJECTS):
         parser.error(f"no subject {', '.join(sorted(unknown))}; there are {', '.join(SUBJECTS)}")
     effort = Effort(2, 0.002) if options.quick else Effort()
-    what = options.what or SUBJECTS
     print(", ".join(f"{name} {value}" for name, value in environment().items()))
-    if "queries" in what:
-        queries.queries(effort)
-        queries.lagrangian(effort)
-        queries.right_angles(effort)
-        queries.startup(effort)
-    if "first" in what:
-        first_run.first_run(effort)
-    if "compiled" in what:
-        kernels.kernels(effort)
-        kernels.from_python(effort)
-        kernels.threads(effort)
-        kernels.first_use(effort)
-    if "rollouts" in what:
-        rollouts.one_step(effort)
-        rollouts.thousands(effort)
-        rollouts.sticking(effort)
-    if "parameters" in what:
-        parameters.parameters(effort)
-    if "growth" in what:
-        growth.growth(effort, None if options.quick else PICTURES / "growth.png")
-        growth.memory(effort)
-    if "iftomm" in what:
-        iftomm.iftomm(effort)
-    if "stiff" in what:
-        stiff.stiff(effort)
-    if "sticking" in what:
-        sticking.sticking(effort)
-    if "precision" in what:
-        precision.precision(effort, None if options.quick else PICTURES / "precision.png")
-    if "energy" in what:
-        energy.energy(effort)
-    if "estimates" in what:
-        estimates.estimates(effort)
-    if "proofs" in what:
-        proofs.proofs(effort, None if options.quick else PICTURES / "proofs.png")
+    for subject in options.what or SUBJECTS:
+        for measure in SUBJECTS[subject]:
+            measure(effort)
 
 
 if __name__ == "__main__":

@@ -5,15 +5,11 @@ It is `rd.cost`; table and figure are those of docs/accuracy_and_time.md.
 
 from __future__ import annotations
 
-import argparse
-import tempfile
-from pathlib import Path
+from benchmarks.measure import PICTURES, command_line, starter_setup
 
 import robot_dyn as rd
 from robot_dyn.cli.studies import cost_rows
-from robot_dyn.scene.starters import starter
 
-PICTURES = Path(__file__).parents[1] / "docs" / "pictures"
 SCENE, QUICK = "panda_computed_torque", "pendulum"
 
 
@@ -24,16 +20,13 @@ def markdown(result: rd.Cost) -> str:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="a pendulum, and no figure: to see that it works")
+    parser = command_line(__doc__, "a pendulum, and no figure: to see that it works")
     parser.add_argument("--budget", type=float, default=60.0, help="seconds, compiling not counted")
     options = parser.parse_args()
     name = QUICK if options.quick else SCENE
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / f"{name}.toml"
-        path.write_text(starter(name), encoding="utf-8")
-        setup = rd.read_scene(path)
-    result = rd.cost(setup, budget_s=1.0 if options.quick else options.budget, repeats=2 if options.quick else 200)
+    result = rd.cost(
+        starter_setup(name), budget_s=1.0 if options.quick else options.budget, repeats=2 if options.quick else 200
+    )
     print(f"{result.sentence}\n\n{markdown(result)}\n")
     print("\n".join(f"left out: {each}" for each in result.left_out))
     print(", ".join(f"{key} {value}" for key, value in result.environment.items()))

@@ -6,7 +6,6 @@ photographed. Writes docs/pictures/NAME.png.
 
 from __future__ import annotations
 
-import argparse
 import shutil
 import sys
 import tempfile
@@ -14,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from benchmarks.measure import PICTURES, command_line
 
 import robot_dyn as rd
 
@@ -56,15 +56,13 @@ def photograph(browser: Any, page: Path, picture: Path, t: float) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="one arm, into a temporary folder")
-    quick = parser.parse_args().quick
+    quick = command_line(__doc__, "one arm, into a temporary folder").parse_args().quick
     chromium = shutil.which("chromium")
     if chromium is None:
         sys.exit("this script photographs pages in Chromium: apt-get install chromium")
     from playwright.sync_api import sync_playwright
 
-    folder = Path(tempfile.mkdtemp()) if quick else Path(__file__).parents[1] / "docs" / "pictures"
+    folder = Path(tempfile.mkdtemp()) if quick else PICTURES
     folder.mkdir(exist_ok=True)
     with sync_playwright() as playwright, tempfile.TemporaryDirectory() as pages:
         browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)

@@ -1,4 +1,4 @@
-"""What a frame should do at time t: p(t) along a line or a circle, and R(t) = exp(â φ(t)) R₀ about one axis.
+"""Desired motions of a frame: p(t) along a line or a circle, and R(t) = exp(â φ(t)) R₀ about one axis.
 
 Position and angle are piecewise polynomials; the twist is (ṗ, φ̇ a), in base axes. [Siciliano et al. 2009, sec. 4.3]
 """
@@ -82,12 +82,12 @@ def line(
     """The straight line from p0 to p1 and the shortest turn between two orientations, both of least jerk from rest.
 
     Args:
-        p0: Where it starts, shape (3,), in [m].
-        p1: Where it ends, shape (3,).
+        p0: Start, shape (3,), in [m].
+        p1: End, shape (3,).
         duration_s: In [s], positive.
         rotation: Orientation at the start, (3, 3); None leaves it free.
         rotation_end: Orientation at the end, (3, 3); None keeps that of the start.
-        start_s: Time at which it starts, in [s].
+        start_s: Time of the start, in [s].
 
     Raises:
         ControlError: If a value has the wrong shape or is not a rotation.
@@ -123,7 +123,7 @@ def circle(
     """A circle at constant speed, with a smooth start and end: quintic pieces within 1e-9 of the radius.
 
     The pieces match p, ṗ, p̈ at 64 knots a turn or more; between knots the distance from the centre is off by less than
-    1e-9 of the radius. The speed rises as the quintic of least jerk over `ramp_s`, and falls alike, so that the motion
+    1e-9 of the radius. The speed rises as the quintic of least jerk over `ramp_s` and falls likewise, so the motion
     lasts turns · period_s + ramp_s.
 
     Args:
@@ -132,12 +132,12 @@ def circle(
         normal: Axis about which it turns by the right hand, shape (3,), of any length.
         period_s: Time of one turn at full speed, in [s].
         turns: Number of turns, positive, 1000 at most; ramp_s may be at most turns · period_s.
-        ramp_s: Time to full speed in [s]; 0 starts at full speed, with a jump. Unless given, a quarter of the period,
+        ramp_s: Time to full speed in [s]; 0 starts at full speed, with a jump. By default a quarter of the period,
             or turns · period_s if that is less.
-        toward: Direction from the centre to the starting point; unless given, that of the base's axis (x, y or z) which
-            lies best in the plane, projected onto it.
+        toward: Direction from the centre to the starting point; by default that of the base axis (x, y or z) closest
+            to the plane, projected onto it.
         rotation: Constant orientation, (3, 3); None leaves it free.
-        start_s: Time at which it starts, in [s].
+        start_s: Time of the start, in [s].
 
     Raises:
         ControlError: If a value is not allowed.

@@ -1,6 +1,6 @@
 """Control with a model of the arm: τ = M(q)(a_d + kd ė + kp e) + C(q, v) v + N(q) makes ë + kd ė + kp e = 0.
 
-The model is the controller's own and may be wrong: then M, C, N do not cancel, and the error is driven by the rest.
+The model may differ from the arm: then M, C, N do not cancel, and the difference drives the error.
 [Murray, Li, Sastry 1994, sec. 4.5; Siciliano et al. 2009, sec. 8.5]
 """
 
@@ -21,7 +21,7 @@ from robot_dyn.threshold import smooth
 
 @dataclass(frozen=True, eq=False)
 class ModelBased(Stateless):
-    """A controller with a model of the arm and a plan.
+    """A controller with a model of the arm and a reference.
 
     Attributes:
         model: The controller's model of the arm.

@@ -33,7 +33,7 @@ class ControlLaw(Stateless):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        with suppress(ValueError):  # of some functions written in C the arguments are not known
+        with suppress(ValueError):  # the arguments of some functions written in C are unknown
             known = signature(self.function)
             try:
                 known.bind(0.0, None, None)

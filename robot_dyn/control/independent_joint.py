@@ -1,4 +1,4 @@
-"""Each joint on its own, the coupling a disturbance: τ = kp e + kd ė + ki ∫ e dt, with e = q_d − q.
+"""Control of each joint alone, with the coupling as a disturbance: τ = kp e + kd ė + ki ∫ e dt, with e = q_d − q.
 
 [Siciliano et al. 2009, sec. 8.3; Spong, Hutchinson, Vidyasagar 2006, ch. 6]
 """
@@ -54,7 +54,7 @@ class PD(Stateless):
 @final
 @dataclass(frozen=True, eq=False)
 class PID(Controller):
-    """PD and an integral that a limit on the effort does not wind up.
+    """PD with an integral that does not wind up at an effort limit.
 
     The state z is the integral's torque. Where the desired torque u exceeds the limit, the excess flows back:
 
@@ -69,7 +69,7 @@ class PID(Controller):
         ki: A scalar or (n,), in [N m/(rad s)] or [N/(m s)], not negative.
         kd: A scalar or (n,), in [N m s/rad] or [N s/m], not negative.
         effort_limit: Greatest torque, a scalar or (n,), in [N m] or [N], positive; inf where there is none.
-        tracking_time_s: T_t, in [s], positive; unless given, the greatest √(kd/ki) of the joints.
+        tracking_time_s: T_t, in [s], positive; by default the greatest √(kd/ki) of the joints.
         period_s: In [s], 0 for continuous control.
 
     Source: Åström and Hägglund, PID Controllers, 1995, sec. 3.5 (back-calculation).
@@ -110,7 +110,7 @@ class PID(Controller):
     def thresholds(self) -> tuple[Threshold, ...]:
         return limits_reached(self.effort_limit, self._middle, self.n)
 
-    def beyond(self, sides: Mapping[Threshold, int]) -> PID:
+    def on_side(self, sides: Mapping[Threshold, int]) -> PID:
         limit, middle = piece(self.effort_limit, self.n, sides)
         return with_values(self, {"effort_limit": limit, "_middle": middle})
 
@@ -160,7 +160,7 @@ def gains_from(inertia_diagonal: Any, frequency: Any, damping_ratio: Any = 1.0) 
 
 
 def joint_count(reference: Any) -> int:
-    """Number of joints of a joint reference; raises ControlError if it is not one."""
+    """Number of joints of a joint reference; ControlError if it is not one."""
     if not isinstance(reference, PiecewisePolynomial):
         raise ControlError(f"reference must be a PiecewisePolynomial, such as hold(q), got {shown(reference)}")
     return reference.n

@@ -1,6 +1,6 @@
-"""The arm as its end effector feels it: Λ ẍ + μ + p = F, with Λ = (J M⁻¹ Jᵀ)⁻¹ and τ = Jᵀ F.
+"""The dynamics of the end effector: Λ ẍ + μ + p = F, with Λ = (J M⁻¹ Jᵀ)⁻¹ and τ = Jᵀ F.
 
-The task velocity ẋ is made of rows of a frame's world-aligned twist (ṗ, ω). [Khatib 1987, IEEE J. Robotics and
+The task velocity ẋ consists of rows of a frame's world-aligned twist (ṗ, ω). [Khatib 1987, IEEE J. Robotics and
 Automation 3(1), A unified approach for motion and force control of robot manipulators]
 """
 
@@ -54,7 +54,7 @@ class TaskDynamics(Value):
 
     @property
     def projector(self) -> Array:
-        """1 − Jᵀ J̄ᵀ, which lets pass the torque that does not accelerate the task, shape (..., n, n)."""
+        """1 − Jᵀ J̄ᵀ, the projector onto torques that do not accelerate the task, shape (..., n, n)."""
         J = self.J
         return np.eye(J.shape[-1], dtype=J.dtype) - transpose(J) @ transpose(self.J_bar)
 
@@ -68,8 +68,8 @@ def task_dynamics(
 
         s/ε² = s/(s² + λ²),   λ² = ε² − s²,
 
-    which keeps Λ below 1/ε and asks for no force at the singularity itself, where none can act. The other directions
-    stay exact. Metres and radians are weighed alike.
+    which keeps Λ below 1/ε, and gives no force at the singularity itself, where none can act. The other directions
+    stay exact. Metres and radians have equal weight.
 
     Args:
         dynamics: The arm.
@@ -93,7 +93,7 @@ def task_dynamics(
 def _task_dynamics(
     dynamics: Dynamics, q: Array, v: Array, frame: str, rows: tuple[int, ...], epsilon: float
 ) -> TaskDynamics:
-    """The same of arguments that were checked."""
+    """As `task_dynamics`, for checked arguments."""
     J = dynamics.jacobian(q, frame)[..., rows, :]
     drift = apply(dynamics.jacobian_rate(q, v, frame)[..., rows, :], np.asarray(v))
     # rows of J M⁻¹, one solve each: M is symmetric
@@ -119,7 +119,7 @@ class OperationalSpace(Stateless):
 
     With the exact model and away from singularities ẍ = ẍ_d + kd ė + kp e. The orientation error is the rotation vector
     of R_d Rᵀ. Near a singularity (`task_dynamics`) the task torque τ_x = Jᵀ Λ (ẍ_d + kd ė + kp e − J̇ v) obeys
-    τ_xᵀ M⁻¹ τ_x ≤ ‖ẍ_d + kd ė + kp e − J̇ v‖²/ε, and the posture takes over the direction that the task gives up.
+    τ_xᵀ M⁻¹ τ_x ≤ ‖ẍ_d + kd ė + kp e − J̇ v‖²/ε, and the posture controls the direction that the task gives up.
 
     Attributes:
         model: The controller's model of the arm.
@@ -130,7 +130,7 @@ class OperationalSpace(Stateless):
         posture: q_p, shape (n,), in [rad] or [m]; None for damping alone.
         posture_kp: A scalar or (n,), in [1/s²], not negative.
         posture_kd: A scalar or (n,), in [1/s], not negative.
-        rows: Which of (ṗ, ω) are the task; unless given, POSE, or POSITION if the orientation is free.
+        rows: Which of (ṗ, ω) are the task; by default POSE, or POSITION if the orientation is free.
         threshold: ε of `task_dynamics`.
         period_s: In [s], 0 for continuous control.
 
@@ -159,7 +159,7 @@ class OperationalSpace(Stateless):
         rows = _rows((POSITION if free else POSE) if self.rows is None else self.rows)
         if free and max(rows) > 2:
             raise ControlError(f"rows {rows} hold the orientation, which the reference leaves free")
-        self.model.jacobian(np.zeros(self.n), self.frame)  # so that an unknown frame is told now
+        self.model.jacobian(np.zeros(self.n), self.frame)  # so that an unknown frame is reported now
         object.__setattr__(self, "rows", rows)
         if self.posture is None:
             object.__setattr__(self, "posture", np.zeros(self.n))
@@ -197,7 +197,7 @@ class OperationalSpace(Stateless):
 
 
 def _rows(rows: Any) -> tuple[int, ...]:
-    """Rows of a twist, increasing; raises ControlError if they are not."""
+    """Rows of a twist, increasing; ControlError if they are not."""
     try:
         chosen = tuple(index(row) for row in rows if not isinstance(row, bool))
     except (TypeError, OverflowError):

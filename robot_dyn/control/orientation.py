@@ -13,7 +13,7 @@ from robot_dyn.arithmetic import Array, sqrt, transpose
 def rotation_vector(R: Array) -> Array:
     """Logarithm of a rotation, φ with exp(φ̂) = R: accurate from no turn to half a turn.
 
-    It goes through the unit quaternion (w, x): θ = 2 atan2(‖x‖, |w|), which loses no digits where the textbook's
+    By the unit quaternion (w, x): θ = 2 atan2(‖x‖, |w|), which loses no digits where the textbook's
     (R − Rᵀ)θ/(2 sin θ) is 0/0. At exactly half a turn φ and −φ are the same rotation; one of them is returned.
 
     Args:

@@ -1,7 +1,7 @@
-"""What is desired at time t, as a piecewise polynomial: q(t) = Σⱼ cᵢⱼ (t − tᵢ)ʲ on tᵢ ≤ t ≤ tᵢ₊₁.
+"""Desired motions as piecewise polynomials: q(t) = Σⱼ cᵢⱼ (t − tᵢ)ʲ on tᵢ ≤ t ≤ tᵢ₊₁.
 
-Every reference is such a table, whatever made it, so one evaluator serves them all, traced or not.
-Each piece is Hermite's polynomial of what is given at its two ends. [Siciliano et al. 2009, ch. 4]
+Every reference is such a table, so one evaluator serves all of them, traced or not.
+Each piece is the Hermite polynomial of the values and derivatives at its two ends. [Siciliano et al. 2009, ch. 4]
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ numbers = partial(validate.numbers, error=ControlError)
 
 
 class Reference(Value, ABC):
-    """What a controller follows: a function of time made of piecewise polynomials."""
+    """A desired motion: a function of time that consists of piecewise polynomials."""
 
     @property
     @abstractmethod
@@ -43,13 +43,13 @@ class Reference(Value, ABC):
 
     @property
     def polynomials(self) -> dict[str, PiecewisePolynomial]:
-        """What it is made of, by attribute; by "" if it is a polynomial itself."""
+        """Its piecewise polynomials, by attribute; by "" if it is one itself."""
         return {name: value for name, value in vars(self).items() if isinstance(value, PiecewisePolynomial)}
 
 
 @dataclass(frozen=True, eq=False)
 class PiecewisePolynomial(Reference):
-    """A motion q(t) with its velocity and acceleration; before its first and after its last break it rests there.
+    """A motion q(t) with its velocity and acceleration; it rests before its first and after its last break.
 
     Attributes:
         breaks: Times tᵢ, increasing, shape (k + 1,), in [s].
@@ -91,8 +91,8 @@ class PiecewisePolynomial(Reference):
     def at(self, t: Array) -> tuple[Array, Array, Array]:
         """Position, velocity and acceleration at t, by Horner's rule.
 
-        At a break the piece to its right counts; at the last one, the piece to its left. Finding the piece is the one
-        branch on a value: a trace must look it up in `breaks`.
+        At a break the piece to its right counts; at the last one, the piece to its left. The search for the piece is
+        the only branch on a value: a trace must look it up in `breaks`.
 
         Args:
             t: Time, shape () or (...), in [s].
@@ -125,7 +125,7 @@ def polynomial(c: Array, s: Array) -> tuple[Array, Array, Array]:
 
 
 def hold(q: Any) -> PiecewisePolynomial:
-    """Rest at q, shape (n,), at all times; raises ControlError for any other array."""
+    """Rest at q, shape (n,), at all times; ControlError for any other array."""
     return PiecewisePolynomial([0.0, 1.0], numbers("q", q, ("n",))[None, None])
 
 
@@ -146,10 +146,10 @@ def quintic(
     Between rests its greatest velocity is 15/8 · (q1 − q0)/duration_s, halfway.
 
     Args:
-        q0: Where it starts, shape (n,), in [rad] or [m].
-        q1: Where it ends, shape (n,).
+        q0: Start, shape (n,), in [rad] or [m].
+        q1: End, shape (n,).
         duration_s: In [s], positive.
-        start_s: Time at which it starts, in [s].
+        start_s: Time of the start, in [s].
         v0: Velocity at the start, a scalar or (n,), in [rad/s] or [m/s].
         v1: Velocity at the end, likewise.
         a0: Acceleration at the start, a scalar or (n,), in [rad/s²] or [m/s²].

@@ -69,7 +69,7 @@ class Samples(PiecewisePolynomial):
         """The samples of a CSV file, such as `robot-dyn simulate --csv` writes.
 
         Its first line names the columns: t, and of each joint q, and if given v and a, with the joint's name, as
-        "t [s], q elbow [rad], v elbow [rad/s]". What stands in brackets is for readers: times are in [s], angles in
+        "t [s], q elbow [rad], v elbow [rad/s]". Brackets are ignored: times are in [s], angles in
         [rad], lengths in [m]. Columns of u, power, energy and residual are left out.
 
         Args:

@@ -1,4 +1,4 @@
-"""What drives can do: |u| ≤ u_max, and u' = (u_command − u) / T."""
+"""Limits of actuators: |u| ≤ u_max, and the lag u' = (u_command − u) / T."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ if TYPE_CHECKING:
 @final
 @dataclass(frozen=True, eq=False)
 class EffortLimit(Bound):
-    """The actuation is cut at the effort limits: −u_max ≤ u ≤ u_max.
+    """The actuation saturates at the effort limits: −u_max ≤ u ≤ u_max.
 
     Attributes:
-        limit: u_max, a scalar or (n,), inf for none, in [N m] or [N], not negative; "urdf" for those the file states,
-            of which none may be 0.
+        limit: u_max, a scalar or (n,), inf for none, in [N m] or [N], not negative; "urdf" for those in the
+            file, which must not be 0.
     """
 
     limit: Any = field(
@@ -44,15 +44,15 @@ class EffortLimit(Bound):
     def thresholds(self, n: int) -> tuple[Threshold, ...]:
         return limits_reached(self.limit, self._middle, n)
 
-    def beyond(self, n: int, sides: Mapping[Threshold, int]) -> EffortLimit:
+    def on_side(self, n: int, sides: Mapping[Threshold, int]) -> EffortLimit:
         limit, middle = piece(self.limit, n, sides)
         return with_values(self, {"limit": limit, "_middle": middle})
 
     def on(self, dynamics: Any) -> Effect:
-        made = super().on(dynamics)
+        known = super().on(dynamics)
         if self.limit is URDF:
             stated_efforts(dynamics)  # refuses limits of 0
-        return made
+        return known
 
     def actuation(self, u: Array) -> Array:
         return saturated(u, self.limit, self._middle)
@@ -63,7 +63,7 @@ class EffortLimit(Bound):
 class ActuatorLag(Stateful, Bound):
     """The actuation follows its command with a lag of first order: u' = (u_command − u) / T, from u = 0.
 
-    Of the bounds of a plant, those before it act on the command, and those after it on u.
+    Bounds before it in a plant act on the command, bounds after it on u.
 
     Attributes:
         time_constant: T, a scalar or (n,), in [s], positive.
@@ -87,10 +87,10 @@ class ActuatorLag(Stateful, Bound):
 
 
 def stated_efforts(robot: Any) -> np.ndarray:
-    """The effort limits that the file of a robot states, (n,), inf for none, in [N m] or [N].
+    """Effort limits in the file of a robot, (n,), inf for none, in [N m] or [N].
 
     Raises:
-        EffectError: If one is 0, which files state for an unknown limit: the joint would have no drive.
+        EffectError: If one is 0, which files use for an unknown limit: the joint would have no actuation.
     """
     if names := [name for name, limit in zip(robot.joint_names, robot.effort_limit, strict=True) if limit == 0]:
         listed = ", ".join(map(repr, names[:6])) + (", …" if len(names) > 6 else "")

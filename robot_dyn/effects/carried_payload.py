@@ -1,4 +1,4 @@
-"""A payload that the arm picks up and drops: M, C and N have its body for start_s ≤ t < end_s.
+"""A payload that the arm picks up and drops: M, C and N include its body for start_s ≤ t < end_s.
 
     picked up at rest            (M + ΔM) v⁺ = M v⁻
     picked up at the hand's speed, or dropped     v⁺ = v⁻
@@ -14,11 +14,10 @@ from dataclasses import dataclass, field, replace
 from math import inf
 from typing import Any, final
 
-from robot_dyn.coefficients import coefficient, with_values
+from robot_dyn.coefficients import coefficient
 from robot_dyn.description.edits import Payload
-from robot_dyn.effects.effect import Effect
+from robot_dyn.effects.effect import Timed
 from robot_dyn.errors import EditError, EffectError
-from robot_dyn.threshold import smooth
 from robot_dyn.validate import instance, truth
 
 _START = coefficient("s", shapes=((),), swept=False)
@@ -27,17 +26,17 @@ _END = coefficient("s", shapes=((),), infinite=True, swept=False)
 
 @final
 @dataclass(frozen=True, eq=False)
-class CarriedPayload(Effect):
-    """A payload that is carried for start_s ≤ t < end_s; a run has it from the start where start_s is not after 0.
+class CarriedPayload(Timed):
+    """A payload that is carried for start_s ≤ t < end_s; from the start of a run if start_s ≤ 0.
 
-    In the energy ledger its work is the energy that the body has as it comes, less what it takes with it; the kinetic
-    energy that is lost where it is picked up at rest is the work of `pick_up`.
+    In the energy ledger its work is the energy that the body brings, less what it takes away; the kinetic energy that
+    is lost when it is picked up at rest is the work of `pick_up`.
 
     Attributes:
         payload: The body and its link.
-        start_s: When it is picked up, in [s].
-        end_s: When it is dropped, in [s].
-        at_rest: Whether it rests until it is picked up; if not, it moves with the link by then.
+        start_s: Time at which it is picked up, in [s].
+        end_s: Time at which it is dropped, in [s].
+        at_rest: Whether it is at rest until it is picked up; otherwise it moves with the link by then.
     """
 
     payload: Payload
@@ -48,40 +47,23 @@ class CarriedPayload(Effect):
     carried: bool | None = field(default=None, init=False, repr=False)
 
     term = "a rigid body on a link, in M, C and N while it is carried"
-    thresholds = smooth
 
     def __post_init__(self) -> None:
         instance("payload", self.payload, Payload, "give one, as rd.Payload('tool0', 1.5)", error=EffectError)
         truth("at_rest", self.at_rest, error=EffectError)
         super().__post_init__()
-        if not self.start_s < self.end_s:
-            raise EffectError(f"end_s must lie after start_s, got {self.start_s} and {self.end_s}")
 
     def on(self, dynamics: Any) -> CarriedPayload:
         if self.carried is None:
-            robot_with(dynamics, [self], [True])  # so that an unknown link is told now
+            robot_with(dynamics, [self], [True])  # so that an unknown link is reported now
         return self
-
-    @property
-    def switches(self) -> tuple[float, ...]:
-        return self.start_s, self.end_s
-
-
-def in_hand(effect: CarriedPayload, t: float) -> bool:
-    """Whether it is carried at a time in [s], behind a switch at that time."""
-    return effect.start_s <= t < effect.end_s
-
-
-def known(effect: CarriedPayload, carried: bool) -> CarriedPayload:
-    """The effect while it is carried, or not."""
-    return with_values(effect, {"carried": carried})
 
 
 def robot_with(dynamics: Any, effects: Sequence[CarriedPayload], carried: Sequence[bool]) -> Any:
-    """The robot with all these payloads, those that are not carried without mass.
+    """Return the robot with all these payloads, massless where they are not carried.
 
     Raises:
-        EffectError: If the dynamics is no robot, or has no such link.
+        EffectError: If the dynamics is not a robot, or has no such link.
     """
     if not hasattr(dynamics, "with_"):
         raise EffectError(f"carried_payload: needs a Robot, got {type(dynamics).__name__}; give rd.Plant(robot, …)")

@@ -3,7 +3,7 @@
     s = sign(v),   τ = −σ z
 
 From rest it is a spring of stiffness σ; sliding on, |F| goes to f_c, and behind a reversal F runs along the other
-branch of the hysteresis. Time does not matter to it, only the path. [Dahl 1968; Dahl 1976; Bliman 1992]
+branch of the hysteresis. It depends on the path, not on time. [Dahl 1968; Dahl 1976; Bliman 1992]
 """
 
 from __future__ import annotations
@@ -15,27 +15,27 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.coefficients import coefficient
-from robot_dyn.effects.effect import Dissipative, Stateful
-from robot_dyn.effects.lugre import reversals
+from robot_dyn.effects.effect import Dissipative
+from robot_dyn.effects.lugre import Bristles
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.threshold import Threshold
 
-_SLOW = 1e-6  # of the deflection f_c/σ, in a second: where a joint moves to and fro more slowly, no digit depends on it
+_SLOW = 1e-6  # of the deflection f_c/σ, per second: no digit depends on reversals of slower motion
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class DahlFriction(Stateful, Dissipative):
+class DahlFriction(Bristles, Dissipative):
     """Dry friction with a state for each joint, the deflection z of bristles: τ = −σ z.
 
-    z' = |w|^α sign(w) v with w = 1 − (σ z/f_c) sign(v). The bristles store ½ σ z², of which they give back a part; it
-    is passive. Friction of rest and of sliding are one, f_c, which is approached over a path of some f_c/σ. The rate
-    bends where v = 0, where steps end.
+    z' = |w|^α sign(w) v with w = 1 − (σ z/f_c) sign(v). The bristles store ½ σ z² and return part of it: the
+    effect is passive. Static and sliding friction are equal, f_c, which is approached over a path of about f_c/σ. The
+    rate has a kink at v = 0, where steps end.
 
     Attributes:
         bristle_stiffness: σ, a scalar or (n,), in [N m/rad] or [N/m], not negative.
         coulomb: f_c, in [N m] or [N], positive.
-        exponent: α, not less than 1; 1 unless given.
+        exponent: α, not less than 1; 1 by default.
     """
 
     bristle_stiffness: Any = field(metadata=coefficient("N m/rad", symbol="σ", least=0))
@@ -47,22 +47,16 @@ class DahlFriction(Stateful, Dissipative):
     def thresholds(self, n: int) -> tuple[Threshold, ...]:
         stiffness = np.broadcast_to(self.bristle_stiffness, n)
         slow = np.divide(_SLOW * self.coulomb, stiffness, out=np.zeros(n), where=stiffness > 0)
-        return reversals(stiffness, slow, n)
-
-    def state_size(self, n: int) -> int:
-        return n
+        return self.reversals(slow, n)
 
     def state_rate(self, dynamics: Dynamics, t: float, q: Array, v: Array, u: Array, z: Array) -> Array:
-        reached = self.bristle_stiffness * z / self.coulomb
+        relative = self.bristle_stiffness * z / self.coulomb
         if self.exponent is None:
-            return v - reached * np.abs(v)
-        w = 1 - reached * np.sign(v)
+            return v - relative * np.abs(v)
+        w = 1 - relative * np.sign(v)
         return np.abs(w) ** self.exponent * np.sign(w) * v
 
     def torque(  # pyright: ignore[reportIncompatibleMethodOverride]  with its states
         self, dynamics: Dynamics, t: float, q: Array, v: Array, z: Array
     ) -> Array:
         return -self.bristle_stiffness * z
-
-    def stored_energy(self, dynamics: Dynamics, t: float, q: Array, z: Array) -> Array:
-        return (self.bristle_stiffness * z**2 / 2).sum(axis=-1)

@@ -1,4 +1,4 @@
-"""Dry friction that sticks: τ = −f(|v|) sign(v) where a joint slides, and up to f_s either way where it rests."""
+"""Dry friction with sticking: τ = −f(|v|) sign(v) while a joint slides, and up to ±f_s while it rests."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.coefficients import coefficient, with_values
+from robot_dyn.effects.effect import require
 from robot_dyn.effects.set_valued import Interval, Mode, SetValued
 from robot_dyn.errors import EffectError
 from robot_dyn.queries.dynamics import Dynamics
@@ -17,21 +18,21 @@ from robot_dyn.queries.dynamics import Dynamics
 @final
 @dataclass(frozen=True, eq=False)
 class DryFriction(SetValued):
-    """Coulomb's friction: τ = −f sign(v) where v ≠ 0, and any |τ| ≤ f_s that keeps the joint at rest where v = 0.
+    """Coulomb friction: τ = −f sign(v) where v ≠ 0, and the |τ| ≤ f_s that keeps the joint at rest where v = 0.
 
     A joint at rest stays exactly there for as long as the load does not exceed f_s. Then it slides, with f = f_k, or
     by Stribeck's curve, f = f_k + (f_s − f_k) exp(−(v/v_s)²), if v_s is given. Where f_s > f_k, rest and sliding are
-    both consistent with some loads: what rests goes on resting. [Armstrong-Hélouvry, Dupont, Canudas de Wit, A survey
-    of models, analysis tools and compensation methods for the control of machines with friction, 1994]
+    both consistent with some loads: a joint at rest stays at rest. [Armstrong-Hélouvry, Dupont, Canudas de Wit, A
+    survey of models, analysis tools and compensation methods for the control of machines with friction, 1994]
 
-    The acceleration of a plant holds what friction can hold; its N, torque and inverse dynamics have 0 for the friction
-    of a joint at rest, which depends on the load.
+    The acceleration of a plant accounts for sticking; its N, torque and inverse dynamics use 0 for the friction of a
+    joint at rest, which depends on the load.
 
     Attributes:
-        level: f_k, of sliding, a scalar or (n,), in [N m] or [N], not negative.
-        static: f_s, of rest, not less than f_k; f_k unless given.
-        stribeck_velocity: v_s, a scalar or (n,), in [rad/s] or [m/s], positive; unless given, friction falls from f_s
-            to f_k at once where sliding starts.
+        level: f_k, sliding friction, a scalar or (n,), in [N m] or [N], not negative.
+        static: f_s, static friction, not less than f_k; f_k by default.
+        stribeck_velocity: v_s, a scalar or (n,), in [rad/s] or [m/s], positive; without it friction drops
+            from f_s to f_k where sliding starts.
     """
 
     level: Any = field(metadata=coefficient("N m", symbol="f_k", least=0, stated="friction"))
@@ -47,20 +48,15 @@ class DryFriction(SetValued):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.stribeck_velocity is not None and self.static is None:
-            raise EffectError("stribeck_velocity: has no effect without static, the friction of rest; give both")
-        try:
-            less = self.static is not None and np.any(np.less(self.static, self.level))
-        except (TypeError, ValueError):  # by name, or of other numbers of joints: checked when the joints are known
-            return
-        if less:
-            raise EffectError(f"static must not be less than level, got {self.static} and {self.level}")
+            raise EffectError("stribeck_velocity: has no effect without static, the static friction; give both")
+        require("static must not be less than level", np.greater_equal, self.static, self.level)
 
     def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
         direction = np.sign(v) if self._direction is None else self._direction
         return -self.sliding(v) * direction
 
     def sliding(self, v: Array) -> Array:
-        """The friction of sliding, f(v)."""
+        """Sliding friction, f(v)."""
         if self.static is None or self.stribeck_velocity is None:
             return self.level + 0 * v
         return self.level + (self.static - self.level) * np.exp(-((v / self.stribeck_velocity) ** 2))

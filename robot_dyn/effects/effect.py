@@ -1,14 +1,13 @@
-"""What an effect is: a torque τ_effect(t, q, v) exerted on the joints, so that N = ∂V/∂q − Σ τ_effect.
+"""Base classes of effects: an effect is a torque τ_effect(t, q, v) on the joints, so that N = ∂V/∂q − Σ τ_effect.
 
-Its class says what it does to the energy, and a contract test holds it to that. An effect that a plant does not name
-is not evaluated at all.
+Its class declares what it does to the energy, and a contract test checks that. A plant evaluates only its own effects.
 """
 
 from __future__ import annotations
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from math import inf
 from typing import Any, ClassVar
@@ -17,9 +16,10 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.coefficients import check_coefficients, declared
-from robot_dyn.errors import EffectError
+from robot_dyn.errors import EffectError, QueryError
 from robot_dyn.queries.dynamics import Dynamics
-from robot_dyn.threshold import Threshold
+from robot_dyn.threshold import Threshold, smooth
+from robot_dyn.validate import rows
 from robot_dyn.values import Value
 
 
@@ -36,11 +36,11 @@ class Effect(Value):
     and with symbols in place of these numbers where it is compiled: written in `robot_dyn.arithmetic` and NumPy's
     operators it runs in both engines.
 
-    Those of its numbers that are declared (`robot_dyn.coefficients`) are checked when it is made, may be given by joint
-    name, or as "urdf" where files state them, and may be swept.
+    Coefficients that are declared (`robot_dyn.coefficients`) are checked on construction, may be given by joint name,
+    or as "urdf" where files state them, and may be swept.
 
     Attributes:
-        term: Its equation in a few signs, for `explain`.
+        term: Its equation in short, for `explain`.
     """
 
     term: ClassVar[str] = ""
@@ -50,11 +50,11 @@ class Effect(Value):
 
     @property
     def name(self) -> str:
-        """Its name in a scene and in a ledger: that of its class, in small letters."""
+        """Its name in scenes and ledgers: that of its class, in snake case."""
         return re.sub(r"(?<!^)(?=[A-Z])", "_", type(self).__name__).lower()
 
     def on(self, dynamics: Any) -> Effect:
-        """This effect with coefficients given by joint name, or "urdf", made arrays (n,) of these joints.
+        """Return this effect with arrays (n,) for coefficients that are given by joint name or as "urdf".
 
         Raises:
             EffectError: If a joint is unknown, no file states the coefficient, or one is of another number of joints.
@@ -63,12 +63,12 @@ class Effect(Value):
             key: each.on(f"{self.name}: {key}", getattr(self, key), dynamics)
             for key, each in declared(type(self)).items()
         }
-        made: Any = {key: value for key, value in known.items() if value is not getattr(self, key)}
-        return replace(self, **made) if made else self  # pyright: ignore[reportArgumentType]  a dataclass
+        changed: Any = {key: value for key, value in known.items() if value is not getattr(self, key)}
+        return replace(self, **changed) if changed else self  # pyright: ignore[reportArgumentType]  a dataclass
 
     @property
     def parts(self) -> tuple[Effect, ...]:
-        """The forces and bounds that a plant takes it as; itself unless it consists of several."""
+        """The forces and bounds that it consists of; by default itself."""
         return (self,)
 
     @property
@@ -79,14 +79,14 @@ class Effect(Value):
     def thresholds(self, n: int) -> tuple[Threshold, ...]:
         """Where it switches from one smooth formula to another, on an arm of n joints; () if it is smooth everywhere.
 
-        A step of integration ends where one is passed; `beyond` says what the effect is on either side. A class that
-        does not define this declares nothing: it runs interpreted unless machine code is asked for, and error estimates
-        do not rest on the order of a method. Levels of the actuation are for bounds: of what reaches them.
+        A step of integration ends where one is passed; `on_side` returns the effect on either side. A class that does
+        not define this declares nothing: it runs interpreted unless machine code is requested, and error estimates do
+        not rest on the order of a method. Levels of the actuation are for bounds: of what reaches them.
         """
         return ()
 
-    def beyond(self, n: int, sides: Mapping[Threshold, int]) -> Effect:
-        """The effect as it is with each threshold passed (1) or not (−1), a smooth function wherever q and v are."""
+    def on_side(self, n: int, sides: Mapping[Threshold, int]) -> Effect:
+        """Return the effect with each threshold passed (1) or not (−1), extended smoothly to all q and v."""
         return self
 
     @property
@@ -116,7 +116,7 @@ class Conservative(Force):
 
 
 class Dissipative(Force):
-    """An effect that only takes energy: torqueᵀ v ≤ 0 at all t, q, v. Contract as of `Effect`."""
+    """An effect that never adds energy: torqueᵀ v ≤ 0 at all t, q, v. Contract as of `Effect`."""
 
 
 class Active(Force):
@@ -124,11 +124,11 @@ class Active(Force):
 
 
 class Stateful(Effect, ABC):
-    """An effect with states z of its own, ż = rate(t, q, v, u, z), which are integrated with the plant.
+    """An effect with states z, ż = rate(t, q, v, u, z), which are integrated with the plant.
 
-    It is of another kind besides. The torque of such a force is torque(dynamics, t, q, v, z), and what such a bound
-    leaves is actuation(u, z). A dissipative one obeys torqueᵀ v + dE/dt ≤ 0, with E the energy that its states store.
-    A plant that is asked for one state takes those of the start, and its actuation as it is.
+    A subclass is also of another kind. The torque of such a force is torque(dynamics, t, q, v, z), and the actuation
+    that such a bound leaves is actuation(u, z). A dissipative one obeys torqueᵀ v + dE/dt ≤ 0, with E the energy that
+    its states store. Queries of a plant at one state use the initial z, and leave the actuation unchanged.
     """
 
     @abstractmethod
@@ -136,7 +136,7 @@ class Stateful(Effect, ABC):
         """Number of its states on an arm of n joints."""
 
     def start(self, dynamics: Dynamics, q: Array, v: Array) -> Array:
-        """Its states at the start of a run from q, v, (..., n), shape (..., state_size); 0 unless it says otherwise."""
+        """Return its states at the start of a run from q, v, (..., n), shape (..., state_size); 0 by default."""
         shape = (*v.shape[:-1], self.state_size(dynamics.n))
         return np.zeros(shape, dtype=v.dtype).view(type(v))
 
@@ -149,17 +149,17 @@ class Stateful(Effect, ABC):
             t: Time.
             q: Position.
             v: Velocity.
-            u: The actuation, (n,), in [N m] or [N]; for a bound what the bounds before it leave.
+            u: The actuation, (n,), in [N m] or [N]; for a bound, after the bounds before it.
             z: Its states, (state_size,).
         """
 
     def stored_energy(self, dynamics: Dynamics, t: float, q: Array, z: Array) -> Array:
-        """Energy E that its states hold, in [J], for the ledger; 0 unless it says otherwise."""
+        """Energy E stored in its states, in [J], for the ledger; 0 by default."""
         return 0 * q[..., 0]
 
 
 class Drive(Stateful, Force, ABC):
-    """A force with states that the actuation of some joints drives in place of these: it works on motors, not on them.
+    """A force with states whose motors take the actuation of some joints in place of these joints.
 
     Its work in the ledger is that of its torque on the joints less that of the actuation on its motors.
     """
@@ -168,22 +168,22 @@ class Drive(Stateful, Force, ABC):
     def driven(self, n: int) -> Sequence[int]:
         """Indices of the joints whose actuation it takes, on an arm of n joints."""
 
-    coupled: ClassVar[bool] = False  # whether its motors may move with their joints: its state_rate takes a, too
+    coupled: ClassVar[bool] = False  # whether its motors may move with their joints: state_rate then takes a as well
 
     @abstractmethod
     def speeds(self, z: Array) -> Array:
         """Velocities at which the actuation of these joints works, in the order of `driven`."""
 
     def reaching(self, u: Array) -> Array:
-        """What of the actuation u, (..., n), acts on these joints; 0 unless it says otherwise."""
+        """The part of the actuation u, (..., n), that acts on these joints; 0 by default."""
         return 0 * u[..., list(self.driven(u.shape[-1]))]
 
     def added_inertia(self, n: int) -> Array:
-        """Inertia of motors that move with these joints; 0 unless it says otherwise."""
+        """Inertia of motors that move with these joints; 0 by default."""
         return np.zeros(len(self.driven(n)))
 
     def power(self, v: Array, u: Array, torque: Array, z: Array, a: Array) -> Array:
-        """Its power, at the velocity and acceleration of one state, the actuation, its torque and its states."""
+        """Its power at one state: velocity, actuation, its torque, its states, acceleration."""
         return torque @ v - u[list(self.driven(len(v)))] @ self.speeds(z)
 
 
@@ -192,4 +192,49 @@ class Bound(Effect, ABC):
 
     @abstractmethod
     def actuation(self, u: Array) -> Array:
-        """What is left of the actuation u, (..., n), in [N m] or [N]; same shape and unit."""
+        """Return the bounded actuation for u, (..., n), in [N m] or [N]."""
+
+
+class Timed(Effect):
+    """An effect that is smooth but acts only from its field `start_s` until its field `end_s`, in [s]."""
+
+    start_s: float
+    end_s: float
+
+    thresholds = smooth
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require("end_s must lie after start_s", lambda start, end: start < end, self.start_s, self.end_s)
+
+    @property
+    def switches(self) -> tuple[float, ...]:
+        return self.start_s, self.end_s
+
+    def acts(self, t: Any) -> Array:
+        """Whether it acts at times t (...,), at `start_s` already and at `end_s` no longer."""
+        t = rows("t", t)
+        return (self.start_s <= t) & (t < self.end_s)
+
+
+def require(message: str, relation: Callable[..., Any], *values: Any) -> None:
+    """Raise an EffectError unless coefficients satisfy a relation for every joint.
+
+    Values by joint name or "urdf" are checked when a plant knows the joints, as are different numbers of joints.
+    """
+    if not all(isinstance(x, float | np.ndarray) for x in values):
+        return
+    try:
+        satisfied = np.all(relation(*values))
+    except ValueError:  # of different numbers of joints
+        return
+    if not satisfied:
+        raise EffectError(f"{message}, got {' and '.join(map(str, values))}")
+
+
+def check_frame(effect: Effect, dynamics: Any, frame: str) -> None:
+    """Raise an EffectError if the arm has no such frame."""
+    try:
+        dynamics.placement(np.zeros(dynamics.n), frame)
+    except QueryError as error:
+        raise EffectError(f"{effect.name}: {error}") from None

@@ -2,21 +2,19 @@
 
     a = M⁻¹ (Υ + Σ τ_effect − C v − ∂V/∂q),    ṗ = Υ + Σ τ_effect + Cᵀ v − ∂V/∂q  with p = M v
 
-Its arguments are not checked: floats, balls or symbols. [Murray, Li, Sastry 1994, eq. 4.24]
+Arguments are not checked, and may be floats, balls or symbols. [Murray, Li, Sastry 1994, eq. 4.24]
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import count
 from typing import Any, final
 
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.convex import LARGE
 from robot_dyn.effects.carried_payload import CarriedPayload
 from robot_dyn.effects.effect import Bound, Conservative, Drive, Effect, Force, Stateful
 from robot_dyn.effects.set_valued import SetValued, settled
@@ -41,7 +39,7 @@ class EquationOfMotion:
 
     @cached_property
     def forces(self) -> tuple[Force, ...]:
-        """The effects that are torques."""
+        """The effects that exert a torque."""
         return tuple(effect for effect in self.effects if isinstance(effect, Force))
 
     @cached_property
@@ -56,7 +54,7 @@ class EquationOfMotion:
 
     @cached_property
     def states(self) -> Mapping[int, slice]:
-        """Where the states of effects stand among those of all, by the number of the effect."""
+        """Place of the states of each effect among those of all, by the number of the effect."""
         places, end = {}, 0
         for k, effect in enumerate(self.effects):
             if isinstance(effect, Stateful):
@@ -80,30 +78,30 @@ class EquationOfMotion:
         return found
 
     def on_joints(self, u: Array) -> Array:
-        """What of the actuation u, (..., n), acts on joints: 0 where it acts on the motor of a drive."""
+        """The part of the actuation u, (..., n), that acts on joints: 0 where it acts on the motor of a drive."""
         if not self.drives:
             return u
-        made = u.copy()
+        on_joints = u.copy()
         for drive in self.drives.values():
-            made[..., list(drive.driven(self.dynamics.n))] = drive.reaching(u)
-        return made
+            on_joints[..., list(drive.driven(self.dynamics.n))] = drive.reaching(u)
+        return on_joints
 
     def torques(
         self, t: float, q: Array, v: Array, shape: tuple[int, ...] | None = None, z: Array | None = None
     ) -> list[Array]:
-        """The torque of each force, of the shape if one is given, at states z of the effects, 0 unless given.
+        """Return the torque of each force, broadcast to a shape if it is given, at states z of the effects.
 
         Raises:
             EffectError: If one does not fit the joints.
         """
         return [
-            self._torque_of(force, (t, q, v, *self._own(k, q, v, z)), shape)
+            self._torque_of(force, (t, q, v, *self._states_of(k, q, v, z)), shape)
             for k, force in enumerate(self.effects)
             if isinstance(force, Force)
         ]
 
-    def _own(self, k: int, q: Array, v: Array, z: Array | None) -> tuple[Array, ...]:
-        """The states of an effect, as its last argument; nothing if it has none."""
+    def _states_of(self, k: int, q: Array, v: Array, z: Array | None) -> tuple[Array, ...]:
+        """The states of an effect as its last argument, those of the start by default; () if it has none."""
         effect = self.effects[k]
         if not isinstance(effect, Stateful):
             return ()
@@ -111,8 +109,8 @@ class EquationOfMotion:
 
     def start(self, q: Array, v: Array) -> Array:
         """The states of the effects at the start of a run, (state_size,)."""
-        own = [effect.start(self.dynamics, q, v) for effect in self.effects if isinstance(effect, Stateful)]
-        return np.concatenate([*own, np.zeros(0)])
+        starts = [effect.start(self.dynamics, q, v) for effect in self.effects if isinstance(effect, Stateful)]
+        return np.concatenate([*starts, np.zeros(0)])
 
     def _torque_of(self, force: Force, state: tuple[Any, ...], shape: tuple[int, ...] | None) -> Array:
         v = state[2]
@@ -127,7 +125,7 @@ class EquationOfMotion:
             ) from None
 
     def actuation(self, u: Array) -> Array:
-        """What the bounds leave of the actuation u, in the order of the effects; one with states leaves it as it is.
+        """Return the actuation after all bounds without states, in the order of the effects.
 
         Raises:
             EffectError: If one does not fit.
@@ -139,11 +137,11 @@ class EquationOfMotion:
 
     @cached_property
     def _lags(self) -> int:
-        """Number of the first bound with states: what is held between ticks is what the bounds before it leave."""
+        """Number of the first bound with states: only the bounds before it act before the actuation is held."""
         return next((k for k in self.states if isinstance(self.effects[k], Bound)), len(self.effects))
 
     def commanded(self, u: Array) -> Array:
-        """What the bounds before the first one with states leave of the actuation u."""
+        """Return the actuation after the bounds before the first one with states."""
         for effect in self.effects[: self._lags]:
             if isinstance(effect, Bound):
                 u = self._bounded(effect, u)
@@ -155,18 +153,18 @@ class EquationOfMotion:
         return range(self._lags, len(self.effects))
 
     def applied(self, u: Array, z: Array, of: range | None = None) -> tuple[Array, Mapping[int, Array]]:
-        """What the other bounds leave of it, at states z of the effects; and what reaches each: of those effects."""
+        """Return the actuation after the other bounds, at states z of the effects, and what reaches each of them."""
         reached = {}
         for k in self.bounds_at_all_times if of is None else of:
             effect = self.effects[k]
             if isinstance(effect, Bound):
                 reached[k] = u
-                u = self._bounded(effect, u, *self._own(k, u, u, z))
+                u = self._bounded(effect, u, *self._states_of(k, u, u, z))
         return u, reached
 
-    def _bounded(self, bound: Bound, u: Array, *own: Array) -> Array:
+    def _bounded(self, bound: Bound, u: Array, *states: Array) -> Array:
         try:
-            return call(bound.actuation, u, *own)
+            return call(bound.actuation, u, *states)
         except (TypeError, ValueError) as error:
             if users_line(error):
                 raise
@@ -175,20 +173,20 @@ class EquationOfMotion:
     def state_rates(
         self, t: float, q: Array, v: Array, u: Array, reached: Mapping[int, Array], z: Array, a: Array | None = None
     ) -> list[tuple[slice, Array]]:
-        """ż of each effect with states, with its place, at the actuation u and what reaches each bound of it.
+        """Return the place and ż of each effect with states, at the actuation u and what reaches each bound.
 
-        Motors that may move with their joints take the acceleration, 0 unless given.
+        Motors that may move with their joints take the acceleration, 0 by default.
         """
         a = 0 * v if a is None else a
-        made = []
+        rates = []
         for k, place in self.states.items():
             effect: Any = self.effects[k]
             more = (a,) if isinstance(effect, Drive) and effect.coupled else ()
-            made.append((place, call(effect.state_rate, self.dynamics, t, q, v, reached.get(k, u), z[place], *more)))
-        return made
+            rates.append((place, call(effect.state_rate, self.dynamics, t, q, v, reached.get(k, u), z[place], *more)))
+        return rates
 
     def N(self, q: Array, torque: Array) -> Array:
-        """Every force but actuation, with the torque Σ τ_effect."""
+        """All forces but actuation, for the torque Σ τ_effect."""
         return self.dynamics.N(q) - torque
 
     def inverse_dynamics(self, q: Array, v: Array, a: Array, torque: Array) -> Array:
@@ -204,15 +202,15 @@ class EquationOfMotion:
     def with_reaction(self, q: Array, v: Array, total: Array) -> tuple[Array, Array]:
         """The acceleration of one state, and the reaction λ of what holds joints: M a + C v + ∂V/∂q = total + λ.
 
-        A joint that is held has a = 0, the others have λ = 0. Effects without a mode hold what they can at v = 0.
+        A held joint has a = 0, the others have λ = 0. Effects without a mode hold every joint at rest that they can.
         """
         M, load = self.dynamics.M(q), total - self.dynamics.inverse_dynamics(q, v, 0 * v)
         held = self.set_valued[0].held
         if held is None:
-            acceleration(M, load, self.dynamics.joint_names)  # is told of M that is singular, as without friction
+            acceleration(M, load, self.dynamics.joint_names)  # raises if M is singular, as without friction
             if M.dtype not in (np.float32, np.float64):
                 raise EffectError(
-                    f"{self.set_valued[0].name}: which joints it holds is decided in float64, not in {M.dtype}; ask a"
+                    f"{self.set_valued[0].name}: which joints it holds is decided in float64, not in {M.dtype}; use a"
                     " plant of the robot, or of its Lagrangian in float64"
                 )
             a = settled(self.set_valued, M, load, q, v)[0]
@@ -234,45 +232,6 @@ class EquationOfMotion:
                 added[list(drive.driven(n))] = drive.added_inertia(n)
         return added * np.eye(n)
 
-    def in_a_step(self, q: Array, v: Array) -> tuple[Array, Array, Array, list[Array]]:
-        """For a step of time stepping with the middle q: friction at most, bounds of v⁺, and the shares of effects.
-
-        Shares are those of each of several effects with friction in it, and of each of several with bounds, (n,).
-        """
-        rub, stop = [[x for x in self.set_valued if getattr(x, of)] for of in ("rubs", "stops")]
-        levels, bounds = [x.friction(v) for x in rub], [x.bounds(q, v) for x in stop]
-        friction = sum(levels, start=0 * v)
-        lower, upper = 0 * v - np.inf, 0 * v + np.inf
-        for low, high in bounds:
-            lower, upper = np.maximum(lower, low), np.minimum(upper, high)
-        shares: list[Array] = []
-        if len(rub) > 1:
-            shares += [np.where(friction > 0, level / np.where(friction > 0, friction, 1.0), 0 * v) for level in levels]
-        if len(stop) > 1:
-            left = 1 + 0 * v
-            for low, high in bounds:
-                below = np.logical_and(low > -LARGE, low >= lower)
-                touches = np.logical_or(below, np.logical_and(high < LARGE, high <= upper))
-                shares.append(np.where(touches, left, 0 * v))
-                left = left - shares[-1]
-        return friction, lower, upper, shares
-
-    def impulses_of(self, rubbing: Array, stopping: Array, shares: Array) -> Iterator[Array]:
-        """The impulse of each set-valued effect, from those of all friction and of all stops, by shares in a row."""
-        n = len(rubbing)
-        rub, stop = (sum(getattr(x, of) for x in self.set_valued) for of in ("rubs", "stops"))
-        each_n = (shares[k * n : (k + 1) * n] for k in count())
-        of_rub = [next(each_n) for _ in range(rub)] if rub > 1 else [np.ones(n)]
-        of_stop = [next(each_n) for _ in range(stop)] if stop > 1 else [np.ones(n)]
-        rubs, stops = iter(of_rub), iter(of_stop)
-        for each in self.set_valued:
-            impulse = 0 * rubbing
-            if each.rubs:
-                impulse = impulse + next(rubs) * rubbing
-            if each.stops:
-                impulse = impulse + next(stops) * stopping
-            yield impulse
-
     def momentum_rate(self, q: Array, v: Array, total: Array) -> Array:
         """The rate of the momentum p = M v under the total torque."""
         return total + self.dynamics.coriolis_transpose(q, v) - self.dynamics.N(q)
@@ -293,16 +252,16 @@ class EquationOfMotion:
             u: Actuation, (n,).
             torques: Of each force, (n,).
             z: States of the effects.
-            a: Acceleration, (n,), of which the motors of some drives have their share.
+            a: Acceleration, (n,), for motors that move with their joints.
         """
         powers, speeds = [], v
         places = {drive: self.states[k] for k, drive in self.drives.items()}
         for force, torque in zip(self.forces, torques, strict=True):
             if isinstance(force, Drive):
-                own = z[places[force]]
+                states = z[places[force]]
                 speeds = speeds.copy()
-                speeds[list(force.driven(len(v)))] = force.speeds(own)
-                powers.append(force.power(v, u, torque, own, a))
+                speeds[list(force.driven(len(v)))] = force.speeds(states)
+                powers.append(force.power(v, u, torque, states, a))
             elif not isinstance(force, Conservative):
                 powers.append(torque @ v)
         return [u @ speeds, *powers]

@@ -36,7 +36,7 @@ class ViscousFriction(Dissipative):
 @final
 @dataclass(frozen=True, eq=False)
 class RegularisedCoulombFriction(Dissipative):
-    """Dry friction made smooth: τ = −f tanh(v / v_s).
+    """Regularised dry friction: τ = −f tanh(v / v_s).
 
     Inside |v| < v_s it creeps and does not stick; its slope f / v_s is stiff where v_s is small.
 

@@ -1,8 +1,8 @@
-"""How firmly dry friction and rigid stops hold a joint that rests: its load, and the loads at which it breaks away.
+"""How firmly dry friction and rigid stops hold a joint at rest: its load, and the loads at which it breaks away.
 
     M a + C v + ∂V/∂q = u + Σ τ_effect + λ,    load = −λ
 
-λ solves the convex problem of all joints at once: the load of one depends on those that slide, and on those held.
+λ solves the convex problem of all joints together: the load of one depends on the state of all.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ class Hold:
 
     Attributes:
         joint: Its name.
-        by: Names of the effects that can exert something on it.
+        by: Names of the effects that can hold it.
         load: The torque that they balance, in [N m] or [N].
-        least, most: The loads beyond which it breaks away; −inf or inf towards a stop.
+        least, most: The loads below and above which it breaks away; −inf or inf towards a stop.
     """
 
     joint: str
@@ -36,12 +36,12 @@ class Hold:
 
     @reported
     def margin(self) -> float:
-        """How much the load may change, either way, before the joint breaks away, in [N m] or [N]; not negative."""
+        """Change of the load, in either direction, at which the joint breaks away, in [N m] or [N]; not negative."""
         return max(min(self.load - self.least, self.most - self.load), 0.0)
 
 
 def held(equation: EquationOfMotion, q: np.ndarray, v: np.ndarray, total: np.ndarray) -> tuple[Hold, ...]:
-    """The joints that are held under a total torque; arguments are not checked.
+    """Return the joints that are held under a total torque; arguments are not checked.
 
     Args:
         equation: The equation of motion, of effects without a mode.

@@ -14,8 +14,8 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array, apply, sqrt, transpose
 from robot_dyn.coefficients import coefficient
-from robot_dyn.effects.effect import Conservative, Dissipative, Effect
-from robot_dyn.errors import EffectError, QueryError
+from robot_dyn.effects.effect import Conservative, Dissipative, Effect, check_frame
+from robot_dyn.errors import EffectError
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.spatial import hat
 from robot_dyn.threshold import smooth
@@ -43,7 +43,9 @@ class _Line(Effect):
         for name, frame in zip(("frame", "other_frame"), self._frames, strict=False):
             instance(name, frame, str, "give the name of a frame", error=EffectError)
         if self.frame == self.other_frame:
-            raise EffectError(f"both points are fixed to {self.frame!r}, so their distance is constant: name another")
+            raise EffectError(
+                f"both points are fixed to {self.frame!r}, so their distance is constant: name another frame"
+            )
         super().__post_init__()
 
     @property
@@ -56,10 +58,7 @@ class _Line(Effect):
 
     def on(self, dynamics: Any) -> Effect:
         for frame in self._frames:
-            try:
-                dynamics.placement(np.zeros(dynamics.n), frame)
-            except QueryError as error:
-                raise EffectError(f"{self.name}: {error}") from None
+            check_frame(self, dynamics, frame)
         return self
 
     def _line(self, dynamics: Dynamics, q: Array) -> tuple[Array, Array]:

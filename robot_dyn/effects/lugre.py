@@ -16,23 +16,39 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.coefficients import coefficient
-from robot_dyn.effects.effect import Active, Stateful
-from robot_dyn.errors import EffectError
+from robot_dyn.effects.effect import Active, Stateful, require
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.threshold import Threshold
 
-_SLOW = 1e-6  # of v_s: where a joint moves to and fro more slowly, the bend matters to no digit
+_SLOW = 1e-6  # of v_s: no digit depends on reversals of slower motion
 _REVERSAL = "velocity", "turns positive", "turns negative"
+
+
+class Bristles(Stateful):
+    """Friction with one state for each joint: the deflection z of bristles of stiffness σ, which store ½ σ z²."""
+
+    bristle_stiffness: Any
+
+    def state_size(self, n: int) -> int:
+        return n
+
+    def stored_energy(self, dynamics: Dynamics, t: float, q: Array, z: Array) -> Array:
+        return (self.bristle_stiffness * z**2 / 2).sum(axis=-1)
+
+    def reversals(self, slack: Any, n: int) -> tuple[Threshold, ...]:
+        """Where the velocity of a joint with bristles reverses, passed by the slack, (n,)."""
+        acts, slow = np.broadcast_to(self.bristle_stiffness, n) > 0, np.broadcast_to(slack, n)
+        return tuple(Threshold(i, 0.0, *_REVERSAL, of_velocity=True, slack=slow[i]) for i in range(n) if acts[i])
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class LuGreFriction(Stateful, Active):
+class LuGreFriction(Bristles, Active):
     """Dry friction with a state for each joint, the deflection z of bristles: τ = −(σ₀ z + σ₁ z' + σ₂ v).
 
-    z' = v − σ₀ |v| z / g(v) and g(v) = f_c + (f_s − f_c) exp(−(v/v_s)²). The bristles store ½ σ₀ z² and give it back,
+    z' = v − σ₀ |v| z / g(v) and g(v) = f_c + (f_s − f_c) exp(−(v/v_s)²). The bristles store ½ σ₀ z² and return it,
     so that its power may be positive; it is passive where σ₂ ≥ σ₁ (f_s / f_c − 1) [Barahanov, Ortega 2000]. Its rate
-    bends where v = 0, where steps end, and is stiff: bristles settle within g / (σ₀ |v|) seconds.
+    has a kink at v = 0, where steps end, and is stiff: bristles settle within g / (σ₀ |v|) seconds.
 
     Attributes:
         bristle_stiffness: σ₀, a scalar or (n,), in [N m/rad] or [N/m], not negative.
@@ -54,12 +70,7 @@ class LuGreFriction(Stateful, Active):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        try:
-            less = np.any(np.less(self.breakaway, self.coulomb))
-        except (TypeError, ValueError):  # by name, or of other numbers of joints: checked when the joints are known
-            return
-        if less:
-            raise EffectError(f"breakaway must not be less than coulomb, got {self.breakaway} and {self.coulomb}")
+        require("breakaway must not be less than coulomb", np.greater_equal, self.breakaway, self.coulomb)
 
     @property
     def name(self) -> str:
@@ -70,10 +81,7 @@ class LuGreFriction(Stateful, Active):
         return inf, self.stribeck_velocity
 
     def thresholds(self, n: int) -> tuple[Threshold, ...]:
-        return reversals(self.bristle_stiffness, _SLOW * np.asarray(self.stribeck_velocity), n)
-
-    def state_size(self, n: int) -> int:
-        return n
+        return self.reversals(_SLOW * np.asarray(self.stribeck_velocity), n)
 
     def state_rate(self, dynamics: Dynamics, t: float, q: Array, v: Array, u: Array, z: Array) -> Array:
         return self._rate(v, z)
@@ -86,12 +94,3 @@ class LuGreFriction(Stateful, Active):
         self, dynamics: Dynamics, t: float, q: Array, v: Array, z: Array
     ) -> Array:
         return -(self.bristle_stiffness * z + self.bristle_damping * self._rate(v, z) + self.viscous * v)
-
-    def stored_energy(self, dynamics: Dynamics, t: float, q: Array, z: Array) -> Array:
-        return (self.bristle_stiffness * z**2 / 2).sum(axis=-1)
-
-
-def reversals(stiffness: Any, slack: Any, n: int) -> tuple[Threshold, ...]:
-    """Where the velocity of a joint with bristles of some stiffness turns, passed by the slack, (n,)."""
-    acts, slow = np.broadcast_to(stiffness, n) > 0, np.broadcast_to(slack, n)
-    return tuple(Threshold(i, 0.0, *_REVERSAL, of_velocity=True, slack=slow[i]) for i in range(n) if acts[i])

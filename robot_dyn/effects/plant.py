@@ -1,4 +1,4 @@
-"""Plant: rigid bodies and what acts on them; its queries check their arguments and results."""
+"""Plant: rigid bodies and the effects on them; its queries check their arguments and results."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.arithmetic import FLOAT64, Arithmetic, Array
-from robot_dyn.effects.carried_payload import CarriedPayload, in_hand, known, robot_with
+from robot_dyn.coefficients import with_values
+from robot_dyn.effects.carried_payload import CarriedPayload, robot_with
 from robot_dyn.effects.effect import Bound, Conservative, Effect, Force, Stateful
 from robot_dyn.effects.equation_of_motion import EquationOfMotion
 from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFriction
@@ -29,7 +30,7 @@ class Plant:
 
     Attributes:
         dynamics: The rigid bodies in gravity.
-        effects: What else acts; "urdf" for the friction that the robot's file states, each kind only if it states any.
+        effects: What else acts; "urdf" for the friction in the robot's file, if there is any.
     """
 
     dynamics: Dynamics
@@ -60,16 +61,16 @@ class Plant:
 
     @cached_property
     def equation_of_motion(self) -> EquationOfMotion:
-        """Its equation of motion, of arguments that are not checked."""
+        """Its equation of motion, for arguments that are not checked."""
         return EquationOfMotion(self.dynamics, self.effects)
 
     @cached_property
     def _comes_and_goes(self) -> tuple[CarriedPayload, ...]:
-        """The payloads of which a run knows which are carried, and this plant does not."""
+        """The payloads that come and go: a run fixes which of them are carried."""
         return tuple(each for each in self.effects if isinstance(each, CarriedPayload) and each.carried is None)
 
     def at(self, t: float) -> Plant:
-        """The plant with the payloads that it carries at time t in [s] fixed to it; itself if none comes or goes.
+        """Return the plant with the payloads that it carries at time t, in [s], fixed to it; itself without payloads.
 
         Raises:
             QueryError: If t is not a finite number.
@@ -77,14 +78,14 @@ class Plant:
         t, payloads = number("t", t), self._comes_and_goes
         if not payloads:
             return self
-        held = [each.payload for each in payloads if in_hand(each, t)]
+        carried = [each.payload for each in payloads if each.acts(t)]
         robot: Any = self.dynamics
         others = [each for each in self.effects if each not in payloads]
-        return Plant(robot.with_(payload=held), others)
+        return Plant(robot.with_(payload=carried), others)
 
     def _whenever(self, what: str) -> None:
         if self._comes_and_goes:
-            raise EffectError(f"{what} depends on what is carried, and so on the time: ask plant.at(t), t in [s]")
+            raise EffectError(f"{what} depends on the carried payloads, and so on the time: use plant.at(t), t in [s]")
 
     @property
     def forces(self) -> tuple[Force, ...]:
@@ -92,12 +93,12 @@ class Plant:
         return self.equation_of_motion.forces
 
     def actuation(self, u: Array) -> Array:
-        """What the bounds among the effects leave of the actuation u, (..., n); EffectError if one does not fit."""
+        """Return the actuation after all bounds, for u (..., n); EffectError if one does not fit."""
         (u,) = (u,) if self._is_plain(u) else self._states(u=u)
         return self.equation_of_motion.actuation(u)
 
     def M(self, q: Array) -> Array:
-        """Mass matrix, (..., n, n); EffectError if a payload comes or goes: ask that of `at` a time."""
+        """Mass matrix, (..., n, n); EffectError if a payload comes or goes: use `at` first."""
         self._whenever("M")
         return self.dynamics.M(q)
 
@@ -107,7 +108,7 @@ class Plant:
         return self.dynamics.C(q, v)
 
     def N(self, t: float, q: Array, v: Array) -> Array:
-        """Every force but actuation, as what must be overcome: N = ∂V/∂q − Σ τ_effect, (..., n)."""
+        """All forces but actuation, with the sign of a load: N = ∂V/∂q − Σ τ_effect, (..., n)."""
         return self._finite(self.at(t).equation_of_motion.N(q, self.torque(t, q, v)))
 
     def torque(self, t: float, q: Array, v: Array) -> Array:
@@ -128,7 +129,7 @@ class Plant:
                 return total
         t, (q, v) = number("t", t), self._states(q=q, v=v)
         zeros = np.zeros((*check_batches(q=q, v=v), self.dynamics.n))
-        with self._arithmetic.scope(), np.errstate(all="ignore"):  # what overflows is told in words
+        with self._arithmetic.scope(), np.errstate(all="ignore"):  # overflow is reported as an error
             zeros = zeros if q.dtype != object else self._arithmetic.array(zeros)
             return self._finite(sum(self.equation_of_motion.torques(t, q, v, zeros.shape), start=zeros))
 
@@ -145,11 +146,10 @@ class Plant:
         q, v = self._states(q=q, v=v)
         batch, n = check_batches(q=q, v=v, u=total), self.dynamics.n
         rows = zip(*(np.broadcast_to(x, (*batch, n)).reshape(-1, n) for x in (q, v, total)), strict=True)
-        made = [equation.acceleration(*row) for row in rows]
-        return np.array(made).reshape(*batch, n)
+        return np.array([equation.acceleration(*row) for row in rows]).reshape(*batch, n)
 
     def held(self, t: float, q: Array, v: Array, u: Array) -> tuple[Hold, ...]:
-        """The joints that dry friction and rigid stops hold in one state, each with its load and what it would bear.
+        """Return the joints that dry friction and rigid stops hold in one state, with load and break-away loads.
 
         Args:
             t: Time, in [s].
@@ -159,7 +159,7 @@ class Plant:
 
         Raises:
             QueryError: If an argument has another shape or is not finite.
-            EffectError: If which joints are held is not decided in the arithmetic of the dynamics.
+            EffectError: If the arithmetic of the dynamics does not decide which joints are held.
         """
         q, v, u = self._states(q=q, v=v, u=u)
         if any(x.shape != (self.dynamics.n,) for x in (q, v, u)):
@@ -173,7 +173,7 @@ class Plant:
 
     @cached_property
     def _shape(self) -> tuple[int] | None:
-        """Shape of one state, of which the checks are short; None if it has to be made of other numbers."""
+        """Shape of one state for the short checks; None if states are converted to another arithmetic."""
         return (self.dynamics.n,) if self._arithmetic == FLOAT64 else None
 
     def _is_plain(self, x: Any) -> bool:
@@ -190,24 +190,24 @@ class Plant:
 
 
 def carrying(plant: Plant, carried: Sequence[bool]) -> Plant:
-    """The plant of a run with these of its payloads in its bodies; its other effects are the same."""
+    """Return the plant of a run that carries these of its payloads."""
     payloads = plant.equation_of_motion.payloads
-    of = {each: known(each, taken) for each, taken in zip(payloads, carried, strict=True)}
+    of = {each: with_values(each, {"carried": taken}) for each, taken in zip(payloads, carried, strict=True)}
     effects = [of[each] if isinstance(each, CarriedPayload) else each for each in plant.effects]
     return Plant(robot_with(plant.dynamics, payloads, carried), effects)
 
 
 def in_mode(plant: Plant, mode: Mode) -> Plant:
-    """The plant in a mode of what may hold its joints."""
+    """Return the plant in a mode of its set-valued effects."""
     effects = [each.in_mode(mode) if isinstance(each, SetValued) else each for each in plant.effects]
     return Plant(plant.dynamics, effects)
 
 
 def stated_friction(dynamics: Any) -> tuple[Effect, ...]:
-    """The friction that the file of a robot states.
+    """Return the friction in the file of a robot.
 
     Raises:
-        EffectError: If the dynamics comes from no file.
+        EffectError: If the dynamics does not come from a file.
     """
     try:
         damping, friction = dynamics.damping, dynamics.friction

@@ -8,7 +8,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, final
 
@@ -16,30 +15,30 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.coefficients import coefficient, with_values
-from robot_dyn.effects.effect import Drive
+from robot_dyn.effects.effect import require
+from robot_dyn.effects.geared_motor import GearedMotor
 from robot_dyn.effects.set_valued import Interval, Mode, SetValued
-from robot_dyn.errors import EffectError
 from robot_dyn.queries.dynamics import Dynamics
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class RigidBacklash(Drive, SetValued):
+class RigidBacklash(GearedMotor, SetValued):
     """Joints that a motor drives through a rigid gear with a gap: |δ| ≤ β, δ = θ − q, and δ̇⁺ = −e δ̇⁻ at its ends.
 
     A run starts in the middle of the gap, δ = 0, with motors that move with their joints. The actuation u of such a
     joint is the torque of its motor behind the gear, n times that at the rotor. Steps end where an end of the gap is
-    struck or left. States are δ of each of these joints, then δ̇, θ̇ and the impulse of the contact in the latest step.
+    reached or left. States are δ of each of these joints, then δ̇, θ̇ and the impulse of the contact in the latest step.
 
-    In the energy ledger the work of the control is done on the motors, which store ½ n² J θ̇². The rotors turn about
-    the axes of their joints alone: that they move with the arm is left out.
+    In the energy ledger the work of the control is done on the motors, which store ½ n² J θ̇². The motion of the rotors
+    with the arm is neglected.
 
     Attributes:
         gap: β, to each side, a scalar or (n,), in [rad] or [m], not negative; joints of gap 0 are driven directly.
         inertia: J of the rotor, in [kg m²], or [kg] for a prismatic joint, positive.
-        ratio: n of the gear; 1 unless given.
-        restitution: e, a scalar or (n,), 0 to 1; 0 unless given.
-        viscous: b of the motor behind the gear, in [N m s/rad] or [N s/m], not negative; 0 unless given.
+        ratio: n of the gear; 1 by default.
+        restitution: e, a scalar or (n,), 0 to 1; 0 by default.
+        viscous: b of the motor behind the gear, in [N m s/rad] or [N s/m], not negative; 0 by default.
     """
 
     gap: Any = field(metadata=coefficient("rad", symbol="β", least=0))
@@ -53,28 +52,12 @@ class RigidBacklash(Drive, SetValued):
     _contact: Any = field(default=None, init=False, repr=False, metadata=coefficient(swept=False))
 
     coupled: ClassVar[bool] = True
+    through = "gap"
     term = "|δ| ≤ β, δ = θ − q, δ̇⁺ = −e δ̇⁻, n² J θ̈ = u − b θ̇ within"
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if isinstance(self.restitution, float | np.ndarray) and np.any(np.greater(self.restitution, 1)):
-            raise EffectError(f"restitution must not be greater than 1, got {self.restitution}")
-
-    def on(self, dynamics: Any) -> RigidBacklash:
-        made: Any = super().on(dynamics)
-        driven = np.flatnonzero(np.broadcast_to(made.gap, dynamics.n) > 0)
-        if not len(driven):
-            raise EffectError("rigid_backlash: gap is 0 for all joints; give a positive one, or leave it out")
-        return with_values(made, {"joints": tuple(driven.tolist())})
-
-    @property
-    def _driven(self) -> list[int]:
-        if self.joints is None:
-            raise EffectError("rigid_backlash: its joints are known in a plant; ask that")
-        return list(self.joints)
-
-    def driven(self, n: int) -> Sequence[int]:
-        return self._driven
+        require("restitution must not be greater than 1", lambda e: e <= 1, self.restitution)
 
     def speeds(self, z: Array) -> Array:
         k = len(self._driven)
@@ -93,15 +76,6 @@ class RigidBacklash(Drive, SetValued):
     def start(self, dynamics: Dynamics, q: Array, v: Array) -> Array:
         v = v[..., self._driven]
         return np.concatenate([0 * v, 0 * v, v, 0 * v], axis=-1)
-
-    def of(self, name: str, n: int) -> Array:
-        """A coefficient of its joints, (k,)."""
-        return np.broadcast_to(getattr(self, name), (n,), subok=True)[self._driven]
-
-    def reflected(self, n: int) -> Array:
-        """The inertia of the motors behind the gear, n² J, (k,)."""
-        J = self.of("inertia", n)
-        return J if self.ratio is None else self.of("ratio", n) ** 2 * J
 
     def drag(self, n: int, z: Array) -> Array:
         """The friction b θ̇ of the motors, (k,)."""
@@ -130,10 +104,10 @@ class RigidBacklash(Drive, SetValued):
     def torque(  # pyright: ignore[reportIncompatibleMethodOverride]  with its states
         self, dynamics: Dynamics, t: float, q: Array, v: Array, z: Array
     ) -> Array:
-        made = 0 * v
+        torque = 0 * v
         if self.viscous is not None and self._contact is not None:
-            made[self._driven] = -self._touching(dynamics.n) * self.drag(dynamics.n, z)
-        return made
+            torque[self._driven] = -self._touching(dynamics.n) * self.drag(dynamics.n, z)
+        return torque
 
     def power(self, v: Array, u: Array, torque: Array, z: Array, a: Array) -> Array:
         n, d = len(v), self._driven

@@ -1,4 +1,4 @@
-"""Rigid joint stops: a joint never passes them; it bounces off with a restitution, or comes to rest and is held."""
+"""Rigid joint stops: a joint never passes them; it bounces with a restitution, or comes to rest and is held."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.coefficients import coefficient, with_values
+from robot_dyn.effects.effect import require
+from robot_dyn.effects.joint_limit import LOWER, UPPER
 from robot_dyn.effects.set_valued import Interval, Mode, SetValued
-from robot_dyn.errors import EffectError
 from robot_dyn.queries.dynamics import Dynamics
 
 _NEAR = 4e-15  # of a stop, or in its unit: as close as rounding leaves an event
@@ -20,19 +21,19 @@ _NEAR = 4e-15  # of a stop, or in its unit: as close as rounding leaves an event
 @final
 @dataclass(frozen=True, eq=False)
 class RigidStops(SetValued):
-    """Stops that are not passed: lower ≤ q ≤ upper, with Newton's law v⁺ = −e v⁻ for each one that is struck.
+    """Stops that are never passed: lower ≤ q ≤ upper, with Newton's law v⁺ = −e v⁻ for each one that is struck.
 
-    All that strike or touch at one time are solved together, and no impact adds energy. At rest at a stop the torque
-    is any that pushes away from it. [Moreau 1988; Glocker, Set-Valued Force Laws, 2001]
+    Simultaneous impacts and contacts are solved together, and no impact adds energy. At rest at a stop the torque may
+    have any size, directed away from it. [Moreau 1988; Glocker, Set-Valued Force Laws, 2001]
 
     Attributes:
         lower: Position of the lower stop, −inf for none, a scalar or (n,), in [rad] or [m]; "urdf" for the file's.
         upper: Position of the upper stop, inf for none, above the lower one.
-        restitution: e, a scalar or (n,), 0 to 1; 0 unless given.
+        restitution: e, a scalar or (n,), 0 to 1; 0 by default.
     """
 
-    lower: Any = field(metadata=coefficient("rad", symbol="Lower stop", infinite=True, elsewhere=-inf, stated="lower"))
-    upper: Any = field(metadata=coefficient("rad", symbol="Upper stop", infinite=True, elsewhere=inf, stated="upper"))
+    lower: Any = field(metadata=LOWER)
+    upper: Any = field(metadata=UPPER)
     restitution: Any = field(default=0.0, metadata=coefficient(symbol="e", least=0))
 
     held: Any = field(default=None, init=False, repr=False, metadata=coefficient(swept=False))
@@ -42,16 +43,8 @@ class RigidStops(SetValued):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if isinstance(self.restitution, float | np.ndarray) and np.any(np.greater(self.restitution, 1)):
-            raise EffectError(f"restitution must not be greater than 1, got {self.restitution}")
-        if isinstance(self.lower, str) or isinstance(self.upper, str):  # checked when the joints are known
-            return
-        try:
-            crossed = not np.all(np.less(self.lower, self.upper))
-        except (TypeError, ValueError):  # by name, or of other numbers of joints: so are these
-            return
-        if crossed:
-            raise EffectError(f"lower stops must lie below upper ones, got {self.lower} and {self.upper}")
+        require("restitution must not be greater than 1", lambda e: e <= 1, self.restitution)
+        require("lower stops must lie below upper ones", np.less, self.lower, self.upper)
 
     def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
         return 0 * v
@@ -64,24 +57,24 @@ class RigidStops(SetValued):
         return Interval(np.where(side > 0, -inf, 0.0), np.where(side < 0, inf, 0.0))
 
     def bounds(self, q: Array, v: Array) -> tuple[Array, Array]:
-        # Newton's law where a joint approaches; one that leaves is turned round at most, so that r (v + v⁺) / 2 is 0
+        # Newton's law where a joint approaches; one that leaves is reversed at most, so that r (v + v⁺) / 2 is 0
         back = -self.restitution * v
         lower = np.where(q <= self.lower + 0 * q, np.minimum(back, -v), 0 * v - inf)
         return lower, np.where(q >= self.upper + 0 * q, np.maximum(back, -v), 0 * v + inf)
 
     def touched(self, q: np.ndarray) -> np.ndarray:
-        """−1 for each joint at its lower stop, to rounding, or beyond it, 1 at the upper one, 0 elsewhere, (n,)."""
+        """−1 for each joint at its lower stop, to rounding, or past it, 1 at the upper one, 0 elsewhere, (n,)."""
         lower, upper = (touching(level, side) for level, side in zip(self._levels(q), (-1, 1), strict=True))
         return np.where(q <= lower, -1, np.where(q >= upper, 1, 0))
 
-    def beyond_by(self, q: np.ndarray) -> np.ndarray:
-        """How far each joint is beyond a stop, more than by rounding, (n,); 0 for the others."""
+    def penetration(self, q: np.ndarray) -> np.ndarray:
+        """Depth of each joint past a stop if it is more than rounding, (n,); 0 for the others."""
         lower, upper = self._levels(q)
         depth = np.maximum(lower - q, q - upper)
         return np.where(depth > _near(np.where(q < lower, lower, upper)), depth, 0.0)
 
     def snapped(self, q: np.ndarray) -> np.ndarray:
-        """The same position with each joint that touches a stop exactly there."""
+        """Return the position with each joint that touches a stop exactly there."""
         lower, upper = self._levels(q)
         side = self.touched(q)
         return np.where(side < 0, lower, np.where(side > 0, upper, q))

@@ -3,12 +3,12 @@
     n² J θ̈ = u − k δ − d δ̇ − b θ̇,     τ = k δ + d δ̇
 
 θ is the motor's angle behind the gear, u its torque there, n times that of the motor. The rotor turns about the joint's
-axis alone: that it moves with the arm is left out. [Spong 1987; Albu-Schäffer, Ott, Hirzinger 2007]
+axis alone: its motion with the arm is neglected. [Spong 1987; Albu-Schäffer, Ott, Hirzinger 2007]
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, final
 
@@ -16,8 +16,8 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array, positive_part
 from robot_dyn.coefficients import coefficient, with_values
-from robot_dyn.effects.effect import Dissipative, Drive
-from robot_dyn.errors import EffectError
+from robot_dyn.effects.effect import Dissipative
+from robot_dyn.effects.geared_motor import GearedMotor
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.threshold import Threshold
 
@@ -27,24 +27,24 @@ _BACKWARD = ("backward side of the backlash", "left", "touched")
 
 @final
 @dataclass(frozen=True, eq=False)
-class SeriesElastic(Drive, Dissipative):
+class SeriesElastic(GearedMotor, Dissipative):
     """Joints that a motor drives through a gear, a spring and a damper: τ = k δ + d δ̇, n² J θ̈ = u − τ − b θ̇.
 
     δ = θ − q is the deflection of the spring, θ the angle of the motor behind the gear; states are δ of each of these
     joints, then θ̇. A run starts with relaxed springs, δ = 0, and motors that move with their joints. The actuation u
     of such a joint is the torque of its motor behind the gear, n times that at the rotor. With a backlash β the spring
-    has no torque while |δ| ≤ β; the damper acts there, too.
+    has no torque while |δ| ≤ β; the damper acts there as well.
 
     In the energy ledger the work of the control is done on the motors, and what the motors and springs store is
-    ½ n² J θ̇² + ½ k δ². The rotors turn about the axes of their joints alone: that they move with the arm is left out.
+    ½ n² J θ̇² + ½ k δ². The motion of the rotors with the arm is neglected.
 
     Attributes:
         stiffness: k, a scalar or (n,), in [N m/rad] or [N/m], not negative; joints of stiffness 0 are driven directly.
         inertia: J of the rotor, in [kg m²], or [kg] for a prismatic joint, positive.
-        ratio: n of the gear; 1 unless given.
-        damping: d of the spring, in [N m s/rad] or [N s/m], not negative; 0 unless given.
-        friction: b of the motor behind the gear, in [N m s/rad] or [N s/m], not negative; 0 unless given.
-        backlash: β, to each side, in [rad] or [m], not negative; 0 unless given.
+        ratio: n of the gear; 1 by default.
+        damping: d of the spring, in [N m s/rad] or [N s/m], not negative; 0 by default.
+        friction: b of the motor behind the gear, in [N m s/rad] or [N s/m], not negative; 0 by default.
+        backlash: β, to each side, in [rad] or [m], not negative; 0 by default.
     """
 
     stiffness: Any = field(metadata=coefficient("N m/rad", symbol="k", least=0))
@@ -57,19 +57,13 @@ class SeriesElastic(Drive, Dissipative):
     joints: tuple[int, ...] | None = field(default=None, init=False, repr=False)
     _side: Any = field(default=None, init=False, repr=False, metadata=coefficient(swept=False))
 
+    through = "stiffness"
     term = "k δ + d δ̇, n² J θ̈ = u − k δ − d δ̇ − b θ̇, δ = θ − q"
-
-    def on(self, dynamics: Any) -> SeriesElastic:
-        made: Any = super().on(dynamics)
-        driven = np.flatnonzero(np.broadcast_to(made.stiffness, dynamics.n) > 0)
-        if not len(driven):
-            raise EffectError("series_elastic: stiffness is 0 for all joints; give a positive one, or leave it out")
-        return with_values(made, {"joints": tuple(driven.tolist())})
 
     def thresholds(self, n: int) -> tuple[Threshold, ...]:
         if self.backlash is None:
             return ()
-        gaps = self._of(self.backlash, n)
+        gaps = self.of("backlash", n)
         return tuple(
             Threshold(i, way * float(gaps[k]), *words, state=k)
             for way, words in ((1, _FORWARD), (-1, _BACKWARD))
@@ -77,7 +71,7 @@ class SeriesElastic(Drive, Dissipative):
             if gaps[k] > 0
         )
 
-    def beyond(self, n: int, sides: Mapping[Threshold, int]) -> SeriesElastic:
+    def on_side(self, n: int, sides: Mapping[Threshold, int]) -> SeriesElastic:
         if self.backlash is None:
             return self
         side = np.zeros(n)
@@ -86,15 +80,6 @@ class SeriesElastic(Drive, Dissipative):
             side[each.joint] += way * (passed == way)
         return with_values(self, {"_side": side})
 
-    @property
-    def _driven(self) -> Sequence[int]:
-        if self.joints is None:
-            raise EffectError("series_elastic: its joints are known in a plant; ask that")
-        return self.joints
-
-    def driven(self, n: int) -> Sequence[int]:
-        return self._driven
-
     def speeds(self, z: Array) -> Array:
         return z[len(self._driven) :]
 
@@ -102,49 +87,40 @@ class SeriesElastic(Drive, Dissipative):
         return 2 * len(self._driven)
 
     def start(self, dynamics: Dynamics, q: Array, v: Array) -> Array:
-        v = v[..., list(self._driven)]
+        v = v[..., self._driven]
         return np.concatenate([0 * v, v], axis=-1)
 
     def state_rate(self, dynamics: Dynamics, t: float, q: Array, v: Array, u: Array, z: Array) -> Array:
         n, speed = dynamics.n, self.speeds(z)
         load = self._torque(n, v, z)
         if self.friction is not None:
-            load = load + self._of(self.friction, n) * speed
-        return np.concatenate([speed - v[list(self._driven)], (u[list(self._driven)] - load) / self._inertia(n)])
+            load = load + self.of("friction", n) * speed
+        return np.concatenate([speed - v[self._driven], (u[self._driven] - load) / self.reflected(n)])
 
     def torque(  # pyright: ignore[reportIncompatibleMethodOverride]  with its states
         self, dynamics: Dynamics, t: float, q: Array, v: Array, z: Array
     ) -> Array:
-        made = 0 * v
-        made[..., list(self._driven)] = self._torque(dynamics.n, v, z)
-        return made
+        torque = 0 * v
+        torque[..., self._driven] = self._torque(dynamics.n, v, z)
+        return torque
 
     def stored_energy(self, dynamics: Dynamics, t: float, q: Array, z: Array) -> Array:
-        n, k = dynamics.n, self._of(self.stiffness, dynamics.n)
-        return (self._inertia(n) * self.speeds(z) ** 2 / 2 + k * self._stretch(n, z) ** 2 / 2).sum(axis=-1)
-
-    def _of(self, values: Any, n: int) -> Array:
-        """Numbers of its joints."""
-        return np.broadcast_to(values, (n,), subok=True)[list(self._driven)]
-
-    def _inertia(self, n: int) -> Array:
-        """The inertia behind the gear, n² J."""
-        J = self._of(self.inertia, n)
-        return J if self.ratio is None else self._of(self.ratio, n) ** 2 * J
+        n, k = dynamics.n, self.of("stiffness", dynamics.n)
+        return (self.reflected(n) * self.speeds(z) ** 2 / 2 + k * self._stretch(n, z) ** 2 / 2).sum(axis=-1)
 
     def _stretch(self, n: int, z: Array) -> Array:
         """Deflection of the springs, without backlash."""
         deflection = z[..., : len(self._driven)]
         if self.backlash is None:
             return deflection
-        gap = self._of(self.backlash, n)
+        gap = self.of("backlash", n)
         if self._side is None:
             return positive_part(deflection - gap) - positive_part(-gap - deflection)
-        side = self._of(self._side, n)
+        side = self.of("_side", n)
         return side**2 * deflection - side * gap
 
     def _torque(self, n: int, v: Array, z: Array) -> Array:
-        torque = self._of(self.stiffness, n) * self._stretch(n, z)
+        torque = self.of("stiffness", n) * self._stretch(n, z)
         if self.damping is None:
             return torque
-        return torque + self._of(self.damping, n) * (z[..., len(self._driven) :] - v[..., list(self._driven)])
+        return torque + self.of("damping", n) * (z[..., len(self._driven) :] - v[..., self._driven])

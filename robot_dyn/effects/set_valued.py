@@ -1,40 +1,41 @@
-"""Effects that hold a joint: where it rests, their torque is any of an interval, that which keeps it there.
+"""Effects that hold joints: at rest their torque may be any of an interval, and is the one that keeps the joint there.
 
     τ ∈ −F(v):   one value where v ≠ 0,   an interval where v = 0
 
-A run knows at each time which joints they hold, and in which direction the others slide: its mode. Within a mode the
-equation of motion is smooth; where a torque would leave its interval, or a velocity reaches 0, the mode changes.
+The mode of a run is which joints they hold, and in which direction the others slide. Within a mode the equation of
+motion is smooth; where a torque would leave its interval, or a velocity reaches 0, the mode changes.
 [Moreau 1988; Glocker, Set-Valued Force Laws, 2001]
 """
 
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import count
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.convex import not_found
+from robot_dyn.convex import LARGE, not_found
 from robot_dyn.effects.effect import Dissipative
 from robot_dyn.effects.settling import settle, settling
 from robot_dyn.threshold import smooth
 
 
 class Interval(NamedTuple):
-    """What an effect may exert on joints at rest, each (n,), in [N m] or [N]; (0, 0) where it does not act."""
+    """Bounds of the torque on joints at rest, each (n,), in [N m] or [N]; (0, 0) where the effect does not act."""
 
     least: np.ndarray
     most: np.ndarray
 
 
 class Mode(NamedTuple):
-    """What is held, and which way the others slide, each (n,).
+    """Which joints are held, and in which direction the others slide, each (n,).
 
     Attributes:
         held: 1 for each joint that is held, 0 for the others.
-        direction: 1 or −1 for each joint that slides or is about to; 0 for those held, and those that nothing can hold.
+        direction: 1 or −1 for each joint that slides or is about to; 0 for held ones and those that nothing holds.
         contact: 1 or −1 where the motor of a joint rests at an end of its backlash, else 0; None for 0 everywhere.
     """
 
@@ -47,7 +48,7 @@ class SetValued(Dissipative):
     """An effect with a mode.
 
     Attributes:
-        held: 1 for each joint that it holds and 0 for the others, (n,); None where no run has chosen a mode.
+        held: 1 for each joint that is held and 0 for the others, (n,); None before a mode is chosen.
         rubs, stops: Whether it is friction, and whether it has `bounds`, for time stepping.
     """
 
@@ -55,18 +56,18 @@ class SetValued(Dissipative):
     rubs: ClassVar[bool] = False
     stops: ClassVar[bool] = False
 
-    thresholds = smooth  # but where its mode ends
+    thresholds = smooth  # within a mode
 
     @abstractmethod
     def in_mode(self, mode: Mode) -> SetValued:
-        """The effect in a mode of the plant: smooth in q and v."""
+        """Return the effect in a mode of the plant: smooth in q and v."""
 
     def sliding(self, v: Array) -> Array:
-        """Its friction where joints slide, not negative, (..., n); 0 unless it says otherwise."""
+        """Friction of sliding joints, not negative, (..., n); 0 by default."""
         return 0 * v
 
     def friction(self, v: Array) -> Array:
-        """Its friction at most, at the velocity at the start of a step, (n,)."""
+        """Greatest friction, at the velocity at the start of a step, (n,)."""
         return 0 * v
 
     def bounds(self, q: Array, v: Array) -> tuple[Array, Array]:
@@ -75,7 +76,7 @@ class SetValued(Dissipative):
 
     @abstractmethod
     def at_rest(self, q: np.ndarray) -> Interval:
-        """What it may exert on joints whose velocity is 0, at q; the same at all q but for stops."""
+        """Interval of its torque on joints of velocity 0, at q; it depends on q for stops alone."""
 
 
 def settled(
@@ -86,12 +87,12 @@ def settled(
     v: np.ndarray,
     forced: Mapping[int, int] | None = None,
 ) -> tuple[np.ndarray, Mode]:
-    """The acceleration of least constraint, (n,), and the mode from there on; joints that stay at rest have exactly 0.
+    """Return the acceleration of least constraint, (n,), and the mode that follows; see `settling`.
 
-    As of `settling`.
+    Joints that stay at rest have exactly 0.
 
     Args:
-        effects: What may hold joints.
+        effects: The set-valued effects.
         M: Mass matrix, (n, n).
         load: All other torques less C v and ∂V/∂q, with the friction of the joints that slide, (n,).
         q: Position, (n,).
@@ -106,7 +107,48 @@ def settled(
     for i, way in (forced or {}).items():
         let_go[i] = way
     with np.errstate(all="ignore"):
-        found = settle(M, load, least, most, slides, v, let_go, a, held, direction, settling(n))
-    if not found:
+        solved = settle(M, load, least, most, slides, v, let_go, a, held, direction, settling(n))
+    if not solved:
         raise not_found(M, load)
     return a, Mode(held, direction)
+
+
+def in_a_step(effects: Sequence[SetValued], q: Array, v: Array) -> tuple[Array, Array, Array, list[Array]]:
+    """Greatest friction, bounds of v⁺, and shares of effects, for a step of time stepping with the middle q.
+
+    Shares are those of each of several effects with friction in it, and of each of several with bounds, (n,).
+    """
+    rub, stop = [[x for x in effects if getattr(x, of)] for of in ("rubs", "stops")]
+    levels, bounds = [x.friction(v) for x in rub], [x.bounds(q, v) for x in stop]
+    friction = sum(levels, start=0 * v)
+    lower, upper = 0 * v - np.inf, 0 * v + np.inf
+    for low, high in bounds:
+        lower, upper = np.maximum(lower, low), np.minimum(upper, high)
+    shares: list[Array] = []
+    if len(rub) > 1:
+        shares += [np.where(friction > 0, level / np.where(friction > 0, friction, 1.0), 0 * v) for level in levels]
+    if len(stop) > 1:
+        left = 1 + 0 * v
+        for low, high in bounds:
+            below = np.logical_and(low > -LARGE, low >= lower)
+            touches = np.logical_or(below, np.logical_and(high < LARGE, high <= upper))
+            shares.append(np.where(touches, left, 0 * v))
+            left = left - shares[-1]
+    return friction, lower, upper, shares
+
+
+def impulses_of(effects: Sequence[SetValued], rubbing: Array, stopping: Array, shares: Array) -> Iterator[Array]:
+    """Impulse of each effect, from the total impulses of friction and of stops, by consecutive shares."""
+    n = len(rubbing)
+    rub, stop = (sum(getattr(x, of) for x in effects) for of in ("rubs", "stops"))
+    each_n = (shares[k * n : (k + 1) * n] for k in count())
+    of_rub = [next(each_n) for _ in range(rub)] if rub > 1 else [np.ones(n)]
+    of_stop = [next(each_n) for _ in range(stop)] if stop > 1 else [np.ones(n)]
+    rubs, stops = iter(of_rub), iter(of_stop)
+    for each in effects:
+        impulse = 0 * rubbing
+        if each.rubs:
+            impulse = impulse + next(rubs) * rubbing
+        if each.stops:
+            impulse = impulse + next(stops) * stopping
+        yield impulse

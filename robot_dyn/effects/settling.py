@@ -1,9 +1,9 @@
-"""What rests and what slides from now on: the acceleration of least constraint, and the mode that follows from it.
+"""Which joints stick and which slide: the acceleration of least constraint, and the mode that follows from it.
 
-    a = argmin ½ (a − M⁻¹ load)ᵀ M (a − M⁻¹ load) + Σ fᵢ |aᵢ|   over joints at rest, at stops on the free side
+    a = argmin ½ (a − M⁻¹ load)ᵀ M (a − M⁻¹ load) + Σ fᵢ |aᵢ|   over joints at rest, away from stops
 
-Where friction of rest is above that of sliding, joints break away one by one, the one of most energy first, and the
-others are solved again; one that would move the other way then is taken back, and rests on. Plain functions of arrays,
+Where static friction exceeds sliding friction, joints break away one by one, that of the greatest energy first, and
+the problem is solved again; a joint that would then move the other way is restored to rest. Plain functions of arrays,
 as `convex.active_set`. [Moreau 1988; Glocker, Set-Valued Force Laws, 2001]
 """
 
@@ -20,14 +20,14 @@ _ROUNDING = 1e-12  # of the accelerations that add up
 
 
 class Settling(NamedTuple):
-    """Room for `settle` of n joints.
+    """Work arrays of `settle` for n joints.
 
     Attributes:
         p, f, lower, upper, place: Of the convex problem, (n,).
         rests: 1 for each joint that may stay at rest, (n,).
-        friction: What holds it there, (n,).
-        back: 1 for each joint that broke away and was taken back, (n,).
-        size: Of what cancels in its acceleration, (n,).
+        friction: Friction that holds it there, (n,).
+        back: 1 for each joint that broke away and was restored to rest, (n,).
+        size: Size of the terms that cancel in its acceleration, (n,).
         L: For the active set, (n + 1, n); wider for n = 1, since machine code has a type for arrays of one column.
     """
 
@@ -44,7 +44,7 @@ class Settling(NamedTuple):
 
 
 def settling(n: int) -> Settling:
-    """Room for n joints."""
+    """Return work arrays for n joints."""
     return Settling._make([*np.zeros((9, n)), np.zeros((n + 1, max(n, 2)))])
 
 
@@ -52,20 +52,20 @@ def settle(
     M: Array, load: Array, least: Array, most: Array, slides: Array, v: Array, forced: Array, a: Array, held: Array,
     direction: Array, room: Settling,
 ) -> bool:  # fmt: skip
-    """Write the acceleration, 0 for joints that stay at rest, and the mode from there on; whether it was found.
+    """Write the acceleration, 0 for joints that stay at rest, and the mode; return whether they were found.
 
     Args:
         M: Mass matrix, (n, n).
-        load: All torques but those of rest, less C v and ∂V/∂q, (n,).
-        least: The least that may act on a joint at rest, (n,).
-        most: The most, (n,).
+        load: All torques but those on joints at rest, less C v and ∂V/∂q, (n,).
+        least: Least torque on a joint at rest, (n,).
+        most: Greatest, (n,).
         slides: Friction where sliding begins, (n,).
         v: Velocity, (n,).
-        forced: The direction of joints at rest that are known to break away, (n,); becomes that of all that do.
-        a: Where the acceleration goes, (n,).
-        held: Where the mode goes: 1 for each joint that is held, (n,).
-        direction: Where its direction goes: 1 or −1 for each joint that slides or is about to, (n,).
-        room: Room to work.
+        forced: The direction of joints at rest that are known to break away, (n,); all that do are added.
+        a: Output: the acceleration, (n,).
+        held: Output: 1 for each joint that is held, (n,).
+        direction: Output: 1 or −1 for each joint that slides or is about to, (n,).
+        room: Work arrays.
     """
     for i in range(len(v)):
         rests = v[i] == 0.0 and (least[i] < 0.0 or most[i] > 0.0)
@@ -73,7 +73,7 @@ def settle(
         room.rests[i], room.friction[i], room.back[i] = 1.0 if rests else 0.0, held_by if rests else 0.0, 0.0
         room.lower[i] = 0.0 if rests and most[i] == np.inf else -np.inf
         room.upper[i] = 0.0 if rests and least[i] == -np.inf else np.inf
-    while True:  # each joint breaks away once, and is taken back once, at most
+    while True:  # each joint breaks away and is restored at most once
         for i in range(len(v)):
             room.p[i] = load[i] - slides[i] * forced[i]
             room.f[i] = room.friction[i] if forced[i] == 0.0 else 0.0
@@ -90,7 +90,7 @@ def settle(
 
 
 def least_value(M: Array, room: Settling, x: Array) -> bool:
-    """Write the minimum of the convex problem in `room`; whether there is one, of finite numbers."""
+    """Write the minimum of the convex problem in `room`; return whether there is one, of finite numbers."""
     total = 0.0
     if not active_set(M, room.p, room.f, room.lower, room.upper, x, room.place, room.L):
         return False
@@ -100,7 +100,7 @@ def least_value(M: Array, room: Settling, x: Array) -> bool:
 
 
 def taken_back(M: Array, load: Array, forced: Array, a: Array, room: Settling) -> bool:
-    """Take back the joints that broke away and would move the other way, beyond rounding; whether there are any."""
+    """Restore the joints that broke away and would move the other way, by more than rounding; whether there are any."""
     against, largest, found = False, 0.0, False
     for i in range(len(a)):
         against = against or a[i] * forced[i] < 0.0
@@ -138,7 +138,7 @@ def weigh(M: Array, load: Array, room: Settling) -> None:
 
 
 def broken_away(M: Array, slides: Array, forced: Array, a: Array, room: Settling) -> bool:
-    """Let one joint break away: that of most energy of those that move and slide less easily; whether there is one."""
+    """Let the joint of greatest energy break away, of those with less sliding friction; whether there is one."""
     which, most = -1, -1.0
     for i in range(len(a)):
         known = forced[i] != 0.0 or room.back[i] != 0.0

@@ -11,10 +11,9 @@ import numpy as np
 from robot_dyn.arithmetic import Array, transpose
 from robot_dyn.arithmetic import apply as times
 from robot_dyn.coefficients import coefficient
-from robot_dyn.effects.effect import Active
-from robot_dyn.errors import EffectError, QueryError
+from robot_dyn.effects.effect import Active, Timed, check_frame
+from robot_dyn.errors import EffectError
 from robot_dyn.queries.dynamics import Axes, Dynamics
-from robot_dyn.threshold import smooth
 from robot_dyn.validate import instance, rows
 
 _TIME = coefficient("s", shapes=((),), infinite=True, swept=False)
@@ -22,13 +21,13 @@ _TIME = coefficient("s", shapes=((),), infinite=True, swept=False)
 
 @final
 @dataclass(frozen=True, eq=False)
-class ExternalWrench(Active):
+class ExternalWrench(Timed, Active):
     """A force and a torque on a link: τ = Jᵀ F, with F and J in the same axes.
 
     Attributes:
         frame: The link.
         wrench: F = (force, torque), (6,), in [N] and [N m].
-        expressed_in: "world_aligned": at the frame's origin, base axes; "body": its own axes; "world": at the base.
+        expressed_in: "world_aligned": at the frame's origin, base axes; "body": its axes; "world": at the base.
         start_s: When it starts, in [s].
         end_s: When it ends, in [s]; it acts for start_s ≤ t < end_s.
     """
@@ -40,36 +39,21 @@ class ExternalWrench(Active):
     end_s: float = field(default=inf, metadata=_TIME)
 
     term = "Jᵀ F"
-    thresholds = smooth
 
     def __post_init__(self) -> None:
         instance("frame", self.frame, str, "give the name of a link", error=EffectError)
         super().__post_init__()
-        if not self.start_s < self.end_s:
-            raise EffectError(f"end_s must lie after start_s, got {self.start_s} and {self.end_s}")
         object.__setattr__(self, "expressed_in", Axes.of(self.expressed_in))
 
     def on(self, dynamics: Any) -> ExternalWrench:
-        try:
-            dynamics.placement(np.zeros(dynamics.n), self.frame)  # so that an unknown link is told now
-        except QueryError as error:
-            raise EffectError(f"external_wrench: {error}") from None
+        check_frame(self, dynamics, self.frame)
         return self
-
-    @property
-    def switches(self) -> tuple[float, ...]:
-        return self.start_s, self.end_s
 
     def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
         if not self.start_s <= t < self.end_s:
             return 0 * v
         J = dynamics.jacobian(q, self.frame, expressed_in=self.expressed_in)
         return times(transpose(J), self.wrench)
-
-    def acts(self, t: Array) -> Array:
-        """Whether it acts at times t (...,)."""
-        t = rows("t", t)
-        return (self.start_s <= t) & (t < self.end_s)
 
     def at(self, placement: Array) -> Array:
         """The wrench in base axes at the frame's origin, (..., 6), where the frame is placed at (..., 4, 4)."""

@@ -6,20 +6,18 @@ II, 2nd ed., 1996, IV.8]
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from enum import Enum
 from math import inf
 from types import MappingProxyType
-from typing import Any, ClassVar, cast, final
+from typing import Any, ClassVar, final
 
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.errors import OverflowedError, QueryError, RobotDynError
-from robot_dyn.foreign import is_mistake
+from robot_dyn.errors import QueryError
 from robot_dyn.integrate import dop853
-from robot_dyn.integrate.controlled_steps import ControlledSteps
+from robot_dyn.integrate.controlled_steps import Status, Steps
 from robot_dyn.integrate.integrator import System
 from robot_dyn.integrate.rosenbrock import ROSENBROCK_5
 from robot_dyn.integrate.step_control import ControlledStepper, control_of
@@ -27,29 +25,20 @@ from robot_dyn.validate import choice, function, instance, number, numbers, rows
 
 EXPLICIT, STIFF, AUTO = "DOP853", "Rosenbrock", "auto"
 ADAPTIVE = (EXPLICIT, STIFF, AUTO)
-LEAST_RTOL = 100 * np.finfo(float).eps  # SciPy's bound; below it rounding is taken for local error
-
-
-class Status(Enum):
-    """How a run ended."""
-
-    FINISHED = "finished"
-    STOPPED = "stopped"
-    FAILED = "failed"
-    INTERRUPTED = "interrupted"
+LEAST_RTOL = 100 * np.finfo(float).eps  # SciPy's bound; below it rounding dominates the local error
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """The course of y from t0 to where the run ended, at every time between by the method's own interpolation.
+    """The solution y from t0 to the end of the run, at every time between by the interpolation of the method.
 
     Attributes:
         times: Ends of the steps, shape (k,), the first is t0.
         states: y there, shape (k, m).
         evaluations: Of the rate, those for Jacobians and interpolation included.
         status: How the run ended.
-        message: The same in words, with time and remedy if it failed.
+        message: A sentence that says the same, with time and remedy if it failed.
     """
 
     times: np.ndarray
@@ -89,7 +78,7 @@ class Adaptive:
 
     Attributes:
         method: DOP853 (explicit, order 8), Rosenbrock (linearly implicit, order 5, L-stable), or auto: a simulation by
-            DOP853 that is made by Rosenbrock if stability bounds its steps.
+            DOP853 that Rosenbrock takes over if stability bounds its steps.
         rtol: Relative tolerance, 2.3e-14 at least.
         atol: Absolute tolerance, in the unit of y, not negative.
         max_step_s: Longest step, in [s].
@@ -110,12 +99,12 @@ class Adaptive:
 
     @property
     def needs_jacobian(self) -> bool:
-        """Whether its steps ask for ∂f/∂y."""
+        """Whether its steps need ∂f/∂y."""
         return self.method == STIFF
 
     @property
     def name(self) -> str:
-        """As a scene file says it."""
+        """Its name in scene files."""
         return self.method
 
     def with_tolerances(self, factor: float, longest_s: float) -> Adaptive:
@@ -153,10 +142,10 @@ class Adaptive:
             stop: A function of (t, y); the run stops where it first changes sign, if it is given.
 
         Returns:
-            The solution up to where the run ended; a run that fails says so in its status and keeps what it has.
+            The solution up to the end of the run; one that fails has its steps until then, and a status that says so.
 
         Raises:
-            QueryError: If y0, t0 or t1 is unfit, or the method is to be chosen.
+            QueryError: If y0, t0 or t1 is not valid, or the method is auto.
         """
         steps = self.steps(system, t0, y0, t1, stop)
         times, states, pieces = [steps.t], [steps.y], []
@@ -182,100 +171,13 @@ class Adaptive:
         if t0 == t1:
             raise QueryError(f"t0 and t1 must differ, got {t0} twice")
         function("stop", stop, "(t, y)")
-        return Steps(self, system, stop, t0, y0, t1)
+        m = len(y0)
+        stepper = STEPPERS[self.method](m, m, m)
+        control = control_of(stepper, self.rtol, self.atol, self.max_step_s)
+        return Steps(stepper, control, system, stop, t0, y0, t1)
 
 
-class _NotFiniteError(Exception):
-    """Internal: the rate or its Jacobian is not finite where the solver needs it."""
-
-
-@final
-class Steps:
-    """The steps of a run as they are made: an iterator over (t, y, piece), the end of each and y between its ends.
-
-    Attributes:
-        t, y: Where the run is.
-        evaluations: Of the rate so far.
-        status: How the run ended, once the steps are spent.
-        message: The same in words, with time and remedy if it failed.
-    """
-
-    def __init__(
-        self, options: Adaptive, system: System, stop: Callable[[float, Array], float] | None,
-        t0: float, y0: Array, t1: float,
-    ) -> None:  # fmt: skip
-        self.t, self.y, self.evaluations = t0, y0, 0
-        self.status, self.message = Status.FINISHED, ""
-        self._options, self._end, self._stop, self._counted = options, t1, stop, system.rate
-        self._system = replace(system, rate=self._rate)
-
-    def _rate(self, t: Any, y: Array) -> Array:
-        self.evaluations += y.size // y.shape[-1]
-        try:
-            return self._counted(t, y)
-        except OverflowedError:  # a trial step went too far; the solver tries a shorter one
-            return np.full_like(y, np.nan)
-
-    def __iter__(self) -> Iterator[tuple[float, Array, Any]]:
-        solver = None
-        try:
-            while solver is None or solver.status == "running":
-                with np.errstate(all="ignore"):  # overflow in a trial step shortens it, or ends the run with a status
-                    solver = solver or self._solver()
-                    if not np.isfinite(solver.f).all():
-                        raise _NotFiniteError
-                    solver.step()
-                    if solver.status == "failed":
-                        self._failed("the step became smaller than the spacing of floats")
-                        return
-                    stopped, piece = self._take(solver)
-                yield self.t, self.y, piece
-                if stopped:
-                    self.status, self.message = Status.STOPPED, f"stopped at t = {self.t}"
-                    return
-        except _NotFiniteError:
-            self._failed("the rate is not finite")
-        except RobotDynError as error:
-            if is_mistake(error):
-                raise
-            self.status, self.message = Status.FAILED, f"{error}, at t = {self.t}"
-        else:
-            self.message = f"finished at t = {self.t}"
-
-    def _solver(self) -> ControlledSteps:
-        options, m = self._options, len(self.y)
-        stepper = STEPPERS[options.method](m, m, m)
-        control = control_of(stepper, options.rtol, options.atol, options.max_step_s)
-        return ControlledSteps(stepper, control, self._system, self.t, self.y, self._end)
-
-    def _failed(self, what: str) -> None:
-        where = f"{what} at t = {self.t}, max |y| = {np.abs(self.y).max():.3g}"
-        self.status, self.message = Status.FAILED, f"{where}: y grows without bound, or tolerances are too tight"
-
-    def _take(self, solver: Any) -> tuple[bool, Any]:
-        """Take the step just made, up to where `stop` changes sign; tell whether it does, and give y between."""
-        piece, t, y = solver.dense_output(), float(solver.t), solver.y
-        stopped = False
-        if self._stop is not None:
-            before, after = self._stop(self.t, self.y), self._stop(t, y)
-            stopped = bool(before * after < 0 or (after == 0 and before != 0))
-            if stopped and after != 0:
-                t = self._crossing(piece, self.t, t)
-                y = piece(t)
-        self.t, self.y = t, y.copy()
-        return stopped, piece
-
-    def _crossing(self, piece: Any, t0: float, t1: float) -> float:
-        from scipy.optimize import brentq
-
-        stop, root = cast(Any, self._stop), cast(Any, brentq)
-        # the ends are states, which interpolation meets up to rounding: the sign must not depend on that
-        ends = {t0: stop(t0, self.y), t1: -stop(t0, self.y)}
-        t = float(root(lambda t: ends.get(t) or stop(t, piece(t)), t0, t1, xtol=4e-16 * max(1, abs(t1))))
-        return t if t != t0 else float(np.nextafter(t0, t1))  # times ascend
-
-
-# The methods of our own, ready for a loop: (entries of the state, rows of the rate, entries whose error counts).
+# Each method for a loop, of (entries of the state, rows of the rate, entries whose error counts).
 STEPPERS: Mapping[str, Callable[[int, int, int], ControlledStepper]] = MappingProxyType(
     {EXPLICIT: dop853.stepper, STIFF: ROSENBROCK_5.controlled, AUTO: dop853.stepper}
 )

@@ -1,4 +1,4 @@
-"""Polynomials on a step in Bernstein's form, whose coefficients enclose them: a sign that all share proves no root.
+"""Polynomials on a step in Bernstein form, whose coefficients enclose them: coefficients of one sign exclude a root.
 
     p(θ) = Σ_j b_j C(d, j) θʲ (1 − θ)^(d−j),   min b ≤ p(θ) ≤ max b   for 0 ≤ θ ≤ 1
 
@@ -13,16 +13,16 @@ from robot_dyn.arithmetic import Array
 
 NONE = 2.0  # in place of a root
 _NARROW = 1e-13  # of a step
-_DEEP = 64  # more halvings than floats between 0 and 1 allow to be of use
+_DEEP = 64  # more halvings are of no use in floats
 
 
 def room(degree: int) -> np.ndarray:
-    """Room for `first_below`."""
+    """Return the work array of `first_below`."""
     return np.zeros((_DEEP, degree + 3))
 
 
 def coefficients(start: float, F: Array, e: int, b: Array) -> None:
-    """Coefficients b (d + 1,) of entry e of `primitives.between`: start + θ (F₀ + (1 − θ) (F₁ + θ (F₂ + …)))."""
+    """Write coefficients b (d + 1,) of entry e of `primitives.between`: start + θ (F₀ + (1 − θ) (F₁ + θ (F₂ + …)))."""
     d = len(F)
     b[0] = 0.0
     for i in range(d - 1, -1, -1):
@@ -42,7 +42,7 @@ def coefficients(start: float, F: Array, e: int, b: Array) -> None:
 
 
 def rate_coefficients(F: Array, e: int, h: float, b: Array) -> None:
-    """Coefficients of the derivative of entry e by time, on a step of length h: the first d of b (d + 1,)."""
+    """Write the coefficients of the time derivative of entry e, on a step of length h: the first d of b (d + 1,)."""
     d = len(F)
     coefficients(0.0, F, e, b)
     for j in range(d):
@@ -59,7 +59,7 @@ def value(b: Array, theta: float) -> float:
 
 
 def first_below(b: Array, slack: float, stack: Array) -> float:
-    """The first θ from which a polynomial is below −slack, up to the halving of floats; NONE if it never is.
+    """Return the first θ from which a polynomial is below −slack, within rounding; NONE if it never is.
 
     Args:
         b: Its coefficients, (d + 1,).

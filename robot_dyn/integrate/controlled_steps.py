@@ -1,94 +1,151 @@
-"""Steps of controlled error for any System, in Python: as those of a run, and with the same functions."""
+"""Steps of controlled error for any System, in Python: by the same functions as those of a run."""
 
 from __future__ import annotations
 
-from typing import Any, final
+from collections.abc import Callable, Iterator
+from enum import Enum
+from typing import Any, cast, final
 
 import numpy as np
 
 from robot_dyn.arithmetic import Array
+from robot_dyn.errors import OverflowedError, RobotDynError
+from robot_dyn.foreign import is_mistake
 from robot_dyn.integrate.integrator import RightSide, System
 from robot_dyn.integrate.primitives import between
 from robot_dyn.integrate.step_control import At, Choice, ControlledStepper, chosen_step, first_step
 
-_NONE = np.zeros(0)
+_NONE = np.zeros(0)  # no parameters, and no mesh
+Stop = Callable[[float, Array], float]
+
+
+class Status(Enum):
+    """How a run ended."""
+
+    FINISHED = "finished"
+    STOPPED = "stopped"
+    FAILED = "failed"
+    INTERRUPTED = "interrupted"
+
+
+class _NotFiniteError(Exception):
+    """Internal: the rate or its Jacobian is not finite where a step needs it."""
 
 
 @final
-class ControlledSteps:
-    """The steps of a method from t to its end, one at a time.
-
-    Args:
-        stepper: The method.
-        control: Its choice of steps.
-        system: The equation y' = f(t, y).
-        t: Where it starts.
-        y: State there, (m,).
-        end: Where it ends.
+class Steps:
+    """The steps of a run, computed one at a time: an iterator over (t, y, piece), with y between the ends of each.
 
     Attributes:
-        t: Time reached.
-        status: "running", "finished" or "failed".
+        t, y: Time and state reached.
+        evaluations: Of the rate so far.
+        status: How the run ended, after the last step.
+        message: A sentence that says the same, with time and remedy if it failed.
     """
 
     def __init__(
-        self, stepper: ControlledStepper, control: Array, system: System, t: float, y: Array, end: float
-    ) -> None:
-        self.t, self.status = t, "running"
-        self._stepper, self._control, self._end = stepper, control, end
+        self, stepper: ControlledStepper, control: Array, system: System, stop: Stop | None,
+        t0: float, y0: Array, t1: float,
+    ) -> None:  # fmt: skip
+        self.t, self.y, self.evaluations = t0, y0, 0
+        self.status, self.message = Status.FINISHED, ""
+        self._stepper, self._control, self._end, self._stop = stepper, control, t1, stop
         self._choose = chosen_step(stepper.step, stepper.error)
-        self._now, self._after, self._lost = y[:, None].copy(), np.empty((len(y), 1)), np.zeros(1, np.int64)
-        self._last: Any = None
+        self._after, self._lost = np.empty((len(y0), 1)), np.zeros(1, np.int64)
+        counted = System(self._counted(system.rate), system.n, system.widths, system.exact)
 
-        def rate(t: Any, x: Array, p: Any, own: Any, out: Array) -> None:
-            out[:, 0] = system.rate(t, x[:, 0].copy())
+        def rate(t: Any, x: Array, p: Any, run_parameters: Any, out: Array) -> None:
+            out[:, 0] = counted.rate(t, x[:, 0].copy())
 
-        def jacobian(t: Any, x: Array, p: Any, own: Any, out: Array) -> None:
-            out[:, :, 0] = system.derivatives(t, x[:, 0].copy(), end)
+        def jacobian(t: Any, x: Array, p: Any, run_parameters: Any, out: Array) -> None:
+            out[:, :, 0] = counted.derivatives(t, x[:, 0].copy(), t1)
 
         self._f = RightSide(rate, jacobian)
-        stepper.begin(self._f, stepper.coefficients, t, self._now, _NONE, _NONE, stepper.work)
 
-    @property
-    def y(self) -> Array:
-        """State reached, (m,)."""
-        return self._now[:, 0].copy()
+    def _counted(self, rate: Callable[[Any, Array], Array]) -> Callable[[Any, Array], Array]:
+        def counted(t: Any, y: Array) -> Array:
+            self.evaluations += y.size // y.shape[-1]
+            try:
+                return rate(t, y)
+            except OverflowedError:  # a trial step went too far; a shorter one is tried
+                return np.full_like(y, np.nan)
 
-    @property
-    def f(self) -> Array:
-        """Its rate, (m,)."""
-        return self._stepper.work.K[0][:, 0].copy()
+        return counted
 
-    def step(self) -> None:
-        """The next step."""
-        of, y, after, control = self._stepper, self._now, self._after, self._control
+    def __iter__(self) -> Iterator[tuple[float, Array, Any]]:
+        of, t, now = self._stepper, self.t, self.y[:, None].copy()
+        try:
+            with np.errstate(all="ignore"):
+                of.begin(self._f, of.coefficients, t, now, _NONE, _NONE, of.work)
+            while t != self._end:
+                with np.errstate(all="ignore"):  # overflow in a trial step shortens it, or ends the run with a status
+                    if not np.isfinite(of.work.K[0]).all():
+                        raise _NotFiniteError
+                    piece = self._step(t, now)
+                    if piece is None:
+                        self._failed("the step became smaller than the spacing of floats")
+                        return
+                    t = float(self._control[At.END])
+                    stopped = self._take(piece, t, now[:, 0])
+                yield self.t, self.y, piece
+                if stopped:
+                    self.status, self.message = Status.STOPPED, f"stopped at t = {self.t}"
+                    return
+        except _NotFiniteError:
+            self._failed("the rate is not finite")
+        except RobotDynError as error:
+            if is_mistake(error):
+                raise
+            self.status, self.message = Status.FAILED, f"{error}, at t = {self.t}"
+        else:
+            self.message = f"finished at t = {self.t}"
+
+    def _step(self, t: float, now: Array) -> _Between | None:
+        """Advance `now`, (m, 1), by a step from t, and return its polynomial; None if every step is too small."""
+        of, control, after, end = self._stepper, self._control, self._after, self._end
         if control[At.NEXT] == 0:
-            first_step(self._f, self.t, self._end, y, _NONE, _NONE, after, of.work, control)
-        here = self._f, of.coefficients, self.t
-        _, found = self._choose(
-            *here, self._end, y, _NONE, _NONE, after, of.work, self._lost, control, _NONE
-        )  # fmt: skip
-        if found != Choice.TAKEN:
-            self.status = "failed"
-            return
+            first_step(self._f, t, end, now, _NONE, _NONE, after, of.work, control)
+        here = self._f, of.coefficients, t
+        _, choice = self._choose(*here, end, now, _NONE, _NONE, after, of.work, self._lost, control, _NONE)
+        if choice != Choice.TAKEN:
+            return None
         h = control[At.TAKEN]
-        of.accept(*here, h, y, _NONE, _NONE, after, of.work)
-        of.dense(*here, h, y, _NONE, _NONE, after, of.work)
-        self._last = _Between(self.t, h, y.copy(), of.work.F.copy())
-        y[...] = after
+        of.accept(*here, h, now, _NONE, _NONE, after, of.work)
+        of.dense(*here, h, now, _NONE, _NONE, after, of.work)
+        piece = _Between(t, h, now.copy(), of.work.F.copy())
+        now[...] = after
         of.work.K[0] = of.work.last
-        self.t = float(control[At.END])
-        if self.t == self._end:
-            self.status = "finished"
+        return piece
 
-    def dense_output(self) -> Any:
-        """Y between the ends of the last step, a function of times (...,)."""
-        return self._last
+    def _failed(self, what: str) -> None:
+        where = f"{what} at t = {self.t}, max |y| = {np.abs(self.y).max():.3g}"
+        self.status, self.message = Status.FAILED, f"{where}: y grows without bound, or tolerances are too tight"
+
+    def _take(self, piece: _Between, t: float, y: Array) -> bool:
+        """Advance to t, or to where `stop` changes sign before that; return whether it does."""
+        stopped = False
+        if self._stop is not None:
+            before, after = self._stop(self.t, self.y), self._stop(t, y.copy())
+            stopped = bool(before * after < 0 or (after == 0 and before != 0))
+            if stopped and after != 0:
+                t = self._crossing(piece, self.t, t)
+                y = piece(t)
+        self.t, self.y = t, y.copy()
+        return stopped
+
+    def _crossing(self, piece: _Between, t0: float, t1: float) -> float:
+        from scipy.optimize import brentq
+
+        stop, root = cast(Any, self._stop), cast(Any, brentq)
+        # the ends are states, which interpolation meets up to rounding: the sign must not depend on that
+        ends = {t0: stop(t0, self.y), t1: -stop(t0, self.y)}
+        t = float(root(lambda t: ends.get(t) or stop(t, piece(t)), t0, t1, xtol=4e-16 * max(1, abs(t1))))
+        return t if t != t0 else float(np.nextafter(t0, t1))  # times ascend
 
 
 @final
 class _Between:
-    """Y (m,) or (m, k) at times within a step."""
+    """The polynomial of a step: y (m,) or (m, k) at times within it."""
 
     def __init__(self, t: float, h: float, y: Array, F: Array) -> None:
         self.t, self.h, self.y, self.F = t, h, y, F

@@ -2,7 +2,7 @@
 
     ∂f/∂y_j ≈ (f(t, y + s e_j) − f(t, y − s e_j)) / 2 s
 
-In error by some u^(2/3), of truncation and rounding alike. [Dennis, Schnabel, Numerical Methods for Unconstrained
+The error is about u^(2/3), of truncation and rounding alike. [Dennis, Schnabel, Numerical Methods for Unconstrained
 Optimization, 1983, 5.4]
 """
 

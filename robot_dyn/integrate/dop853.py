@@ -2,9 +2,9 @@
 
     y⁺ = y + h (k₁ + Σ b_j (k_j − k₁)),   ‖e‖ = |h| ‖e₅‖² / √(‖e₅‖² + 0.01 ‖e₃‖²),   dense output of order 7
 
-Its stages stand as differences from the first: Σ |b_j| is 13, and Σ b_j, as rounded, is not 1. One b_j is rounded so
-that Σ b_j c_j is ½ to the last bit, as free fall needs, which would gain 1e-15 of its energy in each step otherwise.
-Three further stages make the dense output, where it is asked for. The coefficients are SciPy's.
+Stages are stored as differences from the first: Σ |b_j| is 13, and Σ b_j, as rounded, is not 1. One b_j is rounded so
+that Σ b_j c_j is ½ to the last bit, as free fall needs, which would otherwise gain 1e-15 of its energy in each step.
+Three further stages give the dense output where it is needed. The coefficients are SciPy's.
 
 [Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed., 1993, II.5, II.6 and II.10]
 """
@@ -23,13 +23,13 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.integrate.primitives import combination, copy, evaluate, norm, subtract
-from robot_dyn.integrate.step_control import ControlledStepper
+from robot_dyn.integrate.step_control import ControlledStepper, rate_at_end, rate_at_start
 
 _STAGES, _EXTENDED, _DEGREE, _ERROR_ORDER = 12, 16, 7, 8
 
 
 class Coefficients(NamedTuple):
-    """A, b, c of all 16 stages, the weights of errors, of dense output and of the rate at the end, of differences."""
+    """A, b, c of all 16 stages; weights of errors, of dense output and of the rate at the end; for differences."""
 
     a: Array
     b: Array
@@ -60,7 +60,7 @@ class Work(NamedTuple):
 
 @cache
 def coefficients() -> Coefficients:
-    """SciPy's coefficients, for differences of the stages."""
+    """Return SciPy's coefficients for differences of the stages."""
     DOP853 = table()
     a = np.zeros((_EXTENDED, _EXTENDED))
     a[:_STAGES, :_STAGES], a[_STAGES + 1 :] = DOP853.A, DOP853.A_EXTRA
@@ -80,14 +80,14 @@ def coefficients() -> Coefficients:
 
 
 def table() -> Any:
-    """SciPy's table, from its file: to import `scipy.integrate` takes longer than to load a run's machine code."""
+    """Return SciPy's table from its file: to import `scipy.integrate` takes longer than to load machine code."""
     package = find_spec("scipy")
     try:
         assert package is not None
         file = Path((package.submodule_search_locations or [""])[0], "integrate", "_ivp", "dop853_coefficients.py")
         known, s = run_path(str(file)), _STAGES
         A, B, C, D, E3, E5 = (known[name] for name in ("A", "B", "C", "D", "E3", "E5"))
-    except (AssertionError, KeyError, OSError):  # it is kept elsewhere
+    except (AssertionError, KeyError, OSError):  # SciPy stores it elsewhere
         from scipy.integrate import DOP853
 
         return DOP853
@@ -97,18 +97,12 @@ def table() -> Any:
 
 
 def stepper(m: int, rows: int, bounded: int) -> ControlledStepper:
-    """The method for one state of m entries, rates of so many rows, and so many entries whose error is bounded."""
+    """Return the method for one state of m entries, rates of `rows`, and errors of the first `bounded` entries."""
     work = Work(
         np.zeros((_EXTENDED, rows, 1)), np.zeros((rows, 1)), np.zeros((_DEGREE, m, 1)),
         np.zeros((2, bounded, 1)), np.zeros((m, 1)),
     )  # fmt: skip
-    return ControlledStepper(begin, step, error, accept, dense, coefficients(), work, _ERROR_ORDER)
-
-
-def begin(f: Any, c: Coefficients, t: Any, y: Array, p: Array, run_parameters: Array, work: Work) -> int:
-    """The first stage."""
-    evaluate(f.rate, t, y, p, run_parameters, work.K[0])
-    return 1
+    return ControlledStepper(rate_at_start, step, error, rate_at_end, dense, coefficients(), work, _ERROR_ORDER)
 
 
 def stage(
@@ -121,17 +115,9 @@ def stage(
 
 
 def step(
-    f: Any,
-    c: Coefficients,
-    t: Any,
-    h: Any,
-    y: Array,
-    p: Array,
-    run_parameters: Array,
-    after: Array,
-    work: Work,
+    f: Any, c: Coefficients, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Work,
     lost: Array,
-) -> int:
+) -> int:  # fmt: skip
     """A trial; see `ControlledStepper`."""
     lost[0] = 0
     for i in range(1, _STAGES):
@@ -150,14 +136,6 @@ def error(c: Coefficients, h: Any, y: Array, after: Array, work: Work, rtol: flo
     if large == 0.0:
         return 0.0
     return abs(h) * large * large / np.sqrt(large * large + 0.01 * small * small)
-
-
-def accept(
-    f: Any, c: Coefficients, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Work
-) -> int:
-    """The rate at the end; see `ControlledStepper`."""
-    evaluate(f.rate, t + h, after, p, run_parameters, work.last)
-    return 1
 
 
 def dense(

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple, final
 from robot_dyn.aligned import aligned
 from robot_dyn.arithmetic import Arithmetic, Array
 from robot_dyn.errors import QueryError
+from robot_dyn.integrate.dop853 import table
 from robot_dyn.integrate.integrator import PlainMethod, RightSide, Stepper
 from robot_dyn.integrate.primitives import combination, evaluate
 from robot_dyn.integrate.tableau import ButcherTableau, Coefficients
@@ -77,17 +78,9 @@ class Start(NamedTuple):
 
 
 def semi_implicit_step(
-    f: RightSide,
-    start: Start,
-    t: Any,
-    h: Any,
-    y: Array,
-    p: Array,
-    run_parameters: Array,
-    after: Array,
-    work: Stages,
+    f: RightSide, start: Start, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Stages,
     lost: Array,
-) -> int:
+) -> int:  # fmt: skip
     """A step of semi-implicit Euler; arguments as of `Stepper`."""
     n = start.n
     evaluate(f.rate, t, y, p, run_parameters, work.K[0])
@@ -140,21 +133,14 @@ RK4 = ExplicitRungeKutta(
 
 @cache
 def order_8() -> ExplicitRungeKutta:
-    """The method of order 8 with 12 stages of Dormand and Prince, at a fixed step; also `explicit.ORDER_8`.
+    """Return the method of order 8 with 12 stages of Dormand and Prince, at a fixed step.
 
     Its coefficients are SciPy's, rounded to float64: in longdouble they bound the accuracy of a step to some 1e-16 h.
 
     Source: Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed., 1993, II.5 and II.10.
     """
-    from scipy.integrate import DOP853
-
+    DOP853 = table()
     a = tuple(tuple(map(float, row[:i])) for i, row in enumerate(DOP853.A))
     return ExplicitRungeKutta(
         "order_8", ButcherTableau(a, tuple(map(float, DOP853.B)), tuple(map(float, DOP853.C)), order=8)
     )
-
-
-def __getattr__(name: str) -> Any:
-    if name == "ORDER_8":  # made when asked for: SciPy is slow to import
-        return order_8()
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,6 +1,6 @@
-"""Fixed-point iteration x ← Φ(x), for the stages of implicit methods, carried to where rounding ends it.
+"""Fixed-point iteration x ← Φ(x), for the stages of implicit methods, continued until rounding ends it.
 
-An iteration that is cut off earlier, at a tolerance, adds an error with a sign, and energy drifts. [Hairer, Lubich,
+An iteration that stops earlier, at a tolerance, adds a systematic error, and energy drifts. [Hairer, Lubich,
 Wanner, Geometric Numerical Integration, 2nd ed., 2006, VIII.6]
 """
 
@@ -19,11 +19,11 @@ _INFLATION = 1.1  # Rump's ε-inflation: more than the rounding, less than 1 / t
 
 
 def fixed_point(update: Callable[[Array], Array], x: Array, y: Array) -> Array | None:
-    """Iterate x ← Φ(x) until the increments of no entry shrink any more, by the rule of `settle`.
+    """Iterate x ← Φ(x) until no increments shrink any more, by the rule of `settle`.
 
     Args:
         update: Φ.
-        x: Where to start, shape (..., m).
+        x: Start, shape (..., m).
         y: The state that x is a change of, shape (..., m); taken to be of size 1 at least in some entry.
 
     Returns:
@@ -45,9 +45,9 @@ def fixed_point(update: Callable[[Array], Array], x: Array, y: Array) -> Array |
 
 
 def enclose_fixed_point(update: Callable[[Array], Array], x: Array) -> Array | None:
-    """Balls that certainly hold a fixed point of Φ, near an approximate one.
+    """Return balls that certainly contain a fixed point of Φ, near an approximate one.
 
-    A box that Φ maps into its own interior holds a fixed point, by Brouwer's theorem; so does every further image.
+    A box that Φ maps into its interior contains a fixed point, by Brouwer's theorem; so does every further image.
 
     Args:
         update: Φ, in balls.
@@ -75,7 +75,7 @@ def enclose_fixed_point(update: Callable[[Array], Array], x: Array) -> Array | N
 
 
 def _inflate(box: Array) -> Array:
-    """Each ball a little wider, and an exact one no longer so."""
+    """Return slightly wider balls, of positive radius."""
     from flint import arb
 
     least = 8 * unit_roundoff(box) * max(_sizes(box).max(), 1e-300)
@@ -90,7 +90,7 @@ def _sizes(x: Array) -> np.ndarray:
 
 
 def unit_roundoff(x: Array) -> Any:
-    """Of the arithmetic of an array."""
+    """Return the unit roundoff of the arithmetic of an array."""
     if x.dtype != object:
         return np.finfo(x.dtype).eps
     from flint import ctx

@@ -18,7 +18,14 @@ from robot_dyn.aligned import aligned
 from robot_dyn.arithmetic import Arithmetic, Array
 from robot_dyn.errors import OverflowedError, QueryError
 from robot_dyn.integrate.fixed_point import enclose_fixed_point, unit_roundoff
-from robot_dyn.integrate.integrator import IntegrationError, PlainMethod, RightSide, Stepper, System
+from robot_dyn.integrate.integrator import (
+    IntegrationError,
+    PlainMethod,
+    RightSide,
+    Stepper,
+    System,
+    arithmetic_like,
+)
 from robot_dyn.integrate.primitives import GOING, MOST_ITERATIONS, SETTLED, combination, evaluate, settle
 from robot_dyn.integrate.tableau import ButcherTableau, Coefficients, Surd, combine
 from robot_dyn.validate import integer
@@ -56,7 +63,7 @@ _TABLEAUS = {
 
 
 class Increments(NamedTuple):
-    """The increments Z_i = h k_i of a step, (s, m, W), as they are iterated; see `settle`."""
+    """The increments Z_i = h k_i of a step, (s, m, W), during their iteration; see `settle`."""
 
     K: Array
     Z: Array
@@ -95,7 +102,7 @@ class Gauss(PlainMethod):
     """Gauss–Legendre collocation of order 2, 4 or 6, its stages solved by fixed-point iteration until rounding ends it.
 
     The iteration converges where h is small against the fastest motion, h L ‖A‖ < 1 with L the Lipschitz constant of f,
-    and may take MOST_ITERATIONS (100) rounds: the method is A-stable, but this solution of its stages is not for stiff
+    and may take MOST_ITERATIONS (100) rounds: the method is A-stable, but this iteration is not for stiff
     systems. In balls the step holds an exact solution of the stage equations, proven by Brouwer's theorem.
 
     Attributes:
@@ -140,8 +147,9 @@ class Gauss(PlainMethod):
         return after if y.dtype != object else self._enclosed(system, t, y, h, work.Z)
 
     def _enclosed(self, system: System, t: Any, y: Array, h: Any, Z: Array) -> Array:
-        """The step in balls, from approximate increments (s, m, B): around them lies a solution of the stages."""
-        kind, a, b, c = self.tableau.numbers(y)
+        """Return the step in balls, from approximate increments (s, m, B), around which a solution lies."""
+        kind = arithmetic_like(y)
+        a, b, c, *_ = self.tableau.arrays(kind)
         h, times = kind.number(h), [t + node * kind.number(h) for node in c]
 
         def update(x: Array) -> Array:

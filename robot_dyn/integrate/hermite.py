@@ -1,4 +1,4 @@
-"""Methods of fixed step made ready for a loop that cuts steps at events: with dense output by Hermite's cubic.
+"""Methods of fixed step prepared for a loop that ends steps at events: with dense output by Hermite's cubic.
 
     y(t + θ h) ≈ y + θ (Δ + (1 − θ) (h f − Δ + θ (2 Δ − h (f + f⁺)))),   Δ = y⁺ − y
 
@@ -16,12 +16,12 @@ import numpy as np
 
 from robot_dyn.arithmetic import FLOAT64, Array
 from robot_dyn.integrate.integrator import Integrator
-from robot_dyn.integrate.primitives import combination, copy, evaluate, subtract
-from robot_dyn.integrate.step_control import ControlledStepper
+from robot_dyn.integrate.primitives import combination, copy, subtract
+from robot_dyn.integrate.step_control import ControlledStepper, rate_at_end, rate_at_start
 
 
 class Numbers(NamedTuple):
-    """The coefficients of the method, and the weights that choose the rate at the start, or at the end."""
+    """The coefficients of the method, and the weights that select the rate at the start, or at the end."""
 
     method: Any
     one: Array
@@ -32,11 +32,11 @@ class Work(NamedTuple):
     """The arrays of a step.
 
     Attributes:
-        method: Those of the method.
-        K: The rate at the start, and room for that at the end, (2, r, 1).
+        method: Arrays of the method.
+        K: The rate at the start, and one at the end, (2, r, 1).
         last: The rate at the end, (r, 1).
         F: Dense output, (3, m, 1), as of `between`.
-        error: Of no step, (0, m, 1).
+        error: Empty, (0, m, 1).
         zero: (m, 1).
     """
 
@@ -49,55 +49,35 @@ class Work(NamedTuple):
 
 
 def stepper(method: Integrator, m: int, n: int, rows: int, widths: Array | None) -> ControlledStepper:
-    """A method of fixed step for one state of m entries, n of them positions, and rates of so many rows."""
+    """Return a method of fixed step for one state of m entries, n of them positions, and rates of `rows`."""
     inner = method.stepper(FLOAT64, m, n, rows, 1, widths)
     K, last, F = np.zeros((2, rows, 1)), np.zeros((rows, 1)), np.zeros((3, m, 1))
     work = Work(inner.work, K, last, F, np.zeros((0, m, 1)), np.zeros((m, 1)))
     step = (_known_step if method.plain else step_of)(inner.step)
-    return ControlledStepper(begin, step, error, accept, dense, Numbers(inner.coefficients, *np.eye(2)), work, 1)
+    return ControlledStepper(
+        rate_at_start, step, error, rate_at_end, dense, Numbers(inner.coefficients, *np.eye(2)), work, 1
+    )
 
 
 def step_of(inner: Callable[..., int]) -> Callable[..., int]:
-    """The step of a method, of its coefficients and arrays among these."""
+    """Return the step of a method, with its coefficients and arrays inside these."""
 
     def step(
-        f: Any,
-        c: Numbers,
-        t: Any,
-        h: Any,
-        y: Array,
-        p: Array,
-        run_parameters: Array,
-        after: Array,
-        work: Work,
+        f: Any, c: Numbers, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Work,
         lost: Array,
-    ) -> int:
+    ) -> int:  # fmt: skip
         lost[0] = 0
         return inner(f, c.method, t, h, y, p, run_parameters, after, work.method, lost)
 
     return step
 
 
-_known_step = cache(step_of)  # machine code is made once for a function
-
-
-def begin(f: Any, c: Numbers, t: Any, y: Array, p: Array, run_parameters: Array, work: Work) -> int:
-    """The rate at the start."""
-    evaluate(f.rate, t, y, p, run_parameters, work.K[0])
-    return 1
+_known_step = cache(step_of)  # machine code is built once for each function
 
 
 def error(c: Numbers, h: Any, y: Array, after: Array, work: Work, rtol: float, atol: float) -> float:
-    """None is known."""
+    """No error is known."""
     return 0.0
-
-
-def accept(
-    f: Any, c: Numbers, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Work
-) -> int:
-    """The rate at the end."""
-    evaluate(f.rate, t + h, after, p, run_parameters, work.last)
-    return 1
 
 
 def dense(

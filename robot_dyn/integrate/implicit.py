@@ -16,8 +16,8 @@ import numpy as np
 from robot_dyn.arithmetic import Array, apply
 from robot_dyn.errors import QueryError
 from robot_dyn.integrate.fixed_point import MOST_ITERATIONS, fixed_point
-from robot_dyn.integrate.integrator import IntegrationError, Integrator, System, arithmetic_like
-from robot_dyn.integrate.tableau import ButcherTableau, Row, combine
+from robot_dyn.integrate.integrator import IntegrationError, Integrator, System, arithmetic_like, singular
+from robot_dyn.integrate.tableau import ButcherTableau, combine
 
 
 @final
@@ -26,7 +26,7 @@ class LinearlyImplicitEuler(Integrator):
     """Rosenbrock's method of one stage: y⁺ = y + h k with (1 − h J) k = f(t + h, y), J at (t + h, y).
 
     One step of Newton's method on the implicit Euler method, and equal to it where f is linear in y. L-stable. f at
-    t + h rather than t: what forces a stiff system is then followed without a lag.
+    t + h rather than t: a stiff system then follows its forcing without a lag.
 
     Source: Hairer and Wanner, Solving Ordinary Differential Equations II, 2nd ed., 1996, IV.7.
     """
@@ -43,7 +43,7 @@ class LinearlyImplicitEuler(Integrator):
         try:
             k = np.linalg.solve(W, system.rate(t + h, y)[..., None])[..., 0]
         except np.linalg.LinAlgError:
-            raise _singular(self, t, h) from None
+            raise singular(self, t, h) from None
         return y + h * k
 
 
@@ -52,7 +52,7 @@ class LinearlyImplicitEuler(Integrator):
 class SinglyDiagonallyImplicit(Integrator):
     """The diagonally implicit Runge–Kutta method of a tableau with equal a_ii = γ, by simplified Newton iteration.
 
-    All stages and rounds share one matrix, 1 − h γ J, with J at (t, y). The rounds go on until rounding ends them,
+    All stages and rounds share one matrix, 1 − h γ J, with J at (t, y). The rounds continue until rounding ends them,
     MOST_ITERATIONS (100) at most.
 
     Raises:
@@ -74,16 +74,16 @@ class SinglyDiagonallyImplicit(Integrator):
 
     def step(self, system: System, t: Any, y: Array, h: Any) -> Array:
         h = _step_of(self, y, h)
-        _, a, b, c = self.tableau.numbers(y)
-        h_gamma = h * a[0][0][1]
-        try:  # the inverse, for it serves many rounds, and Newton's iteration corrects its rounding
+        a, b, c, *_ = self.tableau.arrays(arithmetic_like(y))
+        h_gamma = h * a[0, 0]
+        try:  # the inverse: it is used in many rounds, and Newton's iteration corrects its rounding
             inverse = np.linalg.inv(np.eye(y.shape[-1], dtype=y.dtype) - h_gamma * system.jacobian(t, y))
         except np.linalg.LinAlgError:
-            raise _singular(self, t, h) from None
+            raise singular(self, t, h) from None
         k: list[Array] = []
         with np.errstate(over="ignore", invalid="ignore"):  # a diverging iteration is reported
-            for node, row in zip(c, a, strict=True):
-                known = _known(row, k, y) * h
+            for i, node in enumerate(c):
+                known = (combine(a[i, :i], k) if i else np.zeros_like(y)) * h
                 z = self._stage(system, t + node * h, y, known, h_gamma, inverse)
                 if z is None:
                     raise IntegrationError(
@@ -104,23 +104,12 @@ class SinglyDiagonallyImplicit(Integrator):
         return fixed_point(newton, known, y)
 
 
-def _known(row: Row, k: list[Array], y: Array) -> Array:
-    """Σ_{j<i} a_ij k_j, zero in the first stage."""
-    return combine(row[:-1], k) if len(row) > 1 else np.zeros_like(y)
-
-
 def _step_of(method: Integrator, y: Array, h: Any) -> Any:
     if y.dtype not in (np.dtype(np.float32), np.dtype(np.float64)):
         raise QueryError(
             f"{method.name} works in float32 and float64, got {y.dtype}: convert y, or take an explicit or Gauss method"
         )
     return arithmetic_like(y).number(h)
-
-
-def _singular(method: Integrator, t: Any, h: Any) -> IntegrationError:
-    return IntegrationError(
-        f"{method.name}: 1 − h γ J is singular for the step {float(h)} at t = {float(t)}: take a smaller step", t
-    )
 
 
 def _alexander() -> ButcherTableau:

@@ -1,6 +1,6 @@
-"""What a fixed-step method is: a map y ↦ y⁺ of one step h that approximates the flow of y' = f(t, y).
+"""Base classes of methods: a step h is a map y ↦ y⁺ that approximates the flow of y' = f(t, y).
 
-A `PlainMethod` writes it as a plain function of arrays, which the time loop calls as it stands or as machine code.
+The step of a `PlainMethod` is a plain function of arrays, which the time loop calls as it is or as machine code.
 
 A method of order p errs by O(hᵖ⁺¹) in one step and by O(hᵖ) after a fixed time. [Hairer, Nørsett, Wanner, Solving
 Ordinary Differential Equations I, 2nd ed., 1993, II.3]
@@ -21,11 +21,11 @@ from robot_dyn.integrate.differences import by_state, by_time
 from robot_dyn.integrate.primitives import evaluate
 
 _FLOATS = {np.dtype(kind): Float(np.dtype(kind)) for kind in (np.float32, np.float64, np.longdouble)}
-_BALL = Ball()  # makes its numbers in the precision of the caller's scope
+_BALL = Ball()  # in the precision of the caller's scope
 
 
 class IntegrationError(RobotDynError):
-    """A step that cannot be made, such as one with a stage iteration that does not converge.
+    """A step that fails, such as one whose stage iteration does not converge.
 
     Attributes:
         t: Time at which the step starts.
@@ -36,21 +36,28 @@ class IntegrationError(RobotDynError):
         self.t = t
 
 
+def singular(method: Integrator, t: Any, h: Any) -> IntegrationError:
+    """The error of a step whose linear systems have no solution."""
+    return IntegrationError(
+        f"{method.name}: 1 − h γ J is singular for the step {float(h)} at t = {float(t)}: take a smaller step", t
+    )
+
+
 @final
 @dataclass(frozen=True, eq=False)
 class System:
     """An ordinary differential equation y' = f(t, y).
 
     y is (q, v, w): n positions, n velocities (or momenta) and any number of quadratures, w' = power, say, which do not
-    act back on q and v. Only the methods that treat positions and velocities differently read n.
+    act on q and v. Only methods that treat positions and velocities differently read n.
 
     Attributes:
         rate: f(t, y), a fresh array of the shape of y, (..., m); batch axes come first.
         n: Number of positions, 0 if y has no such parts.
         widths: Change of each entry of y over which the rate bends, (m,), positive, inf where it does not; None if
-            nothing is known. A difference quotient across more than that is not a derivative.
-        exact: ∂f/∂y_j for each j and then ∂f/∂t, a fresh array (m + 1, ..., m) of t and y (..., m); None if they are
-            to be found by differences.
+            unknown. A difference quotient over a larger change is not a derivative.
+        exact: ∂f/∂y_j for each j and then ∂f/∂t, a fresh array (m + 1, ..., m) of t and y (..., m); None for
+            differences.
     """
 
     rate: Callable[[Any, Array], Array]
@@ -71,7 +78,7 @@ class System:
 
 
 class RightSide(NamedTuple):
-    """f of y' = f(t, y) as a step calls it: functions of (t, y, p, own, out), as of `evaluate`.
+    """f of y' = f(t, y) as a step calls it: functions of (t, y, p, run_parameters, out), as of `evaluate`.
 
     Attributes:
         rate: y', (r, W).
@@ -86,12 +93,12 @@ class RightSide(NamedTuple):
 
 
 class Stepper(NamedTuple):
-    """A method made ready for a time loop, for states (m, W).
+    """A method prepared for a time loop, for states (m, W).
 
     Attributes:
-        step: The plain function (f, coefficients, t, h, y, p, own, after, work, lost) → evaluations. It writes
+        step: The plain function (f, coefficients, t, h, y, p, s, after, work, lost) → evaluations. It writes
             y(t + h) into `after`, and 1 into `lost` (W,) where stages are not found; f has the functions of a
-            `RightSide`, p and own are as of `evaluate`.
+            `RightSide`, p and s (run_parameters) are as of `evaluate`.
         coefficients: Its numbers.
         work: Its arrays; work.K[-1], (r, W), is the latest rate.
     """
@@ -108,18 +115,18 @@ class Latest(NamedTuple):
 
 
 class Integrator(ABC):
-    """A method that makes one step of given size. A value without state: two runs share nothing.
+    """A method for one step of given size. A value without state: two runs share nothing.
 
     Attributes:
-        name: As a scene file says it.
-        order: Order of convergence p, of the nodes h, 2 h, ….
+        name: Its name in scene files.
+        order: Order of convergence p, at the nodes h, 2 h, ….
         evaluations_per_step: Of the rate in a step, or None where it depends on the state.
-        canonical: Whether it keeps the structure of a Hamiltonian system, which has to be given in (q, p), p = M v.
+        canonical: Whether it keeps the structure of a Hamiltonian system, given in (q, p), p = M v.
         stiff: Whether its step is not bounded by the fastest decay of the system.
         plain: Whether its step is a plain function, which machine code and runs in lock step take.
         controls_error: Whether it chooses its steps, as `Adaptive` does.
-        needs_jacobian: Whether its step asks for ∂f/∂y.
-        nonsmooth: Whether velocities may jump within its step, as at impacts; it asks for a convex problem then.
+        needs_jacobian: Whether its step needs ∂f/∂y.
+        nonsmooth: Whether velocities may jump within its step, as at impacts; it then needs a convex problem.
     """
 
     name: str
@@ -138,28 +145,28 @@ class Integrator(ABC):
 
         Args:
             system: The equation y' = f(t, y).
-            t: Time, a number of the kind of y or a float.
+            t: Time, a number of the arithmetic of y or a float.
             y: State, shape (..., m), of floats or balls; the step runs in its arithmetic.
             h: Step, in the unit of t. Negative for a step back.
 
         Returns:
-            A fresh array of the shape and kind of y.
+            A fresh array of the shape and arithmetic of y.
 
         Raises:
             IntegrationError: If the stages of an implicit method cannot be solved for.
-            QueryError: If y is of a kind of number that the method cannot take.
+            QueryError: If the method does not support the arithmetic of y.
         """
 
     def stepper(
         self, kind: Arithmetic, m: int, n: int, rows: int, runs: int = 1, widths: Array | None = None
     ) -> Stepper:
-        """The method for a time loop.
+        """Return the method prepared for a time loop.
 
         Args:
             kind: Arithmetic of the state.
             m: Entries of the state of a run.
             n: Number of positions among them.
-            rows: Numbers that a rate gives, m or more.
+            rows: Entries of a rate, m or more.
             runs: W; 1 unless the method is `plain`.
             widths: As of `System`.
         """
@@ -194,7 +201,7 @@ class Integrator(ABC):
 
 
 class PlainMethod(Integrator):
-    """A method whose step is a plain function: the one of its `stepper`."""
+    """A method whose step is a plain function, that of its `stepper`."""
 
     plain: ClassVar[bool] = True
 
@@ -210,7 +217,7 @@ class PlainMethod(Integrator):
         return after
 
     def stepped(self, system: System, t: Any, y: Array, h: Any) -> tuple[Array, Array, Any]:
-        """A step, whether stages were found, (B,), and the arrays of the stepper."""
+        """Return a step, whether its stages were lost, (B,), and the arrays of the stepper."""
         m, kind = y.shape[-1], arithmetic_like(y)
         x, h = y.reshape(-1, m).T, kind.number(h)
         step, coefficients, work = self.stepper(kind, m, system.n, m, x.shape[1])
@@ -220,8 +227,8 @@ class PlainMethod(Integrator):
             out[...] = system.rate(t, x.T.reshape(y.shape)).reshape(-1, m).T
 
         def jacobian(t: Any, x: Array, p: Any, run_parameters: Any, out: Array) -> None:
-            made = system.derivatives(t, x.T.reshape(y.shape), t + h)
-            out[...] = np.moveaxis(made.reshape(m + 1, -1, m), 1, 2)
+            derivatives = system.derivatives(t, x.T.reshape(y.shape), t + h)
+            out[...] = np.moveaxis(derivatives.reshape(m + 1, -1, m), 1, 2)
 
         step(RightSide(rate, jacobian), coefficients, t, h, x, None, None, after, work, lost)
         return after.T.reshape(y.shape), lost, work
@@ -232,7 +239,7 @@ class PlainMethod(Integrator):
 
 
 def arithmetic_like(y: Array) -> Arithmetic:
-    """The arithmetic of an array: that of its float dtype, or balls if it holds objects.
+    """Return the arithmetic of an array: that of its float dtype, or balls if it holds objects.
 
     Raises:
         QueryError: If it holds other numbers, such as integers.

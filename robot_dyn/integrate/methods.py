@@ -1,8 +1,8 @@
-"""The methods of integration by name, the one list of them: scenes and every function that takes a method read it.
+"""The list of methods of integration by name, which scenes and every function with a method use.
 
     y⁺ = method("rk4").step(system, t, y, h)
 
-Each names its source where it is defined: Hairer, Nørsett, Wanner (two volumes), or Hairer, Lubich, Wanner.
+Each cites its source where it is defined: Hairer, Nørsett, Wanner (two volumes), or Hairer, Lubich, Wanner.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _READY = (
     TimeStepping(),
 )
 
-# How to get each; order_8 takes its coefficients from SciPy when asked for, so that this module stays light.
+# Functions that return each; order_8 reads SciPy's coefficients only when it is used.
 METHODS: Mapping[str, Callable[[], Integrator | Adaptive]] = MappingProxyType(
     {
         **{each.name: lambda each=each: each for each in _READY},
@@ -47,16 +47,16 @@ FIXED_STEP = tuple(name for name in METHODS if name not in ADAPTIVE)
 
 
 def method(name: str) -> Any:
-    """The method of that name: an `Integrator` of fixed step, or an `Adaptive` one with its default tolerances.
+    """Return the method of that name: an `Integrator` of fixed step, or an `Adaptive` one with its default tolerances.
 
     Raises:
-        QueryError: If the name is unknown; gives the nearest names.
+        QueryError: If the name is unknown, with the nearest names.
     """
     return METHODS[choice("integration method", name, METHODS)]()
 
 
 def as_method(given: Any) -> Integrator | Adaptive:
-    """The method that is meant: one by its name, or a method as it is.
+    """Return a method that is given by its name, or itself.
 
     Raises:
         QueryError: If it is not a method.

@@ -1,9 +1,9 @@
-"""Primitives of steps and loops: the few operations that stand twice, as NumPy and as loops of machine code.
+"""Primitives of steps and loops: the few operations that exist twice, as NumPy and as loops of machine code.
 
     x = y + h Σ_j w_j K_j
 
-Here they are NumPy, in any arithmetic (elimination in floats); `compiled.primitives` has their machine code. All that
-is above them stands once. A state is (m, W), entry by run: one run, or W of them in lock step.
+Here they are NumPy, in any arithmetic (elimination in floats); `compiled.primitives` has their machine code. All code
+above them exists once. A state is (m, W), entry by run: one run, or W of them in lock step.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array, midpoint
 
-MOST_ITERATIONS = 100  # so the iteration must gain a binary digit in two rounds, to end in float64
+MOST_ITERATIONS = 100  # the iteration must gain a binary digit in two rounds, to end in float64
 PATIENCE = 2  # rounds: where q' = v and v' = −k q, increments shrink only every second one
 NOISE = 1e3  # roundings of the largest entry that an increment may keep, as where forces cancel
 GOING, SETTLED, LOST = 1, 0, 2  # an iteration: not yet ended; at rounding; overflowed
 
 
 def evaluate(function: Any, t: Any, y: Array, p: Array, run_parameters: Array, out: Array) -> None:
-    """Write a function of (t, y, p, own) into `out`; in machine code the function is an address.
+    """Write a function of (t, y, p, run_parameters) into `out`; in machine code the function is an address.
 
     Args:
         function: Such as the rate y' = f(t, y).
@@ -29,7 +29,7 @@ def evaluate(function: Any, t: Any, y: Array, p: Array, run_parameters: Array, o
         y: State, (m, W).
         p: Numbers that all runs share, (P,).
         run_parameters: Numbers of each run, (O, W).
-        out: Where the result goes, (r, W).
+        out: Output, (r, W).
     """
     function(t, y, p, run_parameters, out)
 
@@ -62,7 +62,7 @@ def below(x: Array, limit: Any) -> bool:
 
 
 def enclose(low: Array, high: Array, x: Array, least: float, most: float) -> bool:
-    """Let low and high (W,), neither nan, enclose x (W,); whether any of x is below `least` or above `most`.
+    """Extend low and high (W,), neither nan, to x (W,); return whether any x is below `least` or above `most`.
 
     A nan in x changes nothing.
     """
@@ -92,10 +92,10 @@ def between(y: Array, F: Array, theta: float, out: Array) -> None:
 
 
 def settle(Z: Array, new: Array, y: Array, least: Array, stale: Array, state: Array, epsilon: Any) -> int:
-    """Take the next iterate of a fixed-point iteration for the runs that are going; how many go on.
+    """Take the next iterate of a fixed-point iteration for the runs that are going; return how many continue.
 
-    It ends where the increments of no entry shrink any more and are of the size of rounding. Entries count apart, so
-    that one in a large unit does not end the iteration of the others. In balls midpoints count.
+    It ends when no increments shrink any more and all are of the size of rounding. Entries count separately, so that
+    one in a large unit does not end the iteration of the others. In balls midpoints count.
 
     Args:
         Z: Iterate, (s, m, W); becomes the next one.
@@ -139,10 +139,10 @@ def factor(A: Array, J: Array, scale: Any, rows: Array, lost: Array) -> None:
     [Golub and Van Loan, Matrix Computations, 4th ed., 2013, alg. 3.4.1]
 
     Args:
-        A: Where the factors go, by column: A[j, i] is row i of column j, (m, m, W).
+        A: Output: the factors by column, A[j, i] is row i of column j, (m, m, W).
         J: Matrices by column, and what may follow them, (m, m, W) or more.
         scale: Number.
-        rows: Where the row goes that each one is exchanged with, (m, W).
+        rows: Output: the row that each one is exchanged with, (m, W).
         lost: 1 where a pivot is 0, (W,); else 0.
     """
     m, runs = len(A), np.arange(A.shape[2])

@@ -19,17 +19,17 @@ from robot_dyn.integrate.primitives import combination, evaluate, norm, subtract
 
 _BETA_ORDER = 0.2  # β times the order of the error: the part that the error before has in the next step
 _SAFETY, _LEAST, _MOST = 0.9, 0.2, 10.0  # of a new step
-_CUT = 0.1  # of a step whose error is no number
-_STRETCH = 1.01  # rather than to leave a sliver of a step before the end
+_CUT = 0.1  # of a step whose error is not a number
+_STRETCH = 1.01  # to avoid a sliver of a step before the end
 _SPACINGS = 4  # of floats at t: the least step
 _ONE = np.ones(1)
 
 
 class Choice(IntEnum):
-    """What came of the choice of a step."""
+    """The outcome of the choice of a step."""
 
     TAKEN = 0
-    TOO_SMALL = 1  # no step whose end floats can tell from t has an error within the tolerance
+    TOO_SMALL = 1  # only steps within rounding of t have an error within the tolerance
 
 
 class _Entries(NamedTuple):
@@ -51,16 +51,16 @@ At = _Entries()
 
 
 class ControlledStepper(NamedTuple):
-    """A method made ready for steps of controlled error, of one state (m, 1).
+    """A method prepared for steps of controlled error, for one state (m, 1).
 
-    Its functions are plain; f is the state equation (f.rate, f.jacobian), p and own are as of `evaluate`.
+    Functions are plain; f is the state equation (f.rate, f.jacobian), p and s, run_parameters, are as of `evaluate`.
 
     Attributes:
-        begin: (f, c, t, y, p, own, work) → evaluations. What depends on (t, y) alone: work.K[0], (r, 1), is the rate.
-        step: (f, c, t, h, y, p, own, after, work, lost) → evaluations. A trial: writes y(t + h) into `after`.
+        begin: (f, c, t, y, p, s, work) → evaluations. What depends on (t, y) alone: work.K[0], (r, 1), is the rate.
+        step: (f, c, t, h, y, p, s, after, work, lost) → evaluations. A trial: writes y(t + h) into `after`.
         error: (c, h, y, after, work, rtol, atol) → ‖e‖.
-        accept: (f, c, t, h, y, p, own, after, work) → evaluations. work.last, (r, 1), is the rate at its end.
-        dense: (f, c, t, h, y, p, own, after, work) → evaluations. work.F, (d, m, 1), as of `between`.
+        accept: (f, c, t, h, y, p, s, after, work) → evaluations. work.last, (r, 1), is the rate at its end.
+        dense: (f, c, t, h, y, p, s, after, work) → evaluations. work.F, (d, m, 1), as of `between`.
         coefficients: Its numbers, c.
         work: Its arrays; work.error, (…, k, 1), of the first entries of y, whose error is bounded.
         error_order: Order of ‖e‖ in h.
@@ -76,8 +76,22 @@ class ControlledStepper(NamedTuple):
     error_order: int
 
 
+def rate_at_start(f: Any, c: Any, t: Any, y: Array, p: Array, run_parameters: Array, work: Any) -> int:
+    """Write the rate into work.K[0]: the `begin` of a method that needs nothing else."""
+    evaluate(f.rate, t, y, p, run_parameters, work.K[0])
+    return 1
+
+
+def rate_at_end(
+    f: Any, c: Any, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Any
+) -> int:
+    """Write the rate at the end of a step into work.last: the `accept` of every method here."""
+    evaluate(f.rate, t + h, after, p, run_parameters, work.last)
+    return 1
+
+
 def control_of(stepper: ControlledStepper, rtol: float, atol: float, longest: float) -> np.ndarray:
-    """The choice of steps before the first."""
+    """Return the choice of steps before the first one."""
     control = np.zeros(len(At))
     control[At.ERROR], control[At.RTOL], control[At.ATOL] = 1e-4, rtol, atol
     control[At.LONGEST], control[At.EXPONENT] = longest, 1 / stepper.error_order
@@ -87,7 +101,7 @@ def control_of(stepper: ControlledStepper, rtol: float, atol: float, longest: fl
 def first_step(
     f: Any, t: float, end: float, y: Array, p: Array, run_parameters: Array, after: Array, work: Any, control: Array
 ) -> int:
-    """The length of the first step, from the rate at its start and after a short step of Euler's; 1 evaluation.
+    """Write the length of the first step, from the rate at its start and after a short Euler step; 1 evaluation.
 
     [Hairer, Nørsett, Wanner 1993, II.4]
     """
@@ -108,7 +122,7 @@ def first_step(
 
 
 def following(mesh: Array, control: Array, t: float, end: float) -> float:
-    """The first time of a mesh behind t, or the end."""
+    """Return the first time of a mesh after t, or the end."""
     k = int(control[At.MESH])
     while k < len(mesh) and mesh[k] <= t:
         k += 1
@@ -125,15 +139,15 @@ def finite(x: Array) -> bool:
 
 
 def shortened(h: float, e: float, control: Array) -> float:
-    """The length of the step that is tried after one of length h that is refused, with the error e."""
+    """Return the length of the step after one of length h that is rejected with the error e."""
     control[At.REJECTED] += 1
     return abs(h) * (max(_LEAST, _SAFETY * e ** -control[At.EXPONENT]) if e < np.inf else _CUT)
 
 
 def chosen_step(step: Callable[..., int], error: Callable[..., float]) -> Callable[..., tuple[int, int]]:
-    """The choice of a step, for a method's `step` and `error`.
+    """Return the function that chooses a step, for a method's `step` and `error`.
 
-    choose(f, c, t, end, y, p, own, after, work, lost, control, mesh) → evaluations, Choice. Steps end at the times of
+    choose(f, c, t, end, y, p, s, after, work, lost, control, mesh) → evaluations, Choice. Steps end at the times of
     the mesh (k,), if there are any, and before them where the error asks for it: not where both tolerances are 0.
     """
 
@@ -145,14 +159,14 @@ def chosen_step(step: Callable[..., int], error: Callable[..., float]) -> Callab
         if control[At.RTOL] + control[At.ATOL] == 0.0:
             control[At.END], control[At.TAKEN] = end, end - t
             h = end - t
-            made = step(f, c, t, h, y, p, run_parameters, after, work, lost)
-            return made, Choice.TAKEN if lost[0] == 0 and finite(after) else Choice.TOO_SMALL
+            evaluations = step(f, c, t, h, y, p, run_parameters, after, work, lost)
+            return evaluations, Choice.TAKEN if lost[0] == 0 and finite(after) else Choice.TOO_SMALL
         left, evaluations, rejected = abs(end - t), 0, False
-        wanted = min(control[At.NEXT], control[At.LONGEST])
+        desired = min(control[At.NEXT], control[At.LONGEST])
         least = _SPACINGS * (np.nextafter(abs(t), np.inf) - abs(t))
         while True:
-            reaches = wanted * _STRETCH >= left
-            h = left if reaches else wanted
+            reaches = desired * _STRETCH >= left
+            h = left if reaches else desired
             if h < least and not reaches:
                 return evaluations, Choice.TOO_SMALL
             signed = h if end >= t else -h
@@ -161,8 +175,8 @@ def chosen_step(step: Callable[..., int], error: Callable[..., float]) -> Callab
             if e <= 1.0:
                 break
             rejected = True
-            wanted = shortened(h, e, control)
-            if wanted < least:
+            desired = shortened(h, e, control)
+            if desired < least:
                 return evaluations, Choice.TOO_SMALL
         alpha = control[At.EXPONENT]
         beta = _BETA_ORDER * alpha
@@ -170,8 +184,8 @@ def chosen_step(step: Callable[..., int], error: Callable[..., float]) -> Callab
         if e > 0.0:
             factor = min(_MOST, max(_LEAST, _SAFETY * e ** (0.75 * beta - alpha) * control[At.ERROR] ** beta))
         next_h = h * (min(1.0, factor) if rejected else factor)
-        # the end of a segment says nothing about the error
-        control[At.NEXT] = max(next_h, wanted) if reaches and not rejected else next_h
+        # a step that the end of a segment shortens does not reflect the error
+        control[At.NEXT] = max(next_h, desired) if reaches and not rejected else next_h
         control[At.ERROR] = max(e, 1e-4)
         control[At.TAKEN], control[At.END] = signed, end if reaches else t + signed
         return evaluations, Choice.TAKEN

@@ -17,7 +17,6 @@ import numpy as np
 
 from robot_dyn.arithmetic import Arithmetic, Array, sqrt
 from robot_dyn.errors import QueryError
-from robot_dyn.integrate.integrator import arithmetic_like
 
 _ROUNDINGS = 8  # of float64, relative to Σ |a_ij|, that a row may be off by
 
@@ -25,7 +24,7 @@ _ROUNDINGS = 8  # of float64, relative to Σ |a_ij|, that a row may be off by
 @final
 @dataclass(frozen=True)
 class Surd:
-    """The number rational + factor · √radicand, of which every arithmetic makes its own nearest one."""
+    """The number rational + factor · √radicand, which every arithmetic rounds to its nearest number."""
 
     rational: Fraction
     factor: Fraction
@@ -36,16 +35,6 @@ class Surd:
 
 
 Coefficient = int | Fraction | float | Surd
-Row = tuple[tuple[int, Any], ...]  # (j, a_ij) of the coefficients that are not zero, j ascending
-
-
-class Numbers(NamedTuple):
-    """A tableau in one arithmetic."""
-
-    arithmetic: Arithmetic
-    a: tuple[Row, ...]
-    b: Row
-    c: tuple[Any, ...]
 
 
 class Coefficients(NamedTuple):
@@ -64,10 +53,10 @@ class ButcherTableau:
     """Coefficients a, b, c of a Runge–Kutta method, exact where they are fractions or surds.
 
     Attributes:
-        a: One row a stage; a row may end early, its further entries are zero.
+        a: One row for each stage; entries that a row lacks are zero.
         b: Weights, Σ b_i = 1.
         c: Nodes, c_i = Σ_j a_ij.
-        order: Order of convergence that the source states; not checked here, but measured in the tests.
+        order: Order of convergence, as in the source; the tests measure it.
 
     Raises:
         QueryError: If the lengths do not fit, or a sum is off by more than rounding.
@@ -77,7 +66,6 @@ class ButcherTableau:
     b: tuple[Coefficient, ...]
     c: tuple[Coefficient, ...]
     order: int
-    _in_floats: dict[np.dtype, Numbers] = field(default_factory=dict, init=False, repr=False, compare=False)
     _arrays: dict[np.dtype, Coefficients] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -95,57 +83,32 @@ class ButcherTableau:
         """Whether each stage needs only those before it."""
         return all(len(row) <= i for i, row in enumerate(self.a))
 
-    def numbers(self, y: Array) -> Numbers:
-        """The coefficients in the arithmetic of y.
-
-        Raises:
-            QueryError: If y holds neither floats nor balls.
-        """
-        known = self._in_floats.get(y.dtype)
-        if known is not None:
-            return known
-        kind = arithmetic_like(y)
-        made = Numbers(
-            kind,
-            tuple(_nonzero(kind, row) for row in self.a),
-            _nonzero(kind, self.b),
-            tuple(_number(kind, node) for node in self.c),
-        )
-        if y.dtype != object:  # balls change with the precision, which is the caller's
-            self._in_floats[y.dtype] = made
-        return made
-
     def arrays(self, kind: Arithmetic) -> Coefficients:
-        """The coefficients in an arithmetic, with their zeros."""
+        """Return the coefficients in an arithmetic, zeros included."""
         known = self._arrays.get(kind.dtype)
         if known is not None:
             return known
         s, zero = len(self.b), kind.number(0)
         rows = [[*(_number(kind, x) for x in row), *[zero] * (s - len(row))] for row in self.a]
         b, c = ([_number(kind, x) for x in each] for each in (self.b, self.c))
-        made = Coefficients(kind.array(rows).reshape(s, s), kind.array(b), kind.array(c), zero, kind.number(1))
-        if kind.dtype != object:  # balls change with the precision, which is the caller's
-            self._arrays[kind.dtype] = made
-        return made
+        coefficients = Coefficients(kind.array(rows).reshape(s, s), kind.array(b), kind.array(c), zero, kind.number(1))
+        if kind.dtype != object:  # balls change with the precision, which the caller sets
+            self._arrays[kind.dtype] = coefficients
+        return coefficients
 
 
-def combine(row: Row, k: Sequence[Array] | Array) -> Array:
-    """Σ_j a_ij k_j over the coefficients that are not zero; at least one must be."""
-    (first, weight), *rest = row
-    total = k[first] * weight
-    for j, weight in rest:
-        total = total + k[j] * weight
-    return total
+def combine(weights: Array, k: Sequence[Array] | Array) -> Array:
+    """Σ_j w_j k_j over the weights that are not zero, of which there must be one."""
+    first, *rest = [each * weight for weight, each in zip(weights, k, strict=True) if weight != 0]
+    for term in rest:
+        first = first + term
+    return first
 
 
 def _require_sum(name: str, row: Sequence[Coefficient], expected: Coefficient) -> None:
     total, size = sum(map(float, row)), sum(abs(float(entry)) for entry in row)
     if not abs(total - float(expected)) <= _ROUNDINGS * np.finfo(float).eps * max(size, 1.0):
         raise QueryError(f"tableau: the sum of {name} must be {float(expected)!r}, got {total!r}")
-
-
-def _nonzero(kind: Arithmetic, row: Sequence[Coefficient]) -> Row:
-    return tuple((j, _number(kind, entry)) for j, entry in enumerate(row) if float(entry) != 0)
 
 
 def _number(kind: Arithmetic, coefficient: Coefficient) -> Any:

@@ -3,8 +3,8 @@
     q_m = q + h/2 v,   v⁺ from M(q_m) (v⁺ − v) = h (u + Σ τ − C v − N) + the impulses of what holds joints,
     q⁺ = q_m + h/2 v⁺
 
-The impulses are those of a convex problem in v⁺. What happens within a step happens once, whenever and however often:
-no event is looked for, and the order is 1. Without what holds joints it is the method of Störmer and Verlet in its form
+The impulses are those of a convex problem in v⁺. Within a step, events are neither
+located nor counted, and the order is 1. Without set-valued effects it is the method of Störmer and Verlet in its form
 for positions, with forces that may depend on v. [Moreau 1988; Jean, The non-smooth contact dynamics method, 1999;
 Acary, Brogliato, Numerical Methods for Nonsmooth Dynamical Systems, 2008, §10.1]
 """
@@ -23,13 +23,13 @@ from robot_dyn.integrate.primitives import copy, evaluate
 
 
 class Problem(NamedTuple):
-    """First rows of the numbers of a convex problem of n joints in an array: behind v⁺, its places, and `changed`.
+    """First rows of the numbers of a convex problem of n joints in an array: after v⁺, its places, and `changed`.
 
     Attributes:
         changed: How many places have changed.
         M: The upper triangle of the mass matrix, by rows.
-        p: M v and the impulses that are known, (n,).
-        f: Impulses of friction at most, (n,).
+        p: M v and the known impulses, (n,).
+        f: Greatest impulses of friction, (n,).
         lower, upper: Bounds of v⁺, (n,).
         u: The actuation, the first of the torques that work, (n,).
         rest: The other torques that work, then the rates of states of controller and effects, then shares of effects.
@@ -46,7 +46,7 @@ class Problem(NamedTuple):
 
 
 def problem_rows(n: int) -> Problem:
-    """The rows of the problem of n joints."""
+    """Return the rows of the problem of n joints."""
     M = 2 * n + 1
     p = M + n * (n + 1) // 2
     return Problem(2 * n, M, p, *(p + k * n for k in range(1, 6)))
@@ -58,14 +58,14 @@ class Work(NamedTuple):
     Attributes:
         K: v and u of the latest step, where a rate has them, (1, r, W).
         y: The state, the step, and the places of v⁺ after the step before, (m + 1 + n, W).
-        made: y⁺, then rows as of `Problem`, (m + R, W).
+        out: y⁺, then rows as of `Problem`, (m + R, W).
         again: y⁺ of runs that are solved alone, (m, W).
         M, one, room: For the problem of one run, (n, n), (6, n) and (n + 1, n).
     """
 
     K: Array
     y: Array
-    made: Array
+    out: Array
     again: Array
     M: Array
     one: Array
@@ -76,33 +76,33 @@ def time_step(
     f: RightSide, rows: Problem, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Work,
     lost: Array,
 ) -> int:  # fmt: skip
-    """A step; arguments as of `Stepper`. The places of the step before are where the solution starts."""
-    n, m, made = len(work.M), len(y), work.made
+    """Write a step; arguments as of `Stepper`. The solution starts from the places of the previous step."""
+    n, m, out = len(work.M), len(y), work.out
     copy(work.y[:m], y)
     for b in range(y.shape[1]):
         work.y[m, b], lost[b] = h, 0
-    evaluate(f.step, t + h / 2, work.y, p, run_parameters, made)
-    copy(after, made[:m])
+    evaluate(f.step, t + h / 2, work.y, p, run_parameters, out)
+    copy(after, out[:m])
     alone = False
     for b in range(y.shape[1]):
-        if made[m + rows.changed, b] > 0.0:
+        if out[m + rows.changed, b] > 0.0:
             alone = True
-            lost[b] = 0 if solved_alone(rows, work, made[m:], b) else 1
+            lost[b] = 0 if solved_alone(rows, work, out[m:], b) else 1
     if alone:
-        evaluate(f.behind, t, work.y[: m + 1], p, made[m:], work.again)
+        evaluate(f.behind, t, work.y[: m + 1], p, out[m:], work.again)
         for b in range(y.shape[1]):
-            if made[m + rows.changed, b] > 0.0:
+            if out[m + rows.changed, b] > 0.0:
                 for e in range(m):
                     after[e, b] = work.again[e, b]
-    copy(work.y[m + 1 :], made[m + n : m + 2 * n])
+    copy(work.y[m + 1 :], out[m + n : m + 2 * n])
     copy(work.K[0, :n], y[n : 2 * n])
-    seen = work.K.shape[1] - m  # no run in lock step shows its actuation
-    copy(work.K[0, m:], made[m + rows.u : m + rows.u + seen])
+    recorded = work.K.shape[1] - m  # runs in lock step do not record their actuation
+    copy(work.K[0, m:], out[m + rows.u : m + rows.u + recorded])
     return 1
 
 
 def solved_alone(rows: Problem, work: Work, known: Array, b: int) -> bool:
-    """The problem of run b by the active set, where Newton's method cycles."""
+    """Solve the problem of run b by the active set, where Newton's method cycles; return whether it was found."""
     n, k, one = len(work.M), rows.M, work.one
     for i in range(n):
         for j in range(i, n):
@@ -122,7 +122,7 @@ def solved_alone(rows: Problem, work: Work, known: Array, b: int) -> bool:
 class TimeStepping(PlainMethod):
     """The method of Moreau and Jean: of order 1, through impacts and sticking friction, without events.
 
-    On an equation y' = f(t, y) without anything that jumps it is a method like others, with y = (q, v, quadratures)
+    On an equation y' = f(t, y) without jumps it is a method like others, with y = (q, v, quadratures)
     and q' = v.
     """
 
@@ -135,10 +135,10 @@ class TimeStepping(PlainMethod):
     def stepper(
         self, kind: Arithmetic, m: int, n: int, rows: int, runs: int = 1, widths: Array | None = None
     ) -> Stepper:
-        of, most = problem_rows(n), (m - 2 * n) * (n + 1)
-        made = (np.zeros((size, runs)) for size in (m + 1 + n, m + of.rest + most, m))
+        places, most = problem_rows(n), (m - 2 * n) * (n + 1)
+        arrays = (np.zeros((size, runs)) for size in (m + 1 + n, m + places.rest + most, m))
         room = (np.empty(shape) for shape in ((n, n), (6, n), (n + 1, n)))
-        return Stepper(time_step, of, Work(np.zeros((1, rows, runs)), *made, *room))
+        return Stepper(time_step, places, Work(np.zeros((1, rows, runs)), *arrays, *room))
 
     def step(self, system: System, t: Any, y: Array, h: Any) -> Array:
         n, h = system.n, arithmetic_like(y).number(h)

@@ -10,13 +10,9 @@ from typing import Annotated, Any, ClassVar, Literal, Union
 from pydantic import ConfigDict, Field, create_model
 
 from robot_dyn.coefficients import Coefficient, declared
-from robot_dyn.control.digital_loop.block import SIGNAL, Block, name_of
-from robot_dyn.control.digital_loop.differences import Differences
+from robot_dyn.control.digital_loop.block import SIGNAL, Block, Differences, Noise, Quantisation, RateLimit, name_of
 from robot_dyn.control.digital_loop.loop import LINES
 from robot_dyn.control.digital_loop.low_pass import LowPass
-from robot_dyn.control.digital_loop.noise import Noise
-from robot_dyn.control.digital_loop.quantisation import Quantisation
-from robot_dyn.control.digital_loop.rate_limit import RateLimit
 from robot_dyn.model.robot import Robot
 from robot_dyn.scene.declared import key_of
 from robot_dyn.scene.schema import Part, PerJoint, per_joint

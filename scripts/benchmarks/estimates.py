@@ -10,10 +10,9 @@ from dataclasses import replace
 import numpy as np
 
 import robot_dyn as rd
-from benchmarks.measure import Effort, arms, row, table
+from benchmarks.measure import READY, Effort, arms, row, table
 
 TIGHT = rd.Adaptive(rtol=1e-13, atol=1e-14)
-READY = np.array([0.3, 0.6, -0.4, -1.2, 0.5, 1.1, 0.2])
 
 
 def scenes() -> dict[str, rd.Setup]:

@@ -5,15 +5,12 @@ Each number is the median of new processes, which find modules as bytecode, as i
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.measure import Effort, row, table
+from benchmarks.measure import Effort, printed, row, table
 
 _PROCESSES = 5
 _RUN = """
@@ -55,8 +52,5 @@ def first_run(effort: Effort) -> None:
 
 
 def _spent(code: str, folder: Path, store: Path) -> float:
-    """What a new process prints."""
-    place = os.environ | {"ROBOT_DYN_CACHE": str(store), "PYTHONPYCACHEPREFIX": str(folder / "bytecode")}
-    place.pop("PYTHONDONTWRITEBYTECODE", None)
-    done = subprocess.run([sys.executable, "-c", code], env=place, check=True, capture_output=True)
-    return float(done.stdout)
+    """Processor time of a new process."""
+    return printed(code, ROBOT_DYN_CACHE=str(store), PYTHONPYCACHEPREFIX=str(folder / "bytecode"))[0]

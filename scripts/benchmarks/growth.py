@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
-from time import perf_counter
 from typing import Any
 
 import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
 
 import robot_dyn as rd
-from benchmarks.measure import BATCH, Effort, alternate, row, table
+from benchmarks.measure import BATCH, Effort, alternate, printed, row, seconds, table
 
 JOINTS = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)
 
@@ -38,7 +35,7 @@ def chain(n: int) -> str:
     return "".join([*parts, "</robot>"])
 
 
-def growth(effort: Effort, picture: Path | None) -> None:
+def growth(effort: Effort) -> None:
     """Instructions, time per state and compile time of forward dynamics against the number of joints."""
     table("joints", "instructions", "which", "compile, s", "batch, µs per state", "C++, µs per state", "ratio")
     found = []
@@ -49,9 +46,7 @@ def growth(effort: Effort, picture: Path | None) -> None:
             robot = rd.load(file)
         ours: Any = rd.Compiled(robot, cache=False)
         batch, out = np.random.default_rng(1).normal(size=(3, BATCH, n)), np.empty((BATCH, n))
-        began = perf_counter()
-        ours.forward_dynamics(*batch, out=out)
-        first = perf_counter() - began
+        first = seconds(lambda: ours.forward_dynamics(*batch, out=out))
         pool, columns = pin.ModelPool(robot.model, 1), [np.asfortranarray(x.T) for x in batch]
         result = np.asfortranarray(np.empty((n, BATCH)))
         sides = {
@@ -62,7 +57,7 @@ def growth(effort: Effort, picture: Path | None) -> None:
         which, count = ours.served_by("forward_dynamics"), min(ours.instructions["forward_dynamics"].values())
         row(n, count, which, f"{first:.1f}", f"{t['ours']:.3f}", f"{t['C++']:.3f}", f"{t['C++'] / t['ours']:.1f}")
         found.append((n, count, first, t["ours"], t["C++"]))
-    if picture is not None:
+    if (picture := effort.picture("growth")) is not None:
         draw(np.array(found), picture)
 
 
@@ -104,6 +99,5 @@ print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024, (bat
 def memory(effort: Effort) -> None:
     """What a batch of forward dynamics takes beyond its arguments and its result."""
     states = 100_000 if effort.quick else 1_000_000
-    done = subprocess.run([sys.executable, "-c", _MEMORY, str(states)], check=True, capture_output=True, text=True)
-    beyond, arrays = map(float, done.stdout.split())
-    print(f"\nA batch of {states} states of UR5 takes {beyond:.1f} MiB beyond the {arrays:.0f} MiB of its arrays.")
+    extra, arrays = printed(_MEMORY, str(states))
+    print(f"\nA batch of {states} states of UR5 takes {extra:.1f} MiB beyond the {arrays:.0f} MiB of its arrays.")

@@ -12,9 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import pi
-from pathlib import Path
 from statistics import median
-from time import perf_counter
 from typing import Any, final
 
 import numpy as np
@@ -22,10 +20,8 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk
 
 import robot_dyn as rd
-from benchmarks.measure import Effort, row, table
+from benchmarks.measure import Effort, row, seconds, starter_setup, table
 from robot_dyn.integrate.adaptive import ADAPTIVE
-from robot_dyn.scene.scene import parse_scene
-from robot_dyn.scene.starters import starter
 
 WITHIN, G = 1e-5, 9.81  # [m], [m/s²]
 LADDERS: dict[str, tuple[float, ...]] = {
@@ -51,7 +47,7 @@ class Problem:
 
     def setup(self, **options: Any) -> rd.Setup:
         """Its setup with other options."""
-        return replace(parse_scene(starter(self.scene), self.scene).setup(Path(), {}), **options)
+        return replace(starter_setup(self.scene), **options)
 
 
 def pendulum(t: np.ndarray) -> np.ndarray:
@@ -138,7 +134,7 @@ def iftomm(effort: Effort) -> None:
                     error = float(np.abs(problem.position(run.q) - reference).max())
                 if error < WITHIN:
                     repeats = 1 if effort.quick or run.statistics.wall_s > 1 else 5
-                    ms = 1e3 * median(_seconds(setup) for _ in range(repeats))
+                    ms = 1e3 * median(seconds(lambda: rd.simulate(setup)) for _ in range(repeats))
                     row(name, method, f"{number:g}", f"{error:.1e}", run.statistics.steps, f"{ms:.2f}")
                     break
 
@@ -147,9 +143,3 @@ def _options(method: str, number: float) -> dict[str, Any]:
     if method in ADAPTIVE:
         return {"integrator": rd.Adaptive(method, number, number), "step_s": None, "engine": "compiled"}
     return {"integrator": rd.method(method), "step_s": number, "engine": "compiled"}
-
-
-def _seconds(setup: rd.Setup) -> float:
-    began = perf_counter()
-    rd.simulate(setup)
-    return perf_counter() - began

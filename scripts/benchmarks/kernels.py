@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import ctypes
 import os
-import subprocess
-import sys
 import tempfile
 from collections.abc import Callable
 from typing import Any
@@ -17,7 +15,7 @@ import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
 
 import robot_dyn as rd
-from benchmarks.measure import BATCH, Effort, alternate, arms, row, table
+from benchmarks.measure import BATCH, Effort, alternate, arms, printed, row, table
 
 QUERIES = ("forward_dynamics", "inverse_dynamics", "M")
 
@@ -72,18 +70,8 @@ def kernels(effort: Effort) -> None:
     """Time per state in µs, and how many times faster than Pinocchio's C++."""
     binding = binding_cost(effort)
     print(f"\nOf crba the call from Python minus {binding:.2f} µs, its cost for one joint, stands for the C++.")
-    table(
-        "arm",
-        "query",
-        "instructions",
-        "C++, µs",
-        "one state, µs",
-        "ratio",
-        f"batch of {BATCH}, µs",
-        "ratio",
-        "float32, µs",
-        "ratio",
-    )
+    timed = ("one state, µs", f"batch of {BATCH}, µs", "float32, µs")
+    table("arm", "query", "instructions", "C++, µs", *(heading for what in timed for heading in (what, "ratio")))
     for arm, robot in arms().items():
         batch = np.random.default_rng(1).normal(size=(3, BATCH, robot.n))
         for name, cpp in in_cpp(robot, batch).items():
@@ -157,10 +145,8 @@ def first_use(effort: Effort) -> None:
     cold, warm = [], []
     for _ in range(1 if effort.quick else 5):
         with tempfile.TemporaryDirectory() as folder:
-            place = os.environ | {"ROBOT_DYN_CACHE": os.path.join(folder, "kernels")}
             for times in (cold, warm):
-                done = subprocess.run([sys.executable, "-c", _FIRST], env=place, check=True, capture_output=True)
-                times.append(float(done.stdout))
+                times += printed(_FIRST, ROBOT_DYN_CACHE=os.path.join(folder, "kernels"))
     table("what", "s")
     row("first forward dynamics, Panda-7, nothing in the cache", f"{np.median(cold):.2f}")
     row("the same in a second process, from the cache", f"{np.median(warm):.3f}")

@@ -7,13 +7,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 from fractions import Fraction
-from time import perf_counter
 from typing import Any
 
 import numpy as np
 
 import robot_dyn as rd
-from benchmarks.measure import Effort, arms, row, table
+from benchmarks.measure import READY, Effort, arms, row, seconds, table
 from robot_dyn.codegen.trace.right_angles import completed
 from robot_dyn.integrate.methods import method
 from robot_dyn.simulation.compiled.build import compiled_equation, machine_of_constants
@@ -24,8 +23,6 @@ from robot_dyn.simulation.rollouts.lock_step import LANES, Batch
 from robot_dyn.simulation.run.fixed_step import FixedStep
 from robot_dyn.simulation.run.watch import Watch
 from robot_dyn.simulation.setup.size import MOST_BYTES
-
-READY = np.array([0.3, 0.6, -0.4, -1.2, 0.5, 1.1, 0.2])
 
 
 def parameters(effort: Effort) -> None:
@@ -50,16 +47,15 @@ def parameters(effort: Effort) -> None:
             rd.Plant(plant.dynamics.with_(gravity=(0.0, 0.0, -9.7)), plant.effects), READY, duration_s=0.02,  # pyright: ignore
             controller=controller and replace(controller, kp=90.0), estimate_error=False, engine="compiled",
         )  # fmt: skip
-        began = perf_counter()
-        rd.simulate(other)
-        again = perf_counter() - began
+        again = seconds(lambda: rd.simulate(other))
+        equation, rk4 = StateEquation(setup.plant, setup.controller), setup.integrator
         made = {
-            "constants": machine_of_constants(_equation(setup), _rk4(setup)),
-            "inputs": compiled_equation(_equation(setup), _rk4(setup)),
+            "constants": machine_of_constants(equation, rk4),
+            "inputs": compiled_equation(equation, rk4),
         }
         lanes = {
-            "constants": machine_of_constants(_equation(setup), _rk4(setup), lanes=LANES),
-            "inputs": compiled_equation(_equation(setup), _rk4(setup), lanes=LANES, kept=()),
+            "constants": machine_of_constants(equation, rk4, lanes=LANES),
+            "inputs": compiled_equation(equation, rk4, lanes=LANES, kept=()),
         }
         counts = {kind: len(each.equations.programs["rate"]) for kind, each in made.items()}
         alone = _ratio({kind: _one(setup, each) for kind, each in made.items()}, effort)
@@ -71,22 +67,12 @@ def parameters(effort: Effort) -> None:
         )  # fmt: skip
 
 
-def _equation(setup: rd.Setup) -> StateEquation:
-    return StateEquation(setup.plant, setup.controller)
-
-
-def _rk4(setup: rd.Setup) -> Any:
-    return setup.integrator
-
-
 def _one(setup: rd.Setup, made: CompiledStateEquation) -> Any:
     def run() -> float:
         functions, equation = (made.equations.functions, made.parameters), made.equation
         watch, transfers = Watch(setup, equation), PayloadEvents(equation)
         advance = FixedStep(watch, transfers, lambda _: functions, Fraction(1), made.advance())
-        began = perf_counter()
-        advance.record()
-        return perf_counter() - began
+        return seconds(advance.record)
 
     return run
 
@@ -96,9 +82,7 @@ def _many(setup: rd.Setup, made: CompiledStateEquation) -> Any:
 
     def run() -> float:
         batch = Batch(setup, made, starts, 0 * starts, {}, ("q",), (), MOST_BYTES)
-        began = perf_counter()
-        batch.run(1)
-        return perf_counter() - began
+        return seconds(lambda: batch.run(1))
 
     return run
 

@@ -6,21 +6,16 @@ It is `rd.work_precision`; a whole call of `rd.simulate`, with all that it check
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from statistics import median
-from time import perf_counter
 from typing import Any
 
-import numpy as np
-
 import robot_dyn as rd
-from benchmarks.measure import Effort, arms, row, table
+from benchmarks.measure import READY, Effort, arms, row, seconds, table
 
-READY = np.array([0.3, 0.6, -0.4, -1.2, 0.5, 1.1, 0.2])
 TARGETS = (1e-6, 1e-8, 1e-10)
 
 
-def precision(effort: Effort, picture: Path | None) -> None:
+def precision(effort: Effort) -> None:
     """A table of the time that each takes to an error, and the diagram of all."""
     setup = rd.Setup(rd.Plant(arms()["Panda-7"]), READY, engine="compiled", estimate_error=False)
     quick: Any = {"methods": ["DOP853", "rk4"], "budget_s": 2.0, "repeats": 1} if effort.quick else {"budget_s": 120.0}
@@ -38,7 +33,7 @@ def precision(effort: Effort, picture: Path | None) -> None:
         row(ladder.name, *times, *ratios)
     row("whole call of simulate, DOP853", *(f"{1e3 * x:.3f}" for x in whole(setup, effort)), *["—"] * len(TARGETS))
     print("\n( ) extrapolated by the order.", result.sentence)
-    if picture is not None:
+    if (picture := effort.picture("precision")) is not None:
         rd.save_result(result, picture)
 
 
@@ -47,10 +42,6 @@ def whole(setup: rd.Setup, effort: Effort) -> list[float]:
     found = []
     for target in TARGETS:
         with_method = replace(setup, integrator=rd.Adaptive(rtol=target / 10, atol=target / 10), record_period_s=1.0)
-        times = []
-        for _ in range(effort.repeats + 1):
-            began = perf_counter()
-            rd.simulate(with_method)
-            times.append(perf_counter() - began)
+        times = [seconds(lambda: rd.simulate(with_method)) for _ in range(effort.repeats + 1)]
         found.append(median(times[1:]))
     return found

@@ -13,7 +13,7 @@ from typing import Any, final
 import numpy as np
 
 import robot_dyn as rd
-from benchmarks.measure import Effort, row, table
+from benchmarks.measure import Effort, panda, row, table
 from robot_dyn.studies.proof.motion import motion
 from robot_dyn.studies.proof.tape.tape import Tape
 
@@ -26,8 +26,7 @@ SEED = 20261122
 
 def arm(name: str) -> rd.Robot:
     """An arm, without fingers."""
-    robot = rd.load(name)
-    return robot.with_(lock={"panda_finger_joint1": 0.0}) if name == "panda" else robot
+    return panda() if name == "panda" else rd.load(name)
 
 
 @final
@@ -66,13 +65,13 @@ class Case:
         return made, traced - began, max(process_time() - traced - (traced - began), 0.0)
 
 
-def proofs(effort: Effort, picture: Path | None) -> None:
+def proofs(effort: Effort) -> None:
     """All tables, and the figure."""
     literal(effort)
     random(effort)
     boxes(effort)
     acting(effort)
-    if picture is not None:
+    if (picture := effort.picture("proofs")) is not None:
         draw(picture)
 
 
@@ -96,15 +95,8 @@ def random(effort: Effort) -> None:
             found.append((made.radius_q.max() if made.proven else np.inf, time))
         radius, times = np.array(found).T
         good = int((radius <= 1e-12).sum())
-        row(
-            NAMES[name],
-            until_s,
-            len(found),
-            good,
-            f"{radius.max():.1e}",
-            f"{np.median(times):.2f}",
-            f"{times.max():.2f}",
-        )
+        cells = f"{radius.max():.1e}", f"{np.median(times):.2f}", f"{times.max():.2f}"
+        row(NAMES[name], until_s, len(found), good, *cells)
 
 
 def boxes(effort: Effort) -> None:

@@ -7,19 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from importlib import import_module
-from time import perf_counter
 from typing import Any
 
 import numpy as np
 
 import robot_dyn as rd
-from benchmarks.measure import BATCH, Effort, arms, row, table
+from benchmarks.measure import BATCH, READY, Effort, arms, row, seconds, stick_and_stop, table
 from robot_dyn.studies.work_precision_diagram.peers.mujoco import STEP_S, mujoco_model
 
 mujoco: Any = import_module("mujoco")
 mujoco_rollout: Any = import_module("mujoco.rollout")
 
-READY = np.array([0.3, 0.6, -0.4, -1.2, 0.5, 1.1, 0.2])
 GAINS, DAMPING, THREADS = (100.0, 10.0), 0.5, 2
 LEVEL = np.array([3.0, 6.0, 2.0, 4.0, 1.0, 0.8, 0.3])
 LOWER, UPPER = READY - 0.15, READY + 0.25
@@ -28,9 +26,7 @@ LOWER, UPPER = READY - 0.15, READY + 0.25
 def _second(call: Callable[[], object]) -> float:
     """Time in [s] of the second of two calls: the first one after other work may pay for pages of memory."""
     call()
-    began = perf_counter()
-    call()
-    return perf_counter() - began
+    return seconds(call)
 
 
 def one_step(effort: Effort) -> None:
@@ -39,22 +35,15 @@ def one_step(effort: Effort) -> None:
     model: Any = mujoco_model(mujoco, panda, bare=True)
     duration = steps * STEP_S
     setup = rd.Setup(
-        rd.Plant(panda),
-        READY,
-        duration_s=duration,
-        record_period_s=duration,
-        estimate_error=False,
-        engine="compiled",
-        integrator="rk4",
-    )
-    theirs, ours, apart = [], [], 0.0
+        rd.Plant(panda), READY, duration_s=duration, record_period_s=duration, estimate_error=False,
+        engine="compiled", integrator="rk4",
+    )  # fmt: skip
+    theirs, ours = [], []
     rd.simulate(setup)
     for _ in range(effort.repeats):
         data = mujoco.MjData(model)
         data.qpos[:] = READY
-        began = perf_counter()
-        mujoco.mj_step(model, data, steps)
-        theirs.append((perf_counter() - began) / steps)
+        theirs.append(seconds(lambda: mujoco.mj_step(model, data, steps)) / steps)
         statistics = rd.simulate(setup).statistics
         ours.append(statistics.wall_s / statistics.steps)
     short, data = 100, mujoco.MjData(model)
@@ -76,11 +65,7 @@ def thousands(effort: Effort) -> None:
 def sticking(effort: Effort) -> None:
     """The same with dry friction and rigid stops, e = 0, by time stepping; MuJoCo with its stiffest settings."""
     model: Any = mujoco_model(mujoco, arms()["Panda-7"], GAINS, DAMPING)
-    model.opt.integrator = mujoco.mjtIntegrator.mjINT_EULER
-    model.dof_frictionloss[:], model.jnt_limited[:] = LEVEL, 1
-    model.jnt_range[:] = np.column_stack([LOWER, UPPER])
-    for stiffness, width in ((model.dof_solref, model.dof_solimp), (model.jnt_solref, model.jnt_solimp)):
-        stiffness[:], width[:, :2] = (2 * STEP_S, 1.0), 0.9999
+    stick_and_stop(mujoco, model, LEVEL, LOWER, UPPER, STEP_S)
     held = [rd.DryFriction(LEVEL), rd.RigidStops(LOWER, UPPER)]
     _side_by_side(effort, model, held, "time_stepping", "steps, PD, dry friction and rigid stops")
 
@@ -89,13 +74,8 @@ def _side_by_side(effort: Effort, model: Any, held: list[Any], method: str, what
     panda, runs, steps = arms()["Panda-7"], (128 if effort.quick else BATCH), (40 if effort.quick else 1000)
     goal, starts = READY + 0.2, READY + 0.1 * np.random.default_rng(0).uniform(-1, 1, size=(runs, 7))
     control = rd.PD(rd.hold(goal), *GAINS)
-    setup = rd.Setup(
-        rd.Plant(panda, [rd.ViscousFriction(DAMPING), *held]),
-        READY,
-        duration_s=steps * STEP_S,
-        controller=control,
-        integrator=method,
-    )
+    plant = rd.Plant(panda, [rd.ViscousFriction(DAMPING), *held])
+    setup = rd.Setup(plant, READY, duration_s=steps * STEP_S, controller=control, integrator=method)
     first = np.zeros((runs, 1 + 14))
     first[:, 1:8] = starts
     command, state = np.broadcast_to(goal, (runs, steps, 7)).copy(), np.empty((runs, steps, 15))

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 import robot_dyn as rd
-from benchmarks.measure import Effort, arms, row, table
+from benchmarks.measure import Effort, arms, row, stick_and_stop, table
 from robot_dyn.studies.work_precision_diagram.peers.mujoco import mujoco_model
 
 LEVELS, DAMPING, DURATION_S, SAMPLE_S = np.array([3, 6, 2, 4, 1, 0.8, 0.3]), 0.1, 2.0, 8e-3
@@ -47,12 +47,12 @@ def sticking(effort: Effort) -> None:
         def ours(h: float, plant: rd.Plant = plant, options: dict[str, Any] = options) -> np.ndarray:
             return rd.simulate(plant, **options, integrator="time_stepping", step_s=h).q
 
-        _told("time_stepping", ours, steps, limit.q)
+        _distances("time_stepping", ours, steps, limit.q)
         for name, stiff in (("MuJoCo, stiffest", True), ("MuJoCo, default", False)):
-            _told(name, lambda h, stiff=stiff: _mujoco(panda, drive, h, stiff, bool(stops)), steps, limit.q)
+            _distances(name, lambda h, stiff=stiff: _mujoco(panda, drive, h, stiff, bool(stops)), steps, limit.q)
 
 
-def _told(name: str, run: Callable[[float], np.ndarray], steps: tuple[float, ...], limit: np.ndarray) -> None:
+def _distances(name: str, run: Callable[[float], np.ndarray], steps: tuple[float, ...], limit: np.ndarray) -> None:
     apart = [np.abs(run(h) - limit).max() for h in steps]
     order = np.log2(apart[0] / apart[-1]) / np.log2(steps[0] / steps[-1])
     row(name, *(f"{x:.2e}" for x in apart), f"{order:.2f}")
@@ -62,12 +62,8 @@ def _mujoco(panda: rd.Robot, drive: Drive, h: float, stiff: bool, stops: bool) -
     """Samples of q, (m, n), of Euler's method, whose damping is implicit."""
     mujoco: Any = import_module("mujoco")
     model = mujoco_model(mujoco, panda, damping=DAMPING)
-    model.opt.integrator, model.opt.timestep = mujoco.mjtIntegrator.mjINT_EULER, h
-    model.dof_frictionloss[:], model.jnt_limited[:] = LEVELS, stops
-    model.jnt_range[:] = np.column_stack([LOWER, UPPER])
-    if stiff:
-        for stiffness, width in ((model.dof_solref, model.dof_solimp), (model.jnt_solref, model.jnt_solimp)):
-            stiffness[:], width[:, :2] = (2 * h, 1.0), 0.9999
+    model.opt.timestep = h
+    stick_and_stop(mujoco, model, LEVELS, *((LOWER, UPPER) if stops else (None, None)), h if stiff else 0.0)
     data, each = mujoco.MjData(model), round(SAMPLE_S / h)
     data.qpos[:], samples = START, [START]
     for k in range(round(DURATION_S / h)):

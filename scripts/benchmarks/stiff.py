@@ -8,23 +8,21 @@ The reference is the explicit method at 1e-12, whose steps stability bounds: h |
 from __future__ import annotations
 
 from statistics import median
-from time import perf_counter
 from typing import Any
 
 import numpy as np
 
 import robot_dyn as rd
-from benchmarks.measure import Effort, arms, row, table
+from benchmarks.measure import READY, Effort, arms, row, seconds, table
 
-REST = np.array([0.3, 0.6, -0.4, -1.2, 0.5, 1.1, 0.2])
 EARLY_S = 0.01
 
 
 def stiff(effort: Effort) -> None:
     """Errors, steps and times of a run of 1 s, by tolerance."""
-    plant = rd.Plant(arms()["Panda-7"], [rd.ViscousFriction(1e5), rd.Spring(1e8, REST)])
+    plant = rd.Plant(arms()["Panda-7"], [rd.ViscousFriction(1e5), rd.Spring(1e8, READY)])
     options: dict[str, Any] = {
-        "q0": REST + 0.1, "duration_s": 0.001 if effort.quick else 1.0, "record_period_s": 1e-4,
+        "q0": READY + 0.1, "duration_s": 0.001 if effort.quick else 1.0, "record_period_s": 1e-4,
         "estimate_error": False, "engine": "compiled",
     }  # fmt: skip
     reference = rd.simulate(plant, **options, integrator=rd.Adaptive("DOP853", 1e-12, 1e-12))
@@ -32,14 +30,10 @@ def stiff(effort: Effort) -> None:
     many = [("Rosenbrock", tolerance) for tolerance in (1e-4, 1e-5, 1e-6, 1e-8, 1e-10)]
     for name, tolerance in [*many, ("DOP853", 1e-5), ("DOP853", 1e-8)]:
         method = rd.Adaptive(name, tolerance, tolerance)
-        runs = [_timed(plant, options | {"integrator": method}) for _ in range(5 if name == "Rosenbrock" else 1)]
-        run = runs[0][0]
+        given: dict[str, Any] = options | {"integrator": method}
+        times = [seconds(lambda: rd.simulate(plant, **given)) for _ in range(5 if name == "Rosenbrock" else 1)]
+        run = rd.simulate(plant, **given)
         error = np.abs(run.q - reference.q).max(axis=1)
         early = error[run.t <= EARLY_S + 1e-9].max()
-        ms = 1e3 * median(seconds for _, seconds in runs)
+        ms = 1e3 * median(times)
         row(name, f"{tolerance:g}", f"{early:.1e}", f"{error[-1]:.1e}", run.statistics.steps, f"{ms:.1f}")
-
-
-def _timed(plant: rd.Plant, options: dict[str, Any]) -> tuple[rd.Trajectory, float]:
-    began = perf_counter()
-    return rd.simulate(plant, **options), perf_counter() - began

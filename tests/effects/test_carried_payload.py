@@ -171,7 +171,9 @@ def test_a_plant_is_asked_at_a_time() -> None:
         np.testing.assert_array_equal(plant.at(t).M(Q), other.M(Q))
         np.testing.assert_array_equal(rd.linearise(plant, Q, V, t=t)[0], rd.linearise(other, Q, V)[0])
     for ask in (lambda: plant.M(Q), lambda: plant.C(Q, V)):
-        with pytest.raises(EffectError, match=r"depends on what is carried, and so on the time: ask plant.at\(t\)"):
+        with pytest.raises(
+            EffectError, match=r"depends on the carried payloads, and so on the time: use plant.at\(t\)"
+        ):
             ask()
     with pytest.raises(TraceError, match=r"carried_payload comes and goes: ask plant.at\(t\)"):
         rd.Compiled(plant).forward_dynamics(0.0, Q, V, V)

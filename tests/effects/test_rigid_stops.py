@@ -62,7 +62,7 @@ class OneWay(rd.Dissipative):
     def thresholds(self, n: int) -> tuple[rd.Threshold, ...]:
         return (rd.Threshold(0, 0.0, "damper", "taken along", "left", of_velocity=True),)
 
-    def beyond(self, n: int, sides: Any) -> OneWay:
+    def on_side(self, n: int, sides: Any) -> OneWay:
         ((_, side),) = sides.items()
         b = self.up if side > 0 else self.down
         return replace(self, up=b, down=b)

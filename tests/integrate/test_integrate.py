@@ -18,7 +18,7 @@ from robot_dyn.errors import QueryError
 from robot_dyn.integrate.explicit import RK4, ExplicitRungeKutta
 from robot_dyn.integrate.gauss import Gauss
 from robot_dyn.integrate.implicit import SinglyDiagonallyImplicit
-from robot_dyn.integrate.integrator import Integrator, System
+from robot_dyn.integrate.integrator import Integrator, System, arithmetic_like
 from robot_dyn.integrate.methods import FIXED_STEP, METHODS, method
 from robot_dyn.integrate.tableau import ButcherTableau, Surd
 from robot_dyn.scene.scene import parse_scene
@@ -85,11 +85,11 @@ def test_a_surd_is_as_fine_as_its_arithmetic() -> None:
         ((Surd(Fraction(1, 2), Fraction(1, 6), 3),),), (1,), (Surd(Fraction(1, 2), Fraction(1, 6), 3),), 1
     )
     for kind in (np.float32, np.float64, np.longdouble):
-        x = tableau.numbers(np.zeros(1, kind)).c[0]
+        x = tableau.arrays(arithmetic_like(np.zeros(1, kind))).c[0]
         assert type(x) is kind
         assert abs(6 * x * x - 6 * x + 1) <= 8 * np.finfo(kind).eps
     with Ball(300).scope():
-        x = tableau.numbers(Ball(300).array([0])).c[0]
+        x = tableau.arrays(Ball(300)).c[0]
         assert (6 * x * x - 6 * x + 1).contains(arb(0))
         assert float(x.rad()) < 1e-85
 

@@ -1,1 +1,7 @@
-"""The loop of a real controller: delays, quantisation, filters, noise, rates."""
+"""What a real control loop adds to a controller: delays, rounding, filters, noise, limits, two rates.
+
+loop, tick, delay    `Loop`: a controller with delays and blocks, and what happens at each of its ticks
+block                base class of blocks; `Quantisation`, `Noise`, `RateLimit`, `Differences`
+low_pass             `LowPass`
+multirate            `Multirate`: the sum of two controllers with different periods
+"""

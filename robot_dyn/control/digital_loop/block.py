@@ -1,5 +1,7 @@
 """Blocks of a sampled loop: y = output(x, s), s⁺ = next(x, s) at each tick, of a signal x with one entry a joint.
 
+The base class, and the blocks whose equation is one line: quantisation, noise, rate limit and differences.
+
 [Åström, Wittenmark, Computer-Controlled Systems, 3rd ed., 1997, ch. 1; Franklin, Powell, Workman, Digital Control of
 Dynamic Systems, 3rd ed., 1998, ch. 1]
 """
@@ -8,10 +10,13 @@ from __future__ import annotations
 
 import re
 from abc import ABC, abstractmethod
-from typing import ClassVar
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, final
+
+import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.coefficients import check_coefficients
+from robot_dyn.coefficients import check_coefficients, coefficient
 from robot_dyn.errors import ControlError
 from robot_dyn.values import Value
 
@@ -30,16 +35,18 @@ class Block(Value, ABC):
     and with symbols in place of these where they are compiled, as of `Controller`.
 
     Attributes:
-        term: Its equation in a few signs.
-        linear: Whether it acts on small signals; one that does not is left out where a loop is linearised.
+        term: Its equation in short.
+        linear: Whether it acts on small signals; otherwise it is left out of linearised loops.
         rounds: Whether its output jumps where its input does not; a class that does not define it declares nothing.
-        random: Whether its states are standard normal deviates, drawn anew at each tick.
+        random: Whether its states are standard normal deviates, drawn again at each tick.
+        differentiates: Whether it derives the velocity from the measured position, as the first block of velocity.
     """
 
     term: ClassVar[str] = ""
     linear: ClassVar[bool] = True
     rounds: ClassVar[bool] = False
     random: ClassVar[bool] = False
+    differentiates: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         check_coefficients(self, ControlError)
@@ -50,25 +57,120 @@ class Block(Value, ABC):
         return name_of(type(self))
 
     def check(self, period_s: float) -> None:
-        """ControlError if it has no meaning at a period."""
+        """Raise a ControlError if it is not defined for a period."""
 
     def state_size(self, n: int) -> int:
         """Number of its states."""
         return 0
 
     def start(self, x: Array, period_s: float) -> Array:
-        """The states after x at all times, (state_size(n),)."""
+        """Return the states after a constant signal x, (state_size(n),)."""
         return x[:0]
 
     @abstractmethod
     def output(self, x: Array, s: Array, period_s: float) -> Array:
-        """The signal behind it, (n,)."""
+        """Return the output signal, (n,)."""
 
     def next_state(self, x: Array, s: Array, period_s: float) -> Array:
-        """Its states after the tick, (state_size(n),)."""
+        """Return its states after the tick, (state_size(n),)."""
         return s
 
 
 def name_of(kind: type[Block]) -> str:
-    """The name of a class of blocks in small letters, as "low_pass"."""
+    """The name of a class of blocks in snake case, as "low_pass"."""
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", kind.__name__).lower()
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Quantisation(Block):
+    """Rounding to the nearest multiple of a resolution: y = Δ ⌊x/Δ + ½⌋, as by an encoder or a converter.
+
+    Attributes:
+        resolution: Δ, a scalar or (n,), in the unit of the signal, positive.
+    """
+
+    term = "y = Δ ⌊x/Δ + ½⌋"
+    linear, rounds = False, True
+
+    resolution: Any = field(metadata=coefficient(SIGNAL, symbol="Δ", above=0))
+
+    def output(self, x: Array, s: Array, period_s: float) -> Array:
+        return self.resolution * np.floor(x / self.resolution + 0.5)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Noise(Block):
+    """Normal noise, independent from tick to tick and from joint to joint: y = x + σ ξ.
+
+    Attributes:
+        deviation: σ, the standard deviation, a scalar or (n,), in the unit of the signal, not negative.
+    """
+
+    # the deviates ξ of the counter (seed, run, tick, channel): the time loop, which knows the tick, draws them
+    term = "y = x + σ ξ"
+    linear, rounds, random = False, False, True
+
+    deviation: Any = field(metadata=coefficient(SIGNAL, symbol="σ", least=0))
+
+    def state_size(self, n: int) -> int:
+        return n
+
+    def output(self, x: Array, s: Array, period_s: float) -> Array:
+        return x + self.deviation * s
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class RateLimit(Block):
+    """Follows a signal by at most r T in a period T: y_k = y_{k−1} + min(max(x_k − y_{k−1}, −r T), r T).
+
+    Torques start at 0.
+
+    Attributes:
+        rate: r, a scalar or (n,), in the unit of the signal per [s], positive.
+    """
+
+    term = "y = y₋ + sat(x − y₋, r T)"
+    linear, rounds = False, False
+
+    rate: Any = field(metadata=coefficient(f"{SIGNAL}/s", symbol="r", above=0))
+
+    def state_size(self, n: int) -> int:
+        return n
+
+    def start(self, x: Array, period_s: float) -> Array:
+        return x
+
+    def output(self, x: Array, s: Array, period_s: float) -> Array:
+        most = self.rate * period_s
+        return s + np.minimum(np.maximum(x - s, -most), most)
+
+    def next_state(self, x: Array, s: Array, period_s: float) -> Array:
+        return self.output(x, s, period_s)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Differences(Block):
+    """Backward difference of a signal over the period T: y_k = (x_k − x_{k−1}) / T.
+
+    At the first tick it is 0. As the first block of the velocity of a `Loop` it takes the measured position, after
+    the blocks of that. A quantised position makes it a multiple of Δ/T.
+    """
+
+    term = "y = (x − x₋)/T"
+    rounds, differentiates = False, True
+
+    def state_size(self, n: int) -> int:
+        return n
+
+    def start(self, x: Array, period_s: float) -> Array:
+        return x
+
+    def output(self, x: Array, s: Array, period_s: float) -> Array:
+        return (x - s) / period_s
+
+    def next_state(self, x: Array, s: Array, period_s: float) -> Array:
+        return x

@@ -1,4 +1,4 @@
-"""Delays of a sampled loop: whole periods by what is on its way, the rest of a period by an instant of its own.
+"""Delays of a sampled loop: whole periods by a queue of signals, the rest of a period by a further instant.
 
     measured at t_k − τ_m: x_{k−d} of the instants t_k − (τ_m mod T);   acts from t_k + τ_u on: at t_{k+d} + (τ_u mod T)
 
@@ -21,7 +21,7 @@ _ROUNDED = 1e-9  # of a period
 
 
 class Instant(NamedTuple):
-    """A part of each period, and what happens there: measuring, computing, or a torque that begins to act."""
+    """A part of each period at which the loop measures, computes, or lets a torque act."""
 
     part: float
     measures: bool
@@ -30,10 +30,10 @@ class Instant(NamedTuple):
 
 
 def instants(measurement_delay: float, actuation_delay: float) -> tuple[Instant, ...]:
-    """What happens in each period, the computation first, with delays in periods.
+    """Return the instants of each period, the computation first, for delays in periods.
 
     Raises:
-        ControlError: If two instants lie too close together to be told apart.
+        ControlError: If two instants lie too close together.
     """
     measured, acted = -measurement_delay % 1.0, actuation_delay % 1.0
     parts = sorted({0.0, measured, acted})
@@ -46,7 +46,7 @@ def instants(measurement_delay: float, actuation_delay: float) -> tuple[Instant,
 
 
 def delay(name: str, given: Any) -> float:
-    """A delay in periods; within rounding of a whole number of them it is that."""
+    """Return a delay in periods, rounded to a whole number if it is that but for rounding."""
     periods = number(name, given, error=ControlError)
     if not 0 <= periods <= _MOST:
         raise ControlError(f"{name} must be from 0 to {_MOST} periods, got {periods:g}; take another period")
@@ -54,7 +54,7 @@ def delay(name: str, given: Any) -> float:
 
 
 def shifted(x: Array, past: Array) -> tuple[Array, Array]:
-    """What leaves a delay of whole periods as x enters it, and what is in it then, the newest first."""
+    """Return what leaves a delay of whole periods when x enters it, and its content then, the newest first."""
     if not len(past):
         return x, past
     return past[-len(x) :], np.concatenate([x, past[: -len(x)]])

@@ -1,9 +1,9 @@
-"""The loop of a real controller: what is measured comes late and rounded, and what is asked for acts late and limited.
+"""The loop of a real controller: measurements are late and rounded, and commands act late and limited.
 
     q, v at t_k − τ_m ─ blocks ─► q̂, v̂ ─ controller at t_k ─► blocks ─► u from t_k + τ_u on
 
-All of it is a map of the states z of a sampled controller: z holds what is on its way, and the states of the blocks.
-A delay that is no whole number of periods makes a second instant in each, at which z passes it on.
+All of it is a map of the states z of a sampled controller: z holds the signals in delays, and the states of blocks.
+A delay that is not a whole number of periods adds a second instant to each period.
 [Åström, Wittenmark, Computer-Controlled Systems, 3rd ed., 1997, sec. 2.3 and ch. 9]
 """
 
@@ -18,13 +18,11 @@ from typing import Any, ClassVar, final
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.coefficients import declared, with_values
-from robot_dyn.control.controller import Controller, Nested
+from robot_dyn.coefficients import with_values
+from robot_dyn.control.controller import Controller, Nested, check_joints, check_sampled, nested
 from robot_dyn.control.digital_loop.block import Block
 from robot_dyn.control.digital_loop.delay import Instant, delay, instants
-from robot_dyn.control.digital_loop.differences import Differences
 from robot_dyn.control.digital_loop.tick import tick
-from robot_dyn.control.nested import check_sampled, nested
 from robot_dyn.errors import ControlError, shown
 from robot_dyn.threshold import smooth
 from robot_dyn.validate import integer
@@ -38,9 +36,9 @@ class Loop(Controller):
     """A sampled controller with delays, and blocks between it and the arm.
 
     Delays are in periods T. The controller computes at t_k = k T, with the reference of that time and what was measured
-    at t_k − measurement_delay · T; its torque acts from t_k + actuation_delay · T on. Before the start the arm has been
-    where it starts, with the velocity it has there, and the torque is 0 until the first one acts. The actuation of a
-    run is the torque that acts.
+    at t_k − measurement_delay · T; its torque acts from t_k + actuation_delay · T on. Before the start the arm is
+    measured at its initial position and velocity, and the torque is 0 until the first one acts. The actuation of a run
+    is the torque that acts.
 
     Attributes:
         controller: A sampled controller, whose period is that of the loop.
@@ -48,9 +46,9 @@ class Loop(Controller):
         velocity: Blocks of the measured velocity; `Differences` as the first takes the position behind its blocks.
         actuation: Blocks of the torque, in the order from the controller to the joints.
         measurement_delay: Of position and velocity, in periods, not negative.
-        actuation_delay: Of the torque, time to compute it and on its way, in periods, not negative.
+        actuation_delay: Of the torque, from the start of its computation, in periods, not negative.
         seed: Of noise, a whole number.
-        run: Number of the run whose noise it is; `rollouts` counts on from it.
+        run: Number of the run, which selects its noise; `rollouts` counts up from it.
 
     Raises:
         ControlError: If the controller is continuous, or a loop itself, or a block or delay is not allowed.
@@ -85,17 +83,15 @@ class Loop(Controller):
 
     def _check_blocks(self, period_s: float) -> None:
         for line, i, block in self.blocks:
-            if isinstance(block, Differences) and (line, i) != ("velocity", 0):
-                raise ControlError(f"{line}: Differences may only be the first block of velocity; move it there")
-            for name, each in declared(type(block)).items():
-                shape = np.shape(getattr(block, name))
-                if each.of_joints and shape not in ((), (self.n,)):
-                    raise ControlError(f"{line}: {name} must be one number or of shape ({self.n},), got {shape}")
+            if block.differentiates and (line, i) != ("velocity", 0):
+                kind = type(block).__name__
+                raise ControlError(f"{line}: {kind} may only be the first block of velocity; move it there")
+            check_joints(block, self.n, f"{line}: ")
             block.check(period_s)
 
     @property
     def blocks(self) -> Iterator[tuple[str, int, Block]]:
-        """Line, number and block of each."""
+        """Each block, with its line and number."""
         return ((line, i, block) for line in LINES for i, block in enumerate(getattr(self, line)))
 
     @cached_property
@@ -105,13 +101,13 @@ class Loop(Controller):
 
     @property
     def parts(self) -> tuple[Nested, ...]:
-        made = [*nested(self, "controller", "")]
+        parts = [*nested(self, "controller", "")]
         for line in LINES:
             names = [block.name for block in getattr(self, line)]
             for i, (name, block) in enumerate(zip(names, getattr(self, line), strict=True)):
                 number = f" {names[: i + 1].count(name)}" if names.count(name) > 1 else ""
-                made.append(Nested(f"{line}.{i}", f"{line}.{name}{number}.", block))
-        return tuple(made)
+                parts.append(Nested(f"{line}.{i}", f"{line}.{name}{number}.", block))
+        return tuple(parts)
 
     @property
     def task_frame(self) -> str | None:
@@ -150,17 +146,17 @@ class Loop(Controller):
 
     @cached_property
     def ticks(self) -> tuple[Instant, ...]:
-        """In each period, the first at its start."""
+        """The instants of each period, the first at its start."""
         return instants(self.measurement_delay, self.actuation_delay)
 
     @property
     def differs(self) -> bool:
-        """Whether the velocity is that of differences."""
-        return bool(self.velocity) and isinstance(self.velocity[0], Differences)
+        """Whether the velocity is derived from the measured position."""
+        return bool(self.velocity) and self.velocity[0].differentiates
 
     @cached_property
     def places(self) -> dict[str, slice]:
-        """Where z has what."""
+        """Places of the states in z, by name."""
         n, several = self.n, len(self.ticks) > 1
         measured = n if self.differs else 2 * n
         whole = int(self.measurement_delay), int(self.actuation_delay)
@@ -209,8 +205,8 @@ class Loop(Controller):
 
 
 def _blocks(line: str, given: Any) -> tuple[Block, ...]:
-    """The blocks that are meant: several, or one."""
-    made = (given,) if isinstance(given, Block) else given
-    if not isinstance(made, tuple | list) or not all(isinstance(each, Block) for each in made):
+    """The blocks of a line, given as several or as one."""
+    blocks = (given,) if isinstance(given, Block) else given
+    if not isinstance(blocks, tuple | list) or not all(isinstance(each, Block) for each in blocks):
         raise ControlError(f"{line} must be blocks, such as [rd.Quantisation(1e-4)], got {shown(given)}")
-    return tuple(made)
+    return tuple(blocks)

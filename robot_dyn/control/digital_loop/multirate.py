@@ -14,8 +14,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.coefficients import with_values
-from robot_dyn.control.controller import Controller, Nested
-from robot_dyn.control.nested import check_sampled, nested
+from robot_dyn.control.controller import Controller, Nested, check_sampled, nested
 from robot_dyn.errors import ControlError
 from robot_dyn.threshold import smooth
 
@@ -25,7 +24,7 @@ _ROUNDED = 1e-9  # of a ratio of periods: it is a whole number
 @final
 @dataclass(frozen=True, eq=False)
 class Multirate(Controller):
-    """The sum of two sampled controllers, the period of one a whole number of those of the other.
+    """The sum of two sampled controllers, the period of one a whole number of periods of the other.
 
     As feedback each millisecond beside the torque of a model each ten: `Multirate(PD(…, 1e-3), PDGravity(…, 1e-2))`,
     the second with gains 0. The torque of the slow one is that of its last tick.
@@ -111,14 +110,14 @@ class Multirate(Controller):
             ]
         )  # fmt: skip
 
-    def _slow(self, t: float, q: Array, v: Array, z: Array, own: Array) -> Array:
-        """The torque of the slow part, made at its ticks."""
+    def _slow(self, t: float, q: Array, v: Array, z: Array, slow: Array) -> Array:
+        """The torque of the slow part, computed at its ticks."""
         if not self.period_s or z[self._of_both] < 0.5:
-            return self.slow.torque(t, q, v, own)
+            return self.slow.torque(t, q, v, slow)
         return z[self._of_both + 1 :]
 
     def _split(self, z: Array) -> tuple[Array, Array]:
-        """The states of the two."""
+        """The states of both parts."""
         return z[: self._of_fast], z[self._of_fast : self._of_both]
 
     def at_period(self, period_s: float) -> Multirate:

@@ -15,7 +15,7 @@ import numpy as np
 from robot_dyn.arithmetic import Array, NotPositiveDefiniteError
 from robot_dyn.convex import PASSES, newton
 from robot_dyn.effects.effect import Conservative
-from robot_dyn.effects.set_valued import SetValued
+from robot_dyn.effects.set_valued import SetValued, impulses_of, in_a_step
 from robot_dyn.integrate.time_stepping import problem_rows
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 
@@ -41,7 +41,7 @@ def problem(equation: StateEquation, t: Any, x: Array, held: Array | None) -> Ar
     ]
     M = equation.plant.M(q)
     load = sum((torque for _, torque in torques), start=u) - equation.plant.dynamics.inverse_dynamics(q, v, 0 * v)
-    friction, lower, upper, shares = motion.in_a_step(q, v)
+    friction, lower, upper, shares = in_a_step(motion.set_valued, q, v)
     working = [torque for force, torque in torques if not isinstance(force, Conservative)]
     rates = np.zeros_like(z)
     if held is None and equation.controller is not None and equation.state_size:
@@ -114,7 +114,7 @@ def behind(equation: StateEquation, x: Array, found: Array) -> Array:
     at, works = problem_rows(n).rest - problem_rows(n).M, [h * (given["u"] @ mean)]
     smooth = sum(not isinstance(force, SetValued) for force in own)
     rates = known[at + n * smooth :][: equation.states - equation.impulses]
-    impulses = motion.impulses_of(rubbing, stopping, known[at + n * smooth + len(rates) :])
+    impulses = impulses_of(motion.set_valued, rubbing, stopping, known[at + n * smooth + len(rates) :])
     for force in own:
         if isinstance(force, SetValued):
             works.append(next(impulses) @ mean)

@@ -12,7 +12,6 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.effects.carried_payload import in_hand
 from robot_dyn.effects.plant import carrying
 from robot_dyn.queries.dynamics import acceleration
 from robot_dyn.simulation.dynamics.state_equation import PICK_UP, StateEquation
@@ -39,7 +38,7 @@ class PayloadEvents:
 
     def _at(self, t: float) -> Carried:
         payloads = self._whole.equation_of_motion.payloads
-        return tuple(in_hand(each, t) for each in payloads if each.carried is None)
+        return tuple(bool(each.acts(t)) for each in payloads if each.carried is None)
 
     @property
     def any(self) -> bool:

@@ -155,11 +155,11 @@ class Switching:
             at = {k: {each: of[k if each.own else None, each] for each in mine} for k, mine in self._of.items()}
             equation, n = self.equation, self._n
             effects: list[Effect] = [
-                effect.beyond(n, at[k]) if at[k] else effect for k, effect in enumerate(equation.plant.effects)
+                effect.on_side(n, at[k]) if at[k] else effect for k, effect in enumerate(equation.plant.effects)
             ]
             plant, controller = Plant(equation.plant.dynamics, effects), equation.controller
             if controller is not None and at.get(CONTROLLER):
-                controller = controller.beyond(at[CONTROLLER])
+                controller = controller.on_side(at[CONTROLLER])
             plant = plant if mode is None else in_mode(plant, mode)
             made = replace(equation, plant=plant, controller=controller)
             if len(self._known) >= _MOST:

@@ -72,7 +72,7 @@ def check_stops(plant: Plant, q0: Array, of: str = "q0") -> None:
         QueryError: If it is; names the joint, and by `of` the start.
     """
     for each in plant.effects:
-        if isinstance(each, RigidStops) and (depth := each.beyond_by(q0)).any():
+        if isinstance(each, RigidStops) and (depth := each.penetration(q0)).any():
             i = int(np.argmax(depth))
             name, which = plant.dynamics.joint_names[i], "lower" if each.touched(q0)[i] < 0 else "upper"
             raise QueryError(f"{of}: {name!r} is {depth[i]:.3g} beyond its {which} stop; start between the stops")

@@ -1,0 +1,36 @@
+# The public names of this room and where they live: type checkers read this file, and __init__.py does.
+from robot_dyn.effects.actuator import ActuatorLag as ActuatorLag
+from robot_dyn.effects.actuator import EffortLimit as EffortLimit
+from robot_dyn.effects.carried_payload import CarriedPayload as CarriedPayload
+from robot_dyn.effects.dahl import DahlFriction as DahlFriction
+from robot_dyn.effects.dry_friction import DryFriction as DryFriction
+from robot_dyn.effects.effect import Active as Active
+from robot_dyn.effects.effect import Bound as Bound
+from robot_dyn.effects.effect import Conservative as Conservative
+from robot_dyn.effects.effect import Dissipative as Dissipative
+from robot_dyn.effects.effect import Drive as Drive
+from robot_dyn.effects.effect import Effect as Effect
+from robot_dyn.effects.effect import Force as Force
+from robot_dyn.effects.effect import Stateful as Stateful
+from robot_dyn.effects.equation_of_motion import EquationOfMotion as EquationOfMotion
+from robot_dyn.effects.friction import RegularisedCoulombFriction as RegularisedCoulombFriction
+from robot_dyn.effects.friction import ViscousFriction as ViscousFriction
+from robot_dyn.effects.hold import Hold as Hold
+from robot_dyn.effects.joint_limit import JointStopDamper as JointStopDamper
+from robot_dyn.effects.joint_limit import JointStopSpring as JointStopSpring
+from robot_dyn.effects.joint_limit import joint_stops as joint_stops
+from robot_dyn.effects.line_spring_damper import LineDamper as LineDamper
+from robot_dyn.effects.line_spring_damper import LineSpring as LineSpring
+from robot_dyn.effects.line_spring_damper import LineSpringDamper as LineSpringDamper
+from robot_dyn.effects.lugre import LuGreFriction as LuGreFriction
+from robot_dyn.effects.plant import Plant as Plant
+from robot_dyn.effects.rigid_backlash import RigidBacklash as RigidBacklash
+from robot_dyn.effects.rigid_stops import RigidStops as RigidStops
+from robot_dyn.effects.series_elastic import SeriesElastic as SeriesElastic
+from robot_dyn.effects.set_valued import Interval as Interval
+from robot_dyn.effects.set_valued import Mode as Mode
+from robot_dyn.effects.set_valued import SetValued as SetValued
+from robot_dyn.effects.spring import Spring as Spring
+from robot_dyn.effects.wrench import ExternalWrench as ExternalWrench
+
+__all__: list[str]

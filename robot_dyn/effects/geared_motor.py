@@ -1,0 +1,54 @@
+"""What drives with a gear share: which joints they drive, and the inertia of the rotor behind the gear, n² J."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.coefficients import with_values
+from robot_dyn.effects.effect import Drive
+from robot_dyn.errors import EffectError
+
+
+class GearedMotor(Drive):
+    """Motors behind gears, each for one of the joints for which the coefficient `through` is positive.
+
+    Attributes:
+        inertia: J of the rotor, a scalar or (n,).
+        ratio: n of the gear, a scalar or (n,); None for 1.
+        joints: Indices of the driven joints; None outside a plant.
+        through: Name of the coefficient that describes how a motor moves its joint.
+    """
+
+    inertia: Any
+    ratio: Any
+    joints: tuple[int, ...] | None
+    through: ClassVar[str]
+
+    def on(self, dynamics: Any) -> Any:
+        known: Any = super().on(dynamics)
+        driven = np.flatnonzero(np.broadcast_to(getattr(known, self.through), dynamics.n) > 0)
+        if not len(driven):
+            raise EffectError(f"{self.name}: {self.through} is 0 for all joints; give a positive one, or leave it out")
+        return with_values(known, {"joints": tuple(driven.tolist())})
+
+    @property
+    def _driven(self) -> list[int]:
+        if self.joints is None:
+            raise EffectError(f"{self.name}: its joints are known in a plant; ask that")
+        return list(self.joints)
+
+    def driven(self, n: int) -> Sequence[int]:
+        return self._driven
+
+    def of(self, name: str, n: int) -> Array:
+        """A coefficient of its joints, (k,)."""
+        return np.broadcast_to(getattr(self, name), (n,), subok=True)[self._driven]
+
+    def reflected(self, n: int) -> Array:
+        """The inertia of the rotors behind the gear, n² J, (k,)."""
+        J = self.of("inertia", n)
+        return J if self.ratio is None else self.of("ratio", n) ** 2 * J
