@@ -32,20 +32,9 @@ LINES = (
     "--help",
 )
 ODD = (
-    *WORDS,
-    "scene.toml",
-    "run.npz",
-    ".",
-    "/",
-    "/dev/full",
-    "pipe",
-    "--json",
-    "--",
-    "-h",
-    "joint_1=nan",
-    "1,2,3",
+    *WORDS, "scene.toml", "run.npz", ".", "/", "/dev/full", "pipe", "--json", "--", "-h", "joint_1=nan", "1,2,3",
     "--force",
-)
+)  # fmt: skip
 
 
 def seeds(folder: Path) -> list[list[str]]:

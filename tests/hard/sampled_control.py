@@ -26,18 +26,8 @@ from tests.loops import growth
 
 TITLE = "Sampled control"
 ARMS = (
-    "pendulum",
-    "planar_2r",
-    "double_pendulum",
-    "finger_edu",
-    "ur3",
-    "ur5",
-    "ur10",
-    "panda",
-    "kinova",
-    "xarm7",
-    "z1",
-)
+    "pendulum", "planar_2r", "double_pendulum", "finger_edu", "ur3", "ur5", "ur10", "panda", "kinova", "xarm7", "z1",
+)  # fmt: skip
 SHORT = ("planar_2r", "ur5")
 PERIODS, START, BANDWIDTH = 1500, 1e-3, 20.0
 LATE = {"PD": (0.0, 0.0), "PD with delay": (0.4, 1.3)}  # of measurement and actuation, in periods

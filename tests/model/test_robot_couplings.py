@@ -69,7 +69,7 @@ def test_couplings_are_read_only():
             array[0] = 1.0
 
 
-@pytest.mark.parametrize("road", ["Pinocchio", "Lagrangian", "machine code"])
+@pytest.mark.parametrize("implementation", ["Pinocchio", "Lagrangian", "machine code"])
 def test_where_rounding_hides_the_joints_that_follow_the_state_is_refused(implementation: str) -> None:
     """Half of 3e6 rad is known to 1e-9 rad, half of 1e15 rad to 0.1 rad, with as few digits of M; balls know both."""
     robot = rd.load("mimic_chain")
