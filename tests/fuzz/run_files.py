@@ -120,9 +120,8 @@ def _text(rng: np.random.Generator, text: str) -> str:
         return text
     table: Any = about
     while isinstance(table, dict | list) and table:
-        key: Any = (
-            list(table)[int(rng.integers(len(table)))] if isinstance(table, dict) else int(rng.integers(len(table)))
-        )
+        i = int(rng.integers(len(table)))
+        key: Any = list(table)[i] if isinstance(table, dict) else i
         if not isinstance(table[key], dict | list) or not table[key] or rng.random() < 0.3:
             table[key] = ODD[int(rng.integers(len(ODD)))]
             break

@@ -112,9 +112,8 @@ def rows(case: str, robot: rd.Robot, engines: dict[str, Any], at: list[dict[str,
     for implementation in engines:
         own = [each for each in found if each.implementation == implementation]
         solved = [each for each in own if each.quantity == FORWARD_DYNAMICS.name]
-        yield Row(
-            case, f"{implementation}: M, C, C v, N, ID, in n u", max(x.error for x in own if x not in solved), SUMS
-        )
+        sums = max(each.error for each in own if each not in solved)
+        yield Row(case, f"{implementation}: M, C, C v, N, ID, in n u", sums, SUMS)
         worst = max(solved, key=lambda each: np.nan_to_num(each.error, nan=np.inf))
         yield Row(
             case, f"{implementation}: FD, in n u κ", worst.error, SOLVED, worst.said if np.isnan(worst.error) else ""

@@ -147,9 +147,8 @@ def engines(name: str, seed: int) -> Iterator[Row]:
     v[TILE // 2] = 1e9
     wild = rd.rollouts(setup, q, v, threads=1)
     beside = np.arange(TILE) != TILE // 2
-    yield Row(
-        case, "beside a run that diverges: entries with other bits", int(np.sum(wild.q[beside] != many[0].q[beside])), 0
-    )
+    other = int(np.sum(wild.q[beside] != many[0].q[beside]))
+    yield Row(case, "beside a run that diverges: entries with other bits", other, 0)
     yield Row(case, "runs that diverge and are not named", int(not wild.diverged[TILE // 2]), 0)
 
 

@@ -12,9 +12,8 @@ NOT_DECIMAL = (
 )
 XYZ, RPY, CENTRE = 'xyz="0 0 0.7"', 'rpy="0 0 0.7"', 'xyz="0 0 0.1"'
 
-LARGEST = re.sub(r'(value|i(?:xx|yy|zz)|damping|friction)="[^"]*"', r'\1="1e12"', ARM).replace(
-    "0.4 0 0", "1e12 1e12 1e12"
-)
+LARGEST = re.sub(r'(value|i(?:xx|yy|zz)|damping|friction)="[^"]*"', r'\1="1e12"', ARM)
+LARGEST = LARGEST.replace("0.4 0 0", "1e12 1e12 1e12")
 
 
 def moment(key: str, value: str) -> tuple[str, str]:

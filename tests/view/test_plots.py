@@ -106,9 +106,8 @@ def test_tracking_is_the_deviation_with_its_rms(run, cart) -> None:
 
 def test_phase_is_velocity_over_position(cart) -> None:
     for i, axes in enumerate(plot(cart, "phase").axes):
-        np.testing.assert_array_equal(
-            lines(axes, "path")[0].get_xydata(), np.column_stack([cart.q[:, i], cart.v[:, i]])
-        )
+        path = np.column_stack([cart.q[:, i], cart.v[:, i]])
+        np.testing.assert_array_equal(lines(axes, "path")[0].get_xydata(), path)
 
 
 def test_error_growth_is_veiled_where_it_is_not_resolved(run) -> None:
