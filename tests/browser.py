@@ -77,7 +77,6 @@ def opened(browser: Any, url: str | Path, *, offline: bool = False) -> Iterator[
 
 
 def until(condition: Any, what: str, view: View | None = None, seconds: float = 60.0) -> None:
-    """Wait for a condition."""
     end = time.monotonic() + seconds
     while not condition():
         if time.monotonic() > end:

@@ -337,7 +337,6 @@ def print_nothing(*_: object) -> None:
 
 
 def free_port() -> int:
-    """A port that nobody listens on."""
     with socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return probe.getsockname()[1]

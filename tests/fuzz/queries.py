@@ -23,7 +23,6 @@ Query = tuple[str, Any, dict[str, Any]]
 
 
 def seeds(folder: Path) -> list[Query]:
-    """Valid calls."""
     return [(name, *example) for name, example in examples(folder).items() if name not in SLOW and example[1]]
 
 

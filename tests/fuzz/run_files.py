@@ -42,7 +42,6 @@ def seeds(folder: Path) -> list[bytes]:
 
 
 def mutate(rng: np.random.Generator, seed: bytes) -> bytes:
-    """A damaged run file."""
     kind = int(rng.integers(4))
     if kind == 0:
         return damage(rng, seed)
@@ -63,7 +62,6 @@ def mutate(rng: np.random.Generator, seed: bytes) -> bytes:
 
 
 def attempt(mutant: bytes, folder: Path) -> str:
-    """Load it; use what is accepted."""
     path = folder / "mutant.npz"
     path.write_bytes(mutant)
     run = rd.load_run(path)

@@ -89,7 +89,6 @@ def _change(rng: np.random.Generator, root: etree._Element) -> None:
 
 
 def attempt(mutant: bytes, folder: Path) -> str:
-    """Check it, load it, draw it and ask it."""
     path = folder / "mutant.urdf"
     path.write_bytes(mutant)
     rd.check(path)

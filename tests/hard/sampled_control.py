@@ -43,7 +43,6 @@ def at_rest(name: str, seed: int) -> tuple[rd.Robot, np.ndarray, tuple[np.ndarra
 
 
 def controller(arm: rd.Robot, q: np.ndarray, gains: tuple[np.ndarray, np.ndarray], kind: str) -> rd.Controller:
-    """A controller that holds the arm at q."""
     if kind == "PID in saturation":
         limit = 1.5 * np.abs(arm.N(q)) + 2e-3 * gains[0]  # [N m], of twice the deviation at the start
         return rd.PID(rd.hold(q), gains[0], 3 * gains[0], gains[1], limit, period_s=1e-3)

@@ -153,7 +153,6 @@ def engines(name: str, seed: int) -> Iterator[Row]:
 
 
 def rows(name: str, seed: int) -> Iterator[Row]:
-    """All of a robot of the catalog."""
     yield from batches(completed(rd.load(name))[0], seed)
     yield from caches(name, seed)
     yield from right_angles(name, seed)

@@ -6,7 +6,6 @@ from tests.hostile.kinds import AXIS, ELBOW, Kind, Make, arm, chain, text, welde
 
 
 def mimicking(elbow: str, shoulder: str = "") -> Make:
-    """The sound arm with <mimic> elements."""
     return text(arm((ELBOW, ELBOW + elbow), (AXIS, AXIS + shoulder)))
 
 
