@@ -19,15 +19,9 @@ import pytest
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 # Root needs --no-sandbox; WebGL comes from software; the rest keeps Chromium from asking the network for itself.
 FLAGS = [
-    "--no-sandbox",
-    "--enable-unsafe-swiftshader",
-    "--use-angle=swiftshader",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
+    "--no-sandbox", "--enable-unsafe-swiftshader", "--use-angle=swiftshader", "--disable-quic", "--no-first-run",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync",
+]  # fmt: skip
 
 
 def chromium() -> str:
@@ -83,7 +77,6 @@ def opened(browser: Any, url: str | Path, *, offline: bool = False) -> Iterator[
 
 
 def until(condition: Any, what: str, view: View | None = None, seconds: float = 60.0) -> None:
-    """Wait for a condition."""
     end = time.monotonic() + seconds
     while not condition():
         if time.monotonic() > end:

@@ -36,6 +36,27 @@ def started(*args: str | Path, code: str = MAIN) -> Iterator[subprocess.Popen[st
             process.kill()
 
 
+AT_WORK = """import sys
+from robot_dyn.cli import main
+def tell():
+    print("at work", file=sys.stderr, flush=True)
+{}
+main()
+"""
+
+
+def interrupted_at_work(*args: str | Path, watched: str) -> str:
+    """Output of a command that Ctrl-C ends once `tell()` was called, from code that is put around its work."""
+    with started(*args, code=AT_WORK.format(watched)) as process:
+        assert process.stderr is not None
+        assert process.stderr.readline() == "at work\n"
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+    assert process.returncode == 130, err
+    assert "Traceback" not in err
+    return out
+
+
 def run(*args: str | Path) -> Done[str]:
     """The command in this process, its output no terminal; test_command_line.py checks that it is the same."""
     from robot_dyn.cli import main

@@ -51,7 +51,6 @@ class RandomTree:
 
     @property
     def robot(self) -> rd.Robot:
-        """The robot it describes."""
         return rd.Robot(check(self.urdf.encode(), "random tree"))
 
 

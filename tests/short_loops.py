@@ -232,14 +232,12 @@ class Judged:
 
 
 def judge(seed: int, index: int) -> Judged:
-    """The advice on a loop."""
     loop, exact = drawn(seed, index)
     advice = rd.advise(loop.setup())
     return Judged(f"{seed}/{index} {loop}", loop.radius(loop.period), advice.stable, exact, advice.longest_period_s)
 
 
 def main() -> int:
-    """Judge all loops and print the worst."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--loops", type=int, default=100)
     parser.add_argument("--seed", type=int, default=1)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 import os
 import re
 import shlex
 import subprocess
 import sys
 from collections.abc import Callable
-from itertools import pairwise
+from itertools import pairwise, takewhile
 from pathlib import Path
 
 import pytest
@@ -16,7 +17,6 @@ import pytest
 from tests import command as here
 from tests.browser import chromium
 from tests.long import long
-from tests.printed import check_prints
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
@@ -102,3 +102,24 @@ def test_script_runs_quickly(command: list[str]) -> None:
 def test_make_targets_of_the_readme_exist() -> None:
     targets = set(re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(), flags=re.MULTILINE))
     assert set(re.findall(r"\bmake ([\w-]+)", README)) <= targets
+
+
+def check_prints(document: Path, capsys: pytest.CaptureFixture[str]) -> int:
+    """Run the Python blocks one after the other in one session, and count the lines that were held to what is printed.
+
+    Comments `# → text` state the first lines that the statement above prints.
+    """
+    blocks = re.findall(r"^```python\n(.*?)^```$", document.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    names: dict[str, object] = {}
+    held = 0
+    for block in blocks:
+        lines = block.splitlines()
+        for statement in ast.parse(block).body:
+            exec(compile(ast.Module([statement], []), document.name, "exec"), names)
+            printed = capsys.readouterr().out.splitlines()
+            after = takewhile(lambda line: line.startswith("# → "), lines[statement.end_lineno :])
+            expected = [line.removeprefix("# → ") for line in after]
+            assert printed[: len(expected)] == expected
+            held += len(expected)
+    assert held == sum(block.count("# →") for block in blocks)  # none stands where it is not looked for
+    return held

@@ -28,18 +28,11 @@ NOT_WHOLE = (*NOT_NUMBERS, -1, 0.5, [1])
 NOT_TEXT = (None, 3, NAN, True, b"arm", object(), ["arm"], {}, np.ones(2), 10**5000)
 NOT_OBJECTS = (None, 3, NAN, True, "no such", object(), np.ones(2), MASKED, {"a": 1}, rd.Robot, 10**5000)
 
+# Made by the library: their constructors take what it computed.
 RESULTS = {
-    "Advice",
-    "Certificate",
-    "Checkup",
-    "Comparison",
-    "Cost",
-    "Proof",
-    "Rollouts",
-    "Stress",
-    "Trajectory",
+    "Advice", "Certificate", "Checkup", "Comparison", "Cost", "Proof", "Rollouts", "Stress", "Trajectory",
     "WorkPrecision",
-}  # made by the library: their constructors take what it computed
+}  # fmt: skip
 # What time loops and traces call, with numbers that were checked before, or symbols.
 INTERFACES = (Effect, Controller, rd.Block, Arithmetic)
 FOR_LOOPS = {
@@ -344,7 +337,6 @@ def print_nothing(*_: object) -> None:
 
 
 def free_port() -> int:
-    """A port that nobody listens on."""
     with socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return probe.getsockname()[1]

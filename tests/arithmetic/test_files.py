@@ -20,7 +20,7 @@ from robot_dyn import reading
 from robot_dyn.errors import QueryError, RobotDynError
 from robot_dyn.files import Kind, save, target
 from robot_dyn.simulation.table import export_csv
-from tests.faults import failing_at, raising
+from tests.arithmetic.faults import failing_at, raising
 from tests.simulation.test_run_file import run  # noqa: F401  the fixture
 
 NOTE = Kind("a note", ".note", b"note")
@@ -99,7 +99,7 @@ import os, sys
 from pathlib import Path
 from robot_dyn.errors import QueryError
 from robot_dyn.files import save
-from tests.faults import failing_at
+from tests.arithmetic.faults import failing_at
 with failing_at(int(sys.argv[1]), lambda: os._exit(9)):
     save(Path(sys.argv[2]), lambda stream: stream.write(b"note: new"), QueryError)
 """

@@ -82,7 +82,6 @@ def differences(runs: rd.Rollouts, run: int, one: rd.Trajectory) -> list[str]:
 
 
 def about(remark: Remark) -> tuple[str, str, str]:
-    """What a remark is about."""
     return str(remark.kind), remark.joint, remark.quantity
 
 

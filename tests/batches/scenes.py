@@ -26,7 +26,6 @@ class Batch:
 
 
 def batch(seed: int, index: int) -> Batch:
-    """Batch number `index` of a seed."""
     rng = np.random.default_rng([seed, index])
     family = FAMILIES[index % len(FAMILIES)]
     name = str(rng.choice(["pendulum", "planar_2r", "cart_pole"]))

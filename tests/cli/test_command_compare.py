@@ -1,4 +1,4 @@
-"""What `compare` and `demo` say of the two roads, and the exit code where they disagree."""
+"""What `compare` and `demo` say of the two implementations, and the exit code where they disagree."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ def test_piped_tables_are_whole():
 
 
 def err_by(monkeypatch: pytest.MonkeyPatch, error: float) -> None:
-    """Let the own road say a wrong N."""
+    """Let the own implementation say a wrong N."""
     exact = Lagrangian.N
     monkeypatch.setattr(Lagrangian, "N", lambda self, q: exact(self, q) + error)
 
 
-def test_compare_says_where_the_roads_disagree(monkeypatch: pytest.MonkeyPatch):
+def test_compare_says_where_the_implementations_disagree(monkeypatch: pytest.MonkeyPatch):
     err_by(monkeypatch, 1e-9)
     done = run("compare", "ur5", "--samples", "2")
     assert (done.returncode, done.stderr) == (1, "")
@@ -54,13 +54,13 @@ def test_compare_says_where_the_roads_disagree(monkeypatch: pytest.MonkeyPatch):
     assert answer["robots"]["ur5"]["quantities"]["M"]["ok"] is True
 
 
-def test_a_process_of_compare_exits_with_1_when_the_roads_disagree():
+def test_a_process_of_compare_exits_with_1_when_the_implementations_disagree():
     wrong = "from robot_dyn.lagrange.lagrangian import Lagrangian as L; N = L.N; L.N = lambda self, q: N(self, q) + 1"
     done = spawn("compare", "pendulum", "--samples", "1", code=f"{wrong}\n{MAIN}")
     assert (done.returncode, done.stderr) == (1, b"") and b"DISAGREE" in done.stdout
 
 
-def test_a_road_that_says_nan_disagrees_in_valid_json(monkeypatch: pytest.MonkeyPatch):
+def test_a_implementation_that_says_nan_disagrees_in_valid_json(monkeypatch: pytest.MonkeyPatch):
     err_by(monkeypatch, float("nan"))
     done = run("compare", "ur5", "--samples", "1", "--json")
     assert done.returncode == 1

@@ -54,9 +54,8 @@ def test_the_price_needs_no_other_program(monkeypatch) -> None:
     monkeypatch.setattr("robot_dyn.studies.work_precision_diagram.peers.find_spec", lambda name: None)
     lines = list(demo._price(swing))
     assert re.match(r"  robot_dyn.*: ([\d.]+ [µm]?s|reached by no run)", lines[2])
-    assert [line for line in lines if "left out" in line] == [
-        f"  left out: {name}: is not installed" for name in PROGRAMS
-    ]
+    named = [line for line in lines if "left out" in line]
+    assert named == [f"  left out: {name}: is not installed" for name in PROGRAMS]
 
     def refuse(*_: object, **__: object) -> None:
         raise RobotDynError("no reference")

@@ -58,9 +58,7 @@ def interrupted(delays: list[float], *args: str | Path, code: str = READY) -> It
     ("method", "estimate", "delays"),
     [("DOP853", "true", DELAYS[2::4]), *long([("DOP853", "true", DELAYS[::4]), ("Rosenbrock", "false", DELAYS[1::2])])],
 )
-def test_a_run_may_be_interrupted_at_any_moment(
-    method: str, estimate: str, delays: list[float], tmp_path: Path
-) -> None:
+def test_a_run_may_be_interrupted_at_any_moment(method: str, estimate: str, delays: list, tmp_path: Path) -> None:
     """While it imports, reads, runs: it would take minutes by itself."""
     scene = tmp_path / "scene.toml"
     scene.write_text(SCENE.format(method=method, estimate=estimate))

@@ -33,14 +33,9 @@ def spoil(folder: Path, how: str) -> None:
 
 
 SPOILT = [
-    ("link", "is a link"),
-    ("dangling", "is a link"),
-    ("file", "is not a folder"),
-    ("0755", "mode 0755"),
-    ("0770", "mode 0770"),
-    ("0701", "mode 0701"),
-    pytest.param("owner", "owner 12345", marks=as_root),
-]
+    ("link", "is a link"), ("dangling", "is a link"), ("file", "is not a folder"), ("0755", "mode 0755"),
+    ("0770", "mode 0770"), ("0701", "mode 0701"), pytest.param("owner", "owner 12345", marks=as_root),
+]  # fmt: skip
 
 
 @posix

@@ -152,8 +152,6 @@ def test_a_forked_child_has_threads_of_its_own() -> None:
 
 
 class Memory(dict[str, bytes]):
-    """A store in memory."""
-
     def load(self, key: str) -> bytes | None:
         return self.get(key)
 

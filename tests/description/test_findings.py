@@ -86,14 +86,10 @@ FLAT = 'ixx="0.001" ixy="0" ixz="0" iyy="0.001" iyz="0" izz="0.01"'
             "link 'hand': its inertia breaks the triangle inequality (principal moments 0.001, 0.001, 0.01 kg m²);"
             " correct the inertia of this link",
         ),
-        (
-            inside(WELDED.format(9e-13, 'ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"')),
-            "link 'hand': its mass of 9e-13 kg is below 1e-12 kg; correct it, or its unit",
-        ),
-        (
-            altered(('xyz="0.4 0 0"', 'xyz="6.06e3 8.08e3 0"')),
-            "joint 'elbow': its origin lies 10100 m away, beyond 10000 m, which costs digits; correct it, or its unit",
-        ),
+        (inside(WELDED.format(9e-13, 'ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"')),
+         "link 'hand': its mass of 9e-13 kg is below 1e-12 kg; correct it, or its unit"),
+        (altered(('xyz="0.4 0 0"', 'xyz="6.06e3 8.08e3 0"')),
+         "joint 'elbow': its origin lies 10100 m away, beyond 10000 m, which costs digits; correct it, or its unit"),
         (
             altered(('xyz="0 0 0.1"', 'xyz="0 -1.01e4 0"')),
             "link 'upper': its centre of mass lies 10100 m away, beyond 10000 m, which costs digits; correct it, or"
@@ -123,10 +119,8 @@ FLAT = 'ixx="0.001" ixy="0" ixz="0" iyy="0.001" iyz="0" izz="0.01"'
             "joint 'elbow': the velocity limit is 0, which allows no velocity at all; write the limit in rad/s or m/s,"
             " or leave velocity out for none",
         ),
-        (
-            altered((LIMIT, LIMIT.replace('"-1"', '"1"'))),
-            "joint 'shoulder': the lower limit is the upper one; correct them, or make the joint fixed",
-        ),
+        (altered((LIMIT, LIMIT.replace('"-1"', '"1"'))),
+         "joint 'shoulder': the lower limit is the upper one; correct them, or make the joint fixed"),
         (
             inside(f'<link name="tip">{POINT}</link>' + joint("wrist", "fore", "tip")),
             "joint 'wrist': what it moves has mass but no inertia about its axis, so M is singular; give its link"
@@ -134,7 +128,7 @@ FLAT = 'ixx="0.001" ixy="0" ixz="0" iyy="0.001" iyz="0" izz="0.01"'
         ),
     ],
     ids=lambda value: value[:30] if value.startswith(("link", "joint")) else "",
-)
+)  # fmt: skip
 def test_each_finding_names_place_value_and_remedy(text: str, expected: str, tmp_path: Path) -> None:
     assert findings(text, tmp_path) == (expected,)
 

@@ -31,9 +31,7 @@ def test_table_is_wide() -> None:
 
 
 @pytest.mark.parametrize("file", LOADING, ids=[file.id for file in LOADING])
-def test_foreign_file_has_the_dynamics_of_the_sound_one_and_says_what_was_assumed(
-    file: Foreign, tmp_path: Path
-) -> None:
+def test_foreign_file_has_the_dynamics_of_the_sound_one_and_says_what_was_assumed(file: Foreign, tmp_path) -> None:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         robot = rd.load(written(file, tmp_path))

@@ -33,7 +33,6 @@ def one(task: tuple[int, int]) -> dict:
 
 
 def main() -> int:
-    """Judge all scenes and print a table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--scenes", type=int, default=600)
     parser.add_argument("--seed", type=int, default=1)
@@ -80,7 +79,6 @@ def ask(task: tuple[int, int]) -> tuple[str, bool | None, str]:
 
 
 def reply(task: tuple[int, int]) -> Answer:
-    """What came of one request."""
     return answer(*task)
 
 

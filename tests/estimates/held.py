@@ -2,35 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 import robot_dyn as rd
+from tests.estimates.asked import Answer
 from tests.estimates.nonsmooth import nonsmooth_truth, time_of_event
 from tests.estimates.scenes import Scene, arms
 
 FAMILIES = ("rigid", "dry")
 EVENTS = 150  # of a scene, at most
-
-
-@dataclass(frozen=True)
-class Met:
-    """What came of a scene: the error that was asked for, estimated and true, and how far two truths are apart."""
-
-    label: str
-    asked: float
-    estimated: float
-    true: float
-    unsure: float
-
-    @property
-    def met(self) -> bool:
-        return self.true - self.unsure <= self.asked
-
-    def __str__(self) -> str:
-        numbers = (f"{name} {getattr(self, name):.1e}" for name in ("asked", "estimated", "true", "unsure"))
-        return f"{self.label}: {', '.join(numbers)}"
 
 
 def held_scene(seed: int, index: int, of: str = "") -> tuple[Scene, float]:
@@ -75,7 +57,7 @@ def cut(made: Scene) -> Scene:
     return replace(made, setup=replace(made.setup, duration_s=end, record_period_s=end / 20))
 
 
-def meet(seed: int, index: int) -> Met:
+def meet(seed: int, index: int) -> Answer:
     """Ask for the accuracy of a scene; AccuracyError if it is refused. The truth, and its witness, are `nonsmooth`."""
     whole, asked = held_scene(seed, index)
     scene = cut(whole)
@@ -83,4 +65,4 @@ def meet(seed: int, index: int) -> Met:
     assert run.accuracy is not None
     exact, other = nonsmooth_truth(scene.setup, run.t), nonsmooth_truth(scene.setup, run.t, 1e-12, 3e-3)
     true, unsure = (float(np.abs(exact - q).max()) for q in (run.q, other))
-    return Met(scene.label, asked, run.accuracy.estimated, true, unsure)
+    return Answer(scene.label, asked, run.accuracy.estimated, true, unsure)

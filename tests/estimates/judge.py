@@ -67,7 +67,6 @@ class Judgement:
 
 
 def judge(seed: int, index: int, of: Callable[[int, int], Scene] = scene) -> Judgement:
-    """Run a scene and its truth."""
     return judged(of(seed, index), truth, lambda setup, t: truth(setup, t, 2e-13, 3e-3))
 
 

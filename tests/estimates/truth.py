@@ -193,9 +193,8 @@ def _rounding(model, q, stiffness) -> float:
     """
     M = pin.crba(model, model.createData(), q)
     M = np.triu(M) + np.triu(M, 1).T
-    return (
-        2 * np.finfo(float).eps * float(np.sqrt(np.linalg.eigvals(np.linalg.solve(M, np.diag(stiffness))).real.max()))
-    )
+    fastest = np.linalg.eigvals(np.linalg.solve(M, np.diag(stiffness))).real.max()
+    return 2 * np.finfo(float).eps * float(np.sqrt(fastest))
 
 
 def _force(model, data, effect) -> Callable[[float], Callable]:

@@ -32,20 +32,9 @@ LINES = (
     "--help",
 )
 ODD = (
-    *WORDS,
-    "scene.toml",
-    "run.npz",
-    ".",
-    "/",
-    "/dev/full",
-    "pipe",
-    "--json",
-    "--",
-    "-h",
-    "joint_1=nan",
-    "1,2,3",
+    *WORDS, "scene.toml", "run.npz", ".", "/", "/dev/full", "pipe", "--json", "--", "-h", "joint_1=nan", "1,2,3",
     "--force",
-)
+)  # fmt: skip
 
 
 def seeds(folder: Path) -> list[list[str]]:
@@ -61,7 +50,6 @@ def seeds(folder: Path) -> list[list[str]]:
 
 
 def mutate(rng: np.random.Generator, seed: list[str]) -> list[str]:
-    """A changed command line."""
     words = list(seed)
     for _ in range(int(rng.integers(1, 3))):
         i = int(rng.integers(0, len(words) + 1))
@@ -80,7 +68,6 @@ def mutate(rng: np.random.Generator, seed: list[str]) -> list[str]:
 
 
 def attempt(mutant: list[str], folder: Path) -> str:
-    """Run the command in this process."""
     from robot_dyn.cli import main
 
     out, err = (io.TextIOWrapper(io.BytesIO(), "utf-8", write_through=True) for _ in range(2))

@@ -42,7 +42,6 @@ def seeds(folder: Path) -> list[bytes]:
 
 
 def mutate(rng: np.random.Generator, seed: bytes) -> bytes:
-    """A damaged run file."""
     kind = int(rng.integers(4))
     if kind == 0:
         return damage(rng, seed)
@@ -63,7 +62,6 @@ def mutate(rng: np.random.Generator, seed: bytes) -> bytes:
 
 
 def attempt(mutant: bytes, folder: Path) -> str:
-    """Load it; use what is accepted."""
     path = folder / "mutant.npz"
     path.write_bytes(mutant)
     run = rd.load_run(path)
@@ -120,9 +118,8 @@ def _text(rng: np.random.Generator, text: str) -> str:
         return text
     table: Any = about
     while isinstance(table, dict | list) and table:
-        key: Any = (
-            list(table)[int(rng.integers(len(table)))] if isinstance(table, dict) else int(rng.integers(len(table)))
-        )
+        i = int(rng.integers(len(table)))
+        key: Any = list(table)[i] if isinstance(table, dict) else i
         if not isinstance(table[key], dict | list) or not table[key] or rng.random() < 0.3:
             table[key] = ODD[int(rng.integers(len(ODD)))]
             break

@@ -63,12 +63,10 @@ def seeds(folder: Path) -> list[str]:
 
 
 def mutate(rng: np.random.Generator, seed: str) -> bytes:
-    """A damaged scene."""
     return damage(rng, seed.encode()) if rng.random() < 0.2 else damage_text(rng, seed).encode("utf-8", "surrogatepass")
 
 
 def attempt(mutant: bytes, folder: Path) -> str:
-    """Read it."""
     path = folder / "mutant.toml"
     path.write_bytes(mutant)
     rd.read_scene(path)

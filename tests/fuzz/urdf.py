@@ -23,19 +23,8 @@ NUMBERS = ["0", "-1", "1e-320", "1e13", "nan", "inf", "1e-30", "3", "", "0 0", "
 NUMBERS += ["1e12", "-1e12", "1e300", "-1e300", "1e-300", "1e-160", "5e-324", "-0.0", "1e6", "0,5", "1.5708", "90", "a"]
 EDGES = ["0", "1e-320", "5e-324", "1e-160", "1e-300", "1e12", "-1e12", "1e-9", "1", "-1", "1.5707963267948966"]
 WORDS = [
-    "world",
-    "base",
-    "",
-    "a b",
-    "é",
-    "\u202e",
-    "x" * 5000,
-    "revolute",
-    "continuous",
-    "prismatic",
-    "fixed",
-    "floating",
-]
+    "world", "base", "", "a b", "é", "\u202e", "x" * 5000, "revolute", "continuous", "prismatic", "fixed", "floating",
+]  # fmt: skip
 
 
 def seeds(folder: Path) -> list[str]:
@@ -100,7 +89,6 @@ def _change(rng: np.random.Generator, root: etree._Element) -> None:
 
 
 def attempt(mutant: bytes, folder: Path) -> str:
-    """Check it, load it, draw it and ask it."""
     path = folder / "mutant.urdf"
     path.write_bytes(mutant)
     rd.check(path)

@@ -38,7 +38,6 @@ def run(task: tuple[str, int, int]) -> Result:
 
 
 def main() -> int:
-    """Run, print and write."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--family", action="append", choices=list(FAMILIES))
     parser.add_argument("--case", default="", help="only cases whose name holds this text")

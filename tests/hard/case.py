@@ -37,7 +37,6 @@ class Row:
 
     @property
     def ours(self) -> bool:
-        """Whether it is a figure of this library."""
         return self.program.startswith(OURS)
 
     @property
@@ -47,7 +46,6 @@ class Row:
 
     @property
     def verdict(self) -> str:
-        """In a word."""
         return "holds" if self.holds else "said" if self.said else "SILENT" if self.silent else "fails"
 
 

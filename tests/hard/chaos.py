@@ -68,7 +68,6 @@ def start(seed: int, n: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def times(duration: float) -> np.ndarray:
-    """Times of samples."""
     return np.linspace(0, duration, round(duration / PERIOD) + 1)
 
 

@@ -21,17 +21,7 @@ from tests.hard import (
 from tests.hard.case import Family
 
 _ALL = (
-    conditioning,
-    far_out,
-    long_runs,
-    stiffness,
-    contact,
-    singularity,
-    sampled_control,
-    chaos,
-    tools,
-    world,
-    peers,
+    conditioning, far_out, long_runs, stiffness, contact, singularity, sampled_control, chaos, tools, world, peers,
     peer_runs,
-)
+)  # fmt: skip
 FAMILIES: dict[str, Family] = {each.__name__.rpartition(".")[2]: cast("Family", each) for each in _ALL}

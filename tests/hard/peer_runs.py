@@ -125,9 +125,8 @@ def energy(seed: int) -> Iterator[Row]:
     size = abs(robot.potential_energy(q0)) + abs(robot.potential_energy(np.zeros(2)))
 
     def drift(end: End) -> float:
-        return (
-            abs(robot.kinetic_energy(end.q, end.v) + robot.potential_energy(end.q) - robot.potential_energy(q0)) / size
-        )
+        energy = robot.kinetic_energy(end.q, end.v) + robot.potential_energy(end.q)
+        return abs(energy - robot.potential_energy(q0)) / size
 
     def rk4(module: Any, model: Any) -> None:
         model.opt.integrator = module.mjtIntegrator.mjINT_RK4

@@ -47,7 +47,6 @@ def programs() -> Iterator[Program]:
 
 
 def chain(name: str, seed: int) -> Iterator[Row]:
-    """A chain by every program."""
     robot = rd.Robot.from_text((CHAINS | LONG)[name])
     at = states(robot.n, seed)
     for program, make in programs():

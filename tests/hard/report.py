@@ -67,7 +67,6 @@ def summarise(folder: Path) -> None:
 
 
 def rows(known: dict) -> dict[str, list[Row]]:
-    """All figures of each family."""
     return {name: [_row(each) for case in of.values() for each in case["rows"]] for name, of in known.items()}
 
 
@@ -127,7 +126,6 @@ def _every_figure(known: dict) -> Iterator[str]:
 
 
 def _not_run(name: str, family: dict) -> str:
-    """The cases of a family that were not run."""
     missing = [case.name for case in FAMILIES[name].CASES if case.name not in family]
     return f" Not run: {'; '.join(missing)}." if missing else ""
 
@@ -137,7 +135,6 @@ def _environment(case: dict) -> str:
 
 
 def _table(rows: Sequence[Row]) -> Iterator[str]:
-    """A row for each figure."""
     several = any(not row.ours for row in rows)
     heads = ["case", *(["program"] if several else []), "figure", "found", "allowed", "verdict"]
     yield "| " + " | ".join(heads) + " |"

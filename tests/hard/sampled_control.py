@@ -26,18 +26,8 @@ from tests.loops import growth
 
 TITLE = "Sampled control"
 ARMS = (
-    "pendulum",
-    "planar_2r",
-    "double_pendulum",
-    "finger_edu",
-    "ur3",
-    "ur5",
-    "ur10",
-    "panda",
-    "kinova",
-    "xarm7",
-    "z1",
-)
+    "pendulum", "planar_2r", "double_pendulum", "finger_edu", "ur3", "ur5", "ur10", "panda", "kinova", "xarm7", "z1",
+)  # fmt: skip
 SHORT = ("planar_2r", "ur5")
 PERIODS, START, BANDWIDTH = 1500, 1e-3, 20.0
 LATE = {"PD": (0.0, 0.0), "PD with delay": (0.4, 1.3)}  # of measurement and actuation, in periods
@@ -53,7 +43,6 @@ def at_rest(name: str, seed: int) -> tuple[rd.Robot, np.ndarray, tuple[np.ndarra
 
 
 def controller(arm: rd.Robot, q: np.ndarray, gains: tuple[np.ndarray, np.ndarray], kind: str) -> rd.Controller:
-    """A controller that holds the arm at q."""
     if kind == "PID in saturation":
         limit = 1.5 * np.abs(arm.N(q)) + 2e-3 * gains[0]  # [N m], of twice the deviation at the start
         return rd.PID(rd.hold(q), gains[0], 3 * gains[0], gains[1], limit, period_s=1e-3)

@@ -38,7 +38,6 @@ def true_error(run: rd.Trajectory, motion: Motion) -> float:
 
 
 def rows(case: str, make: Callable[[], Motion], engine: str, seed: int) -> Iterator[Row]:
-    """All methods on one motion."""
     motion = make()
     setup = replace(motion.setup, record_period_s=motion.setup.duration_s / SAMPLES, engine=engine)
     yield _asked(case, motion, setup)
@@ -94,22 +93,10 @@ def _explicit(case: str, motion: Motion, setup: rd.Setup) -> Iterator[Row]:
         yield _fixed(case, "rk4 at half the limit", motion, replace(setup, step_s=limit / 2))
 
 
-def _damped(name: str, b: float) -> Motion:
-    return of_arm(name, [rd.ViscousFriction(b)], lambda q, v: -b * v)
-
-
 def _driven(name: str, k: float) -> Motion:
     d = np.sqrt(k)
     law = rd.PD(rd.hold(np.full(rd.load(name).n, 0.3)), k, d)
     return of_arm(name, [], lambda q, v: k * (0.3 - q) - d * v, law)
-
-
-def _rubbed(name: str, width: float) -> Motion:
-    return of_arm(name, [rd.RegularisedCoulombFriction(30.0, width)], lambda q, v: -30.0 * np.tanh(v / width))
-
-
-def _geared(name: str, inertia: float) -> Motion:
-    return of_arm(name, [rd.ViscousFriction(10.0)], lambda q, v: -10.0 * v, armature=inertia)
 
 
 ONE: dict[str, Any] = {
@@ -119,10 +106,14 @@ ONE: dict[str, Any] = {
     **{f"tanh friction of width {w:g} rad/s": partial(dry, w) for w in (1e-2, 1e-6)},
 }
 ARMS: dict[str, Any] = {
-    "2R, dampers of 1e4 N m s/rad": partial(_damped, "planar_2r", 1e4),
+    "2R, dampers of 1e4 N m s/rad": partial(of_arm, "planar_2r", [rd.ViscousFriction(1e4)], lambda q, v: -1e4 * v),
     "2R, PD of 1e6 N m/rad": partial(_driven, "planar_2r", 1e6),
-    "2R, tanh friction of width 1e-4 rad/s": partial(_rubbed, "planar_2r", 1e-4),
-    "2R, inertia of motors 1e3 kg m²": partial(_geared, "planar_2r", 1e3),
+    "2R, tanh friction of width 1e-4 rad/s": partial(
+        of_arm, "planar_2r", [rd.RegularisedCoulombFriction(30.0, 1e-4)], lambda q, v: -30.0 * np.tanh(v / 1e-4)
+    ),
+    "2R, inertia of motors 1e3 kg m²": partial(
+        of_arm, "planar_2r", [rd.ViscousFriction(10.0)], lambda q, v: -10.0 * v, armature=1e3
+    ),
 }
 _DAMPER = "damper of 1e+06 N m s/rad"
 SHORT = {_DAMPER: ONE.pop(_DAMPER)}  # interpreted: machine code of five methods takes longer to make

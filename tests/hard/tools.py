@@ -147,14 +147,12 @@ def engines(name: str, seed: int) -> Iterator[Row]:
     v[TILE // 2] = 1e9
     wild = rd.rollouts(setup, q, v, threads=1)
     beside = np.arange(TILE) != TILE // 2
-    yield Row(
-        case, "beside a run that diverges: entries with other bits", int(np.sum(wild.q[beside] != many[0].q[beside])), 0
-    )
+    other = int(np.sum(wild.q[beside] != many[0].q[beside]))
+    yield Row(case, "beside a run that diverges: entries with other bits", other, 0)
     yield Row(case, "runs that diverge and are not named", int(not wild.diverged[TILE // 2]), 0)
 
 
 def rows(name: str, seed: int) -> Iterator[Row]:
-    """All of a robot of the catalog."""
     yield from batches(completed(rd.load(name))[0], seed)
     yield from caches(name, seed)
     yield from right_angles(name, seed)

@@ -29,65 +29,25 @@ MATRIX = True
 MOST_JOINTS, SWING_S, HELD_S = 12, 0.3, 1.0
 LEAST = 0.3  # part of the true error that an estimate has to be
 ARMS = [
-    "a1",
-    "anymal_b",
-    "anymal_c",
-    "b1",
-    "bolt",
-    "borinot_flying_arm_2",
-    "cart_pole",
-    "double_pendulum",
-    "double_pendulum_continuous",
-    "double_pendulum_simple",
-    "finger_edu",
-    "flyball_governor",
-    "go1",
-    "go2",
-    "hextilt_flying_arm_5",
-    "hyq_no_sensors",
-    "iris",
-    "kinova",
-    "laikago",
-    "light_tip",
-    "massless_tip",
-    "mimic_chain",
-    "panda",
-    "panda_collision",
-    "pendulum",
-    "planar_2r",
-    "quadruped",
-    "simple_pendulum",
-    "skew_tree",
-    "so100",
-    "so101",
-    "solo",
-    "solo12",
-    "talos_left_arm",
-    "tiago_no_hand",
-    "twodofs",
-    "ur10",
-    "ur10_joint_limited",
-    "ur3",
-    "ur3_gripper",
-    "ur3_joint_limited",
-    "ur5",
-    "ur5_gripper",
-    "ur5_joint_limited",
-    "xarm7",
-    "z1",
-]
+    "a1", "anymal_b", "anymal_c", "b1", "bolt", "borinot_flying_arm_2", "cart_pole", "double_pendulum",
+    "double_pendulum_continuous", "double_pendulum_simple", "finger_edu", "flyball_governor", "go1", "go2",
+    "hextilt_flying_arm_5", "hyq_no_sensors", "iris", "kinova", "laikago", "light_tip", "massless_tip", "mimic_chain",
+    "panda", "panda_collision", "pendulum", "planar_2r", "quadruped", "simple_pendulum", "skew_tree", "so100",
+    "so101", "solo", "solo12", "talos_left_arm", "tiago_no_hand", "twodofs", "ur10", "ur10_joint_limited", "ur3",
+    "ur3_gripper", "ur3_joint_limited", "ur5", "ur5_gripper", "ur5_joint_limited", "xarm7", "z1",
+]  # fmt: skip
 Column = Callable[[str, rd.Robot, int], Iterator[Row]]
 
 
 def implementations(name: str, robot: rd.Robot, seed: int) -> Iterator[Row]:
-    """All roads against balls."""
+    """All implementations against balls."""
     engines = conditioning.implementations(robot, compiled=True)
     found = list(conditioning.errors(robot, engines, conditioning.states(robot.n, seed)))
     sums = max(each.error for each in found if each.quantity != FORWARD_DYNAMICS.name)
-    yield Row(name, "roads: M … ID, n u", sums, conditioning.SUMS)
+    yield Row(name, "implementations: M … ID, n u", sums, conditioning.SUMS)
     solved = [each for each in found if each.quantity == FORWARD_DYNAMICS.name]
     worst = max(solved, key=lambda each: np.nan_to_num(each.error, nan=np.inf))
-    yield Row(name, "roads: FD, n u κ", worst.error, conditioning.SOLVED, worst.said)
+    yield Row(name, "implementations: FD, n u κ", worst.error, conditioning.SOLVED, worst.said)
 
 
 def far(name: str, robot: rd.Robot, seed: int) -> Iterator[Row]:

@@ -25,24 +25,19 @@ UNDECLARED = ("which is not declared", "write its text instead")
 KINDS = [
     Kind("a document type that declares nothing", text(doctype("")), NO_DOCTYPE),
     Kind("a document type in UTF-16", text(encoded("UTF-16") + doctype("[]"), "utf-16"), NO_DOCTYPE),
-    Kind(
-        "a document type in UTF-7",
-        text((encoded("UTF-7") + doctype('[<!ENTITY m "1.5">]').replace("<", "+ADw-")).encode()),
-        NO_DOCTYPE,
-    ),
-    Kind("a document type of another file", beside(lambda secret: doctype(f'SYSTEM "{secret.as_uri()}"')), NO_DOCTYPE),
-    Kind(
-        "a default attribute by document type",
-        text(doctype('[<!ATTLIST mass value CDATA "1.5">]', arm((MASS, "<mass/>")))),
-        NO_DOCTYPE,
-    ),
-    Kind("an entity in a number", text(doctype('[<!ENTITY m "1.5">]', arm((MASS, '<mass value="&m;"/>')))), NO_DOCTYPE),
-    Kind(
-        "an entity without declaration after a comment and in UTF-16",
-        text(encoded("UTF-16") + arm((MASS, '<!-- &mdash; --><mass value="&heavy;"/>')), "utf-16"),
-        ("line 6", "&heavy;", *UNDECLARED),
-    ),
-    Kind("an entity without declaration", altered(MASS, '<mass value="&heavy;"/>'), ("line 6", "&heavy;", *UNDECLARED)),
+    Kind("a document type in UTF-7",
+         text((encoded("UTF-7") + doctype('[<!ENTITY m "1.5">]').replace("<", "+ADw-")).encode()), NO_DOCTYPE),
+    Kind("a document type of another file", beside(lambda secret: doctype(f'SYSTEM "{secret.as_uri()}"')),
+         NO_DOCTYPE),
+    Kind("a default attribute by document type",
+         text(doctype('[<!ATTLIST mass value CDATA "1.5">]', arm((MASS, "<mass/>")))), NO_DOCTYPE),
+    Kind("an entity in a number", text(doctype('[<!ENTITY m "1.5">]', arm((MASS, '<mass value="&m;"/>')))),
+         NO_DOCTYPE),
+    Kind("an entity without declaration after a comment and in UTF-16",
+         text(encoded("UTF-16") + arm((MASS, '<!-- &mdash; --><mass value="&heavy;"/>')), "utf-16"),
+         ("line 6", "&heavy;", *UNDECLARED)),
+    Kind("an entity without declaration", altered(MASS, '<mass value="&heavy;"/>'),
+         ("line 6", "&heavy;", *UNDECLARED)),
     Kind("entities that grow in a text", text(doctype(laughs(), "<robot name='a'>&e9;</robot>")), TOO_MUCH),
     Kind("entities that grow in an attribute", text(doctype(laughs(), "<robot name='&e9;'/>")), TOO_MUCH),
     Kind(
@@ -52,16 +47,10 @@ KINDS = [
         ),
         NO_DOCTYPE,
     ),
-    Kind(
-        "parameter entities of another file",
-        beside(lambda secret: doctype(f'[<!ENTITY % x SYSTEM "{secret.as_uri()}"> %x;]')),
-        NO_DOCTYPE,
-    ),
-    Kind(
-        "a parameter entity that holds itself",
-        text(doctype('[<!ENTITY % x "&#37;x;"> %x;]')),
-        ("line 1", "entity reference loop", "correct the file"),
-    ),
+    Kind("parameter entities of another file",
+         beside(lambda secret: doctype(f'[<!ENTITY % x SYSTEM "{secret.as_uri()}"> %x;]')), NO_DOCTYPE),
+    Kind("a parameter entity that holds itself", text(doctype('[<!ENTITY % x "&#37;x;"> %x;]')),
+         ("line 1", "entity reference loop", "correct the file")),
     Kind(
         "an inclusion of another file",
         beside(
@@ -71,4 +60,4 @@ KINDS = [
         ),
         upper=(1, 2),
     ),
-]
+]  # fmt: skip

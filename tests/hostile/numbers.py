@@ -12,9 +12,8 @@ NOT_DECIMAL = (
 )
 XYZ, RPY, CENTRE = 'xyz="0 0 0.7"', 'rpy="0 0 0.7"', 'xyz="0 0 0.1"'
 
-LARGEST = re.sub(r'(value|i(?:xx|yy|zz)|damping|friction)="[^"]*"', r'\1="1e12"', ARM).replace(
-    "0.4 0 0", "1e12 1e12 1e12"
-)
+LARGEST = re.sub(r'(value|i(?:xx|yy|zz)|damping|friction)="[^"]*"', r'\1="1e12"', ARM)
+LARGEST = LARGEST.replace("0.4 0 0", "1e12 1e12 1e12")
 
 
 def moment(key: str, value: str) -> tuple[str, str]:
@@ -31,21 +30,12 @@ ON_LINK = (
     ("two masses", MASS, MASS + MASS, ("2 <mass> elements", "keep one")),
     ("two inertials", MASS, f"{MASS}</inertial><inertial>", ("2 <inertial> elements", "keep one")),
     ("a moment missing", ' izz="0.01"', "", ("<inertia> has no izz", 'write izz="')),
-    (
-        "a centre of four numbers",
-        CENTRE,
-        'xyz="0 0 0.1 0"',
-        ("<origin> xyz", "three numbers", "'0 0 0.1 0'"),
-    ),
-    (
-        "a mass just too large",
-        MASS,
-        '<mass value="1.0001e12"/>',
-        ("is 1.0001e12, beyond ±1e+12 in SI units; correct",),
-    ),
+    ("a centre of four numbers", CENTRE, 'xyz="0 0 0.1 0"', ("<origin> xyz", "three numbers", "'0 0 0.1 0'")),
+    ("a mass just too large", MASS, '<mass value="1.0001e12"/>',
+     ("is 1.0001e12, beyond ±1e+12 in SI units; correct",)),
     ("a moment of 1e308", *moment("ixx", "1e308"), ("<inertia> ixx is 1e308, beyond ±1e+12", "correct it")),
     ("a centre at 1e200 m", CENTRE, 'xyz="1e200 0 0.1"', ("<origin> xyz is 1e200, beyond ±1e+12", "correct it")),
-)
+)  # fmt: skip
 ON_JOINT = (
     ("zero axis", AXIS, '<axis xyz="0 0 0"/>', ("<axis> xyz must be a direction", "'0 0 0'", "write a unit vector")),
     ("an axis of 1e11", AXIS, '<axis xyz="0 0 1e11"/>', ("must be a direction", "'0 0 1e11'", "unit vector")),
@@ -72,24 +62,14 @@ KINDS = [
         for number in NOT_DECIMAL
     ),
     *(Kind(f"a link with {word}", altered(old, new), ("link 'upper'", *said)) for word, old, new, said in ON_LINK),
-    *(
-        Kind(f"a joint with {word}", altered(old, new), ("joint 'shoulder'", *said))
-        for word, old, new, said in ON_JOINT
-    ),
+    *(Kind(f"a joint with {word}", altered(old, new), ("joint 'shoulder'", *said)) for word, old, new,
+      said in ON_JOINT),
     Kind("the widest turn", altered(RPY, 'rpy="1e12 -1e12 1e12"'), upper=(1, 2)),
     Kind("the widest limits", altered(LIMIT, '<limit upper="1e300" effort="1e308"/>'), upper=(1e300, 2)),
-    Kind(
-        "a mass of 1e-320",
-        altered(MASS, '<mass value="1e-320"/>'),
-        warned=("link 'upper': its mass of 9.99989e-321 kg is below 1e-12 kg", "correct it"),
-        upper=(1, 2),
-    ),
+    Kind("a mass of 1e-320", altered(MASS, '<mass value="1e-320"/>'),
+         warned=("link 'upper': its mass of 9.99989e-321 kg is below 1e-12 kg", "correct it"), upper=(1, 2)),
     Kind("numbers in odd but sound spelling", altered(MASS, '<mass value=" +01.50E+0 "/>'), upper=(1, 2)),
     Kind("an axis over several lines", altered(AXIS, '<axis xyz="\n0\t0\n1 "/>'), upper=(1, 2)),
-    Kind(
-        "every number the largest",
-        text(LARGEST),
-        warned=("origin lies 1.73205e+12 m away, beyond 10000 m, which costs digits", "correct it"),
-        upper=(1, 2),
-    ),
-]
+    Kind("every number the largest", text(LARGEST),
+         warned=("origin lies 1.73205e+12 m away, beyond 10000 m, which costs digits", "correct it"), upper=(1, 2)),
+]  # fmt: skip

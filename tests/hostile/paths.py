@@ -62,14 +62,11 @@ KINDS = [
     Kind("a dangling link", link_to("nowhere"), NO_FILE),
     Kind("a link to itself", link_to("robot.urdf"), NO_FILE),
     Kind("a file that fails when read", at("/proc/self/mem"), ("cannot be read (Input/output error); check",)),
-    Kind(
-        "a path longer than the system takes",
-        lambda path: path.with_name("x" * 300 + ".urdf"),
-        ("no file", "File name too long", "give the path of a URDF file"),
-    ),
+    Kind("a path longer than the system takes", lambda path: path.with_name("x" * 300 + ".urdf"),
+         ("no file", "File name too long", "give the path of a URDF file")),
     Kind("a path with a NUL", lambda path: path.with_name("a\0.urdf"), ("no file",)),
     Kind("a path in the home of nobody", at("~no_such_user/robot.urdf"), ("no file", "home", "give the path")),
     Kind("a path through a file", lambda path: text(ARM)(path) / "robot.urdf", NO_FILE),
     Kind("a file of 64 GiB of zeros", sparse, ("is larger than 16 MiB", "keep meshes")),
     Kind("a file whose name is not text", lambda path: text(ARM)(path.with_name("arm-\udcff.urdf")), upper=(1, 2)),
-]
+]  # fmt: skip

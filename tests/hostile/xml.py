@@ -24,25 +24,17 @@ KINDS = [
     Kind("an encoding that is another one", text(XML_16 + ARM), NOT_XML),
     Kind("another format", text('<sdf version="1.7"><model name="arm"/></sdf>'), ("<sdf>", "give a URDF file")),
     Kind("a robot of another namespace", altered("<robot ", '<robot xmlns="urn:x" '), ("urn:x", "give a URDF file")),
-    Kind(
-        "macros with an expression",
-        text(inside('<xacro:arm xmlns:xacro="http://www.ros.org/wiki/xacro" side="${side}"/>')),
-        ("line 28", "xacro macros", "expand"),
-    ),
-    Kind(
-        "macros of no namespace with a substitution",
-        text(inside('<xacro:include filename="$(find arms)/arm.xacro"/>')),
-        ("line 28", "xacro macros", "expand"),
-    ),
-    Kind(
-        "macros beside an expression elsewhere",
-        text(inside('<xacro:arm side="left"/>').replace('"1.5"', '"${mass}"')),
-        ("line 6", "xacro macros", "expand"),
-    ),
+    Kind("macros with an expression",
+         text(inside('<xacro:arm xmlns:xacro="http://www.ros.org/wiki/xacro" side="${side}"/>')),
+         ("line 28", "xacro macros", "expand")),
+    Kind("macros of no namespace with a substitution",
+         text(inside('<xacro:include filename="$(find arms)/arm.xacro"/>')), ("line 28", "xacro macros", "expand")),
+    Kind("macros beside an expression elsewhere",
+         text(inside('<xacro:arm side="left"/>').replace('"1.5"', '"${mass}"')),
+         ("line 6", "xacro macros", "expand")),
     Kind("a robot in UTF-16", text(XML_16 + ARM, "utf-16"), upper=(1, 2)),
     Kind("a robot after a byte order mark", text(ARM, "utf-8-sig"), upper=(1, 2)),
     Kind("comments in all places", text(ARM.replace("<", "<!-- - --><").removeprefix("<!-- - -->")), upper=(1, 2)),
-    Kind(
-        "a style sheet of the network", text('<?xml-stylesheet href="http://127.0.0.1:9/x.xsl"?>' + ARM), upper=(1, 2)
-    ),
-]
+    Kind("a style sheet of the network", text('<?xml-stylesheet href="http://127.0.0.1:9/x.xsl"?>' + ARM),
+         upper=(1, 2)),
+]  # fmt: skip

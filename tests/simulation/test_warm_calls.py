@@ -208,16 +208,8 @@ def test_a_second_call_computes_nothing_that_depends_on_the_setup_alone(name: st
         "StateEquation.energies", "rules_of", "observations_of",
     }  # fmt: skip
     late = {
-        "remarks",
-        "ledger",
-        "origin",
-        "Observer.close",
-        "deviation_of",
-        "acting",
-        "wrenches",
-        "at_stop",
-        "unstable",
-    }
+        "remarks", "ledger", "origin", "Observer.close", "deviation_of", "acting", "wrenches", "at_stop", "unstable",
+    }  # fmt: skip
     assert not (alone | late) & found.keys()
     assert sum(found.values()) < most
 

@@ -1,4 +1,4 @@
-"""Certificates: digits by each road against independent counts, the search for worst states, and what is refused."""
+"""Certificates: digits of each implementation against independent counts, worst states, and what is refused."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def implementation(robot: rd.Robot, name: str) -> Implementation:
     return next(each for each in implementations(robot)[0] if each.name == name)
 
 
-def test_each_road_has_the_digits_of_its_numbers(made: Certificate) -> None:
+def test_each_implementation_has_the_digits_of_its_numbers(made: Certificate) -> None:
     """Rounding is 6e-8, 1.1e-16 and 5e-20; what two joints compute takes less than 3 digits."""
     whole = {"float32": 7.2, "longdouble": 19.3}
     for each in made.digits:
@@ -118,7 +118,7 @@ class Moved:
 
 
 @pytest.mark.parametrize("digits", [4, 9, 13])
-def test_a_road_with_a_wrong_entry_has_the_digits_before_it(digits: int) -> None:
+def test_a_implementation_with_a_wrong_entry_has_the_digits_before_it(digits: int) -> None:
     robot, rng = rd.load("planar_2r"), np.random.default_rng(1)
     counting = Counting(robot, random_states(robot, 100, rng), None, rng)
     found = counting.count(Implementation("moved", robot, Moved(robot, 10.0**-digits), (M,)), M)
@@ -233,7 +233,7 @@ def test_articulated_bodies_answer_a_batch_with_joints_that_slide() -> None:
     np.testing.assert_allclose(articulated_body(own.linkage, q, v, tau), own.forward_dynamics(q, v, tau), rtol=1e-12)
 
 
-def test_a_road_whose_numbers_overflow_everywhere_is_left_out_by_name() -> None:
+def test_a_implementation_whose_numbers_overflow_everywhere_is_left_out_by_name() -> None:
     """A joint that turns its follower 1e9 times as fast: C of it is beyond float32."""
     pendulum = """<link name="{0}"><inertial><origin xyz="0 0 0.1"/><mass value="1"/>
     <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>"""

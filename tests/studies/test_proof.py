@@ -34,8 +34,8 @@ from robot_dyn.studies.proof.packed import packed, unpacked
 from robot_dyn.studies.proof.prove import _precision
 from robot_dyn.studies.proof.tape.straight_line import straight_line
 from robot_dyn.studies.proof.tape.tape import Tape
-from tests.extrapolation import BITS, motion
 from tests.long import long
+from tests.studies.extrapolation import BITS, motion
 
 FINGERS = {"panda_finger_joint1": 0.0}
 GENERAL_Q = ["0.31", "-0.42", "0.53", "-0.64", "0.75", "-0.86", "0.97"]

@@ -33,9 +33,8 @@ def box_of_link(arm: rd.Robot, link: str, q: np.ndarray, source: Path) -> np.nda
         name = mesh.get("filename")
         path = resolve(name, source) if name.startswith("package://") else source.parent / name
         vertices = trimesh.load_scene(path, process=False).to_geometry().vertices
-        if path.suffix.lower() == ".dae" and (
-            unit := re.search(r'<unit[^>]*meter="([^"]*)"', path.read_text("utf-8", "replace"))
-        ):
+        unit = re.search(r'<unit[^>]*meter="([^"]*)"', path.read_text("utf-8", "replace"))
+        if path.suffix.lower() == ".dae" and unit:
             vertices = vertices * float(unit[1])
         vertices = vertices * [float(x) for x in mesh.get("scale", "1 1 1").split()]
         points.append(trimesh.transform_points(vertices, arm.placement(q, link) @ place))

@@ -22,21 +22,15 @@ from tests.browser import opened, until
 from tests.command import started
 
 JUNK = [
-    [b""],
-    [b"capture"],
-    [b"\xff\xfe\x00"],
-    [b"set_object"],
-    [b"set_object", b"/x"],
-    [b"set_object", b"\xff", b"no MessagePack"],
-    [b"set_object", b"/x", b""],
+    [b""], [b"capture"], [b"\xff\xfe\x00"], [b"set_object"], [b"set_object", b"/x"],
+    [b"set_object", b"\xff", b"no MessagePack"], [b"set_object", b"/x", b""],
     [b"set_object", b"/x", umsgpack.packb([1, 2])],
     [b"set_object", b"/x", umsgpack.packb({"type": "delete", "path": "/x"})],
     [b"set_transform", b"/x", umsgpack.packb({"type": "set_transform", "path": 3})],
     [b"set_property", b"/x", b"\x91" * 5000],  # arrays in arrays
-    [b"delete", b"/x", b"\xc1"],
-    [b"get_scene"],
+    [b"delete", b"/x", b"\xc1"], [b"get_scene"],
     [b"x" * 100_000, b"y"],
-]
+]  # fmt: skip
 TEXTS = ["", "{", '{"data": 1}', '{"data": null}', '{"data": "no comma"}', '{"data": "a,!"}', "[]", "3", "[" * 50_000]
 
 

@@ -50,9 +50,8 @@ def test_a_plane_is_seen_from_its_front_whatever_its_size(size: float) -> None:
 
 
 def labels(robot: rd.Robot) -> str:
-    return document((rd.simulate(robot, q0=[0.3, -0.5], duration_s=0.01, estimate_error=False),), (), None, False)[
-        "gravity"
-    ]
+    run = rd.simulate(robot, q0=[0.3, -0.5], duration_s=0.01, estimate_error=False)
+    return document((run,), (), None, False)["gravity"]
 
 
 def test_gravity_is_said_and_so_is_its_absence() -> None:

@@ -1,4 +1,4 @@
-"""Motions to many digits by another road than that of proofs: the closed form in balls, extrapolated midpoint steps.
+"""Motions to many digits, not as proofs find them: the closed form in balls, extrapolated midpoint steps.
 
 Gragg, Bulirsch and Stoer: y(h; n) by the modified midpoint rule has an error in powers of (h/n)², which Neville's
 scheme takes away, order by order. [Hairer, Nørsett, Wanner 1993, II.9]

@@ -12,7 +12,7 @@ from robot_dyn.view.plots.plots import plot
 from robot_dyn.view.rests import rests
 from tests.browser import opened
 from tests.estimates.scenes import arms
-from tests.plotted import cells
+from tests.view.plotted import cells
 
 G = 9.80665
 RAIL = arms()["rail"]  # 1 kg on a vertical rail
