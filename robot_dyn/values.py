@@ -2,16 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import fields
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
 from functools import cached_property
 from threading import RLock
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, final
 
 import numpy as np
 
 Result = TypeVar("Result")
 Late = TypeVar("Late", bound="Derived")
+
+NOT_STORED: Mapping[str, bool] = {"stored": False}
+"""Metadata of a field that files leave out."""
+
+
+@final
+@dataclass(frozen=True)
+class Layout:
+    """How a file stores an array, stated in the type of its field: `Annotated[np.ndarray, Layout(("m", "n"))]`.
+
+    Attributes:
+        shape: A number; a letter, which stands for the same length in all arrays of a file; None for any length; or
+            several of these, each of which is allowed.
+        dtype: Of its entries.
+        finite: Whether nan and inf are refused unless the run diverged.
+        absent: Whether all of it may be nan: what a run of rollouts did not record.
+    """
+
+    shape: tuple[Any, ...]
+    dtype: str = "float64"
+    finite: bool = True
+    absent: bool = False
 
 
 class Value:

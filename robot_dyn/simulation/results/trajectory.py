@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from math import inf
 from types import NoneType
-from typing import TYPE_CHECKING, Any, Protocol, final, runtime_checkable
+from typing import Annotated, Any, Protocol, final, runtime_checkable
 
 import numpy as np
 
@@ -16,10 +16,7 @@ from robot_dyn.simulation.results.error_estimate import ErrorEstimate
 from robot_dyn.simulation.results.ledger import Ledger
 from robot_dyn.simulation.results.tracking import root_mean_square
 from robot_dyn.simulation.run.outcome import Outcome
-from robot_dyn.values import Derived, read_only
-
-if TYPE_CHECKING:
-    pass
+from robot_dyn.values import Derived, Layout, read_only
 
 # Residuals, as parts of the energy exchanged. Over 150 random scenes they were at most 10 times the estimated error of
 # q, as a part of the motion; one that is far larger contradicts the estimate.
@@ -150,27 +147,27 @@ class Trajectory(Derived):
     """
 
     joint_names: tuple[str, ...]
-    t: np.ndarray
-    q: np.ndarray
-    v: np.ndarray
-    a: np.ndarray
-    u: np.ndarray
-    power: dict[str, np.ndarray]
+    t: Annotated[np.ndarray, Layout(("m",))]
+    q: Annotated[np.ndarray, Layout(("m", "n"))]
+    v: Annotated[np.ndarray, Layout(("m", "n"))]
+    a: Annotated[np.ndarray, Layout(("m", "n"), absent=True)]
+    u: Annotated[np.ndarray, Layout(("m", "n"), absent=True)]
+    power: dict[str, Annotated[np.ndarray, Layout(("m",), absent=True)]]
     ledger: Ledger
-    desired: np.ndarray | None
-    deviation: np.ndarray | None
+    desired: Annotated[np.ndarray, Layout(("m", "n"))] | None
+    deviation: Annotated[np.ndarray, Layout(("m", ("n", 3)))] | None
     outcome: Outcome
     statistics: Statistics
     error: ErrorEstimate | None = field(default_factory=NoneType)
     about: dict[str, str] = field(default_factory=dict, repr=False)
-    wrenches: dict[str, np.ndarray] = field(default_factory=dict)
-    at_stop: np.ndarray | None = field(default_factory=NoneType)
+    wrenches: dict[str, Annotated[np.ndarray, Layout((None, 7))]] = field(default_factory=dict)
+    at_stop: Annotated[np.ndarray, Layout(("m", "n"), "bool")] | None = field(default_factory=NoneType)
     remarks: tuple[Remark, ...] = field(default_factory=tuple)
-    extremes: np.ndarray | None = field(default_factory=NoneType)
+    extremes: Annotated[np.ndarray, Layout((3, 2, "n"), finite=False)] | None = field(default_factory=NoneType)
     acting: tuple[str, ...] | None = field(default_factory=NoneType)
-    controller_states: np.ndarray | None = field(default_factory=NoneType)
+    controller_states: Annotated[np.ndarray, Layout(("m", "z"))] | None = field(default_factory=NoneType)
     events: tuple[Occurrence, ...] = field(default_factory=tuple)
-    effect_states: dict[str, np.ndarray] = field(default_factory=dict)
+    effect_states: dict[str, Annotated[np.ndarray, Layout(("m", None))]] = field(default_factory=dict)
     accuracy: Accuracy | None = field(default_factory=NoneType)
 
     def __post_init__(self) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, final
+from typing import TYPE_CHECKING, Annotated, final
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from robot_dyn.simulation.observation.remarks import Kind, Remark
 from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.tracking import deviation_of, root_mean_square
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.values import Value, read_only
+from robot_dyn.values import Layout, Value, read_only
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.rollouts.result import Rollouts
@@ -40,7 +40,7 @@ class Overview(Value):
 
     worst: int
     remarks: tuple[Remark, ...]
-    tracking_error: np.ndarray | None
+    tracking_error: Annotated[np.ndarray, Layout(("B",))] | None
 
     def __post_init__(self) -> None:
         read_only(self)

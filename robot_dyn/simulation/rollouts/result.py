@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from operator import index
-from typing import Any, final, overload
+from typing import Annotated, Any, final, overload
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from robot_dyn.simulation.rollouts.overview import Overview, of_some, overview
 from robot_dyn.simulation.run.outcome import Ending, Outcome
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.validate import integer
-from robot_dyn.values import Value, read_only
+from robot_dyn.values import NOT_STORED, Layout, Value, read_only
 
 _SHARED = ("joint_names", "t", "statistics", "sources", "about", "setup", "uncut", "saved", "numbers")  # by all runs
 
@@ -62,30 +62,30 @@ class Rollouts(Value):
     """
 
     joint_names: tuple[str, ...]
-    t: np.ndarray
-    q: np.ndarray | None
-    v: np.ndarray | None
-    u: np.ndarray | None
-    kinetic: np.ndarray | None
-    potential: np.ndarray | None
-    work: dict[str, np.ndarray] | None
-    ended: np.ndarray
-    diverged: np.ndarray
-    stopped: np.ndarray
+    t: Annotated[np.ndarray, Layout(("m",))]
+    q: Annotated[np.ndarray, Layout(("B", "m", "n"))] | None
+    v: Annotated[np.ndarray, Layout(("B", "m", "n"))] | None
+    u: Annotated[np.ndarray, Layout(("B", "m", "n"))] | None
+    kinetic: Annotated[np.ndarray, Layout(("B", "m"))] | None
+    potential: Annotated[np.ndarray, Layout(("B", "m"))] | None
+    work: dict[str, Annotated[np.ndarray, Layout(("B", "m"))]] | None
+    ended: Annotated[np.ndarray, Layout(("B",))]
+    diverged: Annotated[np.ndarray, Layout(("B",), "bool")]
+    stopped: Annotated[np.ndarray, Layout(("B",), "bool")]
     advice: tuple[str, ...]
-    steps: np.ndarray
-    evaluations: np.ndarray
+    steps: Annotated[np.ndarray, Layout(("B",), "int64")]
+    evaluations: Annotated[np.ndarray, Layout(("B",), "int64")]
     statistics: Statistics
     sources: tuple[str, ...]
     about: dict[str, str]
-    params: dict[str, np.ndarray]
-    setup: Setup | None = None
+    params: dict[str, Annotated[np.ndarray, Layout(("B", None))]]
+    setup: Setup | None = field(default=None, metadata=NOT_STORED)
     uncut: tuple[str, ...] = ()
-    q0: np.ndarray | None = None
-    v0: np.ndarray | None = None
+    q0: Annotated[np.ndarray, Layout(("B", "n"))] | None = None
+    v0: Annotated[np.ndarray, Layout(("B", "n"))] | None = None
     observed: Observed | None = None
     saved: Overview | None = None
-    numbers: np.ndarray | None = None
+    numbers: np.ndarray | None = field(default=None, metadata=NOT_STORED)
 
     def __post_init__(self) -> None:
         read_only(self)
