@@ -16,7 +16,7 @@ import robot_dyn as rd
 from benchmarks.measure import Effort, arms, row, table
 from robot_dyn.codegen.trace.right_angles import completed
 from robot_dyn.integrate.methods import method
-from robot_dyn.simulation.compiled.build import compiled_equation, machine_of_constants
+from robot_dyn.simulation.compiled.build import compiled_equation, compiled_with_constants
 from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.events.payload_events import PayloadEvents
@@ -54,14 +54,14 @@ def parameters(effort: Effort) -> None:
         rd.simulate(other)
         again = perf_counter() - began
         made = {
-            "constants": machine_of_constants(_equation(setup), _rk4(setup)),
+            "constants": compiled_with_constants(_equation(setup), _rk4(setup)),
             "inputs": compiled_equation(_equation(setup), _rk4(setup)),
         }
         lanes = {
-            "constants": machine_of_constants(_equation(setup), _rk4(setup), lanes=LANES),
-            "inputs": compiled_equation(_equation(setup), _rk4(setup), lanes=LANES, kept=()),
+            "constants": compiled_with_constants(_equation(setup), _rk4(setup), lanes=LANES),
+            "inputs": compiled_equation(_equation(setup), _rk4(setup), lanes=LANES, extras=()),
         }
-        counts = {kind: len(each.equations.programs["rate"]) for kind, each in made.items()}
+        counts = {kind: len(each.functions.programs["rate"]) for kind, each in made.items()}
         alone = _ratio({kind: _one(setup, each) for kind, each in made.items()}, effort)
         many = _ratio({kind: _many(setup, each) for kind, each in lanes.items()}, effort)
         ratio = counts["inputs"] / counts["constants"]
@@ -81,7 +81,7 @@ def _rk4(setup: rd.Setup) -> Any:
 
 def _one(setup: rd.Setup, made: CompiledStateEquation) -> Any:
     def run() -> float:
-        functions, equation = (made.equations.functions, made.parameters), made.equation
+        functions, equation = (made.functions.addresses, made.parameters), made.equation
         watch, transfers = Watch(setup, equation), PayloadEvents(equation)
         advance = FixedStep(watch, transfers, lambda _: functions, Fraction(1), made.advance())
         began = perf_counter()

@@ -16,8 +16,8 @@ from robot_dyn.control.controller import Controller
 from robot_dyn.control.digital_loop.block import Block
 from robot_dyn.effects.effect import Effect
 from robot_dyn.errors import EffectError, TraceError
-from robot_dyn.simulation.compiled.compiled_state_equation import MachineError
 from robot_dyn.simulation.compiled.engine_choice import choose
+from robot_dyn.simulation.compiled.self_check import MachineError
 from robot_dyn.simulation.dynamics.declarations import undeclared
 from robot_dyn.simulation.dynamics.smoothness import LOOKS
 from robot_dyn.simulation.dynamics.state_equation import StateEquation

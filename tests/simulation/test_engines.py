@@ -20,8 +20,8 @@ from robot_dyn.effects.effect import Active
 from robot_dyn.errors import QueryError
 from robot_dyn.integrate.methods import FIXED_STEP
 from robot_dyn.queries.dynamics import Dynamics
-from robot_dyn.simulation.compiled.compiled_state_equation import MachineError
 from robot_dyn.simulation.compiled.engine_choice import choose
+from robot_dyn.simulation.compiled.self_check import MachineError, check
 from robot_dyn.simulation.compiled.trace import SymbolicDynamics
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from tests.long import long
@@ -270,15 +270,15 @@ def test_a_machine_that_disagrees_is_refused(monkeypatch) -> None:
 
     setup = rd.Setup(rd.Plant(ARM), Q)
     made = build.compiled_equation(StateEquation(setup.plant, None), rd.method("rk4"))
-    made.check(setup)
-    equations = replace(made.equations, checked={})
+    check(made, setup)
+    functions = replace(made.functions, checked={})
     other = replace(
-        made, equation=StateEquation(rd.Plant(ARM.with_(gravity=(0.0, 0.0, -9.80664))), None), equations=equations
+        made, equation=StateEquation(rd.Plant(ARM.with_(gravity=(0.0, 0.0, -9.80664))), None), functions=functions
     )
     with pytest.raises(
         MachineError, match=r"differs from the interpreted one by .* allowed: take engine='interpreted'"
     ):
-        other.check(setup)
+        check(other, setup)
 
 
 def test_interpreted_runs_import_no_compiler(tmp_path) -> None:

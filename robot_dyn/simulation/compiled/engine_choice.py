@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from robot_dyn.codegen.waiting import told
 from robot_dyn.errors import RobotDynError
-from robot_dyn.simulation.compiled.programs import Identified, Traces, identified, interpreted, stored
+from robot_dyn.simulation.compiled.programs import Identified, Traces, identify, interpreted, stored
 from robot_dyn.simulation.dynamics.declarations import named, undeclared
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.setup.setup import Setup
@@ -30,7 +30,7 @@ _PER_SECOND, _PER_SEGMENT = 1000, 17  # evaluations of an adaptive method: for e
 
 
 def choose(setup: Setup, equation: StateEquation, seen: float = 0) -> tuple[CompiledStateEquation | None, str]:
-    """The machine that runs a setup, or None for the interpreted engine; and words for the summary.
+    """Return the machine code that runs a setup, None for the interpreted engine, and a text for the summary.
 
     Args:
         setup: What to run.
@@ -47,9 +47,9 @@ def choose(setup: Setup, equation: StateEquation, seen: float = 0) -> tuple[Comp
     if not asked and (parts := undeclared(setup.plant, setup.controller)):  # they may do what a trace would lose
         return None, _interpreted(setup, " ".join((named(parts[0][0]), parts[0][1])))
     try:
-        made, what = identified(_code(setup, equation)), _traces(setup)
-        found = _existing(setup, made, what)
-        if found is None and not asked and not _is_worthwhile(setup, made, what, seen):
+        identified, what = identify(_code(setup, equation)), _traces(setup)
+        found = _existing(setup, identified, what)
+        if found is None and not asked and not _is_worthwhile(setup, identified, what, seen):
             return None, _interpreted(setup, "short: compiling does not pay")
         compiled_equation = _checked(setup, equation, found)
         return compiled_equation, _label(compiled_equation)
@@ -68,17 +68,19 @@ def most_interpreted(setup: Setup, equation: StateEquation, compiled_equation: C
 
 
 def _checked(setup: Setup, equation: StateEquation, found: CompiledStateEquation | None) -> CompiledStateEquation:
-    """The machine that was found, or another, once it has been compared."""
+    """The machine code that exists, or new code, after its self-check."""
+    from robot_dyn.simulation.compiled.self_check import check
+
     if found is not None:
-        found.check(setup)
+        check(found, setup)
         return found
     with told("compiling the equations of this run, once for its structure"):
-        made = machine_of(setup, equation)
-        made.check(setup)
-    return made
+        compiled = compiled_for(setup, equation)
+        check(compiled, setup)
+    return compiled
 
 
-def machine_of(setup: Setup, equation: StateEquation, swept: tuple[str, ...] = ()) -> CompiledStateEquation:
+def compiled_for(setup: Setup, equation: StateEquation, swept: tuple[str, ...] = ()) -> CompiledStateEquation:
     """The machine code of a run by itself, not checked yet; `swept` as of `compiled_equation`.
 
     Raises:
@@ -92,21 +94,21 @@ def machine_of(setup: Setup, equation: StateEquation, swept: tuple[str, ...] = (
     )
 
 
-def _existing(setup: Setup, made: Identified, what: Traces) -> CompiledStateEquation | None:
+def _existing(setup: Setup, identified: Identified, what: Traces) -> CompiledStateEquation | None:
     """The machine code that this process has, or the store."""
     programs = None
     if "robot_dyn.simulation.compiled.build" not in sys.modules:  # to import it takes ten times as long as to ask
-        programs = stored(made, what)
+        programs = stored(identified, what)
         if programs is None:
             return None
     from robot_dyn.simulation.compiled.build import existing
 
-    return existing(made, what, _plain(setup), setup.finds_events, programs)
+    return existing(identified, what, _plain(setup), setup.finds_events, programs)
 
 
-def _is_worthwhile(setup: Setup, made: Identified, what: Traces, seen: float) -> bool:
+def _is_worthwhile(setup: Setup, identified: Identified, what: Traces, seen: float) -> bool:
     """Whether compiling takes less than this run and those of its structure that were interpreted before it."""
-    before, size = interpreted(made, what), made.equation.size
+    before, size = interpreted(identified, what), identified.equation.size
     count = before[0] + max(seen * _in_all(setup, size), _evaluations(setup, size))
     if count >= _COMPILED or (count >= _WITHOUT_LOOP and _has_loop(setup)):
         return True
@@ -116,7 +118,7 @@ def _is_worthwhile(setup: Setup, made: Identified, what: Traces, seen: float) ->
 
 def _has_loop(setup: Setup) -> bool:
     """Whether the time loop is in the store."""
-    from robot_dyn.simulation.compiled.build import loop_of
+    from robot_dyn.simulation.compiled.loop import loop_of
 
     method = _plain(setup)
     return (

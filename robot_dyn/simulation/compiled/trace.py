@@ -37,7 +37,7 @@ def trace(
     equation: StateEquation,
     bodies: Bodies,
     known: Sequence[Parameter],
-    kept: tuple[str, ...] | None,
+    extras: tuple[str, ...] | None,
     jacobian: bool = False,
     nonsmooth: bool = False,
 ) -> dict[str, ca.Function]:
@@ -47,7 +47,7 @@ def trace(
         equation: What to trace.
         bodies: Gives the symbols of a robot, the plant's or a model's.
         known: The parameters.
-        kept: Which of "u", "v" and "energy" a sample of runs in lock step holds; None for a single run, whose
+        extras: Which of "u", "v" and "energy" a sample of runs in lock step holds; None for a single run, whose
             samples hold y', u, K and V.
         jacobian: Whether a method needs it.
         nonsmooth: Whether the method asks for the convex problem of each step in place of the rate.
@@ -71,10 +71,10 @@ def trace(
         if u is None:
             rate, u = symbolic.rate(time, state, held_here)
         parts = {"u": wide(u, n), "v": v, "energy": symbolic.energies(time, q, v)}
-        single = kept is None
+        single = extras is None
         made = {"rate": np.concatenate([rate, parts["u"]]) if single else rate, "energy": parts["energy"]}
         made["sample"] = np.concatenate(
-            [rate, parts["u"], parts["energy"]] if single else [parts[x] for x in kept] or [[]]
+            [rate, parts["u"], parts["energy"]] if single else [parts[x] for x in extras] or [[]]
         )
         if not single and (not equation.sampled or equation.equation_of_motion.bounds_at_all_times):
             made["actuation"] = parts["u"]

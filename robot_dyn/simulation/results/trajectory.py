@@ -14,7 +14,7 @@ from robot_dyn.simulation.events.occurrence import Occurrence
 from robot_dyn.simulation.observation.remarks import Remark
 from robot_dyn.simulation.results.error_estimate import ErrorEstimate
 from robot_dyn.simulation.results.ledger import Ledger
-from robot_dyn.simulation.results.tracking import root_mean_square
+from robot_dyn.simulation.results.samples import root_mean_square
 from robot_dyn.simulation.run.outcome import Outcome
 from robot_dyn.values import Derived, Layout, read_only
 

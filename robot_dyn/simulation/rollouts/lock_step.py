@@ -80,7 +80,7 @@ class Batch:
         check_batch(setup, len(self.y), len(self.columns) + more, most)
         self.table, self.apart = segment_table(setup), 0
         steps = int(self.table.counts[:-1].sum())
-        if "actuation" in compiled_equation.equations.programs:
+        if "actuation" in compiled_equation.functions.programs:
             self.apart = 1 if equation.sampled else max(1, steps // _INSTANTS)
         self.instants = steps // self.apart if self.apart > 1 else 0
         most = samples_at_most(setup, self.table.counts)
@@ -167,7 +167,7 @@ class Batch:
         assert advance is not None
         rows = equation.size | 1  # odd: stages a power of two apart would share the sets of a cache
         stepper = method.stepper(FLOAT64, equation.size, n, rows, LANES)
-        functions, now = self.compiled_equation.equations.functions, np.zeros(len(Now), dtype=np.int64)
+        functions, now = self.compiled_equation.functions.addresses, np.zeros(len(Now), dtype=np.int64)
         now[Now.BUDGET] = np.iinfo(np.int64).max
         records = Records(
             np.array(self.columns, np.int64), np.empty((len(self.out_y), 2), np.int64), self.out_y, self.made,

@@ -12,7 +12,8 @@ from robot_dyn.codegen.parameters import over_runs, with_parameters
 from robot_dyn.coefficients import with_values
 from robot_dyn.simulation.compiled.build import with_numbers
 from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
-from robot_dyn.simulation.compiled.engine_choice import machine_of
+from robot_dyn.simulation.compiled.engine_choice import compiled_for
+from robot_dyn.simulation.compiled.self_check import check
 from robot_dyn.simulation.diagnostics.step_remarks import observer_of
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.observation.guard_levels import GuardLevels, levels
@@ -71,8 +72,8 @@ class OneByOne:
         self.compiled_equation: CompiledStateEquation | None = None
         if self.compiled:
             whole = StateEquation(setup.plant, setup.controller, setup.integrator.canonical, setup.events)
-            self.compiled_equation = machine_of(setup, whole, tuple(sweep))
-            self.compiled_equation.check(setup)
+            self.compiled_equation = compiled_for(setup, whole, tuple(sweep))
+            check(self.compiled_equation, setup)
         self.made: list[Single | None] = [None] * len(q0)
         self.stop = np.zeros(1, np.int64)
 
@@ -89,7 +90,7 @@ class OneByOne:
         if self.compiled_equation is None:
             return setup, equation, None
         if self.compiled_equation.equation.limited != equation.limited or setup.finds_events != self.setup.finds_events:
-            return setup, equation, machine_of(setup, equation, tuple(self.sweep))
+            return setup, equation, compiled_for(setup, equation, tuple(self.sweep))
         return setup, equation, with_numbers(self.compiled_equation, equation.in_a_mode)  # only numbers differ
 
     def run(self, threads: int, on_progress: Callable[[float], object] | None = None) -> None:

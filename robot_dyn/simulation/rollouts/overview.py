@@ -17,7 +17,7 @@ from robot_dyn.simulation.observation.chatter import Episode
 from robot_dyn.simulation.observation.observation import Observed
 from robot_dyn.simulation.observation.remarks import Kind, Remark
 from robot_dyn.simulation.results.provenance import joint_types
-from robot_dyn.simulation.results.tracking import deviation_of, root_mean_square
+from robot_dyn.simulation.results.samples import deviation_of, root_mean_square
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.values import Layout, Value, read_only
 

@@ -25,8 +25,9 @@ from robot_dyn.integrate.adaptive import AUTO, EXPLICIT
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.simulation.compiled.build import compiled_equation
+from robot_dyn.simulation.compiled.self_check import check
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.results.link_wrenches import frame_of
+from robot_dyn.simulation.results.acting import frame_of
 from robot_dyn.simulation.results.provenance import edits_of_machine_code
 from robot_dyn.simulation.rollouts.divergence import causes
 from robot_dyn.simulation.rollouts.lock_step import LANES, Batch
@@ -160,13 +161,13 @@ def _side_by_side(
         equation,
         cast(Integrator, setup.integrator),
         lanes=LANES,
-        kept=kept,
+        extras=kept,
         swept=tuple(sweep),
         jacobian=setup.integrator.needs_jacobian,
         detects=passed is not None,
         nonsmooth=setup.integrator.nonsmooth,
     )
-    made.check(setup)
+    check(made, setup)
     return Batch(setup, made, q, v, sweep, recorded, kept, most, passed).run(threads, on_progress)
 
 

@@ -13,11 +13,9 @@ import numpy as np
 from robot_dyn.codegen.parameters import with_parameters
 from robot_dyn.errors import QueryError
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.results.acting import acting
+from robot_dyn.simulation.results.acting import acting, at_stop, wrenches
 from robot_dyn.simulation.results.ledger import Ledger
-from robot_dyn.simulation.results.link_wrenches import at_stop, wrenches
-from robot_dyn.simulation.results.samples import columns
-from robot_dyn.simulation.results.tracking import deviation_of
+from robot_dyn.simulation.results.samples import columns, deviation_of
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.rollouts.overview import remarks_of
 from robot_dyn.simulation.run.state_functions import sample
