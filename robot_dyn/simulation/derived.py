@@ -9,11 +9,10 @@ from typing import final
 import numpy as np
 
 from robot_dyn.simulation.diagnostics.damped_task import damped
-from robot_dyn.simulation.diagnostics.divergence import explained
 from robot_dyn.simulation.diagnostics.imbalance import cause
 from robot_dyn.simulation.diagnostics.step_remarks import remarks
 from robot_dyn.simulation.diagnostics.stiffness import bounded_by_stability
-from robot_dyn.simulation.diagnostics.unstable_loop import unstable
+from robot_dyn.simulation.diagnostics.unstable_loop import explained, unstable
 from robot_dyn.simulation.observation.observation import Observed
 from robot_dyn.simulation.observation.observer import Observer
 from robot_dyn.simulation.observation.remarks import Remark
@@ -83,11 +82,11 @@ class Results:
     @cached_property
     def ledger(self) -> Ledger:
         """Energy and work; with the cause where it does not close, unless undeclared parts are not to be asked."""
-        made, equation = ledger(self.setup.equation, self.record), self.setup.equation
+        energy = ledger(self.setup.equation, self.record)
         asks = self.setup.estimate_error or not self.setup.undeclared  # the search calls these 4000 times
-        if asks and self.record.outcome.ending is not Ending.STOPPED and leak(made, self.error, self.q):
-            return replace(made, cause=cause(self.setup, equation, self.record, made.closes))
-        return made
+        if asks and self.record.outcome.ending is not Ending.STOPPED and leak(energy, self.error, self.q):
+            return replace(energy, cause=cause(self.setup, self.record, energy.closes))
+        return energy
 
     @cached_property
     def _tracking(self) -> tuple[np.ndarray | None, np.ndarray | None]:
@@ -140,7 +139,7 @@ class Results:
         observed, samples = self._observed, np.hstack([self.q, self.v, self.u])
         return (
             *remarks(self.setup, self.observer, observed, self.record.t, samples, self.power), *self.before,
-            *bounded_by_stability(self.setup, self.setup.equation, self.record), *self._of_control,
+            *bounded_by_stability(self.setup, self.record), *self._of_control,
         )  # fmt: skip
 
     @cached_property
@@ -148,8 +147,7 @@ class Results:
         """What is said of the controller; one that was interrupted is not asked again."""
         if self.record.outcome.ending is Ending.STOPPED:
             return ()
-        equation, record = self.setup.equation, self.record
-        return (*unstable(self.setup, equation, record.t, record.y), *damped(self.setup, record))
+        return (*unstable(self.setup, self.record.t, self.record.y), *damped(self.setup, self.record))
 
     @property
     def acting(self) -> tuple[str, ...]:

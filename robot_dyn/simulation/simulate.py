@@ -72,7 +72,7 @@ def simulate(
     if setup.accuracy is not None:
         pilot = replace(setup, accuracy=None)
         return run_to(pilot, setup.accuracy, lambda each: simulate(each, on_progress=on_progress))
-    check_record(setup, setup.equation)
+    check_record(setup)
     began = perf_counter()
     ran = _by_choice(setup, on_progress)
     finished, setup = perf_counter(), ran.setup
@@ -190,7 +190,7 @@ def _with_estimate(
         return made
 
     try:
-        error = estimate(setup, setup.equation, record, companion)
+        error = estimate(setup, record, companion)
     except KeyboardInterrupt:
         error = no_estimate("it was interrupted")
         if record.outcome.ending is Ending.FINISHED:

@@ -6,7 +6,6 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.errors import QueryError
-from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.setup.size import check_record, samples, segments, steps
 
 ARM = rd.Plant(rd.load("planar_2r"), [rd.ExternalWrench("tip", [1.0] * 6, start_s=0.3, end_s=0.7)])
@@ -70,4 +69,4 @@ def test_what_fits_is_not_refused() -> None:
     """An hour of 1 kHz control with samples of 10 ms: 3.6e6 ticks, 3.6e5 samples."""
     law = rd.PD(rd.hold([0.1, 0.2]), 3.0, 1.0, period_s=0.001)
     setup = rd.Setup(ARM, [0.1, 0.2], duration_s=3600.0, controller=law, record_period_s=0.01)
-    check_record(setup, StateEquation(setup.plant, setup.controller))
+    check_record(setup)

@@ -17,7 +17,7 @@ import numpy as np
 from robot_dyn.arithmetic import Array
 from robot_dyn.errors import RobotDynError
 from robot_dyn.foreign import because
-from robot_dyn.integrate.differences import INSIDE, by_state, by_time
+from robot_dyn.integrate.differences import INSIDE, by_state, by_time, rowwise
 from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
 from robot_dyn.simulation.compiled.functions import STEP, States
 from robot_dyn.simulation.dynamics.bodies import bodies
@@ -257,8 +257,7 @@ def jacobian_error(equation: StateEquation, t: float, y: Array, held: Array | No
 
     def f(at: Any, states: Array) -> Array:
         time = min(max(float(at), p[0]), p[1])
-        rows = states.reshape(-1, equation.size)
-        return np.array([equation.rate(time, row, held)[0] for row in rows]).reshape(states.shape)
+        return rowwise(lambda row: equation.rate(time, row, held)[0])(at, states)
 
     span = np.cbrt(np.finfo(float).eps)
     widths, ahead = np.minimum(equation.widths, span * np.maximum(1.0, np.abs(y)) / INSIDE), 2 * span * max(1.0, abs(t))

@@ -27,24 +27,23 @@ _UNBOOKED = 1e-3  # of the powers
 _FINER, _TIGHTER = 4, 100  # times as short steps, as small a tolerance
 
 
-def cause(setup: Setup, equation: StateEquation, run: Recording, contradicts: bool) -> str:
+def cause(setup: Setup, run: Recording, contradicts: bool) -> str:
     """Why the ledger of a run does not close, and what to do.
 
     Args:
         setup: What was run.
-        equation: Its state equation.
         run: What it left behind.
         contradicts: Whether it closes, but not as well as the estimated error of q says.
     """
     if run.outcome.ending is Ending.DIVERGED:
         return "the run diverged"
-    if unbooked := _unbooked(equation, run):
+    if unbooked := _unbooked(setup.equation, run):
         return unbooked
     method: Any = setup.integrator
     doubt = "do not trust the estimate, " if contradicts else ""
     if method.controls_error:
         return f"{doubt}the tolerance is too loose; take rtol = {method.rtol / _TIGHTER:.0e}"
-    missed = stepped_over(setup, equation, run.step_log, 0.0) or cut_alike(setup, run)
+    missed = stepped_over(setup, run.step_log, 0.0) or cut_alike(setup, run)
     why = "the steps are too long for the motion" if missed is None else f"{missed.why}, at t = {missed.t:.4g} s"
     return f"{doubt}{why}; take step_s = {setup.taken_step_s / _FINER:.0e}"
 

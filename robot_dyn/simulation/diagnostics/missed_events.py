@@ -35,17 +35,17 @@ class Missed:
     why: str
 
 
-def stepped_over(setup: Setup, equation: StateEquation, path: Path, error: float) -> Missed | None:
+def stepped_over(setup: Setup, path: Path, error: float) -> Missed | None:
     """The first thing that acted between two steps and would move a joint by more than the estimated error.
 
     Args:
         setup: What was run.
-        equation: Its state equation.
         path: The states at the ends of its steps.
         error: Estimated error of q, in [rad] or [m].
     """
     if len(path.t) < 2:
         return None
+    equation = setup.equation
     q, v = path.y[:, : equation.plant.dynamics.n], equation.velocities(path.y)
     effects = () if setup.finds_events else setup.plant.effects
     found = [_crossed(equation, effect, path, q, v, error) for effect in effects]

@@ -10,6 +10,7 @@ import numpy as np
 
 from robot_dyn.effects.effect import Conservative, Dissipative, Stateful
 from robot_dyn.errors import RobotDynError
+from robot_dyn.integrate.differences import by_state, rowwise
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.units import unit
 from robot_dyn.simulation.diagnostics.creep import creeping
@@ -180,13 +181,12 @@ def against(setup: Setup, t: np.ndarray, q: np.ndarray) -> Callable[[Episode], s
 def _remedy(setup: Setup, t: float, q: np.ndarray, period: float) -> str:
     """What to do about a chatter, with the largest kd T/M: the eigenvalue of −M⁻¹ ∂u/∂v times the period."""
     general = "take a shorter period_s or less damping: it reverses where an eigenvalue of M⁻¹ kd period_s is above 1"
-    controller, n = setup.controller, len(q)
+    controller = setup.controller
     assert controller is not None
-    z, v = np.zeros(controller.state_size), np.zeros(n)
+    z, v = np.zeros(controller.state_size), np.zeros(len(q))
     try:
         with np.errstate(all="ignore"):
-            u = [controller.torque(t, q, v + side * dv, z) for dv in 1e-6 * np.eye(n) for side in (1, -1)]
-            slope = np.array([(plus - minus) / 2e-6 for plus, minus in zip(u[::2], u[1::2], strict=True)]).T
+            slope = by_state(rowwise(lambda v: controller.torque(t, q, v, z)), t, v).T
             ratio = float(np.abs(np.linalg.eigvals(np.linalg.solve(setup.plant.at(t).M(q), -slope))).max()) * period
     except (RobotDynError, np.linalg.LinAlgError):
         return general

@@ -45,15 +45,15 @@ _FAR_PUSH = 1000 * PUSH  # of what a short step adds to q, rounding may lose all
 Companion = Callable[[Any, Setup], Recording]  # of a factor of the steps, or of a mesh
 
 
-def estimate(setup: Setup, equation: StateEquation, run: Recording, companion: Companion) -> ErrorEstimate:
+def estimate(setup: Setup, run: Recording, companion: Companion) -> ErrorEstimate:
     """The estimated error of a run.
 
     Args:
         setup: What was run.
-        equation: Its state equation.
         run: What it left behind.
         companion: Runs a setup with steps, or tolerances, multiplied by a factor.
     """
+    equation = setup.equation
     if len(run.shared.t) < 2:
         return no_estimate("it ended in its first step")
     if equation.impulses and setup.integrator.nonsmooth:
@@ -68,14 +68,14 @@ def estimate(setup: Setup, equation: StateEquation, run: Recording, companion: C
     if method.controls_error:
         made = _by_refinement(setup, method, run, estimated, companion)
     else:
-        if motion := damped_oscillation(setup, equation, run):
+        if motion := damped_oscillation(setup, run):
             return no_estimate(
                 f"the energy ledger does not close: {motion}, which {method.name} damps in steps longer than"
                 f" {1 / abs(motion.eigenvalue):.0e} s, so that runs with other steps do not show it; take shorter ones"
             )
         made = _by_steps(setup, method, estimated, companion, _turn(equation, run.step_log))
         made = _until_alike(setup, run, made)
-    return _advised(setup, _looked_between(setup, equation, run, made), why)
+    return _advised(setup, _looked_between(setup, run, made), why)
 
 
 def _by_steps(
@@ -165,9 +165,9 @@ def _turn(equation: StateEquation, step_log: Path) -> float:
     return float((np.abs(np.diff(step_log.y[:, : dynamics.n], axis=0)) / steps)[:, turns].max(initial=0.0))
 
 
-def _looked_between(setup: Setup, equation: StateEquation, run: Recording, made: ErrorEstimate) -> ErrorEstimate:
+def _looked_between(setup: Setup, run: Recording, made: ErrorEstimate) -> ErrorEstimate:
     """The estimate up to where something acted between two steps only, if that matters beside it."""
-    missed = stepped_over(setup, equation, run.step_log, made.final)
+    missed = stepped_over(setup, run.step_log, made.final)
     if missed is None or missed.t >= made.resolved_until:
         return made
     return replace(made, resolved_until=missed.t, note=missed.why)

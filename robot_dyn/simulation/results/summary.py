@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from robot_dyn.errors import escaped
@@ -12,6 +14,9 @@ from robot_dyn.simulation.results.ledger import largest
 from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.run.outcome import Ending
+
+if TYPE_CHECKING:
+    from robot_dyn.simulation.rollouts.result import Rollouts
 
 _TOLD = 3  # events in a summary
 _NOTICED = 0.01  # [s]: shorter times are not worth a word
@@ -34,8 +39,7 @@ def summary(run: Trajectory) -> str:
     lines += [f"events: {_told(run.events)}"] if run.events else []
     lines += [line for line in said(run.remarks) if line != run.outcome.advice]
     if run.tracking_error is not None:
-        what = "the frame [m]" if run.desired is None else f"q [{unit}]"
-        lines.append(f"tracking error of {what}: {run.tracking_error:.3e} rms")
+        lines.append(f"{of_tracking(run, run.desired is None)}: {run.tracking_error:.3e} rms")
     step = f"step {s.step_s:.4g} s, " if s.step_s else ""
     lines.append(f"{s.method}: {step}{s.steps} steps, {s.evaluations} evaluations, {s.engine}")
     if s.user_code and s.companion_runs:
@@ -53,6 +57,12 @@ def summary(run: Trajectory) -> str:
         "time: " + ", ".join(f"{name} {spent:.2g} s" for name, spent in parts if spent >= _NOTICED or name == "run")
     )
     return "\n".join(map(escaped, lines))
+
+
+def of_tracking(run: Trajectory | Rollouts, of_frame: bool) -> str:
+    """What a tracking error is of, with its unit."""
+    what = "the frame [m]" if of_frame else f"q [{units('q', joint_types(run))}]"
+    return f"tracking error of {what}"
 
 
 def _not_estimated(run: Trajectory) -> str:

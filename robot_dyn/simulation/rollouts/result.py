@@ -11,11 +11,10 @@ from typing import Annotated, Any, final, overload
 import numpy as np
 
 from robot_dyn.errors import QueryError, escaped
-from robot_dyn.queries.units import units
 from robot_dyn.simulation.observation.observation import Observed
 from robot_dyn.simulation.observation.remarks import Remark
 from robot_dyn.simulation.observation.remarks import lines as said
-from robot_dyn.simulation.results.provenance import joint_types
+from robot_dyn.simulation.results.summary import of_tracking
 from robot_dyn.simulation.results.trajectory import Statistics, Trajectory
 from robot_dyn.simulation.rollouts.overview import Overview, of_some, overview
 from robot_dyn.simulation.run.outcome import Ending, Outcome
@@ -202,9 +201,8 @@ class Rollouts(Value):
         errors = self.tracking_error
         if errors is not None and np.isfinite(errors).any():
             most = int(np.nanargmax(errors))
-            what = "the frame [m]" if "frame" in self.about else f"q [{units('q', joint_types(self))}]"
             largest = f" in the median, {errors[most]:.3e} in run {most}" if counted else ""
-            lines.append(f"tracking error of {what}: {np.nanmedian(errors):.3e} rms{largest}")
+            lines.append(f"{of_tracking(self, 'frame' in self.about)}: {np.nanmedian(errors):.3e} rms{largest}")
         again = "" if self.setup is None else f"; rd.simulate(runs.setup_of({self.worst})) repeats it by itself"
         lines.append(f"look at run {self.worst} first{again}")
         return "\n".join(escaped(line) for line in lines)

@@ -26,12 +26,12 @@ from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.simulation.compiled.build import compiled_equation
 from robot_dyn.simulation.compiled.self_check import check
-from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.results.acting import frame_of
 from robot_dyn.simulation.results.provenance import edits_of_machine_code
-from robot_dyn.simulation.rollouts.divergence import causes
-from robot_dyn.simulation.rollouts.lock_step import LANES, Batch
+from robot_dyn.simulation.rollouts.batch import Batch
+from robot_dyn.simulation.rollouts.lock_step import LANES, Tiles
 from robot_dyn.simulation.rollouts.one_by_one import one_by_one
+from robot_dyn.simulation.rollouts.overview import causes
 from robot_dyn.simulation.rollouts.result import Rollouts
 from robot_dyn.simulation.rollouts.thresholds import Thresholds, thresholds
 from robot_dyn.simulation.setup.checks import check_stops
@@ -122,17 +122,17 @@ def rollouts(
     why = _why_one_by_one(setup)
     if not truth("cuts", cuts) and why:
         raise QueryError(f"cuts=False: {why}, and so runs are made one after the other; leave it out")
+    batch = Batch(setup, q, v, sweep, recorded)
     passed = None if why else thresholds(setup, sweep, len(q))
     cut = passed is not None or setup.finds_events  # samples are then interpolated within steps, which lock step cannot
     if why or (cuts and cut and not setup.samples_on_steps):
-        runs = one_by_one(setup, q, v, sweep, recorded, most_bytes, threads, on_progress)
+        runs = one_by_one(batch, most_bytes, threads, on_progress)
     else:
-        at = passed if cuts else None
-        runs = _side_by_side(setup, q, v, sweep, recorded, most_bytes, at, threads, on_progress)
+        runs = _side_by_side(batch, passed if cuts else None, most_bytes).run(threads, on_progress)
         if passed is not None and not cuts:
             runs = replace(runs, uncut=passed.names)
     about = frame_of(setup) | edits_of_machine_code(setup) | runs.about
-    return replace(runs, about=about, advice=causes(runs, setup, q, v))
+    return replace(runs, about=about, advice=causes(replace(runs, setup=setup)))
 
 
 def _why_one_by_one(setup: Setup) -> str:
@@ -149,26 +149,19 @@ def _why_one_by_one(setup: Setup) -> str:
     return "steps end at events" if setup.events else ""
 
 
-def _side_by_side(
-    setup: Setup, q: np.ndarray, v: np.ndarray, sweep: dict[str, np.ndarray], recorded: tuple[str, ...], most: int,
-    passed: Thresholds | None, threads: int, on_progress: Callable[[float], object] | None,
-) -> Rollouts:  # fmt: skip
-    """The runs in lock step, of which those that pass a threshold are made again."""
-    equation = StateEquation(setup.plant, setup.controller, setup.integrator.canonical)
-    asked = {"u": "u" in recorded, "v": equation.canonical and "v" in recorded, "energy": "energy" in recorded}
-    kept = tuple(name for name, yes in asked.items() if yes)
-    made = compiled_equation(
-        equation,
-        cast(Integrator, setup.integrator),
-        lanes=LANES,
-        extras=kept,
-        swept=tuple(sweep),
-        jacobian=setup.integrator.needs_jacobian,
-        detects=passed is not None,
-        nonsmooth=setup.integrator.nonsmooth,
-    )
-    check(made, setup)
-    return Batch(setup, made, q, v, sweep, recorded, kept, most, passed).run(threads, on_progress)
+def _side_by_side(batch: Batch, passed: Thresholds | None, most: int) -> Tiles:
+    """The runs in lock step, of which those that pass a threshold are repeated one by one."""
+    setup, recorded = batch.setup, batch.recorded
+    equation = setup.equation
+    from_code = ("u", "v", "energy") if equation.canonical else ("u", "energy")
+    extras = tuple(name for name in from_code if name in recorded)
+    method = cast(Integrator, setup.integrator)
+    compiled = compiled_equation(
+        equation, method, lanes=LANES, extras=extras, swept=tuple(batch.sweep), jacobian=method.needs_jacobian,
+        detects=passed is not None, nonsmooth=setup.integrator.nonsmooth,
+    )  # fmt: skip
+    check(compiled, setup)
+    return Tiles(batch, compiled, extras, most, passed)
 
 
 def _recorded(record: Any) -> tuple[str, ...]:

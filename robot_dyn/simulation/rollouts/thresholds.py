@@ -56,7 +56,7 @@ def thresholds(setup: Setup, sweep: Mapping[str, np.ndarray], count: int) -> Thr
     """
     if setup.steps > MOST_CUT or setup.integrator.nonsmooth:
         return None
-    equation = StateEquation(setup.plant, setup.controller, setup.integrator.canonical)
+    equation = setup.equation
     of_runs = _of_runs(equation, sweep, count)
     others = np.array([each.equation.limited != equation.limited for each, _ in of_runs])
     known = [(each, runs) for (each, runs), other in zip(of_runs, others, strict=True) if not other]

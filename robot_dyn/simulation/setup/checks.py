@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
@@ -12,11 +13,14 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.effects.rigid_stops import RigidStops
 from robot_dyn.errors import ControlError, EffectError, OverflowedError, QueryError, shown
 from robot_dyn.foreign import call
+from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.simulation.setup.size import MOST_CUT
-from robot_dyn.validate import returned
+from robot_dyn.validate import number, returned
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.setup.setup import Setup
+
+_UNITS = ("rad", "m")
 
 
 def check_parts(setup: Setup) -> None:
@@ -159,3 +163,21 @@ def _check_events(setup: Setup) -> None:
         value = call(event.function, 0.0, setup.q0, setup.v0)
         if np.ndim(value) or not isinstance(value, int | float | np.number) or not np.isfinite(value):
             raise QueryError(f"event {event.name!r}: its function must return a finite number, got {shown(value)}")
+
+
+def least_accuracy(given: Any, dynamics: Dynamics) -> float:
+    """Return the requested accuracy as one number: the least of those for the units that the joints have.
+
+    Raises:
+        QueryError: If it is not a positive number, or lacks the unit of a joint.
+    """
+    if not isinstance(given, Mapping):
+        return number("accuracy", given, above=0)
+    if unknown := [name for name in given if name not in _UNITS]:
+        raise QueryError(f"accuracy: no unit {shown(unknown[0])}; give 'rad', 'm' or both")
+    kinds = getattr(getattr(dynamics, "robot", dynamics), "joint_types", None)
+    slides = [None] if kinds is None else [kind == "prismatic" for kind in kinds]
+    units = [unit for unit, slide in zip(_UNITS, (False, True), strict=True) if slide in slides or None in slides]
+    if missing := [unit for unit in units if unit not in given]:
+        raise QueryError(f"accuracy: none is given for joints in {missing[0]}, got {shown(dict(given))}; add it")
+    return min(number(f"accuracy in {unit}", given[unit], above=0) for unit in units)

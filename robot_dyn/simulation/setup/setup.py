@@ -18,8 +18,7 @@ from robot_dyn.integrate.adaptive import AUTO, Adaptive
 from robot_dyn.integrate.methods import as_method
 from robot_dyn.simulation.dynamics.declarations import is_value, undeclared
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.setup.accuracy import asked
-from robot_dyn.simulation.setup.checks import check_model, check_parts
+from robot_dyn.simulation.setup.checks import check_model, check_parts, least_accuracy
 from robot_dyn.simulation.setup.event import Event
 from robot_dyn.simulation.setup.schedule import LEAST_STEPS, ON_STEP, Segment, cuts, near, nodes, steps_on
 from robot_dyn.simulation.setup.size import MOST_CUT, check_segments
@@ -107,7 +106,7 @@ class Setup(Value, Caching):
 
     def _check_accuracy(self) -> None:
         """That an accuracy is one, and that nothing else chooses method or tolerance."""
-        object.__setattr__(self, "accuracy", asked(self.accuracy, self.plant.dynamics))
+        object.__setattr__(self, "accuracy", least_accuracy(self.accuracy, self.plant.dynamics))
         if self.integrator != Adaptive(AUTO):
             raise QueryError(f"accuracy: chooses method and tolerance; leave out integrator, got {self.integrator}")
         if not self.estimate_error:

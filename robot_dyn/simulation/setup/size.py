@@ -13,7 +13,6 @@ from robot_dyn.errors import QueryError
 from robot_dyn.validate import LEAST_EXACT
 
 if TYPE_CHECKING:
-    from robot_dyn.simulation.dynamics.state_equation import StateEquation
     from robot_dyn.simulation.setup.setup import Setup
 
 MOST_BYTES = 8 * 2**30  # of all that is recorded, unless said
@@ -48,12 +47,13 @@ def check_segments(setup: Setup) -> None:
         )
 
 
-def check_record(setup: Setup, equation: StateEquation) -> None:
+def check_record(setup: Setup) -> None:
     """Refuse a run whose samples take more than MOST_BYTES.
 
     Raises:
         QueryError: If they do; says how much and the remedy.
     """
+    equation = setup.equation
     n, s, m = equation.plant.dynamics.n, len(equation.sources), len(equation.widths)
     # t, y, zero-order hold; q, v, a, u, work, power, energies; desired, deviation; and copies of all while it is made
     size = 2 * 8 * samples(setup) * (1 + m + n + 4 * n + 2 * s + 2 + 2 * n)

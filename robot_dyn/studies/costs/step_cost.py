@@ -26,7 +26,8 @@ from robot_dyn.simulation.compiled.build import compiled_equation, compiled_with
 from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.events.payload_events import PayloadEvents
-from robot_dyn.simulation.rollouts.lock_step import LANES, Batch
+from robot_dyn.simulation.rollouts.batch import Batch
+from robot_dyn.simulation.rollouts.lock_step import LANES, Tiles
 from robot_dyn.simulation.run.fixed_step import FixedStep
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.run.watch import Watch
@@ -111,7 +112,7 @@ def side_by_side(setup: Setup) -> Pair:
     starts = np.tile(short.q0, (RUNS, 1)), np.tile(short.v0, (RUNS, 1))
 
     def run() -> float:
-        batch = Batch(short, made, *starts, {}, (), (), MOST_BYTES)
+        batch = Tiles(Batch(short, *starts), made, (), MOST_BYTES)
         began = process_time()
         batch.run(1)
         return (process_time() - began) / (RUNS * short.steps)
