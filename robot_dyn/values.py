@@ -144,7 +144,7 @@ def derived(of: type[Late], source: Any, **known: Any) -> Late:
     """One whose fields are the attributes of the same name of a source, but for those that are given."""
     value = object.__new__(of)
     vars(value).update({name: _frozen(x) for name, x in known.items()})
-    if of.__dataclass_fields__.keys() - known.keys():  # pyright: ignore[reportAttributeAccessIssue]
+    if len(known) < len(of.__dataclass_fields__):  # pyright: ignore[reportAttributeAccessIssue]
         vars(value)["_source"] = source, RLock()
     return value
 

@@ -33,8 +33,8 @@ class Results:
     """The attributes of a `Trajectory` that are computed from the record of a run and values that do not change.
 
     Attributes:
-        setup: What ran, of the method that made the run.
-        record: What it left behind.
+        setup: With the method of the run.
+        record: Of the run.
         observer: Its observer, at its end.
         error: Its estimated error.
         texts: Copy of the texts of the setup.
@@ -81,10 +81,10 @@ class Results:
 
     @cached_property
     def ledger(self) -> Ledger:
-        """Energy and work; with the cause where it does not close, unless undeclared parts are not to be asked."""
+        """Energy and work; with the cause where it does not close, unless undeclared parts are not to be called."""
         energy = ledger(self.setup.equation, self.record)
-        asks = self.setup.estimate_error or not self.setup.undeclared  # the search calls these 4000 times
-        if asks and self.record.outcome.ending is not Ending.STOPPED and leak(energy, self.error, self.q):
+        explains = self.setup.estimate_error or not self.setup.undeclared  # the search calls these 4000 times
+        if explains and self.record.outcome.ending is not Ending.STOPPED and leak(energy, self.error, self.q):
             return replace(energy, cause=cause(self.setup, self.record, energy.closes))
         return energy
 
@@ -110,7 +110,7 @@ class Results:
 
     @property
     def about(self) -> dict[str, str]:
-        """Texts: where it comes from, what machine code changed, and the user's."""
+        """Texts: where it comes from, what machine code changed, and those of the setup."""
         edits = edits_of_machine_code(self.setup) if self.compiled else {}
         return frame_of(self.setup) | origin(self.setup.plant.dynamics) | edits | self.texts
 
@@ -144,14 +144,14 @@ class Results:
 
     @cached_property
     def _of_control(self) -> tuple[Remark, ...]:
-        """What is said of the controller; one that was interrupted is not asked again."""
+        """Remarks on the controller; one that was interrupted is not called again."""
         if self.record.outcome.ending is Ending.STOPPED:
             return ()
         return (*unstable(self.setup, self.record.t, self.record.y), *damped(self.setup, self.record))
 
     @property
     def acting(self) -> tuple[str, ...]:
-        """What acted, in words."""
+        """Names of what acted."""
         return acting(self.setup)
 
     @property

@@ -1,7 +1,7 @@
 """Simulate: a setup → a Trajectory with its energy ledger and an estimate of its error.
 
 The plant moves in continuous time. A controller with a period acts at its ticks, with a zero-order hold between them;
-steps end at ticks, at the switches of effects, and at the end. A run keeps all its samples, however it ends.
+steps end at ticks, at the switches of effects, and at the end. All samples of a run are returned, however it ends.
 """
 
 from __future__ import annotations
@@ -51,21 +51,21 @@ def simulate(
     on_progress: Callable[[float], object] | None = None,
     **options: Unpack[Options],
 ) -> Trajectory:
-    """Run a plant or a robot from a start; or a setup, with the options that are given in place of its own.
+    """Run a plant or a robot from a start; or a setup, with the given options in place of those of the setup.
 
     Args:
         what: What to run.
         q0: Position at the start, (n,), in [rad] or [m] by joint; required unless `what` is a setup.
         v0: Velocity at the start, (n,), in [rad/s] or [m/s]; 0, or that of the setup, unless given.
         on_progress: Called with the time reached, in [s], at each step, and with that of the end at the steps of
-            companion runs; in machine code some ten times a second. What it raises ends the call.
+            companion runs; in machine code some ten times a second. An exception from it ends the call.
         **options: The other attributes of a `Setup`, with its defaults: duration_s, controller, integrator, step_s,
             record_period_s, estimate_error, about, engine, events and accuracy.
 
     Raises:
         QueryError: If the setup is not allowed, or its record would not fit into memory. Whatever happens later is
-            told by the trajectory's outcome.
-        AccuracyError: If the accuracy that is asked for cannot be had.
+            reported by the trajectory's outcome.
+        AccuracyError: If the requested accuracy cannot be reached.
     """
     function("on_progress", on_progress, "the time reached")
     setup = setup_of("simulate", what, {**starts(q0, v0), **options})
@@ -200,7 +200,7 @@ def _with_estimate(
 
 
 def _spent_on_loops(compiled_equation: CompiledStateEquation | None) -> float:
-    """On the clock of what is compiled in the first call of a loop, which is no time of the run."""
+    """Time spent on compiling in the first call of a loop, which is not part of the run."""
     if compiled_equation is None:
         return 0.0
     from robot_dyn.codegen.loops.call import spent_on_loops

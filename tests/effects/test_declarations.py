@@ -381,4 +381,5 @@ def test_auto_has_machine_code_for_other_coefficients_and_none_for_another_struc
     rd.simulate(base, engine="compiled")
     assert rd.simulate(replace(base, plant=rd.Plant(ARM, [rd.Spring(5.0)]))).statistics.engine == "compiled"
     other = rd.Plant(ARM.with_(mass_scale=1.07), [rd.Spring(5.0)])
-    assert rd.simulate(replace(base, plant=other)).statistics.engine == "interpreted (short: compiling does not pay)"
+    engine = rd.simulate(replace(base, plant=other)).statistics.engine
+    assert engine == "interpreted (short: compiling is not worthwhile)"

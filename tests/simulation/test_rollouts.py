@@ -426,7 +426,7 @@ def test_a_joint_strikes_its_stops_in_a_batch_as_it_does_alone() -> None:
     others = np.setdiff1d(np.arange(70), strikes)
     for x, y in zip(arrays(runs), arrays(uncut), strict=True):
         np.testing.assert_array_equal(x[others], y[others])
-    assert "2 of them made again with steps cut at thresholds" in runs.statistics.engine
+    assert "2 of them repeated with steps cut at thresholds" in runs.statistics.engine
     assert "cuts=False: no step ends at lower stop, upper stop" in uncut.summary and "cuts" not in runs.summary
 
 

@@ -99,9 +99,9 @@ def _functions_of(
 
     names = tuple(name for name in dict.fromkeys(each.name for each in known) if name in swept)
     functions = _functions.get(identified.objects, (identified.described, lanes, names, what), compute)
-    if functions.instructions > _MOST_INSTRUCTIONS:
+    if (count := functions.programs.instructions) > _MOST_INSTRUCTIONS:
         raise TraceError(
-            f"the run takes {functions.instructions} instructions, more than the {_MOST_INSTRUCTIONS} worth compiling;"
+            f"the run takes {count} instructions, more than the {_MOST_INSTRUCTIONS} worth compiling;"
             " simulate it with engine='interpreted'"
         )
     return functions

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, final
@@ -13,8 +13,6 @@ import numpy as np
 from robot_dyn.codegen.loops.call import MachineFunction
 from robot_dyn.codegen.parameters import CONTROLLER, ROBOT, Parameter, Part, joined, parameters
 from robot_dyn.coefficients import value_at
-from robot_dyn.control.controller import Controller
-from robot_dyn.effects.effect import Effect
 from robot_dyn.simulation.compiled.functions import CompiledFunctions
 from robot_dyn.simulation.dynamics.loop_state import Functions
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
@@ -31,9 +29,9 @@ class CompiledStateEquation:
         equation: The interpreted state equation: that of the setup, with right angles written out in full.
         functions: Its machine code.
         known: Its parameters, with the values of the setup.
-        loop: The time loop as machine code; None if steps are made in Python.
+        loop: The time loop as machine code; None if steps are taken in Python.
         swept: Names of the parameters that differ from run to run.
-        refused: Why steps are made in Python, of a method that might have them as machine code.
+        refused: Why steps are taken in Python although those of the method might be machine code.
     """
 
     equation: StateEquation
@@ -49,34 +47,24 @@ class CompiledStateEquation:
         return joined(self.known)
 
     def advance(self) -> Callable[..., int] | None:
-        """The loop for one run, which keeps the addresses of its arrays."""
+        """The loop for one run, which stores the addresses of its arrays."""
         return None if self.loop is None else self.loop.calls()
 
-    def with_parts(self, effects: Sequence[Effect], controller: Controller | None, dynamics: Any = None) -> np.ndarray:
-        """The values of the parameters where effects and controller have other coefficients, and bodies other numbers.
-
-        Args:
-            effects: As of the plant.
-            controller: As of the equation.
-            dynamics: A robot that carries something else; unless given, the same.
-        """
-        of: dict[Part, Any] = {("effect", i): effect for i, effect in enumerate(effects)} | {CONTROLLER: controller}
+    def parameters_of(self, equation: StateEquation) -> np.ndarray:
+        """The values of the parameters of a state equation with other coefficients of its parts, or other payloads."""
+        plant = equation.plant
+        of: dict[Part, Any] = {("effect", i): effect for i, effect in enumerate(plant.effects)}
+        of[CONTROLLER] = equation.controller
         known = [
             replace(each, value=np.broadcast_to(value_at(of[each.part], each.key), each.value.shape))
             if each.part in of and value_at(of[each.part], each.key) is not None  # no mode is chosen yet
             else each
             for each in self.known
         ]
-        if dynamics is not None:
-            bodies = {each.key: each.value for each in parameters(dynamics, (), None, self.swept)}
+        if plant.equation_of_motion.payloads:
+            bodies = {each.key: each.value for each in parameters(plant.dynamics, (), None, self.swept)}
             known = [replace(each, value=bodies[each.key]) if each.part == ROBOT else each for each in known]
         return joined(known)
-
-    def of(self, equation: StateEquation) -> np.ndarray:
-        """The values of the parameters of a state equation with other numbers."""
-        plant = equation.plant
-        changes = bool(plant.equation_of_motion.payloads)
-        return self.with_parts(plant.effects, equation.controller, plant.dynamics if changes else None)
 
     def run_parameters(self, swept: Mapping[str, np.ndarray]) -> np.ndarray:
         """The numbers of W runs, (O, W): what is held, then row by row what is swept, (W, size) each, then the others.

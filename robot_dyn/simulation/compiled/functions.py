@@ -47,11 +47,6 @@ class CompiledFunctions:
     changeable: tuple[str, ...] = ()
     checked: dict[Any, States] = field(default_factory=dict, repr=False)
 
-    @property
-    def instructions(self) -> int:
-        """Operations in all."""
-        return self.programs.instructions
-
     @cached_property
     def _key(self) -> str:
         return digest([sources_of_the_writer(), str(self.runs), str(sorted(self.shared.items())), str(self.programs)])

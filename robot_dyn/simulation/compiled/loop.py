@@ -60,11 +60,11 @@ def loop_of(method: Any, cuts: bool, detects: bool = False, holds: bool = False)
 
 @cache
 def _translated(
-    make: Callable[..., Callable[..., int]], *functions: Callable[..., Any], works: bool = False
+    make_loop: Callable[..., Callable[..., int]], *functions: Callable[..., Any], works: bool = False
 ) -> MachineFunction:
-    """The loop that `make` returns for the plain functions of a method; `works` if it computes much by itself."""
+    """The loop that `make_loop` returns for the plain functions of a method; `works` if it computes much by itself."""
     about = f"the time loop of {functions[0].__module__}.{functions[0].__name__}"
-    return MachineFunction(make(*functions), INSTEAD, default_store, about, HARD if works else QUICK)
+    return MachineFunction(make_loop(*functions), INSTEAD, default_store, about, HARD if works else QUICK)
 
 
 def _refusal(method: PlainMethod, equation: StateEquation, lanes: int) -> SubsetError | None:

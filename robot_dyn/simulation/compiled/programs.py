@@ -1,6 +1,6 @@
 """The programs of a state equation: by its structure from the store, or traced.
 
-Neither LLVM nor CasADi is imported before something is traced: whether programs are kept is asked before each run.
+Neither LLVM nor CasADi is imported before something is traced: whether programs are stored is checked before each run.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class Identified(NamedTuple):
         known: Its parameters.
         described: Its structure, and where the parameters stand.
         objects: What stands in it by identity.
-        lasting: Whether `described` tells all of it, in another process too.
+        lasting: Whether `described` identifies all of it, in another process too.
     """
 
     equation: StateEquation
@@ -85,7 +85,7 @@ def robot_to_compile(dynamics: Any) -> Robot:
         TraceError: If there is none, or it has no answer.
     """
 
-    def make() -> Robot | None:
+    def compute() -> Robot | None:
         robot = robot_of(dynamics)
         if robot is None or not of_library(type(dynamics)):  # another class may have equations of its own
             raise TraceError(
@@ -96,7 +96,7 @@ def robot_to_compile(dynamics: Any) -> Robot:
             raise TraceError(f"joint {robot.joint_without_inertia!r} carries no inertia: take engine='interpreted'")
         return None if robot is dynamics else robot
 
-    return _robots.get((dynamics,), (), make) or dynamics
+    return _robots.get((dynamics,), (), compute) or dynamics
 
 
 def stored(identified: Identified, what: Traces) -> Programs | None:
@@ -107,7 +107,7 @@ def stored(identified: Identified, what: Traces) -> Programs | None:
 
 
 def interpreted(identified: Identified, what: Traces) -> list[float]:
-    """Where evaluations are counted that runs of a structure have taken without machine code."""
+    """The count of evaluations that runs of a structure have taken without machine code."""
     return _interpreted.get(identified.objects, (identified.described, what), lambda: [0.0])
 
 
@@ -137,7 +137,7 @@ def traced(equation: StateEquation, known: tuple[Parameter, ...], what: Traces, 
     def bodies(dynamics: Any, part: Part) -> SymbolicDynamics:
         """Its equations in symbols, traced once for a file and its edits."""
         robot, inputs = robot_to_compile(dynamics), tuple(each for each in known if each.part == part)
-        if constants:  # what is kept tells robots apart but for the numbers that are inputs
+        if constants:  # cached symbols are of one robot but for the numbers that are inputs
             return SymbolicDynamics(robot)
         described = structure(StateEquation(Plant(robot), None)).described
         places = tuple(each.place for each in inputs)

@@ -1,4 +1,4 @@
-"""What an observer saw, as remarks: in words, with times, values and what to do."""
+"""Remarks on what was observed at every step: text, times, values and what to do."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from robot_dyn.values import cached, copied
 
 Units = list[tuple[str, str, str]]  # of q, v and u of each joint
 QUANTITIES = ("q", "v", "u")
-KINDS = Kind.EFFORT_REACHED, Kind.STOP_REACHED, Kind.BEYOND  # of levels, in the order in which they are told
+KINDS = Kind.EFFORT_REACHED, Kind.STOP_REACHED, Kind.BEYOND  # of levels, in the order of a summary
 _HIDDEN = 0.1  # of the range of a quantity: what the samples beside a window leave out
 _ROUNDING = 1e-9  # of a quantity: a smaller range is noise
 
@@ -47,7 +47,7 @@ def _observation(setup: Setup, of: GuardLevels) -> Observation:
     """Of the start; nan for what u is not known before the first tick."""
     equation, u = setup.equation, np.full(len(setup.q0), np.nan)
     if not equation.sampled:
-        with suppress(RobotDynError):  # the run will tell
+        with suppress(RobotDynError):  # the run will report it
             u = equation.actuation(0.0, setup.q0, setup.v0, np.zeros(equation.states), None)
     return observation_of(np.concatenate([setup.q0, setup.v0, u])[:, None], of)
 
@@ -143,13 +143,13 @@ def _passed(names: tuple[str, ...], units: Units, visits: dict[Level, Visit], in
         unit = f" {units[joint][quantity]}".rstrip()
         far = f"{most.value:.4g} of {level.limit:.4g}{unit} at {most.at:.4g} s"
         spent = f"for {duration:.3g} s from {start:.4g} s"
-        words = {
+        texts = {
             Kind.BEYOND: far,
             Kind.STOP_REACHED: f"{far}, {spent}",
             Kind.EFFORT_REACHED: f"{spent} ({abs(level.limit):.4g}{unit})",
         }
         seen = f" (at samples and {instants} instants)" if QUANTITIES[quantity] == "u" and instants else ""
-        text = f"{names[joint]} {words[level.kind]}{seen}"
+        text = f"{names[joint]} {texts[level.kind]}{seen}"
         yield Remark(
             level.kind, names[joint], QUANTITIES[quantity], start, duration, most.at, most.value, level.limit, text,
             "nothing in the plant enforces them" if level.kind is Kind.BEYOND else "",

@@ -1,4 +1,4 @@
-"""What a summary says of stiff runs: steps bounded by stability, and oscillations that a stiff method damps."""
+"""Remarks on stiff runs: steps bounded by stability, and oscillations that a stiff method damps."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ def unstable(setup: Setup, t: np.ndarray, y: np.ndarray) -> Iterator[Remark]:
 
 
 class Growing(NamedTuple):
-    """A loop in which deviations grow: when, of which joint most, by which factor a period; and its linearisation."""
+    """A loop in which deviations grow: the time, the joint, the factor in each period, and its linearisation."""
 
     t: float
     joint: str

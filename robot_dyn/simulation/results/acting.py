@@ -15,11 +15,11 @@ from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.setup.setup import Setup
 
 _FAR = 1e9  # a run that diverged has samples beyond any placement
-_BEFORE = 2.0**-22  # of its time, a switch's own past: apart from it in single precision too, which viewers keep
+_BEFORE = 2.0**-22  # of its time, a switch's own past: distinct from it in single precision too, which viewers use
 
 
 def acting(setup: Setup) -> tuple[str, ...]:
-    """What acts in a run, by the names of scenes, with units."""
+    """Return what acts in a run, by the names of scenes, with units."""
     dynamics = setup.plant.dynamics
     robot = getattr(dynamics, "robot", dynamics)
     edits = _edits(robot) if isinstance(robot, Robot) else ()

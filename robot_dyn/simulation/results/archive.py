@@ -70,7 +70,7 @@ def write(stream: BinaryIO, arrays: Mapping[str, np.ndarray]) -> None:
 
 @final
 class Archive:
-    """An archive open for reading; `headers` tell what each member holds.
+    """An archive open for reading; `headers` describe what each member holds.
 
     Args:
         stream: Of a regular file.
@@ -121,7 +121,7 @@ class Archive:
             return str(array)
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """All arrays; ArchiveError unless they are those that the digest was made of."""
+        """All arrays; ArchiveError unless the digest is that of their contents."""
         arrays = {name: self.array(name) for name in self.headers if name != DIGEST}
         if self.text(DIGEST) != _digest(arrays):
             raise ArchiveError("its SHA-256 is not that of its contents: it was changed after it was written")

@@ -32,22 +32,22 @@ class Columns(NamedTuple):
     energy: np.ndarray
 
 
-def columns(equation: StateEquation, t: np.ndarray, y: np.ndarray, made: np.ndarray) -> Columns:
+def columns(equation: StateEquation, t: np.ndarray, y: np.ndarray, derived: np.ndarray) -> Columns:
     """Return the quantities at samples, (k, …).
 
     Args:
         equation: State equation of the run.
         t: Times, (k,).
         y: States, (k, m).
-        made: y', u, K and V, (k, m + n + 2): y' holds v, a and the powers.
+        derived: y', u, K and V, (k, m + n + 2): y' holds v, a and the powers.
     """
     n, m, works = equation.plant.dynamics.n, equation.size, equation.size - len(equation.sources)
-    q, v, a, u = y[:, :n], y[:, n : 2 * n], made[:, n : 2 * n], made[:, m : m + n]
+    q, v, a, u = y[:, :n], y[:, n : 2 * n], derived[:, n : 2 * n], derived[:, m : m + n]
     if equation.canonical:  # y holds the momentum, and y' its rate
-        v = made[:, :n]
+        v = derived[:, :n]
         z = y[:, 2 * n : works]
         a = np.array([_acceleration(equation, *each) for each in zip(t, q, v, z, u, strict=True)]).reshape(q.shape)
-    return Columns(q, v, a, u, y[:, works:], made[:, works:m], made[:, m + n :])
+    return Columns(q, v, a, u, y[:, works:], derived[:, works:m], derived[:, m + n :])
 
 
 def ledger(equation: StateEquation, record: Recording) -> Ledger:

@@ -9,7 +9,7 @@ import numpy as np
 from robot_dyn.errors import escaped
 from robot_dyn.queries.units import units
 from robot_dyn.simulation.events.occurrence import Occurrence
-from robot_dyn.simulation.observation.remarks import lines as said
+from robot_dyn.simulation.observation.remarks import lines as lines_of
 from robot_dyn.simulation.results.ledger import largest
 from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.trajectory import Trajectory
@@ -18,8 +18,8 @@ from robot_dyn.simulation.run.outcome import Ending
 if TYPE_CHECKING:
     from robot_dyn.simulation.rollouts.result import Rollouts
 
-_TOLD = 3  # events in a summary
-_NOTICED = 0.01  # [s]: shorter times are not worth a word
+_LISTED = 3  # events in a summary
+_NOTICED = 0.01  # [s]: shorter times are left out
 
 
 def summary(run: Trajectory) -> str:
@@ -35,9 +35,9 @@ def summary(run: Trajectory) -> str:
         f"error of q [{unit}]: {run.error or _not_estimated(run)}",
     ]
     lines += [] if run.accuracy is None else [f"accuracy: {run.accuracy}"]
-    lines += ["between samples: not watched"] if run.extremes is None else []
-    lines += [f"events: {_told(run.events)}"] if run.events else []
-    lines += [line for line in said(run.remarks) if line != run.outcome.advice]
+    lines += ["between samples: not observed"] if run.extremes is None else []
+    lines += [f"events: {_events_text(run.events)}"] if run.events else []
+    lines += [line for line in lines_of(run.remarks) if line != run.outcome.advice]
     if run.tracking_error is not None:
         lines.append(f"{of_tracking(run, run.desired is None)}: {run.tracking_error:.3e} rms")
     step = f"step {s.step_s:.4g} s, " if s.step_s else ""
@@ -72,10 +72,10 @@ def _not_estimated(run: Trajectory) -> str:
     return f"not estimated ({'a run of rollouts' if 'run' in run.about else 'estimate_error is False'})"
 
 
-def _told(events: tuple[Occurrence, ...]) -> str:
-    """The first events in words."""
-    words = [f"{each.name} at {each.t:.4g} s" for each in events[:_TOLD]]
-    return ", ".join(words) + (f", and {len(events) - _TOLD} more" if len(events) > _TOLD else "")
+def _events_text(events: tuple[Occurrence, ...]) -> str:
+    """The first events and their times."""
+    first = [f"{each.name} at {each.t:.4g} s" for each in events[:_LISTED]]
+    return ", ".join(first) + (f", and {len(events) - _LISTED} more" if len(events) > _LISTED else "")
 
 
 def _after(text: str) -> str:

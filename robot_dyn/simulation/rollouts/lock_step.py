@@ -1,7 +1,7 @@
 """A batch of runs in tiles of 64 in lock step, each tile run by one thread from beginning to end.
 
 Records are arrays over time, row and run, in this order, so that a tile writes whole vectors. Where `simulate` cuts
-steps at thresholds, the runs that may pass one are made again by themselves, and written over what lock step gave.
+steps at thresholds, the runs that may pass one are repeated by themselves, and replace those of lock step.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ class Tiles:
             self.apart = 1 if equation.sampled else max(1, steps // _INSTANTS)
         self.instants = steps // self.apart if self.apart > 1 else 0
         rows = samples_at_most(setup, self.table.counts)
-        self.out_y, self.made = np.empty((rows, len(self.columns), width)), np.empty((rows, more, width))
+        self.out_y, self.out_extras = np.empty((rows, len(self.columns), width)), np.empty((rows, more, width))
         numbers = np.minimum(np.arange(width), len(batch) - 1)
         start = np.vstack([batch.q0[numbers].T, batch.v0[numbers].T, np.full((n, width), np.nan)])
         self.observations = observations_of(start, self.levels.of_runs(numbers), tiles)
@@ -141,15 +141,15 @@ class Tiles:
                 rows = int(np.searchsorted(t, self.until[run], side="right"))
             else:
                 rows = len(single.t)
-                for array, of in ((self.out_y, self.states), (self.made, self.extras)):
+                for array, of in ((self.out_y, self.states), (self.out_extras, self.extras)):
                     array[:rows, :, run] = np.hstack([*(single.columns[name] for name in of), np.empty((rows, 0))])
-            self.out_y[rows:, :, run], self.made[rows:, :, run] = np.nan, np.nan
+            self.out_y[rows:, :, run], self.out_extras[rows:, :, run] = np.nan, np.nan
 
     def _runs(self, tile: int) -> Runs:
         """The runs of a tile at their start; a tile that is not full repeats a run."""
         equation, index = self.compiled.equation, self._numbers(tile)
         run_parameters = self.compiled.run_parameters({name: x[index] for name, x in self.batch.sweep.items()})
-        return runs_of(equation, self.y[index].T, run_parameters, self.made.shape[1], index)
+        return runs_of(equation, self.y[index].T, run_parameters, self.out_extras.shape[1], index)
 
     def _numbers(self, tile: int) -> np.ndarray:
         """The numbers of the runs in a tile."""
@@ -166,7 +166,7 @@ class Tiles:
         functions, now = self.compiled.functions.addresses, np.zeros(len(Now), dtype=np.int64)
         now[Now.BUDGET] = np.iinfo(np.int64).max
         records = Records(
-            np.array(self.columns, np.int64), np.empty((len(self.out_y), 2), np.int64), self.out_y, self.made,
+            np.array(self.columns, np.int64), np.empty((len(self.out_y), 2), np.int64), self.out_y, self.out_extras,
             np.empty((0, equation.size + 2)), np.empty((1 + 3 * n, 0)), self.observations[tile],
         )  # fmt: skip
         rules = rules_of(equation, False, LARGEST, base=lanes.start, apart=self.apart)
@@ -188,7 +188,7 @@ class Tiles:
         if ended != Ended.DONE:
             reached = self.table.starts[now[Now.SEGMENT]] + now[Now.STEP] * self.table.lengths[now[Now.SEGMENT]]
             self.ended[lanes] = np.where(runs.why > 0, runs.ended, reached)
-            for array in (self.out_y, self.made):
+            for array in (self.out_y, self.out_extras):
                 array[int(now[Now.ROW]) :, :, lanes] = np.nan
 
     def _result(self) -> Rollouts:
@@ -207,7 +207,7 @@ class Tiles:
                 steps[run], evaluations[run] = single.steps, single.evaluations
         alone = {run: single.observation for run, single in self.again.items() if single is not None}
         recorded, sizes = dict[str, np.ndarray](), self.batch.sizes
-        for array, names in ((self.out_y, self.states), (self.made, self.extras)):
+        for array, names in ((self.out_y, self.states), (self.out_extras, self.extras)):
             by_run = np.moveaxis(array[: len(t), :, :B], -1, 0)
             ends = np.cumsum([0, *(sizes[name] for name in names)])
             recorded |= {name: by_run[..., a:b] for name, a, b in zip(names, ends, ends[1:], strict=False)}
@@ -247,7 +247,7 @@ class Tiles:
         method, steps = self.setup.integrator, int(self.table.counts[:-1].sum())
         runs = f"compiled, {len(self.batch)} runs side by side"
         if self.again:
-            runs += f", {len(self.again)} of them made again with steps cut at thresholds"
+            runs += f", {len(self.again)} of them repeated with steps cut at thresholds"
         most = int(self.evaluations.max())
         return Statistics(method.name, self.setup.duration_s / steps, steps, most, 0.0, engine=runs)
 

@@ -30,7 +30,7 @@ _JUDGED = 8  # runs that diverged: each loop is linearised about a start of its 
 @final
 @dataclass(frozen=True, eq=False)
 class Overview(Value):
-    """What the runs of a batch come to.
+    """The overview of a batch.
 
     Attributes:
         worst: As of `Rollouts`.

@@ -13,7 +13,7 @@ import numpy as np
 from robot_dyn.errors import QueryError, escaped
 from robot_dyn.simulation.observation.observation import Observed
 from robot_dyn.simulation.observation.remarks import Remark
-from robot_dyn.simulation.observation.remarks import lines as said
+from robot_dyn.simulation.observation.remarks import lines as lines_of
 from robot_dyn.simulation.results.summary import of_tracking
 from robot_dyn.simulation.results.trajectory import Statistics, Trajectory
 from robot_dyn.simulation.rollouts.overview import Overview, of_some, overview
@@ -48,10 +48,10 @@ class Rollouts(Value):
         evaluations: Of the equation of motion, by the 64 runs that each was side by side with, (B,).
         statistics: Of the longest run; its time is that of all runs.
         sources: Names of what does work: the control and the effects without a potential.
-        about: Texts that make the runs whole, as of a `Trajectory`; of all runs, without `params`.
+        about: Texts, as of a `Trajectory`; of all runs, without `params`.
         params: Values that differ from run to run, by name, (B, n).
-        setup: What was run; None for runs that were read from a file.
-        uncut: Names of the thresholds at which steps do not end, as `cuts=False` asks.
+        setup: Of all runs; None for runs that were read from a file.
+        uncut: Names of the thresholds at which steps do not end, with `cuts=False`.
         q0, v0: Starts, (B, n).
         observed: Extremes, limits passed and chatter of each run, over all steps but for u of continuous control, see
             `remarks`; None in files of older versions.
@@ -105,8 +105,8 @@ class Rollouts(Value):
 
         Positions and velocities are those recorded. The rest is recorded, or follows from them and the setup: the
         acceleration, the powers and energies, and the torque of a continuous controller without an integral. What
-        neither tells is nan: work that was not recorded; the torque of other controllers; and all but what was
-        recorded of runs that were read from a file. It has no error estimate, and of the remarks that `simulate` makes
+        neither determines is nan: work that was not recorded; the torque of other controllers; and all but what was
+        recorded of runs that were read from a file. It has no error estimate, and of the remarks of `simulate`
         those on limits, stops, chatter and the reference.
 
         Raises:
@@ -151,17 +151,17 @@ class Rollouts(Value):
         from robot_dyn.simulation.rollouts.run import setup_of
 
         if self.setup is None:
-            raise QueryError("runs that were read from a file have no setup; make them again, and keep the result")
+            raise QueryError("runs that were read from a file have no setup; run rd.rollouts again, and use its result")
         return setup_of(self, self.setup, integer("run", run, least=-len(self), most=len(self) - 1) % len(self))
 
     @cached_property
     def overview(self) -> Overview:
-        """What all runs come to."""
+        """The overview of all runs."""
         return self.saved or overview(self)
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
-        """What `simulate` remarks on each run: limits, stops, chatter and the reference, by kind, joint and quantity.
+        """The remarks of `simulate` on each run: limits, stops, chatter and the reference, by kind, joint and quantity.
 
         `Remark.runs` are the numbers of the runs that it is about: first the worst, whose values and text it has, then
         the others in their order. A sampled loop is linearised in one run alone, `worst`. Under continuous control in
@@ -197,7 +197,7 @@ class Rollouts(Value):
             lines.append(f"run {run} diverged at t = {self.ended[run]:g} s; {self.advice[run]}")
         counted = len(self) > 1
         remarks = [each if counted else replace(each, runs=()) for each in self.remarks]
-        lines += said(remarks) if self.observed is not None else ["between samples: not watched"]
+        lines += lines_of(remarks) if self.observed is not None else ["between samples: not observed"]
         errors = self.tracking_error
         if errors is not None and np.isfinite(errors).any():
             most = int(np.nanargmax(errors))

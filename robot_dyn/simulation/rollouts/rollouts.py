@@ -1,4 +1,4 @@
-"""Rollouts: one setup from many starts, or with many values of its parameters, at once in machine code.
+"""Rollouts: one setup from many starts, or with many values of its parameters, side by side in machine code.
 
     q' = v,   v' = M⁻¹ (u + Σ τ − C v − N)   for 64 runs side by side, on all threads
 
@@ -65,7 +65,7 @@ def rollouts(
 
     Each run is that of `simulate`, to rounding. By an explicit, Gauss or Rosenbrock method of fixed step, such as
     `integrator="rk4"`, and by time stepping, the runs go side by side in machine code. Those that may pass a threshold
-    (a stop, an effort limit, a reversal of friction with states) are made again one after the other on each thread,
+    (a stop, an effort limit, a reversal of friction with states) are repeated one after the other on each thread,
     with steps that end there, in a few milliseconds a run. So are all runs by a method
     that chooses its steps, such as the default, and by one of fixed step where dry friction, rigid stops, payloads
     that come and go, or events end steps, or where samples lie between the ends of steps that may be cut.
@@ -80,8 +80,8 @@ def rollouts(
             payload that a link carries its mass in [kg], as {"payload_mass:tool0": …}, or its centre of mass,
             "payload_com:tool0", (B, 3); "armature", (B, n); "mass_scale", (B,); mass and inertia of a link as of
             `Robot.with_`, as {"link3.mass": …, "link3.inertia": …}, (B,) and (B, 3, 3). Models of controllers keep
-            theirs: they are "model.gravity", ….
-        record: Which of "q", "v", "u", "energy", "work" to keep at the samples; states of effects and controllers are
+            their own values: they are "model.gravity", ….
+        record: Which of "q", "v", "u", "energy", "work" to record at the samples; states of effects and controllers are
             those of `simulate`.
         cuts: False for runs in lock step whose steps do not end at thresholds, which the summary then names: faster,
             and wrong by as much as a step that passes one.
@@ -91,16 +91,16 @@ def rollouts(
             a record period of 0 it grows as tiles of 64 runs end.
         **options: As of `simulate`; all but `estimate_error` and `accuracy`, which have no effect here: no error is
             estimated (`simulate` one of the runs for that). The method "auto" is DOP853 here, and the engine "auto" is
-            machine code; "interpreted" makes the runs one after the other in Python.
+            machine code; "interpreted" executes the runs one after the other in Python.
 
-    Runs are watched at every step: `Rollouts.remarks` counts in how many of them actuation reverses at every tick, and
+    Runs are observed at every step: `Rollouts.remarks` counts in how many of them actuation reverses at every tick, and
     in how many a limit or a stop is reached or passed. In lock step the actuation of a continuous controller is watched
     at samples and at least 200 instants, or every step if there are fewer; whether it reverses at every step is not.
     Likewise where the reference does not begin as the joint does, or moves a joint that friction holds. The other
-    remarks of `simulate` are made on single runs alone.
+    remarks of `simulate` are on single runs alone.
 
     Returns:
-        The runs, in the order given. Ctrl-C ends them, and keeps what there is.
+        The runs, in the order given. Ctrl-C ends them; what was recorded is returned.
 
     Raises:
         QueryError: If an argument is not allowed or has the wrong shape, or the record would exceed `most_bytes`.
@@ -121,7 +121,7 @@ def rollouts(
     q, v, sweep = _starts(setup, q0, v0, params or {})
     why = _why_one_by_one(setup)
     if not truth("cuts", cuts) and why:
-        raise QueryError(f"cuts=False: {why}, and so runs are made one after the other; leave it out")
+        raise QueryError(f"cuts=False: {why}, and so the runs go one after the other; leave it out")
     batch = Batch(setup, q, v, sweep, recorded)
     passed = None if why else thresholds(setup, sweep, len(q))
     cut = passed is not None or setup.finds_events  # samples are then interpolated within steps, which lock step cannot
@@ -165,7 +165,7 @@ def _side_by_side(batch: Batch, passed: Thresholds | None, most: int) -> Tiles:
 
 
 def _recorded(record: Any) -> tuple[str, ...]:
-    """Names of what is to be kept."""
+    """Names of what is to be recorded."""
     instance("record", record, Iterable, f"give names of {', '.join(RECORDS)}")
     return tuple(choice("record", name, RECORDS) for name in record)
 

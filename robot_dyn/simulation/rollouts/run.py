@@ -80,10 +80,10 @@ def _follows(
         return nothing, nothing if u is None else u, np.full((len(t), len(equation.sources)), np.nan), energies
     if u is None and (equation.sampled or equation.states):
         u = np.full_like(q, np.nan)  # it depends on what was before
-    made = np.full((len(t), equation.size + q.shape[1] + 2), np.nan)
+    derived = np.full((len(t), equation.size + q.shape[1] + 2), np.nan)
     rest = np.zeros((len(t), equation.size - 2 * q.shape[1]))
     y = np.hstack([q, v, rest])
     for i in range(len(t)):
-        sample(equation, float(t[i]), y[i], None if u is None else u[i], made[i])
-    _, _, a, u, _, power, energy = columns(equation, t, y, made)
+        sample(equation, float(t[i]), y[i], None if u is None else u[i], derived[i])
+    _, _, a, u, _, power, energy = columns(equation, t, y, derived)
     return a, u, power, energy

@@ -92,5 +92,5 @@ def _numbers(compiled_equation: CompiledStateEquation, equation: StateEquation) 
     """The parameters of machine code for an equation of other numbers, which keeps those of the latest machine."""
     latest = equation.cache.get(_numbers)
     if latest is None or latest[0] is not compiled_equation:
-        latest = equation.cache[_numbers] = compiled_equation, compiled_equation.of(equation)
+        latest = equation.cache[_numbers] = compiled_equation, compiled_equation.parameters_of(equation)
     return latest[1]

@@ -24,7 +24,7 @@ _UNITS = ("rad", "m")
 
 
 def check_parts(setup: Setup) -> None:
-    """That the method can make the run, and that effects, controller and events have an answer at the start.
+    """That the method can integrate the setup, and that effects, controller and events have an answer at the start.
 
     Raises:
         QueryError: If the method cannot, or an event returns no number.
@@ -47,7 +47,7 @@ def check_parts(setup: Setup) -> None:
     nothing = np.zeros(setup.plant.dynamics.n)
     setup.plant.actuation(nothing)
     with suppress(OverflowedError):  # a start so far out is the outcome of a run
-        setup.plant.forward_dynamics(0.0, setup.q0, setup.v0, nothing)  # a singular M is told at once
+        setup.plant.forward_dynamics(0.0, setup.q0, setup.v0, nothing)  # a singular M is reported here
 
 
 def check_model(setup: Setup) -> None:
@@ -57,16 +57,16 @@ def check_model(setup: Setup) -> None:
         return
     for model in controller.models.values():
         pairs = tuple(zip(model.joint_names, plant.joint_names, strict=False))
-        if not any(own in plant.joint_names for own, _ in pairs):
+        if not any(of_model in plant.joint_names for of_model, _ in pairs):
             continue
-        for own, name in pairs:
-            if own != name:
+        for of_model, name in pairs:
+            if of_model != name:
                 raise QueryError(
-                    f"the controller's model has the joint {own!r} where the plant has {name!r}; lock the same"
+                    f"the controller's model has the joint {of_model!r} where the plant has {name!r}; lock the same"
                     " joints of both"
                 )
     if controller.task_frame is not None:
-        plant.placement(setup.q0, controller.task_frame)  # so that an unknown link is told now
+        plant.placement(setup.q0, controller.task_frame)  # so that an unknown link is reported here
 
 
 def check_stops(plant: Plant, q0: Array, of: str = "q0") -> None:
@@ -103,16 +103,13 @@ def _check_set_valued(setup: Setup) -> None:
 
 def _check_payloads(setup: Setup) -> None:
     """That the state is one of velocities where payloads come and go."""
-    if setup.plant.equation_of_motion.payloads and setup.integrator.canonical:
-        raise QueryError(
-            f"carried_payload: what is picked up or dropped changes momenta, which {setup.integrator.name}"
-            " integrates; take integrator='DOP853'"
-        )
-    if setup.plant.equation_of_motion.payloads and setup.integrator.nonsmooth:
-        raise QueryError(
-            f"carried_payload: steps of {setup.integrator.name} do not end where it comes and goes; take"
-            " integrator='DOP853'"
-        )
+    method: Any = setup.integrator
+    for fails, why in (
+        (method.canonical, f"what is picked up or dropped changes momenta, which {method.name} integrates"),
+        (method.nonsmooth, f"steps of {method.name} do not end where it comes and goes"),
+    ):
+        if setup.plant.equation_of_motion.payloads and fails:
+            raise QueryError(f"carried_payload: {why}; take integrator='DOP853'")
 
 
 def _check_drives(setup: Setup) -> None:
@@ -153,8 +150,8 @@ def _check_control(setup: Setup) -> None:
         returned(f"{controller.name}.torque", torque, n, error=ControlError)
         if controller.state_size:
             after = controller.next_state if controller.period_s else controller.state_rate
-            made = f"{controller.name}.{after.__name__}"
-            returned(made, call(after, *start), controller.state_size, "state", error=ControlError)
+            what = f"{controller.name}.{after.__name__}"
+            returned(what, call(after, *start), controller.state_size, "state", error=ControlError)
 
 
 def _check_events(setup: Setup) -> None:
