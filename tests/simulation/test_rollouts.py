@@ -436,7 +436,7 @@ def test_a_joint_that_starts_from_rest_has_not_reversed() -> None:
     push = rd.PD(rd.hold(Q + 3.0), [20.0, 0.8], 0.0)
     setup = rd.Setup(plant, Q, duration_s=0.2, controller=push, integrator="rk4", estimate_error=False)
     runs = rd.rollouts(setup, starts(3, 0.01))
-    assert "made again" not in runs.statistics.engine
+    assert "repeated" not in runs.statistics.engine
     np.testing.assert_allclose(runs.q[2], rd.simulate(setup, q0=starts(3, 0.01)[2]).q, rtol=0, atol=1e-13)
 
 

@@ -28,7 +28,7 @@ def test_a_run_that_fits_no_memory_is_refused_before_it_starts(duration, method,
     if isinstance(method, rd.Adaptive) and not options:
         return  # it keeps 1000 samples and chooses its steps
     if isinstance(method, rd.Adaptive) and "controller" not in options and duration > 1e13:
-        remedy = "floats tell"  # with no record either
+        remedy = "floats resolve"  # with no record either
     with pytest.raises(QueryError, match=f"{remedy}.*shorter duration_s"):
         rd.simulate(ARM, q0=[0.1, 0.2], duration_s=duration, integrator=method, **options)
 
