@@ -1,17 +1,42 @@
-"""Values that hold arrays, read-only in copies too; and values whose parts are computed when they are read."""
+"""Values that hold arrays, read-only in copies too; values computed when they are read; caches."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import fields
+import weakref
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
 from functools import cached_property
 from threading import RLock
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, final
 
 import numpy as np
 
 Result = TypeVar("Result")
 Late = TypeVar("Late", bound="Derived")
+
+_MOST = 64  # values that a cache by identity holds
+
+NOT_STORED: Mapping[str, bool] = {"stored": False}
+"""Metadata of a field that files leave out."""
+
+
+@final
+@dataclass(frozen=True)
+class Layout:
+    """How a file stores an array, stated in the type of its field: `Annotated[np.ndarray, Layout(("m", "n"))]`.
+
+    Attributes:
+        shape: A number; a letter, which stands for the same length in all arrays of a file; None for any length; or
+            several of these, each of which is allowed.
+        dtype: Of its entries.
+        finite: Whether nan and inf are refused unless the run diverged.
+        absent: Whether all of it may be nan: what a run of rollouts did not record.
+    """
+
+    shape: tuple[Any, ...]
+    dtype: str = "float64"
+    finite: bool = True
+    absent: bool = False
 
 
 class Value:
@@ -29,20 +54,60 @@ class Value:
                 array.setflags(write=False)
 
 
-class Keeping:
-    """An immutable value that keeps what functions compute from it."""
+class Caching:
+    """An immutable value that caches what functions compute from it."""
 
     @cached_property
-    def known(self) -> dict[Any, Any]:
+    def cache(self) -> dict[Any, Any]:
         """What was computed, by the functions."""
         return {}
 
 
-def kept(value: Keeping, compute: Callable[[Any], Result]) -> Result:
-    """What a function of the value alone returns; it is called once."""
-    if compute not in value.known:
-        value.known[compute] = compute(value)
-    return value.known[compute]
+def cached(
+    value: Caching, compute: Callable[..., Result], *more: Any, lasts: Callable[[Result], bool] | None = None
+) -> Result:
+    """Return what a function of the value computes, from the cache if it was called before.
+
+    Args:
+        value: The first argument of the function.
+        compute: Depends on the value alone, as far as its results are cached.
+        *more: Further arguments.
+        lasts: Whether a result is cached; all are by default.
+    """
+    if compute in value.cache:
+        return value.cache[compute]
+    result = compute(value, *more)
+    if lasts is None or lasts(result):
+        value.cache[compute] = result
+    return result
+
+
+@final
+class LRUByIdentity:
+    """A cache: values by hashable keys and by the identity of objects, for as long as these live; the latest ones."""
+
+    def __init__(self) -> None:
+        self._values: dict[tuple[Any, ...], tuple[list[weakref.ref[Any]], Any]] = {}
+        self._lock = RLock()  # runs may start in several threads
+
+    def get(self, objects: tuple[Any, ...], more: tuple[Any, ...], compute: Callable[[], Any]) -> Any:
+        """The value of objects and of further, hashable values; it must not hold on to the objects."""
+        key = (*map(id, objects), *more)
+        with self._lock:
+            entry = self._values.pop(key, None)
+            if entry is None or any(ref() is not each for ref, each in zip(entry[0], objects, strict=True)):
+                entry = [weakref.ref(each) for each in objects], compute()
+            self._values[key] = entry
+            while len(self._values) > _MOST or any(ref() is None for ref in next(iter(self._values.values()))[0]):
+                del self._values[next(iter(self._values))]
+            return entry[1]
+
+    def known(self, objects: tuple[Any, ...], more: tuple[Any, ...]) -> Any:
+        """The value that `get` would return without computing it, or None."""
+        with self._lock:
+            entry = self._values.get((*map(id, objects), *more))
+            same = entry is not None and all(ref() is each for ref, each in zip(entry[0], objects, strict=True))
+            return entry[1] if entry is not None and same else None
 
 
 class Derived(Value):
@@ -77,9 +142,11 @@ class Derived(Value):
 
 def derived(of: type[Late], source: Any, **known: Any) -> Late:
     """One whose fields are the attributes of the same name of a source, but for those that are given."""
-    made = object.__new__(of)
-    vars(made).update({name: _frozen(x) for name, x in known.items()}, _source=(source, RLock()))
-    return made
+    value = object.__new__(of)
+    vars(value).update({name: _frozen(x) for name, x in known.items()})
+    if len(known) < len(of.__dataclass_fields__):  # pyright: ignore[reportAttributeAccessIssue]
+        vars(value)["_source"] = source, RLock()
+    return value
 
 
 def copied(x: Any) -> Any:

@@ -21,6 +21,28 @@ _LEAST = 64  # units in the last place of an entry that a difference spans at le
 Rate = Callable[[Any, Array], Array]
 
 
+def rowwise(function: Callable[[Array], Any]) -> Rate:
+    """A function of one state (m,), which returns k numbers, as one of a time and states (…, m), which returns (…, k).
+
+    It does not depend on the time.
+    """
+
+    def f(t: Any, states: Array) -> Array:
+        results = [np.asarray(function(row), dtype=float) for row in states.reshape(-1, states.shape[-1])]
+        return np.array(results).reshape(*states.shape[:-1], -1)
+
+    return f
+
+
+def of_fourth_order(f: Callable[[Array], Array], x: Array, h: float) -> Array:
+    """∂f/∂x of a function of numbers (m,), (k, m), by central differences of steps h and 2 h: error O(h⁴) and u/h."""
+    slopes = []
+    for step in h * np.eye(len(x)):
+        near, far = f(x + step) - f(x - step), f(x + 2 * step) - f(x - 2 * step)
+        slopes.append((8 * near - far) / (12 * h))
+    return np.array(slopes).T
+
+
 def by_state(f: Rate, t: Any, y: Array, widths: Array | None = None) -> Array:
     """∂f/∂y_j for each j, (m, ..., m), from 2 m evaluations in one batch.
 

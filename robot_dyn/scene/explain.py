@@ -119,7 +119,7 @@ def _of_tick(control: Control, setup: Setup) -> Iterator[str]:
     inside = inside if control.slow is None else inside.fast
     try:
         counts = [
-            len(compiled_equation(StateEquation(setup.plant, each).in_a_mode, None).equations.programs["tick"])
+            len(compiled_equation(StateEquation(setup.plant, each).in_a_mode, None).functions.programs["tick"])
             for each in dict.fromkeys((controller, inside))
         ]
     except RobotDynError:  # the reason is told of the acceleration, or the run is interpreted

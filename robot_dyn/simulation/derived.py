@@ -9,23 +9,19 @@ from typing import final
 import numpy as np
 
 from robot_dyn.simulation.diagnostics.damped_task import damped
-from robot_dyn.simulation.diagnostics.divergence import explained
 from robot_dyn.simulation.diagnostics.imbalance import cause
 from robot_dyn.simulation.diagnostics.step_remarks import remarks
 from robot_dyn.simulation.diagnostics.stiffness import bounded_by_stability
-from robot_dyn.simulation.diagnostics.unstable_loop import unstable
-from robot_dyn.simulation.events.occurrence import Occurrence
+from robot_dyn.simulation.diagnostics.unstable_loop import explained, unstable
 from robot_dyn.simulation.observation.observation import Observed
 from robot_dyn.simulation.observation.observer import Observer
 from robot_dyn.simulation.observation.remarks import Remark
-from robot_dyn.simulation.results.acting import acting
+from robot_dyn.simulation.results.acting import acting, at_stop, frame_of, wrenches
 from robot_dyn.simulation.results.error_estimate import ErrorEstimate
 from robot_dyn.simulation.results.ledger import Ledger
-from robot_dyn.simulation.results.link_wrenches import at_stop, frame_of, wrenches
 from robot_dyn.simulation.results.provenance import edits_of_machine_code, origin
-from robot_dyn.simulation.results.samples import columns, ledger
-from robot_dyn.simulation.results.tracking import deviation_of
-from robot_dyn.simulation.results.trajectory import Accuracy, leak
+from robot_dyn.simulation.results.samples import Columns, columns, deviation_of, ledger
+from robot_dyn.simulation.results.trajectory import leak
 from robot_dyn.simulation.run.outcome import Ending, Outcome
 from robot_dyn.simulation.run.recording import Recording
 from robot_dyn.simulation.setup.setup import Setup
@@ -34,79 +30,67 @@ from robot_dyn.simulation.setup.setup import Setup
 @final
 @dataclass(frozen=True, eq=False)
 class Results:
-    """The attributes of a `Trajectory` but for its statistics, from the record of a run and values that do not change.
+    """The attributes of a `Trajectory` that are computed from the record of a run and values that do not change.
 
     Attributes:
-        setup: What ran, of the method that made the run.
-        record: What it left behind.
-        observer: What saw it, at its end.
+        setup: With the method of the run.
+        record: Of the run.
+        observer: Its observer, at its end.
         error: Its estimated error.
-        own: Texts of the user's.
+        texts: Copy of the texts of the setup.
         compiled: Whether machine code ran.
         before: Remarks on runs before it.
-        accuracy: None, as none was asked for.
     """
 
     setup: Setup
     record: Recording
     observer: Observer
     error: ErrorEstimate | None
-    own: dict[str, str]
+    texts: dict[str, str]
     compiled: bool
     before: tuple[Remark, ...]
-    accuracy: Accuracy | None = None
-
-    @property
-    def joint_names(self) -> tuple[str, ...]:
-        """Of the n joints."""
-        return self.setup.plant.dynamics.joint_names
-
-    @property
-    def t(self) -> np.ndarray:
-        """Times of the samples, (m,)."""
-        return self.record.t
 
     @cached_property
-    def _columns(self) -> tuple[np.ndarray, ...]:
+    def _columns(self) -> Columns:
         return columns(self.setup.equation, self.record.t, self.record.y, self.record.made)
 
     @property
     def q(self) -> np.ndarray:
         """Positions there, (m, n)."""
-        return self._columns[0]
+        return self._columns.q
 
     @property
     def v(self) -> np.ndarray:
         """Velocities there, (m, n)."""
-        return self._columns[1]
+        return self._columns.v
 
     @property
     def a(self) -> np.ndarray:
         """Accelerations there, (m, n)."""
-        return self._columns[2]
+        return self._columns.a
 
     @property
     def u(self) -> np.ndarray:
         """Actuation there, (m, n)."""
-        return self._columns[3]
+        return self._columns.u
 
     @property
     def power(self) -> dict[str, np.ndarray]:
         """Of each source, (m,), by name."""
-        return dict(zip(self.setup.equation.sources, self._columns[5].T, strict=True))
+        return dict(zip(self.setup.equation.sources, self._columns.power.T, strict=True))
 
     @cached_property
     def ledger(self) -> Ledger:
-        """Energy and work; with the cause where it does not close, unless undeclared parts are not to be asked."""
-        made, equation = ledger(self.setup.equation, self.record), self.setup.equation
-        asks = self.setup.estimate_error or not self.setup.undeclared  # the search calls these 4000 times
-        if asks and self.record.outcome.ending is not Ending.STOPPED and leak(made, self.error, self.q):
-            return replace(made, cause=cause(self.setup, equation, self.record, made.closes))
-        return made
+        """Energy and work; with the cause where it does not close, unless undeclared parts are not to be called."""
+        energy = ledger(self.setup.equation, self.record)
+        explains = self.setup.estimate_error or not self.setup.undeclared  # the search calls these 4000 times
+        if explains and self.record.outcome.ending is not Ending.STOPPED and leak(energy, self.error, self.q):
+            return replace(energy, cause=cause(self.setup, self.record, energy.closes))
+        return energy
 
     @cached_property
     def _tracking(self) -> tuple[np.ndarray | None, np.ndarray | None]:
-        return deviation_of(self.setup, self.t, self.q)
+        return deviation_of(self.setup, self.record.t, self.q)
 
     @property
     def desired(self) -> np.ndarray | None:
@@ -126,14 +110,14 @@ class Results:
 
     @property
     def about(self) -> dict[str, str]:
-        """Texts: where it comes from, what machine code changed, and the user's."""
+        """Texts: where it comes from, what machine code changed, and those of the setup."""
         edits = edits_of_machine_code(self.setup) if self.compiled else {}
-        return frame_of(self.setup) | origin(self.setup.plant.dynamics) | edits | self.own
+        return frame_of(self.setup) | origin(self.setup.plant.dynamics) | edits | self.texts
 
     @property
     def wrenches(self) -> dict[str, np.ndarray]:
         """External wrench by link."""
-        return wrenches(self.setup.plant, self.t, self.q)
+        return wrenches(self.setup.plant, self.record.t, self.q)
 
     @property
     def at_stop(self) -> np.ndarray | None:
@@ -154,21 +138,20 @@ class Results:
         """On what was observed, on runs before it, on its steps and on its control."""
         observed, samples = self._observed, np.hstack([self.q, self.v, self.u])
         return (
-            *remarks(self.setup, self.observer, observed, self.t, samples, self.power), *self.before,
-            *bounded_by_stability(self.setup, self.setup.equation, self.record), *self._of_control,
+            *remarks(self.setup, self.observer, observed, self.record.t, samples, self.power), *self.before,
+            *bounded_by_stability(self.setup, self.record), *self._of_control,
         )  # fmt: skip
 
     @cached_property
     def _of_control(self) -> tuple[Remark, ...]:
-        """What is said of the controller; one that was interrupted is not asked again."""
+        """Remarks on the controller; one that was interrupted is not called again."""
         if self.record.outcome.ending is Ending.STOPPED:
             return ()
-        equation, record = self.setup.equation, self.record
-        return (*unstable(self.setup, equation, record.t, record.y), *damped(self.setup, record))
+        return (*unstable(self.setup, self.record.t, self.record.y), *damped(self.setup, self.record))
 
     @property
     def acting(self) -> tuple[str, ...]:
-        """What acted, in words."""
+        """Names of what acted."""
         return acting(self.setup)
 
     @property
@@ -180,8 +163,3 @@ class Results:
     def effect_states(self) -> dict[str, np.ndarray]:
         """Of each effect with states at the samples."""
         return self.setup.equation.effect_states(self.record.y)
-
-    @property
-    def events(self) -> tuple[Occurrence, ...]:
-        """That occurred."""
-        return self.record.events

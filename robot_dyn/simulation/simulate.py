@@ -1,7 +1,7 @@
 """Simulate: a setup → a Trajectory with its energy ledger and an estimate of its error.
 
 The plant moves in continuous time. A controller with a period acts at its ticks, with a zero-order hold between them;
-steps end at ticks, at the switches of effects, and at the end. A run keeps all its samples, however it ends.
+steps end at ticks, at the switches of effects, and at the end. All samples of a run are returned, however it ends.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from robot_dyn.simulation.setup.options import Options, setup_of, starts, takes_
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.setup.size import check_record
 from robot_dyn.validate import function
-from robot_dyn.values import derived, kept
+from robot_dyn.values import cached, derived
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
@@ -51,39 +51,40 @@ def simulate(
     on_progress: Callable[[float], object] | None = None,
     **options: Unpack[Options],
 ) -> Trajectory:
-    """Run a plant or a robot from a start; or a setup, with the options that are given in place of its own.
+    """Run a plant or a robot from a start; or a setup, with the given options in place of those of the setup.
 
     Args:
         what: What to run.
         q0: Position at the start, (n,), in [rad] or [m] by joint; required unless `what` is a setup.
         v0: Velocity at the start, (n,), in [rad/s] or [m/s]; 0, or that of the setup, unless given.
         on_progress: Called with the time reached, in [s], at each step, and with that of the end at the steps of
-            companion runs; in machine code some ten times a second. What it raises ends the call.
+            companion runs; in machine code some ten times a second. An exception from it ends the call.
         **options: The other attributes of a `Setup`, with its defaults: duration_s, controller, integrator, step_s,
             record_period_s, estimate_error, about, engine, events and accuracy.
 
     Raises:
         QueryError: If the setup is not allowed, or its record would not fit into memory. Whatever happens later is
-            told by the trajectory's outcome.
-        AccuracyError: If the accuracy that is asked for cannot be had.
+            reported by the trajectory's outcome.
+        AccuracyError: If the requested accuracy cannot be reached.
     """
     function("on_progress", on_progress, "the time reached")
     setup = setup_of("simulate", what, {**starts(q0, v0), **options})
     if setup.accuracy is not None:
         pilot = replace(setup, accuracy=None)
         return run_to(pilot, setup.accuracy, lambda each: simulate(each, on_progress=on_progress))
-    check_record(setup, setup.equation)
+    check_record(setup)
     began = perf_counter()
     ran = _by_choice(setup, on_progress)
     finished, setup = perf_counter(), ran.setup
     record, error, spent, companions = _with_estimate(ran, on_progress)
     estimated = perf_counter()
-    results = Results(
-        setup, record, ran.observer, error, dict(setup.about), ran.compiled_equation is not None, ran.said
-    )
-    waits = setup.is_value and record.outcome.ending is Ending.FINISHED
-    names = () if waits else (each.name for each in fields(Trajectory) if each.name != "statistics")
-    read = {name: getattr(results, name) for name in names}
+    compiled = ran.compiled_equation is not None
+    results = Results(setup, record, ran.observer, error, dict(setup.about), compiled, ran.remarks)
+    known = {"joint_names": setup.plant.dynamics.joint_names, "t": record.t, "events": record.events, "error": error}
+    known["accuracy"] = None
+    if not (setup.is_value and record.outcome.ending is Ending.FINISHED):  # nothing may be read later
+        missing = (each.name for each in fields(Trajectory) if each.name not in (*known, "statistics"))
+        known |= {name: getattr(results, name) for name in missing}
     statistics = Statistics(
         EXPLICIT if setup.integrator.name == AUTO else setup.integrator.name,
         0.0 if setup.integrator.controls_error else record.outcome.t / max(record.steps, 1),
@@ -91,19 +92,19 @@ def simulate(
         ran.engine, ran.ready - began, perf_counter() - estimated, spent, companions,
         ", ".join(named(part) for part, _ in setup.undeclared),
     )  # fmt: skip
-    return derived(Trajectory, results, statistics=statistics) if waits else Trajectory(statistics=statistics, **read)
+    return derived(Trajectory, results, statistics=statistics, **known)
 
 
 class _Ran(NamedTuple):
-    """A run that was made.
+    """A run that has ended.
 
     Attributes:
-        setup: Of the method that made it.
+        setup: With the method of the run.
         compiled_equation, engine: As of `choose`.
-        observer: What saw it.
-        record: What it left behind.
+        observer: Its observer.
+        record: Its record.
         ready: When it began, on the clock, put later by what it compiled.
-        said: Remarks on a run before it.
+        remarks: On a run before it.
     """
 
     setup: Setup
@@ -112,7 +113,7 @@ class _Ran(NamedTuple):
     observer: Observer
     record: Recording
     ready: float
-    said: tuple[Remark, ...]
+    remarks: tuple[Remark, ...]
 
 
 def _by_choice(setup: Setup, on_progress: Callable[[float], object] | None) -> _Ran:
@@ -150,9 +151,9 @@ def _by_choice(setup: Setup, on_progress: Callable[[float], object] | None) -> _
         except TooLongError as found:
             seen = found.evaluations
         except StiffError as found:
-            setup, chooses, said = kept(setup, _stiff), False, (found.remark,)
+            setup, chooses, said = cached(setup, _stiff), False, (found.remark,)
         except AccumulationError as found:
-            setup, chooses, said = kept(setup, _nonsmooth), False, (*said, found.remark)
+            setup, chooses, said = cached(setup, _nonsmooth), False, (*said, found.remark)
 
 
 def _stiff(setup: Setup) -> Setup:
@@ -164,11 +165,8 @@ def _nonsmooth(setup: Setup) -> Setup:
 
 
 def _chosen(setup: Setup, seen: float) -> tuple[CompiledStateEquation | None, str]:
-    """As of `choose`, which chooses machine code once; that of events is compared with them before each run."""
-    found = setup.known.get(choose) or choose(setup, setup.equation, seen)
-    if found[0] is not None and not setup.events:
-        setup.known[choose] = found
-    return found
+    """As of `choose`; machine code is chosen once, but with events it is compared with them before each run."""
+    return cached(setup, choose, setup.equation, seen, lasts=lambda chosen: chosen[0] is not None and not setup.events)
 
 
 def _with_estimate(
@@ -192,7 +190,7 @@ def _with_estimate(
         return made
 
     try:
-        error = estimate(setup, setup.equation, record, companion)
+        error = estimate(setup, record, companion)
     except KeyboardInterrupt:
         error = no_estimate("it was interrupted")
         if record.outcome.ending is Ending.FINISHED:
@@ -202,7 +200,7 @@ def _with_estimate(
 
 
 def _spent_on_loops(compiled_equation: CompiledStateEquation | None) -> float:
-    """On the clock of what is compiled in the first call of a loop, which is no time of the run."""
+    """Time spent on compiling in the first call of a loop, which is not part of the run."""
     if compiled_equation is None:
         return 0.0
     from robot_dyn.codegen.loops.call import spent_on_loops

@@ -15,11 +15,12 @@ import robot_dyn as rd
 from benchmarks.measure import READY, Effort, arms, row, seconds, table
 from robot_dyn.codegen.trace.right_angles import completed
 from robot_dyn.integrate.methods import method
-from robot_dyn.simulation.compiled.build import compiled_equation, machine_of_constants
+from robot_dyn.simulation.compiled.build import compiled_equation, compiled_with_constants
 from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.events.payload_events import PayloadEvents
-from robot_dyn.simulation.rollouts.lock_step import LANES, Batch
+from robot_dyn.simulation.rollouts.batch import Batch
+from robot_dyn.simulation.rollouts.lock_step import LANES, Tiles
 from robot_dyn.simulation.run.fixed_step import FixedStep
 from robot_dyn.simulation.run.watch import Watch
 from robot_dyn.simulation.setup.size import MOST_BYTES
@@ -50,14 +51,14 @@ def parameters(effort: Effort) -> None:
         again = seconds(lambda: rd.simulate(other))
         equation, rk4 = StateEquation(setup.plant, setup.controller), setup.integrator
         made = {
-            "constants": machine_of_constants(equation, rk4),
+            "constants": compiled_with_constants(equation, rk4),
             "inputs": compiled_equation(equation, rk4),
         }
         lanes = {
-            "constants": machine_of_constants(equation, rk4, lanes=LANES),
-            "inputs": compiled_equation(equation, rk4, lanes=LANES, kept=()),
+            "constants": compiled_with_constants(equation, rk4, lanes=LANES),
+            "inputs": compiled_equation(equation, rk4, lanes=LANES, extras=()),
         }
-        counts = {kind: len(each.equations.programs["rate"]) for kind, each in made.items()}
+        counts = {kind: len(each.functions.programs["rate"]) for kind, each in made.items()}
         alone = _ratio({kind: _one(setup, each) for kind, each in made.items()}, effort)
         many = _ratio({kind: _many(setup, each) for kind, each in lanes.items()}, effort)
         ratio = counts["inputs"] / counts["constants"]
@@ -69,7 +70,7 @@ def parameters(effort: Effort) -> None:
 
 def _one(setup: rd.Setup, made: CompiledStateEquation) -> Any:
     def run() -> float:
-        functions, equation = (made.equations.functions, made.parameters), made.equation
+        functions, equation = (made.functions.addresses, made.parameters), made.equation
         watch, transfers = Watch(setup, equation), PayloadEvents(equation)
         advance = FixedStep(watch, transfers, lambda _: functions, Fraction(1), made.advance())
         return seconds(advance.record)

@@ -215,7 +215,7 @@ def test_two_periods_that_differ_in_their_ratio_share_no_machine_code() -> None:
 def test_a_loop_of_nothing_adds_no_instruction() -> None:
     """And a run without a controller, or with a bare one, has the instructions that it had."""
     counts = [
-        {name: len(each) for name, each in compiled_equation(StateEquation(PLANT, x), None).equations.programs.items()}
+        {name: len(each) for name, each in compiled_equation(StateEquation(PLANT, x), None).functions.programs.items()}
         for x in (PD, rd.Loop(PD), rd.Loop(PD, actuation_delay=0.5))
     ]
     assert counts[0] == counts[1]

@@ -11,8 +11,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.integrate.integrator import System
 from robot_dyn.simulation.compiled import build
-from robot_dyn.simulation.compiled.compiled_state_equation import MachineError
-from robot_dyn.simulation.compiled.jacobian_check import by_differences
+from robot_dyn.simulation.compiled.self_check import MachineError, check, jacobian_error
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.setup.segment_table import segment_table
 
@@ -78,16 +77,16 @@ def test_it_is_held_to_differences_of_the_interpreted_equation() -> None:
     made = setup()
     equation, p = equation_of(made), segment_table(made).parameters[0]
     J = exact_jacobian(made, 0.37, STATE)
-    assert by_differences(equation, 0.37, STATE, None, p, J) < 1
+    assert jacobian_error(equation, 0.37, STATE, None, p, J) < 1
     for column in (1, 3, 5, len(STATE)):
         wrong = J.copy()
         wrong[column, 2] += 1e-3 * max(1.0, np.abs(J[column]).max())
-        assert by_differences(equation, 0.37, STATE, None, p, wrong) > 1
+        assert jacobian_error(equation, 0.37, STATE, None, p, wrong) > 1
 
 
 def test_wrong_machine_code_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     made = build.compiled_equation(equation_of(setup()), None, jacobian=True)
-    wrong = replace(made, equations=replace(made.equations, checked={}))
+    wrong = replace(made, functions=replace(made.functions, checked={}))
     functions = made.in_python
 
     def jacobian(t: float, y: Any, p: Any, run_parameters: Any, out: np.ndarray) -> None:
@@ -96,14 +95,14 @@ def test_wrong_machine_code_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setitem(wrong.__dict__, "in_python", functions._replace(jacobian=jacobian))
     with pytest.raises(MachineError, match="Jacobian of planar_2r differs"):
-        wrong.check(setup())
+        check(wrong, setup())
 
 
 def test_it_is_made_only_for_methods_that_need_it() -> None:
     equation = equation_of(setup())
-    assert "jacobian" not in build.compiled_equation(equation, rd.method("rk4")).equations.programs
+    assert "jacobian" not in build.compiled_equation(equation, rd.method("rk4")).functions.programs
     assert build.compiled_equation(equation, None).in_python.jacobian == 0
-    assert "jacobian" in build.compiled_equation(equation, None, jacobian=True).equations.programs
+    assert "jacobian" in build.compiled_equation(equation, None, jacobian=True).functions.programs
 
 
 def test_runs_in_lock_step_have_each_their_own() -> None:
@@ -113,7 +112,7 @@ def test_runs_in_lock_step_have_each_their_own() -> None:
     rng = np.random.default_rng(3)
     damping = rng.uniform(0.1, 9.0, (lanes, 2))
     machine = build.compiled_equation(
-        equation_of(made), None, lanes=lanes, kept=(), swept=("viscous_friction.damping",), jacobian=True
+        equation_of(made), None, lanes=lanes, extras=(), swept=("viscous_friction.damping",), jacobian=True
     )
     m = machine.equation.size
     y, out = rng.normal(size=(m, lanes)), np.empty((m + 1, m, lanes))

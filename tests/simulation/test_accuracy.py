@@ -28,7 +28,7 @@ def test_the_error_is_at_most_what_is_asked(index: int) -> None:
     setup = replace(scene.setup, record_period_s=scene.setup.duration_s / 10)
     run = rd.simulate(setup, accuracy=asked)
     assert run.accuracy is not None
-    assert run.accuracy.asked == asked
+    assert run.accuracy.requested == asked
     assert run.accuracy.estimated <= asked
     assert np.abs(run.q - truth(setup, run.t)).max() <= asked
 
@@ -79,7 +79,7 @@ def test_a_tolerance_is_not_the_error() -> None:
     digits = np.log10(of[1e-7].estimated / of[1e-10].estimated)
     expected = of[1e-7].run * (of[1e-7].digit_more / of[1e-7].run) ** digits
     assert of[1e-10].run == pytest.approx(expected, rel=0.2)  # whole steps, and a first one that is chosen apart
-    assert f"accuracy: asked 1.0e-10, estimated {of[1e-10].estimated:.1e} at rtol" in runs[1e-10].summary
+    assert f"accuracy: requested 1.0e-10, estimated {of[1e-10].estimated:.1e} at rtol" in runs[1e-10].summary
 
 
 @pytest.mark.parametrize("index", [1, *long([36])])
@@ -132,7 +132,7 @@ def test_a_run_that_diverges_says_so() -> None:
         ({"accuracy": 0.0}, "accuracy must be positive"),
         ({"accuracy": "fine"}, "accuracy must be a"),
         ({"accuracy": {"deg": 1.0}}, "no unit 'deg'; give 'rad', 'm' or both"),
-        ({"accuracy": {"m": 1e-3}}, "says nothing of joints in rad"),
+        ({"accuracy": {"m": 1e-3}}, "none is given for joints in rad"),
         ({"accuracy": 1e-6, "integrator": "rk4"}, "chooses method and tolerance; leave out integrator"),
         ({"accuracy": 1e-6, "integrator": rd.Adaptive(rtol=1e-6)}, "leave out integrator"),
         ({"accuracy": 1e-6, "estimate_error": False}, "leave out estimate_error=False"),
@@ -148,15 +148,15 @@ def test_what_means_nothing_is_refused(options: dict[str, Any], message: str) ->
 def test_of_two_units_the_least_that_a_joint_has_holds() -> None:
     cart = rd.load("cart_pole")
     for given, expected in (({"rad": 1e-5, "m": 1e-7}, 1e-7), ({"rad": 1e-6, "m": 1e-3}, 1e-6)):
-        assert rd.simulate(cart, [0.1, 0.4], duration_s=0.2, accuracy=given).accuracy.asked == expected
-    assert rd.simulate(ARM, START, duration_s=0.2, accuracy={"rad": 1e-5, "m": 1e-9}).accuracy.asked == 1e-5
+        assert rd.simulate(cart, [0.1, 0.4], duration_s=0.2, accuracy=given).accuracy.requested == expected
+    assert rd.simulate(ARM, START, duration_s=0.2, accuracy={"rad": 1e-5, "m": 1e-9}).accuracy.requested == 1e-5
 
 
 def test_it_is_kept_with_the_run_and_asked_for_in_scenes(tmp_path: Path) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text('robot = "planar_2r"\nduration_s = 0.3\naccuracy = 1e-7\n[[effect]]\nkind = "gravity"\n')
     run = rd.simulate(rd.read_scene(scene))
-    assert run.accuracy.asked == 1e-7
+    assert run.accuracy.requested == 1e-7
     kept = rd.load_run(rd.save_run(run, tmp_path / "run.npz"))
     assert kept.accuracy == run.accuracy
     scene.write_text(scene.read_text().replace("accuracy", 'method = "rk4"\naccuracy'))

@@ -20,8 +20,8 @@ from robot_dyn.effects.effect import Active
 from robot_dyn.errors import QueryError
 from robot_dyn.integrate.methods import FIXED_STEP
 from robot_dyn.queries.dynamics import Dynamics
-from robot_dyn.simulation.compiled.compiled_state_equation import MachineError
 from robot_dyn.simulation.compiled.engine_choice import choose
+from robot_dyn.simulation.compiled.self_check import MachineError, check
 from robot_dyn.simulation.compiled.trace import SymbolicDynamics
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from tests.long import long
@@ -226,7 +226,7 @@ def test_auto_compiles_where_it_pays(monkeypatch: pytest.MonkeyPatch) -> None:
     """Evaluations times their cost: a second of motion is short, an hour is not."""
     monkeypatch.setenv("ROBOT_DYN_CACHE", "off")
     setup = rd.Setup(rd.Plant(ARM.with_(mass_scale=1.01)), Q, duration_s=1.0, integrator="rk4")
-    assert choose(setup, StateEquation(setup.plant, None))[1] == "interpreted (short: compiling does not pay)"
+    assert choose(setup, StateEquation(setup.plant, None))[1] == "interpreted (short: compiling is not worthwhile)"
     long = replace(setup, duration_s=3600.0)
     machine, words = choose(long, StateEquation(setup.plant, None))
     assert machine is not None and words == "compiled"
@@ -237,7 +237,7 @@ def test_auto_compiles_what_is_asked_for_again_as_often_as_compiling_takes(monke
     monkeypatch.setenv("ROBOT_DYN_CACHE", "off")
     setup = rd.Setup(rd.Plant(ARM.with_(mass_scale=1.02)), Q, duration_s=1.0, integrator="rk4")
     said = [choose(setup, StateEquation(setup.plant, None))[1] for _ in range(3)]
-    assert said[0] == "interpreted (short: compiling does not pay)"
+    assert said[0] == "interpreted (short: compiling is not worthwhile)"
     assert said[2] == "compiled"
 
 
@@ -258,7 +258,7 @@ def test_a_second_process_takes_the_machine_code_of_the_store_for_a_short_run(tm
         return said, np.array(q, float), float(error)
 
     before, made, after = run("auto"), run("compiled"), run("auto")
-    assert before[0] == "interpreted (short: compiling does not pay)"
+    assert before[0] == "interpreted (short: compiling is not worthwhile)"
     assert [made[0], after[0]] == ["compiled", "compiled"]
     assert np.array_equal(made[1], after[1])
     assert np.abs(before[1] - after[1]).max() <= before[2] + after[2]
@@ -270,15 +270,15 @@ def test_a_machine_that_disagrees_is_refused(monkeypatch) -> None:
 
     setup = rd.Setup(rd.Plant(ARM), Q)
     made = build.compiled_equation(StateEquation(setup.plant, None), rd.method("rk4"))
-    made.check(setup)
-    equations = replace(made.equations, checked={})
+    check(made, setup)
+    functions = replace(made.functions, checked={})
     other = replace(
-        made, equation=StateEquation(rd.Plant(ARM.with_(gravity=(0.0, 0.0, -9.80664))), None), equations=equations
+        made, equation=StateEquation(rd.Plant(ARM.with_(gravity=(0.0, 0.0, -9.80664))), None), functions=functions
     )
     with pytest.raises(
         MachineError, match=r"differs from the interpreted one by .* allowed: take engine='interpreted'"
     ):
-        other.check(setup)
+        check(other, setup)
 
 
 def test_interpreted_runs_import_no_compiler(tmp_path) -> None:

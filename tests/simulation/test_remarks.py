@@ -274,7 +274,7 @@ def test_remarks_are_said_wherever_a_run_is_shown(joint, tmp_path) -> None:
 
 def test_a_run_that_was_not_watched_says_so(joint, tmp_path) -> None:
     run = replace(rd.simulate(damped(joint, 0.5)), extremes=None, remarks=())
-    assert "not watched" in rd.load_run(rd.save_run(run, tmp_path / "run")).summary
+    assert "not observed" in rd.load_run(rd.save_run(run, tmp_path / "run")).summary
 
 
 def test_regularised_friction_that_creeps_is_named_with_its_speed(joint) -> None:

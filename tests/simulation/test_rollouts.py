@@ -426,7 +426,7 @@ def test_a_joint_strikes_its_stops_in_a_batch_as_it_does_alone() -> None:
     others = np.setdiff1d(np.arange(70), strikes)
     for x, y in zip(arrays(runs), arrays(uncut), strict=True):
         np.testing.assert_array_equal(x[others], y[others])
-    assert "2 of them made again with steps cut at thresholds" in runs.statistics.engine
+    assert "2 of them repeated with steps cut at thresholds" in runs.statistics.engine
     assert "cuts=False: no step ends at lower stop, upper stop" in uncut.summary and "cuts" not in runs.summary
 
 
@@ -436,7 +436,7 @@ def test_a_joint_that_starts_from_rest_has_not_reversed() -> None:
     push = rd.PD(rd.hold(Q + 3.0), [20.0, 0.8], 0.0)
     setup = rd.Setup(plant, Q, duration_s=0.2, controller=push, integrator="rk4", estimate_error=False)
     runs = rd.rollouts(setup, starts(3, 0.01))
-    assert "made again" not in runs.statistics.engine
+    assert "repeated" not in runs.statistics.engine
     np.testing.assert_allclose(runs.q[2], rd.simulate(setup, q0=starts(3, 0.01)[2]).q, rtol=0, atol=1e-13)
 
 

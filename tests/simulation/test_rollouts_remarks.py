@@ -111,7 +111,7 @@ def test_a_batch_tells_of_each_run_what_simulate_does(batch) -> None:
         assert f"{remark.text} (run {remark.runs[0]}; {len(of)} of {B} runs)" in "; ".join(lines([remark]))
     assert all(line in runs.summary for line in lines(runs.remarks))
     assert f"rd.simulate(runs.setup_of({runs.worst})) repeats it" in runs.summary
-    assert "not watched" not in runs.summary
+    assert "not observed" not in runs.summary
 
 
 @pytest.mark.parametrize("sampled", [False, True], ids=["continuous", "sampled with a lag"])

@@ -6,7 +6,6 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.errors import QueryError
-from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.setup.size import check_record, samples, segments, steps
 
 ARM = rd.Plant(rd.load("planar_2r"), [rd.ExternalWrench("tip", [1.0] * 6, start_s=0.3, end_s=0.7)])
@@ -29,7 +28,7 @@ def test_a_run_that_fits_no_memory_is_refused_before_it_starts(duration, method,
     if isinstance(method, rd.Adaptive) and not options:
         return  # it keeps 1000 samples and chooses its steps
     if isinstance(method, rd.Adaptive) and "controller" not in options and duration > 1e13:
-        remedy = "floats tell"  # with no record either
+        remedy = "floats resolve"  # with no record either
     with pytest.raises(QueryError, match=f"{remedy}.*shorter duration_s"):
         rd.simulate(ARM, q0=[0.1, 0.2], duration_s=duration, integrator=method, **options)
 
@@ -38,7 +37,7 @@ def test_a_run_that_fits_no_memory_is_refused_before_it_starts(duration, method,
 def test_a_run_that_ends_at_a_time_that_floats_do_not_tell_is_refused(duration: float) -> None:
     """A method that chooses its steps is bounded by no number of them; from 2^43 s floats lie 2 ms apart and more."""
     for run in (rd.simulate, rd.rollouts, rd.work_precision):
-        with pytest.raises(QueryError, match=r"ends at a time that floats tell to .* take a shorter duration_s, "):
+        with pytest.raises(QueryError, match=r"ends at a time that floats resolve to .* take a shorter duration_s, "):
             run(ARM, [0.1, 0.2], duration_s=duration)
 
 
@@ -70,4 +69,4 @@ def test_what_fits_is_not_refused() -> None:
     """An hour of 1 kHz control with samples of 10 ms: 3.6e6 ticks, 3.6e5 samples."""
     law = rd.PD(rd.hold([0.1, 0.2]), 3.0, 1.0, period_s=0.001)
     setup = rd.Setup(ARM, [0.1, 0.2], duration_s=3600.0, controller=law, record_period_s=0.01)
-    check_record(setup, StateEquation(setup.plant, setup.controller))
+    check_record(setup)

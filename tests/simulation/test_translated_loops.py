@@ -192,7 +192,7 @@ def test_lanes_in_lock_step_give_the_same_bits(name: str, controller: rd.Control
     equation = StateEquation(made.plant, made.controller, of.canonical)
     equation = equation if of.nonsmooth else equation.in_a_mode
     code = compiled_equation(
-        equation, of, lanes=W, kept=("u", "energy"), jacobian=of.needs_jacobian, nonsmooth=of.nonsmooth
+        equation, of, lanes=W, extras=("u", "energy"), jacobian=of.needs_jacobian, nonsmooth=of.nonsmooth
     )
     n, m, plan = 2, equation.size, segment_table(made)
     rng = np.random.default_rng(3)
@@ -215,7 +215,7 @@ def test_lanes_in_lock_step_give_the_same_bits(name: str, controller: rd.Control
         now, clock = np.zeros(len(Now), np.int64), np.array([0.0, 0.02, 1e-12])
         now[Now.BUDGET] = 10**6
         advance: Any = time_loop(stepper.step) if interpreted else code.advance()
-        functions = code.in_python if interpreted else code.equations.functions
+        functions = code.in_python if interpreted else code.functions.addresses
         with np.errstate(all="ignore"):
             ended = advance(
                 functions, plan, runs, records, rules, stepper.coefficients, stepper.work, now, clock,

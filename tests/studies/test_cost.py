@@ -18,7 +18,7 @@ from robot_dyn.codegen.trace.from_casadi import program_of
 from robot_dyn.errors import QueryError, RobotDynError
 from robot_dyn.result import json_text
 from robot_dyn.scene.starters import starter
-from robot_dyn.simulation.compiled.build import compiled_equation, machine_of_constants
+from robot_dyn.simulation.compiled.build import compiled_equation, compiled_with_constants
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.studies.budget import Budget
 from robot_dyn.studies.costs import step_cost
@@ -38,7 +38,7 @@ def setup(*effects: Any, **options: Any) -> rd.Setup:
 def compiled(of: rd.Setup) -> dict[str, int]:
     """Instructions of the programs that `simulate` runs, by name."""
     made = compiled_equation(StateEquation(of.plant, of.controller), rd.method("rk4"))
-    return {name: len(program) for name, program in made.equations.programs.items()}
+    return {name: len(program) for name, program in made.functions.programs.items()}
 
 
 CONTROLLERS = {
@@ -128,7 +128,7 @@ def test_machine_code_of_constants_has_no_inputs_and_the_numbers_of_its_robot() 
     for gravity in ((0.0, 0.0, -9.81), (0.0, 0.0, -3.7)):
         plant = rd.Plant(ARM.with_(gravity=gravity), [FRICTION])
         equation = StateEquation(plant, None)
-        made = machine_of_constants(equation, rd.method("rk4"))
+        made = compiled_with_constants(equation, rd.method("rk4"))
         assert made.parameters.size == 0 < sum(each.size for each in parameters(ARM, plant.effects, None))
         y, out = np.array([*Q, *V, 0.0, 0.0]), np.empty((8, 1))
         made.in_python.rate(0.0, y, np.array([0.0, 1.0]), np.zeros((1, 1)), out)

@@ -1,6 +1,6 @@
-"""The making of machines: state equations traced and compiled, once for all runs of one structure.
+"""Building of machine code: state equations are traced and compiled, once for all runs of one structure.
 
-machine(equation, method) → Machine
+compiled_equation(equation, method) → CompiledStateEquation
 """
 
 from __future__ import annotations
@@ -8,23 +8,19 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from robot_dyn.arithmetic import FLOAT64
-from robot_dyn.codegen.loops.call import MachineFunction
 from robot_dyn.codegen.loops.source import SubsetError
 from robot_dyn.codegen.parameters import Parameter, parameters
 from robot_dyn.codegen.program import Programs
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import TraceError
-from robot_dyn.integrate import hermite
-from robot_dyn.integrate.adaptive import STEPPERS
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
-from robot_dyn.simulation.compiled.functions import Equations
-from robot_dyn.simulation.compiled.lru_by_identity import LRUByIdentity
+from robot_dyn.simulation.compiled.functions import CompiledFunctions
+from robot_dyn.simulation.compiled.loop import loop_for
 from robot_dyn.simulation.compiled.programs import (
     Identified,
     Traces,
-    identified,
+    identify,
     programs_of,
     robot_to_compile,
     stored,
@@ -32,14 +28,11 @@ from robot_dyn.simulation.compiled.programs import (
 )
 from robot_dyn.simulation.compiled.structure import changeable
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.events.detection import detecting
-from robot_dyn.simulation.events.mode_change import end_mode, without_modes
-from robot_dyn.simulation.run.event_loop import event_loop
-from robot_dyn.simulation.run.time_loop import time_loop
+from robot_dyn.values import LRUByIdentity
 
 _MOST_INSTRUCTIONS = 100_000  # some ten seconds of compiling
 
-_equations = LRUByIdentity()
+_functions = LRUByIdentity()
 
 
 def compiled_equation(
@@ -47,20 +40,20 @@ def compiled_equation(
     method: Integrator | None,
     *,
     lanes: int = 1,
-    kept: tuple[str, ...] | None = None,
+    extras: tuple[str, ...] | None = None,
     swept: tuple[str, ...] = (),
     jacobian: bool = False,
     cuts: bool = False,
     detects: bool = False,
     nonsmooth: bool = False,
 ) -> CompiledStateEquation:
-    """The machine of a state equation, from the latest ones if it is among them; not compiled yet.
+    """Return a state equation as machine code, from the cache if it is there; not compiled yet.
 
     Args:
         equation: What to compile.
         method: One whose steps are machine code too; None for the state equation alone.
         lanes: Runs in lock step.
-        kept: As of `trace`.
+        extras: As of `trace`.
         swept: Names of the parameters that differ from run to run.
         jacobian: Whether the method needs that of the rate.
         cuts: Whether steps are chosen, or cut at events.
@@ -70,86 +63,88 @@ def compiled_equation(
     Raises:
         TraceError: If a part of the equation cannot be compiled; names it, with the remedy.
     """
-    made, what = identified(equation, swept), Traces(kept, jacobian, nonsmooth)
-    return _with_loop(made, _equations_of(made, what, lanes, swept), method, lanes, cuts, detects, swept)
+    identified, what = identify(equation, swept), Traces(extras, jacobian, nonsmooth)
+    return _with_loop(identified, _functions_of(identified, what, lanes, swept), method, lanes, cuts, detects, swept)
 
 
 def existing(
-    made: Identified, what: Traces, method: Integrator | None, cuts: bool, programs: Programs | None = None
+    identified: Identified, what: Traces, method: Integrator | None, cuts: bool, programs: Programs | None = None
 ) -> CompiledStateEquation | None:
-    """The machine of a single run if its code is in this process or in the store; or None.
+    """Return the machine code of a single run if it is in this process or in the store; or None.
 
     Args:
-        made: Its state equation.
+        identified: Its state equation.
         what: What is traced of it.
         method: As of `compiled_equation`.
         cuts: As of `compiled_equation`.
         programs: Those in the store, if they are known.
     """
-    if _equations.known(made.objects, (made.described, 1, (), what)) is None:
-        programs = programs or stored(made, what)
+    if _functions.known(identified.objects, (identified.described, 1, (), what)) is None:
+        programs = programs or stored(identified, what)
         if programs is None:
             return None
-    found = _with_loop(made, _equations_of(made, what, programs=programs), method, cuts=cuts)
-    return found if found.is_kept() else None
+    compiled = _with_loop(identified, _functions_of(identified, what, programs=programs), method, cuts=cuts)
+    return compiled if compiled.is_kept() else None
 
 
-def _equations_of(
-    made: Identified, what: Traces, lanes: int = 1, swept: tuple[str, ...] = (), programs: Programs | None = None
-) -> Equations:
-    """The equations of a structure, from the latest ones if they are among them."""
+def _functions_of(
+    identified: Identified, what: Traces, lanes: int = 1, swept: tuple[str, ...] = (), programs: Programs | None = None
+) -> CompiledFunctions:
+    """The functions of a structure, cached."""
+    equation, known = identified.equation, identified.known
 
-    def make() -> Equations:
-        shared, name = _shared(made.equation, made.known, lanes, swept), made.equation.plant.dynamics.name  # pyright: ignore
-        return Equations(programs or programs_of(made, what), lanes, name, shared, changeable(made.equation))
+    def compute() -> CompiledFunctions:
+        shared, name = _shared(equation, known, lanes, swept), equation.plant.dynamics.name  # pyright: ignore
+        return CompiledFunctions(programs or programs_of(identified, what), lanes, name, shared, changeable(equation))
 
-    names = tuple(name for name in dict.fromkeys(each.name for each in made.known) if name in swept)
-    equations = _equations.get(made.objects, (made.described, lanes, names, what), make)
-    if equations.instructions > _MOST_INSTRUCTIONS:
+    names = tuple(name for name in dict.fromkeys(each.name for each in known) if name in swept)
+    functions = _functions.get(identified.objects, (identified.described, lanes, names, what), compute)
+    if (count := functions.programs.instructions) > _MOST_INSTRUCTIONS:
         raise TraceError(
-            f"the run takes {equations.instructions} instructions, more than the {_MOST_INSTRUCTIONS} worth compiling;"
+            f"the run takes {count} instructions, more than the {_MOST_INSTRUCTIONS} worth compiling;"
             " simulate it with engine='interpreted'"
         )
-    return equations
+    return functions
 
 
 def _with_loop(
-    made: Identified, equations: Equations, method: Any, lanes: int = 1, cuts: bool = False, detects: bool = False,
-    swept: tuple[str, ...] = (),
+    identified: Identified, functions: CompiledFunctions, method: Any, lanes: int = 1, cuts: bool = False,
+    detects: bool = False, swept: tuple[str, ...] = (),
 ) -> CompiledStateEquation:  # fmt: skip
-    """The machine of these equations with the loop of a method; without one where its step cannot be machine code."""
-    found = None if method is None else _loop(method, made.equation, cuts, lanes, detects)
-    if isinstance(found, SubsetError):
-        return CompiledStateEquation(made.equation, equations, made.known, None, swept, str(found))
-    return CompiledStateEquation(made.equation, equations, made.known, found, swept)
+    """These functions with the loop of a method; without one where its step cannot be machine code."""
+    loop = None if method is None else loop_for(method, identified.equation, cuts, lanes, detects)
+    refused = str(loop) if isinstance(loop, SubsetError) else ""
+    loop = None if isinstance(loop, SubsetError) else loop
+    return CompiledStateEquation(identified.equation, functions, identified.known, loop, swept, refused)
 
 
-def with_numbers(made: CompiledStateEquation, equation: StateEquation) -> CompiledStateEquation:
-    """The machine of an equation that differs from the compiled one in parameters alone, swept ones among them."""
+def with_numbers(compiled: CompiledStateEquation, equation: StateEquation) -> CompiledStateEquation:
+    """The machine code for an equation that differs from the compiled one in parameters alone, swept ones included."""
     robot, plant = robot_to_compile(equation.plant.dynamics), equation.plant
-    own = equation if robot is plant.dynamics else replace(equation, plant=Plant(robot, plant.effects))
-    return replace(made, equation=own, known=parameters(robot, plant.effects, equation.controller, made.swept))
+    compiled_form = equation if robot is plant.dynamics else replace(equation, plant=Plant(robot, plant.effects))
+    known = parameters(robot, plant.effects, equation.controller, compiled.swept)
+    return replace(compiled, equation=compiled_form, known=known)
 
 
-def machine_of_constants(equation: StateEquation, method: Integrator, *, lanes: int = 1) -> CompiledStateEquation:
-    """The machine of a state equation whose numbers are constants of the code: none of them can be changed.
+def compiled_with_constants(equation: StateEquation, method: Integrator, *, lanes: int = 1) -> CompiledStateEquation:
+    """Return a state equation as machine code whose numbers are constants: none of them can be changed.
 
     Args:
         equation: As of `compiled_equation`.
         method: One whose steps are machine code too.
-        lanes: Runs in lock step, of which no sample is kept.
+        lanes: Runs in lock step, of which no sample is recorded.
 
     Raises:
         TraceError: As of `compiled_equation`.
     """
     robot = robot_to_compile(equation.plant.dynamics)
-    own = replace(equation, plant=Plant(robot, equation.plant.effects))
+    equation = replace(equation, plant=Plant(robot, equation.plant.effects))
     what = Traces(None if lanes == 1 else (), method.needs_jacobian, method.nonsmooth)
-    programs = traced(own, (), what, constants=True)
-    made = _loop(method, own, False, lanes)
-    if isinstance(made, SubsetError):
-        raise made
-    return CompiledStateEquation(own, Equations(programs, lanes, robot.name), (), made)
+    loop = loop_for(method, equation, False, lanes)
+    if isinstance(loop, SubsetError):
+        raise loop
+    programs = traced(equation, (), what, constants=True)
+    return CompiledStateEquation(equation, CompiledFunctions(programs, lanes, robot.name), (), loop)
 
 
 def _shared(
@@ -163,35 +158,3 @@ def _shared(
     first = (held + len(once) - sum(once)) * lanes
     numbers = (held + k for k, shared in enumerate(once) if shared)
     return {k: first + i for i, k in enumerate(numbers)}
-
-
-def _loop(
-    method: Any, equation: StateEquation, cuts: bool, lanes: int, detects: bool = False
-) -> MachineFunction | SubsetError:
-    """The loop of a method; or why its step, written elsewhere, cannot be machine code. Runs in lock step need it."""
-    from robot_dyn.simulation.compiled.loop import refusal
-
-    if not method.controls_error and (refused := refusal(method, equation, lanes)) is not None:
-        if lanes > 1:
-            raise refused
-        return refused
-    return loop_of(method, cuts, detects, bool(equation.impulses))
-
-
-def loop_of(method: Any, cuts: bool, detects: bool = False, holds: bool = False) -> MachineFunction:
-    """The time loop of a method whose steps are plain; its `is_kept` tells whether it costs milliseconds or a second.
-
-    Args:
-        method: An `Integrator` or `Adaptive`.
-        cuts: Whether steps are chosen, or cut at events.
-        detects: As of `compiled_equation`.
-        holds: Whether something may hold joints.
-    """
-    from robot_dyn.simulation.compiled.loop import loop
-
-    if not cuts:
-        step = method.stepper(FLOAT64, 1, 0, 1).step
-        return loop(time_loop, detecting(step) if detects else step, works=method.nonsmooth)
-    made = STEPPERS[method.method](1, 1, 1) if method.controls_error else hermite.stepper(method, 1, 0, 1, None)
-    of_modes = end_mode if holds else without_modes
-    return loop(event_loop, made.begin, made.step, made.error, made.accept, made.dense, of_modes)

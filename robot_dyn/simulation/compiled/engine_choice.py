@@ -1,4 +1,4 @@
-"""The choice of the engine that runs a setup: machine code, or Python where compiling does not pay or cannot be.
+"""The choice of the engine that runs a setup: machine code, or Python where compiling is not worthwhile or impossible.
 
 It is made by a count, about how often the equation of motion is evaluated: the same for a setup on every machine.
 Machine code that this process already has, or the store, is used in any case.
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from robot_dyn.codegen.waiting import told
 from robot_dyn.errors import RobotDynError
-from robot_dyn.simulation.compiled.programs import Identified, Traces, identified, interpreted, stored
+from robot_dyn.simulation.compiled.programs import Identified, Traces, identify, interpreted, stored
 from robot_dyn.simulation.dynamics.declarations import named, undeclared
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.setup.setup import Setup
@@ -30,12 +30,12 @@ _PER_SECOND, _PER_SEGMENT = 1000, 17  # evaluations of an adaptive method: for e
 
 
 def choose(setup: Setup, equation: StateEquation, seen: float = 0) -> tuple[CompiledStateEquation | None, str]:
-    """The machine that runs a setup, or None for the interpreted engine; and words for the summary.
+    """Return the machine code that runs a setup, None for the interpreted engine, and a text for the summary.
 
     Args:
         setup: What to run.
         equation: Its state equation.
-        seen: Evaluations that it is known to take at least, without its companions.
+        seen: A lower bound of its evaluations, without its companions.
 
     Raises:
         TraceError: If engine is "compiled" and a part cannot be; names it.
@@ -43,24 +43,24 @@ def choose(setup: Setup, equation: StateEquation, seen: float = 0) -> tuple[Comp
     """
     if setup.engine == "interpreted":
         return None, _interpreted(setup)
-    asked = setup.engine == "compiled"
-    if not asked and (parts := undeclared(setup.plant, setup.controller)):  # they may do what a trace would lose
+    required = setup.engine == "compiled"
+    if not required and (parts := undeclared(setup.plant, setup.controller)):  # they may do what a trace would lose
         return None, _interpreted(setup, " ".join((named(parts[0][0]), parts[0][1])))
     try:
-        made, what = identified(_code(setup, equation)), _traces(setup)
-        found = _existing(setup, made, what)
-        if found is None and not asked and not _is_worthwhile(setup, made, what, seen):
-            return None, _interpreted(setup, "short: compiling does not pay")
+        identified, what = identify(_code(setup, equation)), _traces(setup)
+        found = _existing(setup, identified, what)
+        if found is None and not required and not _is_worthwhile(setup, identified, what, seen):
+            return None, _interpreted(setup, "short: compiling is not worthwhile")
         compiled_equation = _checked(setup, equation, found)
         return compiled_equation, _label(compiled_equation)
     except (ImportError, RobotDynError) as error:
-        if asked:
+        if required:
             raise
         return None, _interpreted(setup, str(error))
 
 
 def most_interpreted(setup: Setup, equation: StateEquation, compiled_equation: CompiledStateEquation | None) -> float:
-    """Evaluations after which a run is begun again in machine code: a count that was guessed too low."""
+    """Evaluations after which a run starts again in machine code: a count that was guessed too low."""
     guessed = setup.engine == "auto" and compiled_equation is None and setup.integrator.controls_error
     if not guessed or undeclared(setup.plant, setup.controller):  # what is not compiled would never end
         return inf
@@ -68,17 +68,19 @@ def most_interpreted(setup: Setup, equation: StateEquation, compiled_equation: C
 
 
 def _checked(setup: Setup, equation: StateEquation, found: CompiledStateEquation | None) -> CompiledStateEquation:
-    """The machine that was found, or another, once it has been compared."""
+    """The machine code that exists, or new code, after its self-check."""
+    from robot_dyn.simulation.compiled.self_check import check
+
     if found is not None:
-        found.check(setup)
+        check(found, setup)
         return found
     with told("compiling the equations of this run, once for its structure"):
-        made = machine_of(setup, equation)
-        made.check(setup)
-    return made
+        compiled = compiled_for(setup, equation)
+        check(compiled, setup)
+    return compiled
 
 
-def machine_of(setup: Setup, equation: StateEquation, swept: tuple[str, ...] = ()) -> CompiledStateEquation:
+def compiled_for(setup: Setup, equation: StateEquation, swept: tuple[str, ...] = ()) -> CompiledStateEquation:
     """The machine code of a run by itself, not checked yet; `swept` as of `compiled_equation`.
 
     Raises:
@@ -92,21 +94,21 @@ def machine_of(setup: Setup, equation: StateEquation, swept: tuple[str, ...] = (
     )
 
 
-def _existing(setup: Setup, made: Identified, what: Traces) -> CompiledStateEquation | None:
-    """The machine code that this process has, or the store."""
+def _existing(setup: Setup, identified: Identified, what: Traces) -> CompiledStateEquation | None:
+    """The machine code in this process or in the store; None if there is none."""
     programs = None
-    if "robot_dyn.simulation.compiled.build" not in sys.modules:  # to import it takes ten times as long as to ask
-        programs = stored(made, what)
+    if "robot_dyn.simulation.compiled.build" not in sys.modules:  # to import it takes ten times as long as the look-up
+        programs = stored(identified, what)
         if programs is None:
             return None
     from robot_dyn.simulation.compiled.build import existing
 
-    return existing(made, what, _plain(setup), setup.finds_events, programs)
+    return existing(identified, what, _plain(setup), setup.finds_events, programs)
 
 
-def _is_worthwhile(setup: Setup, made: Identified, what: Traces, seen: float) -> bool:
-    """Whether compiling takes less than this run and those of its structure that were interpreted before it."""
-    before, size = interpreted(made, what), made.equation.size
+def _is_worthwhile(setup: Setup, identified: Identified, what: Traces, seen: float) -> bool:
+    """Whether compiling takes less time than this run and those of its structure that were interpreted before it."""
+    before, size = interpreted(identified, what), identified.equation.size
     count = before[0] + max(seen * _in_all(setup, size), _evaluations(setup, size))
     if count >= _COMPILED or (count >= _WITHOUT_LOOP and _has_loop(setup)):
         return True
@@ -116,7 +118,7 @@ def _is_worthwhile(setup: Setup, made: Identified, what: Traces, seen: float) ->
 
 def _has_loop(setup: Setup) -> bool:
     """Whether the time loop is in the store."""
-    from robot_dyn.simulation.compiled.build import loop_of
+    from robot_dyn.simulation.compiled.loop import loop_of
 
     method = _plain(setup)
     return (
@@ -142,8 +144,8 @@ def _plain(setup: Setup) -> Any:
 
 
 def _interpreted(setup: Setup, why: str = "") -> str:
-    words = [why] * bool(why) + ["Jacobian by differences"] * setup.integrator.needs_jacobian
-    return f"interpreted ({'; '.join(words)})" if words else "interpreted"
+    reasons = [why] * bool(why) + ["Jacobian by differences"] * setup.integrator.needs_jacobian
+    return f"interpreted ({'; '.join(reasons)})" if reasons else "interpreted"
 
 
 def _label(compiled_equation: CompiledStateEquation) -> str:
@@ -157,10 +159,10 @@ def _evaluations(setup: Setup, size: int) -> float:
     """About how many evaluations of an equation of motion of that size a run takes, with its companions."""
     method: Any = setup.integrator
     if method.controls_error:
-        own = max(_PER_SECOND * setup.duration_s, _PER_SEGMENT * segments(setup))
+        of_run = max(_PER_SECOND * setup.duration_s, _PER_SEGMENT * segments(setup))
     else:
-        own = setup.steps * (method.evaluations_per_step or _GUESSED)
-    return own * _in_all(setup, size)
+        of_run = setup.steps * (method.evaluations_per_step or _GUESSED)
+    return of_run * _in_all(setup, size)
 
 
 def _in_all(setup: Setup, size: int) -> float:

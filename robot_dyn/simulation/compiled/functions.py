@@ -5,28 +5,36 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, final
+from typing import Any, NamedTuple, final
+
+import numpy as np
 
 from robot_dyn.codegen.llvm import machine_code
 from robot_dyn.codegen.program import Programs
 from robot_dyn.codegen.store.cache import default_store
 from robot_dyn.codegen.store.identity import digest, sources_of_the_writer
 from robot_dyn.convex import PASSES
-from robot_dyn.simulation.compiled.checked_states import States
 from robot_dyn.simulation.dynamics.loop_state import Functions
 
 STEP = "problem", "newton", "behind"  # programs of one function; the last is one by itself, too
 
 
+class States(NamedTuple):
+    """Times (k,), in [s], and states (k, m)."""
+
+    t: np.ndarray
+    y: np.ndarray
+
+
 @final
 @dataclass(frozen=True, eq=False)
-class Equations:
+class CompiledFunctions:
     """The functions of a state equation, as programs and machine code.
 
     Attributes:
         programs: rate, energy and sample, tick where there is one, and jacobian where a method needs it.
         runs: W.
-        name: What moves, for people.
+        name: Of what moves, for messages.
         shared: As of `write_function`.
         changeable: Names of the parts whose code may be another at the next run, or do what a trace does not see.
         checked: States at which they were compared with the interpreted equation, by the loops that they ran in.
@@ -39,11 +47,6 @@ class Equations:
     changeable: tuple[str, ...] = ()
     checked: dict[Any, States] = field(default_factory=dict, repr=False)
 
-    @property
-    def instructions(self) -> int:
-        """Operations in all."""
-        return self.programs.instructions
-
     @cached_property
     def _key(self) -> str:
         return digest([sources_of_the_writer(), str(self.runs), str(sorted(self.shared.items())), str(self.programs)])
@@ -54,8 +57,8 @@ class Equations:
         return store is not None and store.load(self._key) is not None
 
     @cached_property
-    def functions(self) -> Functions:
-        """The addresses; compiled if they are not in the store."""
+    def addresses(self) -> Functions:
+        """The addresses of the functions, which are compiled unless they are in the store."""
 
         def write(module: Any, prefix: str) -> None:
             from robot_dyn.codegen.llvm.lock_step import write_function, write_step
@@ -71,5 +74,5 @@ class Equations:
         written = {*self.programs, *(["step"] if "problem" in self.programs else [])}
         known = [name for name in Functions._fields if name in written]
         about = f"the state equation of {self.name}"
-        made = machine_code.addresses(known, self._key, write, default_store(), about)
-        return Functions(**dict.fromkeys(Functions._fields, 0) | dict(zip(known, made, strict=True)))
+        addresses = machine_code.addresses(known, self._key, write, default_store(), about)
+        return Functions(**dict.fromkeys(Functions._fields, 0) | dict(zip(known, addresses, strict=True)))

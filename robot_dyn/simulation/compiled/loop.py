@@ -1,4 +1,4 @@
-"""The time loop as machine code: one for each method, whatever it is that moves.
+"""The time loops as machine code: one for each method, whatever moves.
 
 The functions of the state equation are addresses; so a loop is compiled once for a version of this library.
 """
@@ -17,44 +17,70 @@ from robot_dyn.codegen.loops.call import QUICK, MachineFunction
 from robot_dyn.codegen.loops.source import SubsetError
 from robot_dyn.codegen.primitives import INSTEAD
 from robot_dyn.codegen.store.cache import default_store
+from robot_dyn.integrate import hermite
+from robot_dyn.integrate.adaptive import STEPPERS
 from robot_dyn.integrate.integrator import PlainMethod
 from robot_dyn.simulation.dynamics.loop_state import Functions
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.events.detection import detecting
+from robot_dyn.simulation.events.mode_change import end_mode, without_modes
+from robot_dyn.simulation.run.event_loop import event_loop
+from robot_dyn.simulation.run.time_loop import time_loop
 
 HARD = Passes(level=3, effort=3)
 
 
+def loop_for(
+    method: Any, equation: StateEquation, cuts: bool, lanes: int, detects: bool = False
+) -> MachineFunction | SubsetError:
+    """The loop of a method; or why its user-defined step cannot be machine code, which runs in lock step need."""
+    if not method.controls_error and (refused := _refusal(method, equation, lanes)) is not None:
+        if lanes > 1:
+            raise refused
+        return refused
+    return loop_of(method, cuts, detects, bool(equation.impulses))
+
+
+def loop_of(method: Any, cuts: bool, detects: bool = False, holds: bool = False) -> MachineFunction:
+    """Return the time loop of a method whose steps are plain; `is_kept` is whether it costs milliseconds or a second.
+
+    Args:
+        method: An `Integrator` or `Adaptive`.
+        cuts: Whether steps are chosen, or cut at events.
+        detects: As of `compiled_equation`.
+        holds: Whether something may hold joints.
+    """
+    if not cuts:
+        step = method.stepper(FLOAT64, 1, 0, 1).step
+        return _translated(time_loop, detecting(step) if detects else step, works=method.nonsmooth)
+    stepper = STEPPERS[method.method](1, 1, 1) if method.controls_error else hermite.stepper(method, 1, 0, 1, None)
+    of_modes = end_mode if holds else without_modes
+    return _translated(event_loop, stepper.begin, stepper.step, stepper.error, stepper.accept, stepper.dense, of_modes)
+
+
 @cache
-def loop(
-    make: Callable[..., Callable[..., int]], *functions: Callable[..., Any], works: bool = False
+def _translated(
+    make_loop: Callable[..., Callable[..., int]], *functions: Callable[..., Any], works: bool = False
 ) -> MachineFunction:
-    """The loop that `make` gives of the plain functions of a method, and whether it works beside what it calls."""
+    """The loop that `make_loop` returns for the plain functions of a method; `works` if it computes much by itself."""
     about = f"the time loop of {functions[0].__module__}.{functions[0].__name__}"
-    return MachineFunction(make(*functions), INSTEAD, default_store, about, HARD if works else QUICK)
+    return MachineFunction(make_loop(*functions), INSTEAD, default_store, about, HARD if works else QUICK)
 
 
-def refusal(method: PlainMethod, equation: StateEquation, lanes: int) -> SubsetError | None:
-    """Why the step of a method written elsewhere cannot be machine code; None if it can, as those of this library."""
+def _refusal(method: PlainMethod, equation: StateEquation, lanes: int) -> SubsetError | None:
+    """Why the step of a user-defined method cannot be machine code; None if it can."""
     n, m = equation.plant.dynamics.n, equation.size
-    made = method.stepper(FLOAT64, m, n, m + n, lanes)
-    if (made.step.__module__ or "").startswith("robot_dyn."):
+    stepper = method.stepper(FLOAT64, m, n, m + n, lanes)
+    if (stepper.step.__module__ or "").startswith("robot_dyn."):
         return None
     y, run_parameters, lost = np.zeros((m, lanes)), np.zeros((1, lanes)), np.zeros(lanes, np.int64)
-    step = MachineFunction(made.step, INSTEAD, lambda: None, "")
+    step = MachineFunction(stepper.step, INSTEAD, lambda: None, "")
     functions = Functions(*[0] * len(Functions._fields))
     try:
         step.check(
-            functions,
-            made.coefficients,
-            0.0,
-            1.0,
-            y,
-            np.zeros(2),
-            run_parameters,
-            np.zeros((m, lanes)),
-            made.work,
-            lost,
-        )
+            functions, stepper.coefficients, 0.0, 1.0, y, np.zeros(2), run_parameters, np.zeros((m, lanes)),
+            stepper.work, lost,
+        )  # fmt: skip
     except SubsetError as error:
         return error
     return None

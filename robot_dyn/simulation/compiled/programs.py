@@ -1,6 +1,6 @@
 """The programs of a state equation: by its structure from the store, or traced.
 
-Neither LLVM nor CasADi is imported before something is traced: whether programs are kept is asked before each run.
+Neither LLVM nor CasADi is imported before something is traced: whether programs are stored is checked before each run.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from robot_dyn.codegen.trace.right_angles import robot_of
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import TraceError
 from robot_dyn.model.robot import Robot
-from robot_dyn.simulation.compiled.lru_by_identity import LRUByIdentity
 from robot_dyn.simulation.compiled.structure import of_library, structure
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.values import LRUByIdentity
 
 _robots, _symbols, _interpreted = LRUByIdentity(), LRUByIdentity(), LRUByIdentity()
 
@@ -28,12 +28,12 @@ class Traces(NamedTuple):
     """What is traced of a state equation.
 
     Attributes:
-        kept: As of `trace`.
+        extras: As of `trace`.
         jacobian: Whether the method needs that of the rate.
         nonsmooth: Whether velocities may jump within steps.
     """
 
-    kept: tuple[str, ...] | None = None
+    extras: tuple[str, ...] | None = None
     jacobian: bool = False
     nonsmooth: bool = False
 
@@ -46,7 +46,7 @@ class Identified(NamedTuple):
         known: Its parameters.
         described: Its structure, and where the parameters stand.
         objects: What stands in it by identity.
-        lasting: Whether `described` tells all of it, in another process too.
+        lasting: Whether `described` identifies all of it, in another process too.
     """
 
     equation: StateEquation
@@ -60,7 +60,7 @@ class Identified(NamedTuple):
         return digest(["programs", sources_of_programs(), repr(self.described), repr(what)], processor=False)
 
 
-def identified(equation: StateEquation, swept: tuple[str, ...] = ()) -> Identified:
+def identify(equation: StateEquation, swept: tuple[str, ...] = ()) -> Identified:
     """A state equation with its structure.
 
     Args:
@@ -72,10 +72,10 @@ def identified(equation: StateEquation, swept: tuple[str, ...] = ()) -> Identifi
     """
     plant = equation.plant
     robot = robot_to_compile(plant.dynamics)
-    own = equation if robot is plant.dynamics else replace(equation, plant=Plant(robot, plant.effects))
+    compiled_form = equation if robot is plant.dynamics else replace(equation, plant=Plant(robot, plant.effects))
     known = parameters(robot, plant.effects, equation.controller, swept)
-    described, objects, lasting = structure(own)
-    return Identified(own, known, (described, tuple(each.place for each in known)), objects, lasting)
+    described, objects, lasting = structure(compiled_form)
+    return Identified(compiled_form, known, (described, tuple(each.place for each in known)), objects, lasting)
 
 
 def robot_to_compile(dynamics: Any) -> Robot:
@@ -85,7 +85,7 @@ def robot_to_compile(dynamics: Any) -> Robot:
         TraceError: If there is none, or it has no answer.
     """
 
-    def make() -> Robot | None:
+    def compute() -> Robot | None:
         robot = robot_of(dynamics)
         if robot is None or not of_library(type(dynamics)):  # another class may have equations of its own
             raise TraceError(
@@ -96,33 +96,34 @@ def robot_to_compile(dynamics: Any) -> Robot:
             raise TraceError(f"joint {robot.joint_without_inertia!r} carries no inertia: take engine='interpreted'")
         return None if robot is dynamics else robot
 
-    return _robots.get((dynamics,), (), make) or dynamics
+    return _robots.get((dynamics,), (), compute) or dynamics
 
 
-def stored(made: Identified, what: Traces) -> Programs | None:
+def stored(identified: Identified, what: Traces) -> Programs | None:
     """The programs in the store; None if they are not there, or the structure is known in this process alone."""
-    store = default_store() if made.lasting else None
-    payload = None if store is None else store.load(made.key(what))
+    store = default_store() if identified.lasting else None
+    payload = None if store is None else store.load(identified.key(what))
     return None if payload is None else Programs.read(payload.decode())
 
 
-def interpreted(made: Identified, what: Traces) -> list[float]:
-    """Where evaluations are counted that runs of a structure have taken without machine code."""
-    return _interpreted.get(made.objects, (made.described, what), lambda: [0.0])
+def interpreted(identified: Identified, what: Traces) -> list[float]:
+    """The count of evaluations that runs of a structure have taken without machine code."""
+    return _interpreted.get(identified.objects, (identified.described, what), lambda: [0.0])
 
 
-def programs_of(made: Identified, what: Traces) -> Programs:
+def programs_of(identified: Identified, what: Traces) -> Programs:
     """The programs of a state equation.
 
     Raises:
         TraceError: If a part of it cannot be compiled; names it.
     """
-    if (found := stored(made, what)) is not None:
-        return found
-    programs = traced(made.equation, made.known, what)
-    store = default_store() if made.lasting else None
-    if store is not None and structure(made.equation).described == made.described[0]:  # a trace may have changed it
-        store.save(made.key(what), str(programs).encode(), f"the equations of {made.equation.plant.dynamics.name}")  # pyright: ignore
+    if (programs := stored(identified, what)) is not None:
+        return programs
+    programs = traced(identified.equation, identified.known, what)
+    store = default_store() if identified.lasting else None
+    equation = identified.equation
+    if store is not None and structure(equation).described == identified.described[0]:  # a trace may have changed it
+        store.save(identified.key(what), str(programs).encode(), f"the equations of {equation.plant.dynamics.name}")  # pyright: ignore
     return programs
 
 
@@ -135,12 +136,11 @@ def traced(equation: StateEquation, known: tuple[Parameter, ...], what: Traces, 
 
     def bodies(dynamics: Any, part: Part) -> SymbolicDynamics:
         """Its equations in symbols, traced once for a file and its edits."""
-        robot, own = robot_to_compile(dynamics), tuple(each for each in known if each.part == part)
-        if constants:  # what is kept tells robots apart but for the numbers that are inputs
+        robot, inputs = robot_to_compile(dynamics), tuple(each for each in known if each.part == part)
+        if constants:  # cached symbols are of one robot but for the numbers that are inputs
             return SymbolicDynamics(robot)
         described = structure(StateEquation(Plant(robot), None)).described
-        inputs = tuple(each.place for each in own)
-        return _symbols.get((), (described, inputs), lambda: SymbolicDynamics(robot, own))
+        places = tuple(each.place for each in inputs)
+        return _symbols.get((), (described, places), lambda: SymbolicDynamics(robot, inputs))
 
-    made = trace(equation, bodies, known, *what)
-    return Programs({name: program_of(each) for name, each in made.items()})
+    return Programs({name: program_of(each) for name, each in trace(equation, bodies, known, *what).items()})

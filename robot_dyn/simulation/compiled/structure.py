@@ -1,7 +1,7 @@
 """The structure of a state equation: all that its machine code depends on besides the parameters.
 
-Two setups of one structure run the same code. What is not of this library is told by identity, since it may change,
-and by its definition where it has one, which tells it in another process too.
+Two setups of one structure run the same code. User-defined code is identified by the object, since it may change,
+and by its definition where it has one, which identifies it in another process too.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Structure(NamedTuple):
     Attributes:
         described: In hashable values.
         objects: What stands in it by identity.
-        lasting: Whether `described` tells all of it, in another process too.
+        lasting: Whether `described` identifies all of it, in another process too.
     """
 
     described: tuple[Any, ...]
@@ -54,7 +54,7 @@ def structure(equation: StateEquation) -> Structure:
 
 
 def changeable(equation: StateEquation) -> tuple[str, ...]:
-    """Names of the parts whose code the version of this library does not tell: it may be another at the next run."""
+    """Names of the parts whose code the version of this library does not identify: it may change from run to run."""
 
     def by_identity(part: Any) -> bool:
         found = _Found()
@@ -110,15 +110,16 @@ class _Found:
         if issubclass(kind, np.generic) or (kind is np.ndarray and not value.dtype.hasobject):
             return value.dtype.str, value.shape, value.tobytes()
         robot = getattr(value, "robot", value)
-        if isinstance(robot, Robot) and of_library(kind) and _is_dynamics(value):
+        if isinstance(robot, Robot) and of_library(kind) and isinstance(value, Dynamics):
             edits = _of_edits(robot.edits) if self._is_model(path) else self._of(robot.edits, "edits")
             return kind.__name__, sha256(robot.description.xml).digest(), robot.joint_names, edits
         if path in self.numbered and _is_polynomial(value):
             return "polynomial", value.coefficients.shape[1:]
         if is_dataclass(value) and is_frozen(value):
             before = len(self.objects)
-            described = self._class(kind), *(self._of_field(value, name, path) for name in attributes(value))
-            if all(map(_weakly, self.objects[before:])):
+            name = kind.__qualname__ if of_library(kind) else self._by_identity(kind)
+            described = name, *(self._of_field(value, name, path) for name in attributes(value))
+            if all(type(each).__weakrefoffset__ for each in self.objects[before:]):  # weak references identify them
                 return described
             del self.objects[before:]
         return self._by_identity(value)
@@ -126,9 +127,6 @@ class _Found:
     def _is_model(self, path: str) -> bool:
         """Whether the numbers of a robot are among the parameters."""
         return path in self.numbered or (isinstance(self.part, Controller) and path in self.part.models)
-
-    def _class(self, kind: type) -> Any:
-        return kind.__qualname__ if of_library(kind) else self._by_identity(kind)
 
     def _by_identity(self, value: Any) -> tuple[str, str | None]:
         self.objects.append(value)
@@ -149,21 +147,12 @@ class _Found:
 
 
 def of_library(kind: type) -> bool:
-    """Whether the version of this library tells the code of a class, in another process too."""
+    """Whether the version of this library identifies the code of a class, in another process too."""
     return kind.__module__.startswith("robot_dyn.")
-
-
-def _is_dynamics(value: Any) -> bool:
-    return isinstance(value, Dynamics)
 
 
 def _is_polynomial(value: Any) -> bool:
     return isinstance(value, PiecewisePolynomial) and type(value).at is PiecewisePolynomial.at
-
-
-def _weakly(value: Any) -> bool:
-    """Whether it can be told by identity for as long as it lives."""
-    return type(value).__weakrefoffset__ != 0
 
 
 def _of_edits(edits: Edits) -> tuple[Any, ...]:

@@ -1,6 +1,6 @@
 """The state equation in symbols: the lines of `StateEquation` traced to functions of (t, y, p, run_parameters).
 
-    rate = (y', u),   tick = (u, z⁺),   energy = (K, V),   sample = what is kept beside the state
+    rate = (y', u),   tick = (u, z⁺),   energy = (K, V),   sample = what is recorded beside the state
     bodies = (M, loads), where something may hold joints
     in lock step rate = y', and actuation = u where it changes between ticks
     jacobian = (∂y'/∂y₁, …, ∂y'/∂y_m, ∂y'/∂t)
@@ -37,20 +37,20 @@ def trace(
     equation: StateEquation,
     bodies: Bodies,
     known: Sequence[Parameter],
-    kept: tuple[str, ...] | None,
+    extras: tuple[str, ...] | None,
     jacobian: bool = False,
     nonsmooth: bool = False,
 ) -> dict[str, ca.Function]:
-    """The state equation as CasADi Functions: rate, energy, tick if it is sampled, sample, and jacobian if asked for.
+    """The state equation as CasADi Functions: rate, energy, tick if it is sampled, sample, and jacobian if requested.
 
     Args:
         equation: What to trace.
         bodies: Gives the symbols of a robot, the plant's or a model's.
         known: The parameters.
-        kept: Which of "u", "v" and "energy" a sample of runs in lock step holds; None for a single run, whose
+        extras: Which of "u", "v" and "energy" a sample of runs in lock step holds; None for a single run, whose
             samples hold y', u, K and V.
         jacobian: Whether a method needs it.
-        nonsmooth: Whether the method asks for the convex problem of each step in place of the rate.
+        nonsmooth: Whether the method needs the convex problem of each step in place of the rate.
 
     Raises:
         TraceError: If a part cannot be traced; names it.
@@ -58,38 +58,38 @@ def trace(
     n, held = equation.plant.dynamics.n, equation.plant.dynamics.n * equation.sampled
     followed = polynomials(equation.controller)
     sizes = 1, equation.size, BOUNDS + sum(map(lengths, followed)), held + sum(each.size for each in known)
-    (t, ts), (y, ys), (p, ps), (run_parameters, owns) = (
+    (t, ts), (y, ys), (p, ps), (run_parameters, rs) = (
         inputs(name, size) for name, size in zip(("t", "y", "p", "own"), sizes, strict=True)
     )
     state, time = ys.view(Symbols), np.minimum(np.maximum(ts.view(Symbols), ps[:1]), ps[1:2])[0]
     with Symbolic().scope():
-        symbolic = _symbolic(equation, bodies, split(known, owns[held:].view(Symbols)), _pieces(followed, ps[BOUNDS:]))
-        held_here = owns[:held].view(Symbols) if equation.sampled else None
+        symbolic = _symbolic(equation, bodies, split(known, rs[held:].view(Symbols)), _pieces(followed, ps[BOUNDS:]))
+        held_here = rs[:held].view(Symbols) if equation.sampled else None
         q, v, z, _ = symbolic.state(state)
         rate = np.full(equation.size, np.nan, dtype=object)
         u = symbolic.actuation(time, q, v, z, held_here) if nonsmooth else None
         if u is None:
             rate, u = symbolic.rate(time, state, held_here)
         parts = {"u": wide(u, n), "v": v, "energy": symbolic.energies(time, q, v)}
-        single = kept is None
-        made = {"rate": np.concatenate([rate, parts["u"]]) if single else rate, "energy": parts["energy"]}
-        made["sample"] = np.concatenate(
-            [rate, parts["u"], parts["energy"]] if single else [parts[x] for x in kept] or [[]]
+        single = extras is None
+        results = {"rate": np.concatenate([rate, parts["u"]]) if single else rate, "energy": parts["energy"]}
+        results["sample"] = np.concatenate(
+            [rate, parts["u"], parts["energy"]] if single else [parts[x] for x in extras] or [[]]
         )
         if not single and (not equation.sampled or equation.equation_of_motion.bounds_at_all_times):
-            made["actuation"] = parts["u"]
+            results["actuation"] = parts["u"]
         if single and equation.impulses and not nonsmooth:
-            made["bodies"] = bodies_of(symbolic, time, state, held_here)
+            results["bodies"] = bodies_of(symbolic, time, state, held_here)
         if equation.events or equation.limited:
             demands = symbolic.demands(time, q, v, z, held_here, equation.limited)
             values = [wide(each, n) for each in demands] + [_value(each, time, q, v) for each in equation.events]
-            made["events"] = np.concatenate(values)
+            results["events"] = np.concatenate(values)
         if equation.sampled and symbolic.controller is not None:
             after = z[: equation.state_size]
             if equation.state_size:
                 after = symbolic.controller.next_state(time, q, v, after)
-            made["tick"] = np.concatenate([wide(symbolic.command(time, q, v, z), n), after])
-        columns = {name: column(x) for name, x in made.items()}
+            results["tick"] = np.concatenate([wide(symbolic.command(time, q, v, z), n), after])
+        columns = {name: column(x) for name, x in results.items()}
         if jacobian:
             # of the time before it is bounded: a segment goes on, for its derivatives
             unbounded, [free] = inputs("time", 1)

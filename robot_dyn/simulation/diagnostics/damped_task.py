@@ -1,6 +1,6 @@
 """Where operational-space control damps its task: the smallest eigenvalue of J M⁻¹ Jᵀ is below the threshold.
 
-There the arm no longer follows along a direction that it is told to move in.
+There the arm no longer follows along a commanded direction.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ def damped(setup: Setup, record: Recording) -> Iterator[Remark]:
 
 def _of(task: OperationalSpace, t: np.ndarray, q: np.ndarray) -> Iterator[Remark]:
     try:
-        made = task_dynamics(task.model, q, 0 * q, task.frame, rows=task.rows, threshold=task.threshold)
+        in_task = task_dynamics(task.model, q, 0 * q, task.frame, rows=task.rows, threshold=task.threshold)
     except RobotDynError:  # of its model: the outcome of a run
         return
-    smallest = np.asarray(made.smallest, float)
+    smallest = np.asarray(in_task.smallest, float)
     below = smallest < task.threshold
     if not below.any():
         return

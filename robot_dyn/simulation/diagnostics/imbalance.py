@@ -27,24 +27,23 @@ _UNBOOKED = 1e-3  # of the powers
 _FINER, _TIGHTER = 4, 100  # times as short steps, as small a tolerance
 
 
-def cause(setup: Setup, equation: StateEquation, run: Recording, contradicts: bool) -> str:
+def cause(setup: Setup, run: Recording, contradicts: bool) -> str:
     """Why the ledger of a run does not close, and what to do.
 
     Args:
         setup: What was run.
-        equation: Its state equation.
         run: What it left behind.
-        contradicts: Whether it closes, but not as well as the estimated error of q says.
+        contradicts: Whether it closes, but not as well as the estimated error of q implies.
     """
     if run.outcome.ending is Ending.DIVERGED:
         return "the run diverged"
-    if unbooked := _unbooked(equation, run):
+    if unbooked := _unbooked(setup.equation, run):
         return unbooked
     method: Any = setup.integrator
     doubt = "do not trust the estimate, " if contradicts else ""
     if method.controls_error:
         return f"{doubt}the tolerance is too loose; take rtol = {method.rtol / _TIGHTER:.0e}"
-    missed = stepped_over(setup, equation, run.step_log, 0.0) or cut_alike(setup, run)
+    missed = stepped_over(setup, run.step_log, 0.0) or cut_alike(setup, run)
     why = "the steps are too long for the motion" if missed is None else f"{missed.why}, at t = {missed.t:.4g} s"
     return f"{doubt}{why}; take step_s = {setup.taken_step_s / _FINER:.0e}"
 
@@ -52,7 +51,7 @@ def cause(setup: Setup, equation: StateEquation, run: Recording, contradicts: bo
 def _unbooked(equation: StateEquation, run: Recording) -> str:
     """What changes the energy beside the powers, at the sample where it does most; empty if that is not the cause.
 
-    A sample at which dE/dt jumps, as at a stop, tells nothing. Payloads that come and go change what the energy is of.
+    A sample at which dE/dt jumps, as at a stop, shows nothing. Payloads that come and go change what the energy is of.
     """
     if equation.equation_of_motion.payloads:
         return ""
@@ -60,7 +59,7 @@ def _unbooked(equation: StateEquation, run: Recording) -> str:
     t, y = run.t[rows], run.y[rows]
     q, v, a, _, _, P, _ = columns(equation, t, y, run.made[rows])
     worst = largest(np.abs(ledger(equation, run).residual)) / float(run.t[-1]) / 2  # on average, to leave the residual
-    said = ""
+    advice = ""
     for k in range(len(t)):
         state = float(t[k]), q[k], v[k], a[k]
         try:
@@ -71,8 +70,8 @@ def _unbooked(equation: StateEquation, run: Recording) -> str:
         left = (before + after) / 2 - float(P[k].sum())
         noticed = abs(left) > _UNBOOKED * (abs(flows) + float(np.abs(P[k]).sum()))
         if noticed and abs(left) > worst and abs(after - before) < abs(left) / 2:
-            worst, said = abs(left), _named(equation, state, left)
-    return said
+            worst, advice = abs(left), _named(equation, state, left)
+    return advice
 
 
 def _slope(energy: Any, state: tuple[float, Array, Array, Array], side: float) -> float:
@@ -89,8 +88,8 @@ def _named(equation: StateEquation, state: tuple[float, Array, Array, Array], le
     for force in motion.forces:
         if not isinstance(force, Conservative):
             continue
-        own = _slope(lambda t, q, v, force=force: call(force.potential, dynamics, t, q), state, 1)
-        if abs(own + float(call(force.torque, dynamics, t, q, v) @ v)) > abs(left) / 2:
+        slope = _slope(lambda t, q, v, force=force: call(force.potential, dynamics, t, q), state, 1)
+        if abs(slope + float(call(force.torque, dynamics, t, q, v) @ v)) > abs(left) / 2:
             return (
                 f"{force.name} does {-left:.2g} W at t = {t:.4g} s that its potential does not give; its torque must be"
                 " −∂E/∂q of a potential E(q), otherwise declare it Active"

@@ -35,17 +35,17 @@ class Missed:
     why: str
 
 
-def stepped_over(setup: Setup, equation: StateEquation, path: Path, error: float) -> Missed | None:
+def stepped_over(setup: Setup, path: Path, error: float) -> Missed | None:
     """The first thing that acted between two steps and would move a joint by more than the estimated error.
 
     Args:
         setup: What was run.
-        equation: Its state equation.
         path: The states at the ends of its steps.
         error: Estimated error of q, in [rad] or [m].
     """
     if len(path.t) < 2:
         return None
+    equation = setup.equation
     q, v = path.y[:, : equation.plant.dynamics.n], equation.velocities(path.y)
     effects = () if setup.finds_events else setup.plant.effects
     found = [_crossed(equation, effect, path, q, v, error) for effect in effects]
@@ -54,7 +54,7 @@ def stepped_over(setup: Setup, equation: StateEquation, path: Path, error: float
 
 
 def cut_alike(setup: Setup, run: Recording) -> Missed | None:
-    """The first time from which a run of fixed steps and its companions make the same few steps between switches.
+    """The first time from which a run of fixed steps and its companions take the same few steps between switches.
 
     That is where a joint switches and switches back within a few steps, or switches in the last step of the run.
     """
@@ -110,14 +110,14 @@ def _change(
 def _code(equation: StateEquation, part: Any, path: Path, q: np.ndarray, v: np.ndarray, error: float) -> Missed | None:
     """A torque that stands out between two steps from what it is at their ends."""
     n, m, dynamics = equation.plant.dynamics.n, equation.states, equation.plant.dynamics
-    own = slice(0, equation.state_size) if isinstance(part, Controller) else _states_of(equation, part)
+    states = slice(0, equation.state_size) if isinstance(part, Controller) else _states_of(equation, part)
     if not isinstance(part, Force | Controller) or (isinstance(part, Controller) and equation.sampled):
         return None
 
     def torque(t: float, q: np.ndarray, v: np.ndarray, z: np.ndarray) -> np.ndarray:
         if isinstance(part, Controller):
-            return np.asarray(call(part.torque, t, q, v, z[own]), dtype=float)
-        state = (t, q, v) if own is None else (t, q, v, z[own])
+            return np.asarray(call(part.torque, t, q, v, z[states]), dtype=float)
+        state = (t, q, v) if states is None else (t, q, v, z[states])
         return np.broadcast_to(np.asarray(call(part.torque, dynamics, *state), dtype=float), (n,))
 
     every = max(1, len(path.t) // LOOKS)
@@ -132,7 +132,7 @@ def _code(equation: StateEquation, part: Any, path: Path, q: np.ndarray, v: np.n
             there = np.array([torque(float(at[0]), *state) for at, *state in zip(*inside, strict=True)])
             jump = np.maximum(jump, np.abs(there - ends[:-1] - weight * np.diff(ends, axis=0)))
     except RobotDynError:
-        return None  # the run itself says what is wrong
+        return None  # the run itself reports what is wrong
     around = np.abs(np.diff(ends, axis=0))
     for k in np.flatnonzero((jump > _STANDS_OUT * around + 1e-9).any(axis=1)).tolist():
         if _displacement(equation, path, path.y[:, :n], k * every, jump[k]) > error:

@@ -1,4 +1,4 @@
-"""What a reference asks for that the run cannot do: it jumps where it begins, or moves a joint that friction holds."""
+"""What a reference demands and the run cannot do: it jumps where it begins, or moves a joint that friction holds."""
 
 from __future__ import annotations
 
@@ -42,10 +42,10 @@ def jumps(setup: Setup, q0: np.ndarray, v0: np.ndarray, units: Units) -> Iterato
         gaps[:, ~_moves(q)] = 0.0
         gaps[gaps <= _JUMP * size] = 0.0
         for i in np.flatnonzero(gaps.any(axis=0)):
-            asked, at_start = float(begin[i]), float(there[gaps[:, i].argmax(), i])
-            text = f"{quantity} of {names[i]} from {at_start:.4g} to {asked:.4g} {units[i][row]} at {t:.4g} s"
+            begins, at_start = float(begin[i]), float(there[gaps[:, i].argmax(), i])
+            text = f"{quantity} of {names[i]} from {at_start:.4g} to {begins:.4g} {units[i][row]} at {t:.4g} s"
             yield Remark(
-                Kind.JUMPS, names[i], quantity, t, 0.0, t, asked, at_start, text,
+                Kind.JUMPS, names[i], quantity, t, 0.0, t, begins, at_start, text,
                 "let it begin where and as fast as the joint does; rd.via_points(times_s, points) begins at rest",
             ), gaps[:, i]  # fmt: skip
 
@@ -67,14 +67,14 @@ def held(setup: Setup, extremes: np.ndarray, t: np.ndarray, units: Units) -> Ite
         if isinstance(effect, DryFriction):
             rubs |= np.asarray(effect.friction(0 * setup.v0)) > 0
     path = reference.at(t)[0]
-    asked, moves = np.ptp(path, axis=0), _moves(path)
+    span, moves = np.ptp(path, axis=0), _moves(path)
     for i in np.flatnonzero(rubs & at_rest(extremes) & moves):
         name, (unit, _, of_u) = setup.plant.dynamics.joint_names[i], units[i]
         most = float(np.nan_to_num(np.abs(extremes[2, :, i])).max())
-        text = f"{name} at {setup.q0[i]:.4g} {unit}, its reference moves by {asked[i]:.3g}, |u| up to {most:.3g} {of_u}"
+        text = f"{name} at {setup.q0[i]:.4g} {unit}, its reference moves by {span[i]:.3g}, |u| up to {most:.3g} {of_u}"
         yield Remark(
-            Kind.HELD, name, "q", 0.0, float(t[-1]), 0.0, float(setup.q0[i]), float(asked[i]), text,
-            "the control asks for less than friction holds: take larger gains, or less friction",
+            Kind.HELD, name, "q", 0.0, float(t[-1]), 0.0, float(setup.q0[i]), float(span[i]), text,
+            "the control demands less than friction holds: take larger gains, or less friction",
         )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""What an observer saw, as remarks: in words, with times, values and what to do."""
+"""Remarks on what was observed at every step: text, times, values and what to do."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from robot_dyn.effects.effect import Conservative, Dissipative, Stateful
 from robot_dyn.errors import RobotDynError
+from robot_dyn.integrate.differences import by_state, rowwise
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.units import unit
 from robot_dyn.simulation.diagnostics.creep import creeping
@@ -20,11 +21,11 @@ from robot_dyn.simulation.observation.observation import Observation, Observed, 
 from robot_dyn.simulation.observation.observer import Observer
 from robot_dyn.simulation.observation.remarks import Kind, Remark
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.values import copied, kept
+from robot_dyn.values import cached, copied
 
 Units = list[tuple[str, str, str]]  # of q, v and u of each joint
 QUANTITIES = ("q", "v", "u")
-KINDS = Kind.EFFORT_REACHED, Kind.STOP_REACHED, Kind.BEYOND  # of levels, in the order in which they are told
+KINDS = Kind.EFFORT_REACHED, Kind.STOP_REACHED, Kind.BEYOND  # of levels, in the order of a summary
 _HIDDEN = 0.1  # of the range of a quantity: what the samples beside a window leave out
 _ROUNDING = 1e-9  # of a quantity: a smaller range is noise
 
@@ -33,7 +34,7 @@ def observer_of(setup: Setup, of: GuardLevels | None = None) -> Observer:
     """An observer of a run that has not begun, for its levels unless others are given."""
     if of is not None:
         return Observer(_observation(setup, of), of, setup.equation.canonical)
-    of, start = kept(setup, _beginning)
+    of, start = cached(setup, _beginning)
     return Observer(copied(start), of, setup.equation.canonical)
 
 
@@ -46,7 +47,7 @@ def _observation(setup: Setup, of: GuardLevels) -> Observation:
     """Of the start; nan for what u is not known before the first tick."""
     equation, u = setup.equation, np.full(len(setup.q0), np.nan)
     if not equation.sampled:
-        with suppress(RobotDynError):  # the run will tell
+        with suppress(RobotDynError):  # the run will report it
             u = equation.actuation(0.0, setup.q0, setup.v0, np.zeros(equation.states), None)
     return observation_of(np.concatenate([setup.q0, setup.v0, u])[:, None], of)
 
@@ -142,13 +143,13 @@ def _passed(names: tuple[str, ...], units: Units, visits: dict[Level, Visit], in
         unit = f" {units[joint][quantity]}".rstrip()
         far = f"{most.value:.4g} of {level.limit:.4g}{unit} at {most.at:.4g} s"
         spent = f"for {duration:.3g} s from {start:.4g} s"
-        words = {
+        texts = {
             Kind.BEYOND: far,
             Kind.STOP_REACHED: f"{far}, {spent}",
             Kind.EFFORT_REACHED: f"{spent} ({abs(level.limit):.4g}{unit})",
         }
         seen = f" (at samples and {instants} instants)" if QUANTITIES[quantity] == "u" and instants else ""
-        text = f"{names[joint]} {words[level.kind]}{seen}"
+        text = f"{names[joint]} {texts[level.kind]}{seen}"
         yield Remark(
             level.kind, names[joint], QUANTITIES[quantity], start, duration, most.at, most.value, level.limit, text,
             "nothing in the plant enforces them" if level.kind is Kind.BEYOND else "",
@@ -180,13 +181,12 @@ def against(setup: Setup, t: np.ndarray, q: np.ndarray) -> Callable[[Episode], s
 def _remedy(setup: Setup, t: float, q: np.ndarray, period: float) -> str:
     """What to do about a chatter, with the largest kd T/M: the eigenvalue of −M⁻¹ ∂u/∂v times the period."""
     general = "take a shorter period_s or less damping: it reverses where an eigenvalue of M⁻¹ kd period_s is above 1"
-    controller, n = setup.controller, len(q)
+    controller = setup.controller
     assert controller is not None
-    z, v = np.zeros(controller.state_size), np.zeros(n)
+    z, v = np.zeros(controller.state_size), np.zeros(len(q))
     try:
         with np.errstate(all="ignore"):
-            u = [controller.torque(t, q, v + side * dv, z) for dv in 1e-6 * np.eye(n) for side in (1, -1)]
-            slope = np.array([(plus - minus) / 2e-6 for plus, minus in zip(u[::2], u[1::2], strict=True)]).T
+            slope = by_state(rowwise(lambda v: controller.torque(t, q, v, z)), t, v).T
             ratio = float(np.abs(np.linalg.eigvals(np.linalg.solve(setup.plant.at(t).M(q), -slope))).max()) * period
     except (RobotDynError, np.linalg.LinAlgError):
         return general

@@ -1,4 +1,4 @@
-"""What a summary says of stiff runs: steps bounded by stability, and oscillations that a stiff method damps."""
+"""Remarks on stiff runs: steps bounded by stability, and oscillations that a stiff method damps."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import numpy as np
 from robot_dyn.errors import RobotDynError
 from robot_dyn.integrate.adaptive import STIFF
 from robot_dyn.simulation.dynamics.fastest_motion import Fastest, fastest
-from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.observation.remarks import Remark
 from robot_dyn.simulation.results.samples import ledger
 from robot_dyn.simulation.run.recording import Recording
@@ -18,13 +17,13 @@ _LEAST_STEPS = 1000  # of a run that is looked at
 _LOOKS = 9  # at steps of it
 
 
-def bounded_by_stability(setup: Setup, equation: StateEquation, record: Recording) -> tuple[Remark, ...]:
+def bounded_by_stability(setup: Setup, record: Recording) -> tuple[Remark, ...]:
     """A remark if stability, and not the tolerance, bounds the steps of an explicit method that chooses them.
 
     That is where h |λ| is about the end of the stability domain in most of some steps, λ the fastest decay.
     [Hairer, Wanner 1996, IV.2, p. 21]
     """
-    method, t, y = setup.integrator, record.step_log.t, record.step_log.y
+    method, equation, t, y = setup.integrator, setup.equation, record.step_log.t, record.step_log.y
     explicit = method.controls_error and method.plain and not method.needs_jacobian
     if not explicit or record.steps < _LEAST_STEPS or len(t) < _LEAST_STEPS:
         return ()
@@ -42,11 +41,12 @@ def bounded_by_stability(setup: Setup, equation: StateEquation, record: Recordin
     return (remark(motion, 0.0, float(t[-1]), float(t[k]), f"take integrator={STIFF!r}"),)
 
 
-def damped_oscillation(setup: Setup, equation: StateEquation, record: Recording) -> Fastest | None:
+def damped_oscillation(setup: Setup, record: Recording) -> Fastest | None:
     """What a stiff method damps with steps of any length near its own: an oscillation of more than a radian a step.
 
     None if the energy ledger closes, or nothing of the kind is found at some states of the run.
     """
+    equation = setup.equation
     if not setup.integrator.stiff or ledger(equation, record).closes:
         return None
     t, y, held = record.step_log.t, record.step_log.y, np.zeros(equation.plant.dynamics.n) if equation.sampled else None

@@ -1,13 +1,17 @@
-"""Whether the loop of a sampled controller is unstable about states of a run; slow growth may end before it shows.
+"""Whether the loop of a sampled controller is unstable about states of a run, and whether a run diverged for that.
 
-δx⁺ = Φ(T) δx over a period T:   ρ(Φ) > 1, and more than the square of e^{T max Re λ} under control at all times
+    δx⁺ = Φ(T) δx over a period T:   ρ(Φ) > 1, and more than the square of e^{T max Re λ} under control at all times
+
+Slow growth may end before it shows. It explains a divergence at t if ρ(Φ)^(t/T) > 1e3: shorter steps follow such growth
+more closely, and do not end it, so that the advice is then that on the loop.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
-from math import inf
+from dataclasses import replace
+from math import inf, log
 from typing import NamedTuple
 
 import numpy as np
@@ -15,30 +19,31 @@ import numpy as np
 from robot_dyn.errors import RobotDynError
 from robot_dyn.simulation.dynamics.sampled_loop import SampledLoop, linearised, remedy
 from robot_dyn.simulation.dynamics.stability import after, below, periods, shown
-from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.observation.remarks import Kind, Remark
+from robot_dyn.simulation.observation.remarks import Kind, Remark, lines
+from robot_dyn.simulation.run.outcome import Ending, Outcome
 from robot_dyn.simulation.setup.setup import Setup
 
+_EXPLAINS = 1e3  # growth of deviations
 
-def unstable(setup: Setup, equation: StateEquation, t: np.ndarray, y: np.ndarray) -> Iterator[Remark]:
+
+def unstable(setup: Setup, t: np.ndarray, y: np.ndarray) -> Iterator[Remark]:
     """A remark if the loop is unstable about the start, the middle or the end of a run, as far as it is finite there.
 
     Args:
         setup: What ran.
-        equation: Its state equation.
         t: Times of its samples, (m,), in [s].
         y: Its states there, (m, size).
     """
     good = np.flatnonzero(np.isfinite(y).all(axis=1))
     looks = sorted({int(k) for k in good[[0, len(good) // 2, -1]]}) if len(good) else []
     for k in looks:  # the first of them: later ones may be far out
-        if found := growing(setup, equation, float(t[k]), y[k]):
+        if found := growing(setup, float(t[k]), y[k]):
             yield _remark(setup, found)
             return
 
 
 class Growing(NamedTuple):
-    """A loop in which deviations grow: when, of which joint most, by which factor a period; and its linearisation."""
+    """A loop in which deviations grow: the time, the joint, the factor in each period, and its linearisation."""
 
     t: float
     joint: str
@@ -57,12 +62,13 @@ class Growing(NamedTuple):
         return f"so it is with every period: take {remedy(anyway)}"
 
 
-def growing(setup: Setup, equation: StateEquation, t: float, y: np.ndarray) -> Growing | None:
+def growing(setup: Setup, t: float, y: np.ndarray) -> Growing | None:
     """The loop about a state y of a run, if it is sampled and deviations grow there because it is; otherwise None.
 
     Where they grow under control at all times too, as of an arm that falls, that is if they grow twice as fast.
     """
-    controller, motion, n = setup.controller, equation.equation_of_motion, setup.plant.dynamics.n
+    controller, equation, n = setup.controller, setup.equation, setup.plant.dynamics.n
+    motion = equation.equation_of_motion
     if controller is None or not equation.sampled or equation.canonical:
         return None
     if motion.payloads or any(drive.coupled for drive in motion.drives.values()):  # no one linearisation holds
@@ -89,3 +95,15 @@ def _remark(setup: Setup, found: Growing) -> Remark:
         f" {shown(after(found.factor, periods(setup.duration_s, period)))} over the run"
     )
     return Remark(Kind.UNSTABLE, joint, "q", t, 0.0, t, found.factor, 1.0, text, found.remedy(period))
+
+
+def explained(outcome: Outcome, setup: Setup, remarks: Iterable[Remark]) -> Outcome:
+    """The outcome of a run; if it diverged and a remark on its loop explains it, with that as advice."""
+    if outcome.ending is not Ending.DIVERGED or setup.controller is None:
+        return outcome
+    for remark in remarks:
+        if remark.kind is Kind.UNSTABLE:
+            elapsed = periods(outcome.t, setup.controller.period_s)
+            if elapsed * log(remark.value) > log(_EXPLAINS):
+                return replace(outcome, advice=lines([remark])[0])
+    return outcome

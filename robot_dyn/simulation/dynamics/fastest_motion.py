@@ -9,12 +9,12 @@ is the participation of entry i. [Hairer, Wanner 1996, IV.1; Pérez-Arriaga, Ver
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, final
+from typing import final
 
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.integrate.differences import by_state
+from robot_dyn.integrate.differences import by_state, rowwise
 from robot_dyn.simulation.dynamics.state_equation import CONTROL, StateEquation, numbered
 
 BODIES = "the motion of the bodies"
@@ -57,13 +57,8 @@ def jacobian(equation: StateEquation, t: float, y: Array, held: Array | None) ->
         y: State, (m,).
         held: The actuation in zero-order hold, or None.
     """
-    size = len(y) - len(equation.sources)
-
-    def f(at: Any, states: Array) -> Array:
-        rows = [equation.rate(t, row, held)[0] for row in states.reshape(-1, len(y))]
-        return np.array(rows).reshape(states.shape)
-
-    return np.moveaxis(by_state(f, t, y, equation.widths), 0, -1)[:size, :size]
+    size, rate = len(y) - len(equation.sources), rowwise(lambda row: equation.rate(t, row, held)[0])
+    return by_state(rate, t, y, equation.widths).T[:size, :size]
 
 
 def fastest(equation: StateEquation, t: float, y: Array, held: Array | None, *, oscillation: bool = False) -> Fastest:
@@ -107,11 +102,7 @@ def _accelerations(equation: StateEquation, t: float, y: Array, held: Array | No
     size = 2 * n + equation.states
     made = {}
     for k, name in enumerate(numbered(CONTROL, *(force.name for force in equation.plant.forces))):
-
-        def torque(at: Any, states: Array, k: int = k) -> Array:
-            rows = states.reshape(-1, size)
-            return np.array([_torque(equation, k, t, row, held) for row in rows]).reshape(*states.shape[:-1], n)
-
+        torque = rowwise(lambda x, k=k: _torque(equation, k, t, x, held))
         made[name] = np.linalg.solve(M, by_state(torque, t, y[:size], equation.widths[:size]).T)
     return made
 

@@ -10,6 +10,7 @@ import numpy as np
 from robot_dyn.arithmetic import Array
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import QueryError
+from robot_dyn.integrate.differences import of_fourth_order
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.validate import one_state
 
@@ -52,16 +53,9 @@ def linearise(
     def a(x: np.ndarray) -> np.ndarray:
         return plant.forward_dynamics(t, x[:n], x[n : 2 * n], x[2 * n :])
 
-    def differences(h: float) -> np.ndarray:
-        slopes = np.empty((n, 3 * n))
-        for i, step in enumerate(h * np.eye(3 * n)):
-            near, far = a(x + step) - a(x - step), a(x + 2 * step) - a(x - 2 * step)
-            slopes[:, i] = (8 * near - far) / (12 * h)
-        return slopes
-
-    slopes, rest = differences(_STEPS[0]), list(_STEPS[1:])
+    slopes, rest = of_fourth_order(a, x, _STEPS[0]), list(_STEPS[1:])
     while rest:  # steep friction needs a short step; the longest one that a shorter one confirms errs least
-        shorter = differences(rest.pop(0))
+        shorter = of_fourth_order(a, x, rest.pop(0))
         if np.abs(shorter - slopes).max() <= _AGREE * np.abs(shorter).max():
             break
         slopes = shorter

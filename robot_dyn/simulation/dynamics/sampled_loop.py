@@ -22,7 +22,7 @@ from robot_dyn.control.controller import Controller
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import RobotDynError
 from robot_dyn.foreign import call
-from robot_dyn.integrate.differences import by_state
+from robot_dyn.integrate.differences import by_state, rowwise
 from robot_dyn.simulation.dynamics.fastest_motion import jacobian
 from robot_dyn.simulation.dynamics.stability import NO_BOUND, STILL, Growth, Stability, first_unstable, growth, lengths
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
@@ -137,7 +137,7 @@ def linearised(plant: Plant, controller: Controller, t: float, y: Array) -> Samp
     u = _law(continuous, continuous.torque, t, n)(t, law)
     A = jacobian(free, t, x, u)
     m = len(A)
-    B = by_state(_rows(lambda each: free.rate(t, x, each)[0][:m]), t, u).T
+    B = by_state(rowwise(lambda each: free.rate(t, x, each)[0][:m]), t, u).T
     driven = np.block([[A, B], [np.zeros((n, m + n))]])
 
     def cycle(period: float) -> Array:
@@ -194,14 +194,4 @@ def _tick(controller: Controller, t: float, joints: Array, z: Array, m: int) -> 
 
 def _law(controller: Controller, function: Callable[..., Any], t: float, n: int) -> Callable[[Any, Array], Array]:
     """A function of a controller, of rows (q, v, z)."""
-    return _rows(lambda row: call(function, t, row[:n], row[n : 2 * n], row[2 * n :]))
-
-
-def _rows(function: Callable[[Array], Any]) -> Callable[[Any, Array], Array]:
-    """A function of one state for states (…, m)."""
-
-    def f(at: Any, states: Array) -> Array:
-        made = [np.asarray(function(row), dtype=float) for row in states.reshape(-1, states.shape[-1])]
-        return np.array(made).reshape(*states.shape[:-1], -1)
-
-    return f
+    return rowwise(lambda row: call(function, t, row[:n], row[n : 2 * n], row[2 * n :]))

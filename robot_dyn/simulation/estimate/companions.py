@@ -23,16 +23,16 @@ from robot_dyn.simulation.results.error_estimate import ErrorEstimate, Verdict, 
 from robot_dyn.simulation.run.recording import Path
 
 ROUNDED = "what rounding leaves of q, as the motion magnifies it, is more than"
-PUSH = 4.0  # units of rounding by which a start is moved, to see what the motion makes of rounding
+PUSH = 4.0  # units of rounding by which a start is moved, to see how the motion magnifies rounding
 ROUNDING = 4500  # units of rounding of q, or as many as steps if there are more: differences below are not an error
 COARSE = (Fraction(2), Fraction(3), Fraction(5))
 FINE = (Fraction(1, 2), Fraction(1, 3))
 _UNITS = 100.0  # of rounding, that ten steps may leave in q
 _BAND = 2.0  # a ratio of differences may be this factor off the one of the method's order
 _ROWS = 2000  # of an estimate, at most
-_FAR_OFF = 8.0  # times the bound of the others: beyond, the longest step is no longer in the range of the method
-_DOUBT = 3.0  # times what the order of the method says: beyond, shorter steps are asked
-_LOST = 0.1  # of the motion, at most 0.1 rad or m: companions that differ by more tell nothing
+_FAR_OFF = 8.0  # times the bound of the others: above, the longest step is no longer in the range of the method
+_DOUBT = 3.0  # times what follows from the order of the method: above, shorter steps are needed
+_LOST = 0.1  # of the motion, at most 0.1 rad or m: companions that differ by more show nothing
 
 
 @final
@@ -45,7 +45,7 @@ class Estimated:
         n: Number of joints.
         kink: Time from which the right-hand side may not be smooth, in [s]: no division by 2ᵖ − 1 after it.
         floor: Error that rounding may leave in q, up to each state, (k,).
-        meaningless: Difference of companions that tells nothing, in [rad] or [m].
+        meaningless: Difference of companions that is meaningless, in [rad] or [m].
     """
 
     path: Path
@@ -61,17 +61,17 @@ class Estimated:
         bound = np.fmax(bound, np.minimum(C / 4, _FAR_OFF * bound))
         ratio = np.maximum(B, self.floor) / np.maximum(A, self.floor)
         nominal = (3.0**order - 1) / (2.0**order - 1)
-        seen = (ratio > nominal / _BAND) & (ratio < nominal * _BAND) | (self.floor >= A)
-        return self._judged(np.where(self._smooth(seen), A / (2.0**order - 1), bound), bound, seen)
+        order_seen = (ratio > nominal / _BAND) & (ratio < nominal * _BAND) | (self.floor >= A)
+        return self._judged(np.where(self._smooth(order_seen), A / (2.0**order - 1), bound), bound, order_seen)
 
-    def doubts(self, made: ErrorEstimate, companions: Mapping[Fraction, Path], order: int) -> bool:
-        """Whether an estimate from longer steps is far above what the order of the method would make of them.
+    def doubts(self, result: ErrorEstimate, companions: Mapping[Fraction, Path], order: int) -> bool:
+        """Whether an estimate from longer steps is far above the one that follows from the order of the method.
 
         Long steps may be unstable, or show no order for a while, where those of the run are neither. A kink is another
         matter: shorter steps show no order either.
         """
         by_order = differences(self.path, companions[COARSE[0]], self.n)[-1] / (2.0**order - 1)
-        return self.kink > self.path.t[-1] and not made.final <= _DOUBT * max(by_order, float(self.floor[-1]))
+        return self.kink > self.path.t[-1] and not result.final <= _DOUBT * max(by_order, float(self.floor[-1]))
 
     def from_shorter_steps(self, companions: Mapping[Fraction, Path], order: int) -> ErrorEstimate:
         """The estimate from companions of `FINE`: |q_h − q_{h/m}| = |e(h)| (1 − m⁻ᵖ), of order 1 where none shows."""
@@ -79,9 +79,9 @@ class Estimated:
         between = differences(third, half, self.n)[np.searchsorted(third.key[:-1], self.path.key)]
         gaps = [differences(self.path, each, self.n) for each in (half, third)]
         largest = np.maximum(np.maximum(*gaps), between)
-        seen = (between < largest / 2) | (largest <= self.floor)
-        error = np.maximum(largest, gaps[1] / (1 - 3.0 ** -np.where(self._smooth(seen), order, 1)))
-        return self._judged(error, error, seen)
+        order_seen = (between < largest / 2) | (largest <= self.floor)
+        error = np.maximum(largest, gaps[1] / (1 - 3.0 ** -np.where(self._smooth(order_seen), order, 1)))
+        return self._judged(error, error, order_seen)
 
     def from_refinement(self, near: np.ndarray, tight: Path | None) -> ErrorEstimate:
         """The estimate of a method that chooses its steps.
@@ -91,8 +91,8 @@ class Estimated:
             tight: The companion of a tenth of the tolerance, where something may switch unseen.
         """
         bound = near if tight is None else np.fmax(near, differences(self.path, tight, self.n))
-        seen = np.ones(len(near), bool)
-        return self._judged(np.where(self._smooth(seen), near, bound), bound, seen)
+        order_seen = np.ones(len(near), bool)
+        return self._judged(np.where(self._smooth(order_seen), near, bound), bound, order_seen)
 
     def begins_as_rounding(self, gap: np.ndarray, until: float) -> bool:
         """Whether differences from other steps are rounding alone up to a time, in [s], and more later."""
@@ -101,21 +101,21 @@ class Estimated:
         return bool(gap[last] < _UNITS * np.finfo(float).eps * size and np.any(gap > self.floor))
 
     def lost_at(self, companion: Path) -> float:
-        """Time in [s] at which a companion tells nothing more of the run; inf if it does not."""
+        """Time in [s] from which a companion is no longer comparable with the run; inf if there is none."""
         gap = differences(self.path, companion, self.n)
         lost = np.flatnonzero(np.isnan(gap) | (gap > self.meaningless))
         return float(self.path.t[lost[0]]) if len(lost) else np.inf
 
     @property
     def _limit(self) -> str:
-        """What `meaningless` is, in words."""
+        """A description of `meaningless`."""
         most = "rad or m" if self.meaningless >= _LOST else "[rad] or [m], a tenth of the motion"
         return f"{self.meaningless:.2g} {most}"
 
-    def _smooth(self, seen: np.ndarray) -> np.ndarray:
-        return seen & (self.path.t < self.kink)
+    def _smooth(self, order_seen: np.ndarray) -> np.ndarray:
+        return order_seen & (self.path.t < self.kink)
 
-    def _judged(self, error: np.ndarray, bound: np.ndarray, seen: np.ndarray) -> ErrorEstimate:
+    def _judged(self, error: np.ndarray, bound: np.ndarray, order_seen: np.ndarray) -> ErrorEstimate:
         """The estimate up to where nothing is known, with its verdict."""
         t, error = self.path.t, np.maximum(error, self.floor)
         bad = np.flatnonzero(np.isnan(bound) | (np.maximum(bound, self.floor) > self.meaningless))
@@ -126,7 +126,7 @@ class Estimated:
         if last < 1 < len(t):
             return no_estimate(note)
         rows = np.arange(last + 1) if last < _ROWS else np.unique(np.linspace(0, last, _ROWS).astype(int))
-        verdict = Verdict.ORDER if self._smooth(seen)[last] else Verdict.BOUND
+        verdict = Verdict.ORDER if self._smooth(order_seen)[last] else Verdict.BOUND
         return ErrorEstimate(t[rows], np.maximum.accumulate(error)[rows], float(t[last]), note, verdict)
 
 
@@ -158,7 +158,7 @@ def rounding(run: Path, n: int) -> np.ndarray:
 def carried(run: Path, pushed: np.ndarray, n: int) -> np.ndarray:
     """Error that rounding of every step leaves where the motion magnifies it: a random walk of steps, each magnified.
 
-    G(t) √Σ_k (u_k / G(t_k))²,    G what the motion has made of a push at the start, over that push
+    G(t) √Σ_k (u_k / G(t_k))²,    G the growth of a push at the start up to t
     """
     u = np.finfo(float).eps * (1 + np.maximum.accumulate(_largest(run.y[:, :n])))
     growth = np.fmax(pushed / (PUSH * np.finfo(float).eps), 1.0)
@@ -167,5 +167,5 @@ def carried(run: Path, pushed: np.ndarray, n: int) -> np.ndarray:
 
 
 def meaningless(step_log: Path, n: int) -> float:
-    """Difference of companions that tells nothing: a tenth of the motion of a run, at most 0.1 rad or m."""
+    """Difference of companions that is meaningless: a tenth of the motion of a run, at most 0.1 rad or m."""
     return _LOST * min(1.0, max(float(np.ptp(step_log.y[:, :n], axis=0).max()), 1e-6))

@@ -1,7 +1,7 @@
-"""The error estimate of a run: companion runs are made until one of the verdicts of `companions` holds to its end.
+"""The error estimate of a run: companion runs, until one of the verdicts of `companions` holds to its end.
 
 Longer steps cost about as much as the run and come first; shorter ones cost five times as much, and are taken where
-longer ones cannot be made, or do not show the order of the method throughout.
+longer ones are not possible, or do not show the order of the method throughout.
 """
 
 from __future__ import annotations
@@ -38,22 +38,22 @@ from robot_dyn.simulation.setup.setup import Setup
 
 _EARLY = 10  # steps of a method that chooses them: by then an error that is not rounding is more than that
 _GAIN = 1.1  # in the time resolved, that a shorter step must bring
-_FAR_TURN = 1.0  # [rad] in a step: beyond, longer steps may meet the same angles
-_BLIND_TURN = np.pi  # [rad] in a step: beyond, shorter ones may, too
+_FAR_TURN = 1.0  # [rad] in a step: above, longer steps may meet the same angles
+_BLIND_TURN = np.pi  # [rad] in a step: above, shorter ones may, too
 _FAR_PUSH = 1000 * PUSH  # of what a short step adds to q, rounding may lose all until v has grown
 
 Companion = Callable[[Any, Setup], Recording]  # of a factor of the steps, or of a mesh
 
 
-def estimate(setup: Setup, equation: StateEquation, run: Recording, companion: Companion) -> ErrorEstimate:
+def estimate(setup: Setup, run: Recording, companion: Companion) -> ErrorEstimate:
     """The estimated error of a run.
 
     Args:
         setup: What was run.
-        equation: Its state equation.
         run: What it left behind.
         companion: Runs a setup with steps, or tolerances, multiplied by a factor.
     """
+    equation = setup.equation
     if len(run.shared.t) < 2:
         return no_estimate("it ended in its first step")
     if equation.impulses and setup.integrator.nonsmooth:
@@ -66,16 +66,16 @@ def estimate(setup: Setup, equation: StateEquation, run: Recording, companion: C
     estimated = Estimated(run.shared, n, kink, rounding(run.shared, n), meaningless(run.step_log, n))
     method: Any = setup.integrator
     if method.controls_error:
-        made = _by_refinement(setup, method, run, estimated, companion)
+        result = _by_refinement(setup, method, run, estimated, companion)
     else:
-        if motion := damped_oscillation(setup, equation, run):
+        if motion := damped_oscillation(setup, run):
             return no_estimate(
                 f"the energy ledger does not close: {motion}, which {method.name} damps in steps longer than"
                 f" {1 / abs(motion.eigenvalue):.0e} s, so that runs with other steps do not show it; take shorter ones"
             )
-        made = _by_steps(setup, method, estimated, companion, _turn(equation, run.step_log))
-        made = _until_alike(setup, run, made)
-    return _advised(setup, _looked_between(setup, equation, run, made), why)
+        result = _by_steps(setup, method, estimated, companion, _turn(equation, run.step_log))
+        result = _until_alike(setup, run, result)
+    return _advised(setup, _looked_between(setup, run, result), why)
 
 
 def _by_steps(
@@ -86,30 +86,30 @@ def _by_steps(
         return no_estimate(
             f"a joint turns by {turn:.3g} rad in a step, so that runs with other steps may meet the same angles"
         )
-    made = no_estimate("fewer than 3 steps between ticks, switches or breaks")
+    result = no_estimate("fewer than 3 steps between ticks, switches or breaks")
     if turn < _FAR_TURN and min(each.steps for each in setup.segments) >= LEAST_STEPS:
         paths = {pace: companion(pace, setup).shared for pace in COARSE}
         magnified = _with_rounding(estimated, companion(COARSE[1], _pushed(setup)).shared, paths[COARSE[1]])
-        made = magnified.from_longer_steps(paths, method.order)
-        if made.resolved_until >= estimated.path.t[-1] and not estimated.doubts(made, paths, method.order):
-            return made
+        result = magnified.from_longer_steps(paths, method.order)
+        if result.resolved_until >= estimated.path.t[-1] and not estimated.doubts(result, paths, method.order):
+            return result
     half = companion(FINE[0], setup).shared
-    if made.resolved_until > 0 and estimated.lost_at(half) < _GAIN * made.resolved_until:
-        return made  # chaos: no step of practical length resolves it
+    if result.resolved_until > 0 and estimated.lost_at(half) < _GAIN * result.resolved_until:
+        return result  # chaos: no step of practical length resolves it
     magnified = estimated
     for units in (PUSH, _FAR_PUSH):
         pushed = companion(Fraction(1), _pushed(setup, units)).shared
         magnified = _with_rounding(magnified, pushed, estimated.path, units)
     shorter = magnified.from_shorter_steps({FINE[0]: half, FINE[1]: companion(FINE[1], setup).shared}, method.order)
-    return shorter if shorter.resolved_until >= made.resolved_until else made
+    return shorter if shorter.resolved_until >= result.resolved_until else result
 
 
-def _until_alike(setup: Setup, run: Recording, made: ErrorEstimate) -> ErrorEstimate:
-    """The estimate up to where each companion cuts its steps as the run does, so that all make the same one or two."""
+def _until_alike(setup: Setup, run: Recording, result: ErrorEstimate) -> ErrorEstimate:
+    """The estimate up to where each companion cuts its steps as the run does, so that all take the same one or two."""
     alike = cut_alike(setup, run)
-    if alike is None or alike.t >= made.resolved_until:
-        return made
-    return replace(made, resolved_until=alike.t, note=alike.why)
+    if alike is None or alike.t >= result.resolved_until:
+        return result
+    return replace(result, resolved_until=alike.t, note=alike.why)
 
 
 def _by_refinement(
@@ -117,7 +117,7 @@ def _by_refinement(
 ) -> ErrorEstimate:
     """From half as long steps; where something may switch unseen, from a tenth of the tolerance as well.
 
-    Two runs whose errors are rounding alone, magnified, differ by anything: then a push tells how much is magnified.
+    Two runs whose errors are rounding alone, magnified, differ by anything: then a push shows how much is magnified.
     Steps of a tenth of the tolerance may err alike where stability bounds them, half as long ones where both step over
     a kink at the same place.
     """
@@ -137,7 +137,7 @@ def _by_refinement(
 
 
 def _with_rounding(estimated: Estimated, pushed: Path, of: Path, units: float = PUSH) -> Estimated:
-    """With what the motion makes of rounding as the floor, seen on a companion and another one that was pushed."""
+    """With magnified rounding as the floor, observed on a companion and another one that was pushed."""
     rounds = carried(of, differences(of, pushed, estimated.n) * (PUSH / units), estimated.n)
     rows = np.searchsorted(of.key[:-1], estimated.path.key)
     return replace(estimated, floor=np.fmax(estimated.floor, np.append(rounds, rounds[-1])[rows]))
@@ -149,7 +149,7 @@ def _tolerant(setup: Setup, method: Adaptive, factor: float) -> Setup:
 
 
 def _pushed(setup: Setup, units: float = PUSH) -> Setup:
-    """The setup from a start that differs by units of rounding: its run tells what the motion makes of rounding."""
+    """The setup from a start that differs by units of rounding: its run shows how the motion magnifies rounding."""
     sign = np.where(np.arange(len(setup.q0)) % 2, -1.0, 1.0)
     unit = units * np.finfo(float).eps
     q0, v0 = setup.q0 + sign * unit * (1 + np.abs(setup.q0)), setup.v0 + unit * (1 + np.abs(setup.v0))
@@ -165,22 +165,22 @@ def _turn(equation: StateEquation, step_log: Path) -> float:
     return float((np.abs(np.diff(step_log.y[:, : dynamics.n], axis=0)) / steps)[:, turns].max(initial=0.0))
 
 
-def _looked_between(setup: Setup, equation: StateEquation, run: Recording, made: ErrorEstimate) -> ErrorEstimate:
+def _looked_between(setup: Setup, run: Recording, result: ErrorEstimate) -> ErrorEstimate:
     """The estimate up to where something acted between two steps only, if that matters beside it."""
-    missed = stepped_over(setup, equation, run.step_log, made.final)
-    if missed is None or missed.t >= made.resolved_until:
-        return made
-    return replace(made, resolved_until=missed.t, note=missed.why)
+    missed = stepped_over(setup, run.step_log, result.final)
+    if missed is None or missed.t >= result.resolved_until:
+        return result
+    return replace(result, resolved_until=missed.t, note=missed.why)
 
 
-def _advised(setup: Setup, made: ErrorEstimate, why: str) -> ErrorEstimate:
+def _advised(setup: Setup, result: ErrorEstimate, why: str) -> ErrorEstimate:
     """The estimate with what to do where it ends early, and the reason where it is a bound."""
-    if made.verdict is Verdict.BOUND:
-        made = replace(made, reason=why or "the order of the method does not show")
-    if not made.note:
-        return made
-    if made.note.startswith(ROUNDED):
-        return replace(made, note=f"{made.note}; take a shorter run")
+    if result.verdict is Verdict.BOUND:
+        result = replace(result, reason=why or "the order of the method does not show")
+    if not result.note:
+        return result
+    if result.note.startswith(ROUNDED):
+        return replace(result, note=f"{result.note}; take a shorter run")
     method: Any = setup.integrator
     finer = f"rtol = {method.rtol / 100:.0e}" if method.controls_error else f"step_s = {setup.taken_step_s / 4:.0e}"
-    return replace(made, note=f"{made.note}; take {finer}, or a shorter run")
+    return replace(result, note=f"{result.note}; take {finer}, or a shorter run")

@@ -1,4 +1,4 @@
-"""A run to an accuracy that is asked for: a tolerance bounds the error of a step, what that leaves is measured.
+"""A run to a requested accuracy: a tolerance bounds the error of a step, the error of the run is measured.
 
     e = c · tol,   c from a pilot run at a loose tolerance
 
@@ -19,20 +19,22 @@ from robot_dyn.errors import RobotDynError
 from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, LEAST_RTOL, STIFF, Adaptive
 from robot_dyn.integrate.explicit import RK4
 from robot_dyn.simulation.dynamics.fastest_motion import fastest
-from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.observation.remarks import Kind
 from robot_dyn.simulation.results.trajectory import Accuracy, Trajectory
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.setup.setup import Setup
 
-_AIM = 0.3  # of what is asked
-_TRUSTED = 0.5  # of what is asked: the estimate of a run at a loose tolerance may be this part of its error
-_LOOSE = {EXPLICIT: 0.75, STIFF: 0.5}  # tolerance of the pilot, a power of what is asked; what is fast has decayed
+_AIM = 0.3  # of the requested error
+_TRUSTED = 0.5  # of the requested error: the estimate of a run at a loose tolerance may be this part of its error
+_LOOSE = {
+    EXPLICIT: 0.75,
+    STIFF: 0.5,
+}  # tolerance of the pilot, a power of the requested error; what is fast has decayed
 _LOOSEST = 1e-3
 _ATOL = 0.01  # over rtol
 _TRIES = 4  # runs of a tolerance, at most
 _LAST = 0.1  # of the tolerance before, at most, in the last run: coarse steps may show no proportion
-_TOO_MUCH = 1.7  # times the cost of a run with the error that is asked
+_TOO_MUCH = 1.7  # times the cost of a run with the requested error
 _FEW = 1.5  # steps between ticks, switches and events, where these decide on them
 _MANY = 20  # segments of sampled control, in each of which one step of RK4 may do
 _LONG = 500.0  # |λ| T: explicit steps, of |λ| h = 6 at most, are then as many as those of a run that is not stiff
@@ -41,10 +43,10 @@ _WEIGHT = {STIFF: 2}  # of its evaluations, Jacobians and eliminations included
 
 
 class AccuracyError(RobotDynError):
-    """An accuracy that cannot be had; says which can, and why.
+    """An accuracy that cannot be reached; says which can, and why.
 
     Attributes:
-        best: The least estimated error of the runs that were made, in [rad] or [m]; inf if none holds to the end.
+        best: The least estimated error of the trial runs, in [rad] or [m]; inf if none holds to the end.
     """
 
     def __init__(self, message: str, best: float = inf) -> None:
@@ -52,83 +54,85 @@ class AccuracyError(RobotDynError):
         self.best = best
 
 
-def run_to(setup: Setup, asked: float, run: Callable[[Setup], Trajectory]) -> Trajectory:
-    """The run of a setup whose estimated error is at most what is asked; one that does not finish is returned as it is.
+def run_to(setup: Setup, requested: float, run: Callable[[Setup], Trajectory]) -> Trajectory:
+    """Return a run whose estimated error is at most the requested one; or the first that does not finish.
 
     The estimate is to be half of it at most. Where no run has that, the best one is returned if its estimate is at
-    most what is asked.
+    most the requested error.
 
     Args:
         setup: What to run.
-        asked: Largest error of q at any time, over the joints, in [rad] and [m].
+        requested: Largest error of q at any time, over the joints, in [rad] and [m].
         run: Runs a setup, and estimates its error.
 
     Raises:
-        AccuracyError: If it cannot be had.
+        AccuracyError: If it cannot be reached.
     """
-    simple, spent = _in_each_segment(setup, asked, run)
+    simple, spent = _in_each_segment(setup, requested, run)
     if simple is not None:
         return simple
     least, stiff = 1.01 * LEAST_RTOL, _stiff(setup)
     method = STIFF if stiff else AUTO
-    rtol = max(least, min(_LOOSEST, asked ** _LOOSE[STIFF if stiff else EXPLICIT]))
+    rtol = max(least, min(_LOOSEST, requested ** _LOOSE[STIFF if stiff else EXPLICIT]))
     tried: list[_Try] = []
     for k in range(_TRIES):
-        made, more = _at(setup, method, rtol, asked, run)
+        trial, more = _at(setup, method, rtol, requested, run)
         spent += more
-        if made.outcome.ending is not Ending.FINISHED:
-            return made
-        error, method = _resolved(made), made.statistics.method
-        tried.append(_Try(error, rtol, made))
-        least_cost = made.statistics.evaluations * _WEIGHT.get(method, 1) / _TOO_MUCH
-        if error <= _TRUSTED * asked and (
-            k > 0 or rtol == _LOOSEST or not _decides(setup, made) or _predicted(made, asked) > least_cost
+        if trial.outcome.ending is not Ending.FINISHED:
+            return trial
+        error, method = _resolved(trial), trial.statistics.method
+        tried.append(_Try(error, rtol, trial))
+        least_cost = trial.statistics.evaluations * _WEIGHT.get(method, 1) / _TOO_MUCH
+        if error <= _TRUSTED * requested and (
+            k > 0 or rtol == _LOOSEST or not _decides(setup, trial) or _predicted(trial, requested) > least_cost
         ):
-            return _achieved(tried[-1], asked, spent)
+            return _achieved(tried[-1], requested, spent)
         if rtol == least:
             break
-        factor = _AIM * asked / error if isfinite(error) else 1e-2
+        factor = _AIM * requested / error if isfinite(error) else 1e-2
         rtol = max(least, min(_LOOSEST, rtol * (min(factor, _LAST) if k == _TRIES - 2 else factor)))
     best = min(tried, key=lambda each: each.error)
-    if best.error <= asked:
-        return _achieved(best, asked, spent)
-    raise AccuracyError(_refusal(best, asked, tried[-1].rtol), best.error)
+    if best.error <= requested:
+        return _achieved(best, requested, spent)
+    raise AccuracyError(_refusal(best, requested, tried[-1].rtol), best.error)
 
 
 def _at(
-    setup: Setup, method: str, rtol: float, asked: float, run: Callable[[Setup], Trajectory]
+    setup: Setup, method: str, rtol: float, requested: float, run: Callable[[Setup], Trajectory]
 ) -> tuple[Trajectory, int]:
     """The run at a tolerance, of the cheaper method where stability bounds explicit steps; what all of it took."""
-    made = run(replace(setup, integrator=Adaptive(method, rtol, _ATOL * rtol)))
-    if method != AUTO or made.statistics.method != EXPLICIT or _sampled(setup) or not _stable_at_most(made):
-        return made, _in_all(made)
+    trial = run(replace(setup, integrator=Adaptive(method, rtol, _ATOL * rtol)))
+    if method != AUTO or trial.statistics.method != EXPLICIT or setup.equation.sampled or not _stable_at_most(trial):
+        return trial, _in_all(trial)
     other = run(replace(setup, integrator=Adaptive(STIFF, rtol, _ATOL * rtol)))
-    return min((made, other), key=lambda each: _predicted(each, asked)), _in_all(made) + _in_all(other)
+    return min((trial, other), key=lambda each: _predicted(each, requested)), _in_all(trial) + _in_all(other)
 
 
 class _Try(NamedTuple):
-    """A run, the tolerance it was made with, 0 for a fixed step, and its estimated error."""
+    """A run, its tolerance, 0 for a fixed step, and its estimated error."""
 
     error: float
     rtol: float
-    made: Trajectory
+    trial: Trajectory
 
 
-def _in_each_segment(setup: Setup, asked: float, run: Callable[[Setup], Trajectory]) -> tuple[Trajectory | None, int]:
+def _in_each_segment(
+    setup: Setup, requested: float, run: Callable[[Setup], Trajectory]
+) -> tuple[Trajectory | None, int]:
     """One step of RK4 between ticks of sampled control, if that is accurate enough; what that took."""
-    if not _sampled(setup) or len(setup.segments) < _MANY:
+    if not setup.equation.sampled or len(setup.segments) < _MANY:
         return None, 0
-    made = run(replace(setup, integrator=RK4, step_s=setup.duration_s))
-    error, spent = _resolved(made), _in_all(made)
-    good = made.outcome.ending is Ending.FINISHED and error <= _TRUSTED * asked
-    return (_achieved(_Try(error, 0.0, made), asked, spent) if good else None), spent
+    trial = run(replace(setup, integrator=RK4, step_s=setup.duration_s))
+    error, spent = _resolved(trial), _in_all(trial)
+    good = trial.outcome.ending is Ending.FINISHED and error <= _TRUSTED * requested
+    return (_achieved(_Try(error, 0.0, trial), requested, spent) if good else None), spent
 
 
 def _stiff(setup: Setup) -> bool:
     """Whether explicit steps would be many for the fastest decay at the start."""
-    if _sampled(setup):
+    if setup.equation.sampled:
         return False
-    equation = StateEquation(setup.plant, setup.controller).in_a_mode
+    equation = setup.equation.in_a_mode
     try:
         motion = fastest(equation, 0.0, equation.start(setup.q0, setup.v0), None)
     except (RobotDynError, np.linalg.LinAlgError):
@@ -136,57 +140,53 @@ def _stiff(setup: Setup) -> bool:
     return motion.decays and abs(motion.eigenvalue) * setup.duration_s > _LONG
 
 
-def _sampled(setup: Setup) -> bool:
-    return setup.controller is not None and setup.controller.period_s > 0
-
-
-def _stable_at_most(made: Trajectory) -> bool:
+def _stable_at_most(trial: Trajectory) -> bool:
     """Whether stability bounds the steps."""
-    return any(each.kind is Kind.STIFF for each in made.remarks)
+    return any(each.kind is Kind.STIFF for each in trial.remarks)
 
 
-def _decides(setup: Setup, made: Trajectory) -> bool:
+def _decides(setup: Setup, trial: Trajectory) -> bool:
     """Whether the tolerance decides on the steps, and not stability, ticks, switches or events."""
-    return not _stable_at_most(made) and made.statistics.steps > _FEW * (len(setup.segments) + len(made.events))
+    return not _stable_at_most(trial) and trial.statistics.steps > _FEW * (len(setup.segments) + len(trial.events))
 
 
-def _in_all(made: Trajectory) -> int:
-    return made.statistics.evaluations + made.statistics.companion_evaluations
+def _in_all(trial: Trajectory) -> int:
+    return trial.statistics.evaluations + trial.statistics.companion_evaluations
 
 
-def _predicted(made: Trajectory, asked: float) -> float:
-    """Cost of a run of its method with the error that is asked, in evaluations."""
-    if made.outcome.ending is not Ending.FINISHED:
+def _predicted(trial: Trajectory, requested: float) -> float:
+    """Cost of a run of its method with the requested error, in evaluations."""
+    if trial.outcome.ending is not Ending.FINISHED:
         return inf
-    name, factor = made.statistics.method, _resolved(made) / (_AIM * asked)
-    return made.statistics.evaluations * _WEIGHT.get(name, 1) * factor ** (1 / _ORDER[name])
+    name, factor = trial.statistics.method, _resolved(trial) / (_AIM * requested)
+    return trial.statistics.evaluations * _WEIGHT.get(name, 1) * factor ** (1 / _ORDER[name])
 
 
-def _resolved(made: Trajectory) -> float:
+def _resolved(trial: Trajectory) -> float:
     """The estimated error of a run; inf where it does not hold to the end."""
-    error = made.error
+    error = trial.error
     return error.final if error is not None and not error.note else inf
 
 
-def _achieved(chosen: _Try, asked: float, spent: int) -> Trajectory:
+def _achieved(chosen: _Try, requested: float, spent: int) -> Trajectory:
     """With the evaluations of all runs, and those of one ten times as accurate, and of one a tenth: e = O(hᵖ)."""
-    made, s = chosen.made, chosen.made.statistics
+    trial, s = chosen.trial, chosen.trial.statistics
     factor = 10 ** (1 / _ORDER[s.method])
     return replace(
-        made,
+        trial,
         accuracy=Accuracy(
-            asked, chosen.error, chosen.rtol, s.evaluations, spent - _in_all(made), s.companion_evaluations,
+            requested, chosen.error, chosen.rtol, s.evaluations, spent - _in_all(trial), s.companion_evaluations,
             s.evaluations * factor, s.evaluations / factor,
         ),
     )  # fmt: skip
 
 
-def _refusal(best: _Try, asked: float, rtol: float) -> str:
-    """Why the best run does not have what is asked, although tolerances went down to the given one."""
-    why = "" if best.made.error is None else best.made.error.note
+def _refusal(best: _Try, requested: float, rtol: float) -> str:
+    """Why the best run does not have the requested error, although tolerances went down to the given one."""
+    why = "" if best.trial.error is None else best.trial.error.note
     if not why:
-        method = best.made.statistics.method
+        method = best.trial.statistics.method
         least = f"{method}'s least tolerance" if rtol <= 1.01 * LEAST_RTOL else "the tolerance"
         why = f"the estimated error is {best.error:.1e} at {least}, {rtol:.1e}"
     remedy = f"ask for {1.1 * best.error / _TRUSTED:.1e}" if isfinite(best.error) else "take a shorter run"
-    return f"accuracy {asked:.1e} cannot be had: {why}; {remedy}"
+    return f"accuracy {requested:.1e} cannot be had: {why}; {remedy}"

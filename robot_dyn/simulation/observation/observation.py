@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import NamedTuple, final
+from typing import Annotated, NamedTuple, final
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from robot_dyn.arithmetic import Array
 from robot_dyn.integrate.primitives import enclose
 from robot_dyn.simulation.observation.chatter import Chatter, Episode, chatters_of, close_all, tick
 from robot_dyn.simulation.observation.guard_levels import GuardLevels, Level
-from robot_dyn.values import Value, read_only
+from robot_dyn.values import Layout, Value, read_only
 
 _NONE: Mapping[int, Observation] = MappingProxyType({})
 
@@ -166,12 +166,12 @@ class Observed(Value):
         episodes: Start, duration and amplitude of the chatter of each joint, (B, n, 3); of amplitude 0 without any.
     """
 
-    extremes: np.ndarray
-    instants: np.ndarray
+    extremes: Annotated[np.ndarray, Layout(("B", 3, 2, "n"))]
+    instants: Annotated[np.ndarray, Layout(("B",), "int64")]
     levels: tuple[Level, ...]
-    limits: np.ndarray
-    visits: np.ndarray
-    episodes: np.ndarray
+    limits: Annotated[np.ndarray, Layout(("B", "L"))]
+    visits: Annotated[np.ndarray, Layout(("B", "L", 4))]
+    episodes: Annotated[np.ndarray, Layout(("B", "n", 3))]
 
     def __post_init__(self) -> None:
         read_only(self)

@@ -1,1 +1,10 @@
-"""The trajectory of a run: samples, ledger, tables, files, where it came from."""
+"""The result of a run, and its file.
+
+- trajectory: `Trajectory`, its statistics and requested accuracy; summary: its text.
+- samples: what follows from states: acceleration, actuation, power, energy, tracking error; ledger: energy and work.
+- error_estimate: the estimated error and its verdict.
+- acting: what acts: names, wrenches on links, stops that joints bear on.
+- provenance: texts from which the robot of a run is built again.
+- run_file: files of runs and of rollouts; serialise: dataclasses as arrays and plain data; archive: named arrays in a
+  .npz file, read within bounds.
+"""

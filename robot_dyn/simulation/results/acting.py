@@ -1,17 +1,25 @@
-"""What acts on a plant, in words: gravity, payloads, the other edits, the effects and the control."""
+"""What acts on a plant: by name, as wrenches on links, F = (f, τ), and as stops that joints bear on."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
+from robot_dyn.effects.joint_limit import JointStopSpring
+from robot_dyn.effects.plant import Plant
+from robot_dyn.effects.rigid_stops import RigidStops
+from robot_dyn.effects.wrench import ExternalWrench
 from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.setup.setup import Setup
 
+_FAR = 1e9  # a run that diverged has samples beyond any placement
+_BEFORE = 2.0**-22  # of its time, a switch's own past: distinct from it in single precision too, which viewers use
+
 
 def acting(setup: Setup) -> tuple[str, ...]:
-    """What acts in a run, by the names of scenes, with units."""
+    """Return what acts in a run, by the names of scenes, with units."""
     dynamics = setup.plant.dynamics
     robot = getattr(dynamics, "robot", dynamics)
     edits = _edits(robot) if isinstance(robot, Robot) else ()
@@ -31,3 +39,48 @@ def _edits(robot: Robot) -> Iterator[str]:
     if any(value for _, value in edits.armature):
         yield "armature"
     yield from (f"lock {joint}" for joint, _ in edits.lock)
+
+
+def wrenches(plant: Plant, t: np.ndarray, q: np.ndarray) -> dict[str, np.ndarray]:
+    """External wrench on each link that has one, in base axes at the link's frame.
+
+    Args:
+        plant: What moves.
+        t: Times of the samples, (m,), in [s].
+        q: Positions, (m, n).
+
+    Returns:
+        By link, rows (t, force, torque), (k, 7), in [s], [N], [N m]: at the samples, and at both sides of each switch.
+    """
+    effects = [effect for effect in plant.effects if isinstance(effect, ExternalWrench)]
+    total: dict[str, np.ndarray] = {}
+    links = {effect.frame: link_of(plant.dynamics, effect.frame) for effect in effects}
+    for link in dict.fromkeys(links.values()):
+        mine = [effect for effect in effects if links[effect.frame] == link]
+        switches = np.array([s for effect in mine for s in effect.switches if t[0] < s <= t[-1]])
+        times = np.unique(np.concatenate([t, switches, switches * (1 - _BEFORE)]))
+        at = np.stack([np.interp(times, t, np.clip(np.nan_to_num(column), -_FAR, _FAR)) for column in q.T], axis=1)
+        placement = plant.dynamics.placement(at, link)
+        F = sum(np.where(effect.acts(times)[:, None], effect.at(placement), 0.0) for effect in mine)
+        total[link] = np.column_stack([times, F])
+    return total
+
+
+def link_of(dynamics: Any, frame: str) -> str:
+    """The link of a frame, which may be called by its joint."""
+    robot = getattr(dynamics, "robot", dynamics)
+    return robot.description.joint_frames.get(frame, frame) if isinstance(robot, Robot) else frame
+
+
+def at_stop(plant: Plant, q: np.ndarray) -> np.ndarray | None:
+    """Whether each joint bears on a soft stop, or touches a rigid one, (m, n); None without stops."""
+    soft = [(q < x.lower) | (q > x.upper) for x in plant.effects if isinstance(x, JointStopSpring)]
+    rigid = [x.touched(q) != 0 for x in plant.effects if isinstance(x, RigidStops)]
+    return np.any(soft + rigid, axis=0) if soft or rigid else None
+
+
+def frame_of(setup: Setup) -> dict[str, str]:
+    """The link whose motion is controlled, as a text of the run; nothing if it is that of the joints."""
+    if setup.controller is None or setup.controller.task_frame is None:
+        return {}
+    return {"frame": link_of(setup.plant.dynamics, setup.controller.task_frame)}

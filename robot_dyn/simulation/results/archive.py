@@ -20,7 +20,7 @@ import numpy as np
 
 from robot_dyn.errors import RobotDynError, shorten
 
-_DIGEST = "sha256"  # the member that holds it; it covers all others
+DIGEST = "sha256"  # the member that holds it; it covers all others
 _MOST_MEMBERS = 10_000
 _MOST_HEADER = 4096  # bytes of an array's own header; NumPy writes 118
 _MOST_NAME = 10_000  # characters; zip files end at 65 535 bytes
@@ -61,7 +61,7 @@ def write(stream: BinaryIO, arrays: Mapping[str, np.ndarray]) -> None:
         if "\0" in name or len(name) > _MOST_NAME:
             raise ArchiveError(f"{shorten(name)!r} cannot be a name in a file; use a shorter one, without NUL")
     contents = {name: np.ascontiguousarray(array).reshape(np.shape(array)) for name, array in arrays.items()}
-    contents[_DIGEST] = np.array(_digest(contents))
+    contents[DIGEST] = np.array(_digest(contents))
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as file:
         for name, array in contents.items():
             with file.open(f"{name}.npy", "w", force_zip64=True) as member:
@@ -70,7 +70,7 @@ def write(stream: BinaryIO, arrays: Mapping[str, np.ndarray]) -> None:
 
 @final
 class Archive:
-    """An archive open for reading; `headers` tell what each member holds.
+    """An archive open for reading; `headers` describe what each member holds.
 
     Args:
         stream: Of a regular file.
@@ -121,9 +121,9 @@ class Archive:
             return str(array)
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """All arrays; ArchiveError unless they are those that the digest was made of."""
-        arrays = {name: self.array(name) for name in self.headers if name != _DIGEST}
-        if self.text(_DIGEST) != _digest(arrays):
+        """All arrays; ArchiveError unless the digest is that of their contents."""
+        arrays = {name: self.array(name) for name in self.headers if name != DIGEST}
+        if self.text(DIGEST) != _digest(arrays):
             raise ArchiveError("its SHA-256 is not that of its contents: it was changed after it was written")
         return arrays
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import final
+from typing import Annotated, final
 
 import numpy as np
 
-from robot_dyn.values import Value, read_only
+from robot_dyn.values import Layout, Value, read_only
 
 
 class Verdict(StrEnum):
@@ -33,8 +33,8 @@ class ErrorEstimate(Value):
         reason: Why an error that is bounded shows no order.
     """
 
-    t: np.ndarray
-    error: np.ndarray
+    t: Annotated[np.ndarray, Layout(("k",))]
+    error: Annotated[np.ndarray, Layout(("k",), finite=False)]
     resolved_until: float
     note: str = ""
     verdict: Verdict = Verdict.ORDER

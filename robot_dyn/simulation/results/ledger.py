@@ -7,11 +7,11 @@ Why one is not near zero is found by `imbalance`.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import final
+from typing import Annotated, final
 
 import numpy as np
 
-from robot_dyn.values import Value, read_only
+from robot_dyn.values import Layout, Value, read_only
 
 _OPEN = 1e-3  # a residual, as a part of the energy exchanged
 _ROUNDING = 1e-12  # of the energies, whose differences are the residual
@@ -31,11 +31,11 @@ class Ledger(Value):
         cause: Why it does not close, and what to do; empty if it closes, or the cause was not looked for.
     """
 
-    kinetic: np.ndarray
-    potential: np.ndarray
-    work: dict[str, np.ndarray]
+    kinetic: Annotated[np.ndarray, Layout(("m",), absent=True)]
+    potential: Annotated[np.ndarray, Layout(("m",), absent=True)]
+    work: dict[str, Annotated[np.ndarray, Layout(("m",), absent=True)]]
     kinetic_peak: float = 0.0
-    stored: dict[str, np.ndarray] = field(default_factory=dict)
+    stored: dict[str, Annotated[np.ndarray, Layout(("m",))]] = field(default_factory=dict)
     cause: str = ""
 
     def __post_init__(self) -> None:

@@ -1,7 +1,7 @@
 """The origin of a run: the texts from which its robot is built again, wherever the file is read.
 
 A run file carries the URDF, the edits, the scene and the versions, so that a replay needs nothing else but meshes.
-These are found from the path of the URDF, which a file holds in a form that tells nothing of the machine.
+These are found from the path of the URDF, which a file holds in a form that reveals nothing about the machine.
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ def origin(dynamics: Any) -> dict[str, str]:
 
 def edits_of_machine_code(setup: Setup) -> dict[str, str]:
     """What machine code changes of a setup, as texts of a run: right angles of plant and controller's models."""
-    words = written_out(setup.plant.dynamics, *(setup.controller.models.values() if setup.controller else ()))
-    return {"right_angles": words} if words else {}
+    edited_angles = written_out(setup.plant.dynamics, *(setup.controller.models.values() if setup.controller else ()))
+    return {"right_angles": edited_angles} if edited_angles else {}
 
 
 def packed(about: dict[str, str], folder: Path) -> dict[str, str]:
-    """The texts of a run as a file in `folder` keeps them."""
+    """The texts of a run as a file in `folder` stores them."""
     return about | {"source": portable(about["source"], folder)} if "source" in about else about
 
 
@@ -60,7 +60,7 @@ def unpacked(about: dict[str, str], folder: Path) -> dict[str, str]:
 
 
 def portable(source: str, folder: Path) -> str:
-    """The path of a URDF from the folder of a run, or from the user's own folder (~); else its name alone.
+    """The path of a URDF from the folder of a run, or from the home folder (~); else its name alone.
 
     A robot of the catalog needs no more than its name: its meshes are found in the installed package.
     """

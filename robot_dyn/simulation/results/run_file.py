@@ -1,26 +1,33 @@
-"""Run files: one .npz that holds a trajectory and all it came from.
+"""Run files: one .npz that holds a trajectory, or the runs of a batch, and all it came from.
 
-Each array of the trajectory is a member, under the path of its field; what is text (joint names, outcome, statistics,
-URDF, edits, scene, versions) is one JSON text, `about`. A SHA-256 covers all of it.
+Each array is a member, under the path of its field; what is text (joint names, outcome, statistics, URDF, edits, scene,
+versions) is one JSON text, `about`. A SHA-256 covers all of it.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, Generic, TypeVar, final
 
 import numpy as np
 
 from robot_dyn.errors import RobotDynError, shorten
 from robot_dyn.files import Kind, save, target
 from robot_dyn.reading import file_path, reading
-from robot_dyn.simulation.results.archive import Archive, ArchiveError, Header, write
+from robot_dyn.simulation.results.archive import DIGEST, Archive, ArchiveError, Header, write
 from robot_dyn.simulation.results.provenance import packed, unpacked
-from robot_dyn.simulation.results.schema import MEMBERS, Member, check_headers, member
-from robot_dyn.simulation.results.serialise import Arrays, SerialError, build, take_apart
+from robot_dyn.simulation.results.serialise import (
+    Arrays,
+    SerialError,
+    build,
+    check_headers,
+    layout_of,
+    layouts,
+    take_apart,
+)
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.setup.size import LONGEST_S
@@ -29,22 +36,73 @@ from robot_dyn.validate import integer
 FORMAT = 4
 ROLLOUTS_FORMAT = "rollouts 3"
 RUN = Kind("a run file", ".npz", b"PK\x03\x04")
-MAX_BYTES = 4 * 2**30  # of the arrays of a run that is read without being asked for more
+MAX_BYTES = 4 * 2**30  # of the arrays of a run that is read, unless more is requested
 _MAX_TEXT = 2**28  # bytes of `about`, 4 a character; the largest URDF that loads has 2^24
 
-
 Run = TypeVar("Run", bound=Any)
-RunOf = TypeVar("RunOf", covariant=True)
-
-
-class Checked(Protocol[RunOf]):
-    """Gives the run of arrays and plain data, or an ArchiveError if they do not fit together."""
-
-    def __call__(self, arrays: Arrays, about: dict[str, Any], /) -> RunOf: ...
 
 
 class RunFileError(RobotDynError):
     """A run file that cannot be written or read."""
+
+
+@final
+@dataclass(frozen=True)
+class Format(Generic[Run]):
+    """A format of run files.
+
+    Attributes:
+        name: As a file states it.
+        kind: Type of what it holds, a dataclass with `about`.
+        check: Raises an ArchiveError if the numbers cannot be those of runs.
+    """
+
+    name: int | str
+    kind: type[Run]
+    check: Callable[[Run], None]
+
+    def write(self, run: Run, path: str | Path) -> Path:
+        """Write a run, or many, after the checks of a reader; errors as of `save_run`."""
+        path = target(path, RUN, RunFileError)
+        try:
+            arrays, plain = take_apart(replace(run, about=packed(run.about, path.parent)))
+            text = json.dumps({"format": self.name} | plain)
+            self._built(arrays, json.loads(text))
+            return save(path, lambda stream: write(stream, arrays | {"about": np.array(text)}), RunFileError)
+        except (ArchiveError, SerialError, TypeError, ValueError) as error:
+            raise RunFileError(
+                f"the run cannot be written to {path}: {error}; save one that rd.simulate gives"
+            ) from None
+
+    def read(self, path: str | Path, max_bytes: int) -> Run:
+        """Read what `write` wrote; errors as of `load_run`."""
+        path = file_path(path, RunFileError)
+        max_bytes = integer("max_bytes", max_bytes, most=2**63 - 1, error=RunFileError)
+        writes = "rd.save_rollouts" if self.name == ROLLOUTS_FORMAT else f"robot-dyn simulate … -o {path}"
+        with reading(path, RunFileError, f"write one with {writes}") as stream:
+            try:
+                archive = Archive(stream)
+                about, found = _about(archive)
+                _check_format(found, self.name, path)
+                described = {name: header for name, header in archive.headers.items() if name not in ("about", DIGEST)}
+                check_headers(self.kind, described, about)
+                if archive.size > max_bytes:
+                    held = f"{archive.size / 2**30:.3g} GiB, more than {max_bytes / 2**30:.3g} GiB"
+                    raise RunFileError(f"{path}: holds {held}; if you trust it, raise max_bytes of the load")
+                run = self._built(archive.arrays(), about)
+                return replace(run, about=unpacked(run.about, Path(path).parent))
+            except (ArchiveError, SerialError) as error:
+                raise RunFileError(f"{path}: is not a complete run file: {error}; simulate again") from None
+
+    def _built(self, arrays: Arrays, about: dict[str, Any]) -> Run:
+        """The value of arrays and plain data, checked."""
+        arrays = {name: x for name, x in arrays.items() if name != "about"}
+        check_headers(self.kind, {name: Header(x.shape, x.dtype) for name, x in arrays.items()}, about)
+        run = build(self.kind, {key: value for key, value in about.items() if key != "format"}, arrays)
+        if arrays:
+            raise ArchiveError(f"member {min(arrays)!r} belongs to nothing")
+        self.check(run)
+        return run
 
 
 def save_run(trajectory: Trajectory, path: str | Path) -> Path:
@@ -58,11 +116,11 @@ def save_run(trajectory: Trajectory, path: str | Path) -> Path:
     if not isinstance(trajectory, Trajectory):
         kind = type(trajectory).__name__
         raise RunFileError(f"save_run takes the Trajectory of rd.simulate, got {kind}; save_rollouts takes Rollouts")
-    return write_whole(trajectory, path, FORMAT, _checked)
+    return _RUN.write(trajectory, path)
 
 
 def load_run(path: str | Path, *, max_bytes: int = MAX_BYTES) -> Trajectory:
-    """The trajectory of a run file.
+    """Return the trajectory of a run file.
 
     Args:
         path: Of the file.
@@ -71,43 +129,7 @@ def load_run(path: str | Path, *, max_bytes: int = MAX_BYTES) -> Trajectory:
     Raises:
         RunFileError: If it is missing, damaged, cut short, larger, of another format, or was changed.
     """
-    return read_whole(path, max_bytes, FORMAT, MEMBERS, _checked)
-
-
-def write_whole(run: Run, path: str | Path, form: int | str, checked: Checked[Run]) -> Path:
-    """Write a run, or many, of a format, after it was checked as a reader would; errors as of `save_run`."""
-    path = target(path, RUN, RunFileError)
-    try:
-        arrays, plain = take_apart(replace(run, about=packed(run.about, path.parent)))
-        text = json.dumps({"format": form} | plain)
-        checked(dict(arrays), json.loads(text))
-        return save(path, lambda stream: write(stream, arrays | {"about": np.array(text)}), RunFileError)
-    except (ArchiveError, SerialError, TypeError, ValueError) as error:
-        raise RunFileError(f"the run cannot be written to {path}: {error}; save one that rd.simulate gives") from None
-
-
-def read_whole(
-    path: str | Path, max_bytes: int, form: int | str, members: Mapping[str, Member], checked: Checked[Run]
-) -> Run:
-    """Read what `write_whole` wrote; errors as of `load_run`."""
-    path = file_path(path, RunFileError)
-    max_bytes = integer("max_bytes", max_bytes, most=2**63 - 1, error=RunFileError)
-    writes = "rd.save_rollouts" if form == ROLLOUTS_FORMAT else f"robot-dyn simulate … -o {path}"
-    with reading(path, RunFileError, f"write one with {writes}") as stream:
-        try:
-            archive = Archive(stream)
-            about, found = _about(archive)
-            _check_format(found, form, path)
-            check_headers(archive.headers, about, members)
-            if archive.size > max_bytes:
-                held = f"{archive.size / 2**30:.3g} GiB, more than {max_bytes / 2**30:.3g} GiB"
-                raise RunFileError(f"{path}: holds {held}; if you trust it, raise max_bytes of the load")
-            arrays = archive.arrays()
-            del arrays["about"]
-            run = checked(arrays, about)
-            return replace(run, about=unpacked(run.about, Path(path).parent))
-        except (ArchiveError, SerialError) as error:
-            raise RunFileError(f"{path}: is not a complete run file: {error}; simulate again") from None
+    return _RUN.read(path, max_bytes)
 
 
 def _about(archive: Archive) -> tuple[dict[str, Any], Any]:
@@ -135,17 +157,13 @@ def _check_format(found: Any, form: int | str, path: Path) -> None:
     raise ArchiveError(f"it has format {shorten(repr(found))}, this version reads {form!r}")
 
 
-def _checked(arrays: Arrays, about: dict[str, Any]) -> Trajectory:
-    """The run of these, whose arrays fit together and whose numbers can be those of a run."""
-    check_headers({name: Header(x.shape, x.dtype) for name, x in arrays.items()}, about)
-    members = dict(arrays)
-    run = build(Trajectory, {key: value for key, value in about.items() if key != "format"}, arrays)
-    if arrays:
-        raise ArchiveError(f"member {min(arrays)!r} belongs to nothing")
+def _check(run: Trajectory) -> None:
+    """That the arrays of a run fit together, and its numbers can be those of one."""
     if run.outcome.ending is not Ending.DIVERGED:
-        for name, array in members.items():
-            known = member(name)
-            if known.finite and not np.isfinite(array).all() and not (known.absent and np.isnan(array).all()):
+        known = layouts(Trajectory)
+        for name, array in take_apart(run)[0].items():
+            layout = layout_of(name, known)
+            if layout.finite and not np.isfinite(array).all() and not (layout.absent and np.isnan(array).all()):
                 raise ArchiveError(f"member {shorten(name)!r} of a run that did not diverge holds nan or inf")
     for name, t in (("t", run.t), *((f"wrenches/{link}", F[:, 0]) for link, F in run.wrenches.items())):
         if not are_times(t) or len(t) < len(run.t):
@@ -160,9 +178,11 @@ def _checked(arrays: Arrays, about: dict[str, Any]) -> Trajectory:
         raise ArchiveError("member 'deviation' of joints needs 'desired', which is missing")
     if not are_times(np.array([run.outcome.t])):
         raise ArchiveError(f"'outcome/t' holds {run.outcome.t!r}, not a time in [s]")
-    return run
 
 
 def are_times(t: np.ndarray) -> bool:
     """Whether these are times of a run: as long as one can be, and none before the last."""
     return bool(np.all((t >= 0) & (t <= LONGEST_S)) and np.all(t[1:] >= t[:-1]))
+
+
+_RUN = Format(FORMAT, Trajectory, _check)

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from robot_dyn.errors import escaped
 from robot_dyn.queries.units import units
 from robot_dyn.simulation.events.occurrence import Occurrence
-from robot_dyn.simulation.observation.remarks import lines as said
+from robot_dyn.simulation.observation.remarks import lines as lines_of
 from robot_dyn.simulation.results.ledger import largest
 from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.run.outcome import Ending
 
-_TOLD = 3  # events in a summary
-_NOTICED = 0.01  # [s]: shorter times are not worth a word
+if TYPE_CHECKING:
+    from robot_dyn.simulation.rollouts.result import Rollouts
+
+_LISTED = 3  # events in a summary
+_NOTICED = 0.01  # [s]: shorter times are left out
 
 
 def summary(run: Trajectory) -> str:
@@ -30,12 +35,11 @@ def summary(run: Trajectory) -> str:
         f"error of q [{unit}]: {run.error or _not_estimated(run)}",
     ]
     lines += [] if run.accuracy is None else [f"accuracy: {run.accuracy}"]
-    lines += ["between samples: not watched"] if run.extremes is None else []
-    lines += [f"events: {_told(run.events)}"] if run.events else []
-    lines += [line for line in said(run.remarks) if line != run.outcome.advice]
+    lines += ["between samples: not observed"] if run.extremes is None else []
+    lines += [f"events: {_events_text(run.events)}"] if run.events else []
+    lines += [line for line in lines_of(run.remarks) if line != run.outcome.advice]
     if run.tracking_error is not None:
-        what = "the frame [m]" if run.desired is None else f"q [{unit}]"
-        lines.append(f"tracking error of {what}: {run.tracking_error:.3e} rms")
+        lines.append(f"{of_tracking(run, run.desired is None)}: {run.tracking_error:.3e} rms")
     step = f"step {s.step_s:.4g} s, " if s.step_s else ""
     lines.append(f"{s.method}: {step}{s.steps} steps, {s.evaluations} evaluations, {s.engine}")
     if s.user_code and s.companion_runs:
@@ -55,6 +59,12 @@ def summary(run: Trajectory) -> str:
     return "\n".join(map(escaped, lines))
 
 
+def of_tracking(run: Trajectory | Rollouts, of_frame: bool) -> str:
+    """What a tracking error is of, with its unit."""
+    what = "the frame [m]" if of_frame else f"q [{units('q', joint_types(run))}]"
+    return f"tracking error of {what}"
+
+
 def _not_estimated(run: Trajectory) -> str:
     """That its error was not estimated, and why."""
     if run.outcome.ending is Ending.STOPPED:
@@ -62,10 +72,10 @@ def _not_estimated(run: Trajectory) -> str:
     return f"not estimated ({'a run of rollouts' if 'run' in run.about else 'estimate_error is False'})"
 
 
-def _told(events: tuple[Occurrence, ...]) -> str:
-    """The first events in words."""
-    words = [f"{each.name} at {each.t:.4g} s" for each in events[:_TOLD]]
-    return ", ".join(words) + (f", and {len(events) - _TOLD} more" if len(events) > _TOLD else "")
+def _events_text(events: tuple[Occurrence, ...]) -> str:
+    """The first events and their times."""
+    first = [f"{each.name} at {each.t:.4g} s" for each in events[:_LISTED]]
+    return ", ".join(first) + (f", and {len(events) - _LISTED} more" if len(events) > _LISTED else "")
 
 
 def _after(text: str) -> str:

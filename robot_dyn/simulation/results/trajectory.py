@@ -1,11 +1,11 @@
-"""The trajectory of a run: samples with names and units, what each effect did, how it ended, how far to trust it."""
+"""The trajectory of a run: samples with names and units, what each effect did, how it ended, how accurate it is."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from math import inf
 from types import NoneType
-from typing import TYPE_CHECKING, Any, Protocol, final, runtime_checkable
+from typing import Annotated, Any, Protocol, final, runtime_checkable
 
 import numpy as np
 
@@ -14,12 +14,9 @@ from robot_dyn.simulation.events.occurrence import Occurrence
 from robot_dyn.simulation.observation.remarks import Remark
 from robot_dyn.simulation.results.error_estimate import ErrorEstimate
 from robot_dyn.simulation.results.ledger import Ledger
-from robot_dyn.simulation.results.tracking import root_mean_square
+from robot_dyn.simulation.results.samples import root_mean_square
 from robot_dyn.simulation.run.outcome import Outcome
-from robot_dyn.values import Derived, read_only
-
-if TYPE_CHECKING:
-    pass
+from robot_dyn.values import Derived, Layout, read_only
 
 # Residuals, as parts of the energy exchanged. Over 150 random scenes they were at most 10 times the estimated error of
 # q, as a part of the motion; one that is far larger contradicts the estimate.
@@ -55,10 +52,10 @@ class Statistics:
         companions_s: Time of the error estimate.
         engine: Which loop ran, and why if another was possible.
         compile_s: Time before the run, for the choice of the loop and for compiling it.
-        samples_s: Time after it, for what follows from the states of its samples and does not wait until it is read.
+        samples_s: Time after it, for what follows from the states of its samples and is not computed later.
         companion_evaluations: Evaluations of the error estimate.
         companion_runs: Companion runs of the error estimate.
-        user_code: Parts of the setup that are code of the user's, by name; each run calls them.
+        user_code: Parts of the setup that are user-defined code, by name; each run calls them.
     """
 
     method: str
@@ -78,10 +75,10 @@ class Statistics:
 @final
 @dataclass(frozen=True)
 class Accuracy:
-    """An accuracy that was asked for, what was got, and what it took in evaluations of the equation of motion.
+    """A requested accuracy, the estimated one, and the cost in evaluations of the equation of motion.
 
     Attributes:
-        asked: Largest error of q over joints and times, in [rad] and [m].
+        requested: Largest error of q over joints and times, in [rad] and [m].
         estimated: The estimated one.
         rtol: The tolerance that was chosen, atol a hundredth of it; 0 for a method of fixed step.
         run: Of the run.
@@ -90,7 +87,7 @@ class Accuracy:
         digit_more, digit_less: Of a run with an error ten times smaller, or larger, by the order of the method.
     """
 
-    asked: float
+    requested: float
     estimated: float
     rtol: float
     run: int
@@ -101,13 +98,13 @@ class Accuracy:
 
     @property
     def margin(self) -> float:
-        """What was asked over what is estimated: at least 2, or 1 where no tolerance brings more; inf for no error."""
-        return self.asked / self.estimated if self.estimated > 0 else inf
+        """The requested over the estimated error: at least 2, or 1 where no tolerance brings more; inf for no error."""
+        return self.requested / self.estimated if self.estimated > 0 else inf
 
     def __str__(self) -> str:
         at = f" at rtol {self.rtol:.1e}" if self.rtol else ""
         return (
-            f"asked {self.asked:.1e}, estimated {self.estimated:.1e}{at}, a margin of {self.margin:.1f};"
+            f"requested {self.requested:.1e}, estimated {self.estimated:.1e}{at}, a margin of {self.margin:.1f};"
             f" {self.run} evaluations,"
             f" pilots {self.pilots}, check {self.check}; a digit more about {self.digit_more:.0f}, a digit less"
             f" {self.digit_less:.0f}"
@@ -119,8 +116,8 @@ class Accuracy:
 class Trajectory(Derived):
     """Samples of a run, m of them; arrays are (m,) or (m, n).
 
-    What follows from the states of a run of `simulate` is computed when it is first read; where parts are the user's
-    own code, or the run did not finish, `simulate` computes it.
+    What follows from the states of a run of `simulate` is computed when it is first read; where parts are user-defined
+    code, or the run did not finish, `simulate` computes it.
 
     Attributes:
         joint_names: Of the n joints.
@@ -135,42 +132,42 @@ class Trajectory(Derived):
         outcome: How it ended.
         statistics: What it took.
         error: Its estimated error; None without an estimate.
-        about: Texts that make it whole: URDF, its path, edits, scene, versions; the frame under control, if one is.
+        about: Texts that make it whole: URDF, its path, edits, scene, versions; the controlled frame, if any.
         wrenches: External wrench by link, rows (t, force, torque), (k, 7), in base axes at its frame, in SI units:
             at the samples and at both sides of each switch.
         at_stop: Whether each joint is at or beyond a stop, (m, n); None without stops.
-        remarks: What was seen at every step that the samples need not show.
-        extremes: The least and the largest of q, v and u over all steps, (3, 2, n); None if it was not watched.
-        acting: What acted, in words: gravity, payloads, effects, limits, control; None if it is not known.
+        remarks: What was observed at every step and need not show in the samples.
+        extremes: The least and the largest of q, v and u over all steps, (3, 2, n); None if they were not observed.
+        acting: Names of what acted: gravity, payloads, effects, limits, control; None if it is not known.
         controller_states: z of the controller, (m, z), of a sampled one after its tick; None if it has none, or they
             were not recorded.
-        events: Where effects switched, and those asked for, in the order of time.
+        events: Where effects switched, and requested ones, in the order of time.
         effect_states: z of each effect with states, by name, (m, z); empty if they were not recorded.
-        accuracy: What was asked for, and what it took; None if nothing was.
+        accuracy: The requested accuracy and its cost; None if none was requested.
     """
 
     joint_names: tuple[str, ...]
-    t: np.ndarray
-    q: np.ndarray
-    v: np.ndarray
-    a: np.ndarray
-    u: np.ndarray
-    power: dict[str, np.ndarray]
+    t: Annotated[np.ndarray, Layout(("m",))]
+    q: Annotated[np.ndarray, Layout(("m", "n"))]
+    v: Annotated[np.ndarray, Layout(("m", "n"))]
+    a: Annotated[np.ndarray, Layout(("m", "n"), absent=True)]
+    u: Annotated[np.ndarray, Layout(("m", "n"), absent=True)]
+    power: dict[str, Annotated[np.ndarray, Layout(("m",), absent=True)]]
     ledger: Ledger
-    desired: np.ndarray | None
-    deviation: np.ndarray | None
+    desired: Annotated[np.ndarray, Layout(("m", "n"))] | None
+    deviation: Annotated[np.ndarray, Layout(("m", ("n", 3)))] | None
     outcome: Outcome
     statistics: Statistics
     error: ErrorEstimate | None = field(default_factory=NoneType)
     about: dict[str, str] = field(default_factory=dict, repr=False)
-    wrenches: dict[str, np.ndarray] = field(default_factory=dict)
-    at_stop: np.ndarray | None = field(default_factory=NoneType)
+    wrenches: dict[str, Annotated[np.ndarray, Layout((None, 7))]] = field(default_factory=dict)
+    at_stop: Annotated[np.ndarray, Layout(("m", "n"), "bool")] | None = field(default_factory=NoneType)
     remarks: tuple[Remark, ...] = field(default_factory=tuple)
-    extremes: np.ndarray | None = field(default_factory=NoneType)
+    extremes: Annotated[np.ndarray, Layout((3, 2, "n"), finite=False)] | None = field(default_factory=NoneType)
     acting: tuple[str, ...] | None = field(default_factory=NoneType)
-    controller_states: np.ndarray | None = field(default_factory=NoneType)
+    controller_states: Annotated[np.ndarray, Layout(("m", "z"))] | None = field(default_factory=NoneType)
     events: tuple[Occurrence, ...] = field(default_factory=tuple)
-    effect_states: dict[str, np.ndarray] = field(default_factory=dict)
+    effect_states: dict[str, Annotated[np.ndarray, Layout(("m", None))]] = field(default_factory=dict)
     accuracy: Accuracy | None = field(default_factory=NoneType)
 
     def __post_init__(self) -> None:
@@ -190,7 +187,7 @@ class Trajectory(Derived):
         """Decimal digits of q that a theorem confirms: −log₁₀ of the largest possible error, in [rad] or [m].
 
         Args:
-            proof: Of the same motion, as `rd.prove` makes it; samples beyond its end are left out.
+            proof: Of the same motion, as `rd.prove` returns it; samples after its end are left out.
 
         Raises:
             QueryError: If it is of other joints, or its motion starts elsewhere.
@@ -214,11 +211,11 @@ class Trajectory(Derived):
 def leak(ledger: Ledger, error: ErrorEstimate | None, q: np.ndarray) -> str:
     """As of `Trajectory.leak`, from the ledger, the estimated error and the samples q (m, n) of a run."""
     if not ledger.closes:
-        return f"it does not close: {ledger.cause or 'simulate it by itself with its error estimate, which tells why'}"
+        return f"it does not close: {ledger.cause or 'simulate it with its error estimate, which finds the cause'}"
     if ledger.rounded or error is None or not error.resolved_until > 0:
         return ""
     span = float(np.ptp(q, axis=0).max())
     if not span > 0 or ledger.closure <= _CONTRADICTS * max(error.final / span, _ROUNDING):
         return ""
     why = ledger.cause or "do not trust the estimate, take a smaller step"
-    return f"it does not close as the estimated error of q says: {why}"
+    return f"it does not close as well as the estimated error of q implies: {why}"

@@ -4,21 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from robot_dyn.simulation.results.archive import ArchiveError, Header
-from robot_dyn.simulation.results.run_file import (
-    MAX_BYTES,
-    ROLLOUTS_FORMAT,
-    RunFileError,
-    are_times,
-    read_whole,
-    write_whole,
-)
-from robot_dyn.simulation.results.schema import OF_ROLLOUTS, check_headers
-from robot_dyn.simulation.results.serialise import Arrays, build
+from robot_dyn.simulation.results.archive import ArchiveError
+from robot_dyn.simulation.results.run_file import MAX_BYTES, ROLLOUTS_FORMAT, Format, RunFileError, are_times
 from robot_dyn.simulation.rollouts.result import Rollouts
 
 
@@ -32,7 +22,7 @@ def save_rollouts(runs: Rollouts, path: str | Path) -> Path:
     """
     if not isinstance(runs, Rollouts):
         raise RunFileError(f"save_rollouts takes the Rollouts of rd.rollouts, got {type(runs).__name__}")
-    return write_whole(replace(runs, setup=None, numbers=None, saved=runs.overview), path, ROLLOUTS_FORMAT, _checked)
+    return _ROLLOUTS.write(replace(runs, saved=runs.overview), path)
 
 
 def load_rollouts(path: str | Path, *, max_bytes: int = MAX_BYTES) -> Rollouts:
@@ -45,17 +35,11 @@ def load_rollouts(path: str | Path, *, max_bytes: int = MAX_BYTES) -> Rollouts:
     Raises:
         RunFileError: If it is missing, damaged, cut short, larger, of another format, or was changed.
     """
-    return read_whole(path, max_bytes, ROLLOUTS_FORMAT, OF_ROLLOUTS, _checked)
+    return _ROLLOUTS.read(path, max_bytes)
 
 
-def _checked(arrays: Arrays, about: dict[str, Any]) -> Rollouts:
-    """The rollouts of these, whose arrays fit together and whose numbers can be those of runs."""
-    check_headers({name: Header(x.shape, x.dtype) for name, x in arrays.items()}, about, OF_ROLLOUTS)
-    if about.get("setup") is not None:
-        raise ArchiveError("'setup' is not empty")
-    runs = build(Rollouts, {key: value for key, value in about.items() if key != "format"}, arrays)
-    if arrays:
-        raise ArchiveError(f"member {min(arrays)!r} belongs to nothing")
+def _check(runs: Rollouts) -> None:
+    """That the arrays of rollouts fit together, and their numbers can be those of runs."""
     if not are_times(runs.t) or not len(runs.t):
         raise ArchiveError("the times of member 't' are not finite, or do not grow")
     if not all(map(are_times, runs.ended[:, None])) or (runs.diverged & runs.stopped).any():
@@ -64,7 +48,7 @@ def _checked(arrays: Arrays, about: dict[str, Any]) -> Rollouts:
     if runs.observed is not None and len(runs.observed.levels) != runs.observed.limits.shape[1]:
         raise ArchiveError("'observed/levels' are not those of member 'observed/limits'")
     if not all(0 <= number < len(runs) for number in (*numbered, 0 if runs.saved is None else runs.saved.worst)):
-        raise ArchiveError(f"'saved' tells of a run that is not one of the {len(runs)}")
+        raise ArchiveError(f"'saved' is about a run that is not one of the {len(runs)}")
     if len(runs.advice) != len(runs):
         raise ArchiveError(f"'advice' is of {len(runs.advice)} runs, not of {len(runs)}")
     if runs.work is not None and set(runs.work) != set(runs.sources):
@@ -76,4 +60,6 @@ def _checked(arrays: Arrays, about: dict[str, Any]) -> Rollouts:
         array = getattr(runs, name)
         if array is not None and not np.isfinite(array[whole]).all():
             raise ArchiveError(f"member {name!r} of a run that did not diverge holds nan or inf")
-    return runs
+
+
+_ROLLOUTS = Format(ROLLOUTS_FORMAT, Rollouts, _check)

@@ -1,7 +1,7 @@
 """A batch of runs in tiles of 64 in lock step, each tile run by one thread from beginning to end.
 
 Records are arrays over time, row and run, in this order, so that a tile writes whole vectors. Where `simulate` cuts
-steps at thresholds, the runs that may pass one are made again by themselves, and written over what lock step gave.
+steps at thresholds, the runs that may pass one are repeated by themselves, and replace those of lock step.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from typing import cast, final
 import numpy as np
 
 from robot_dyn.arithmetic import FLOAT64
-from robot_dyn.codegen.parameters import over_runs
 from robot_dyn.codegen.trace.right_angles import robot_of
 from robot_dyn.coefficients import with_values
 from robot_dyn.effects.plant import Plant
@@ -24,11 +23,10 @@ from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateE
 from robot_dyn.simulation.dynamics.loop_state import Ended, Now, Runs, Why
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.events.detection import Detecting
-from robot_dyn.simulation.observation.guard_levels import levels
 from robot_dyn.simulation.observation.observation import observations_of, observed
-from robot_dyn.simulation.results.provenance import origin
 from robot_dyn.simulation.results.trajectory import Statistics
-from robot_dyn.simulation.rollouts.one_by_one import OneByOne, Single, said
+from robot_dyn.simulation.rollouts.batch import Batch, Ends, advice_of
+from robot_dyn.simulation.rollouts.one_by_one import OneByOne, Single
 from robot_dyn.simulation.rollouts.pool import in_threads
 from robot_dyn.simulation.rollouts.result import Rollouts
 from robot_dyn.simulation.rollouts.thresholds import Thresholds
@@ -39,7 +37,6 @@ from robot_dyn.simulation.run.watch import LARGEST, diverged_advice
 from robot_dyn.simulation.setup.schedule import ON_STEP
 from robot_dyn.simulation.setup.segment_table import segment_table
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.simulation.setup.size import check_batch
 
 LANES = 64  # runs in a tile: with 8, 16 or 32 a step of RK4 took 1.5, 1.1 and 1.05 times as long
 _REASONS = {
@@ -52,48 +49,52 @@ _INSTANTS = 200  # at least, or every step, at which an actuation that changes b
 
 
 @final
-class Batch:
-    """The tiles of a batch and what they record: time by row by run, so that a tile writes whole vectors."""
+class Tiles:
+    """The tiles of a batch and what they record: time by row by run, so that a tile writes whole vectors.
+
+    Args:
+        batch: The runs.
+        compiled: Their state equation.
+        extras: What machine code records beside the state, as of `compiled_equation`.
+        most: Number of bytes to record at most.
+        thresholds: At which `simulate` cuts steps; None if it cuts none, or cuts are not requested.
+    """
 
     def __init__(
-        self, setup: Setup, compiled_equation: CompiledStateEquation, q0: np.ndarray, v0: np.ndarray,
-        sweep: dict[str, np.ndarray], recorded: tuple[str, ...], kept: tuple[str, ...], most: int,
+        self, batch: Batch, compiled: CompiledStateEquation, extras: tuple[str, ...], most: int,
         thresholds: Thresholds | None = None,
     ) -> None:  # fmt: skip
-        equation, n = compiled_equation.equation, compiled_equation.equation.plant.dynamics.n
-        self.setup, self.compiled_equation, self.recorded, self.kept, self.values = (
-            setup,
-            compiled_equation,
-            recorded,
-            kept,
-            sweep,
-        )
-        self.q0, self.v0, self.y, self.thresholds = q0, v0, _starts(equation, q0, v0), thresholds
-        self.levels = levels(equation.plant.dynamics, *over_runs(equation.plant, equation.controller, sweep), len(q0))
-        self.columns = [*range(n)] * ("q" in recorded)
-        if "v" in recorded and not equation.canonical:
-            self.columns += range(n, 2 * n)
-        if "work" in recorded:
-            self.columns += range(equation.size - len(equation.sources), equation.size)
-        tiles = -(-len(self.y) // LANES)
-        width, more = tiles * LANES, sum({"u": n, "v": n, "energy": 2}[name] for name in kept)
-        check_batch(setup, len(self.y), len(self.columns) + more, most)
+        setup, recorded = batch.setup, batch.recorded
+        equation, n = compiled.equation, compiled.equation.plant.dynamics.n
+        self.batch, self.setup, self.compiled, self.extras = batch, setup, compiled, extras
+        self.y, self.thresholds = _starts(equation, batch.q0, batch.v0), thresholds
+        self.levels = batch.levels(equation.plant, equation.controller)
+        places = {
+            "q": range(n),
+            "v": range(n, 2 * n),
+            "work": range(equation.size - len(equation.sources), equation.size),
+        }
+        self.states = [name for name in places if name in recorded and name not in extras]
+        self.columns = [column for name in self.states for column in places[name]]
+        tiles = -(-len(batch) // LANES)
+        width, more = tiles * LANES, sum(batch.sizes[name] for name in extras)
+        batch.check_size(most)
         self.table, self.apart = segment_table(setup), 0
         steps = int(self.table.counts[:-1].sum())
-        if "actuation" in compiled_equation.equations.programs:
+        if "actuation" in compiled.functions.programs:
             self.apart = 1 if equation.sampled else max(1, steps // _INSTANTS)
         self.instants = steps // self.apart if self.apart > 1 else 0
-        most = samples_at_most(setup, self.table.counts)
-        self.out_y, self.made = np.empty((most, len(self.columns), width)), np.empty((most, more, width))
-        numbers = np.minimum(np.arange(width), len(self.y) - 1)
-        start = np.vstack([q0[numbers].T, v0[numbers].T, np.full((n, width), np.nan)])
+        rows = samples_at_most(setup, self.table.counts)
+        self.out_y, self.out_extras = np.empty((rows, len(self.columns), width)), np.empty((rows, more, width))
+        numbers = np.minimum(np.arange(width), len(batch) - 1)
+        start = np.vstack([batch.q0[numbers].T, batch.v0[numbers].T, np.full((n, width), np.nan)])
         self.observations = observations_of(start, self.levels.of_runs(numbers), tiles)
         self.place = np.zeros((0, 2), np.int64)  # segment and step of each sample, of the tile that has most
         self.lock = threading.Lock()
         self.unfinished = np.ones(tiles, dtype=bool)
         self.why, self.last = np.zeros(width, np.int64), np.zeros((equation.size, width))
         self.ended, self.until = np.full(width, setup.duration_s), np.full(width, np.inf)
-        self.again: dict[int, Single | None] = {}  # runs made again by themselves; None where Ctrl-C came first
+        self.again: dict[int, Single | None] = {}  # runs repeated by themselves; None where Ctrl-C came first
         self.clocks = np.tile([0.0, setup.record_period_s, ON_STEP * setup.nominal_step_s], (tiles, 1))
         self.evaluations, self.stop = np.zeros(tiles, np.int64), np.zeros(1, np.int64)
 
@@ -101,17 +102,17 @@ class Batch:
         """All tiles, each by one thread; Ctrl-C ends them at their next step, and an error of `on_progress`."""
         began, end, reached = perf_counter(), self.setup.duration_s, 0.0
 
-        def tell(t: float) -> None:
+        def report(t: float) -> None:
             nonlocal reached
             reached = max(reached, t)
             if on_progress is not None:
                 on_progress(reached)
 
-        in_threads(self._tile, len(self.unfinished), threads, self.stop, lambda: tell(self._reached()))
-        self._make_again(threads, tell)
+        in_threads(self._tile, len(self.unfinished), threads, self.stop, lambda: report(self._reached()))
+        self._make_again(threads, report)
         result = self._result()
         if on_progress is not None and not result.stopped.any():
-            tell(end)
+            report(end)
         return replace(result, statistics=replace(result.statistics, wall_s=perf_counter() - began))
 
     def _reached(self) -> float:
@@ -119,67 +120,62 @@ class Batch:
         end, left = self.setup.duration_s, np.isinf(self.until).reshape(-1, LANES).mean(axis=1)
         return float((left * np.where(self.unfinished, np.minimum(self.clocks[:, 0], end), end)).mean())
 
-    def _make_again(self, threads: int, tell: Callable[[float], object]) -> None:
+    def _make_again(self, threads: int, report: Callable[[float], object]) -> None:
         """Make those runs by themselves that may have passed a threshold, or diverged, where steps are cut."""
         if self.thresholds is None:
             return
         passed = np.isfinite(self.until) | (self.why > 0)
-        numbers = np.flatnonzero(passed[: len(self.y)])
+        numbers = np.flatnonzero(passed[: len(self.batch)])
         self.again = dict.fromkeys(numbers.tolist())
         if not len(numbers) or self.stop[0]:
             return
-        sweep = {name: x[numbers] for name, x in self.values.items()}
-        starts, of = (self.q0[numbers], self.v0[numbers]), self.levels.of_runs(numbers)
-        runs = OneByOne(self.setup, *starts, sweep, self.recorded, of, numbers.tolist())
-        part = len(numbers) / len(self.y)
-        runs.run(threads, lambda t: tell((1 - part) * self.setup.duration_s + part * t))
-        self.again = dict(zip(numbers.tolist(), runs.made, strict=True))
+        runs = OneByOne(self.batch.some(numbers), self.levels.of_runs(numbers))
+        part = len(numbers) / len(self.batch)
+        runs.run(threads, lambda t: report((1 - part) * self.setup.duration_s + part * t))
+        self.again = dict(zip(numbers.tolist(), runs.records, strict=True))
 
     def _write_again(self, t: np.ndarray) -> None:
         """What these runs recorded, in place of what lock step gave; without them, that up to their thresholds."""
-        names = [name for name in ("q", "v", "work") if name in self.recorded and name not in self.kept]
         for run, single in self.again.items():
             if single is None:
                 rows = int(np.searchsorted(t, self.until[run], side="right"))
             else:
                 rows = len(single.t)
-                for array, of in ((self.out_y, names), (self.made, self.kept)):
+                for array, of in ((self.out_y, self.states), (self.out_extras, self.extras)):
                     array[:rows, :, run] = np.hstack([*(single.columns[name] for name in of), np.empty((rows, 0))])
-            self.out_y[rows:, :, run], self.made[rows:, :, run] = np.nan, np.nan
+            self.out_y[rows:, :, run], self.out_extras[rows:, :, run] = np.nan, np.nan
 
     def _runs(self, tile: int) -> Runs:
         """The runs of a tile at their start; a tile that is not full repeats a run."""
-        equation, index = self.compiled_equation.equation, self._numbers(tile)
-        run_parameters = self.compiled_equation.run_parameters(
-            {name: values[index] for name, values in self.values.items()}
-        )
-        return runs_of(equation, self.y[index].T, run_parameters, self.made.shape[1], index)
+        equation, index = self.compiled.equation, self._numbers(tile)
+        run_parameters = self.compiled.run_parameters({name: x[index] for name, x in self.batch.sweep.items()})
+        return runs_of(equation, self.y[index].T, run_parameters, self.out_extras.shape[1], index)
 
     def _numbers(self, tile: int) -> np.ndarray:
         """The numbers of the runs in a tile."""
-        return np.minimum(np.arange(tile * LANES, (tile + 1) * LANES), len(self.y) - 1)
+        return np.minimum(np.arange(tile * LANES, (tile + 1) * LANES), len(self.batch) - 1)
 
     def _tile(self, tile: int) -> None:
-        equation, n = self.compiled_equation.equation, self.compiled_equation.equation.plant.dynamics.n
-        run_parameters, runs = slice(tile * LANES, (tile + 1) * LANES), self._runs(tile)
+        equation, n = self.compiled.equation, self.setup.plant.dynamics.n
+        lanes, runs = slice(tile * LANES, (tile + 1) * LANES), self._runs(tile)
         method = cast(PlainMethod, self.setup.integrator)
-        advance = self.compiled_equation.advance()
+        advance = self.compiled.advance()
         assert advance is not None
         rows = equation.size | 1  # odd: stages a power of two apart would share the sets of a cache
         stepper = method.stepper(FLOAT64, equation.size, n, rows, LANES)
-        functions, now = self.compiled_equation.equations.functions, np.zeros(len(Now), dtype=np.int64)
+        functions, now = self.compiled.functions.addresses, np.zeros(len(Now), dtype=np.int64)
         now[Now.BUDGET] = np.iinfo(np.int64).max
         records = Records(
-            np.array(self.columns, np.int64), np.empty((len(self.out_y), 2), np.int64), self.out_y, self.made,
+            np.array(self.columns, np.int64), np.empty((len(self.out_y), 2), np.int64), self.out_y, self.out_extras,
             np.empty((0, equation.size + 2)), np.empty((1 + 3 * n, 0)), self.observations[tile],
         )  # fmt: skip
-        rules = rules_of(equation, False, LARGEST, base=run_parameters.start, apart=self.apart)
+        rules = rules_of(equation, False, LARGEST, base=lanes.start, apart=self.apart)
         work = stepper.work
         if self.thresholds is not None:
             positions = 0 if equation.canonical else n
             switches = self.thresholds.lanes(self._numbers(tile), equation.size, positions)
-            self.until[run_parameters] = switches.until
-            work = Detecting(work, work.K, switches._replace(until=self.until[run_parameters]))
+            self.until[lanes] = switches.until
+            work = Detecting(work, work.K, switches._replace(until=self.until[lanes]))
         ended = advance(
             functions, self.table, runs, records, rules, stepper.coefficients, work, now, self.clocks[tile], self.stop
         )
@@ -187,17 +183,16 @@ class Batch:
         with self.lock:
             if now[Now.ROW] > len(self.place):
                 self.place = records.place[: now[Now.ROW]]
-        self.why[run_parameters], self.last[:, run_parameters] = runs.why, runs.last
-        self.ended[run_parameters] = np.where(runs.why > 0, runs.ended, self.setup.duration_s)
+        self.why[lanes], self.last[:, lanes] = runs.why, runs.last
+        self.ended[lanes] = np.where(runs.why > 0, runs.ended, self.setup.duration_s)
         if ended != Ended.DONE:
             reached = self.table.starts[now[Now.SEGMENT]] + now[Now.STEP] * self.table.lengths[now[Now.SEGMENT]]
-            self.ended[run_parameters] = np.where(runs.why > 0, runs.ended, reached)
-            for array in (self.out_y, self.made):
-                array[int(now[Now.ROW]) :, :, run_parameters] = np.nan
+            self.ended[lanes] = np.where(runs.why > 0, runs.ended, reached)
+            for array in (self.out_y, self.out_extras):
+                array[int(now[Now.ROW]) :, :, lanes] = np.nan
 
     def _result(self) -> Rollouts:
-        B, equation, n = len(self.y), self.compiled_equation.equation, self.compiled_equation.equation.plant.dynamics.n
-        segment, step = self.place.T
+        B, (segment, step) = len(self.batch), self.place.T
         t = self.table.starts[segment] + step * self.table.lengths[segment]
         self._write_again(t)
         why, ended = self.why[:B], self.ended[:B].copy()
@@ -206,32 +201,23 @@ class Batch:
         evaluations = np.repeat(self.evaluations, LANES)[:B]
         for run, single in self.again.items():
             outcome = Outcome(Ending.STOPPED, min(self.until[run], ended[run])) if single is None else single.outcome
-            ended[run], advice[run] = outcome.t, said(outcome)
+            ended[run], advice[run] = outcome.t, advice_of(outcome)
             diverged[run], stopped[run] = (outcome.ending is each for each in (Ending.DIVERGED, Ending.STOPPED))
             if single is not None:
                 steps[run], evaluations[run] = single.steps, single.evaluations
         alone = {run: single.observation for run, single in self.again.items() if single is not None}
-        y, made, lengths = np.moveaxis(self.out_y[: len(t), :, :B], -1, 0), {}, {"u": n, "v": n, "energy": 2}
-        at = 0
-        for name in self.kept:
-            made[name] = np.moveaxis(self.made[: len(t), at : at + lengths[name], :B], -1, 0)
-            at += lengths[name]
-        q = y[..., :n] if "q" in self.recorded else None
-        v = made.get("v") if equation.canonical else y[..., n * ("q" in self.recorded) :][..., :n]
-        works = (
-            [y[..., i - len(equation.sources)] for i in range(len(equation.sources))] if "work" in self.recorded else []
-        )
-        energy = made.get("energy")
-        K, V = (None, None) if energy is None else (energy[..., 0], energy[..., 1])
-        named = dict(zip(equation.sources, works, strict=True)) if works else None
-        return Rollouts(
-            equation.plant.dynamics.joint_names, t, q, v if "v" in self.recorded else None, made.get("u"), K, V, named,
-            ended, diverged, stopped, tuple(advice), steps, evaluations, self._statistics(), tuple(equation.sources),
-            origin(self.setup.plant.dynamics) | self.setup.about, dict(self.values), self._compiled(),
-            (), self.q0, self.v0, observed(self.observations, self.levels, alone, self.instants)[:B],
+        recorded, sizes = dict[str, np.ndarray](), self.batch.sizes
+        for array, names in ((self.out_y, self.states), (self.out_extras, self.extras)):
+            by_run = np.moveaxis(array[: len(t), :, :B], -1, 0)
+            ends = np.cumsum([0, *(sizes[name] for name in names)])
+            recorded |= {name: by_run[..., a:b] for name, a, b in zip(names, ends, ends[1:], strict=False)}
+        return self.batch.rollouts(
+            self._setup_compiled(), t, recorded,
+            Ends(ended, diverged, stopped, tuple(advice), steps, evaluations), self._statistics(),
+            observed(self.observations, self.levels, alone, self.instants)[:B],
         )  # fmt: skip
 
-    def _compiled(self) -> Setup:
+    def _setup_compiled(self) -> Setup:
         """The setup whose equations were compiled: right angles of the file written out in full."""
         plant, controller = self.setup.plant, self.setup.controller
         if controller is not None:
@@ -242,7 +228,7 @@ class Batch:
 
     def _advice(self, why: np.ndarray) -> list[str]:
         """Why runs diverged and what to do; nothing for the others."""
-        advice, equation = [""] * len(why), self.compiled_equation.equation
+        advice, equation = [""] * len(why), self.compiled.equation
         for run in np.flatnonzero(why).tolist():
             fastest = equation.fastest_joint(self.last[:, run])
             advice[run] = diverged_advice(_REASONS[Why(why[run])], fastest, self.setup)
@@ -259,9 +245,9 @@ class Batch:
     def _statistics(self) -> Statistics:
         """Of the batch; its steps and evaluations are those of one run to the end."""
         method, steps = self.setup.integrator, int(self.table.counts[:-1].sum())
-        runs = f"compiled, {len(self.y)} runs side by side"
+        runs = f"compiled, {len(self.batch)} runs side by side"
         if self.again:
-            runs += f", {len(self.again)} of them made again with steps cut at thresholds"
+            runs += f", {len(self.again)} of them repeated with steps cut at thresholds"
         most = int(self.evaluations.max())
         return Statistics(method.name, self.setup.duration_s / steps, steps, most, 0.0, engine=runs)
 

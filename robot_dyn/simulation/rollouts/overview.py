@@ -1,36 +1,36 @@
-"""What the runs of a batch come to: remarks with counts, tracking errors, and the run to look at first."""
+"""Overview of a batch: remarks with counts, tracking errors, the run to look at first, and why runs diverged."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, final
+from typing import TYPE_CHECKING, Annotated, final
 
 import numpy as np
 
 from robot_dyn.queries.units import unit
 from robot_dyn.simulation.diagnostics.reference_remarks import at_rest, held, jumps
 from robot_dyn.simulation.diagnostics.step_remarks import KINDS, Units, against, of_reference, of_steps, units_of
-from robot_dyn.simulation.diagnostics.unstable_loop import unstable
-from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.diagnostics.unstable_loop import explained, unstable
 from robot_dyn.simulation.observation.chatter import Episode
 from robot_dyn.simulation.observation.observation import Observed
 from robot_dyn.simulation.observation.remarks import Kind, Remark
 from robot_dyn.simulation.results.provenance import joint_types
-from robot_dyn.simulation.results.tracking import deviation_of, root_mean_square
+from robot_dyn.simulation.results.samples import deviation_of, root_mean_square
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.values import Value, read_only
+from robot_dyn.values import Layout, Value, read_only
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.rollouts.result import Rollouts
 
 OF_REFERENCES = Kind.JUMPS, Kind.HELD
+_JUDGED = 8  # runs that diverged: each loop is linearised about a start of its own
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Overview(Value):
-    """What the runs of a batch come to.
+    """The overview of a batch.
 
     Attributes:
         worst: As of `Rollouts`.
@@ -40,7 +40,7 @@ class Overview(Value):
 
     worst: int
     remarks: tuple[Remark, ...]
-    tracking_error: np.ndarray | None
+    tracking_error: Annotated[np.ndarray, Layout(("B",))] | None
 
     def __post_init__(self) -> None:
         read_only(self)
@@ -161,12 +161,12 @@ def _in_runs(remark: Remark, worst: int, some: np.ndarray) -> Remark:
 def _linearised(runs: Rollouts, run: int) -> Iterator[Remark]:
     """The remark on the sampled loop of one run."""
     setup = runs.setup_of(run)
-    equation = StateEquation(setup.plant, setup.controller, setup.integrator.canonical)
+    equation = setup.equation
     t, y = np.zeros(1), equation.start(setup.q0, setup.v0)[None]
     if runs.q is not None and runs.v is not None and not equation.equation_of_motion.state_size:
         t, rest = runs.t, np.zeros((len(runs.t), equation.size - 2 * len(setup.q0)))
         y = np.hstack([runs.q[run], runs.v[run], rest])
-    for remark in unstable(setup, equation, t, y):
+    for remark in unstable(setup, t, y):
         yield replace(remark, runs=(run,), looked=1)
 
 
@@ -193,3 +193,20 @@ def tracking_errors(runs: Rollouts) -> np.ndarray | None:
     if deviation is None:
         return None
     return np.array([root_mean_square(x[of]) if of.any() else np.nan for x, of in zip(deviation, known, strict=True)])
+
+
+def causes(runs: Rollouts) -> tuple[str, ...]:
+    """The advice of each run; of the first that diverged with its loop as the cause, where that explains it.
+
+    Loops are linearised about the starts, which differ from run to run, as their parameters may.
+    """
+    advice, diverged = list(runs.advice), np.flatnonzero(runs.diverged)
+    controller = None if runs.setup is None else runs.setup.controller
+    if controller is None or not controller.period_s or not len(diverged):
+        return runs.advice
+    earliest = diverged[np.argsort(runs.ended[diverged], kind="stable")]
+    for run in list(dict.fromkeys([int(diverged[0]), *earliest.tolist()]))[:_JUDGED]:
+        setup = runs.setup_of(run)
+        remarks = unstable(setup, np.zeros(1), setup.equation.start(setup.q0, setup.v0)[None])
+        advice[run] = explained(runs.outcome(run), setup, remarks).advice
+    return tuple(advice)

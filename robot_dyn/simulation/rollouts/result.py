@@ -3,25 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from operator import index
-from typing import Any, final, overload
+from typing import Annotated, Any, final, overload
 
 import numpy as np
 
 from robot_dyn.errors import QueryError, escaped
-from robot_dyn.queries.units import units
 from robot_dyn.simulation.observation.observation import Observed
 from robot_dyn.simulation.observation.remarks import Remark
-from robot_dyn.simulation.observation.remarks import lines as said
-from robot_dyn.simulation.results.provenance import joint_types
+from robot_dyn.simulation.observation.remarks import lines as lines_of
+from robot_dyn.simulation.results.summary import of_tracking
 from robot_dyn.simulation.results.trajectory import Statistics, Trajectory
 from robot_dyn.simulation.rollouts.overview import Overview, of_some, overview
 from robot_dyn.simulation.run.outcome import Ending, Outcome
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.validate import integer
-from robot_dyn.values import Value, read_only
+from robot_dyn.values import NOT_STORED, Layout, Value, read_only
 
 _SHARED = ("joint_names", "t", "statistics", "sources", "about", "setup", "uncut", "saved", "numbers")  # by all runs
 
@@ -49,10 +48,10 @@ class Rollouts(Value):
         evaluations: Of the equation of motion, by the 64 runs that each was side by side with, (B,).
         statistics: Of the longest run; its time is that of all runs.
         sources: Names of what does work: the control and the effects without a potential.
-        about: Texts that make the runs whole, as of a `Trajectory`; of all runs, without `params`.
+        about: Texts, as of a `Trajectory`; of all runs, without `params`.
         params: Values that differ from run to run, by name, (B, n).
-        setup: What was run; None for runs that were read from a file.
-        uncut: Names of the thresholds at which steps do not end, as `cuts=False` asks.
+        setup: Of all runs; None for runs that were read from a file.
+        uncut: Names of the thresholds at which steps do not end, with `cuts=False`.
         q0, v0: Starts, (B, n).
         observed: Extremes, limits passed and chatter of each run, over all steps but for u of continuous control, see
             `remarks`; None in files of older versions.
@@ -62,30 +61,30 @@ class Rollouts(Value):
     """
 
     joint_names: tuple[str, ...]
-    t: np.ndarray
-    q: np.ndarray | None
-    v: np.ndarray | None
-    u: np.ndarray | None
-    kinetic: np.ndarray | None
-    potential: np.ndarray | None
-    work: dict[str, np.ndarray] | None
-    ended: np.ndarray
-    diverged: np.ndarray
-    stopped: np.ndarray
+    t: Annotated[np.ndarray, Layout(("m",))]
+    q: Annotated[np.ndarray, Layout(("B", "m", "n"))] | None
+    v: Annotated[np.ndarray, Layout(("B", "m", "n"))] | None
+    u: Annotated[np.ndarray, Layout(("B", "m", "n"))] | None
+    kinetic: Annotated[np.ndarray, Layout(("B", "m"))] | None
+    potential: Annotated[np.ndarray, Layout(("B", "m"))] | None
+    work: dict[str, Annotated[np.ndarray, Layout(("B", "m"))]] | None
+    ended: Annotated[np.ndarray, Layout(("B",))]
+    diverged: Annotated[np.ndarray, Layout(("B",), "bool")]
+    stopped: Annotated[np.ndarray, Layout(("B",), "bool")]
     advice: tuple[str, ...]
-    steps: np.ndarray
-    evaluations: np.ndarray
+    steps: Annotated[np.ndarray, Layout(("B",), "int64")]
+    evaluations: Annotated[np.ndarray, Layout(("B",), "int64")]
     statistics: Statistics
     sources: tuple[str, ...]
     about: dict[str, str]
-    params: dict[str, np.ndarray]
-    setup: Setup | None = None
+    params: dict[str, Annotated[np.ndarray, Layout(("B", None))]]
+    setup: Setup | None = field(default=None, metadata=NOT_STORED)
     uncut: tuple[str, ...] = ()
-    q0: np.ndarray | None = None
-    v0: np.ndarray | None = None
+    q0: Annotated[np.ndarray, Layout(("B", "n"))] | None = None
+    v0: Annotated[np.ndarray, Layout(("B", "n"))] | None = None
     observed: Observed | None = None
     saved: Overview | None = None
-    numbers: np.ndarray | None = None
+    numbers: np.ndarray | None = field(default=None, metadata=NOT_STORED)
 
     def __post_init__(self) -> None:
         read_only(self)
@@ -106,8 +105,8 @@ class Rollouts(Value):
 
         Positions and velocities are those recorded. The rest is recorded, or follows from them and the setup: the
         acceleration, the powers and energies, and the torque of a continuous controller without an integral. What
-        neither tells is nan: work that was not recorded; the torque of other controllers; and all but what was
-        recorded of runs that were read from a file. It has no error estimate, and of the remarks that `simulate` makes
+        neither determines is nan: work that was not recorded; the torque of other controllers; and all but what was
+        recorded of runs that were read from a file. It has no error estimate, and of the remarks of `simulate`
         those on limits, stops, chatter and the reference.
 
         Raises:
@@ -152,17 +151,17 @@ class Rollouts(Value):
         from robot_dyn.simulation.rollouts.run import setup_of
 
         if self.setup is None:
-            raise QueryError("runs that were read from a file have no setup; make them again, and keep the result")
+            raise QueryError("runs that were read from a file have no setup; run rd.rollouts again, and use its result")
         return setup_of(self, self.setup, integer("run", run, least=-len(self), most=len(self) - 1) % len(self))
 
     @cached_property
     def overview(self) -> Overview:
-        """What all runs come to."""
+        """The overview of all runs."""
         return self.saved or overview(self)
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
-        """What `simulate` remarks on each run: limits, stops, chatter and the reference, by kind, joint and quantity.
+        """The remarks of `simulate` on each run: limits, stops, chatter and the reference, by kind, joint and quantity.
 
         `Remark.runs` are the numbers of the runs that it is about: first the worst, whose values and text it has, then
         the others in their order. A sampled loop is linearised in one run alone, `worst`. Under continuous control in
@@ -198,13 +197,12 @@ class Rollouts(Value):
             lines.append(f"run {run} diverged at t = {self.ended[run]:g} s; {self.advice[run]}")
         counted = len(self) > 1
         remarks = [each if counted else replace(each, runs=()) for each in self.remarks]
-        lines += said(remarks) if self.observed is not None else ["between samples: not watched"]
+        lines += lines_of(remarks) if self.observed is not None else ["between samples: not observed"]
         errors = self.tracking_error
         if errors is not None and np.isfinite(errors).any():
             most = int(np.nanargmax(errors))
-            what = "the frame [m]" if "frame" in self.about else f"q [{units('q', joint_types(self))}]"
             largest = f" in the median, {errors[most]:.3e} in run {most}" if counted else ""
-            lines.append(f"tracking error of {what}: {np.nanmedian(errors):.3e} rms{largest}")
+            lines.append(f"{of_tracking(self, 'frame' in self.about)}: {np.nanmedian(errors):.3e} rms{largest}")
         again = "" if self.setup is None else f"; rd.simulate(runs.setup_of({self.worst})) repeats it by itself"
         lines.append(f"look at run {self.worst} first{again}")
         return "\n".join(escaped(line) for line in lines)

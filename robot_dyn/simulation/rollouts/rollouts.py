@@ -1,4 +1,4 @@
-"""Rollouts: one setup from many starts, or with many values of its parameters, at once in machine code.
+"""Rollouts: one setup from many starts, or with many values of its parameters, side by side in machine code.
 
     q' = v,   v' = M⁻¹ (u + Σ τ − C v − N)   for 64 runs side by side, on all threads
 
@@ -25,12 +25,13 @@ from robot_dyn.integrate.adaptive import AUTO, EXPLICIT
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.simulation.compiled.build import compiled_equation
-from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.results.link_wrenches import frame_of
+from robot_dyn.simulation.compiled.self_check import check
+from robot_dyn.simulation.results.acting import frame_of
 from robot_dyn.simulation.results.provenance import edits_of_machine_code
-from robot_dyn.simulation.rollouts.divergence import causes
-from robot_dyn.simulation.rollouts.lock_step import LANES, Batch
+from robot_dyn.simulation.rollouts.batch import Batch
+from robot_dyn.simulation.rollouts.lock_step import LANES, Tiles
 from robot_dyn.simulation.rollouts.one_by_one import one_by_one
+from robot_dyn.simulation.rollouts.overview import causes
 from robot_dyn.simulation.rollouts.result import Rollouts
 from robot_dyn.simulation.rollouts.thresholds import Thresholds, thresholds
 from robot_dyn.simulation.setup.checks import check_stops
@@ -64,7 +65,7 @@ def rollouts(
 
     Each run is that of `simulate`, to rounding. By an explicit, Gauss or Rosenbrock method of fixed step, such as
     `integrator="rk4"`, and by time stepping, the runs go side by side in machine code. Those that may pass a threshold
-    (a stop, an effort limit, a reversal of friction with states) are made again one after the other on each thread,
+    (a stop, an effort limit, a reversal of friction with states) are repeated one after the other on each thread,
     with steps that end there, in a few milliseconds a run. So are all runs by a method
     that chooses its steps, such as the default, and by one of fixed step where dry friction, rigid stops, payloads
     that come and go, or events end steps, or where samples lie between the ends of steps that may be cut.
@@ -79,8 +80,8 @@ def rollouts(
             payload that a link carries its mass in [kg], as {"payload_mass:tool0": …}, or its centre of mass,
             "payload_com:tool0", (B, 3); "armature", (B, n); "mass_scale", (B,); mass and inertia of a link as of
             `Robot.with_`, as {"link3.mass": …, "link3.inertia": …}, (B,) and (B, 3, 3). Models of controllers keep
-            theirs: they are "model.gravity", ….
-        record: Which of "q", "v", "u", "energy", "work" to keep at the samples; states of effects and controllers are
+            their own values: they are "model.gravity", ….
+        record: Which of "q", "v", "u", "energy", "work" to record at the samples; states of effects and controllers are
             those of `simulate`.
         cuts: False for runs in lock step whose steps do not end at thresholds, which the summary then names: faster,
             and wrong by as much as a step that passes one.
@@ -90,16 +91,16 @@ def rollouts(
             a record period of 0 it grows as tiles of 64 runs end.
         **options: As of `simulate`; all but `estimate_error` and `accuracy`, which have no effect here: no error is
             estimated (`simulate` one of the runs for that). The method "auto" is DOP853 here, and the engine "auto" is
-            machine code; "interpreted" makes the runs one after the other in Python.
+            machine code; "interpreted" executes the runs one after the other in Python.
 
-    Runs are watched at every step: `Rollouts.remarks` counts in how many of them actuation reverses at every tick, and
+    Runs are observed at every step: `Rollouts.remarks` counts in how many of them actuation reverses at every tick, and
     in how many a limit or a stop is reached or passed. In lock step the actuation of a continuous controller is watched
     at samples and at least 200 instants, or every step if there are fewer; whether it reverses at every step is not.
     Likewise where the reference does not begin as the joint does, or moves a joint that friction holds. The other
-    remarks of `simulate` are made on single runs alone.
+    remarks of `simulate` are on single runs alone.
 
     Returns:
-        The runs, in the order given. Ctrl-C ends them, and keeps what there is.
+        The runs, in the order given. Ctrl-C ends them; what was recorded is returned.
 
     Raises:
         QueryError: If an argument is not allowed or has the wrong shape, or the record would exceed `most_bytes`.
@@ -120,18 +121,18 @@ def rollouts(
     q, v, sweep = _starts(setup, q0, v0, params or {})
     why = _why_one_by_one(setup)
     if not truth("cuts", cuts) and why:
-        raise QueryError(f"cuts=False: {why}, and so runs are made one after the other; leave it out")
+        raise QueryError(f"cuts=False: {why}, and so the runs go one after the other; leave it out")
+    batch = Batch(setup, q, v, sweep, recorded)
     passed = None if why else thresholds(setup, sweep, len(q))
     cut = passed is not None or setup.finds_events  # samples are then interpolated within steps, which lock step cannot
     if why or (cuts and cut and not setup.samples_on_steps):
-        runs = one_by_one(setup, q, v, sweep, recorded, most_bytes, threads, on_progress)
+        runs = one_by_one(batch, most_bytes, threads, on_progress)
     else:
-        at = passed if cuts else None
-        runs = _side_by_side(setup, q, v, sweep, recorded, most_bytes, at, threads, on_progress)
+        runs = _side_by_side(batch, passed if cuts else None, most_bytes).run(threads, on_progress)
         if passed is not None and not cuts:
             runs = replace(runs, uncut=passed.names)
     about = frame_of(setup) | edits_of_machine_code(setup) | runs.about
-    return replace(runs, about=about, advice=causes(runs, setup, q, v))
+    return replace(runs, about=about, advice=causes(replace(runs, setup=setup)))
 
 
 def _why_one_by_one(setup: Setup) -> str:
@@ -148,30 +149,23 @@ def _why_one_by_one(setup: Setup) -> str:
     return "steps end at events" if setup.events else ""
 
 
-def _side_by_side(
-    setup: Setup, q: np.ndarray, v: np.ndarray, sweep: dict[str, np.ndarray], recorded: tuple[str, ...], most: int,
-    passed: Thresholds | None, threads: int, on_progress: Callable[[float], object] | None,
-) -> Rollouts:  # fmt: skip
-    """The runs in lock step, of which those that pass a threshold are made again."""
-    equation = StateEquation(setup.plant, setup.controller, setup.integrator.canonical)
-    asked = {"u": "u" in recorded, "v": equation.canonical and "v" in recorded, "energy": "energy" in recorded}
-    kept = tuple(name for name, yes in asked.items() if yes)
-    made = compiled_equation(
-        equation,
-        cast(Integrator, setup.integrator),
-        lanes=LANES,
-        kept=kept,
-        swept=tuple(sweep),
-        jacobian=setup.integrator.needs_jacobian,
-        detects=passed is not None,
-        nonsmooth=setup.integrator.nonsmooth,
-    )
-    made.check(setup)
-    return Batch(setup, made, q, v, sweep, recorded, kept, most, passed).run(threads, on_progress)
+def _side_by_side(batch: Batch, passed: Thresholds | None, most: int) -> Tiles:
+    """The runs in lock step, of which those that pass a threshold are repeated one by one."""
+    setup, recorded = batch.setup, batch.recorded
+    equation = setup.equation
+    from_code = ("u", "v", "energy") if equation.canonical else ("u", "energy")
+    extras = tuple(name for name in from_code if name in recorded)
+    method = cast(Integrator, setup.integrator)
+    compiled = compiled_equation(
+        equation, method, lanes=LANES, extras=extras, swept=tuple(batch.sweep), jacobian=method.needs_jacobian,
+        detects=passed is not None, nonsmooth=setup.integrator.nonsmooth,
+    )  # fmt: skip
+    check(compiled, setup)
+    return Tiles(batch, compiled, extras, most, passed)
 
 
 def _recorded(record: Any) -> tuple[str, ...]:
-    """Names of what is to be kept."""
+    """Names of what is to be recorded."""
     instance("record", record, Iterable, f"give names of {', '.join(RECORDS)}")
     return tuple(choice("record", name, RECORDS) for name in record)
 

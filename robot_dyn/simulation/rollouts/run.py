@@ -10,15 +10,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from robot_dyn.codegen.parameters import with_parameters
 from robot_dyn.errors import QueryError
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.results.acting import acting
+from robot_dyn.simulation.results.acting import acting, at_stop, wrenches
 from robot_dyn.simulation.results.ledger import Ledger
-from robot_dyn.simulation.results.link_wrenches import at_stop, wrenches
-from robot_dyn.simulation.results.samples import columns
-from robot_dyn.simulation.results.tracking import deviation_of
+from robot_dyn.simulation.results.samples import columns, deviation_of
 from robot_dyn.simulation.results.trajectory import Trajectory
+from robot_dyn.simulation.rollouts.batch import parts_of_run
 from robot_dyn.simulation.rollouts.overview import remarks_of
 from robot_dyn.simulation.run.state_functions import sample
 from robot_dyn.simulation.setup.setup import Setup
@@ -52,46 +50,24 @@ def trajectory(runs: Rollouts, run: int) -> Trajectory:
     if setup is not None:
         desired, deviation = deviation_of(setup, t, q)
         loads, stops, acts = wrenches(setup.plant, t, q), at_stop(setup.plant, q), acting(setup)
-    steps, evaluations = int(runs.steps[run]), int(runs.evaluations[run])
+    counts = {"steps": int(runs.steps[run]), "evaluations": int(runs.evaluations[run])}
     about = runs.about | {"run": f"{run} of {len(runs)}"}
     return Trajectory(
-        joint_names=runs.joint_names,
-        t=t,
-        q=q,
-        v=v,
-        a=a,
-        u=u,
-        power=dict(zip(runs.sources, power.T, strict=True)),
-        ledger=Ledger(energy[:, 0], energy[:, 1], work),
-        desired=desired,
-        deviation=deviation,
-        outcome=runs.outcome(run),
-        statistics=replace(runs.statistics, steps=steps, evaluations=evaluations),
-        about=about,
-        wrenches=loads,
-        at_stop=stops,
-        acting=acts,
-        remarks=remarks_of(runs, run, setup, t, q),
+        joint_names=runs.joint_names, t=t, q=q, v=v, a=a, u=u, power=dict(zip(runs.sources, power.T, strict=True)),
+        ledger=Ledger(energy[:, 0], energy[:, 1], work), desired=desired, deviation=deviation,
+        outcome=runs.outcome(run), statistics=replace(runs.statistics, **counts), about=about, wrenches=loads,
+        at_stop=stops, acting=acts, remarks=remarks_of(runs, run, setup, t, q),
         extremes=None if runs.observed is None else runs.observed.extremes[run],
-    )
+    )  # fmt: skip
 
 
 def setup_of(runs: Rollouts, setup: Setup, run: int) -> Setup:
     """As of `Rollouts`: the setup of a batch with the start, parameters and noise of a run."""
-    if runs.params:
-        plant, controller = with_parameters(
-            setup.plant, setup.controller, {name: x[run] for name, x in runs.params.items()}
-        )
-        setup = replace(setup, plant=plant, controller=controller)
-    if setup.controller is not None:
-        number = run if runs.numbers is None else int(runs.numbers[run])
-        setup = replace(setup, controller=setup.controller.of_run(number))
-    return replace(
-        setup,
-        q0=setup.q0 if runs.q0 is None else runs.q0[run],
-        v0=setup.v0 if runs.v0 is None else runs.v0[run],
-        estimate_error=True,
-    )
+    number = run if runs.numbers is None else int(runs.numbers[run])
+    plant, controller = parts_of_run(setup, {name: x[run] for name, x in runs.params.items()}, number)
+    q0 = setup.q0 if runs.q0 is None else runs.q0[run]
+    v0 = setup.v0 if runs.v0 is None else runs.v0[run]
+    return replace(setup, plant=plant, controller=controller, q0=q0, v0=v0, estimate_error=True)
 
 
 def _follows(
@@ -104,10 +80,10 @@ def _follows(
         return nothing, nothing if u is None else u, np.full((len(t), len(equation.sources)), np.nan), energies
     if u is None and (equation.sampled or equation.states):
         u = np.full_like(q, np.nan)  # it depends on what was before
-    made = np.full((len(t), equation.size + q.shape[1] + 2), np.nan)
+    derived = np.full((len(t), equation.size + q.shape[1] + 2), np.nan)
     rest = np.zeros((len(t), equation.size - 2 * q.shape[1]))
     y = np.hstack([q, v, rest])
     for i in range(len(t)):
-        sample(equation, float(t[i]), y[i], None if u is None else u[i], made[i])
-    _, _, a, u, _, power, energy = columns(equation, t, y, made)
+        sample(equation, float(t[i]), y[i], None if u is None else u[i], derived[i])
+    _, _, a, u, _, power, energy = columns(equation, t, y, derived)
     return a, u, power, energy

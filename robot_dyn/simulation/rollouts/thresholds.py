@@ -40,14 +40,14 @@ class Thresholds:
 
     def lanes(self, runs: np.ndarray, rows: int, positions: int) -> LockStep:
         """The switching functions of some of the runs at their start: of rates of so many rows, and `positions`."""
-        made = lock_step(self.rows, self.coordinates, self.levels[:, runs], rows, self.functions, positions)
-        made.until[self.others[runs]] = 0.0
-        made.left[0] -= self.others[runs].sum()
-        return made
+        switches = lock_step(self.rows, self.coordinates, self.levels[:, runs], rows, self.functions, positions)
+        switches.until[self.others[runs]] = 0.0
+        switches.left[0] -= self.others[runs].sum()
+        return switches
 
 
 def thresholds(setup: Setup, sweep: Mapping[str, np.ndarray], count: int) -> Thresholds | None:
-    """Those of so many runs of a setup, where `simulate` cuts steps; None where it does not.
+    """Return the thresholds at which `simulate` cuts steps, of B runs of a setup; None where it cuts none.
 
     Args:
         setup: Of all runs.
@@ -56,7 +56,7 @@ def thresholds(setup: Setup, sweep: Mapping[str, np.ndarray], count: int) -> Thr
     """
     if setup.steps > MOST_CUT or setup.integrator.nonsmooth:
         return None
-    equation = StateEquation(setup.plant, setup.controller, setup.integrator.canonical)
+    equation = setup.equation
     of_runs = _of_runs(equation, sweep, count)
     others = np.array([each.equation.limited != equation.limited for each, _ in of_runs])
     known = [(each, runs) for (each, runs), other in zip(of_runs, others, strict=True) if not other]
@@ -66,8 +66,8 @@ def thresholds(setup: Setup, sweep: Mapping[str, np.ndarray], count: int) -> Thr
     places = [_places(each) for each, _ in known]
     union = sorted({place for each in places for place in each})
     levels = np.full((len(union), count), np.inf)
-    for (each, runs), own in zip(known, places, strict=True):
-        for place, level in zip(own, each.levels, strict=True):
+    for (each, runs), places_of_runs in zip(known, places, strict=True):
+        for place, level in zip(places_of_runs, each.levels, strict=True):
             levels[union.index(place), runs] = level
     unknown = np.zeros(count, bool)
     for (_, runs), other in zip(of_runs, others, strict=True):
@@ -79,11 +79,11 @@ def thresholds(setup: Setup, sweep: Mapping[str, np.ndarray], count: int) -> Thr
 
 def _places(switching: Switching) -> list[tuple[bool, int, int]]:
     """Where each threshold is: whether of a function, its row, and which one of that row."""
-    made: list[tuple[bool, int, int]] = []
+    places: list[tuple[bool, int, int]] = []
     for k, row in enumerate(switching.rows.tolist()):
         function = k >= switching.coordinates
-        made.append((function, row, sum(each[:2] == (function, row) for each in made)))
-    return made
+        places.append((function, row, sum(each[:2] == (function, row) for each in places)))
+    return places
 
 
 def _of_runs(
@@ -100,14 +100,15 @@ def _of_runs(
     for run in range(count if parts else 1):
         for name, place in places.items():
             values[place] = sweep[name][run]
-        own = {part: with_values(of[part], made) for part, made in split(known, values).items()}
+        swept = {part: with_values(of[part], given) for part, given in split(known, values).items()}
         declared = tuple(
-            each.thresholds() if part == CONTROLLER else each.thresholds(plant.dynamics.n) for part, each in own.items()
+            each.thresholds() if part == CONTROLLER else each.thresholds(plant.dynamics.n)
+            for part, each in swept.items()
         )
-        groups.setdefault(declared, (own, []))[1].append(run)
-    made = []
-    for own, runs in groups.values():
-        effects = [own.get(("effect", i), each) for i, each in enumerate(plant.effects)]
-        state = StateEquation(Plant(plant.dynamics, effects), own.get(CONTROLLER, controller), equation.canonical)
-        made.append((Switching(state), np.array(runs if parts else range(count))))
-    return made
+        groups.setdefault(declared, (swept, []))[1].append(run)
+    found = []
+    for swept, runs in groups.values():
+        effects = [swept.get(("effect", i), each) for i, each in enumerate(plant.effects)]
+        state = StateEquation(Plant(plant.dynamics, effects), swept.get(CONTROLLER, controller), equation.canonical)
+        found.append((Switching(state), np.array(runs if parts else range(count))))
+    return found

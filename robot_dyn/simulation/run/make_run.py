@@ -63,7 +63,7 @@ def prepared(
         if compiled_equation is None:
             return interpreted(of, watch), np.zeros(0)
         functions = (
-            compiled_equation.in_python if compiled_equation.loop is None else compiled_equation.equations.functions
+            compiled_equation.in_python if compiled_equation.loop is None else compiled_equation.functions.addresses
         )
         return functions, compiled_equation.parameters if of is equation else _numbers(compiled_equation, of)
 
@@ -90,7 +90,7 @@ def prepared(
 
 def _numbers(compiled_equation: CompiledStateEquation, equation: StateEquation) -> np.ndarray:
     """The parameters of machine code for an equation of other numbers, which keeps those of the latest machine."""
-    latest = equation.known.get(_numbers)
+    latest = equation.cache.get(_numbers)
     if latest is None or latest[0] is not compiled_equation:
-        latest = equation.known[_numbers] = compiled_equation, compiled_equation.of(equation)
+        latest = equation.cache[_numbers] = compiled_equation, compiled_equation.parameters_of(equation)
     return latest[1]

@@ -1,1 +1,7 @@
-"""The setup of a run: plant, start, controller, method, duration; what it is checked for, and its segments."""
+"""The setup of a run.
+
+- setup: `Setup`: plant, start, controller, method, duration; options: its attributes as keyword arguments.
+- checks: whether its parts fit each other and the method; size: its steps, samples and memory, before it runs.
+- event: user-defined events.
+- schedule: segments between ticks and switches, and the steps on each; segment_table: the same as arrays.
+"""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
@@ -12,15 +13,18 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.effects.rigid_stops import RigidStops
 from robot_dyn.errors import ControlError, EffectError, OverflowedError, QueryError, shown
 from robot_dyn.foreign import call
+from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.simulation.setup.size import MOST_CUT
-from robot_dyn.validate import returned
+from robot_dyn.validate import number, returned
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.setup.setup import Setup
 
+_UNITS = ("rad", "m")
+
 
 def check_parts(setup: Setup) -> None:
-    """That the method can make the run, and that effects, controller and events have an answer at the start.
+    """That the method can integrate the setup, and that effects, controller and events have an answer at the start.
 
     Raises:
         QueryError: If the method cannot, or an event returns no number.
@@ -43,7 +47,7 @@ def check_parts(setup: Setup) -> None:
     nothing = np.zeros(setup.plant.dynamics.n)
     setup.plant.actuation(nothing)
     with suppress(OverflowedError):  # a start so far out is the outcome of a run
-        setup.plant.forward_dynamics(0.0, setup.q0, setup.v0, nothing)  # a singular M is told at once
+        setup.plant.forward_dynamics(0.0, setup.q0, setup.v0, nothing)  # a singular M is reported here
 
 
 def check_model(setup: Setup) -> None:
@@ -53,16 +57,16 @@ def check_model(setup: Setup) -> None:
         return
     for model in controller.models.values():
         pairs = tuple(zip(model.joint_names, plant.joint_names, strict=False))
-        if not any(own in plant.joint_names for own, _ in pairs):
+        if not any(of_model in plant.joint_names for of_model, _ in pairs):
             continue
-        for own, name in pairs:
-            if own != name:
+        for of_model, name in pairs:
+            if of_model != name:
                 raise QueryError(
-                    f"the controller's model has the joint {own!r} where the plant has {name!r}; lock the same"
+                    f"the controller's model has the joint {of_model!r} where the plant has {name!r}; lock the same"
                     " joints of both"
                 )
     if controller.task_frame is not None:
-        plant.placement(setup.q0, controller.task_frame)  # so that an unknown link is told now
+        plant.placement(setup.q0, controller.task_frame)  # so that an unknown link is reported here
 
 
 def check_stops(plant: Plant, q0: Array, of: str = "q0") -> None:
@@ -99,16 +103,13 @@ def _check_set_valued(setup: Setup) -> None:
 
 def _check_payloads(setup: Setup) -> None:
     """That the state is one of velocities where payloads come and go."""
-    if setup.plant.equation_of_motion.payloads and setup.integrator.canonical:
-        raise QueryError(
-            f"carried_payload: what is picked up or dropped changes momenta, which {setup.integrator.name}"
-            " integrates; take integrator='DOP853'"
-        )
-    if setup.plant.equation_of_motion.payloads and setup.integrator.nonsmooth:
-        raise QueryError(
-            f"carried_payload: steps of {setup.integrator.name} do not end where it comes and goes; take"
-            " integrator='DOP853'"
-        )
+    method: Any = setup.integrator
+    for fails, why in (
+        (method.canonical, f"what is picked up or dropped changes momenta, which {method.name} integrates"),
+        (method.nonsmooth, f"steps of {method.name} do not end where it comes and goes"),
+    ):
+        if setup.plant.equation_of_motion.payloads and fails:
+            raise QueryError(f"carried_payload: {why}; take integrator='DOP853'")
 
 
 def _check_drives(setup: Setup) -> None:
@@ -149,8 +150,8 @@ def _check_control(setup: Setup) -> None:
         returned(f"{controller.name}.torque", torque, n, error=ControlError)
         if controller.state_size:
             after = controller.next_state if controller.period_s else controller.state_rate
-            made = f"{controller.name}.{after.__name__}"
-            returned(made, call(after, *start), controller.state_size, "state", error=ControlError)
+            what = f"{controller.name}.{after.__name__}"
+            returned(what, call(after, *start), controller.state_size, "state", error=ControlError)
 
 
 def _check_events(setup: Setup) -> None:
@@ -159,3 +160,21 @@ def _check_events(setup: Setup) -> None:
         value = call(event.function, 0.0, setup.q0, setup.v0)
         if np.ndim(value) or not isinstance(value, int | float | np.number) or not np.isfinite(value):
             raise QueryError(f"event {event.name!r}: its function must return a finite number, got {shown(value)}")
+
+
+def least_accuracy(given: Any, dynamics: Dynamics) -> float:
+    """Return the requested accuracy as one number: the least of those for the units that the joints have.
+
+    Raises:
+        QueryError: If it is not a positive number, or lacks the unit of a joint.
+    """
+    if not isinstance(given, Mapping):
+        return number("accuracy", given, above=0)
+    if unknown := [name for name in given if name not in _UNITS]:
+        raise QueryError(f"accuracy: no unit {shown(unknown[0])}; give 'rad', 'm' or both")
+    kinds = getattr(getattr(dynamics, "robot", dynamics), "joint_types", None)
+    slides = [None] if kinds is None else [kind == "prismatic" for kind in kinds]
+    units = [unit for unit, slide in zip(_UNITS, (False, True), strict=True) if slide in slides or None in slides]
+    if missing := [unit for unit in units if unit not in given]:
+        raise QueryError(f"accuracy: none is given for joints in {missing[0]}, got {shown(dict(given))}; add it")
+    return min(number(f"accuracy in {unit}", given[unit], above=0) for unit in units)

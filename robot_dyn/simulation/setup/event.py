@@ -1,4 +1,4 @@
-"""Events: where a run passes a threshold of an effect, or a function of the user's own vanishes."""
+"""Events: where a run passes a threshold of an effect, or a user-defined function vanishes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _DIRECTIONS = (-1, 0, 1)
 @final
 @dataclass(frozen=True, eq=False)
 class Event:
-    """An event that the user asks for: g(t, q, v) = 0.
+    """A user-defined event: g(t, q, v) = 0.
 
     A step of integration ends there. Between the ends of steps g is looked at eight times on the dense output.
 
@@ -24,7 +24,7 @@ class Event:
         function: g, a function of (t, q, v) that returns a number.
         direction: 1 if only growing g counts, −1 if only falling g does, 0 for both.
         terminal: Whether the run ends there.
-        name: For people; that of the function unless given.
+        name: For messages; that of the function unless given.
 
     Raises:
         QueryError: If the function does not take three arguments, or an option is not allowed.

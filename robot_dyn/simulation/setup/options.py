@@ -21,7 +21,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 class Options(TypedDict, total=False):
-    """Attributes of a `Setup`, but for plant and start, for readers of the source and for type checkers."""
+    """Attributes of a `Setup`, but for plant and start, for readers and type checkers."""
 
     duration_s: float
     controller: Any
@@ -52,7 +52,7 @@ def starts(q0: Any, v0: Any) -> dict[str, Any]:
 
 
 def setup_of(caller: str, what: Setup | Plant | Dynamics, options: Mapping[str, Any]) -> Setup:
-    """The setup that is meant: of a plant or robot with options, or a setup with some of its attributes changed.
+    """Return the setup of a plant or robot with options, or a setup with some of its attributes changed.
 
     Args:
         caller: Name of the function that takes the options.
@@ -63,7 +63,7 @@ def setup_of(caller: str, what: Setup | Plant | Dynamics, options: Mapping[str, 
         QueryError: If an option is unknown, or q0 is missing.
     """
     if isinstance(what, Setup) and not options:
-        return what if what.is_value else copy(what)  # parts may have changed since: nothing that was kept is taken
+        return what if what.is_value else copy(what)  # parts may have changed since: nothing cached is used
     known = {each.name for each in fields(Setup)} if isinstance(what, Setup) else {"q0", "v0", *Options.__annotations__}
     for name in options.keys() - known:
         raise QueryError(f"{caller}: no option {name!r}; {nearest(name, known)}")

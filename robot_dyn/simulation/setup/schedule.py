@@ -67,7 +67,7 @@ def cuts(
         if after - before <= ULPS * np.spacing(after):
             raise QueryError(
                 f"switches at {before!r} s and {after!r} s are {after - before:.1e} s apart, less than times of this "
-                "size can tell: make them one, or move them apart"
+                "size resolve: merge them, or move them apart"
             )
     count = ceil(duration_s / period_s - _ROUNDED) if period_s > 0 else 1
     ticks, fixed = (

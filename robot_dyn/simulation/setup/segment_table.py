@@ -1,4 +1,4 @@
-"""The plan of a run as arrays: its segments, their steps, and what the state equation is given on each.
+"""The segments of a run as arrays: its segments, their steps, and what the state equation is given on each.
 
 p = (first and last time of the segment, t₀, c₀, c₁, …)   with q_d(t) = Σⱼ c_j (t − t₀)ʲ on the segment, one polynomial
 of the references after the other; at one time, of a tick or of the end, the first terms of Taylor's series there
@@ -16,10 +16,10 @@ from robot_dyn.control.controller import Controller
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.simulation.setup.schedule import paced
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.values import kept
+from robot_dyn.values import cached
 
-_MOST_KEPT = 1000  # segments: to compute more of them takes little of the time of their run, and to keep them memory
-BOUNDS = 2  # numbers of p before the reference: time is kept between them, so that switches act as between them
+_MOST_CACHED = 1000  # segments: to compute more of them takes little of the time of their run, to cache them memory
+BOUNDS = 2  # numbers of p before the reference: time is held between them, so that switches act as between them
 
 
 class SegmentTable(NamedTuple):
@@ -44,17 +44,17 @@ class SegmentTable(NamedTuple):
 
 def segment_table(setup: Setup, pace: Fraction = Fraction(1)) -> SegmentTable:
     """The segments of a setup, with steps `pace` times as long, and its end, for one run, which changes it."""
-    if pace != 1 or len(setup.segments) > _MOST_KEPT:
-        return _plan(setup, pace)
-    plan = kept(setup, _plan)
-    return plan._replace(ticks=plan.ticks.copy(), transfers=plan.transfers.copy())
+    if pace != 1 or len(setup.segments) > _MOST_CACHED:
+        return _table(setup, pace)
+    table = cached(setup, _table)
+    return table._replace(ticks=table.ticks.copy(), transfers=table.transfers.copy())
 
 
-def _plan(setup: Setup, pace: Fraction = Fraction(1)) -> SegmentTable:
+def _table(setup: Setup, pace: Fraction = Fraction(1)) -> SegmentTable:
     segments = paced(setup.segments, pace)
     counts = np.array([each.steps for each in segments])
     starts, ends = (np.array([getattr(each, name) for each in segments]) for name in ("start", "end"))
-    ticks = np.array([*(each.tick for each in segments), setup.ends_on_tick]) & _sampled(setup)
+    ticks = np.array([*(each.tick for each in segments), setup.ends_on_tick]) & setup.equation.sampled
     bounds = np.column_stack([np.nextafter(starts, np.inf), np.nextafter(ends, -np.inf)])
     followed = polynomials(setup.controller)
     inside = np.hstack([bounds, *(_pieces(each, starts, ends) for each in followed)])
@@ -78,18 +78,14 @@ def _transfers(setup: Setup) -> list[float]:
     return [t for each in payloads for t in each.switches if t > 0]
 
 
-def _sampled(setup: Setup) -> bool:
-    return setup.controller is not None and setup.controller.period_s > 0
-
-
 def polynomials(controller: Controller | None) -> tuple[PiecewisePolynomial, ...]:
-    """What the references of a controller are made of."""
+    """The polynomials of the references of a controller."""
     references = () if controller is None else controller.references.values()
     return tuple(each for reference in references for each in reference.polynomials.values())
 
 
 def lengths(followed: PiecewisePolynomial) -> int:
-    """Number of the numbers that tell one of its pieces: t₀ and the coefficients."""
+    """How many numbers define one of its pieces: t₀ and the coefficients."""
     return 1 + followed.coefficients[0].size
 
 

@@ -18,13 +18,12 @@ from robot_dyn.integrate.adaptive import AUTO, Adaptive
 from robot_dyn.integrate.methods import as_method
 from robot_dyn.simulation.dynamics.declarations import is_value, undeclared
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.setup.accuracy import asked
-from robot_dyn.simulation.setup.checks import check_model, check_parts
+from robot_dyn.simulation.setup.checks import check_model, check_parts, least_accuracy
 from robot_dyn.simulation.setup.event import Event
 from robot_dyn.simulation.setup.schedule import LEAST_STEPS, ON_STEP, Segment, cuts, near, nodes, steps_on
 from robot_dyn.simulation.setup.size import MOST_CUT, check_segments
 from robot_dyn.validate import choice, duration, instance, integer, one_state, truth
-from robot_dyn.values import Keeping, Value
+from robot_dyn.values import Caching, Value
 
 ENGINES = ("auto", "interpreted", "compiled")
 STEP_S = 1e-3  # of a method of fixed step, unless given
@@ -33,28 +32,28 @@ _LONGEST_STEP_S, _LEAST_STEPS = 0.01, 200  # where a part does not declare where
 
 @final
 @dataclass(frozen=True, eq=False)
-class Setup(Value, Keeping):
-    """All that a run depends on; what follows from it alone is computed once and kept with it, and not copied.
+class Setup(Value, Caching):
+    """All that a run depends on; what follows from it alone is cached with it, and not copied.
 
     Attributes:
         plant: What moves.
         q0: Position at the start, (n,).
         v0: Velocity at the start, (n,); 0 if not given.
         duration_s: In [s].
-        controller: What drives it: a `Controller`; a function (t, q, v) → torque (n,), which is made one; or None.
+        controller: What drives it: a `Controller`; a function (t, q, v) → torque (n,), which becomes one; or None.
         integrator: The method, by its name as in a scene or itself: "auto", "DOP853" and "Rosenbrock", or an `Adaptive`
             with other tolerances, choose their steps; "rk4", "order_8", "gauss_4" and others of `rd.method` have a
             fixed one.
-        step_s: Fixed step, 1 ms unless given; made smaller where samples, ticks, switches and the end ask for it. It is
+        step_s: Fixed step, 1 ms unless given; shortened where samples, ticks, switches and the end require it. It is
             not to be given for a method that chooses its steps.
         record_period_s: Time between samples; 0 for every step, or 1000 samples where the method chooses its steps.
-        estimate_error: Whether companion runs are made, which cost about as much as the run; five times as much
-            where only shorter steps can tell.
-        about: Texts kept with the run.
+        estimate_error: Whether companion runs estimate the error, which cost about as much as the run; five times as
+            much where only shorter steps can show it.
+        about: Texts stored with the run.
         engine: "interpreted"; "compiled", the run in machine code, right angles of the file written out in
-            full; or "auto", which compiles where that pays, and uses machine code that this process already has.
-        events: What to look out for: steps end there, and the run does if one is terminal.
-        accuracy: Largest error of q to have, over joints and times: a number for rad and m alike, or one of each, as
+            full; or "auto", which compiles where that is worthwhile, and uses machine code that exists already.
+        events: Events to find: steps end there, and the run does if one is terminal.
+        accuracy: Largest error of q over joints and times: a number for rad and m alike, or one of each, as
             {"rad": 1e-8, "m": 1e-6}, of which the least holds. Pilot runs choose method and tolerance, and the error
             estimate is the check.
     """
@@ -107,7 +106,7 @@ class Setup(Value, Keeping):
 
     def _check_accuracy(self) -> None:
         """That an accuracy is one, and that nothing else chooses method or tolerance."""
-        object.__setattr__(self, "accuracy", asked(self.accuracy, self.plant.dynamics))
+        object.__setattr__(self, "accuracy", least_accuracy(self.accuracy, self.plant.dynamics))
         if self.integrator != Adaptive(AUTO):
             raise QueryError(f"accuracy: chooses method and tolerance; leave out integrator, got {self.integrator}")
         if not self.estimate_error:
@@ -119,7 +118,7 @@ class Setup(Value, Keeping):
 
     @cached_property
     def is_value(self) -> bool:
-        """Whether no part but its events is the user's own code, or may change: what follows from it stays as it is."""
+        """Whether no part but its events is user-defined code, or may change: what follows from it stays as it is."""
         return all(map(is_value, (self.plant, self.controller, self.integrator)))
 
     @cached_property
@@ -137,7 +136,7 @@ class Setup(Value, Keeping):
         """The run cut at the ticks of the controller, the breaks of its reference and the switches of effects.
 
         Raises:
-            QueryError: If two switches lie closer together than floats can tell.
+            QueryError: If two switches lie closer together than floats resolve.
         """
         starts, step = self._cuts[:-1], self.nominal_step_s
         ends = [t for t, _ in self._cuts[1:]]
@@ -167,7 +166,7 @@ class Setup(Value, Keeping):
 
     @property
     def finds_events(self) -> bool:
-        """Whether steps end where effects and the controller switch, and at events asked for."""
+        """Whether steps end where effects and the controller switch, and at requested events."""
         if self.integrator.controls_error or self.integrator.nonsmooth:
             return not self.integrator.nonsmooth
         return self.equation.switches and self.steps <= MOST_CUT
@@ -187,7 +186,7 @@ class Setup(Value, Keeping):
 
     @property
     def nominal_step_s(self) -> float:
-        """Step of a method of fixed step before it is made smaller, in [s]."""
+        """Step of a method of fixed step before it is shortened, in [s]."""
         return STEP_S if self.step_s is None else self.step_s
 
     @property
@@ -224,13 +223,15 @@ def _events(given: Any) -> tuple[Event, ...]:
 
 def _controller(given: Any, n: int) -> Controller | None:
     """The controller of n joints that is meant; raises QueryError if it is not one."""
-    made: Any = given
+    controller: Any = given
     if callable(given) and not isinstance(given, Controller) and not isinstance(given, type):
-        made = ControlLaw(given, n)
-    instance("controller", made, Controller | None, "give one, such as rd.PD(…), a function of (t, q, v), or None")
-    if made is not None:
-        duration("period_s of the controller", made.period_s, zero=True)
-        if made.n != n:
-            raise QueryError(f"the controller drives {made.n} joints, the plant has {n}")
-        integer("state_size of the controller", made.state_size)
-    return made
+        controller = ControlLaw(given, n)
+    instance(
+        "controller", controller, Controller | None, "give one, such as rd.PD(…), a function of (t, q, v), or None"
+    )
+    if controller is not None:
+        duration("period_s of the controller", controller.period_s, zero=True)
+        if controller.n != n:
+            raise QueryError(f"the controller drives {controller.n} joints, the plant has {n}")
+        integer("state_size of the controller", controller.state_size)
+    return controller

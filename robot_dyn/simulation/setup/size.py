@@ -13,21 +13,20 @@ from robot_dyn.errors import QueryError
 from robot_dyn.validate import LEAST_EXACT
 
 if TYPE_CHECKING:
-    from robot_dyn.simulation.dynamics.state_equation import StateEquation
     from robot_dyn.simulation.setup.setup import Setup
 
-MOST_BYTES = 8 * 2**30  # of all that is recorded, unless said
-LONGEST_S = LEAST_EXACT / float_info.epsilon  # up to there floats tell the times of a run
+MOST_BYTES = 8 * 2**30  # of all that is recorded, by default
+LONGEST_S = LEAST_EXACT / float_info.epsilon  # up to there floats resolve the times of a run
 MOST_CUT = 200_000  # steps of a run of fixed step that is cut at events
 MOST_STEPS = 1e11  # about a day of the fastest machine code
 _SEGMENT_BYTES, _SEGMENT_BYTES_PER_JOINT = 500, 100  # by estimate; the second is a quintic at its start and along it
 
 
 def check_segments(setup: Setup) -> None:
-    """Refuse a run of more steps, ticks or switches than can be made, or of times that floats do not tell apart.
+    """Refuse a run of more steps, ticks or switches than are possible, or of times that floats do not resolve.
 
     Raises:
-        QueryError: If it is one; says how many and the remedy.
+        QueryError: If it is one; with the number and the remedy.
     """
     cut = segments(setup)
     size = cut * (_SEGMENT_BYTES + _SEGMENT_BYTES_PER_JOINT * setup.plant.dynamics.n)
@@ -43,19 +42,20 @@ def check_segments(setup: Setup) -> None:
         )
     if setup.duration_s > LONGEST_S:
         raise QueryError(
-            f"a run of {setup.duration_s:g} s ends at a time that floats tell to {ulp(setup.duration_s):.1g} s only:"
+            f"a run of {setup.duration_s:g} s ends at a time that floats resolve to {ulp(setup.duration_s):.1g} s only:"
             f" take a shorter duration_s, {LONGEST_S:.2g} s at most"
         )
 
 
-def check_record(setup: Setup, equation: StateEquation) -> None:
+def check_record(setup: Setup) -> None:
     """Refuse a run whose samples take more than MOST_BYTES.
 
     Raises:
-        QueryError: If they do; says how much and the remedy.
+        QueryError: If they do; with the size and the remedy.
     """
+    equation = setup.equation
     n, s, m = equation.plant.dynamics.n, len(equation.sources), len(equation.widths)
-    # t, y, zero-order hold; q, v, a, u, work, power, energies; desired, deviation; and copies of all while it is made
+    # t, y, zero-order hold; q, v, a, u, work, power, energies; desired, deviation; and copies of all meanwhile
     size = 2 * 8 * samples(setup) * (1 + m + n + 4 * n + 2 * s + 2 + 2 * n)
     if size > MOST_BYTES:
         raise too_large(f"{samples(setup):.3g} samples", size, MOST_BYTES)
@@ -65,7 +65,7 @@ def check_batch(setup: Setup, runs: int, numbers: int, most: float) -> None:
     """Refuse a batch of so many runs, with so many numbers in each sample, that takes more than `most` bytes.
 
     Raises:
-        QueryError: If it does; says how much and the remedy.
+        QueryError: If it does; with the size and the remedy.
     """
     size = 8 * samples(setup) * runs * numbers
     if size > most:

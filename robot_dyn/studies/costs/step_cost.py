@@ -22,11 +22,12 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import RobotDynError
 from robot_dyn.integrate.methods import method
 from robot_dyn.model.robot import Robot
-from robot_dyn.simulation.compiled.build import compiled_equation, machine_of_constants
+from robot_dyn.simulation.compiled.build import compiled_equation, compiled_with_constants
 from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.events.payload_events import PayloadEvents
-from robot_dyn.simulation.rollouts.lock_step import LANES, Batch
+from robot_dyn.simulation.rollouts.batch import Batch
+from robot_dyn.simulation.rollouts.lock_step import LANES, Tiles
 from robot_dyn.simulation.run.fixed_step import FixedStep
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.run.watch import Watch
@@ -100,18 +101,18 @@ def pairs_of_parts(setup: Setup) -> Iterator[Pair]:
 def numbers(setup: Setup) -> Pair:
     """Numbers as inputs of machine code, and as constants."""
     short = _short(setup, _STEPS)
-    constants = _alone(short, machine_of_constants(_equation(short), short.integrator))
+    constants = _alone(short, compiled_with_constants(_equation(short), short.integrator))
     return Pair("machine code", NUMBERS, PER_STEP, one_run(setup).named("inputs"), constants.named("constants"))
 
 
 def side_by_side(setup: Setup) -> Pair:
     """One run, and many of them side by side on one thread."""
     short = _short(setup, _STEPS_OF_MANY)
-    made = compiled_equation(_equation(short), short.integrator, lanes=LANES, kept=())
+    made = compiled_equation(_equation(short), short.integrator, lanes=LANES, extras=())
     starts = np.tile(short.q0, (RUNS, 1)), np.tile(short.v0, (RUNS, 1))
 
     def run() -> float:
-        batch = Batch(short, made, *starts, {}, (), (), MOST_BYTES)
+        batch = Tiles(Batch(short, *starts), made, (), MOST_BYTES)
         began = process_time()
         batch.run(1)
         return (process_time() - began) / (RUNS * short.steps)
@@ -128,13 +129,13 @@ def one_run(setup: Setup) -> Way:
 
 def instructions(made: CompiledStateEquation) -> int:
     """Of a step, what the method itself adds apart."""
-    programs = made.equations.programs
+    programs = made.functions.programs
     return _EVALUATIONS * len(programs["rate"]) + (len(programs["tick"]) if "tick" in programs else 0)
 
 
 def _alone(short: Setup, made: CompiledStateEquation) -> Way:
     def run() -> float:
-        functions, equation = (made.equations.functions, made.parameters), made.equation
+        functions, equation = (made.functions.addresses, made.parameters), made.equation
         watch, transfers = Watch(short, equation), PayloadEvents(equation)
         steps = FixedStep(watch, transfers, lambda _: functions, Fraction(1), made.advance())
         began = process_time()

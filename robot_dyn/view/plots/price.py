@@ -40,7 +40,7 @@ def _accuracy(run: Trajectory) -> Iterator[tuple[str, str]]:
     of = run.accuracy
     assert of is not None
     at = f", at rtol {of.rtol:.1e}" if of.rtol else ""
-    yield "accuracy asked for", f"{of.asked:.1e}{at}"
+    yield "accuracy asked for", f"{of.requested:.1e}{at}"
     yield "pilots and check", f"{of.pilots} and {of.check} evaluations"
     for name, evaluations in (("a digit more", of.digit_more), ("a digit less", of.digit_less)):
         part = evaluations / max(of.run, 1)

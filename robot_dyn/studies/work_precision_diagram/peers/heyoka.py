@@ -28,7 +28,7 @@ def candidates(motion: FreeMotion) -> list[MethodUnderTest]:
     if machine is None or setup.engine != COMPILED:
         raise PeerError("its equations are taken from our machine code, which this run has not")
     names = [hy.make_vars(f"y{i}") for i in range(2 * n)]
-    rates = _in_heyoka(hy, machine.equations.programs["rate"], names, machine.parameters)
+    rates = _in_heyoka(hy, machine.functions.programs["rate"], names, machine.parameters)
     start = np.concatenate([setup.q0, setup.v0])
     made: dict[float, Any] = {}
 

@@ -1,0 +1,273 @@
+"""The self-check of machine code: it is compared with the interpreted equations before it is used.
+
+    |y' − y'_interpreted| ≤ 1e-13 · cond(M) · scale   at states of the run or at random ones, or it is refused
+
+The Jacobian is compared with differences of the interpreted equation. Two spans show by how much differences may be
+wrong themselves: by rounding, or where a kink lies between.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from robot_dyn.arithmetic import Array
+from robot_dyn.errors import RobotDynError
+from robot_dyn.foreign import because
+from robot_dyn.integrate.differences import INSIDE, by_state, by_time, rowwise
+from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
+from robot_dyn.simulation.compiled.functions import STEP, States
+from robot_dyn.simulation.dynamics.bodies import bodies
+from robot_dyn.simulation.dynamics.moreau_jean import stepped
+from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.run.event_run import TooLongError
+from robot_dyn.simulation.run.make_run import prepared
+from robot_dyn.simulation.run.outcome import Ending
+from robot_dyn.simulation.run.recording import Path
+from robot_dyn.simulation.run.state_functions import sample
+from robot_dyn.simulation.setup.segment_table import segment_table
+from robot_dyn.simulation.setup.setup import Setup
+
+_LANES = 4  # runs in lock step that are compared
+_AGREES = 1e-13
+_LENGTH = 1e-3  # [s], of a step that is compared
+
+_RANDOM = 4  # states
+_FIRST_S, _MOST = 1.0, 2000  # [s] of a run that are interpreted first, and its evaluations, some 0.2 s
+_ALONG, _AT_TIMES = 100, 100  # states of the first second, and states at random times of the whole run
+_AGAIN = 4  # of either
+_TRIES = 4  # of spans, each a tenth; then the start alone is left
+
+_DIFFERENCES = 1e-6  # of a column: differences are right to some 1e-10 of f, over columns of other units
+_NARROWER = 4.0
+_DOUBT, _ROUNDINGS = 30.0, 300.0  # of f, where forces cancel
+
+Pairs = Iterator[tuple[Array, Array]]  # a result of machine code, and that of the interpreted equation
+
+
+class MachineError(RobotDynError):
+    """Machine code that does not agree with the interpreted equations; nothing of it is used."""
+
+
+class _Evaluated(NamedTuple):
+    """The functions at one time, in W lanes.
+
+    Attributes:
+        t: In [s].
+        y: States, (m, W).
+        p: Of the segment.
+        run_parameters: Of each lane, (O, W).
+        results: Of each function that is called by itself, (size, W).
+    """
+
+    t: float
+    y: Array
+    p: Array
+    run_parameters: Array
+    results: Mapping[str, Array]
+
+    def held(self, equation: StateEquation, lane: int) -> Array | None:
+        """The actuation in zero-order hold of a lane; None without."""
+        return self.run_parameters[: equation.plant.dynamics.n, lane] if equation.sampled else None
+
+
+def check(compiled: CompiledStateEquation, setup: Setup) -> None:
+    """Compare machine code with the interpreted equations.
+
+    Once is enough, at random states, where the version of this library identifies the code of all parts. Any other part
+    is compared at states of the first second of its run, and at some of these before each later run.
+
+    Raises:
+        MachineError: If they differ by more than rounding.
+    """
+    checked, changeable = compiled.functions.checked, compiled.functions.changeable
+    states = next(iter(checked.values()), None)
+    if states is None:
+        states = _states_of_run(setup) if changeable else _random_states(setup, compiled.equation.size)
+        _compare(compiled, setup, states)
+    elif changeable:
+        _compare(compiled, setup, _some(states))
+    checked[compiled.loop] = states
+
+
+def _compare(compiled: CompiledStateEquation, setup: Setup, states: States) -> None:
+    rng, equation, functions = np.random.default_rng(20), compiled.equation, compiled.functions
+    W, table, held = functions.runs, segment_table(setup), equation.plant.dynamics.n * equation.sampled
+    results = {name: np.empty((functions.programs.results(name), W)) for name in functions.programs}
+    swept = {each.name: np.tile(each.value.ravel(), (W, 1)) for each in compiled.known if each.name in compiled.swept}
+    run_parameters = compiled.run_parameters(swept)
+    for i, time in enumerate(states.t.tolist()):
+        p = table.parameters[int(np.searchsorted(table.starts[:-1], time, side="right")) - 1]
+        t, y = min(max(time, p[0]), p[1]), np.ascontiguousarray(states.y[(i + np.arange(W)) % len(states.y)].T)
+        run_parameters[:held] = rng.normal(size=(held, W))
+        for name, out in results.items():
+            if name not in STEP:
+                getattr(compiled.in_python, name)(t, y, p, run_parameters, out)
+        at = _Evaluated(t, y, p, run_parameters, results)
+        try:
+            for lane in range(min(W, _LANES)):
+                _compare_lane(compiled, at, lane)
+        except RobotDynError:
+            raise
+        except Exception as error:  # of changeable code
+            parts = " or ".join(functions.changeable)
+            raise MachineError(f"{parts} raises at t = {round(t, 9):g} s ({because(error)})") from error
+        if "jacobian" in results:
+            J = results["jacobian"][:, 0].reshape(equation.size + 1, equation.size)
+            worst = jacobian_error(equation, t, y[:, 0], at.held(equation, 0), p, J)
+            if not worst <= 1:
+                raise _differs(compiled, "Jacobian", worst * _DIFFERENCES, _DIFFERENCES, t)
+
+
+def _compare_lane(compiled: CompiledStateEquation, at: _Evaluated, lane: int) -> None:
+    """Compare all results of one lane."""
+    pairs = [*_results_of_lane(compiled, at, lane)]
+    if "problem" in at.results and not lane:
+        pairs += _results_of_step(compiled, at)
+    y, plant = at.y[:, lane], compiled.equation.plant
+    allowed = _AGREES * max(1.0, float(np.linalg.cond(plant.M(y[: plant.dynamics.n]))))
+    worst = max(_difference(*pair, y) for pair in pairs)
+    if not worst <= allowed:
+        raise _differs(compiled, "state equation", worst, allowed, at.t)
+
+
+def _results_of_lane(compiled: CompiledStateEquation, at: _Evaluated, lane: int) -> Pairs:
+    """What the functions return for a lane, quantity by quantity, and what the equation gives."""
+    equation, t, y, held = compiled.equation, at.t, at.y[:, lane], at.held(compiled.equation, lane)
+    ours, single = {name: out[:, lane] for name, out in at.results.items()}, compiled.functions.runs == 1
+    n, m = equation.plant.dynamics.n, equation.size
+    theirs = np.empty(m + n + 2)
+    sample(equation, t, y, held, theirs)
+    rate, u, energy = np.split(theirs, [m, m + n])
+    yield ours["energy"], energy
+    if "rate" in ours:
+        yield ours["rate"][:m], rate
+    if "rate" in ours and single:
+        yield ours["rate"][m:], u
+        yield from zip(np.split(ours["sample"], [m, m + n]), (rate, u, energy), strict=True)
+    if "actuation" in ours:
+        yield ours["actuation"], u
+    if "events" in ours:
+        q, v, z, _ = equation.state(y)
+        demands = equation.demands(t, q, v, z, held, equation.limited)
+        yield ours["events"], np.array([*np.ravel(demands), *equation.switching(t, q, v)], dtype=float)
+    if "bodies" in ours:
+        both = ours["bodies"], bodies(equation, t, y, held)
+        yield from zip(*(np.split(each, [n * n]) for each in both), strict=True)
+    if "tick" in ours:
+        after, command = equation.tick(t, y)
+        yield ours["tick"][:n], np.asarray(command)
+        yield ours["tick"][n:], after[2 * n : 2 * n + equation.state_size]
+
+
+def _results_of_step(compiled: CompiledStateEquation, at: _Evaluated) -> Pairs:
+    """y⁺, v⁺ and its places by a step of time stepping, lane by lane, and what the equation gives."""
+    equation, (m, W) = compiled.equation, at.y.shape
+    n = equation.plant.dynamics.n
+    x = np.vstack([at.y, np.full((1, W), _LENGTH), np.zeros((n, W))])
+    out = np.empty((m + 2 * n + 1 + compiled.functions.programs.results("problem"), W))
+    compiled.in_python.step(at.t, x, at.p, at.run_parameters, out)
+    for lane in range(min(W, _LANES)):
+        theirs = stepped(equation, at.t, x[:, lane], at.held(equation, lane))
+        yield out[:m, lane], theirs[:m]
+        yield out[m : m + 2 * n, lane], theirs[m : m + 2 * n]
+
+
+def _difference(x: Array, y: Array, start: Array) -> float:
+    """The largest difference of two results, by the size of the second and of the state."""
+    size = max(float(np.abs(y).max(initial=1.0)), float(np.abs(start).max()))
+    return float(np.abs(x - y).max(initial=0.0) / size) if np.isfinite(x).all() and np.isfinite(y).all() else np.inf
+
+
+def _differs(compiled: CompiledStateEquation, what: str, worst: float, allowed: float, t: float) -> MachineError:
+    of, remedy = f"of {compiled.functions.name}", "take engine='interpreted', and report it"
+    if parts := compiled.functions.changeable:
+        of = f"with {' or '.join(parts)}"
+        remedy = (
+            "methods must be functions of their arguments and of what their part declares; take"
+            " engine='interpreted', or create a part again that was changed after a run"
+        )
+    return MachineError(
+        f"the compiled {what} {of} differs from the interpreted one by {worst:.1e} of its size at"
+        f" t = {round(t, 9):g} s, {allowed:.1e} allowed: {remedy}"
+    )
+
+
+def _random_states(setup: Setup, size: int) -> States:
+    """Random states of that size at random segments of a run."""
+    rng, table = np.random.default_rng(20), segment_table(setup)
+    segments = rng.integers(len(table.counts) - 1, size=_RANDOM)
+    return States(table.starts[segments] + table.lengths[segments], rng.normal(size=(_RANDOM, size)))
+
+
+def _states_of_run(setup: Setup) -> States:
+    """States of the first second of a run, at their times and at random times of the whole run.
+
+    They lie halfway between the ends of steps, where rates may have kinks. Those at other times are for code that does
+    on symbols what it does on early times.
+    """
+    path = _first_second(setup)
+    ends = np.unique(np.linspace(0, max(len(path.t) - 2, 0), _ALONG).astype(int))
+    after = np.minimum(ends + 1, len(path.t) - 1)
+    t, y = (path.t[ends] + path.t[after]) / 2, (path.y[ends] + path.y[after]) / 2
+    times = np.random.default_rng(20).uniform(0.0, setup.duration_s, size=_AT_TIMES)
+    return States(np.append(t, times), np.vstack([y, y[np.resize(np.arange(len(y)), _AT_TIMES)]]))
+
+
+def _some(states: States) -> States:
+    """A few of these states, the first and the last among them."""
+    rows = np.unique(np.linspace(0, len(states.t) - 1, 2 * _AGAIN).astype(int))
+    return States(states.t[rows], states.y[rows])
+
+
+def _first_second(setup: Setup) -> Path:
+    """The first second of a run by the interpreted engine, or as much of it as takes few evaluations; or its start."""
+    span = min(setup.duration_s, _FIRST_S)
+    if not setup.integrator.controls_error:
+        span = min(span, _MOST / (setup.integrator.evaluations_per_step or 1) * setup.taken_step_s)
+    for _ in range(_TRIES):
+        short = replace(
+            setup, duration_s=span, record_period_s=0.0, estimate_error=False, accuracy=None, engine="interpreted"
+        )
+        try:
+            record = prepared(short, short.equation, None, samples=False, most=_MOST).record()
+        except TooLongError:
+            span /= 10
+            continue
+        if record.outcome.ending is Ending.STOPPED:
+            raise KeyboardInterrupt
+        return record.step_log
+    return Path(np.zeros(1, np.int64), np.zeros(1), setup.equation.start(setup.q0, setup.v0)[None])
+
+
+def jacobian_error(equation: StateEquation, t: float, y: Array, held: Array | None, p: Array, J: Array) -> float:
+    """Return how far a Jacobian is from differences, over what is allowed: at most 1 if it agrees.
+
+    Args:
+        equation: The interpreted state equation.
+        t: Time within the segment.
+        y: State, (m,).
+        held: The actuation in zero-order hold, or None.
+        p: Of the segment.
+        J: ∂f/∂y_j for each j, then ∂f/∂t, (m + 1, m).
+    """
+
+    def f(at: Any, states: Array) -> Array:
+        time = min(max(float(at), p[0]), p[1])
+        return rowwise(lambda row: equation.rate(time, row, held)[0])(at, states)
+
+    span = np.cbrt(np.finfo(float).eps)
+    widths, ahead = np.minimum(equation.widths, span * np.maximum(1.0, np.abs(y)) / INSIDE), 2 * span * max(1.0, abs(t))
+    ahead = min(ahead, p[1] - t) if t - p[0] < p[1] - t else max(-ahead, p[0] - t)
+    wide, narrow = (
+        np.vstack([by_state(f, t, y, scale * widths), by_time(f, t, y, t + scale * ahead)[None]])
+        for scale in (1.0, 1 / _NARROWER)
+    )
+    rounding = _ROUNDINGS * np.finfo(float).eps * np.abs(f(t, y)).max() / span
+    doubt = _DOUBT * np.abs(wide - narrow).max(axis=1) + rounding
+    allowed = _DIFFERENCES * np.maximum(1.0, np.abs(narrow).max(axis=1)) + doubt
+    far = np.abs(J - wide).max(axis=1)
+    return float((far / allowed).max()) if np.isfinite(J).all() else np.inf
