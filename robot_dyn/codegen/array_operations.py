@@ -16,7 +16,7 @@ from llvmlite import ir
 from robot_dyn.codegen.llvm.vectors import Vectors
 from robot_dyn.codegen.loops import arrays, vectors
 from robot_dyn.codegen.loops.kinds import BOOL, F64, FLOAT, I8, INT
-from robot_dyn.codegen.loops.numbers import converted, scalar, truth
+from robot_dyn.codegen.loops.numbers import converted, real, scalar, truth
 from robot_dyn.codegen.loops.values import ArrayValue, Scalar, StaticValue, Value
 
 if TYPE_CHECKING:
@@ -111,7 +111,7 @@ def _weighted_sum(
         raise f.refused(node, "a combination of arrays that are not contiguous", "copy them first")
     if f.silent:
         return NOTHING
-    b, h = f.builder, converted(f, scalar(f, h, node), FLOAT, node)
+    b, h = f.builder, real(f, h, node)
     stage = K.strides(b)[0].ir
     for width, e in vectors.chunks(f, arrays.size(f, y), _NUMBERS):
         kind = vectors.kind(width, FLOAT)
@@ -247,7 +247,7 @@ def enclosure(
         vectors.check(f, node, bound, [x])
     if f.silent:
         return Scalar(BOOL, None)
-    b, (least, most) = f.builder, (converted(f, scalar(f, each, node), FLOAT, node) for each in (least, most))
+    b, (least, most) = f.builder, (real(f, bound, node) for bound in (least, most))
     found = _Found(b)
     for width, e in vectors.chunks(f, arrays.size(f, x), vectors.WIDTHS):
         given, outside = vectors.loaded(b, x.data, e, width, FLOAT), []

@@ -14,7 +14,6 @@ from numpy import empty
 from robot_dyn.arithmetic import Array
 from robot_dyn.codegen.derivatives import forward_dynamics_derivatives
 from robot_dyn.codegen.engine import Engine
-from robot_dyn.codegen.on_first_use import OnFirstUse
 from robot_dyn.codegen.self_check import SelfCheck
 from robot_dyn.codegen.store.cache import default_store
 from robot_dyn.codegen.threads import thread_count
@@ -25,6 +24,7 @@ from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import Axes, Dynamics
 from robot_dyn.queries.quantity import FORWARD_DYNAMICS_DERIVATIVES
 from robot_dyn.validate import choice, instance, truth
+from robot_dyn.values import OnFirstUse
 
 _DERIVATIVES = FORWARD_DYNAMICS_DERIVATIVES.name
 
@@ -74,23 +74,18 @@ class CompiledDynamics(Dynamics, Parametrised):
     @cached_property
     def engine(self) -> Engine:
         """The kernels."""
-        trace, robot = Trace(self.robot), self.robot
 
         def truth(quantity: str, state: dict[str, np.ndarray]) -> tuple[np.ndarray, Any]:
             return np.asarray(self._otherwise(quantity)(*(state[name] for name in QUANTITIES[quantity].arguments))), 0.0
 
         return Engine(
-            trace.quantity,
+            Trace(self.robot).quantity,
             QUANTITIES,
-            robot.sizes,
-            SelfCheck(robot, "Pinocchio"),
+            SelfCheck(self.robot, "Pinocchio"),
             truth,
-            self.joint_names,
             self.dtype,
             thread_count(self.threads),
             default_store() if self.cache else None,
-            robot.joint_without_inertia is not None,
-            coupled=not robot.couplings.trivial,
         )
 
     @cached_property
@@ -99,15 +94,12 @@ class CompiledDynamics(Dynamics, Parametrised):
 
     @property
     def instructions(self) -> dict[str, dict[str, int]]:
-        """Instructions by formulation, of each quantity used so far; the first is the one that won."""
-        return {
-            name: dict(sorted(trace.counts.items(), key=lambda item: item[1]))
-            for name, trace in self.engine.traces.items()
-        }
+        """Instructions by formulation, of each quantity used so far; the shortest first, which is compiled."""
+        return self.engine.instructions
 
     def served_by(self, quantity: str) -> str:
-        """The formulation whose machine code answers a quantity, or "Pinocchio" past the size where compiling pays."""
-        if quantity not in QUANTITIES or not self.engine.pays(quantity):
+        """The formulation whose machine code computes a quantity; "Pinocchio" if it is too long to be compiled."""
+        if quantity not in QUANTITIES or not self.engine.worthwhile[quantity]:
             return "Pinocchio"
         return self.engine.traces[quantity].formulation
 

@@ -1,7 +1,7 @@
-"""The engine of a compiled robot or plant: each quantity is traced, compiled and checked when it is first asked for.
+"""The engine of a compiled robot or plant: each quantity is traced, compiled and checked on first use.
 
-A quantity of one state costs one call of machine code; what that reports, and lists, batches and errors, go the general
-way, `ask`.
+A quantity of one state is one call of machine code. `ask` handles everything else: lists, batches, and states for
+which the kernel reports a doubt or an error.
 """
 
 from __future__ import annotations
@@ -14,23 +14,22 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.arithmetic import Float
-from robot_dyn.codegen.arguments import into
 from robot_dyn.codegen.kernel import Kernel
-from robot_dyn.codegen.on_first_use import OnFirstUse
+from robot_dyn.codegen.llvm.one_state import Status
 from robot_dyn.codegen.self_check import STATES, SelfCheck
-from robot_dyn.codegen.status import Status
-from robot_dyn.codegen.store.store import Store
+from robot_dyn.codegen.store.cache import Store
 from robot_dyn.codegen.trace.from_casadi import program_of
 from robot_dyn.codegen.trace.trace import Traced
 from robot_dyn.errors import QueryError, RobotDynWarning
 from robot_dyn.queries.batch import DoubtError, answered
 from robot_dyn.queries.quantity import Quantity
 from robot_dyn.validate import converted, shaped, times
+from robot_dyn.values import OnFirstUse
 
 # Measured on chains: forward dynamics of 64 joints, 48 875 instructions, takes 8 s to compile; a batch is then 13 times
 # as fast as Pinocchio, one state from Python twice. The time grows as the count: above this, a quarter of a minute.
 LARGEST_KERNEL = 100_000
-_FEW = 8  # states of a batch that do not pay a batch kernel
+_FEW = 8  # states; for fewer a batch kernel is not worthwhile
 
 
 class SizeWarning(RobotDynWarning):
@@ -43,59 +42,66 @@ class Engine:
     """Kernels by quantity.
 
     Attributes:
-        traced: Gives the trace of a quantity.
-        quantities: Those it answers, by name.
-        sizes: What letters in their shapes stand for.
-        self_check: What kernels must agree with.
-        truth: The independent answer: (quantity, states) → (STATES, …), and the torque of effects, a term.
-        joint_names: For messages.
+        traced: Returns the trace of a quantity.
+        quantities: Those it computes, by name.
+        self_check: What kernels must agree with; its robot has the joints and the shapes.
+        truth: The independent result: (quantity, states) → (STATES, …), and the torque of effects, a term.
         dtype: "float64" or "float32".
         threads: For batches.
-        store: Where compiled code is kept, or None.
-        singular: Whether M is singular everywhere: what is solved has no answer, and its errors are for others to word.
+        store: Where compiled code is stored, or None.
         parameters: What all states share, the last argument of each trace; none if it is empty.
-        coupled: Whether joints follow others: then angles that are far are for `otherwise`, which knows what rounding
+        singular: Whether M is singular everywhere: forward dynamics has no result, and `otherwise` raises the error.
+        coupled: Whether joints follow others: then far angles are left to `otherwise`, which knows what rounding
             of theirs hides.
+        traces, worthwhile, kernels, ones, many: By quantity, on first use: its trace, whether it is small enough to be
+            compiled, its kernel, and that of one state and of batches, checked.
     """
 
     traced: Callable[[str], Traced]
     quantities: Mapping[str, Quantity]
-    sizes: Mapping[str, int]
     self_check: SelfCheck
     truth: Callable[[str, dict[str, np.ndarray]], tuple[np.ndarray, Any]]
-    joint_names: tuple[str, ...]
     dtype: str
     threads: int
     store: Store | None
-    singular: bool = False
     parameters: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    coupled: bool = False
+    sizes: Mapping[str, int] = field(init=False, repr=False)
+    joint_names: tuple[str, ...] = field(init=False)
+    singular: bool = field(init=False)
+    coupled: bool = field(init=False)
     traces: OnFirstUse = field(init=False, repr=False)
-    paying: OnFirstUse = field(init=False, repr=False)
+    worthwhile: OnFirstUse = field(init=False, repr=False)
     kernels: OnFirstUse = field(init=False, repr=False)
     ones: OnFirstUse = field(init=False, repr=False)
     many: OnFirstUse = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        for name, make in (
-            ("traces", self.traced),
-            ("paying", self._pays),
-            ("kernels", self._kernel),
-            ("ones", self._one),
-            ("many", self._many),
-        ):
-            object.__setattr__(self, name, OnFirstUse(make))
+        robot = self.self_check.dynamics
+        vars(self).update(
+            sizes=robot.sizes,
+            joint_names=robot.joint_names,
+            singular=robot.joint_without_inertia is not None,
+            coupled=not robot.couplings.trivial,
+            traces=OnFirstUse(self.traced),
+            worthwhile=OnFirstUse(self._is_worthwhile),
+            kernels=OnFirstUse(self._kernel),
+            ones=OnFirstUse(self._one),
+            many=OnFirstUse(self._many),
+        )
+
+    @property
+    def instructions(self) -> dict[str, dict[str, int]]:
+        """Instructions by formulation, of each quantity used so far; the shortest first, which is compiled."""
+        return {
+            name: dict(sorted(trace.counts.items(), key=lambda item: item[1])) for name, trace in self.traces.items()
+        }
 
     def shape(self, quantity: str) -> tuple[int, ...]:
         """Shape of a quantity for one state, (1,) of a number."""
         return self.quantities[quantity].shape(self.sizes) or (1,)
 
-    def pays(self, quantity: str) -> bool:
-        """Whether a quantity is small enough to be compiled."""
-        return self.paying[quantity]
-
-    def _pays(self, quantity: str) -> bool:
-        """Whether it is, with a SizeWarning if it is not."""
+    def _is_worthwhile(self, quantity: str) -> bool:
+        """Whether a quantity is small enough to be compiled; a SizeWarning if not."""
         if self.singular and self.quantities[quantity].solves:
             return False
         trace = self.traces[quantity]
@@ -131,7 +137,7 @@ class Engine:
         def equation(*given: np.ndarray) -> np.ndarray:
             batch = np.broadcast_shapes(*(x.shape[:-1] for x in given))
             alone = not batch
-            if self.pays(quantity):
+            if self.worthwhile[quantity]:
                 y = self._computed(quantity, given, batch)
                 if y is not None:
                     return y
@@ -143,7 +149,7 @@ class Engine:
             return np.broadcast_to(np.asarray(otherwise(*state), self.dtype), (*batch, *shape))
 
         answer = answered(equation, arrays, shape, self.joint_names, errors, Float(np.dtype(self.dtype)))
-        return into(out, answer if asked.axes else answer[..., 0])
+        return _into(out, answer if asked.axes else answer[..., 0])
 
     def _computed(self, quantity: str, given: tuple[np.ndarray, ...], batch: tuple[int, ...]) -> np.ndarray | None:
         """The kernel's results for a batch of states, or None if it reports a doubt."""
@@ -175,7 +181,7 @@ class Engine:
                     (states[0], int(np.prod(shape))), self.dtype
                 )  # not `out`: a doubt may come after some rows
                 if self.many[quantity](arguments, y, self.threads) is Status.FINE:
-                    return into(out, y.reshape(*states, *shape))
+                    return _into(out, y.reshape(*states, *shape))
         except (AttributeError, TypeError):  # not such arrays
             pass
         return None
@@ -213,7 +219,7 @@ class Engine:
 
     def _one(self, quantity: str) -> Any:
         """The checked kernel for one state."""
-        if not self.pays(quantity):
+        if not self.worthwhile[quantity]:
             return _never
         kernel = self.kernels[quantity]
         self._judge(quantity, lambda inputs, y: [kernel.call(*row, y[i]) for i, row in enumerate(inputs)])
@@ -221,7 +227,7 @@ class Engine:
 
     def _many(self, quantity: str) -> Any:
         """The checked kernel for batches."""
-        if not self.pays(quantity):
+        if not self.worthwhile[quantity]:
             return _never
         kernel = self.kernels[quantity]
         length = int(np.prod(kernel.shape))
@@ -248,5 +254,18 @@ class Engine:
 
 
 def _never(*_: Any) -> int:
-    """In place of a kernel that does not pay: the general way takes over."""
+    """In place of a kernel that is not worthwhile: `ask` takes over."""
     return Status.SHAPE
+
+
+def _into(out: np.ndarray | None, result: np.ndarray) -> Any:
+    """The result, in `out` if that is given; QueryError if it does not fit."""
+    if out is None:
+        return result if result.ndim else result[()]
+    if not isinstance(out, np.ndarray) or out.dtype != result.dtype or out.shape != result.shape:
+        got = f"{out.dtype} {out.shape}" if isinstance(out, np.ndarray) else repr(out)
+        raise QueryError(f"out must be an array of {result.dtype} and shape {result.shape}, got {got}")
+    if not out.flags.writeable:
+        raise QueryError("out must be writable, got a read-only array")
+    out[...] = result
+    return out

@@ -16,13 +16,12 @@ import numpy as np
 from robot_dyn.codegen.llvm import machine_code
 from robot_dyn.codegen.llvm.batch import batch_function, lanes
 from robot_dyn.codegen.llvm.entries import write_batch_entry, write_state_entry
-from robot_dyn.codegen.llvm.lanes import F32, F64
-from robot_dyn.codegen.llvm.one_state import Limits, state_function
+from robot_dyn.codegen.llvm.one_state import Limits, Status, state_function
 from robot_dyn.codegen.llvm.python_function import python_function
+from robot_dyn.codegen.llvm.vectors import F32, F64
 from robot_dyn.codegen.program import Program
-from robot_dyn.codegen.status import Status
-from robot_dyn.codegen.store.identity import digest, sources_of_the_writer
-from robot_dyn.codegen.store.store import Store
+from robot_dyn.codegen.store.cache import Store
+from robot_dyn.codegen.store.keys import digest, sources_of_the_writer
 from robot_dyn.codegen.threads import shared
 
 # Instructions of vectors that a thread takes at a time, about 50 µs; fewer than _PIECES of these, and to wake a second
@@ -146,4 +145,4 @@ class Kernel:
     def _address(self, function: str, what: str, write: Callable[[Any, str], None]) -> int:
         form = str(self.shape), self.dtype, str(self.times), repr(self.doubtful), str(self._parametrised)
         key = digest([what, sources_of_the_writer(), str(self.program), *form])
-        return machine_code.address(function, key, write, self.store, f"{self.about}, {what}")
+        return machine_code.addresses((function,), key, write, self.store, f"{self.about}, {what}")[0]

@@ -17,15 +17,14 @@ import numpy as np
 from robot_dyn.arithmetic import Array
 from robot_dyn.codegen.dynamics import CompiledDynamics
 from robot_dyn.codegen.engine import Engine
-from robot_dyn.codegen.interrupts import interrupts_later
 from robot_dyn.codegen.parameters import ROBOT, Parameter, joined, parameters, split
 from robot_dyn.codegen.self_check import SelfCheck
-from robot_dyn.codegen.store.cache import default_store
 from robot_dyn.codegen.trace.from_casadi import instructions
 from robot_dyn.codegen.trace.symbolic import Symbolic, Symbols, column, inputs
 from robot_dyn.codegen.trace.symbolic_dynamics import SymbolicDynamics
 from robot_dyn.codegen.trace.symbolic_plant import symbolic_plant
 from robot_dyn.codegen.trace.trace import Traced
+from robot_dyn.codegen.waiting import interrupts_later
 from robot_dyn.effects.plant import Plant
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.quantity import PLANT
@@ -67,29 +66,21 @@ class CompiledPlant:
             method = getattr(self.interpreted, quantity)
             return np.array([np.broadcast_to(method(*row), state["q"].shape[1:]) for row in rows]), effects
 
-        robot = self.dynamics.robot
         return Engine(
             self._traced,
             PLANT,
-            robot.sizes,
-            SelfCheck(robot, "the interpreted plant"),
+            SelfCheck(self.dynamics.robot, "the interpreted plant"),
             truth,
-            robot.joint_names,
             self.dynamics.dtype,
             self.dynamics.engine.threads,
-            default_store() if self.dynamics.cache else None,
-            robot.joint_without_inertia is not None,
+            self.dynamics.engine.store,
             joined(self._known),
-            not robot.couplings.trivial,
         )
 
     @property
     def instructions(self) -> dict[str, dict[str, int]]:
         """Instructions by formulation, of each quantity used so far, effects included; the least first."""
-        return self.dynamics.instructions | {
-            name: dict(sorted(trace.counts.items(), key=lambda item: item[1]))
-            for name, trace in self.engine.traces.items()
-        }
+        return self.dynamics.instructions | self.engine.instructions
 
     @property
     def instructions_by_effect(self) -> dict[str, int]:

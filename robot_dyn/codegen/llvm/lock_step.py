@@ -13,8 +13,7 @@ from typing import Any, NamedTuple
 
 from llvmlite import ir
 
-from robot_dyn.codegen.llvm.lanes import F64, wide
-from robot_dyn.codegen.llvm.vectors import I1, I64, Vectors, align_stack
+from robot_dyn.codegen.llvm.vectors import F64, I1, I64, Vectors, align_stack, wide
 from robot_dyn.codegen.llvm.writer import Writer
 from robot_dyn.codegen.program import Program
 
@@ -29,13 +28,13 @@ class Computed(NamedTuple):
 
     Attributes:
         results: A vector of each.
-        beyond: As of `Written`.
+        out_of_range: As of `Written`.
         seldom: Numbers of the results that are stored only where `doubt` holds for some run.
         doubt: The mask of these runs; None if all are stored.
     """
 
     results: list[Any]
-    beyond: Any
+    out_of_range: Any
     seldom: range = range(0)
     doubt: Any = None
 
@@ -57,7 +56,7 @@ def write_function(module: Any, name: str, program: Program, runs: int, shared: 
 
     def body(writer: Writer, given: list[list[Any]]) -> Computed:
         written = writer.write(program, given)
-        return Computed(written.results, written.beyond)
+        return Computed(written.results, written.out_of_range)
 
     _write(module, name, program.inputs, body, runs, shared)
 
@@ -91,7 +90,7 @@ def write_step(
         doubt = writer.builder.fcmp_ordered(">", found[-1], writer.vectors.constant(0.0))
         results = [*after.results, *found, *known.results]
         seldom = len(after.results) + len(found) if runs > 1 else len(results)
-        return Computed(results, known.beyond, range(seldom, len(results)), doubt)
+        return Computed(results, known.out_of_range, range(seldom, len(results)), doubt)
 
     _write(module, name, (1, m + n, *first.inputs[2:]), body, runs, shared)
 
@@ -122,8 +121,8 @@ def _write(
     if made.doubt is not None:
         with builder.if_then(writer.vectors.any(made.doubt), likely=False):
             store(made.seldom)
-    with builder.if_then(writer.vectors.any(made.beyond), likely=False):
-        builder.call(any_angle, [*function.args, at, builder.bitcast(made.beyond, ir.IntType(writer.count))])
+    with builder.if_then(writer.vectors.any(made.out_of_range), likely=False):
+        builder.call(any_angle, [*function.args, at, builder.bitcast(made.out_of_range, ir.IntType(writer.count))])
     following = builder.add(at, ir.Constant(I64, writer.count))
     at.add_incoming(following, builder.block)
     builder.cbranch(builder.icmp_signed("<", following, ir.Constant(I64, runs)), loop, end)

@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 
-from robot_dyn.codegen.llvm.lanes import F64
 from robot_dyn.codegen.llvm.numpy_array import check_structure
-from robot_dyn.codegen.llvm.vectors import I64
+from robot_dyn.codegen.llvm.vectors import F64, I64
 
 _FASTCALL = 0x80  # (self, pointer to the arguments, their number)
 OBJECT = ir.IntType(8).as_pointer()

@@ -11,8 +11,7 @@ from typing import Any
 
 from llvmlite import ir
 
-from robot_dyn.codegen.llvm.lanes import wide
-from robot_dyn.codegen.llvm.vectors import I1, I32, I64, Vectors
+from robot_dyn.codegen.llvm.vectors import I1, I32, I64, Vectors, wide
 
 SIDE = 8
 _LINE = 64  # bytes of a cache line, of most processors

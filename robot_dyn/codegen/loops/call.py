@@ -13,15 +13,14 @@ from functools import cached_property
 from time import perf_counter
 from typing import Any, final
 
-from robot_dyn.codegen.interrupts import interrupts_later
 from robot_dyn.codegen.llvm import machine_code
 from robot_dyn.codegen.llvm.machine_code import Passes
-from robot_dyn.codegen.loops.identity import identity, sources_of_the_translator
+from robot_dyn.codegen.loops.dependencies import dependencies
 from robot_dyn.codegen.loops.kinds import Kind, Number, Static, TupleKind, unpacked, words
 from robot_dyn.codegen.loops.packing import Packed, pack
-from robot_dyn.codegen.store.identity import digest
-from robot_dyn.codegen.store.store import Store
-from robot_dyn.codegen.waiting import told
+from robot_dyn.codegen.store.cache import Store
+from robot_dyn.codegen.store.keys import digest, sources_of_the_translator
+from robot_dyn.codegen.waiting import announced, interrupts_later
 from robot_dyn.errors import MachineCodeError
 
 _ENTRY = ctypes.CFUNCTYPE(ctypes.c_char_p, ctypes.c_void_p, ctypes.c_void_p)
@@ -80,7 +79,7 @@ class MachineFunction:
 
     def key(self, kinds: tuple[Kind, ...]) -> str:
         """Of its machine code in a store."""
-        return self._key(kinds, identity(self.function, self._instead))
+        return self._key(kinds, dependencies(self.function, self._instead))
 
     def _key(self, kinds: tuple[Kind, ...], texts: list[str]) -> str:
         return digest(["loop", str(self._passes), sources_of_the_translator(), *map(repr, kinds), *texts])
@@ -110,7 +109,7 @@ class MachineFunction:
         began, known = perf_counter(), tuple(kinds)
         with self._lock, interrupts_later():
             if known not in self._known:
-                with told(f"compiling {self.about}, once for this version"):
+                with announced(f"compiling {self.about}, once for this version"):
                     self._known[known] = self._compiled(known)
             self._known[place] = self._known[known]
         _spent.seconds += perf_counter() - began
@@ -128,7 +127,7 @@ class MachineFunction:
             of_result = ir.Function(module, ir.FunctionType(TEXT, []), f"{prefix}result")
             ir.IRBuilder(of_result.append_basic_block()).ret(program.text(_written(result)))
 
-        texts = identity(self.function, self._instead)
+        texts = dependencies(self.function, self._instead)
         key, note, store = self._key(kinds, texts), self._key((), texts), self.store()
         call, result = machine_code.addresses(("call", "result"), key, write, store, self.about, self._passes)
         if store is not None and store.load(note) is None:

@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, NoReturn, final
 
 from llvmlite import ir
@@ -211,7 +212,7 @@ class Function:
         if node.id not in self._times:
             if node.id not in self.known:
                 self.refuse(node, f"the name {node.id!r}, which has no value,", "define it before")
-            return self.program.constant(self.known[node.id], lambda *x: self.refuse(node, *x))
+            return self.constant(self.known[node.id], node)
         if node.id not in self.assigned:
             remedy = "give it one before the branch or loop that does"
             raise self.refused(node, f"{node.id!r}, which may have no value here,", remedy)
@@ -222,8 +223,12 @@ class Function:
         return of_leaves(kind, parts)
 
     def refuse(self, node: ast.AST, what: str, remedy: str) -> NoReturn:
-        """Raise it."""
+        """Raise the error of a construct."""
         raise self.refused(node, what, remedy)
+
+    def constant(self, value: Any, node: ast.AST) -> Value:
+        """A value that is known when the function is translated."""
+        return self.program.constant(value, partial(self.refuse, node))
 
     def expression(self, node: ast.expr) -> Value:
         """The value of an expression."""

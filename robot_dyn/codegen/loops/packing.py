@@ -17,7 +17,6 @@ import numpy as np
 from llvmlite import ir
 
 from robot_dyn.codegen.llvm import machine_code, numpy_array
-from robot_dyn.codegen.loops.identity import sources_of_the_translator
 from robot_dyn.codegen.loops.kinds import (
     I8,
     I64,
@@ -31,8 +30,8 @@ from robot_dyn.codegen.loops.kinds import (
     words,
 )
 from robot_dyn.codegen.loops.vectors import ZERO, steps
-from robot_dyn.codegen.store.identity import digest
-from robot_dyn.codegen.store.store import Store
+from robot_dyn.codegen.store.cache import Store
+from robot_dyn.codegen.store.keys import digest, sources_of_the_translator
 
 _I32 = ir.IntType(32)
 _FORM = 2  # words of the form of an array: flags, axes and whether the last is of length 1; and its dtype
@@ -177,7 +176,7 @@ def _reader(store: Callable[[], Store | None]) -> Any:
     if not _readers:
         numpy_array.check_structure()
         key = digest(["arrays", sources_of_the_translator(), str(sorted(numpy_array.OFFSETS.items()))])
-        _readers.append(_HEADER(machine_code.address("read", key, _write, store(), "the arrays of arguments")))
+        _readers.append(_HEADER(machine_code.addresses(("read",), key, _write, store(), "the arrays of arguments")[0]))
     return _readers[0]
 
 

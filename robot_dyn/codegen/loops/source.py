@@ -12,6 +12,7 @@ from functools import lru_cache
 from types import CodeType, FunctionType
 from typing import Any
 
+from robot_dyn.codegen.store.definition import code_parts
 from robot_dyn.errors import TraceError
 
 
@@ -41,7 +42,7 @@ def syntax(function: Callable[..., Any]) -> ast.FunctionDef:
     if place not in trees:
         remedy = "write it with def, in a file or a cell of a notebook"
         raise refused(function, code.co_firstlineno, "a function without its source", remedy)
-    if not _same(codes[place], code):
+    if code_parts(codes[place]) != code_parts(code):
         remedy = "import the module again"
         raise refused(function, code.co_firstlineno, "a function whose source has changed since it was read", remedy)
     return trees[place]
@@ -96,14 +97,3 @@ def _codes(code: CodeType) -> Iterator[CodeType]:
     for each in code.co_consts:
         if isinstance(each, CodeType):
             yield from _codes(each)
-
-
-def _same(x: CodeType, y: CodeType) -> bool:
-    """Whether two pieces of code do the same."""
-    names = "co_code", "co_names", "co_varnames", "co_freevars", "co_cellvars"
-    if any(getattr(x, name) != getattr(y, name) for name in names) or len(x.co_consts) != len(y.co_consts):
-        return False
-    pairs = zip(x.co_consts, y.co_consts, strict=True)
-    return all(
-        _same(a, b) if isinstance(a, CodeType) and isinstance(b, CodeType) else repr(a) == repr(b) for a, b in pairs
-    )

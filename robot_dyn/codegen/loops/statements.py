@@ -1,4 +1,4 @@
-"""Statements of the subset. Each tells whether what follows it is never reached."""
+"""Statements of the subset. Each function returns whether what follows the statement is never reached."""
 
 from __future__ import annotations
 
@@ -223,14 +223,10 @@ def _expression(f: Function, node: ast.Expr) -> bool:
     return False
 
 
-def _pass(f: Function, node: ast.Pass) -> bool:
-    return False
-
-
 STATEMENTS: Mapping[type[ast.stmt], Callable[[Any, Any], bool]] = MappingProxyType(
     {
         ast.Assign: _assign, ast.AnnAssign: _annotated, ast.AugAssign: _augmented, ast.If: _if, ast.While: _while,
         ast.For: _for, ast.Break: _break, ast.Continue: _continue, ast.Return: _return, ast.Expr: _expression,
-        ast.Pass: _pass,
+        ast.Pass: lambda f, node: False,
     }
 )  # fmt: skip

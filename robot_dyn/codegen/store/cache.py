@@ -39,15 +39,6 @@ class CacheWarning(RobotDynWarning):
     """Compiled kernels are not kept on disk; everything else works, only slower at the start."""
 
 
-def key(*parts: bytes | str) -> str:
-    """The SHA-256 of the parts, in hex: kind and length precede each, so no two lists of parts share their bytes."""
-    digest = sha256()
-    for part in parts:
-        kind, data = (b"s", part.encode("utf-8", "surrogatepass")) if isinstance(part, str) else (b"b", part)
-        digest.update(kind + len(data).to_bytes(8, "big") + data)
-    return digest.hexdigest()
-
-
 @final
 @dataclass(frozen=True)
 class Entry:
@@ -85,7 +76,7 @@ class Store:
         """The payload saved under `key`; None if there is none that is whole and yours (a bad one is removed).
 
         Raises:
-            QueryError: If `key` is not one that `key()` gives.
+            QueryError: If `key` is not a digest.
         """
         path = self._path(key)
         if _objection(self.folder):
@@ -126,7 +117,7 @@ class Store:
 
     def _path(self, key: str) -> Path:
         if not _KEY.fullmatch(key):  # it becomes the name of a file
-            raise QueryError(f"key must be 64 hexadecimal digits, got {shorten(key)!r}; give what key() returns")
+            raise QueryError(f"key must be 64 hexadecimal digits, got {shorten(key)!r}; give one of store.keys.digest")
         return self.folder / f"{key}.kernel"
 
     def _files(self, name: re.Pattern[str] = _ENTRY) -> list[tuple[Path, os.stat_result]]:

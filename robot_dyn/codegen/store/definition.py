@@ -17,12 +17,12 @@ from abc import ABCMeta
 from collections.abc import Iterator, Mapping
 from dataclasses import Field
 from functools import cached_property, lru_cache, partial
-from hashlib import sha256
 from types import CodeType, FunctionType, GetSetDescriptorType, MemberDescriptorType, MethodType, ModuleType
 from typing import Any, final
 
 import numpy as np
 
+from robot_dyn.codegen.store.keys import digest_of_texts
 from robot_dyn.coefficients import Coefficient
 
 _NUMBERS = bool, int, float, complex, str, bytes, type(None), type(Ellipsis), type(NotImplemented)
@@ -65,7 +65,7 @@ def definition(value: Any) -> str | None:
         parts = [reader.text(value), *reader.texts()]
     except (_UndefinedError, RecursionError):
         return None
-    return sha256("\0".join(f"{len(part)} {part}" for part in parts).encode("utf-8", "surrogatepass")).hexdigest()
+    return digest_of_texts(parts)
 
 
 @final
@@ -128,7 +128,7 @@ class _Reader:
             raise _UndefinedError
         defaults = self.text(function.__defaults__), self._items(function.__kwdefaults__ or {})
         names = {" ".join(path): _at(function.__globals__, path) for path in _globals(code)}
-        words = _words(code), *defaults, self._items(closure), self._items(names), self._items(vars(function))
+        words = code_parts(code), *defaults, self._items(closure), self._items(names), self._items(vars(function))
         return f"function {function.__qualname__} {words}"
 
     def _of_class(self, kind: type) -> str:
@@ -216,16 +216,17 @@ def _globals(code: CodeType) -> frozenset[tuple[str, ...]]:
 
 
 @lru_cache(maxsize=1024)
-def _words(code: CodeType) -> tuple[Any, ...]:
-    """A code without the places of its lines."""
+def code_parts(code: CodeType) -> tuple[Any, ...]:
+    """All that determines what a code does, as texts and numbers; not its file and lines."""
     names = code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars
-    counts = code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount, code.co_flags
-    return code.co_code.hex(), code.co_exceptiontable.hex(), names, counts, [*map(_constant, code.co_consts)]
+    counts = code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount
+    kind = code.co_flags & 0xFFFF  # without those of __future__, which a cell of a notebook may have from another
+    return code.co_code.hex(), code.co_exceptiontable.hex(), names, counts, kind, [*map(_constant, code.co_consts)]
 
 
 def _constant(value: Any) -> Any:
     if isinstance(value, CodeType):
-        return _words(value)
+        return code_parts(value)
     if isinstance(value, tuple | frozenset):
         items = map(repr, map(_constant, value))
         return type(value).__name__, [*items] if isinstance(value, tuple) else sorted(items)

@@ -10,46 +10,8 @@ from robot_dyn.codegen.program import Kind, Op, Program
 from robot_dyn.errors import RobotDynError
 
 _MOVES = {ca.OP_INPUT, ca.OP_OUTPUT, ca.OP_CONST}
-_KINDS = {
-    ca.OP_ADD: Kind.ADD,
-    ca.OP_SUB: Kind.SUBTRACT,
-    ca.OP_MUL: Kind.MULTIPLY,
-    ca.OP_DIV: Kind.DIVIDE,
-    ca.OP_NEG: Kind.NEGATE,
-    ca.OP_SQ: Kind.SQUARE,
-    ca.OP_TWICE: Kind.TWICE,
-    ca.OP_INV: Kind.RECIPROCAL,
-    ca.OP_FABS: Kind.ABSOLUTE,
-    ca.OP_SIGN: Kind.SIGN,
-    ca.OP_FLOOR: Kind.FLOOR,
-    ca.OP_CEIL: Kind.CEILING,
-    ca.OP_FMIN: Kind.MINIMUM,
-    ca.OP_FMAX: Kind.MAXIMUM,
-    ca.OP_COPYSIGN: Kind.COPY_SIGN,
-    ca.OP_FMOD: Kind.REMAINDER,
-    ca.OP_SQRT: Kind.SQUARE_ROOT,
-    ca.OP_HYPOT: Kind.HYPOTENUSE,
-    ca.OP_POW: Kind.POWER,
-    ca.OP_CONSTPOW: Kind.POWER,
-    ca.OP_EXP: Kind.EXPONENTIAL,
-    ca.OP_LOG: Kind.LOGARITHM,
-    ca.OP_TAN: Kind.TANGENT,
-    ca.OP_ASIN: Kind.ARC_SINE,
-    ca.OP_ACOS: Kind.ARC_COSINE,
-    ca.OP_ATAN: Kind.ARC_TANGENT,
-    ca.OP_ATAN2: Kind.ARC_TANGENT_OF_TWO,
-    ca.OP_SINH: Kind.HYPERBOLIC_SINE,
-    ca.OP_COSH: Kind.HYPERBOLIC_COSINE,
-    ca.OP_TANH: Kind.HYPERBOLIC_TANGENT,
-    ca.OP_LT: Kind.LESS,
-    ca.OP_LE: Kind.LESS_OR_EQUAL,
-    ca.OP_EQ: Kind.EQUAL,
-    ca.OP_NE: Kind.NOT_EQUAL,
-    ca.OP_NOT: Kind.NOT,
-    ca.OP_AND: Kind.AND,
-    ca.OP_OR: Kind.OR,
-    ca.OP_IF_ELSE_ZERO: Kind.WHERE,
-}
+_KINDS = {getattr(ca, f"OP_{kind.value.upper()}"): kind for kind in Kind if kind is not Kind.SINE_COSINE}
+_KINDS[ca.OP_CONSTPOW] = Kind.POWER
 
 
 class OperationError(RobotDynError):
