@@ -33,7 +33,7 @@ _FEW = 8  # states; for fewer a batch kernel is not worthwhile
 
 
 class SizeWarning(RobotDynWarning):
-    """Equations too long to be compiled: Pinocchio answers in their place."""
+    """Equations too long to be compiled: Pinocchio computes them instead."""
 
 
 @final
@@ -109,7 +109,7 @@ class Engine:
             return True
         warnings.warn(
             f"{quantity} takes {count} instructions, more than the {LARGEST_KERNEL} that are worth compiling;"
-            f" {self.self_check.name} answers, at its own speed",
+            f" {self.self_check.name} computes it, at its own speed",
             SizeWarning,
             stacklevel=2,
         )
@@ -123,16 +123,16 @@ class Engine:
         errors: str,
         otherwise: Callable[..., Any],
     ) -> Any:
-        """A quantity in general: check the arguments, go through the batch, hand doubtful states to `otherwise`.
+        """A quantity in general: check the arguments, go through the batch, leave doubtful states to `otherwise`.
 
         Raises:
             QueryError: If an argument is wrong; and what `otherwise` raises. Then `out` is left as it was.
         """
         if (quick := self._plainly(quantity, arguments, out)) is not None:
             return quick
-        asked, shape = self.quantities[quantity], self.shape(quantity)
-        timed = asked.arguments[0] == "t"
-        arrays = {name: self._array(name, x) for name, x in zip(asked.arguments, arguments, strict=True)}
+        requested, shape = self.quantities[quantity], self.shape(quantity)
+        timed = requested.arguments[0] == "t"
+        arrays = {name: self._array(name, x) for name, x in zip(requested.arguments, arguments, strict=True)}
 
         def equation(*given: np.ndarray) -> np.ndarray:
             batch = np.broadcast_shapes(*(x.shape[:-1] for x in given))
@@ -149,7 +149,7 @@ class Engine:
             return np.broadcast_to(np.asarray(otherwise(*state), self.dtype), (*batch, *shape))
 
         answer = answered(equation, arrays, shape, self.joint_names, errors, Float(np.dtype(self.dtype)))
-        return _into(out, answer if asked.axes else answer[..., 0])
+        return _into(out, answer if requested.axes else answer[..., 0])
 
     def _computed(self, quantity: str, given: tuple[np.ndarray, ...], batch: tuple[int, ...]) -> np.ndarray | None:
         """The kernel's results for a batch of states, or None if it reports a doubt."""
@@ -161,12 +161,12 @@ class Engine:
         return y if self._run(quantity, flat, y.reshape(len(flat[0]), -1)) is Status.FINE else None
 
     def _plainly(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None) -> Any:
-        """The result for arrays (B, n) that the kernel takes as they are, in which it finds nothing; else None."""
-        asked, states = self.quantities[quantity], getattr(arguments[-1], "shape", ())[:-1]
-        if len(states) != 1 or states[0] <= _FEW or not asked.axes:
+        """The result for arrays (B, n) that the kernel takes as they are, if it reports no doubt; otherwise None."""
+        requested, states = self.quantities[quantity], getattr(arguments[-1], "shape", ())[:-1]
+        if len(states) != 1 or states[0] <= _FEW or not requested.axes:
             return None
-        shape = asked.shape(self.sizes)
-        if asked.arguments[0] == "t":
+        shape = requested.shape(self.sizes)
+        if requested.arguments[0] == "t":
             t = arguments[0]
             if type(t) is not np.ndarray or t.dtype.kind not in "fiu" or t.shape != states:
                 return None
@@ -177,9 +177,8 @@ class Engine:
             arguments = (t, *arguments[1:])
         try:
             if all(type(x) is np.ndarray and x.flags.aligned for x in arguments):
-                y = np.empty(
-                    (states[0], int(np.prod(shape))), self.dtype
-                )  # not `out`: a doubt may come after some rows
+                # not `out`: a doubt may come after some rows
+                y = np.empty((states[0], int(np.prod(shape))), self.dtype)
                 if self.many[quantity](arguments, y, self.threads) is Status.FINE:
                     return _into(out, y.reshape(*states, *shape))
         except (AttributeError, TypeError):  # not such arrays
@@ -187,7 +186,7 @@ class Engine:
         return None
 
     def _array(self, name: str, x: Any) -> np.ndarray:
-        """An argument as an array; that its numbers are finite the kernel sees faster."""
+        """An argument as an array; the kernel checks faster that its numbers are finite."""
         if name == "t":
             return times(name, x)[..., None]
         plain = x.__class__ is np.ndarray and x.dtype == self.dtype and x.shape[-1:] == (len(self.joint_names),)
@@ -208,12 +207,12 @@ class Engine:
         return Status(self.kernels[quantity].any_angle(*arguments))
 
     def _kernel(self, quantity: str) -> Kernel:
-        asked = self.quantities[quantity]
-        times = asked.arguments[0] == "t"
+        requested = self.quantities[quantity]
+        times = requested.arguments[0] == "t"
         program = program_of(self.traces[quantity].function)
         about = f"{self.self_check.dynamics.name}: {quantity}, {self.dtype}"
         return Kernel(
-            program, self.shape(quantity), self.dtype, times, asked.doubtful, self.store, about, self.parameters,
+            program, self.shape(quantity), self.dtype, times, requested.doubtful, self.store, about, self.parameters,
             not self.coupled,
         )  # fmt: skip
 
@@ -240,17 +239,17 @@ class Engine:
         return kernel.many
 
     def _judge(self, quantity: str, run: Callable[[list[list[Any]], np.ndarray], Any]) -> None:
-        """Hold what `run` writes, and reports by one Status or one a state, to the independent answer."""
-        asked = self.quantities[quantity]
+        """Compare what `run` writes with the independent result; it reports one Status, or one for each state."""
+        requested = self.quantities[quantity]
         state = {name: x.astype(self.dtype).astype(float) for name, x in self.self_check.states().items()}
         rows = [
-            [float(state[n][i]) if n == "t" else state[n][i].astype(self.dtype) for n in asked.arguments]
+            [float(state[n][i]) if n == "t" else state[n][i].astype(self.dtype) for n in requested.arguments]
             for i in range(STATES)
         ]
         ours = np.full((STATES, *self.shape(quantity)), np.nan, self.dtype)  # a state in doubt is not written
         answered = np.broadcast_to(np.equal(run(rows, ours), Status.FINE), STATES)
         theirs, effects = self.truth(quantity, state)
-        self.self_check.judge(asked, ours.reshape(theirs.shape), theirs, self.dtype, effects, answered)
+        self.self_check.judge(requested, ours.reshape(theirs.shape), theirs, self.dtype, effects, answered)
 
 
 def _never(*_: Any) -> int:
