@@ -1,7 +1,7 @@
 """Batches as machine code: batch(x₁, …, y, start, stop) → Status, for states start … stop − 1 of arrays (B, n).
 
-L states at a time go from memory through all instructions and back: a number takes no way through memory that LLVM
-does not choose, and loads and shuffles fill the gaps that long chains of products leave.
+L states at a time go from memory through all instructions and back: intermediate values stay in registers as far as
+LLVM can, and loads and shuffles fill the gaps that long chains of products leave.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """One state as machine code: state(x₁, …, y) → Status, of pointers to the numbers of each input and to the results.
 
-The sums of absolute values tell what is not finite or too large. Results are written if nothing is in doubt, after all
-inputs are read: y may be an input. Parameters, the last input if there are any, were checked when they were made.
+The sums of absolute values detect numbers that are not finite or too large. Results are written if nothing is in
+doubt, after all inputs are read: y may be an input. Parameters, the last input if any, were checked before.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from robot_dyn.codegen.program import Program
 class Status(IntEnum):
     """What a kernel reports of its arguments and results; of several states the largest counts.
 
-    Messages are found out on the slow path.
+    The slow path finds the message.
     """
 
     FINE = 0
@@ -42,7 +42,7 @@ class Limits:
 def state_function(
     module: Any, name: str, program: Program, kind: Any, limits: Limits, any_angle: bool, parameters: bool
 ) -> Any:
-    """The function for one state; with `any_angle`, sine and cosine are the C library's and no angle is too far."""
+    """The function for one state; with `any_angle`, sine and cosine are those of the C library, for any angle."""
     pointers = [kind.as_pointer()] * (len(program.inputs) + 1)
     function = ir.Function(module, ir.FunctionType(I64, pointers), name)
     builder = ir.IRBuilder(function.append_basic_block())
@@ -71,7 +71,7 @@ def numbers(builder: Any, array: Any, n: int) -> list[Any]:
 
 
 def distinct(program: Program, results: list[Any]) -> list[Any]:
-    """Each result once: of M half."""
+    """Each result once; of M half of them."""
     return list(dict(zip(program.outputs, results, strict=True)).values())
 
 
@@ -88,7 +88,7 @@ def judged(
 
 
 def _add_absolute(vectors: Vectors, array: Any, n: int, total: Any) -> Any:
-    """Add Σ |x| of n numbers, read once more in vectors: number by number it would be one instruction in twenty."""
+    """Add Σ |x| of n numbers, read again in vectors: one by one it would be one instruction in twenty."""
     builder, at = vectors.builder, 0
     for count in (8, 4, 2, 1):
         wider = Vectors(builder, vectors.kind, count)

@@ -21,7 +21,7 @@ def in_groups(program: Program) -> Iterator[tuple[Op, ...]]:
 
 
 def _independent_sines(program: Program) -> list[Op]:
-    """Those of angles that depend on no sine or cosine."""
+    """Sines of angles that depend on no sine or cosine."""
     dependent: set[int] = set()
     sines = []
     for op in program.ops:
@@ -34,7 +34,7 @@ def _independent_sines(program: Program) -> list[Op]:
 
 
 def _needed(program: Program, values: list[int]) -> set[int]:
-    """The values that instructions make on the way to these."""
+    """The values that instructions compute on the way to these."""
     needed = set(values)
     for op in reversed(program.ops):
         if not needed.isdisjoint(op.results):

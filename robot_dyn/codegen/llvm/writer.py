@@ -1,7 +1,7 @@
 """From a program to LLVM: each of its instructions on numbers, or on vectors of one number for each state.
 
-The sine and cosine hold for |x| ≤ RANGE; whether an angle is beyond is told with the results, and another writer, of
-the C library's sine and cosine, is for those.
+The sine and cosine hold for |x| ≤ RANGE; the results report farther angles, for which a writer with `any_angle` calls
+the C library.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from robot_dyn.codegen.program import Kind, Op, Program
 @final
 @dataclass(frozen=True)
 class Written:
-    """What instructions of a program give.
+    """The results of the instructions of a program.
 
     Attributes:
         results: A vector of each.

@@ -63,9 +63,9 @@ def _translated(f: Function, node: ast.Call, function: Any, given: list[Value]) 
     if f.silent:
         return of_leaves(written.result, [None] * len(parts))
     b = f.builder
-    made = b.call(written.ir, [leaf for each in given for leaf in leaves(each)])
+    returned = b.call(written.ir, [leaf for each in given for leaf in leaves(each)])
     count = written.may_fail + len(parts)
-    found = [made] if count == 1 else [b.extract_value(made, i) for i in range(count)]
+    found = [returned] if count == 1 else [b.extract_value(returned, i) for i in range(count)]
     if written.may_fail:
         f.fail_unless(b.icmp_unsigned("==", found[0], ir.Constant(TEXT, None)), found[0])
     return of_leaves(written.result, found[written.may_fail :])

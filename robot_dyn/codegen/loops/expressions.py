@@ -95,11 +95,11 @@ def _item(f: Function, of: TupleValue, index: Scalar, node: ast.AST) -> Value:
         raise f.refused(node, "an item of a tuple by a number that varies", "take a tuple of numbers of one type")
     index = arrays.index_within(f, index, number(count), node)
     first, *others = of.items
-    made = first.ir  # pyright: ignore
+    chosen = first.ir  # pyright: ignore
     for i, each in enumerate(others, 1):
         here = f.builder.icmp_signed("==", index.ir, ir.Constant(I64, i))
-        made = f.builder.select(here, each.ir, made)  # pyright: ignore
-    return Scalar(first.kind, made)  # pyright: ignore
+        chosen = f.builder.select(here, each.ir, chosen)  # pyright: ignore
+    return Scalar(first.kind, chosen)  # pyright: ignore
 
 
 def _binary(f: Function, node: ast.BinOp) -> Value:
@@ -182,19 +182,19 @@ def _conditional(f: Function, node: ast.IfExp) -> Value:
     b = f.builder
     yes, no, behind = (b.append_basic_block() for _ in range(3))
     b.cbranch(test(f, node.test), yes, no)
-    made, ends = [], []
+    values, ends = [], []
     for block, each in ((yes, node.body), (no, node.orelse)):
         b.position_at_end(block)
-        made.append(value(f, each))
+        values.append(value(f, each))
         ends.append(b.block)
-    return _either(f, node, made, ends, behind)
+    return _either(f, node, values, ends, behind)
 
 
-def _either(f: Function, node: ast.AST, made: list[Value], ends: list[Any], behind: Any) -> Value:
+def _either(f: Function, node: ast.AST, values: list[Value], ends: list[Any], behind: Any) -> Value:
     """One of two values, by where the translation comes from."""
-    kind, b = f.common(made[0].kind, made[1].kind, node), f.builder
+    kind, b = f.common(values[0].kind, values[1].kind, node), f.builder
     parts = []
-    for each, block in zip(made, ends, strict=True):
+    for each, block in zip(values, ends, strict=True):
         b.position_at_end(block)
         parts.append(leaves(f.fitted(each, kind, node)))
         b.branch(behind)

@@ -103,12 +103,12 @@ def binary(f: Function, of: type[ast.operator], x: Scalar, y: Scalar, node: ast.
 
 def _of_constants(f: Function, of: type[ast.operator], x: Scalar, y: Scalar, node: ast.AST) -> Scalar:
     try:
-        made = _IN_PYTHON[of](x.const, y.const)
+        value = _IN_PYTHON[of](x.const, y.const)
     except (ArithmeticError, TypeError, KeyError, ValueError) as error:
         raise f.refused(node, f"an operation on constants ({error})", "correct it") from None
-    if not isinstance(made, bool | float) and not (isinstance(made, int) and _LEAST <= made < -_LEAST):
-        raise f.refused(node, f"the constant {made}", "take one of 64 bits")
-    return number(made)
+    if not isinstance(value, bool | float) and not (isinstance(value, int) and _LEAST <= value < -_LEAST):
+        raise f.refused(node, f"the constant {value}", "take one of 64 bits")
+    return number(value)
 
 
 def _of_integers(f: Function, of: type[ast.operator], x: Scalar, y: Scalar, node: ast.AST) -> Scalar:

@@ -1,4 +1,4 @@
-"""The syntax tree of a plain function, that of the code which Python runs; and what cannot be translated."""
+"""The syntax tree of a plain function, that of the code which Python runs; errors of untranslatable constructs."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class SubsetError(TraceError):
 
 
 def refused(function: Callable[..., Any], line: int, what: str, remedy: str) -> SubsetError:
-    """The error of a construct: where it stands, and what to write in its place."""
+    """The error of a construct: its line, and what to write instead."""
     code = function.__code__
     return SubsetError(f"{code.co_filename}, line {line}, in {code.co_qualname}: {what} is not translated; {remedy}")
 
@@ -30,7 +30,7 @@ def syntax(function: Callable[..., Any]) -> ast.FunctionDef:
     """The syntax tree of a function.
 
     Raises:
-        SubsetError: If there is no source, or it is not that of the function any more.
+        SubsetError: If the source is missing, or has changed since the function was read.
     """
     if not isinstance(function, FunctionType):
         raise SubsetError(f"{function!r} is not translated; call plain functions")
@@ -49,12 +49,12 @@ def syntax(function: Callable[..., Any]) -> ast.FunctionDef:
 
 
 def names_of(function: FunctionType | Callable[..., Any]) -> Mapping[str, Any]:
-    """The values of names that are not a function's own: of where it was made, of its module, and Python's."""
-    made = {}
+    """The values of names that a function does not assign: of its closure, its module, and Python's."""
+    closure = {}
     for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
         with suppress(ValueError):  # it has no value yet
-            made[name] = cell.cell_contents
-    maps: list[Any] = [made, function.__globals__, vars(builtins)]
+            closure[name] = cell.cell_contents
+    maps: list[Any] = [closure, function.__globals__, vars(builtins)]
     return ChainMap(*maps)
 
 

@@ -69,8 +69,8 @@ def _augmented(f: Function, node: ast.AugAssign) -> bool:
     op, target = type(node.op), node.target
     if isinstance(target, ast.Name):
         x = numbers.scalar(f, f.name(ast.copy_location(ast.Name(target.id, ast.Load()), target)), node)
-        made = numbers.binary(f, op, x, numbers.scalar(f, f.expression(node.value), node), node)
-        f.assign(target.id, made, node)
+        new = numbers.binary(f, op, x, numbers.scalar(f, f.expression(node.value), node), node)
+        f.assign(target.id, new, node)
         return False
     of = f.expression(target.value) if isinstance(target, ast.Subscript) else None
     if not isinstance(of, ArrayValue) or not isinstance(target, ast.Subscript):
@@ -79,8 +79,8 @@ def _augmented(f: Function, node: ast.AugAssign) -> bool:
         raise f.refused(node, "a write into an array that is read-only", "pass one that may be written")
     places = arrays.indices(f, of, target)
     x = arrays.load(f, of, places)
-    made = numbers.binary(f, op, x, numbers.scalar(f, f.expression(node.value), node), node)
-    arrays.store(f, of, places, numbers.converted(f, made, of.kind.of, node))
+    new = numbers.binary(f, op, x, numbers.scalar(f, f.expression(node.value), node), node)
+    arrays.store(f, of, places, numbers.converted(f, new, of.kind.of, node))
     return False
 
 

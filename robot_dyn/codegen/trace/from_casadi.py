@@ -1,4 +1,4 @@
-"""From a CasADi Function to a program. Values are numbered, so no text of a file can reach the code."""
+"""From a CasADi Function to a program. Values are numbered, so that no text of a file can reach the code."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _KINDS[ca.OP_CONSTPOW] = Kind.POWER
 
 
 class OperationError(RobotDynError):
-    """A CasADi Function that has no machine code."""
+    """A CasADi Function has no machine code."""
 
 
 def program_of(function: ca.Function) -> Program:
@@ -33,7 +33,7 @@ def program_of(function: ca.Function) -> Program:
     starts = [0, *accumulate(inputs)]
     firsts = [0, *accumulate(function.numel_out(i) for i in range(function.n_out()))]
     constants = _constants(function, starts[-1])
-    made = starts[-1] + len(constants)  # the number of the next value
+    count = starts[-1] + len(constants)  # the number of the next value
     ops: list[Op] = []
     outputs = [0] * firsts[-1]
     sines: dict[int, tuple[int, int]] = {}  # sine and cosine by angle
@@ -52,19 +52,19 @@ def program_of(function: ca.Function) -> Program:
         elif operation in (ca.OP_SIN, ca.OP_COS):
             angle = at[read[0]]
             if angle not in sines:
-                sines[angle] = made, made + 1
+                sines[angle] = count, count + 1
                 ops.append(Op(Kind.SINE_COSINE, sines[angle], (angle,)))
-                made += 2
+                count += 2
             at[written[0]] = sines[angle][operation == ca.OP_COS]
         else:
-            ops.append(Op(_kind(operation), (made,), tuple(at[place] for place in read)))
-            at[written[0]] = made
-            made += 1
+            ops.append(Op(_kind(operation), (count,), tuple(at[place] for place in read)))
+            at[written[0]] = count
+            count += 1
     return Program(inputs, tuple(map(float, constants)), tuple(ops), tuple(outputs))
 
 
 def _constants(function: ca.Function, first: int) -> dict[str, int]:
-    """The numbers of the constants by their digits, which tell −0 from 0 and are equal for NaN."""
+    """The numbers of the constants by their digits, which distinguish −0 from 0 and are equal for NaN."""
     indices = (i for i in range(function.n_instructions()) if function.instruction_id(i) == ca.OP_CONST)
     texts = dict.fromkeys(repr(function.instruction_constant(i)) for i in indices)
     return {text: first + k for k, text in enumerate(texts)}
