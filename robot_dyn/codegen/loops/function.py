@@ -17,15 +17,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, final
 from llvmlite import ir
 
 from robot_dyn.codegen.loops import expressions, statements
-from robot_dyn.codegen.loops.kinds import (
-    F64,
-    TEXT,
-    ArrayKind,
-    Kind,
-    Number,
-    Static,
-    TupleKind,
-)  # fmt: skip
+from robot_dyn.codegen.loops.kinds import F64, TEXT, ArrayKind, Kind, Number, Static, TupleKind
 from robot_dyn.codegen.loops.numbers import converted, joined
 from robot_dyn.codegen.loops.source import SubsetError, names_of, refused, stores, syntax
 from robot_dyn.codegen.loops.values import (
