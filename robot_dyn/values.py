@@ -182,3 +182,15 @@ def _arrays(x: Any) -> list[np.ndarray]:
 
 def _writeable(x: Any) -> bool:
     return any(array.flags.writeable for array in _arrays(x))
+
+
+class OnFirstUse(dict[str, Any]):
+    """Values by name, each computed when it is first looked up."""
+
+    def __init__(self, compute: Callable[[str], Any]) -> None:
+        super().__init__()
+        self._compute = compute
+
+    def __missing__(self, name: str) -> Any:
+        value = self[name] = self._compute(name)
+        return value

@@ -1,6 +1,6 @@
-"""Operations on whole arrays that are written in instructions of LLVM, each with what it does in Python.
+"""Operations on whole arrays, written in instructions of LLVM, each with its equivalent in Python.
 
-The primitives of machine code are made of them.
+The primitives of machine code consist of them.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from llvmlite import ir
 from robot_dyn.codegen.llvm.vectors import Vectors
 from robot_dyn.codegen.loops import arrays, vectors
 from robot_dyn.codegen.loops.kinds import BOOL, F64, FLOAT, I8, INT
-from robot_dyn.codegen.loops.numbers import converted, scalar, truth
+from robot_dyn.codegen.loops.numbers import converted, real, scalar, truth
 from robot_dyn.codegen.loops.values import ArrayValue, Scalar, StaticValue, Value
 
 if TYPE_CHECKING:
@@ -41,12 +41,12 @@ def require(holds: bool, what: str) -> None:
 
 
 def part(x: Array, first: int, count: int) -> Array:
-    """So many entries of a contiguous array, in one axis."""
+    """A one-dimensional view of `count` entries of a contiguous array."""
     return x.reshape(-1)[first : first + count]
 
 
 def weighted_sum(x: Array, y: Array, h: float, weights: Array, K: Array, count: int) -> None:
-    """X = y + h Σ w_j K_j over the weights that are not 0, one at least; sums in registers."""
+    """X = y + h Σ w_j K_j over the weights other than 0, at least one; sums in registers."""
     for e in range(y.size):
         total = -0.0  # which leaves the first term as it is
         for j in range(count):
@@ -84,7 +84,9 @@ def evaluation(f: Function, node: ast.AST, function: Scalar, t: Scalar, *given: 
     """A call of an address."""
     for x in given:
         if not isinstance(x, ArrayValue) or x.kind.of != FLOAT or not x.kind.contiguous:
-            raise f.refused(node, "an evaluation at what is no contiguous array of floats", "copy it into one that is")
+            raise f.refused(
+                node, "an evaluation at something other than contiguous arrays of floats", "copy it into one that is"
+            )
     if not f.silent:
         shape = ir.FunctionType(ir.VoidType(), [F64, *[_POINTER] * len(given)])
         pointer = f.builder.inttoptr(converted(f, function, INT, node).ir, shape.as_pointer())
@@ -111,7 +113,7 @@ def _weighted_sum(
         raise f.refused(node, "a combination of arrays that are not contiguous", "copy them first")
     if f.silent:
         return NOTHING
-    b, h = f.builder, converted(f, scalar(f, h, node), FLOAT, node)
+    b, h = f.builder, real(f, h, node)
     stage = K.strides(b)[0].ir
     for width, e in vectors.chunks(f, arrays.size(f, y), _NUMBERS):
         kind = vectors.kind(width, FLOAT)
@@ -219,7 +221,7 @@ def limitation(f: Function, node: ast.AST, x: ArrayValue, limit: Value) -> Value
 
 @final
 class _Found:
-    """Whether one of the masks of a loop, of 8 entries at most, held for an entry."""
+    """Whether one of the masks of a loop, of at most 8 entries, held for an entry."""
 
     def __init__(self, b: Any) -> None:
         self._builder = b
@@ -234,7 +236,7 @@ class _Found:
 
     @property
     def value(self) -> Any:
-        """The truth behind the loop."""
+        """The result after the loop."""
         return self._builder.icmp_unsigned("!=", self._builder.load(self._bits), ir.Constant(I8, 0))
 
 
@@ -247,7 +249,7 @@ def enclosure(
         vectors.check(f, node, bound, [x])
     if f.silent:
         return Scalar(BOOL, None)
-    b, (least, most) = f.builder, (converted(f, scalar(f, each, node), FLOAT, node) for each in (least, most))
+    b, (least, most) = f.builder, (real(f, bound, node) for bound in (least, most))
     found = _Found(b)
     for width, e in vectors.chunks(f, arrays.size(f, x), vectors.WIDTHS):
         given, outside = vectors.loaded(b, x.data, e, width, FLOAT), []

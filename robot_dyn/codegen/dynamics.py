@@ -14,7 +14,6 @@ from numpy import empty
 from robot_dyn.arithmetic import Array
 from robot_dyn.codegen.derivatives import forward_dynamics_derivatives
 from robot_dyn.codegen.engine import Engine
-from robot_dyn.codegen.on_first_use import OnFirstUse
 from robot_dyn.codegen.self_check import SelfCheck
 from robot_dyn.codegen.store.cache import default_store
 from robot_dyn.codegen.threads import thread_count
@@ -25,6 +24,7 @@ from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import Axes, Dynamics
 from robot_dyn.queries.quantity import FORWARD_DYNAMICS_DERIVATIVES
 from robot_dyn.validate import choice, instance, truth
+from robot_dyn.values import OnFirstUse
 
 _DERIVATIVES = FORWARD_DYNAMICS_DERIVATIVES.name
 
@@ -32,15 +32,15 @@ _DERIVATIVES = FORWARD_DYNAMICS_DERIVATIVES.name
 @final
 @dataclass(frozen=True)
 class CompiledDynamics(Dynamics, Parametrised):
-    """A robot as machine code; each quantity is compiled, and checked against Pinocchio, when first asked for.
+    """A robot as machine code; each quantity is compiled, and checked against Pinocchio, on first use.
 
-    With out= the answer goes into that array, which is left as it was if the query is refused.
+    With out= the result is written into that array, which stays as it was if the query is refused.
 
     Attributes:
         original: The robot as given.
-        dtype: np.float64 or np.float32, or its name; kept as the name.
+        dtype: np.float64 or np.float32, or its name; stored as the name.
         threads: For batches; None for all processors.
-        cache: Whether compiled code is kept on disk.
+        cache: Whether compiled code is stored on disk.
     """
 
     original: Robot
@@ -68,29 +68,24 @@ class CompiledDynamics(Dynamics, Parametrised):
 
     @property
     def right_angles(self) -> tuple[str, ...]:
-        """Angles that the file states with too few digits and that were taken as right angles, in words."""
+        """Angles that the file states with too few digits and that were taken as right angles, as text."""
         return tuple(map(str, self._completed[1]))
 
     @cached_property
     def engine(self) -> Engine:
         """The kernels."""
-        trace, robot = Trace(self.robot), self.robot
 
         def truth(quantity: str, state: dict[str, np.ndarray]) -> tuple[np.ndarray, Any]:
             return np.asarray(self._otherwise(quantity)(*(state[name] for name in QUANTITIES[quantity].arguments))), 0.0
 
         return Engine(
-            trace.quantity,
+            Trace(self.robot).quantity,
             QUANTITIES,
-            robot.sizes,
-            SelfCheck(robot, "Pinocchio"),
+            SelfCheck(self.robot, "Pinocchio"),
             truth,
-            self.joint_names,
             self.dtype,
             thread_count(self.threads),
             default_store() if self.cache else None,
-            robot.joint_without_inertia is not None,
-            coupled=not robot.couplings.trivial,
         )
 
     @cached_property
@@ -99,15 +94,12 @@ class CompiledDynamics(Dynamics, Parametrised):
 
     @property
     def instructions(self) -> dict[str, dict[str, int]]:
-        """Instructions by formulation, of each quantity used so far; the first is the one that won."""
-        return {
-            name: dict(sorted(trace.counts.items(), key=lambda item: item[1]))
-            for name, trace in self.engine.traces.items()
-        }
+        """Instructions by formulation, of each quantity used so far; the shortest first, which is compiled."""
+        return self.engine.instructions
 
     def served_by(self, quantity: str) -> str:
-        """The formulation whose machine code answers a quantity, or "Pinocchio" past the size where compiling pays."""
-        if quantity not in QUANTITIES or not self.engine.pays(quantity):
+        """The formulation whose machine code computes a quantity; "Pinocchio" if it is too long to be compiled."""
+        if quantity not in QUANTITIES or not self.engine.worthwhile[quantity]:
             return "Pinocchio"
         return self.engine.traces[quantity].formulation
 
@@ -123,23 +115,23 @@ class CompiledDynamics(Dynamics, Parametrised):
 
     @cached_property
     def _vector(self) -> tuple[int, Any]:
-        """What `empty` takes for a result (n,)."""
+        """Arguments of `empty` for a result (n,)."""
         return self.n, np.dtype(self.dtype)
 
     def M(self, q: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
-        return self._matrix("M", (q,), out, errors)
+        return self._fast("M", (q,), out, errors, (self.n, self.n))
 
     def C(self, q: Array, v: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
-        return self._matrix("C", (q, v), out, errors)
+        return self._fast("C", (q, v), out, errors, (self.n, self.n))
 
     def N(self, q: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
-        return self._torque("N", (q,), out, errors)
+        return self._fast("N", (q,), out, errors, self.n)
 
     def coriolis_torque(self, q: Array, v: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
-        return self._torque("coriolis_torque", (q, v), out, errors)
+        return self._fast("coriolis_torque", (q, v), out, errors, self.n)
 
     def coriolis_transpose(self, q: Array, v: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
-        return self._torque("coriolis_transpose", (q, v), out, errors)
+        return self._fast("coriolis_transpose", (q, v), out, errors, self.n)
 
     def inverse_dynamics(
         self, q: Array, v: Array, a: Array, *, out: np.ndarray | None = None, errors: str = "raise"
@@ -171,7 +163,7 @@ class CompiledDynamics(Dynamics, Parametrised):
         return self._ask("potential_energy", (q,), None, errors)
 
     def momentum(self, q: Array, v: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
-        return self._torque("momentum", (q, v), out, errors)
+        return self._fast("momentum", (q, v), out, errors, self.n)
 
     @property
     def body_names(self) -> tuple[str, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
@@ -195,12 +187,6 @@ class CompiledDynamics(Dynamics, Parametrised):
     ) -> Any:
         return self.robot.jacobian_rate(q, v, frame, expressed_in=expressed_in, errors=errors)
 
-    def _torque(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None, errors: str) -> Any:
-        return self._fast(quantity, arguments, out, errors, self.n)
-
-    def _matrix(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None, errors: str) -> Any:
-        return self._fast(quantity, arguments, out, errors, (self.n, self.n))
-
     def _fast(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None, errors: str, shape: Any) -> Any:
         y = empty(shape, self._vector[1]) if out is None else out
         if not self._ones[quantity](*arguments, y):
@@ -211,17 +197,17 @@ class CompiledDynamics(Dynamics, Parametrised):
         return self.engine.ask(quantity, arguments, out, errors, self._otherwise(quantity))
 
     def _otherwise(self, quantity: str) -> Callable[..., Any]:
-        """Pinocchio's way to a quantity."""
+        """Pinocchio's method for a quantity."""
         if quantity == _DERIVATIVES:
             return partial(forward_dynamics_derivatives, self.robot)
         return getattr(self.robot, quantity)
 
 
 def _dtype(given: Any) -> str:
-    """The name of a type of NumPy that machine code is made for."""
+    """The name of a type of NumPy that machine code is written for."""
     name = given
     if given is not None and not isinstance(given, str):
-        with suppress(Exception):  # whatever a foreign object makes of it
+        with suppress(Exception):  # a foreign object may raise anything
             found = np.dtype(given)
             name = found.name if found.isnative else given
     return choice("dtype", name, ("float64", "float32"))

@@ -1,7 +1,7 @@
 """Kernels: the machine code of y = f(x₁, x₂, …) for one state, and for many in vectors on one thread or several.
 
-The checks are in machine code as well: a shape, a number that is not finite, a result that is too large. A kernel only
-reports them; the words are found on the slow path.
+Shapes, numbers that are not finite and results that are too large are checked in machine code too. A kernel reports a
+`Status`; the slow path finds the message.
 """
 
 from __future__ import annotations
@@ -16,13 +16,12 @@ import numpy as np
 from robot_dyn.codegen.llvm import machine_code
 from robot_dyn.codegen.llvm.batch import batch_function, lanes
 from robot_dyn.codegen.llvm.entries import write_batch_entry, write_state_entry
-from robot_dyn.codegen.llvm.lanes import F32, F64
-from robot_dyn.codegen.llvm.one_state import Limits, state_function
+from robot_dyn.codegen.llvm.one_state import Limits, Status, state_function
 from robot_dyn.codegen.llvm.python_function import python_function
+from robot_dyn.codegen.llvm.vectors import F32, F64
 from robot_dyn.codegen.program import Program
-from robot_dyn.codegen.status import Status
-from robot_dyn.codegen.store.identity import digest, sources_of_the_writer
-from robot_dyn.codegen.store.store import Store
+from robot_dyn.codegen.store.cache import Store
+from robot_dyn.codegen.store.keys import digest, sources_of_the_writer
 from robot_dyn.codegen.threads import shared
 
 # Instructions of vectors that a thread takes at a time, about 50 µs; fewer than _PIECES of these, and to wake a second
@@ -34,7 +33,7 @@ _LARGEST = {"float64": 1e100, "float32": 1e18}  # as Robot: below, products do n
 @final
 @dataclass(frozen=True, eq=False)
 class Kernel:
-    """A function of states as machine code, compiled when first asked for.
+    """A function of states as machine code, compiled on first use.
 
     Attributes:
         program: Its instructions; its inputs are x₁, x₂, …, and the parameters if there are any.
@@ -42,10 +41,11 @@ class Kernel:
         dtype: "float64" or "float32".
         times: Whether the first input is a time: a number in `call`, (B, 1) in `many`.
         doubtful: Results whose absolute values sum to more are reported.
-        store: Where compiled code is kept, or None.
-        about: What it is of, for a reader of the store.
+        store: Where compiled code is stored, or None.
+        about: What it computes, shown to a reader of the store.
         parameters: Numbers that all states share, (P,); two kernels that differ in them alone run the same code.
-        takes_any_angle: Whether `many` answers angles beyond the range of our sine too; else it reports them.
+        takes_any_angle: Whether `many` computes angles beyond the range of the vectorised sine too; otherwise it
+            reports them.
     """
 
     program: Program
@@ -62,13 +62,13 @@ class Kernel:
     def call(self) -> Callable[..., int]:
         """For one state, (x₁, …, y) → Status: arrays (nᵢ,), y of the shape of the result, C-contiguous.
 
-        It takes any objects; those that are not such arrays it reports.
+        It accepts any objects and reports those that are not such arrays.
         """
         return self._function("one state", self._write_state)
 
     @cached_property
     def any_angle(self) -> Callable[..., int]:
-        """As `call`, with the sine and cosine of the C library, for angles beyond the range of ours."""
+        """As `call`, with the sine and cosine of the C library, for angles beyond the range of the vectorised ones."""
         write = partial(self._write_state, any_angle=True)
         return self._function("one state, any angle", write)
 
@@ -90,10 +90,10 @@ class Kernel:
     def many(self, inputs: Sequence[np.ndarray], y: np.ndarray, threads: int = 1) -> Status:
         """Run a batch: inputs (B, nᵢ) and y (B, m), C-contiguous and of the kernel's dtype, else SHAPE is reported."""
         states, least = len(y), self.lanes
-        if states < least:  # a vector of its own
-            made = np.empty((least, y.shape[1]), y.dtype)
-            status = self._run([np.resize(x, (least, x.shape[1])) for x in inputs], made, 0, least)
-            y[:] = made[:states]
+        if states < least:  # they share one vector
+            results = np.empty((least, y.shape[1]), y.dtype)
+            status = self._run([np.resize(x, (least, x.shape[1])) for x in inputs], results, 0, least)
+            y[:] = results[:states]
             return status
         piece = max(_PIECE // (len(self.program) + 1), 1) * least
         if threads == 1 or states < _PIECES * piece:
@@ -146,4 +146,4 @@ class Kernel:
     def _address(self, function: str, what: str, write: Callable[[Any, str], None]) -> int:
         form = str(self.shape), self.dtype, str(self.times), repr(self.doubtful), str(self._parametrised)
         key = digest([what, sources_of_the_writer(), str(self.program), *form])
-        return machine_code.address(function, key, write, self.store, f"{self.about}, {what}")
+        return machine_code.addresses((function,), key, write, self.store, f"{self.about}, {what}")[0]

@@ -1,6 +1,6 @@
 """The parameters of a plant and its controller: numbers that machine code takes as inputs, p, not as constants.
 
-Coefficients of effects, gains, what references are made of besides polynomials, gravity and payloads: to change one
+Coefficients of effects, gains, coefficients of references other than polynomials, gravity and payloads: changing one
 compiles nothing, and each may differ from run to run. Armature and the factor on all masses are inputs where they are
 swept, and so are mass and inertia of a single link; lengths are constants of the code.
 """
@@ -58,7 +58,7 @@ class Parameter:
 
     @property
     def place(self) -> tuple[Any, ...]:
-        """Where machine code has it: two with the same one are the same input."""
+        """Its place in machine code: two with the same one are the same input."""
         return self.part, self.key, self.entries
 
     @property
@@ -70,7 +70,7 @@ class Parameter:
 @final
 @dataclass(frozen=True)
 class Numbered:
-    """A robot with other numbers: of any arithmetic.
+    """A robot with other numbers, of any arithmetic.
 
     Attributes:
         description: Its file.
@@ -92,19 +92,19 @@ def parameters(
     does not matter, and its sine is not computed.
     """
     n = dynamics.n
-    made = [*_of_robot(dynamics, ROBOT, "", swept)]
+    known = [*_of_robot(dynamics, ROBOT, "", swept)]
     effects = tuple(effects)
     for i, name in enumerate(names_of(effects)):
-        made += _of_part(effects[i], ("effect", i), f"{name}.", n)
+        known += _of_part(effects[i], ("effect", i), f"{name}.", n)
     if controller is not None:
-        made += _of_part(controller, CONTROLLER, "", n)
+        known += _of_part(controller, CONTROLLER, "", n)
         for path, label, part in controller.parts:
-            made += _of_part(part, CONTROLLER, label, n, f"{path}.")
+            known += _of_part(part, CONTROLLER, label, n, f"{path}.")
         for name, reference in controller.references.items():
-            made += _of_part(reference, ("reference", name), f"{_named(name)}.", n)
+            known += _of_part(reference, ("reference", name), f"{_named(name)}.", n)
         for name, model in controller.models.items():
-            made += _of_robot(model, ("model", name), f"{_named(name)}.", swept)
-    return tuple(made)
+            known += _of_robot(model, ("model", name), f"{_named(name)}.", swept)
+    return tuple(known)
 
 
 def _named(path: str) -> str:
@@ -168,12 +168,12 @@ def link_parameters(dynamics: Any) -> tuple[str, ...]:
 
 def _of_links(robot: Robot) -> dict[str, dict[str, Any]]:
     """Mass and inertia of each link that states some, by link, edited."""
-    made = {}
+    inertias = {}
     for link in tree(robot.description, replace(robot.edits, payloads=(), mass_scale="1")).links:
         for body in link.inertials:
             xx, xy, xz, yy, yz, zz = map(float, body.moments)
-            made[link.name] = {"mass": float(body.mass), "inertia": [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]}
-    return made
+            inertias[link.name] = {"mass": float(body.mass), "inertia": [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]}
+    return inertias
 
 
 Values = Mapping[Part, Mapping[str, Any]]
@@ -181,15 +181,15 @@ Values = Mapping[Part, Mapping[str, Any]]
 
 def split(known: Iterable[Parameter], values: Any) -> dict[Part, dict[str, Any]]:
     """The values of parameters, one row after the other, by part and attribute."""
-    made: dict[Part, dict[str, Any]] = {}
+    parts: dict[Part, dict[str, Any]] = {}
     start = 0
     for each in known:
         inputs = values[start : start + each.size]
         own = np.zeros(each.value.size, dtype=inputs.dtype).view(type(inputs))
         own[list(each.entries)] = inputs
-        made.setdefault(each.part, {})[each.key] = own.reshape(each.value.shape) if each.value.ndim else own[0]
+        parts.setdefault(each.part, {})[each.key] = own.reshape(each.value.shape) if each.value.ndim else own[0]
         start += each.size
-    return made
+    return parts
 
 
 def joined(known: Iterable[Parameter]) -> np.ndarray:
@@ -207,9 +207,9 @@ def described(robot: Described, values: Mapping[str, Any]) -> Numbered:
     if "armature" in values:
         drives = zip(robot.joint_names, _literal(values["armature"]), strict=True)
         edits["armature"] = tuple((dict(robot.edits.armature) | dict(drives)).items())
-    for key, kept in (("mass", robot.edits.masses), ("inertia", robot.edits.inertias)):
+    for key, edited in (("mass", robot.edits.masses), ("inertia", robot.edits.inertias)):
         own = {name.partition(" ")[2]: _literal(x) for name, x in values.items() if name.startswith(f"{key} ")}
-        edits[{"mass": "masses", "inertia": "inertias"}[key]] = tuple((dict(kept) | own).items())
+        edits[{"mass": "masses", "inertia": "inertias"}[key]] = tuple((dict(edited) | own).items())
     return Numbered(robot.description, replace(robot.edits, **edits), robot.joint_names)
 
 
@@ -242,9 +242,9 @@ def with_parameters(plant: Plant, controller: Controller | None, given: Mapping[
     of = {part: each for part, each in split(known, values).items() if part in changed}
     effects = [with_values(each, of.get(("effect", i), {})) for i, each in enumerate(plant.effects)]
     if controller is not None:
-        made = dict(of.get(CONTROLLER, {}))
-        made |= {name: with_numbers(each, of.get(("model", name), {})) for name, each in controller.models.items()}
-        controller = with_values(controller, made)
+        replaced = dict(of.get(CONTROLLER, {}))
+        replaced |= {name: with_numbers(each, of.get(("model", name), {})) for name, each in controller.models.items()}
+        controller = with_values(controller, replaced)
     return Plant(with_numbers(plant.dynamics, of.get(ROBOT, {})), effects), controller
 
 

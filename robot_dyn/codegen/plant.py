@@ -1,6 +1,6 @@
 """CompiledPlant: a plant as machine code, M(q) a + C(q, v) v + N(t, q, v) = Υ, effects and bounds in the kernel.
 
-The effects are traced from the lines that the interpreted plant runs; what a plant does not name is not in the kernel.
+The effects are traced from the lines that the interpreted plant runs; other effects are not in the kernel.
 Coefficients, gravity and payloads are inputs of the code: plants that differ in them alone share it.
 """
 
@@ -17,20 +17,19 @@ import numpy as np
 from robot_dyn.arithmetic import Array
 from robot_dyn.codegen.dynamics import CompiledDynamics
 from robot_dyn.codegen.engine import Engine
-from robot_dyn.codegen.interrupts import interrupts_later
 from robot_dyn.codegen.parameters import ROBOT, Parameter, joined, parameters, split
 from robot_dyn.codegen.self_check import SelfCheck
-from robot_dyn.codegen.store.cache import default_store
 from robot_dyn.codegen.trace.from_casadi import instructions
 from robot_dyn.codegen.trace.symbolic import Symbolic, Symbols, column, inputs
 from robot_dyn.codegen.trace.symbolic_dynamics import SymbolicDynamics
 from robot_dyn.codegen.trace.symbolic_plant import symbolic_plant
 from robot_dyn.codegen.trace.trace import Traced
+from robot_dyn.codegen.waiting import interrupts_later
 from robot_dyn.effects.plant import Plant
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.quantity import PLANT
 
-_TIMES = (float, int, np.float64)  # what machine code takes for a time; others are looked at in general
+_TIMES = (float, int, np.float64)  # what machine code takes as a time; `Engine.ask` handles others
 
 
 @final
@@ -67,29 +66,21 @@ class CompiledPlant:
             method = getattr(self.interpreted, quantity)
             return np.array([np.broadcast_to(method(*row), state["q"].shape[1:]) for row in rows]), effects
 
-        robot = self.dynamics.robot
         return Engine(
             self._traced,
             PLANT,
-            robot.sizes,
-            SelfCheck(robot, "the interpreted plant"),
+            SelfCheck(self.dynamics.robot, "the interpreted plant"),
             truth,
-            robot.joint_names,
             self.dynamics.dtype,
             self.dynamics.engine.threads,
-            default_store() if self.dynamics.cache else None,
-            robot.joint_without_inertia is not None,
+            self.dynamics.engine.store,
             joined(self._known),
-            not robot.couplings.trivial,
         )
 
     @property
     def instructions(self) -> dict[str, dict[str, int]]:
         """Instructions by formulation, of each quantity used so far, effects included; the least first."""
-        return self.dynamics.instructions | {
-            name: dict(sorted(trace.counts.items(), key=lambda item: item[1]))
-            for name, trace in self.engine.traces.items()
-        }
+        return self.dynamics.instructions | self.engine.instructions
 
     @property
     def instructions_by_effect(self) -> dict[str, int]:
@@ -153,8 +144,8 @@ class CompiledPlant:
     @cached_property
     def _inputs(self) -> tuple[Any, ...]:
         """t, q, v, u as CasADi vectors and arrays of symbols."""
-        made = (inputs(name, 1 if name == "t" else self.n) for name in ("t", "q", "v", "u"))
-        return tuple((vector, array.view(Symbols)) for vector, array in made)
+        pairs = (inputs(name, 1 if name == "t" else self.n) for name in ("t", "q", "v", "u"))
+        return tuple((vector, array.view(Symbols)) for vector, array in pairs)
 
     @cached_property
     def _known(self) -> tuple[Parameter, ...]:
@@ -184,7 +175,7 @@ class CompiledPlant:
         with Symbolic().scope():
             equation = self._symbolic.equation_of_motion
             torque = sum(equation.torques(ts[0], qs, vs), start=0 * vs)
-            made: dict[str, Callable[[], Any]] = {
+            formulas: dict[str, Callable[[], Any]] = {
                 "torque": lambda: torque,
                 "N": lambda: equation.N(qs, torque),
                 "inverse_dynamics": lambda: equation.inverse_dynamics(qs, vs, us, torque),
@@ -192,7 +183,7 @@ class CompiledPlant:
                     qs, vs, equation.on_joints(equation.actuation(us)) + torque
                 ),
             }
-            answer = column(made[quantity]())
+            answer = column(formulas[quantity]())
         given = [*[t, q, v, u][: len(PLANT[quantity].arguments)], *self._numbers[0]]
         function = ca.Function("f", given, [ca.cse(ca.densify(answer))])
         formulation = "effects" if quantity == "torque" else self._bodies.formulation(quantity)
@@ -216,7 +207,7 @@ def Compiled(
         robot_or_plant: A Robot, or a Plant whose dynamics is one (or the Lagrangian of one).
         dtype: np.float64 or np.float32, or its name.
         threads: For batches; None for all processors.
-        cache: Whether compiled code is kept on disk.
+        cache: Whether compiled code is stored on disk.
 
     Raises:
         QueryError: If it is neither, or an option is not allowed.

@@ -1,7 +1,7 @@
-"""The primitives of steps as machine code; what they compute is told in `integrate.primitives`.
+"""The primitives of steps as machine code; `integrate.primitives` documents what they compute.
 
-They are functions of the subset, which Python can call as well, over operations on whole arrays. Sums run in the order
-of NumPy's, entry by entry. Each looks at the sizes of its arguments itself; within, nothing is checked.
+They are functions of the subset, which Python can call too, over operations on whole arrays. Sums have the order of
+NumPy's, entry by entry. Each checks the sizes of its arguments; the code inside is not checked.
 """
 
 from __future__ import annotations

@@ -1,59 +1,62 @@
-"""Programs: y = f(x₁, x₂, …) as a list of typed instructions without branches, each value made once.
+"""Programs: y = f(x₁, x₂, …) as a list of typed instructions without branches, each value computed once.
 
-Values are numbered: those of the inputs one after the other, then the constants, then what the instructions make.
+Values are numbered: the inputs one after the other, then the constants, then the results of the instructions.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from enum import Enum, auto
+from enum import Enum
 from functools import cached_property
 from itertools import chain, takewhile
 from typing import final
 
 
 class Kind(Enum):
-    """What an instruction computes of one value x or two, x and y; conditions are 1 or 0."""
+    """What an instruction computes of one value x or two, x and y; conditions are 1 or 0.
 
-    ADD = auto()
-    SUBTRACT = auto()
-    MULTIPLY = auto()
-    DIVIDE = auto()
-    NEGATE = auto()
-    SQUARE = auto()
-    TWICE = auto()
-    RECIPROCAL = auto()
-    ABSOLUTE = auto()
-    SIGN = auto()  # x itself where it is 0 or NaN
-    FLOOR = auto()
-    CEILING = auto()
-    MINIMUM = auto()
-    MAXIMUM = auto()
-    COPY_SIGN = auto()
-    REMAINDER = auto()  # of x / y, with the sign of x
-    SQUARE_ROOT = auto()
-    HYPOTENUSE = auto()
-    POWER = auto()
-    EXPONENTIAL = auto()
-    LOGARITHM = auto()
-    SINE_COSINE = auto()  # two values
-    TANGENT = auto()
-    ARC_SINE = auto()
-    ARC_COSINE = auto()
-    ARC_TANGENT = auto()
-    ARC_TANGENT_OF_TWO = auto()  # of y / x, x the second
-    HYPERBOLIC_SINE = auto()
-    HYPERBOLIC_COSINE = auto()
-    HYPERBOLIC_TANGENT = auto()
-    LESS = auto()
-    LESS_OR_EQUAL = auto()
-    EQUAL = auto()
-    NOT_EQUAL = auto()
-    NOT = auto()
-    AND = auto()
-    OR = auto()
-    WHERE = auto()  # y where the condition x holds, else 0
+    The values are the names that the C library and CasADi have for it.
+    """
+
+    ADD = "add"
+    SUBTRACT = "sub"
+    MULTIPLY = "mul"
+    DIVIDE = "div"
+    NEGATE = "neg"
+    SQUARE = "sq"
+    TWICE = "twice"
+    RECIPROCAL = "inv"
+    ABSOLUTE = "fabs"
+    SIGN = "sign"  # x itself where it is 0 or NaN
+    FLOOR = "floor"
+    CEILING = "ceil"
+    MINIMUM = "fmin"
+    MAXIMUM = "fmax"
+    COPY_SIGN = "copysign"
+    REMAINDER = "fmod"  # of x / y, with the sign of x
+    SQUARE_ROOT = "sqrt"
+    HYPOTENUSE = "hypot"
+    POWER = "pow"
+    EXPONENTIAL = "exp"
+    LOGARITHM = "log"
+    SINE_COSINE = "sincos"  # two values
+    TANGENT = "tan"
+    ARC_SINE = "asin"
+    ARC_COSINE = "acos"
+    ARC_TANGENT = "atan"
+    ARC_TANGENT_OF_TWO = "atan2"  # of y / x, x the second
+    HYPERBOLIC_SINE = "sinh"
+    HYPERBOLIC_COSINE = "cosh"
+    HYPERBOLIC_TANGENT = "tanh"
+    LESS = "lt"
+    LESS_OR_EQUAL = "le"
+    EQUAL = "eq"
+    NOT_EQUAL = "ne"
+    NOT = "not"
+    AND = "and"
+    OR = "or"
+    WHERE = "if_else_zero"  # y where the condition x holds, else 0
 
 
 @final
@@ -63,16 +66,16 @@ class Op:
 
     Attributes:
         kind: What it computes.
-        made: Numbers of the values it makes: one, or the sine and the cosine of an angle.
-        of: Numbers of the values it is made of.
+        results: Numbers of the values it computes: one, or the sine and the cosine of an angle.
+        operands: Numbers of the values it computes them from.
     """
 
     kind: Kind
-    made: tuple[int, ...]
-    of: tuple[int, ...]
+    results: tuple[int, ...]
+    operands: tuple[int, ...]
 
     def __str__(self) -> str:
-        return f"{_list(self.made)} = {self.kind.name.lower()} {_list(self.of)}"
+        return f"{_list(self.results)} = {self.kind.name.lower()} {_list(self.operands)}"
 
 
 @final
@@ -82,9 +85,9 @@ class Program:
 
     Attributes:
         inputs: Length of each input.
-        constants: Numbers that are known.
-        ops: The instructions, each after those that it needs.
-        outputs: Numbers of the values that are the results.
+        constants: Their values.
+        ops: The instructions, each after those that compute its operands.
+        outputs: Numbers of the values that are results of the program.
     """
 
     inputs: tuple[int, ...]
@@ -103,15 +106,15 @@ class Program:
 
     @classmethod
     def read(cls, text: str) -> Program:
-        """The program of its text."""
+        """Parse the text of a program."""
         head, *lines = text.split("\n")
         constants: list[float] = []
         ops: list[Op] = []
         for line in lines[:-1]:
-            made, _, rest = line.partition(" = ")
-            kind, _, of = rest.partition(" ")
-            if of:
-                ops.append(Op(_KINDS[kind], _numbers(made), _numbers(of)))
+            results, _, rest = line.partition(" = ")
+            kind, _, operands = rest.partition(" ")
+            if operands:
+                ops.append(Op(_KINDS[kind], _numbers(results), _numbers(operands)))
             else:
                 constants.append(float(rest))
         inputs = tuple(map(int, head.split(" ")[1:]))
@@ -120,7 +123,7 @@ class Program:
 
 @final
 class Programs(Mapping[str, Program]):
-    """Programs by name; those that are read from a text are parsed when they are looked up."""
+    """Programs by name; those read from a text are parsed on first use."""
 
     def __init__(self, programs: Mapping[str, Program]) -> None:
         self._programs = dict(programs)
@@ -128,10 +131,10 @@ class Programs(Mapping[str, Program]):
 
     @classmethod
     def read(cls, text: str) -> Programs:
-        """The programs of a text, as `str` gives it."""
-        made = cls({})
-        made._texts = {name: program for name, _, program in (each.partition("\n") for each in text.split("\n\n"))}
-        return made
+        """The programs of a text that `str` returned."""
+        programs = cls({})
+        programs._texts = {name: program for name, _, program in (part.partition("\n") for part in text.split("\n\n"))}
+        return programs
 
     def __str__(self) -> str:
         return "\n\n".join(f"{name}\n{text}" for name, text in self._texts.items())
@@ -156,7 +159,7 @@ class Programs(Mapping[str, Program]):
 
     @cached_property
     def instructions(self) -> int:
-        """Operations in all."""
+        """Number of operations of all programs."""
         return sum(map(_instructions, self._texts.values()))
 
 

@@ -1,8 +1,8 @@
-"""The self check: a fresh kernel is compared with an independent engine at random states, or refused.
+"""The self check: a new kernel must agree with an independent implementation at random states.
 
     |x_kernel − x_independent| ≤ tolerance · (Σ of the absolute values of the terms added into x)
 
-Accelerations are held in the units d_i = √M_ii of the joints, to the terms of the torque they are solved from.
+Accelerations are compared in the units d_i = √M_ii of the joints, with the terms of the torque that they follow from.
 """
 
 from __future__ import annotations
@@ -31,17 +31,17 @@ _LEAST = {"float64": 1e-12, "float32": 2e-5}  # the library's tolerance; its rou
 
 
 class SelfCheckError(RobotDynError):
-    """A compiled kernel that does not agree with its self check; nothing of it is used."""
+    """A compiled kernel fails its self check; none of it is used."""
 
 
 @final
 @dataclass(frozen=True)
 class SelfCheck:
-    """An engine that kernels must agree with.
+    """An implementation that kernels must agree with.
 
     Attributes:
         dynamics: Rigid bodies in gravity: Pinocchio's Robot.
-        name: What it is called in a report.
+        name: Its name in messages.
     """
 
     dynamics: Any
@@ -50,7 +50,7 @@ class SelfCheck:
     def states(self) -> dict[str, np.ndarray]:
         """Random states without zeros, (STATES, n) each, and times t (STATES,).
 
-        Torques are those of random accelerations: random ones would move a light link more than a kernel answers.
+        Torques are those of random accelerations: random torques would give a light link an acceleration out of range.
         """
         rng, n = np.random.default_rng(20), self.dynamics.n
         q = rng.uniform(-np.pi, np.pi, (STATES, n))
@@ -67,18 +67,18 @@ class SelfCheck:
         effects: np.ndarray | float = 0.0,
         answered: np.ndarray | None = None,
     ) -> None:
-        """Hold results at `states()` to the independent ones.
+        """Compare results at `states()` with the independent ones.
 
         Args:
-            quantity: What they are.
+            quantity: The quantity.
             ours: Results of the kernel, (STATES, …).
             theirs: The independent ones.
-            dtype: That of the kernel.
+            dtype: The dtype of the kernel.
             effects: Torques of effects, terms of the sum.
-            answered: At which states the kernel gives a result rather than reports a doubt, (STATES,).
+            answered: At which states the kernel returns a result rather than reporting a doubt, (STATES,).
 
         Raises:
-            SelfCheckError: If they differ by more than rounding, or there is no result at all.
+            SelfCheckError: If they differ by more than rounding, or there are no results.
         """
         if answered is not None and not answered.any():
             raise SelfCheckError(f"compiled {quantity.name} gives no result at any of {STATES} random states")

@@ -1,4 +1,4 @@
-"""Work shared out over threads: whoever is free takes the next piece, so that a late thread holds up nobody."""
+"""Work shared out over threads: a free thread takes the next piece, so that a late one delays no other."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ def shared(work: Callable[[int, int], int], count: int, piece: int, threads: int
 
     Args:
         work: Releases the interpreter's lock while it computes.
-        count: How much there is, `piece` at least.
-        piece: Handed out at a time; a multiple of it starts each.
-        threads: That take part at most, the caller one of them.
+        count: How much there is, at least `piece`.
+        piece: How much a thread takes at a time; each starts at a multiple of it.
+        threads: The most that take part, including the caller.
     """
     pieces = max(1, count // piece)
     left = iter(range(pieces))  # `next` of it is atomic
@@ -45,7 +45,7 @@ def shared(work: Callable[[int, int], int], count: int, piece: int, threads: int
 
 @final
 class _Pool:
-    """Threads that wait for work, as many as were ever asked for at once; to start one costs a thousand states."""
+    """Threads that wait for work, as many as were ever needed together; starting one costs a thousand states."""
 
     def __init__(self) -> None:
         self._lock, self._size, self._threads = threading.Lock(), 0, ThreadPoolExecutor(1)
@@ -61,5 +61,5 @@ class _Pool:
 
 _pool = _Pool()
 
-if hasattr(os, "register_at_fork"):  # a child has no threads but its own
+if hasattr(os, "register_at_fork"):  # threads of the parent do not exist in a child
     os.register_at_fork(after_in_child=_pool.__init__)

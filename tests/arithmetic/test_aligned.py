@@ -11,9 +11,9 @@ import robot_dyn as rd
 from robot_dyn.aligned import LINE, aligned
 from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.codegen.llvm.batch import batch_function
-from robot_dyn.codegen.llvm.lanes import F64
 from robot_dyn.codegen.llvm.lock_step import write_function
 from robot_dyn.codegen.llvm.one_state import Limits
+from robot_dyn.codegen.llvm.vectors import F64
 from robot_dyn.codegen.trace.from_casadi import program_of
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.observation.guard_levels import levels

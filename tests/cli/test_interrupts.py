@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.codegen.interrupts import interrupts_later
+from robot_dyn.codegen.waiting import interrupts_later
 from tests.long import long
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")

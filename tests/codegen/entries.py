@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from robot_dyn.codegen.store.cache import Store, key
+from robot_dyn.codegen.store.cache import Store
+from robot_dyn.codegen.store.keys import digest_of_texts
 
-KEY, OTHER = key("kernel"), key("other")
+KEY, OTHER = digest_of_texts(["kernel"]), digest_of_texts(["other"])
 PAYLOAD = bytes(range(256)) + b"\n\n end"
 posix = pytest.mark.skipif(os.name != "posix", reason="owners and modes are those of POSIX")
 as_root = pytest.mark.skipif(os.name != "posix" or os.geteuid() != 0, reason="only root gives files away")

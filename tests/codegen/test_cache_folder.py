@@ -92,12 +92,13 @@ def test_the_same_warning_is_shown_once(tmp_path: Path) -> None:
     """However often and from wherever it comes, under Python's own filters."""
     code = f"""
 from pathlib import Path
-from robot_dyn.codegen.store.cache import Store, key
+from robot_dyn.codegen.store.cache import Store
+from robot_dyn.codegen.store.keys import digest_of_texts
 store = Store(Path({str(tmp_path)!r}) / "file")
 store.folder.write_bytes(b"")
 for _ in range(3):
-    store.save(key("a"), b"")
-store.save(key("b"), b"")
+    store.save(digest_of_texts(["a"]), b"")
+store.save(digest_of_texts(["b"]), b"")
 """
     child = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert child.stderr.count("CacheWarning: ") == 1

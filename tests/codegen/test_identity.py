@@ -12,7 +12,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.codegen.llvm import numpy_array
 from robot_dyn.codegen.llvm.numpy_array import ArrayStructureError, check_structure
-from robot_dyn.codegen.store.identity import digest, digest_of, sources_of_the_writer, traced_sources
+from robot_dyn.codegen.store.keys import digest, digest_of_files, sources_of_the_writer, traced_sources
 
 ROOT = Path(rd.__file__).parent
 
@@ -24,7 +24,7 @@ def test_an_edited_module_is_another_key(tmp_path: Path) -> None:
     (below / "tanh.py").write_text("x = 1")
 
     def now() -> str:
-        return digest_of(tmp_path, tmp_path.rglob("*.py"))
+        return digest_of_files(tmp_path, tmp_path.rglob("*.py"))
 
     digests = [now()]
     (tmp_path / "notes.txt").write_text("one")
@@ -40,7 +40,7 @@ def test_sources_are_in_the_keys_of_kernels_programs_and_equations(monkeypatch: 
     """A kernel's are those of the writer, a program's all that may be traced."""
     kernel = sources_of_the_writer(), {path.name for path in (ROOT / "codegen/llvm").glob("*.py")}
     assert len(kernel[0]) == 64
-    assert {"writer.py", "sincos.py"} <= kernel[1]
+    assert {"writer.py", "elementary.py"} <= kernel[1]
     texts: list[list[str]] = []
     monkeypatch.setattr("robot_dyn.codegen.kernel.digest", lambda of: texts.append(of) or digest(of))
     rd.Compiled(rd.load("planar_2r"), cache=False).M([0.1, 0.2])

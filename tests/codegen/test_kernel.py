@@ -16,9 +16,9 @@ import pytest
 
 from robot_dyn.codegen.kernel import Kernel
 from robot_dyn.codegen.llvm import machine_code
+from robot_dyn.codegen.llvm.one_state import Status
 from robot_dyn.codegen.llvm.sine_groups import in_groups
 from robot_dyn.codegen.program import Kind
-from robot_dyn.codegen.status import Status
 from robot_dyn.codegen.threads import shared
 from robot_dyn.codegen.trace.from_casadi import program_of
 from tests.codegen.arms import compiled, states
@@ -268,6 +268,6 @@ def test_sines_of_one_state_come_together_after_what_they_need() -> None:
     assert [len(group) for group in groups if group[0].kind is Kind.SINE_COSINE] == [8, 4, 1]
     known = set(range(sum(program.inputs) + len(program.constants)))
     for group in groups:
-        assert known.issuperset(value for op in group for value in op.of)
-        known.update(value for op in group for value in op.made)
+        assert known.issuperset(value for op in group for value in op.operands)
+        known.update(value for op in group for value in op.results)
     assert sorted(map(str, (op for group in groups for op in group))) == sorted(map(str, program.ops))

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from robot_dyn.codegen.llvm import machine_code
-from robot_dyn.codegen.loops import identity as of_loops
+from robot_dyn.codegen.loops import dependencies as of_loops
 from robot_dyn.codegen.loops.call import MachineFunction
 from robot_dyn.codegen.loops.kinds import kind_of
 from robot_dyn.codegen.primitives import INSTEAD
-from robot_dyn.codegen.store import identity
+from robot_dyn.codegen.store import keys as identity
 from tests.codegen.test_kernel import Memory
 
 HELPERS = """
@@ -129,7 +129,6 @@ def test_the_translator_and_the_machine_are_in_the_key(change: str, monkeypatch:
     kinds = kind_of(X), kind_of(3)
     before = function.key(kinds)
     if change == "the translator":
-        monkeypatch.setattr(of_loops, "sources_of_the_translator", lambda: "edited")
         monkeypatch.setattr("robot_dyn.codegen.loops.call.sources_of_the_translator", lambda: "edited")
     elif change == "a version":
         monkeypatch.setattr(identity, "version_of", lambda name: "9")
@@ -146,9 +145,9 @@ def test_the_translator_and_the_machine_are_in_the_key(change: str, monkeypatch:
 
 def test_a_word_in_another_file_and_a_function_that_is_not_reached_change_no_key() -> None:
     text = HELPERS + LOOP
-    key = of_loops.identity(built(text), INSTEAD)
-    assert of_loops.identity(built(text.replace("return x - 1.0", "return x - 2.0")), INSTEAD) == key
-    assert of_loops.identity(built(text), INSTEAD) == key
+    key = of_loops.dependencies(built(text), INSTEAD)
+    assert of_loops.dependencies(built(text.replace("return x - 1.0", "return x - 2.0")), INSTEAD) == key
+    assert of_loops.dependencies(built(text), INSTEAD) == key
 
 
 def test_whether_machine_code_is_there_is_known_before_it_is_called(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,8 +8,8 @@ import pytest
 
 from robot_dyn.codegen.kernel import Kernel
 from robot_dyn.codegen.llvm import machine_code
+from robot_dyn.codegen.llvm.one_state import Status
 from robot_dyn.codegen.program import Kind, Op, Program, Programs
-from robot_dyn.codegen.status import Status
 from robot_dyn.codegen.trace.from_casadi import OperationError, instructions, program_of
 
 

@@ -12,8 +12,8 @@ import pytest
 from flint import arb, ctx
 
 from robot_dyn.codegen.kernel import Kernel
-from robot_dyn.codegen.llvm.sincos import RANGE
-from robot_dyn.codegen.status import Status
+from robot_dyn.codegen.llvm.elementary import RANGE
+from robot_dyn.codegen.llvm.one_state import Status
 from robot_dyn.codegen.trace.from_casadi import program_of
 
 

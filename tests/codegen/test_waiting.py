@@ -14,7 +14,7 @@ import robot_dyn as rd
 from robot_dyn.codegen import waiting
 from robot_dyn.codegen.loops.call import MachineFunction
 from robot_dyn.codegen.primitives import INSTEAD
-from robot_dyn.codegen.waiting import told
+from robot_dyn.codegen.waiting import announced
 from robot_dyn.simulation.compiled.engine_choice import choose
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 
@@ -38,7 +38,7 @@ def test_a_wait_is_told_where_a_person_watches(watched: bool, monkeypatch: pytes
     screen = Screen(watched)
     monkeypatch.setattr(sys, "stderr", screen)
     monkeypatch.setattr(waiting, "_AFTER_S", 0.0)
-    with told("thinking"):
+    with announced("thinking"):
         assert screen.said.wait(30.0 if watched else 0.05) is watched
     assert screen.getvalue() == "robot_dyn: thinking\n" * watched
 
@@ -67,9 +67,9 @@ def clocks(monkeypatch: pytest.MonkeyPatch) -> list[Clock]:
 
 
 def test_nothing_is_told_after_the_end_of_what_is_done(clocks: list[Clock]) -> None:
-    with told("thinking"):
+    with announced("thinking"):
         assert not clocks[0].cancelled
-    with pytest.raises(ZeroDivisionError), told("thinking"):
+    with pytest.raises(ZeroDivisionError), announced("thinking"):
         print(1 / 0)
     assert [each.cancelled for each in clocks] == [True, True]
 

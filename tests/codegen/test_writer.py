@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 from llvmlite import ir
 
-from robot_dyn.codegen.llvm.lanes import F32, F64
-from robot_dyn.codegen.llvm.machine_code import address
-from robot_dyn.codegen.llvm.sincos import RANGE
-from robot_dyn.codegen.llvm.vectors import I64
+from robot_dyn.codegen.llvm.elementary import RANGE
+from robot_dyn.codegen.llvm.machine_code import addresses
+from robot_dyn.codegen.llvm.vectors import F32, F64, I64
 from robot_dyn.codegen.llvm.writer import Writer
-from robot_dyn.codegen.store.identity import digest
+from robot_dyn.codegen.store.keys import digest
 from robot_dyn.codegen.trace.from_casadi import program_of
 
 X = ca.SX.sym("x", 3)
@@ -42,7 +41,7 @@ def write(kind: Any, count: int, any_angle: bool) -> Any:
         second = writer.write(program_of(SECOND), [first.results, inputs])
         for k, value in enumerate(second.results):
             builder.store(value, place(y, k), align=writer.vectors.size)
-        builder.ret(builder.zext(writer.vectors.any(first.beyond), I64))
+        builder.ret(builder.zext(writer.vectors.any(first.out_of_range), I64))
 
     return body
 
@@ -53,7 +52,7 @@ def write(kind: Any, count: int, any_angle: bool) -> Any:
 def test_programs_are_written_for_any_number_of_states(kind: Any, dtype: str, count: int, any_angle: bool) -> None:
     """Against CasADi's own virtual machine: 8 ulp of numbers of size 1."""
     key = digest([str(program_of(FIRST)), str(program_of(SECOND)), dtype, str(count), str(any_angle)])
-    place = address("both", key, write(kind, count, any_angle), None)
+    place = addresses(("both",), key, write(kind, count, any_angle), None)[0]
     both = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p)(place)
     x = np.random.default_rng(count).uniform(0.3, 1.2, (3, count)).astype(dtype)
     y = np.empty((3, count), dtype)

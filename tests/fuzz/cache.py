@@ -6,10 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from robot_dyn.codegen.store.cache import Store, key
+from robot_dyn.codegen.store.cache import Store
+from robot_dyn.codegen.store.keys import digest_of_texts
 from tests.fuzz.bytes import damage
 
-PAYLOADS = {key("kernel", str(i)): bytes(range(200)) * (1 + 5 * i) for i in range(3)}
+PAYLOADS = {digest_of_texts(["kernel", str(i)]): bytes(range(200)) * (1 + 5 * i) for i in range(3)}
 
 
 def seeds(folder: Path) -> list[tuple[str, bytes]]:

@@ -1,7 +1,7 @@
 """Batches as machine code: batch(x₁, …, y, start, stop) → Status, for states start … stop − 1 of arrays (B, n).
 
-L states at a time go from memory through all instructions and back: a number takes no way through memory that LLVM
-does not choose, and loads and shuffles fill the gaps that long chains of products leave.
+L states at a time go from memory through all instructions and back: intermediate values stay in registers as far as
+LLVM can, and loads and shuffles fill the gaps that long chains of products leave.
 """
 
 from __future__ import annotations
@@ -10,10 +10,9 @@ from typing import Any
 
 from llvmlite import ir
 
-from robot_dyn.codegen.llvm.lanes import F32
 from robot_dyn.codegen.llvm.one_state import Limits, distinct, judged, numbers
 from robot_dyn.codegen.llvm.rows import loaded, prefetch, store
-from robot_dyn.codegen.llvm.vectors import I64, align_stack
+from robot_dyn.codegen.llvm.vectors import F32, I64, align_stack
 from robot_dyn.codegen.llvm.writer import Writer
 from robot_dyn.codegen.program import Program
 
@@ -39,10 +38,8 @@ def batch_function(module: Any, name: str, program: Program, kind: Any, limits: 
     builder = ir.IRBuilder(loop)
     writer = Writer(builder, kind, lanes(kind))
     vectors, step = writer.vectors, ir.Constant(I64, lanes(kind))
-    base, *before = seen = [builder.phi(each) for each in (I64, vectors.type, vectors.type, vectors.mask(False).type)]
-    for phi, value in zip(
-        seen, (start, vectors.constant(0.0), vectors.constant(0.0), vectors.mask(False)), strict=True
-    ):
+    base, *before = seen = [builder.phi(each) for each in (I64, vectors.type, vectors.type, vectors.none.type)]
+    for phi, value in zip(seen, (start, vectors.constant(0.0), vectors.constant(0.0), vectors.none), strict=True):
         phi.add_incoming(value, opening)
     last, after = builder.sub(stop, step), builder.add(base, step)
     at = builder.select(builder.icmp_signed("<", base, last), base, last)
@@ -75,4 +72,4 @@ def _group(
     store(vectors, y, at, written.results)
     arguments = vectors.absolute_sum((x for each in columns for x in each), before[0])
     results = vectors.absolute_sum(distinct(program, written.results), before[1])
-    return arguments, results, vectors.builder.or_(before[2], written.beyond)
+    return arguments, results, vectors.builder.or_(before[2], written.out_of_range)

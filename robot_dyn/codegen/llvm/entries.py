@@ -1,7 +1,7 @@
-"""Entries for Python: (x₁, …, y) → Status, of NumPy's arrays as they stand.
+"""Entries for Python: (x₁, …, y) → Status, of NumPy's arrays without conversion.
 
-They take any objects; what is not an array of the right form is reported. The `self` of the function is an array of the
-dtype that the others must have: of its parameters, if it has any.
+They accept any objects and report those that are not arrays of the right form. The `self` of the function is an array
+of the dtype that the others must have; it holds the parameters, if there are any.
 """
 
 from __future__ import annotations
@@ -12,10 +12,9 @@ import numpy as np
 from llvmlite import ir
 
 from robot_dyn.codegen.llvm import numpy_array as arrays
-from robot_dyn.codegen.llvm.lanes import F64
+from robot_dyn.codegen.llvm.one_state import Status
 from robot_dyn.codegen.llvm.python_function import api, function_of
-from robot_dyn.codegen.llvm.vectors import I32, I64
-from robot_dyn.codegen.status import Status
+from robot_dyn.codegen.llvm.vectors import F64, I32, I64
 from robot_dyn.validate import LEAST_EXACT
 
 _LARGEST_NARROW = LEAST_EXACT / float(np.finfo(np.float32).eps)
@@ -31,13 +30,13 @@ def write_state_entry(
     builder, like, objects, refuse = _entry(module, name, len(inputs) + 1)
     kind = state.args[0].type.pointee
     rest = objects[timed:]
-    times = [_number(builder, objects[0], kind, refuse)] if timed else []  # first: it may call Python's code
+    times = [_number(builder, objects[0], kind, refuse)] if timed else []  # first, as it may run Python code
     shapes = [*((n,) for n in inputs[timed:]), shape]
     _require(builder, [arrays.is_array(builder, x, like) for x in rest], refuse)
     forms = [arrays.has_form(builder, x, like, len(s), x is rest[-1]) for x, s in zip(rest, shapes, strict=True)]
     _require(builder, forms, refuse)
-    wanted = [[ir.Constant(I64, length) for length in each] for each in shapes]
-    _require(builder, [arrays.has_shape(builder, x, s) for x, s in zip(rest, wanted, strict=True)], refuse)
+    expected = [[ir.Constant(I64, length) for length in each] for each in shapes]
+    _require(builder, [arrays.has_shape(builder, x, s) for x, s in zip(rest, expected, strict=True)], refuse)
     pointers = [arrays.data(builder, x, kind) for x in rest]
     for t in times:
         pointers.insert(0, builder.alloca(kind))
@@ -59,7 +58,7 @@ def write_batch_entry(
     _require(builder, [arrays.has_shape(builder, x, (states, n)) for x, n in zip(rest, widths, strict=True)], refuse)
     pointers = [arrays.data(builder, x, kind) for x in rest]
     ends = [builder.gep(x, [builder.mul(states, n)]) for x, n in zip(pointers, widths, strict=True)]
-    apart = [  # results that are written over arguments would be read as such
+    apart = [  # otherwise results would overwrite arguments
         builder.or_(builder.icmp_unsigned("<=", ends[-1], pointer), builder.icmp_unsigned("<=", end, pointers[-1]))
         for pointer, end in zip(pointers[:-1], ends[:-1], strict=True)
     ]
@@ -89,7 +88,7 @@ def _with_own(builder: Any, pointers: list[Any], like: Any, parameters: bool) ->
 
 
 def _require(builder: Any, conditions: list[Any], refuse: Any) -> None:
-    """Go on where all conditions hold."""
+    """Refuse unless all conditions hold."""
     right = conditions[0]
     for each in conditions[1:]:
         right = builder.and_(right, each)
@@ -99,7 +98,7 @@ def _require(builder: Any, conditions: list[Any], refuse: Any) -> None:
 
 
 def _number(builder: Any, value: Any, kind: Any, refuse: Any) -> Any:
-    """A number of Python's; what is not one is refused, and what float32 rounds as `validate.converted` says."""
+    """A Python number; anything else is refused, and so is what `validate.converted` refuses to round to float32."""
     x = api(builder, "PyFloat_AsDouble", value)
     with builder.if_then(builder.fcmp_ordered("==", x, ir.Constant(F64, -1.0)), likely=False):
         error = builder.ptrtoint(api(builder, "PyErr_Occurred"), I64)

@@ -1,8 +1,8 @@
 """Functions (t, y, p, run_parameters, out) of a state equation as machine code, of one run or of W in lock step.
 
 Number k of run b is y[k W + b]; t and p are shared, and so are those of `run_parameters` that are one number for all
-runs. A run with an angle beyond the range of the vectors' sine and cosine is computed once more with the C library's,
-so that no run depends on the others.
+runs. A run with an angle beyond the range of the vectorised sine and cosine is computed again with those of the C
+library, so that runs do not depend on each other.
 """
 
 from __future__ import annotations
@@ -13,8 +13,7 @@ from typing import Any, NamedTuple
 
 from llvmlite import ir
 
-from robot_dyn.codegen.llvm.lanes import F64, wide
-from robot_dyn.codegen.llvm.vectors import I1, I64, Vectors, align_stack
+from robot_dyn.codegen.llvm.vectors import F64, I1, I64, Vectors, align_stack, wide
 from robot_dyn.codegen.llvm.writer import Writer
 from robot_dyn.codegen.program import Program
 
@@ -29,13 +28,13 @@ class Computed(NamedTuple):
 
     Attributes:
         results: A vector of each.
-        beyond: As of `Written`.
+        out_of_range: As of `Written`.
         seldom: Numbers of the results that are stored only where `doubt` holds for some run.
         doubt: The mask of these runs; None if all are stored.
     """
 
     results: list[Any]
-    beyond: Any
+    out_of_range: Any
     seldom: range = range(0)
     doubt: Any = None
 
@@ -57,7 +56,7 @@ def write_function(module: Any, name: str, program: Program, runs: int, shared: 
 
     def body(writer: Writer, given: list[list[Any]]) -> Computed:
         written = writer.write(program, given)
-        return Computed(written.results, written.beyond)
+        return Computed(written.results, written.out_of_range)
 
     _write(module, name, program.inputs, body, runs, shared)
 
@@ -70,7 +69,7 @@ def write_step(
     shared: Mapping[int, int],
     passes: int,
 ) -> None:
-    """A step as three programs in one, so that what one hands to the next stays near.
+    """A step as three programs in one function, so that values between them stay in registers or cache.
 
         known = first(t, x, p, own),   found = second(t, known, own = places) until nothing changes,
         after = third(t, x, own = found and known)
@@ -91,7 +90,7 @@ def write_step(
         doubt = writer.builder.fcmp_ordered(">", found[-1], writer.vectors.constant(0.0))
         results = [*after.results, *found, *known.results]
         seldom = len(after.results) + len(found) if runs > 1 else len(results)
-        return Computed(results, known.beyond, range(seldom, len(results)), doubt)
+        return Computed(results, known.out_of_range, range(seldom, len(results)), doubt)
 
     _write(module, name, (1, m + n, *first.inputs[2:]), body, runs, shared)
 
@@ -112,18 +111,18 @@ def _write(
     at = builder.phi(I64)
     at.add_incoming(ir.Constant(I64, 0), before)
     writer = Writer(builder, F64, min(SIDE, runs))
-    made = body(writer, _inputs(writer.vectors, function.args, inputs, runs, at, run_parameters))
+    computed = body(writer, _inputs(writer.vectors, function.args, inputs, runs, at, run_parameters))
 
     def store(which: Iterable[int]) -> None:
         for k in which:
-            builder.store(made.results[k], _place(writer.vectors, function.args[-1], k, runs, at), align=8)
+            builder.store(computed.results[k], _place(writer.vectors, function.args[-1], k, runs, at), align=8)
 
-    store(k for k in range(len(made.results)) if k not in made.seldom)
-    if made.doubt is not None:
-        with builder.if_then(writer.vectors.any(made.doubt), likely=False):
-            store(made.seldom)
-    with builder.if_then(writer.vectors.any(made.beyond), likely=False):
-        builder.call(any_angle, [*function.args, at, builder.bitcast(made.beyond, ir.IntType(writer.count))])
+    store(k for k in range(len(computed.results)) if k not in computed.seldom)
+    if computed.doubt is not None:
+        with builder.if_then(writer.vectors.any(computed.doubt), likely=False):
+            store(computed.seldom)
+    with builder.if_then(writer.vectors.any(computed.out_of_range), likely=False):
+        builder.call(any_angle, [*function.args, at, builder.bitcast(computed.out_of_range, ir.IntType(writer.count))])
     following = builder.add(at, ir.Constant(I64, writer.count))
     at.add_incoming(following, builder.block)
     builder.cbranch(builder.icmp_signed("<", following, ir.Constant(I64, runs)), loop, end)
@@ -152,19 +151,19 @@ def _repeated(writer: Writer, program: Program, given: list[list[Any]], passes: 
 
 
 def _any_angle(module: Any, name: str, inputs: tuple[int, ...], body: Body, runs: int, run_parameters: Own) -> Any:
-    """The same for the runs from a number on that share a vector, and stored of those alone whose bit is set."""
+    """The same for the runs that share a vector, stored only for those whose bit is set."""
     side = min(SIDE, runs)
     shape = ir.FunctionType(ir.VoidType(), [*_ARGUMENTS, I64, ir.IntType(side)])
     function = ir.Function(module, shape, name)
     function.linkage = "internal"
     function.attributes.add("noinline")
-    function.attributes.add("optnone")  # it is hardly ever called, and soon compiled
+    function.attributes.add("optnone")  # it is rarely called, and compiled faster so
     builder = ir.IRBuilder(function.append_basic_block())
     *arguments, at, bits = function.args
     writer = Writer(builder, F64, side, any_angle=True)
     mask = builder.bitcast(bits, wide(I1, side))
-    made = body(writer, _inputs(writer.vectors, arguments, inputs, runs, at, run_parameters))
-    for k, value in enumerate(made.results):
+    computed = body(writer, _inputs(writer.vectors, arguments, inputs, runs, at, run_parameters))
+    for k, value in enumerate(computed.results):
         place = _place(writer.vectors, arguments[-1], k, runs, at)
         builder.store(builder.select(mask, value, builder.load(place, align=8)), place, align=8)
     builder.ret_void()

@@ -1,6 +1,6 @@
-"""Machine code that survives its process: a module of LLVM compiled to an object file, kept in a store, and loaded.
+"""Machine code that outlives its process: a module of LLVM compiled to an object file, stored, and loaded.
 
-Machine code is not freed, so a process loads each key once and keeps it: to load it again would lose memory.
+Machine code is never freed, so a process loads each key only once.
 """
 
 from __future__ import annotations
@@ -10,13 +10,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
-from typing import Any, final
+from typing import TYPE_CHECKING, Any, final
 
 import llvmlite.binding as binding
 from llvmlite import ir
 
 from robot_dyn.codegen.llvm import python_function
-from robot_dyn.codegen.store.store import Store
+
+if TYPE_CHECKING:
+    from robot_dyn.codegen.store.cache import Store
 
 _LONG = 10_000  # lines: with 15 000, 0.4 s in place of 0.8, at 2 % of the speed; with 31 000, 4 s in place of 12
 _lock = threading.RLock()
@@ -30,7 +32,8 @@ class Passes:
 
     Attributes:
         level: Of its passes over instructions, 0 to 3.
-        effort: On registers, 0 to 3; None for as hard as its length allows.
+        effort: Of register allocation, 0 to 3; None for 3, or 1 for a long module: in one long block its time grows
+            faster than the block.
     """
 
     level: int = 3
@@ -40,14 +43,6 @@ class Passes:
 _ALL = Passes()
 
 
-def address(
-    function: str, key: str, write: Callable[[Any, str], None], store: Store | None, about: str = "",
-    passes: Passes = _ALL,
-) -> int:  # fmt: skip
-    """The address of a function of a module; arguments as of `addresses`."""
-    return addresses((function,), key, write, store, about, passes)[0]
-
-
 def addresses(
     functions: Sequence[str], key: str, write: Callable[[Any, str], None], store: Store | None, about: str = "",
     passes: Passes = _ALL,
@@ -55,22 +50,22 @@ def addresses(
     """The addresses of functions of a module, which is restored from the store if it is there.
 
     Args:
-        functions: Their names, without the module's.
-        key: What `identity.digest` gives of all that determines the module.
-        write: Writes the functions into a module, each by its name after the module's.
-        store: Where to look and keep; None for nowhere.
-        about: What it is of, for a reader of the store.
+        functions: Their names, without the prefix of the module.
+        key: The `digest` of all that determines the module.
+        write: Writes the functions into a module, with a prefix before the name of each.
+        store: Where machine code is stored, or None.
+        about: What the module computes, shown to a reader of the store.
         passes: How hard LLVM works.
     """
     name = f"robot_dyn_{key}_"
     with _lock:
-        kept = _opened(store.load(key)) if store is not None else None
+        stored = _opened(store.load(key)) if store is not None else None
         if key not in _loaded:
-            made = object_file(write, name, passes) if kept is None else kept
-            _engine().add_object_file(binding.ObjectFileRef.from_data(made))
+            code = object_file(write, name, passes) if stored is None else stored
+            _engine().add_object_file(binding.ObjectFileRef.from_data(code))
             _engine().finalize_object()
-            _loaded[key] = made
-        if store is not None and kept is None:
+            _loaded[key] = code
+        if store is not None and stored is None:
             store.save(key, _sealed(_loaded[key]), about)
         return tuple(_engine().get_function_address(name + each) for each in functions)
 
@@ -78,7 +73,10 @@ def addresses(
 def object_file(write: Callable[[Any, str], None], name: str, passes: Passes = _ALL) -> bytes:
     """The object file of a module."""
     module = _optimised(write, name, passes.level)
-    return _machine(_effort(module) if passes.effort is None else passes.effort).emit_object(module)
+    effort = passes.effort
+    if effort is None:
+        effort = 1 if str(module).count("\n") > _LONG else 3
+    return _machine(effort).emit_object(module)
 
 
 def assembly(write: Callable[[Any, str], None], name: str) -> str:
@@ -92,26 +90,23 @@ def _optimised(write: Callable[[Any, str], None], name: str, level: int = 3) -> 
     write(module, name)
     parsed = binding.parse_assembly(str(module))
     options = binding.create_pipeline_tuning_options(speed_level=level)
-    options.loop_vectorization = options.slp_vectorization = options.loop_unrolling = False  # it is in vectors
+    options.loop_vectorization = options.slp_vectorization = options.loop_unrolling = (
+        False  # the code is vectorised already
+    )
     builder = binding.create_pass_builder(machine, options)
     builder.getModulePassManager().run(parsed, builder)
     return parsed
 
 
-def _sealed(made: bytes) -> bytes:
-    """An object file after its SHA-256: LLVM does not survive a damaged one."""
-    return sha256(made).digest() + made
+def _sealed(code: bytes) -> bytes:
+    """An object file after its SHA-256: a damaged one crashes LLVM."""
+    return sha256(code).digest() + code
 
 
 def _opened(payload: bytes | None) -> bytes | None:
-    """The object file of a payload; None if it is damaged or there is none."""
-    made = (payload or b"")[len(_sealed(b"")) :]
-    return made if payload == _sealed(made) else None
-
-
-def _effort(module: Any) -> int:
-    """How hard LLVM works on registers: in one long block its time grows faster than the block."""
-    return 1 if str(module).count("\n") > _LONG else 3
+    """The object file of a payload; None if it is damaged or missing."""
+    code = (payload or b"")[len(_sealed(b"")) :]
+    return code if payload == _sealed(code) else None
 
 
 def _machine(effort: int = 3) -> Any:
@@ -128,7 +123,7 @@ def _machine(effort: int = 3) -> Any:
 
 @cache
 def _engine() -> Any:
-    """What holds the machine code of this process."""
-    for name, place in python_function.addresses().items():
-        binding.add_symbol(name, place)
+    """The holder of the machine code of this process."""
+    for name, location in python_function.addresses().items():
+        binding.add_symbol(name, location)
     return binding.create_mcjit_compiler(binding.parse_assembly(""), _machine())

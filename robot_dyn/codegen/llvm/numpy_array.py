@@ -1,6 +1,6 @@
 """NumPy's arrays in machine code, by the fields of its C structure (its ABI, numpy/ndarraytypes.h).
 
-To wrap an array up as an object of another library takes 50 ns, four times a call: more than the equations of an arm.
+Wrapping an array as an object of another library takes 50 ns, four times a call: more than the equations of an arm.
 """
 
 from __future__ import annotations
@@ -33,22 +33,22 @@ _I8 = ir.IntType(8)
 
 
 class ArrayStructureError(RobotDynError):
-    """NumPy keeps the fields of an array elsewhere than it is known to."""
+    """This NumPy has the fields of an array at unknown offsets."""
 
 
 @cache
 def check_structure() -> None:
-    """Compare the fields of an array with what they are known to hold.
+    """Compare the fields of an array with their known values.
 
     Raises:
-        ArrayStructureError: If one is not where it is expected.
+        ArrayStructureError: If a field is at another offset.
     """
     x = np.ones((2, 3))
     found = {name: ctypes.c_void_p.from_address(id(x) + OFFSETS[name]).value for name in ("type", "data", "dtype")}
     found |= {name: ctypes.c_int.from_address(id(x) + OFFSETS[name]).value for name in ("axes", "flags")}
     expected = {"type": id(np.ndarray), "data": x.ctypes.data, "dtype": id(x.dtype), "axes": 2, "flags": x.flags.num}
     wrong = [name for name in expected if found[name] != expected[name]]
-    if not wrong:  # then what stands between axes and dtype is a pointer, to be followed
+    if not wrong:  # then the field between axes and dtype is a pointer that can be followed
         shape = ctypes.POINTER(ctypes.c_ssize_t).from_address(id(x) + OFFSETS["lengths"])
         wrong = [] if (shape[0], shape[1]) == x.shape else ["lengths"]
     if not wrong:
@@ -87,7 +87,7 @@ def has_form(builder: Any, array: Any, like: Any, axes: int, writeable: bool) ->
 
 
 def lengths(builder: Any, array: Any, axes: int) -> list[Any]:
-    """The shape of an array of so many axes; one of no axes has none to read."""
+    """The shape of an array of so many axes; a scalar array has no lengths to read."""
     pointer = field(builder, array, "lengths", I64.as_pointer())
     return [builder.load(builder.gep(pointer, [ir.Constant(I64, i)])) for i in range(axes)]
 
@@ -95,6 +95,6 @@ def lengths(builder: Any, array: Any, axes: int) -> list[Any]:
 def has_shape(builder: Any, array: Any, shape: Sequence[Any]) -> Any:
     """Whether an array of len(shape) axes has this shape."""
     right = ir.Constant(ir.IntType(1), 1)
-    for length, wanted in zip(lengths(builder, array, len(shape)), shape, strict=True):
-        right = builder.and_(right, builder.icmp_signed("==", length, wanted))
+    for length, expected in zip(lengths(builder, array, len(shape)), shape, strict=True):
+        right = builder.and_(right, builder.icmp_signed("==", length, expected))
     return right

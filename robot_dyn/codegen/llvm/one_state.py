@@ -1,12 +1,13 @@
 """One state as machine code: state(x₁, …, y) → Status, of pointers to the numbers of each input and to the results.
 
-The sums of absolute values tell what is not finite or too large. Results are written if nothing is in doubt, after all
-inputs are read: y may be an input. Parameters, the last input if there are any, were checked when they were made.
+The sums of absolute values detect numbers that are not finite or too large. Results are written if nothing is in
+doubt, after all inputs are read: y may be an input. Parameters, the last input if any, were checked before.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import Any, final
 
 from llvmlite import ir
@@ -14,13 +15,25 @@ from llvmlite import ir
 from robot_dyn.codegen.llvm.vectors import FLAGS, I64, Vectors
 from robot_dyn.codegen.llvm.writer import Writer
 from robot_dyn.codegen.program import Program
-from robot_dyn.codegen.status import Status
+
+
+class Status(IntEnum):
+    """What a kernel reports of its arguments and results; of several states the largest counts.
+
+    The slow path finds the message.
+    """
+
+    FINE = 0
+    FAR = 1  # an angle beyond the range of the sine and cosine
+    SHAPE = 2
+    ARGUMENT = 3  # not finite, or large
+    RESULT = 4  # not finite, or doubtfully large
 
 
 @final
 @dataclass(frozen=True)
 class Limits:
-    """What Σ |x| of the arguments, and of the results of one state, must be below."""
+    """Upper bounds of Σ |x| of the arguments, and of the results of one state."""
 
     arguments: float
     results: float
@@ -29,7 +42,7 @@ class Limits:
 def state_function(
     module: Any, name: str, program: Program, kind: Any, limits: Limits, any_angle: bool, parameters: bool
 ) -> Any:
-    """The function for one state; with `any_angle`, sine and cosine are the C library's and no angle is too far."""
+    """The function for one state; with `any_angle`, sine and cosine are those of the C library, for any angle."""
     pointers = [kind.as_pointer()] * (len(program.inputs) + 1)
     function = ir.Function(module, ir.FunctionType(I64, pointers), name)
     builder = ir.IRBuilder(function.append_basic_block())
@@ -42,7 +55,9 @@ def state_function(
             total = _add_absolute(vectors, array, n, total)
     written = writer.write(program, columns)
     size = vectors.absolute_sum(distinct(program, written.results), ir.Constant(kind, 0.0))
-    status, fine = judged(builder, total, size, written.beyond, limits.arguments, ir.Constant(kind, limits.results))
+    status, fine = judged(
+        builder, total, size, written.out_of_range, limits.arguments, ir.Constant(kind, limits.results)
+    )
     with builder.if_then(fine, likely=True):
         for k, value in enumerate(written.results):
             builder.store(value, builder.gep(y, [ir.Constant(I64, k)]))
@@ -56,22 +71,24 @@ def numbers(builder: Any, array: Any, n: int) -> list[Any]:
 
 
 def distinct(program: Program, results: list[Any]) -> list[Any]:
-    """Each result once: of M half."""
+    """Each result once; of M half of them."""
     return list(dict(zip(program.outputs, results, strict=True)).values())
 
 
-def judged(builder: Any, arguments: Any, results: Any, beyond: Any, most: float, doubtful: Any) -> tuple[Any, Any]:
+def judged(
+    builder: Any, arguments: Any, results: Any, out_of_range: Any, most: float, doubtful: Any
+) -> tuple[Any, Any]:
     """The Status of the sums of absolute values and of the angles, and whether it is FINE."""
     passed = builder.fcmp_ordered("<", arguments, ir.Constant(arguments.type, most))
     small = builder.fcmp_ordered("<", results, doubtful)
     status = builder.select(small, *(ir.Constant(I64, int(x)) for x in (Status.FINE, Status.RESULT)))
-    status = builder.select(beyond, ir.Constant(I64, int(Status.FAR)), status)
+    status = builder.select(out_of_range, ir.Constant(I64, int(Status.FAR)), status)
     status = builder.select(passed, status, ir.Constant(I64, int(Status.ARGUMENT)))
-    return status, builder.and_(builder.and_(passed, small), builder.not_(beyond))
+    return status, builder.and_(builder.and_(passed, small), builder.not_(out_of_range))
 
 
 def _add_absolute(vectors: Vectors, array: Any, n: int, total: Any) -> Any:
-    """Add Σ |x| of n numbers, read once more in vectors: number by number it would be one instruction in twenty."""
+    """Add Σ |x| of n numbers, read again in vectors: one by one it would be one instruction in twenty."""
     builder, at = vectors.builder, 0
     for count in (8, 4, 2, 1):
         wider = Vectors(builder, vectors.kind, count)

@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 
-from robot_dyn.codegen.llvm.lanes import F64
 from robot_dyn.codegen.llvm.numpy_array import check_structure
-from robot_dyn.codegen.llvm.vectors import I64
+from robot_dyn.codegen.llvm.vectors import F64, I64
 
 _FASTCALL = 0x80  # (self, pointer to the arguments, their number)
 OBJECT = ir.IntType(8).as_pointer()
@@ -40,7 +39,7 @@ class _Method(ctypes.Structure):
 
 
 def addresses() -> dict[str, int]:
-    """Where the functions of Python's C API are, by name."""
+    """Addresses of the functions of Python's C API by name."""
     return {name: ctypes.cast(getattr(ctypes.pythonapi, name), ctypes.c_void_p).value or 0 for name in _API}
 
 
@@ -48,15 +47,15 @@ def python_function(address: int, like: np.ndarray) -> Callable[..., int]:
     """The Python function of machine code that reads arrays, whose `self` is this array.
 
     Raises:
-        ArrayStructureError: If this NumPy keeps the fields of arrays elsewhere.
+        ArrayStructureError: If this NumPy has the fields of arrays at other offsets.
     """
     check_structure()
-    made = ctypes.pythonapi.PyCFunction_NewEx
-    made.restype, made.argtypes = ctypes.py_object, [ctypes.c_void_p, ctypes.py_object, ctypes.py_object]
-    return made(ctypes.addressof(_method(address)), like, None)
+    wrap = ctypes.pythonapi.PyCFunction_NewEx
+    wrap.restype, wrap.argtypes = ctypes.py_object, [ctypes.c_void_p, ctypes.py_object, ctypes.py_object]
+    return wrap(ctypes.addressof(_method(address)), like, None)
 
 
-@cache  # the function does not keep it
+@cache  # the function holds no reference to it
 def _method(address: int) -> _Method:
     return _Method(b"kernel", address, _FASTCALL, None)
 
@@ -67,7 +66,7 @@ def function_of(module: Any, name: str) -> Any:
 
 
 def api(builder: Any, name: str, *arguments: Any) -> Any:
-    """A function of Python's C API."""
+    """Call a function of Python's C API."""
     function = builder.module.globals.get(name)
     if function is None:
         result, *kinds = _API[name]

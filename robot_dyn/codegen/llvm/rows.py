@@ -1,8 +1,8 @@
-"""Rows of an array (B, n) as vectors: number k of L states side by side, read, written and asked for ahead.
+"""Rows of an array (B, n) as vectors: number k of L states side by side, read, written and prefetched.
 
     8 rows of 8 numbers → transposed in registers by shuffles → 8 vectors of one number of 8 states
 
-Element by element, moving the numbers of a state would take as long as a fifth of forward dynamics.
+Moving the numbers of a state one by one would take a fifth of the time of forward dynamics.
 """
 
 from __future__ import annotations
@@ -11,8 +11,7 @@ from typing import Any
 
 from llvmlite import ir
 
-from robot_dyn.codegen.llvm.lanes import wide
-from robot_dyn.codegen.llvm.vectors import I1, I32, I64, Vectors
+from robot_dyn.codegen.llvm.vectors import I1, I32, I64, Vectors, wide
 
 SIDE = 8
 _LINE = 64  # bytes of a cache line, of most processors
@@ -23,10 +22,10 @@ def loaded(vectors: Vectors, array: Any, at: Any, n: int) -> list[Any]:
     """The n numbers of L states, rows of an array from `at` on, each a vector."""
     columns = []
     for k in range(0, n, SIDE):
-        wanted, blocks = min(SIDE, n - k), []
+        width, blocks = min(SIDE, n - k), []
         for first in range(0, vectors.count, SIDE):
-            rows = [_read(vectors, array, at, first + i, n, k, wanted) for i in range(SIDE)]
-            blocks.append(transposed(vectors.builder, rows)[:wanted])
+            rows = [_read(vectors, array, at, first + i, n, k, width) for i in range(SIDE)]
+            blocks.append(transposed(vectors.builder, rows)[:width])
         columns += blocks[0] if len(blocks) == 1 else [_joined(vectors, *pair) for pair in zip(*blocks, strict=True)]
     return columns
 
@@ -35,24 +34,24 @@ def store(vectors: Vectors, array: Any, at: Any, results: list[Any]) -> None:
     """Write vectors as the numbers of L states, rows of an array from `at` on."""
     n = len(results)
     for k in range(0, n, SIDE):
-        wanted = min(SIDE, n - k)
+        width = min(SIDE, n - k)
         for first in range(0, vectors.count, SIDE):
-            part = [_part(vectors, x, first) for x in results[k : k + wanted]]
-            for i, row in enumerate(transposed(vectors.builder, part + [part[0]] * (SIDE - wanted))):
-                place = _place(vectors, array, at, first + i, n, k, wanted)
+            part = [_part(vectors, x, first) for x in results[k : k + width]]
+            for i, row in enumerate(transposed(vectors.builder, part + [part[0]] * (SIDE - width))):
+                place = _place(vectors, array, at, first + i, n, k, width)
                 _masked(vectors, "store", ir.VoidType(), row, *place)
 
 
 def prefetch(vectors: Vectors, array: Any, at: Any, n: int, written: bool) -> None:
-    """Ask for the cache lines of the states that are computed AHEAD groups later; past the end that does no harm."""
+    """Prefetch the cache lines of the states that are computed AHEAD groups later; past the end this is harmless."""
     builder = vectors.builder
     start = builder.bitcast(builder.gep(array, [builder.mul(at, ir.Constant(I64, n))]), ir.IntType(8).as_pointer())
     flags = [ir.Constant(I32, x) for x in (int(written), 3, 1)]  # to write; to keep; data
     shape = ir.FunctionType(ir.VoidType(), [start.type, *(x.type for x in flags)])
-    made = builder.module.declare_intrinsic("llvm.prefetch.p0", fnty=shape)
+    function = builder.module.declare_intrinsic("llvm.prefetch.p0", fnty=shape)
     length = vectors.count * n * vectors.size
     for offset in range(0, length, _LINE):
-        builder.call(made, [builder.gep(start, [ir.Constant(I64, _AHEAD * length + offset)]), *flags])
+        builder.call(function, [builder.gep(start, [ir.Constant(I64, _AHEAD * length + offset)]), *flags])
 
 
 def transposed(builder: Any, rows: list[Any]) -> list[Any]:
@@ -69,9 +68,9 @@ def transposed(builder: Any, rows: list[Any]) -> list[Any]:
     return rows
 
 
-def _read(vectors: Vectors, array: Any, at: Any, i: int, n: int, k: int, wanted: int) -> Any:
+def _read(vectors: Vectors, array: Any, at: Any, i: int, n: int, k: int, width: int) -> Any:
     vector = wide(vectors.kind, SIDE)
-    place = _place(vectors, array, at, i, n, k, wanted)
+    place = _place(vectors, array, at, i, n, k, width)
     return _masked(vectors, "load", vector, *place, ir.Constant(vector, ir.Undefined))
 
 
@@ -81,12 +80,12 @@ def _masked(vectors: Vectors, what: str, result: Any, *arguments: Any) -> Any:
     return vectors.builder.call(vectors.builder.module.declare_intrinsic(name, fnty=shape), arguments)
 
 
-def _place(vectors: Vectors, array: Any, at: Any, i: int, n: int, k: int, wanted: int) -> tuple[Any, Any, Any]:
+def _place(vectors: Vectors, array: Any, at: Any, i: int, n: int, k: int, width: int) -> tuple[Any, Any, Any]:
     """Where numbers k … of row at + i of an array (B, n) stand, their alignment, and the mask of so many."""
     builder = vectors.builder
     offset = builder.add(builder.mul(at, ir.Constant(I64, n)), ir.Constant(I64, i * n + k))
     pointer = builder.bitcast(builder.gep(array, [offset]), wide(vectors.kind, SIDE).as_pointer())
-    mask = ir.Constant(ir.VectorType(I1, SIDE), [int(j < wanted) for j in range(SIDE)])
+    mask = ir.Constant(ir.VectorType(I1, SIDE), [int(j < width) for j in range(SIDE)])
     return pointer, ir.Constant(I32, vectors.size), mask
 
 

@@ -12,31 +12,31 @@ GROUP = 8  # angles of one state in a vector: a 512-bit register, or two or four
 def in_groups(program: Program) -> Iterator[tuple[Op, ...]]:
     """The instructions in an order in which up to GROUP sines and cosines come together, all others alone."""
     sines = _independent_sines(program)
-    first = _needed(program, [op.of[0] for op in sines])
-    yield from ((op,) for op in program.ops if not first.isdisjoint(op.made))
+    first = _needed(program, [op.operands[0] for op in sines])
+    yield from ((op,) for op in program.ops if not first.isdisjoint(op.results))
     for i in range(0, len(sines), GROUP):
         yield tuple(sines[i : i + GROUP])
-    done = first.union(*(op.made for op in sines))
-    yield from ((op,) for op in program.ops if done.isdisjoint(op.made))
+    done = first.union(*(op.results for op in sines))
+    yield from ((op,) for op in program.ops if done.isdisjoint(op.results))
 
 
 def _independent_sines(program: Program) -> list[Op]:
-    """Those of angles that depend on no sine or cosine."""
+    """Sines of angles that depend on no sine or cosine."""
     dependent: set[int] = set()
     sines = []
     for op in program.ops:
-        free = dependent.isdisjoint(op.of)
+        free = dependent.isdisjoint(op.operands)
         if op.kind is Kind.SINE_COSINE and free:
             sines.append(op)
         if op.kind is Kind.SINE_COSINE or not free:
-            dependent.update(op.made)
+            dependent.update(op.results)
     return sines
 
 
 def _needed(program: Program, values: list[int]) -> set[int]:
-    """The values that instructions make on the way to these."""
+    """The values that instructions compute on the way to these."""
     needed = set(values)
     for op in reversed(program.ops):
-        if not needed.isdisjoint(op.made):
-            needed.update(op.of)
-    return needed.intersection(value for op in program.ops for value in op.made)
+        if not needed.isdisjoint(op.results):
+            needed.update(op.operands)
+    return needed.intersection(value for op in program.ops for value in op.results)

@@ -1,31 +1,38 @@
-"""Vectors: numbers side by side, one for each state, and what LLVM and the C library compute of them.
+"""Vectors of numbers, one for each state, and what LLVM and the C library compute of them.
 
-Of one state a vector is a number. Sums may be reordered and products contracted; NaN and infinities come through.
+Of one state, a vector is a number. Two levels of exactness: `Vectors` writes instructions whose sums may be reordered
+and whose products may be contracted, with NaN and infinities preserved; `Lanes` gives vectors Python's operators for
+formulas in which only contraction is allowed (a·b + c rounded once).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, final
 
 from llvmlite import ir
 
 from robot_dyn.aligned import LINE
-from robot_dyn.codegen.llvm.lanes import F64, wide
 
 FLAGS = ("afn", "arcp", "contract", "nsz", "reassoc")  # of LLVM's fast-math flags, all but nnan and ninf
 I1, I32, I64 = ir.IntType(1), ir.IntType(32), ir.IntType(64)
+F32, F64 = ir.FloatType(), ir.DoubleType()
+
+
+def wide(kind: Any, count: int) -> Any:
+    """The type of a vector of `count` numbers; for one, the type of the number itself."""
+    return kind if count == 1 else ir.VectorType(kind, count)
 
 
 @final
 @dataclass(frozen=True)
 class Vectors:
-    """Vectors of so many numbers of one type.
+    """Vectors of one length and type.
 
     Attributes:
         builder: Where instructions go.
-        kind: LLVM's type of a number, F64 or F32.
+        kind: LLVM's type of a number.
         count: Numbers in a vector.
     """
 
@@ -40,35 +47,35 @@ class Vectors:
 
     @property
     def size(self) -> int:
-        """Bytes of a number."""
+        """Size of a floating-point number, in [bytes]."""
         return 8 if self.kind is F64 else 4
 
     def constant(self, x: float) -> Any:
         """A vector of equal numbers."""
-        return ir.Constant(self.type, float(x) if self.count == 1 else [float(x)] * self.count)
+        return ir.Constant(self.type, x if self.count == 1 else [x] * self.count)
 
-    def intrinsic(self, name: str, *of: Any) -> Any:
+    def intrinsic(self, name: str, *operands: Any) -> Any:
         """One of LLVM's own functions of vectors, such as "sqrt"."""
         lanes = "" if self.count == 1 else f"v{self.count}"
-        shape = ir.FunctionType(self.type, [self.type] * len(of))
+        shape = ir.FunctionType(self.type, [self.type] * len(operands))
         name = f"llvm.{name}.{lanes}f{8 * self.size}"
-        return self.builder.call(self.builder.module.declare_intrinsic(name, fnty=shape), of)
+        return self.builder.call(self.builder.module.declare_intrinsic(name, fnty=shape), operands)
 
-    def library(self, name: str, *of: Any) -> Any:
+    def library(self, name: str, *operands: Any) -> Any:
         """A function of the C library, lane by lane in float64."""
         if self.count == 1:
-            return self._library(name, *of)
+            return self._library(name, *operands)
         result = ir.Constant(self.type, ir.Undefined)
         for i in range(self.count):
-            result = self._set(result, self._library(name, *(self.lane(x, i) for x in of)), i)
+            result = self._set(result, self._library(name, *(self.lane(x, i) for x in operands)), i)
         return result
 
-    def _library(self, name: str, *of: Any) -> Any:
-        shape = ir.FunctionType(F64, [F64] * len(of))
+    def _library(self, name: str, *operands: Any) -> Any:
+        shape = ir.FunctionType(F64, [F64] * len(operands))
         function = self.builder.module.globals.get(name) or ir.Function(self.builder.module, shape, name)
         if self.kind is F64:
-            return self.builder.call(function, of)
-        result = self.builder.call(function, [self.builder.fpext(x, F64) for x in of])
+            return self.builder.call(function, operands)
+        result = self.builder.call(function, [self.builder.fpext(x, F64) for x in operands])
         return self.builder.fptrunc(result, self.kind)
 
     def lane(self, vector: Any, i: int) -> Any:
@@ -76,7 +83,7 @@ class Vectors:
         return vector if self.count == 1 else self.builder.extract_element(vector, ir.Constant(I32, i))
 
     def of(self, numbers: Iterable[Any]) -> Any:
-        """A vector of these numbers, and zeros where there are fewer."""
+        """The vector of these numbers, filled up with zeros."""
         result = self.constant(0.0)
         for i, x in enumerate(numbers):
             result = self._set(result, x, i)
@@ -85,10 +92,6 @@ class Vectors:
     def _set(self, vector: Any, x: Any, i: int) -> Any:
         return x if self.count == 1 else self.builder.insert_element(vector, x, ir.Constant(I32, i))
 
-    def mask(self, value: bool) -> Any:
-        """The same truth in each lane."""
-        return ir.Constant(wide(I1, self.count), int(value) if self.count == 1 else [int(value)] * self.count)
-
     def any(self, mask: Any) -> Any:
         """Whether a mask holds in some lane."""
         if self.count == 1:
@@ -96,23 +99,90 @@ class Vectors:
         bits = ir.IntType(self.count)
         return self.builder.icmp_unsigned("!=", self.builder.bitcast(mask, bits), ir.Constant(bits, 0))
 
+    @property
+    def none(self) -> Any:
+        """The mask that holds in no lane."""
+        return Vectors(self.builder, I1, self.count).constant(0)
+
     def absolute_sum(self, vectors: Iterable[Any], total: Any) -> Any:
-        """A total and Σ |x| of vectors, lane by lane."""
+        """A total plus Σ |x| of vectors, lane by lane."""
         for x in vectors:
             total = self.builder.fadd(total, self.intrinsic("fabs", x), flags=FLAGS)
         return total
 
     def sum(self, vector: Any) -> Any:
-        """The sum of a vector's numbers."""
+        """The sum of the numbers of a vector."""
         if self.count == 1:
             return vector
         shape = ir.FunctionType(self.kind, [self.kind, self.type])
         name = f"llvm.vector.reduce.fadd.v{self.count}f{8 * self.size}"
-        made = self.builder.module.declare_intrinsic(name, fnty=shape)
-        return self.builder.call(made, [ir.Constant(self.kind, 0.0), vector], fastmath=FLAGS)
+        function = self.builder.module.declare_intrinsic(name, fnty=shape)
+        return self.builder.call(function, [ir.Constant(self.kind, 0.0), vector], fastmath=FLAGS)
+
+
+def _operator(instruction: str, *flags: str, reflected: bool = False) -> Callable[[Any, Any], Lanes]:
+    """An operator of `Lanes`: one instruction of two values."""
+
+    def operator(self: Lanes, other: Any) -> Lanes:
+        x, y = self.value, self.of(other)
+        return self.like(getattr(self.vectors.builder, instruction)(*((y, x) if reflected else (x, y)), flags=flags))
+
+    return operator
+
+
+@final
+class Lanes:
+    """A vector of numbers or integers under Python's operators, so that one formula serves vectors of any length.
+
+    Attributes:
+        vectors: Length and type.
+        value: The LLVM value.
+    """
+
+    __slots__ = ("value", "vectors")
+
+    def __init__(self, vectors: Vectors, value: Any) -> None:
+        self.vectors, self.value = vectors, value
+
+    __add__ = __radd__ = _operator("fadd", "contract")
+    __mul__ = __rmul__ = _operator("fmul", "contract")
+    __sub__ = _operator("fsub", "contract")
+    __rsub__ = _operator("fsub", "contract", reflected=True)
+    __truediv__ = _operator("fdiv", "contract")
+    __rtruediv__ = _operator("fdiv", "contract", reflected=True)
+    plus, __and__, __lshift__, __xor__ = map(_operator, ("add", "and_", "shl", "xor"))  # of integers
+
+    def of(self, x: Any) -> Any:
+        """A constant, or other lanes, as an LLVM value of this type."""
+        return x.value if isinstance(x, Lanes) else self.vectors.constant(x)
+
+    def like(self, value: Any, kind: Any = None) -> Lanes:
+        """Lanes of as many numbers, of this type or another."""
+        vectors = self.vectors
+        return Lanes(vectors if kind is None else Vectors(vectors.builder, kind, vectors.count), value)
+
+    def cast(self, instruction: str, kind: Any) -> Lanes:
+        """The lanes as another type: "bitcast" keeps the bits, "fpext" and "fptrunc" the numbers."""
+        return self.like(getattr(self.vectors.builder, instruction)(self.value, wide(kind, self.vectors.count)), kind)
+
+    def below(self, other: Any) -> Any:
+        """The mask of the lanes that are less than the other."""
+        return self.vectors.builder.fcmp_ordered("<", self.value, self.of(other))
+
+    def choose(self, mask: Any, other: Any) -> Lanes:
+        """This value where the mask holds, otherwise the other."""
+        return self.like(self.vectors.builder.select(mask, self.value, self.of(other)))
+
+
+def polynomial(z: Lanes, coefficients: tuple[float, ...]) -> Any:
+    """c₀ + c₁ z + c₂ z² + …, by Horner's rule."""
+    value: Any = coefficients[-1]
+    for c in coefficients[-2::-1]:
+        value = c + z * value
+    return value
 
 
 def align_stack(function: Any) -> None:
-    """Let the vectors that a function keeps on the stack begin at cache lines, wherever it is called from."""
+    """Align the vectors that a function keeps on the stack to cache lines, from wherever it is called."""
     function.attributes.add("nounwind")  # llvmlite writes no alignment where there is no other attribute
     function.attributes.alignstack = LINE

@@ -1,7 +1,7 @@
 """From a program to LLVM: each of its instructions on numbers, or on vectors of one number for each state.
 
-The sine and cosine hold for |x| ≤ RANGE; whether an angle is beyond is told with the results, and another writer, of
-the C library's sine and cosine, is for those.
+The sine and cosine hold for |x| ≤ RANGE; the results report farther angles, for which a writer with `any_angle` calls
+the C library.
 """
 
 from __future__ import annotations
@@ -11,26 +11,25 @@ from dataclasses import dataclass
 from itertools import chain
 from typing import Any, final
 
-from robot_dyn.codegen.llvm.lanes import Lanes
+from robot_dyn.codegen.llvm.elementary import RANGE, sincos
 from robot_dyn.codegen.llvm.operations import OPERATIONS
-from robot_dyn.codegen.llvm.sincos import RANGE, sincos_lanes
 from robot_dyn.codegen.llvm.sine_groups import GROUP, in_groups
-from robot_dyn.codegen.llvm.vectors import Vectors
+from robot_dyn.codegen.llvm.vectors import Lanes, Vectors
 from robot_dyn.codegen.program import Kind, Op, Program
 
 
 @final
 @dataclass(frozen=True)
 class Written:
-    """What instructions of a program give.
+    """The results of the instructions of a program.
 
     Attributes:
         results: A vector of each.
-        beyond: The mask of states with an angle beyond RANGE.
+        out_of_range: The mask of states with an angle beyond RANGE.
     """
 
     results: list[Any]
-    beyond: Any
+    out_of_range: Any
 
 
 @final
@@ -59,27 +58,29 @@ class Writer:
         """The instructions of a program, given the vectors of each input."""
         vectors = self.vectors
         values = dict(enumerate(chain(*inputs, map(vectors.constant, program.constants))))
-        beyond = vectors.mask(False)
+        out_of_range = vectors.none
         grouped = self.count == 1 and not self.any_angle
         for ops in in_groups(program) if grouped else ((op,) for op in program.ops):
             op = ops[0]
             if op.kind is not Kind.SINE_COSINE:
-                values[op.made[0]] = OPERATIONS[op.kind](vectors, *(values[i] for i in op.of))
+                values[op.results[0]] = OPERATIONS[op.kind](vectors, *(values[i] for i in op.operands))
             elif self.any_angle:
-                values.update(zip(op.made, (vectors.library(f, values[op.of[0]]) for f in ("sin", "cos")), strict=True))
+                values.update(
+                    zip(op.results, (vectors.library(f, values[op.operands[0]]) for f in ("sin", "cos")), strict=True)
+                )
             else:
-                beyond = self.builder.or_(beyond, self._sines(ops, values))
-        return Written([values[i] for i in program.outputs], beyond)
+                out_of_range = self.builder.or_(out_of_range, self._sines(ops, values))
+        return Written([values[i] for i in program.outputs], out_of_range)
 
     def _sines(self, ops: tuple[Op, ...], values: dict[int, Any]) -> Any:
         """Sines and cosines, of several angles of one state in one vector; the mask of angles beyond RANGE."""
         together = Vectors(self.builder, self.kind, self.count if len(ops) == 1 else GROUP)
-        angles = [values[op.of[0]] for op in ops]
+        angles = [values[op.operands[0]] for op in ops]
         vector = angles[0] if len(ops) == 1 else together.of(angles)
-        both = sincos_lanes(Lanes(self.builder, vector, self.kind, together.count))
+        both = sincos(Lanes(together, vector))
         for i, op in enumerate(ops):
             parts = [half.value if len(ops) == 1 else together.lane(half.value, i) for half in both]
-            values.update(zip(op.made, parts, strict=True))
+            values.update(zip(op.results, parts, strict=True))
         size = together.intrinsic("fabs", vector)
-        beyond = self.builder.fcmp_ordered(">", size, together.constant(RANGE))
-        return beyond if len(ops) == 1 else together.any(beyond)
+        out_of_range = self.builder.fcmp_ordered(">", size, together.constant(RANGE))
+        return out_of_range if len(ops) == 1 else together.any(out_of_range)

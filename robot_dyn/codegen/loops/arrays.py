@@ -1,4 +1,4 @@
-"""Entries and views of arrays. An index out of range ends the call with an error; slices are cut off, as in Python."""
+"""Entries and views of arrays. An index out of range ends the call with an error; slices are clipped, as in Python."""
 
 from __future__ import annotations
 
@@ -53,12 +53,12 @@ def load(f: Function, x: ArrayValue, indices: list[Scalar]) -> Scalar:
 
 def store(f: Function, x: ArrayValue, indices: list[Scalar], value: Scalar) -> None:
     """Write an entry."""
-    made = f.builder.zext(value.ir, I8) if value.kind == BOOL else value.ir
-    f.builder.store(made, address(f, x, indices))
+    stored = f.builder.zext(value.ir, I8) if value.kind == BOOL else value.ir
+    f.builder.store(stored, address(f, x, indices))
 
 
 def address(f: Function, x: ArrayValue, indices: list[Scalar]) -> Any:
-    """Of an entry, or of the first one of a view, by its leading indices."""
+    """The address of an entry, or of the first one of a view, by its leading indices."""
     at, b = number(0), f.builder
     for index, stride in zip(indices, x.strides(b), strict=False):
         term = times(index, stride, b)
@@ -118,7 +118,7 @@ def index_within(f: Function, index: Scalar, length: Scalar, node: ast.AST) -> S
 
 
 def _bound(f: Function, node: ast.expr, length: Scalar) -> Scalar:
-    """A bound of a slice, cut off at the ends of the axis."""
+    """A bound of a slice, clipped to the axis."""
     bound, b, zero = converted(f, scalar(f, f.expression(node), node), INT, node), f.builder, ir.Constant(I64, 0)
     if bound.const == 0 or (not f.checks and (bound.const is None or bound.const > 0)):
         return bound
@@ -154,7 +154,7 @@ def _length(f: Function, low: Scalar, high: Scalar) -> Scalar:
 
 
 def _is_contiguous(x: ArrayValue, kept: list[tuple[int, bool]]) -> bool:
-    """Whether the axes that are kept lie behind all others, and all but the first of them are whole."""
+    """Whether the remaining axes come after all others, and all but the first of them are whole."""
     axes = [axis for axis in range(x.kind.ndim) if not (x.kind.single and axis == x.kind.ndim - 1)]
     of = [(axis, whole) for axis, whole in kept if axis in axes]
     return [axis for axis, _ in of] == axes[len(axes) - len(of) :] and all(whole for _, whole in of[1:])
@@ -166,12 +166,14 @@ def reshaped(f: Function, x: ArrayValue, shape: list[Scalar], node: ast.AST) -> 
         raise f.refused(node, "the reshape of an array that is not contiguous", "copy it first")
     shape, b = [converted(f, each, INT, node) for each in shape], f.builder
     single = len(shape) > 1 and shape[-1].const == 1
-    f.check(b.icmp_signed("==", size(f, x).ir, _product(f, shape).ir), node, "a shape holds another number of entries")
+    f.check(
+        b.icmp_signed("==", size(f, x).ir, _product(f, shape).ir), node, "a shape has a different number of entries"
+    )
     return ArrayValue(replace(x.kind, ndim=len(shape), single=single), x.data, tuple(shape))
 
 
 def part(f: Function, x: ArrayValue, first: Scalar, count: Scalar, node: ast.AST) -> ArrayValue:
-    """So many entries of a contiguous array, in one axis."""
+    """A one-dimensional view of `count` entries of a contiguous array."""
     if not x.kind.contiguous:
         raise f.refused(node, "a primitive of an array that is not contiguous", "copy it into one that is")
     kind = replace(x.kind, ndim=1, single=False)
@@ -184,7 +186,7 @@ def size(f: Function, x: ArrayValue) -> Scalar:
 
 
 def _product(f: Function, lengths: Any) -> Scalar:
-    made = ONE
+    product = ONE
     for each in lengths:
-        made = times(made, each, f.builder)
-    return made
+        product = times(product, each, f.builder)
+    return product

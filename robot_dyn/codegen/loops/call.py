@@ -1,6 +1,6 @@
-"""A plain function as machine code: compiled for the types of its arguments, or taken from a store.
+"""A plain function as machine code: compiled for the types of its arguments, or restored from a store.
 
-The words of arguments, such as the addresses of arrays, are made once, and again only for those that are others.
+Arguments are passed as words, such as the addresses of arrays; a call packs only those that changed since the last.
 """
 
 from __future__ import annotations
@@ -13,15 +13,14 @@ from functools import cached_property
 from time import perf_counter
 from typing import Any, final
 
-from robot_dyn.codegen.interrupts import interrupts_later
 from robot_dyn.codegen.llvm import machine_code
 from robot_dyn.codegen.llvm.machine_code import Passes
-from robot_dyn.codegen.loops.identity import identity, sources_of_the_translator
+from robot_dyn.codegen.loops.dependencies import dependencies
 from robot_dyn.codegen.loops.kinds import Kind, Number, Static, TupleKind, unpacked, words
 from robot_dyn.codegen.loops.packing import Packed, pack
-from robot_dyn.codegen.store.identity import digest
-from robot_dyn.codegen.store.store import Store
-from robot_dyn.codegen.waiting import told
+from robot_dyn.codegen.store.cache import Store
+from robot_dyn.codegen.store.keys import digest, sources_of_the_translator
+from robot_dyn.codegen.waiting import announced, interrupts_later
 from robot_dyn.errors import MachineCodeError
 
 _ENTRY = ctypes.CFUNCTYPE(ctypes.c_char_p, ctypes.c_void_p, ctypes.c_void_p)
@@ -31,7 +30,7 @@ QUICK = Passes(level=1, effort=1)  # the work is behind addresses
 
 
 class _Spent(threading.local):
-    """Of each thread on its own: what another one compiles is no time of this one's run."""
+    """For each thread: what another one compiles does not count as time of this one's run."""
 
     seconds = 0.0
 
@@ -46,13 +45,13 @@ def spent_on_loops() -> float:
 
 @final
 class MachineFunction:
-    """A function as machine code, for whatever types it is called with; `calls` gives what calls it.
+    """A function as machine code, for any types that it is called with; `calls` returns a caller of it.
 
     Args:
         function: A plain function.
-        instead: As of `Program`.
-        store: Gives where machine code is kept, or None.
-        about: What it is of, for a reader of the store.
+        instead: See `Program`.
+        store: Returns where machine code is stored, or None.
+        about: What it computes, shown to a reader of the store.
         passes: How hard LLVM works.
     """
 
@@ -65,22 +64,22 @@ class MachineFunction:
         self._known: dict[Any, tuple[Any, Kind]] = {}
 
     def calls(self) -> Call:
-        """What calls it, for one thread at a time."""
+        """A caller of it, for one thread at a time."""
         return Call(self)
 
     def check(self, *given: Any) -> None:
         """Translate it for such arguments, without compiling it.
 
         Raises:
-            SubsetError: If it is not of the subset.
+            SubsetError: If it is outside the subset.
         """
         from robot_dyn.codegen.loops.program import translated
 
         translated(self.function, pack(given, self.store).kinds, self._instead)
 
     def key(self, kinds: tuple[Kind, ...]) -> str:
-        """Of its machine code in a store."""
-        return self._key(kinds, identity(self.function, self._instead))
+        """The key of its machine code in a store."""
+        return self._key(kinds, dependencies(self.function, self._instead))
 
     def _key(self, kinds: tuple[Kind, ...], texts: list[str]) -> str:
         return digest(["loop", str(self._passes), sources_of_the_translator(), *map(repr, kinds), *texts])
@@ -88,29 +87,29 @@ class MachineFunction:
     def is_kept(self) -> bool:
         """Whether its machine code, for some types of arguments, is in memory or in the store."""
         store = self.store()
-        return bool(self._known) or (store is not None and store.load(self._asked) is not None)
+        return bool(self._known) or (store is not None and store.load(self._note) is not None)
 
     @cached_property
-    def _asked(self) -> str:
-        """The key of the note that it is there; what is compiled goes by the code and the values of then."""
+    def _note(self) -> str:
+        """The key of the note that its machine code is stored; compiling takes the code and values of that moment."""
         return self.key(())
 
     def entry(self, place: Any, kinds: Sequence[Kind]) -> tuple[Any, Kind]:
-        """The function of words, and the type of its result.
+        """The function that takes words, and the type of its result.
 
         Args:
-            place: What the types are known by, or a number of their own.
+            place: A key for the types, or their number.
             kinds: Types of the arguments.
 
         Raises:
-            SubsetError: If it is not of the subset.
+            SubsetError: If it is outside the subset.
         """
         if place in self._known:
             return self._known[place]
         began, known = perf_counter(), tuple(kinds)
         with self._lock, interrupts_later():
             if known not in self._known:
-                with told(f"compiling {self.about}, once for this version"):
+                with announced(f"compiling {self.about}, once for this version"):
                     self._known[known] = self._compiled(known)
             self._known[place] = self._known[known]
         _spent.seconds += perf_counter() - began
@@ -128,28 +127,28 @@ class MachineFunction:
             of_result = ir.Function(module, ir.FunctionType(TEXT, []), f"{prefix}result")
             ir.IRBuilder(of_result.append_basic_block()).ret(program.text(_written(result)))
 
-        texts = identity(self.function, self._instead)
+        texts = dependencies(self.function, self._instead)
         key, note, store = self._key(kinds, texts), self._key((), texts), self.store()
         call, result = machine_code.addresses(("call", "result"), key, write, store, self.about, self._passes)
         if store is not None and store.load(note) is None:
-            store.save(note, b"", f"{self.about} is there")
+            store.save(note, b"", f"{self.about} is stored")
         text = ctypes.CFUNCTYPE(ctypes.c_char_p)(result)().decode()
         return _ENTRY(call), _read(text)
 
 
 @final
 class Call:
-    """A call of machine code whose arguments are much the same from one time to the next.
+    """A caller of machine code whose arguments change little from one call to the next.
 
     Raises:
-        MachineCodeError: If it fails; says where.
+        MachineCodeError: If it fails, with the line.
     """
 
     def __init__(self, function: MachineFunction) -> None:
         self._function = function
         self._given: list[Any] = []
         self._kinds: list[Kind] = []
-        self._packed: dict[tuple[int, ...], Packed] = {}  # by which arguments it is of
+        self._packed: dict[tuple[int, ...], Packed] = {}  # by the indices of their arguments
         self._entry: Any = None
 
     def __call__(self, *given: Any) -> Any:
@@ -169,14 +168,14 @@ class Call:
         return self._result()
 
     def _take(self, others: tuple[int, ...], given: tuple[Any, ...]) -> None:
-        """The words of the arguments that are not those of the call before."""
-        made, same = pack(tuple([given[i] for i in others]), self._function.store), True
-        self._packed[others] = made
-        for i, start, kind in zip(others, made.starts, made.kinds, strict=True):
+        """Pack the arguments that differ from those of the previous call."""
+        packed, same = pack(tuple([given[i] for i in others]), self._function.store), True
+        self._packed[others] = packed
+        for i, start, kind in zip(others, packed.starts, packed.kinds, strict=True):
             same &= self._kinds[i] is kind
             self._given[i], self._block[i], self._kinds[i] = given[i], start, kind
         if not same:
-            whole = made.number if len(others) == len(given) else tuple(self._kinds)
+            whole = packed.number if len(others) == len(given) else tuple(self._kinds)
             self._entry, self._kind = self._function.entry(whole, self._kinds)
             self._out = array("q", bytes(8 * max(1, words(self._kind))))
             self._addresses, self._out_address = self._block.buffer_info()[0], self._out.buffer_info()[0]
@@ -192,7 +191,7 @@ def _written(kind: Kind) -> str:
 
 
 def _read(text: str) -> Kind:
-    """The type that `_written` tells."""
+    """The type of a text that `_written` returned."""
     stack: list[list[Kind]] = [[]]
     for letter in text:
         if letter == "(":

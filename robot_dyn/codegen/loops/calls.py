@@ -1,10 +1,11 @@
-"""Calls: of functions that are translated too, of those that stand in for them, and of some of Python and NumPy."""
+"""Calls: of functions that are translated too, of their substitutes, and of some functions of Python and NumPy."""
 
 from __future__ import annotations
 
 import ast
 import math
 from collections.abc import Callable, Mapping
+from functools import partial
 from types import FunctionType, MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +13,7 @@ import numpy as np
 from llvmlite import ir
 
 from robot_dyn.codegen.loops import arrays, numbers
-from robot_dyn.codegen.loops.kinds import F64, FLOAT, I64, INT, TEXT, UINT, Kind
+from robot_dyn.codegen.loops.kinds import F64, FLOAT, I64, INT, TEXT, UINT
 from robot_dyn.codegen.loops.values import (
     ArrayValue,
     Scalar,
@@ -56,23 +57,18 @@ def called(f: Function, node: ast.Call) -> Value:
 
 def _translated(f: Function, node: ast.Call, function: Any, given: list[Value]) -> Value:
     """The result of another function, which is translated for these types."""
-    written = f.program.written(function, tuple(each.kind for each in given), lambda *x: f.refuse(node, *x))
+    written = f.program.written(function, tuple(each.kind for each in given), partial(f.refuse, node))
     f.may_fail |= written.may_fail
     parts = leaf_types(written.result)
     if f.silent:
         return of_leaves(written.result, [None] * len(parts))
     b = f.builder
-    made = b.call(written.ir, [leaf for each in given for leaf in leaves(each)])
+    returned = b.call(written.ir, [leaf for each in given for leaf in leaves(each)])
     count = written.may_fail + len(parts)
-    found = [made] if count == 1 else [b.extract_value(made, i) for i in range(count)]
+    found = [returned] if count == 1 else [b.extract_value(returned, i) for i in range(count)]
     if written.may_fail:
         f.fail_unless(b.icmp_unsigned("==", found[0], ir.Constant(TEXT, None)), found[0])
     return of_leaves(written.result, found[written.may_fail :])
-
-
-def leaves_of(f: Function, value: Value, kind: Kind, node: ast.AST) -> list[Any]:
-    """The parts of a value of a type that holds it."""
-    return leaves(f.fitted(value, kind, node))
 
 
 def _reshape(f: Function, node: ast.Call, of: ast.expr) -> Value:
@@ -90,23 +86,24 @@ def _abs(f: Function, node: ast.AST, x: Value) -> Value:
     if x.kind == INT:
         below = f.builder.icmp_signed("<", x.ir, ir.Constant(I64, 0))
         return Scalar(INT, f.builder.select(below, numbers.negated(f, x, node).ir, x.ir))
-    return Scalar(FLOAT, f.intrinsic("fabs", numbers.converted(f, x, FLOAT, node).ir))
+    return Scalar(FLOAT, f.intrinsic("fabs", numbers.real(f, x, node).ir))
 
 
 def _extreme(sign: str) -> Handler:
-    """The first of the largest, or smallest, as Python's: nan is neither above nor below."""
+    """The first of the largest, or smallest, numbers as in Python: nan is neither above nor below."""
+    relation = ast.Gt if sign == ">" else ast.Lt
 
-    def of(f: Function, node: ast.AST, *given: Value) -> Value:
+    def extreme(f: Function, node: ast.AST, *given: Value) -> Value:
         if len(given) < 2:
             raise f.refused(node, "min or max of one argument", "give two or more numbers")
-        made, *others = (numbers.scalar(f, each, node) for each in given)
-        for each in others:
-            made, each = numbers.together(f, made, each, node)
-            beyond = numbers.compared(f, ast.Gt if sign == ">" else ast.Lt, each, made, node)
-            made = Scalar(made.kind, f.builder.select(beyond.ir, each.ir, made.ir))
-        return made
+        best, *others = (numbers.scalar(f, each, node) for each in given)
+        for other in others:
+            best, other = numbers.together(f, best, other, node)
+            better = numbers.compared(f, relation, other, best, node)
+            best = Scalar(best.kind, f.builder.select(better.ir, other.ir, best.ir))
+        return best
 
-    return of
+    return extreme
 
 
 def _len(f: Function, node: ast.AST, x: Value) -> Value:
@@ -124,11 +121,13 @@ def _float(f: Function, node: ast.AST, x: Value) -> Value:
 
 
 def _int(f: Function, node: ast.AST, x: Value) -> Value:
-    """Towards 0, of what has 64 bits."""
+    """A number rounded towards 0, if 64 bits hold it."""
     x, b = numbers.scalar(f, x, node), f.builder
     if x.kind == FLOAT:
         size = f.intrinsic("fabs", x.ir)
-        f.check(b.fcmp_ordered("<", size, ir.Constant(F64, 2.0**63)), node, "a float is no integer of 64 bits")
+        f.check(
+            b.fcmp_ordered("<", size, ir.Constant(F64, 2.0**63)), node, "a float does not fit an integer of 64 bits"
+        )
         return Scalar(INT, b.fptosi(x.ir, I64))
     if x.kind == UINT:
         f.check(b.icmp_signed(">=", x.ir, ir.Constant(I64, 0)), node, "an integer overflows 64 bits")
@@ -145,25 +144,25 @@ def _word(f: Function, node: ast.AST, x: Value) -> Value:
 
 
 def _sqrt(f: Function, node: ast.AST, x: Value) -> Value:
-    return Scalar(FLOAT, f.intrinsic("sqrt", numbers.converted(f, numbers.scalar(f, x, node), FLOAT, node).ir))
+    return Scalar(FLOAT, f.intrinsic("sqrt", numbers.real(f, x, node).ir))
 
 
 def _sign(f: Function, node: ast.AST, x: Value) -> Value:
-    """0 of ±0, nan of nan."""
-    x, b, zero = numbers.converted(f, numbers.scalar(f, x, node), FLOAT, node), f.builder, ir.Constant(F64, 0.0)
-    made = b.select(b.fcmp_ordered("<", x.ir, zero), ir.Constant(F64, -1.0), x.ir)
-    made = b.select(b.fcmp_ordered(">", x.ir, zero), ir.Constant(F64, 1.0), made)
-    return Scalar(FLOAT, b.select(b.fcmp_ordered("==", x.ir, zero), zero, made))
+    """The sign of a float: 0 for ±0, nan for nan."""
+    x, b, zero = numbers.real(f, x, node), f.builder, ir.Constant(F64, 0.0)
+    sign = b.select(b.fcmp_ordered("<", x.ir, zero), ir.Constant(F64, -1.0), x.ir)
+    sign = b.select(b.fcmp_ordered(">", x.ir, zero), ir.Constant(F64, 1.0), sign)
+    return Scalar(FLOAT, b.select(b.fcmp_ordered("==", x.ir, zero), zero, sign))
 
 
 def _nextafter(f: Function, node: ast.AST, x: Value, y: Value) -> Value:
-    given = [numbers.converted(f, numbers.scalar(f, each, node), FLOAT, node).ir for each in (x, y)]
+    given = [numbers.real(f, each, node).ir for each in (x, y)]
     return Scalar(FLOAT, f.builder.call(f.external("nextafter", F64, F64, F64), given))
 
 
 def _spacing(f: Function, node: ast.AST, x: Value) -> Value:
-    """To the next float away from 0."""
-    x, b = numbers.converted(f, numbers.scalar(f, x, node), FLOAT, node), f.builder
+    """The distance to the next float away from 0."""
+    x, b = numbers.real(f, x, node), f.builder
     size = f.intrinsic("fabs", x.ir)
     following = b.call(f.external("nextafter", F64, F64, F64), [size, ir.Constant(F64, math.inf)])
     return Scalar(FLOAT, f.intrinsic("copysign", b.fsub(following, size), x.ir))
@@ -171,7 +170,7 @@ def _spacing(f: Function, node: ast.AST, x: Value) -> Value:
 
 def _frexp(f: Function, node: ast.AST, x: Value) -> Value:
     """M and e of x = m 2ᵉ."""
-    x, b = numbers.converted(f, numbers.scalar(f, x, node), FLOAT, node), f.builder
+    x, b = numbers.real(f, x, node), f.builder
     if f.silent:
         return TupleValue((Scalar(FLOAT, None), Scalar(INT, None)))
     i32 = ir.IntType(32)

@@ -19,6 +19,7 @@ from robot_dyn.codegen.loops.values import (
     TupleValue,
     Value,
     leaf_types,
+    leaves,
     number,
     of_leaves,
 )  # fmt: skip
@@ -37,7 +38,7 @@ def value(f: Function, node: ast.expr) -> Value:
 
 
 def _constant(f: Function, node: ast.Constant) -> Value:
-    return f.program.constant(node.value, lambda *x: f.refuse(node, *x))
+    return f.constant(node.value, node)
 
 
 def _tuple(f: Function, node: ast.Tuple) -> Value:
@@ -47,7 +48,7 @@ def _tuple(f: Function, node: ast.Tuple) -> Value:
 def _attribute(f: Function, node: ast.Attribute) -> Value:
     of = value(f, node.value)
     if isinstance(of, StaticValue) and hasattr(of.value, node.attr):
-        return f.program.constant(getattr(of.value, node.attr), lambda *x: f.refuse(node, *x))
+        return f.constant(getattr(of.value, node.attr), node)
     if isinstance(of, RecordValue) and node.attr in of.kind.names:
         return field(f, of, node.attr)
     if isinstance(of, ArrayValue):
@@ -77,15 +78,14 @@ def _subscript(f: Function, node: ast.Subscript) -> Value:
     if isinstance(of, ArrayValue):
         return arrays.subscript(f, of, node)
     if isinstance(of, StaticValue) and isinstance(of.value, tuple):
-        items = [f.program.constant(each, lambda *x: f.refuse(node, *x)) for each in of.value]
-        of = TupleValue(tuple(items))
+        of = TupleValue(tuple(f.constant(each, node) for each in of.value))
     if isinstance(of, TupleValue) and not isinstance(node.slice, ast.Slice):
         return _item(f, of, numbers.scalar(f, value(f, node.slice), node), node)
     raise f.refused(node, f"the subscript {ast.unparse(node)}", "take entries of arrays and tuples")
 
 
 def _item(f: Function, of: TupleValue, index: Scalar, node: ast.AST) -> Value:
-    """An item of a tuple; one that is not known beforehand, of items of one type."""
+    """An item of a tuple; if the index is not constant, all items must be of one type."""
     count = len(of.items)
     if index.const is not None:
         if not -count <= index.const < count:
@@ -95,11 +95,11 @@ def _item(f: Function, of: TupleValue, index: Scalar, node: ast.AST) -> Value:
         raise f.refused(node, "an item of a tuple by a number that varies", "take a tuple of numbers of one type")
     index = arrays.index_within(f, index, number(count), node)
     first, *others = of.items
-    made = first.ir  # pyright: ignore
+    chosen = first.ir  # pyright: ignore
     for i, each in enumerate(others, 1):
         here = f.builder.icmp_signed("==", index.ir, ir.Constant(I64, i))
-        made = f.builder.select(here, each.ir, made)  # pyright: ignore
-    return Scalar(first.kind, made)  # pyright: ignore
+        chosen = f.builder.select(here, each.ir, chosen)  # pyright: ignore
+    return Scalar(first.kind, chosen)  # pyright: ignore
 
 
 def _binary(f: Function, node: ast.BinOp) -> Value:
@@ -113,23 +113,23 @@ def _unary(f: Function, node: ast.UnaryOp) -> Value:
     x = numbers.scalar(f, value(f, node.operand), node)
     if isinstance(node.op, ast.USub):
         return numbers.negated(f, x, node)
-    raise f.refused(node, f"the operation {ast.unparse(node)}", "write it otherwise")
+    raise f.refused(node, f"the operation {ast.unparse(node)}", "write it differently")
 
 
 def _logic(f: Function, node: ast.BoolOp) -> Value:
-    """Of truth values, the later ones only where they matter."""
+    """`and` and `or` of truth values; the later ones are computed only where they matter."""
 
-    def item(each: ast.expr) -> Any:
-        made = numbers.scalar(f, value(f, each), each)
-        if made.kind != BOOL:
-            raise f.refused(each, "and, or of what is no truth value", "compare it, as x != 0")
-        return made.ir
+    def item(operand: ast.expr) -> Any:
+        x = numbers.scalar(f, value(f, operand), operand)
+        if x.kind != BOOL:
+            raise f.refused(operand, "and, or of something other than truth values", "compare it, as x != 0")
+        return x.ir
 
     return Scalar(BOOL, _shortened(f, node.values, isinstance(node.op, ast.And), item))
 
 
 def _shortened(f: Function, nodes: list[ast.expr], all_: bool, item: Callable[[ast.expr], Any]) -> Any:
-    """Whether all hold, or any, asked for one after the other until it is known."""
+    """Whether all or any of the operands hold, computed one after the other until the result is known."""
     b, b0 = f.builder, ir.Constant(BOOL.llvm, int(not all_))
     behind = b.append_basic_block()
     ends = []
@@ -161,7 +161,7 @@ def test(f: Function, node: ast.expr) -> Any:
 
 
 def _comparison(f: Function, node: ast.Compare) -> Value:
-    """A chain of relations, each asked for if those before it hold."""
+    """A chain of relations, each computed only if those before it hold."""
     left, ends, b = numbers.scalar(f, value(f, node.left), node), [], f.builder
     behind = b.append_basic_block() if len(node.ops) > 1 else None
     for i, (op, each) in enumerate(zip(node.ops, node.comparators, strict=True)):
@@ -182,21 +182,21 @@ def _conditional(f: Function, node: ast.IfExp) -> Value:
     b = f.builder
     yes, no, behind = (b.append_basic_block() for _ in range(3))
     b.cbranch(test(f, node.test), yes, no)
-    made, ends = [], []
+    values, ends = [], []
     for block, each in ((yes, node.body), (no, node.orelse)):
         b.position_at_end(block)
-        made.append(value(f, each))
+        values.append(value(f, each))
         ends.append(b.block)
-    return _either(f, node, made, ends, behind)
+    return _either(f, node, values, ends, behind)
 
 
-def _either(f: Function, node: ast.AST, made: list[Value], ends: list[Any], behind: Any) -> Value:
+def _either(f: Function, node: ast.AST, values: list[Value], ends: list[Any], behind: Any) -> Value:
     """One of two values, by where the translation comes from."""
-    kind, b = f.common(made[0].kind, made[1].kind, node), f.builder
+    kind, b = f.common(values[0].kind, values[1].kind, node), f.builder
     parts = []
-    for each, block in zip(made, ends, strict=True):
+    for each, block in zip(values, ends, strict=True):
         b.position_at_end(block)
-        parts.append(calls.leaves_of(f, each, kind, node))
+        parts.append(leaves(f.fitted(each, kind, node)))
         b.branch(behind)
     b.position_at_end(behind)
     if f.silent:
@@ -207,18 +207,10 @@ def _either(f: Function, node: ast.AST, made: list[Value], ends: list[Any], behi
     return of_leaves(kind, merged)
 
 
-def _called(f: Function, node: ast.Call) -> Value:
-    return calls.called(f, node)
-
-
-def _name(f: Function, node: ast.Name) -> Value:
-    return f.name(node)
-
-
 EXPRESSIONS: Mapping[type[ast.expr], Callable[[Any, Any], Value]] = MappingProxyType(
     {
-        ast.Constant: _constant, ast.Name: _name, ast.Tuple: _tuple, ast.Attribute: _attribute,
+        ast.Constant: _constant, ast.Name: lambda f, node: f.name(node), ast.Tuple: _tuple, ast.Attribute: _attribute,
         ast.Subscript: _subscript, ast.BinOp: _binary, ast.UnaryOp: _unary, ast.BoolOp: _logic,
-        ast.Compare: _comparison, ast.IfExp: _conditional, ast.Call: _called,
+        ast.Compare: _comparison, ast.IfExp: _conditional, ast.Call: calls.called,
     }
 )  # fmt: skip

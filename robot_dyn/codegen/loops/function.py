@@ -1,7 +1,7 @@
-"""A function on its way to machine code: its names, its blocks, and where it may fail.
+"""One function being translated: its names, its blocks, and where it may fail.
 
-Types settle by translating it without writing anything until none changes; then it is written. A function that may
-fail gives the text of its failure, or null, besides its result.
+It is translated without writing anything until its types no longer change, and then written. A function that may fail
+returns the text of its failure, or null, before its result.
 """
 
 from __future__ import annotations
@@ -11,20 +11,13 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, NoReturn, final
 
 from llvmlite import ir
 
 from robot_dyn.codegen.loops import expressions, statements
-from robot_dyn.codegen.loops.kinds import (
-    F64,
-    TEXT,
-    ArrayKind,
-    Kind,
-    Number,
-    Static,
-    TupleKind,
-)  # fmt: skip
+from robot_dyn.codegen.loops.kinds import F64, TEXT, ArrayKind, Kind, Number, Static, TupleKind
 from robot_dyn.codegen.loops.numbers import converted, joined
 from robot_dyn.codegen.loops.source import SubsetError, names_of, refused, stores, syntax
 from robot_dyn.codegen.loops.values import (
@@ -46,7 +39,7 @@ _PASSES = 8
 
 
 class _Silent:
-    """In place of LLVM's builder, where types are looked for: it writes nothing."""
+    """A substitute for LLVM's builder that writes nothing, while types are found."""
 
     block = None
 
@@ -60,20 +53,20 @@ def _nothing(*_: Any, **__: Any) -> None:
 
 @final
 class Function:
-    """A function on its way.
+    """A function being translated.
 
     Args:
-        program: Of which it is a part.
+        program: The module that it belongs to.
         function: Python's.
         kinds: The types of its arguments.
-        checks: Whether indices and integers are checked; not in primitives, which look at their arguments themselves.
+        checks: Whether indices and integers are checked; not in primitives, which check their arguments themselves.
 
     Attributes:
         builder: LLVM's, or one that writes nothing.
-        assigned: Names that have a value wherever the translation is.
-        result: The type of what it gives, as far as it is known.
+        assigned: Names that have a value at the current point.
+        result: The type of its result, as far as it is known.
         may_fail: Whether something in it may fail.
-        leaving: For each loop around: the blocks of its next round and behind it, and the names assigned at breaks.
+        leaving: For each enclosing loop: the blocks of its next round and after it, and the names assigned at breaks.
     """
 
     def __init__(self, program: Program, function: Callable[..., Any], kinds: Sequence[Kind], checks: bool) -> None:
@@ -95,7 +88,7 @@ class Function:
 
     @property
     def silent(self) -> bool:
-        """Whether nothing is written yet."""
+        """Whether only types are being found."""
         return isinstance(self.builder, _Silent)
 
     def _parameters(self, count: int) -> list[str]:
@@ -124,17 +117,17 @@ class Function:
             raise self.refused(self.tree, "a function whose types do not settle", "give each name one type")
         result: Any = Static.of(None) if self.result is None else self.result
         given = [leaf for each in self.arguments.values() for leaf in leaf_types(each)]
-        made = ir.Function(
+        function = ir.Function(
             self.program.module, ir.FunctionType(_llvm_result(result, self.may_fail), given),
             self.program.name(self.function.__name__),
         )  # fmt: skip
-        made.linkage = "internal"
-        inlined = hasattr(self.function, "inlined")  # else the time of LLVM doubles; the work is behind addresses
-        made.attributes.add("alwaysinline" if inlined else "noinline")
-        made.attributes.add("nounwind")
-        self.builder = ir.IRBuilder(made.append_basic_block())
-        self._body(list(made.args))
-        return Written(made, result, self.may_fail)
+        function.linkage = "internal"
+        inlined = hasattr(self.function, "inlined")  # otherwise LLVM takes twice as long; the work is behind addresses
+        function.attributes.add("alwaysinline" if inlined else "noinline")
+        function.attributes.add("nounwind")
+        self.builder = ir.IRBuilder(function.append_basic_block())
+        self._body(list(function.args))
+        return Written(function, result, self.may_fail)
 
     def _body(self, given: list[Any]) -> None:
         self.assigned, self.leaving, self._failure = set(self.arguments), [], None
@@ -159,11 +152,11 @@ class Function:
     # Names
 
     def assign(self, name: str, value: Value, node: ast.AST) -> None:
-        """Give a name a value, of the type of the name."""
+        """Assign a value to a name, converted to the type of the name."""
         kind = self._kinds.get(name)
         if kind is None or (self.silent and kind != value.kind):
             self._kinds[name] = value.kind if kind is None else self.common(kind, value.kind, node)
-            self._settled &= kind is None  # else what was made of the first one is to be made again
+            self._settled &= kind is None  # otherwise what follows from the first type is translated again
         self._bind(name, self.fitted(value, self._kinds[name], node))
         self.assigned.add(name)
 
@@ -176,23 +169,23 @@ class Function:
 
     def common(self, x: Kind, y: Kind, node: ast.AST) -> Kind:
         """The type that holds values of two."""
-        made: Kind | None = None
+        kind: Kind | None = None
         if x == y:
             return x
         if isinstance(x, Number) and isinstance(y, Number):
-            made = joined(x, y)
+            kind = joined(x, y)
         elif isinstance(x, ArrayKind) and isinstance(y, ArrayKind) and (x.of, x.ndim) == (y.of, y.ndim):
             both = x.contiguous and y.contiguous, x.single and y.single, x.frozen or y.frozen
-            made = ArrayKind(x.of, x.ndim, *both)
+            kind = ArrayKind(x.of, x.ndim, *both)
         elif isinstance(x, TupleKind) and isinstance(y, TupleKind) and len(x.items) == len(y.items):
             pairs = zip(x.items, y.items, strict=True)
-            made = TupleKind(tuple(self.common(a, b, node) for a, b in pairs))
-        if made is None:
+            kind = TupleKind(tuple(self.common(a, b, node) for a, b in pairs))
+        if kind is None:
             raise self.refused(node, "a name, or a result, of different types", "give each type a name of its own")
-        return made
+        return kind
 
     def fitted(self, value: Value, kind: Kind, node: ast.AST) -> Value:
-        """A value as one of a type that holds it as well."""
+        """A value converted to a type that holds it."""
         if value.kind == kind:
             return value
         if isinstance(value, Scalar) and isinstance(kind, Number):
@@ -211,7 +204,7 @@ class Function:
         if node.id not in self._times:
             if node.id not in self.known:
                 self.refuse(node, f"the name {node.id!r}, which has no value,", "define it before")
-            return self.program.constant(self.known[node.id], lambda *x: self.refuse(node, *x))
+            return self.constant(self.known[node.id], node)
         if node.id not in self.assigned:
             remedy = "give it one before the branch or loop that does"
             raise self.refused(node, f"{node.id!r}, which may have no value here,", remedy)
@@ -222,8 +215,12 @@ class Function:
         return of_leaves(kind, parts)
 
     def refuse(self, node: ast.AST, what: str, remedy: str) -> NoReturn:
-        """Raise it."""
+        """Raise the error of a construct."""
         raise self.refused(node, what, remedy)
+
+    def constant(self, value: Any, node: ast.AST) -> Value:
+        """A value that is known when the function is translated."""
+        return self.program.constant(value, partial(self.refuse, node))
 
     def expression(self, node: ast.expr) -> Value:
         """The value of an expression."""
@@ -244,10 +241,10 @@ class Function:
         if len(parts) < 2:
             self.builder.ret(parts[0]) if parts else self.builder.ret_void()
             return
-        made = ir.Constant(_llvm_result(_known(self.result), self.may_fail), ir.Undefined)
+        returned = ir.Constant(_llvm_result(_known(self.result), self.may_fail), ir.Undefined)
         for i, each in enumerate(parts):
-            made = self.builder.insert_value(made, each, i)
-        self.builder.ret(made)
+            returned = self.builder.insert_value(returned, each, i)
+        self.builder.ret(returned)
 
     def check(self, holds: Any, node: ast.AST, what: str) -> None:
         """Fail unless a condition holds."""
@@ -272,7 +269,7 @@ class Function:
         self.builder.position_at_end(going_on)
 
     def external(self, name: str, result: Any, *given: Any) -> Any:
-        """A function of the C library, which LLVM takes as any other."""
+        """A function of the C library, unknown to LLVM's optimiser."""
         return None if self.silent else self.program.external(name, result, *given)
 
     def intrinsic(self, name: str, *given: Any) -> Any:
@@ -284,7 +281,7 @@ class Function:
 
     @contextmanager
     def loop(self, count: Scalar) -> Iterator[Scalar]:
-        """Instructions that are done for each index from 0 to before a count."""
+        """A loop over the indices below a count."""
         with statements.counted(self, number(0), count, 1) as (index, _):
             yield index
 

@@ -1,4 +1,4 @@
-"""The types of the subset: numbers, arrays of them, named tuples by reference, tuples, and what is known beforehand."""
+"""The types of the subset: numbers, arrays of them, named tuples by reference, tuples, and constants."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class ArrayKind:
         ndim: Number of axes.
         contiguous: Whether it is contiguous in C order; otherwise strides are known only at run time.
         single: Whether the last of several axes is known to be of length 1, as that of a single run.
-        frozen: Whether nothing may be written into it.
+        frozen: Whether it is read-only.
     """
 
     of: Number
@@ -103,8 +103,8 @@ class Static:
     """A value known when the function is translated: a function, a module, a class, a tuple of constants.
 
     Attributes:
-        value: It.
-        token: Tells it from others; 1, 1.0 and True are not the same.
+        value: The value.
+        token: Distinguishes it from others; 1, 1.0 and True differ.
     """
 
     value: Any = field(compare=False)

@@ -1,7 +1,7 @@
-"""Arithmetic of numbers, as Python and NumPy have it: floats by IEEE 754, integers of 64 bits that may not overflow.
+"""Arithmetic of numbers as in Python and NumPy: floats by IEEE 754, integers of 64 bits that may not overflow.
 
-Nothing is contracted or reordered. An integer that overflows, and a division of integers by zero, end the call with an
-error; a float divided by zero is inf or nan, as of NumPy. Unsigned integers wrap.
+Nothing is contracted or reordered. Integer overflow and integer division by zero end the call with an error; a float
+divided by zero is inf or nan, as in NumPy. Unsigned integers wrap.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from llvmlite import ir
 
-from robot_dyn.codegen.loops.kinds import BOOL, F64, FLOAT, I1, I64, INT, UINT, Kind, Number
+from robot_dyn.codegen.loops.kinds import BOOL, F64, FLOAT, I64, INT, UINT, Kind, Number
 from robot_dyn.codegen.loops.values import Scalar, Value, number, word
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ def scalar(f: Function, value: Value, node: ast.AST) -> Scalar:
 
 
 def converted(f: Function, x: Scalar, kind: Kind, node: ast.AST) -> Scalar:
-    """A number as one of another type, without loss: truth value to integer to float, constants to unsigned."""
+    """A number converted to another type without loss: truth value to integer to float, constants to unsigned."""
     if x.kind == kind:
         return x
     if kind == FLOAT and x.kind in (INT, BOOL):
@@ -60,11 +60,18 @@ def converted(f: Function, x: Scalar, kind: Kind, node: ast.AST) -> Scalar:
     if kind == UINT and x.kind == INT and x.const is not None and 0 <= x.const < 2**64:
         return word(x.const)
     remedy = "convert it with int, float or np.uint64"
-    raise f.refused(node, f"a number of type {x.kind.name} where {getattr(kind, 'name', 'another')} is asked", remedy)
+    raise f.refused(
+        node, f"a number of type {x.kind.name} where {getattr(kind, 'name', 'another')} is required", remedy
+    )
+
+
+def real(f: Function, value: Value, node: ast.AST) -> Scalar:
+    """A value that is a number, as a float."""
+    return converted(f, scalar(f, value, node), FLOAT, node)
 
 
 def together(f: Function, x: Scalar, y: Scalar, node: ast.AST) -> tuple[Scalar, Scalar]:
-    """Two numbers as ones of the type that holds both."""
+    """Two numbers converted to the type that holds both."""
     kinds = {x.kind, y.kind}
     if len(kinds) == 1:
         return x, y
@@ -91,17 +98,17 @@ def binary(f: Function, of: type[ast.operator], x: Scalar, y: Scalar, node: ast.
         return _of_integers(f, of, x, y, node)
     if x.kind == UINT and (of in _PLAIN or of in (ast.LShift, ast.RShift)):
         return _of_words(f, of, x, y)
-    raise f.refused(node, f"{of.__name__} of numbers of type {x.kind.name}", "convert them, or write it otherwise")
+    raise f.refused(node, f"{of.__name__} of numbers of type {x.kind.name}", "convert them, or write it differently")
 
 
 def _of_constants(f: Function, of: type[ast.operator], x: Scalar, y: Scalar, node: ast.AST) -> Scalar:
     try:
-        made = _IN_PYTHON[of](x.const, y.const)
+        value = _IN_PYTHON[of](x.const, y.const)
     except (ArithmeticError, TypeError, KeyError, ValueError) as error:
         raise f.refused(node, f"an operation on constants ({error})", "correct it") from None
-    if not isinstance(made, bool | float) and not (isinstance(made, int) and _LEAST <= made < -_LEAST):
-        raise f.refused(node, f"the constant {made}", "take one of 64 bits")
-    return number(made)
+    if not isinstance(value, bool | float) and not (isinstance(value, int) and _LEAST <= value < -_LEAST):
+        raise f.refused(node, f"the constant {value}", "take one of 64 bits")
+    return number(value)
 
 
 def _of_integers(f: Function, of: type[ast.operator], x: Scalar, y: Scalar, node: ast.AST) -> Scalar:
@@ -118,7 +125,7 @@ def _of_integers(f: Function, of: type[ast.operator], x: Scalar, y: Scalar, node
 
 
 def _divided(f: Function, of: type[ast.operator], x: Scalar, y: Scalar, node: ast.AST) -> Scalar:
-    """⌊x / y⌋ and its rest, which has the sign of y."""
+    """⌊x / y⌋ or its remainder, which has the sign of y."""
     b, zero, one = f.builder, ir.Constant(I64, 0), ir.Constant(I64, 1)
     if y.const is None or y.const == 0:
         f.check(b.icmp_signed("!=", y.ir, zero), node, "an integer is divided by zero")
@@ -144,7 +151,7 @@ def _of_words(f: Function, of: type[ast.operator], x: Scalar, y: Scalar) -> Scal
 
 
 def _power(f: Function, x: Scalar, y: Scalar, node: ast.AST) -> Scalar:
-    """By the C library, as Python and NumPy take it."""
+    """A power by the C library, which Python and NumPy use."""
     if x.kind != FLOAT:
         raise f.refused(node, "a power of an integer", "convert it with float, or multiply")
     return Scalar(FLOAT, f.builder.call(f.external("pow", F64, F64, F64), [x.ir, converted(f, y, FLOAT, node).ir]))
@@ -181,11 +188,6 @@ def negated(f: Function, x: Scalar, node: ast.AST) -> Scalar:
     if x.kind == INT:
         return _of_integers(f, ast.Sub, number(0), x, node)
     raise f.refused(node, f"the negative of a number of type {x.kind.name}", "convert it with int")
-
-
-def opposite(f: Function, x: Scalar) -> Scalar:
-    """Whether a number is 0."""
-    return Scalar(BOOL, f.builder.xor(truth(f, x), ir.Constant(I1, 1)))
 
 
 def joined(x: Number, y: Number) -> Number | None:

@@ -50,13 +50,13 @@ _KNOWN: Any = (str, tuple, ModuleType, type, Enum)
 
 @final
 class Program:
-    """A module on its way.
+    """A module being written.
 
     Args:
         module: LLVM's.
-        prefix: With which the names of its functions begin.
-        instead: What is translated in place of a function: one of the subset, which is not checked; or one marked by
-            `emits`, (f, node, arguments) → value, which writes instructions.
+        prefix: Prefix of the names of its functions.
+        instead: Substitutes for functions: one of the subset, translated without checks; or one marked by `emits`,
+            (f, node, arguments) → value, which writes instructions.
     """
 
     def __init__(self, module: Any, prefix: str, instead: Instead) -> None:
@@ -74,26 +74,26 @@ class Program:
             self._done[place] = None
             checks = function not in self._unchecked and not hasattr(function, "unchecked")
             self._done[place] = Function(self, function, kinds, checks).written()
-        made = self._done[place]
-        if made is None:
+        written = self._done[place]
+        if written is None:
             refuse(f"{function.__name__!r}, which calls itself,", "write a loop")
-        return made
+        return written
 
     def name(self, of: str) -> str:
-        """A name that no other function of the module has."""
+        """A unique name for a function of the module."""
         return f"{self.prefix}{of}_{len(self._done)}"
 
     def entry(self, function: FunctionType, kinds: tuple[Kind, ...], name: str) -> Kind:
         """Write the function that others call; the type of its result.
 
-        It takes the addresses of the words of each argument, and that of room for the words of the result; it gives
-        the text of its failure, or null.
+        It takes the addresses of the words of each argument, and the address where it writes the words of the result;
+        it returns the text of its failure, or null.
         """
         written = self.written(function, kinds, self._alone)
         shape = ir.FunctionType(TEXT, [WORDS.as_pointer(), WORDS])
-        made = ir.Function(self.module, shape, f"{self.prefix}{name}")
-        b = ir.IRBuilder(made.append_basic_block())
-        given, out = made.args
+        entry = ir.Function(self.module, shape, f"{self.prefix}{name}")
+        b = ir.IRBuilder(entry.append_basic_block())
+        given, out = entry.args
         parts: list[Any] = []
         for i, kind in enumerate(kinds):
             pointer = self.known_load(b, b.gep(given, [ir.Constant(I64, i)]))
@@ -114,7 +114,7 @@ class Program:
     @staticmethod
     def _nothing(kind: Kind) -> Value:
         if not _only_numbers(kind):
-            raise SubsetError("a function that gives an array is not called from outside; write into one it is given")
+            raise SubsetError("a function that returns an array is not called from Python; write into an argument")
         return of_leaves(kind, [None] * words(kind))
 
     def _loaded(self, b: Any, pointer: Any, kind: Kind) -> list[Any]:
@@ -122,41 +122,41 @@ class Program:
         if isinstance(kind, RecordKind):
             return [pointer]
         if isinstance(kind, TupleKind):
-            made, at = [], 0
+            parts, at = [], 0
             for each in kind.items:
-                made += self._loaded(b, b.gep(pointer, [ir.Constant(I64, at)]), each)
+                parts += self._loaded(b, b.gep(pointer, [ir.Constant(I64, at)]), each)
                 at += words(each)
-            return made
+            return parts
         if isinstance(kind, Static):
             return []
         return leaves(self.read(b, pointer, kind, 0))
 
     def read(self, b: Any, pointer: Any, kind: Number | ArrayKind, first: int) -> Value:
         """A number or an array, from its words."""
-        made = [self.known_load(b, b.gep(pointer, [ir.Constant(I64, first + i)])) for i in range(words(kind))]
+        loaded = [self.known_load(b, b.gep(pointer, [ir.Constant(I64, first + i)])) for i in range(words(kind))]
         if isinstance(kind, Number):
-            of_word = made[0] if kind.llvm == I64 else None
-            of_word = b.trunc(made[0], kind.llvm) if kind == BOOL else of_word
-            return Scalar(kind, b.bitcast(made[0], kind.llvm) if kind == FLOAT else of_word)
+            of_word = loaded[0] if kind.llvm == I64 else None
+            of_word = b.trunc(loaded[0], kind.llvm) if kind == BOOL else of_word
+            return Scalar(kind, b.bitcast(loaded[0], kind.llvm) if kind == FLOAT else of_word)
         n = kind.ndim
-        lengths, apart = made[1 : 1 + n - kind.single], made[1 + n : 1 + 2 * n - kind.single]
+        lengths, apart = loaded[1 : 1 + n - kind.single], loaded[1 + n : 1 + 2 * n - kind.single]
         bytes_ = ir.Constant(I64, 1 if kind.of == BOOL else 8)
         apart = [] if kind.contiguous else [b.sdiv(each, bytes_, flags=("exact",)) for each in apart]
-        return of_leaves(kind, [b.inttoptr(made[0], kind.of.stored.as_pointer()), *lengths, *apart])
+        return of_leaves(kind, [b.inttoptr(loaded[0], kind.of.stored.as_pointer()), *lengths, *apart])
 
     def known_load(self, b: Any, pointer: Any) -> Any:
-        """What lies at an address and does not change while machine code runs."""
-        made = b.load(pointer)
-        made.set_metadata("invariant.load", self._known)
-        return made
+        """Load a value that does not change while machine code runs."""
+        loaded = b.load(pointer)
+        loaded.set_metadata("invariant.load", self._known)
+        return loaded
 
     def external(self, name: str, result: Any, *given: Any) -> Any:
         """A function of the C library."""
         if name in self.module.globals:
             return self.module.globals[name]
-        made = ir.Function(self.module, ir.FunctionType(result, given), name)
-        made.attributes.add("nobuiltin")  # LLVM has a square root, or a product, for some powers
-        return made
+        function = ir.Function(self.module, ir.FunctionType(result, given), name)
+        function.attributes.add("nobuiltin")  # LLVM has a square root, or a product, for some powers
+        return function
 
     def text(self, text: str) -> Any:
         """The address of a text."""
@@ -167,12 +167,12 @@ class Program:
         return self._texts[text]
 
     def _global(self, kind: Any, data: Any) -> Any:
-        made: Any = ir.GlobalVariable(self.module, kind, f"{self.prefix}data_{len(self.module.globals)}")
-        made.linkage, made.global_constant, made.initializer = "internal", True, ir.Constant(kind, data)
-        return made
+        variable: Any = ir.GlobalVariable(self.module, kind, f"{self.prefix}data_{len(self.module.globals)}")
+        variable.linkage, variable.global_constant, variable.initializer = "internal", True, ir.Constant(kind, data)
+        return variable
 
     def constant(self, value: Any, refuse: Refuse) -> Value:
-        """A value that is known."""
+        """A value known when the function is translated."""
         if isinstance(value, _WORDS):
             return word(int(value))
         if isinstance(value, _TRUTHS):
@@ -211,5 +211,5 @@ def _only_numbers(kind: Kind) -> bool:
 
 
 def translated(function: Any, kinds: tuple[Kind, ...], instead: Instead) -> Kind:
-    """Translate a function for arguments of these types, for nothing but its type and its errors."""
+    """Translate a function for arguments of these types, only for the type of its result and its errors."""
     return Program(ir.Module(), "", instead).written(function, kinds, Program._alone).result

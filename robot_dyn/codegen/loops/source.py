@@ -1,4 +1,4 @@
-"""The syntax tree of a plain function, that of the code which Python runs; and what cannot be translated."""
+"""The syntax tree of a plain function, that of the code which Python runs; errors of untranslatable constructs."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from functools import lru_cache
 from types import CodeType, FunctionType
 from typing import Any
 
+from robot_dyn.codegen.store.definition import code_parts
 from robot_dyn.errors import TraceError
 
 
@@ -20,7 +21,7 @@ class SubsetError(TraceError):
 
 
 def refused(function: Callable[..., Any], line: int, what: str, remedy: str) -> SubsetError:
-    """The error of a construct: where it stands, and what to write in its place."""
+    """The error of a construct: its line, and what to write instead."""
     code = function.__code__
     return SubsetError(f"{code.co_filename}, line {line}, in {code.co_qualname}: {what} is not translated; {remedy}")
 
@@ -29,7 +30,7 @@ def syntax(function: Callable[..., Any]) -> ast.FunctionDef:
     """The syntax tree of a function.
 
     Raises:
-        SubsetError: If there is no source, or it is not that of the function any more.
+        SubsetError: If the source is missing, or has changed since the function was read.
     """
     if not isinstance(function, FunctionType):
         raise SubsetError(f"{function!r} is not translated; call plain functions")
@@ -41,19 +42,19 @@ def syntax(function: Callable[..., Any]) -> ast.FunctionDef:
     if place not in trees:
         remedy = "write it with def, in a file or a cell of a notebook"
         raise refused(function, code.co_firstlineno, "a function without its source", remedy)
-    if not _same(codes[place], code):
+    if code_parts(codes[place]) != code_parts(code):
         remedy = "import the module again"
         raise refused(function, code.co_firstlineno, "a function whose source has changed since it was read", remedy)
     return trees[place]
 
 
 def names_of(function: FunctionType | Callable[..., Any]) -> Mapping[str, Any]:
-    """The values of names that are not a function's own: of where it was made, of its module, and Python's."""
-    made = {}
+    """The values of names that a function does not assign: of its closure, its module, and Python's."""
+    closure = {}
     for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
         with suppress(ValueError):  # it has no value yet
-            made[name] = cell.cell_contents
-    maps: list[Any] = [made, function.__globals__, vars(builtins)]
+            closure[name] = cell.cell_contents
+    maps: list[Any] = [closure, function.__globals__, vars(builtins)]
     return ChainMap(*maps)
 
 
@@ -96,14 +97,3 @@ def _codes(code: CodeType) -> Iterator[CodeType]:
     for each in code.co_consts:
         if isinstance(each, CodeType):
             yield from _codes(each)
-
-
-def _same(x: CodeType, y: CodeType) -> bool:
-    """Whether two pieces of code do the same."""
-    names = "co_code", "co_names", "co_varnames", "co_freevars", "co_cellvars"
-    if any(getattr(x, name) != getattr(y, name) for name in names) or len(x.co_consts) != len(y.co_consts):
-        return False
-    pairs = zip(x.co_consts, y.co_consts, strict=True)
-    return all(
-        _same(a, b) if isinstance(a, CodeType) and isinstance(b, CodeType) else repr(a) == repr(b) for a, b in pairs
-    )

@@ -1,4 +1,4 @@
-"""Statements of the subset. Each tells whether what follows it is never reached."""
+"""Statements of the subset. Each function returns whether what follows the statement is never reached."""
 
 from __future__ import annotations
 
@@ -69,8 +69,8 @@ def _augmented(f: Function, node: ast.AugAssign) -> bool:
     op, target = type(node.op), node.target
     if isinstance(target, ast.Name):
         x = numbers.scalar(f, f.name(ast.copy_location(ast.Name(target.id, ast.Load()), target)), node)
-        made = numbers.binary(f, op, x, numbers.scalar(f, f.expression(node.value), node), node)
-        f.assign(target.id, made, node)
+        new = numbers.binary(f, op, x, numbers.scalar(f, f.expression(node.value), node), node)
+        f.assign(target.id, new, node)
         return False
     of = f.expression(target.value) if isinstance(target, ast.Subscript) else None
     if not isinstance(of, ArrayValue) or not isinstance(target, ast.Subscript):
@@ -79,8 +79,8 @@ def _augmented(f: Function, node: ast.AugAssign) -> bool:
         raise f.refused(node, "a write into an array that is read-only", "pass one that may be written")
     places = arrays.indices(f, of, target)
     x = arrays.load(f, of, places)
-    made = numbers.binary(f, op, x, numbers.scalar(f, f.expression(node.value), node), node)
-    arrays.store(f, of, places, numbers.converted(f, made, of.kind.of, node))
+    new = numbers.binary(f, op, x, numbers.scalar(f, f.expression(node.value), node), node)
+    arrays.store(f, of, places, numbers.converted(f, new, of.kind.of, node))
     return False
 
 
@@ -223,14 +223,10 @@ def _expression(f: Function, node: ast.Expr) -> bool:
     return False
 
 
-def _pass(f: Function, node: ast.Pass) -> bool:
-    return False
-
-
 STATEMENTS: Mapping[type[ast.stmt], Callable[[Any, Any], bool]] = MappingProxyType(
     {
         ast.Assign: _assign, ast.AnnAssign: _annotated, ast.AugAssign: _augmented, ast.If: _if, ast.While: _while,
         ast.For: _for, ast.Break: _break, ast.Continue: _continue, ast.Return: _return, ast.Expr: _expression,
-        ast.Pass: _pass,
+        ast.Pass: lambda f, node: False,
     }
 )  # fmt: skip

@@ -54,10 +54,10 @@ class ArrayValue:
         """The strides."""
         if not self.kind.contiguous:
             return self.apart
-        made = [ONE]
+        strides = [ONE]
         for length in reversed(self.shape[1:]):
-            made.insert(0, times(length, made[0], builder))
-        return tuple(made)
+            strides.insert(0, times(length, strides[0], builder))
+        return tuple(strides)
 
 
 @final
@@ -85,7 +85,7 @@ class TupleValue:
 @final
 @dataclass(frozen=True, eq=False)
 class StaticValue:
-    """What is known beforehand."""
+    """A value known when the function is translated."""
 
     value: Any
 
@@ -102,8 +102,8 @@ class Written:
 
     Attributes:
         ir: LLVM's function.
-        result: The type of what it gives.
-        may_fail: Whether it gives the text of a failure first.
+        result: The type of its result.
+        may_fail: Whether it returns the text of a failure first.
     """
 
     ir: Any
@@ -121,7 +121,7 @@ def number(value: float) -> Scalar:
 
 
 def word(value: int) -> Scalar:
-    """A constant that is unsigned."""
+    """An unsigned constant."""
     return Scalar(UINT, ir.Constant(I64, value), value)
 
 
@@ -129,7 +129,7 @@ ONE = number(1)
 
 
 def leaf_types(kind: Kind) -> list[ir.Type]:
-    """LLVM's types of the parts of a value, as they are passed and kept in variables."""
+    """LLVM's types of the parts of a value, as they are passed and stored in variables."""
     if isinstance(kind, Number):
         return [kind.llvm]
     if isinstance(kind, ArrayKind):
@@ -153,7 +153,7 @@ def leaves(value: Value) -> list[Any]:
 
 
 def of_leaves(kind: Kind, parts: Sequence[Any]) -> Value:
-    """The value of these parts."""
+    """The value that consists of these parts."""
     if isinstance(kind, Number):
         return Scalar(kind, parts[0])
     if isinstance(kind, ArrayKind):

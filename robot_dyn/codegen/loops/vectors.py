@@ -1,4 +1,4 @@
-"""Operations on all entries of arrays, by vectors of the processor; each entry is computed as if it were alone."""
+"""Operations on all entries of arrays, by vectors of the processor; each entry has the bits of a scalar computation."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def check(f: Function, node: ast.AST, to: ArrayValue, operands: list[Value]) -> 
 
 
 def chunks(f: Function, count: Scalar, widths: tuple[int, ...]) -> Iterator[tuple[int, Any]]:
-    """Loops over entries, so many at a time: first of the largest width, then what is left by smaller ones."""
+    """Loops over entries by vectors: first of the largest width, then of smaller ones for the rest."""
     b, first = f.builder, ZERO
     for width in widths:
         last = b.and_(count.ir, ir.Constant(I64, -width))
@@ -59,7 +59,7 @@ def chunks(f: Function, count: Scalar, widths: tuple[int, ...]) -> Iterator[tupl
 
 @contextmanager
 def steps(b: Any, start: Any, stop: Any, step: int) -> Iterator[Any]:
-    """A loop in steps, by a phi: it needs no variable."""
+    """A loop in steps, by a phi instead of a variable."""
     before, look, body, behind = b.block, *(b.append_basic_block() for _ in range(3))
     b.branch(look)
     b.position_at_end(look)
@@ -74,17 +74,17 @@ def steps(b: Any, start: Any, stop: Any, step: int) -> Iterator[Any]:
 
 
 def kind(width: int, of: Number) -> Any:
-    """LLVM's type of so many numbers."""
+    """LLVM's type of a vector of numbers."""
     return of.stored if width == 1 else ir.VectorType(of.stored, width)
 
 
 def loaded(b: Any, data: Any, at: Any, width: int, of: Number) -> Any:
-    """So many entries from one on."""
+    """A vector of entries."""
     return b.load(b.bitcast(b.gep(data, [at], inbounds=True), kind(width, of).as_pointer()), align=_bytes(of))
 
 
 def stored(b: Any, value: Any, data: Any, at: Any, width: int, of: Number) -> None:
-    """Write so many entries."""
+    """Write a vector of entries."""
     pointer = b.bitcast(b.gep(data, [at], inbounds=True), kind(width, of).as_pointer())
     b.store(value, pointer, align=_bytes(of))
 

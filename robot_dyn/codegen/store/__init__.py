@@ -1,1 +1,1 @@
-"""Machine code on disk: a folder of entries, each under the digest of all it came from."""
+"""Stored machine code: keys of all that it depends on, the definition of user code in them, the folder (cache)."""

@@ -1,7 +1,7 @@
 """Compiled kernels on disk: a folder of entries, each the bytes of one kernel under the digest of all it came from.
 
-A kernel that is read back is run, so an entry is taken only from a folder that is yours alone and a file that you
-wrote. The SHA-256 inside it finds damage; it proves nothing about who wrote it.
+A stored kernel is executed, so an entry is read only from a folder that belongs to you alone and a file that you
+wrote. The SHA-256 inside it detects damage; it does not prove who wrote it.
 
 An entry is lines of text and then the payload: the format, the SHA-256 of all that follows, the key, what it is about.
 """
@@ -36,16 +36,7 @@ _OPEN = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0
 
 
 class CacheWarning(RobotDynWarning):
-    """Compiled kernels are not kept on disk; everything else works, only slower at the start."""
-
-
-def key(*parts: bytes | str) -> str:
-    """The SHA-256 of the parts, in hex: kind and length precede each, so no two lists of parts share their bytes."""
-    digest = sha256()
-    for part in parts:
-        kind, data = (b"s", part.encode("utf-8", "surrogatepass")) if isinstance(part, str) else (b"b", part)
-        digest.update(kind + len(data).to_bytes(8, "big") + data)
-    return digest.hexdigest()
+    """Compiled kernels are not stored on disk; everything else works, with a slower start."""
 
 
 @final
@@ -55,7 +46,7 @@ class Entry:
 
     Attributes:
         key: Its key.
-        about: What it computes, for people.
+        about: What it computes, as text.
         size: Of its file, in [bytes].
         used: When it was last written or read, in [s] since 1970.
     """
@@ -69,37 +60,37 @@ class Entry:
 @final
 @dataclass(frozen=True)
 class Store:
-    """A folder of kernels. No method raises because of what is on disk; what cannot be trusted is not there.
+    """A folder of kernels. Nothing on disk makes a method raise; an entry that cannot be trusted counts as missing.
 
     Processes may share it without locks: entries appear whole or not at all, and equal keys have equal contents.
 
     Attributes:
-        folder: Its full path; made, for you alone, at the first `save`.
-        most_bytes: Kept in all; beyond it the entries not used for longest go, in [bytes].
+        folder: Its full path; created, for you alone, at the first `save`.
+        most_bytes: Size limit, in [bytes]; above it the entries not used for longest are removed.
     """
 
     folder: Path
     most_bytes: int = 512 * 2**20
 
     def load(self, key: str) -> bytes | None:
-        """The payload saved under `key`; None if there is none that is whole and yours (a bad one is removed).
+        """The payload saved under `key`; None unless one is there that is intact and yours (a bad one is removed).
 
         Raises:
-            QueryError: If `key` is not one that `key()` gives.
+            QueryError: If `key` is not a digest.
         """
         path = self._path(key)
         if _objection(self.folder):
             return None
         try:
             payload = _payload(_read(path), key)
-        except OSError:  # there is none, or for the moment it cannot be read
+        except OSError:  # missing, or not readable at the moment
             return None
         with suppress(OSError):
             path.unlink() if payload is None else os.utime(path)
         return payload
 
     def save(self, key: str, payload: bytes, about: str = "") -> None:
-        """Keep a payload, whole or not at all; a CacheWarning says why if it cannot be kept; QueryError as `load`."""
+        """Store a payload, whole or not at all; a CacheWarning gives the reason if it cannot; QueryError as `load`."""
         path = self._path(key)
         label = " ".join(shorten(about, 200).split())  # one line
         entry = _sealed(f"{key}\n{label}\n".encode("utf-8", "replace") + payload)
@@ -116,17 +107,17 @@ class Store:
             _warn(self.folder, why)
 
     def entries(self) -> tuple[Entry, ...]:
-        """What is kept, the latest used first."""
+        """All entries, the latest used first."""
         return tuple(Entry(path.stem, _about(path), stat.st_size, stat.st_mtime) for path, stat in self._files())
 
     def clear(self) -> int:
-        """Remove all entries, and no other file; how many went."""
+        """Remove all entries, and no other file; return how many."""
         self._evict(None)
         return sum(_remove(path) for path, _ in self._files())
 
     def _path(self, key: str) -> Path:
         if not _KEY.fullmatch(key):  # it becomes the name of a file
-            raise QueryError(f"key must be 64 hexadecimal digits, got {shorten(key)!r}; give what key() returns")
+            raise QueryError(f"key must be 64 hexadecimal digits, got {shorten(key)!r}; give one of store.keys.digest")
         return self.folder / f"{key}.kernel"
 
     def _files(self, name: re.Pattern[str] = _ENTRY) -> list[tuple[Path, os.stat_result]]:
@@ -140,7 +131,7 @@ class Store:
         return sorted(files, key=lambda file: -file[1].st_mtime_ns)
 
     def _evict(self, newest: Path | None) -> None:
-        """Remove what is too much, but not the newest, and what writers that were killed left behind."""
+        """Remove entries above the size limit, except the newest, and files that killed writers left behind."""
         for path, status in self._files(_UNFINISHED):
             if time.time() - status.st_mtime > _ABANDONED_S:
                 _remove(path)
@@ -169,7 +160,7 @@ def default_store() -> Store | None:
 
 
 def _objection(folder: Path) -> str:
-    """Why a folder cannot be trusted and what to do; empty if it can, or is not there yet."""
+    """Why a folder cannot be trusted and the remedy; empty if it can, or does not exist yet."""
     if not folder.is_absolute():
         return f"is not a full path; {_OTHER}"
     try:
@@ -190,8 +181,8 @@ def _is_private(status: os.stat_result, forbidden: int) -> bool:
 
 
 def _read(path: Path, most: int = -1) -> bytes:
-    """The first bytes of an entry, none of a file that someone else can have written; OSError if there is no file."""
-    if path.is_symlink():  # tells a link from other errors; should it become one only now, O_NOFOLLOW stands
+    """The first bytes of an entry; none if another user could have written the file. OSError if it is missing."""
+    if path.is_symlink():  # a link is not an error to raise; if it becomes one only now, O_NOFOLLOW refuses it
         return b""
     handle = os.open(path, _OPEN)
     status = os.fstat(handle)  # of what is read, not of what has the name by now
@@ -215,7 +206,7 @@ def _payload(entry: bytes, key: str) -> bytes | None:
 
 
 def _about(path: Path) -> str:
-    """What an entry says of itself, fit for a terminal even if it is damaged; nothing if it cannot be read."""
+    """The text about an entry, printable even if it is damaged; empty if it cannot be read."""
     with suppress(OSError, IndexError):
         text = _read(path, 1024).split(b"\n")[3].decode("utf-8", "replace")
         return "".join(letter if letter.isprintable() else "?" for letter in text)
@@ -234,7 +225,7 @@ def _write(path: Path, data: bytes) -> None:
             stream.write(data)
         os.replace(name, path)
     finally:
-        _remove(Path(name))  # there only if the above failed
+        _remove(Path(name))  # exists only if the above failed
 
 
 def _remove(path: Path) -> bool:

@@ -1,10 +1,10 @@
-"""What user-defined code depends on, in one digest: all that its functions and classes reach by name.
+"""The definition of user-defined code: one digest of all that its functions and classes reach by name.
 
     function → its code, defaults, closure, attributes, globals → …      class → its bases and the values in it → …
 
-The code is that of Python, which is what runs: a source may have been edited since it was read. Numbers, texts, tuples
+The bytecode counts, as it is what runs: a source may have been edited since it was read. Numbers, texts, tuples
 and arrays count by value, functions and classes of this library and of NumPy by name, for their sources and versions
-are in every key. What may be another in the next process has no definition: files, times, random numbers, objects that
+are in every key. What may differ in the next process has no definition: files, times, random numbers, objects that
 may change, functions that assign to anything but their own variables, and modules as values.
 """
 
@@ -17,12 +17,12 @@ from abc import ABCMeta
 from collections.abc import Iterator, Mapping
 from dataclasses import Field
 from functools import cached_property, lru_cache, partial
-from hashlib import sha256
 from types import CodeType, FunctionType, GetSetDescriptorType, MemberDescriptorType, MethodType, ModuleType
 from typing import Any, final
 
 import numpy as np
 
+from robot_dyn.codegen.store.keys import digest_of_texts
 from robot_dyn.coefficients import Coefficient
 
 _NUMBERS = bool, int, float, complex, str, bytes, type(None), type(Ellipsis), type(NotImplemented)
@@ -31,13 +31,13 @@ _BUILTIN = {
     "isinstance", "issubclass", "len", "list", "map", "max", "min", "object", "pow", "property", "range", "reversed",
     "round", "set", "slice", "sorted", "staticmethod", "classmethod", "sum", "super", "tuple", "type", "zip",
 }  # fmt: skip
-# Modules whose functions and classes are told by their names: they give equal values in every process.
+# Modules whose functions and classes are identified by their names: they give equal values in every process.
 _PURE = {"abc", "cmath", "dataclasses", "math", "numpy", "numpy.linalg", "typing"}
 _PURE_ROOMS = (
     "arithmetic", "coefficients", "control", "effects", "errors", "lagrange", "recursive", "spatial",
     "threshold", "values",
 )  # fmt: skip
-# Those of NumPy that read or write a file, a clock, a setting or memory that holds anything.
+# Functions of NumPy that read or write a file, a clock, a setting or uninitialised memory.
 _IMPURE = {
     "datetime64", "empty", "empty_like", "fromfile", "fromregex", "genfromtxt", "get_printoptions",
     "getbufsize", "geterr", "geterrcall", "load", "loadtxt", "memmap", "save", "savetxt", "savez",
@@ -45,7 +45,7 @@ _IMPURE = {
 }  # fmt: skip
 _SPECIAL = {"__call__", "__class__", "__delattr__", "__init__", "__len__", "__name__", "__post_init__", "__setattr__"}
 _FIELDS = "__dataclass_fields__"
-# In a class: what follows from the rest, and what gives no numbers.
+# In a class: what follows from the rest, and what does not affect numbers.
 _FOLLOWS = {
     _FIELDS, "__abstractmethods__", "__annotate__", "__annotate_func__", "__annotations__", "__annotations_cache__",
     "__dataclass_params__", "__dict__", "__doc__", "__firstlineno__", "__hash__", "__match_args__", "__module__",
@@ -59,13 +59,13 @@ class _UndefinedError(Exception):
 
 
 def definition(value: Any) -> str | None:
-    """The SHA-256 of all that a value depends on; None if another process may have something else."""
+    """The SHA-256 of all that a value depends on; None if it may differ in another process."""
     reader = _Reader()
     try:
         parts = [reader.text(value), *reader.texts()]
     except (_UndefinedError, RecursionError):
         return None
-    return sha256("\0".join(f"{len(part)} {part}" for part in parts).encode("utf-8", "surrogatepass")).hexdigest()
+    return digest_of_texts(parts)
 
 
 @final
@@ -77,7 +77,7 @@ class _Reader:
         self._numbers: dict[int, int] = {}  # of these, by identity
 
     def text(self, value: Any) -> str:
-        """What tells a value from all others, beside the texts of what is reached."""
+        """A text that distinguishes a value from all others, together with those of what it reaches."""
         kind: Any = type(value)
         if kind in _NUMBERS:
             return f"{kind.__name__} {value!r}"
@@ -94,7 +94,7 @@ class _Reader:
             return f"{value.__module__}.{value.__qualname__}"
         if isinstance(value, FunctionType | type):
             return self._number(value)
-        if kind.__name__ == "_HAS_DEFAULT_FACTORY_CLASS":  # a default that is made by a function, in an __init__
+        if kind.__name__ == "_HAS_DEFAULT_FACTORY_CLASS":  # a default from a factory, in an __init__
             return kind.__name__
         if kind is np.ufunc and getattr(np, value.__name__, None) is value:
             return f"numpy {value.__name__}"
@@ -128,7 +128,7 @@ class _Reader:
             raise _UndefinedError
         defaults = self.text(function.__defaults__), self._items(function.__kwdefaults__ or {})
         names = {" ".join(path): _at(function.__globals__, path) for path in _globals(code)}
-        words = _words(code), *defaults, self._items(closure), self._items(names), self._items(vars(function))
+        words = code_parts(code), *defaults, self._items(closure), self._items(names), self._items(vars(function))
         return f"function {function.__qualname__} {words}"
 
     def _of_class(self, kind: type) -> str:
@@ -159,7 +159,7 @@ class _Reader:
 
 
 def _is_pure(value: Any) -> bool:
-    """Whether the name of a function or class tells it: it is where it says, in a module that gives no surprises."""
+    """Whether its name identifies a function or class: it is found by it, in a module of constant behaviour."""
     module, name = getattr(value, "__module__", None), getattr(value, "__qualname__", None)
     if not isinstance(module, str) or not isinstance(name, str) or isinstance(value, ModuleType):
         return False
@@ -191,7 +191,7 @@ def _globals(code: CodeType) -> frozenset[tuple[str, ...]]:
     """Paths to what a code takes from its module, such as (np, linalg, norm): a name, then attributes.
 
     Raises:
-        _UndefinedError: If it assigns to what is not its own, imports, or looks inside of what it calls.
+        _UndefinedError: If it assigns to anything but its own variables, imports, or inspects what it calls.
     """
     found: list[list[str]] = []
     follows = False
@@ -216,16 +216,17 @@ def _globals(code: CodeType) -> frozenset[tuple[str, ...]]:
 
 
 @lru_cache(maxsize=1024)
-def _words(code: CodeType) -> tuple[Any, ...]:
-    """A code without the places of its lines."""
+def code_parts(code: CodeType) -> tuple[Any, ...]:
+    """All that determines what a code does, as texts and numbers; not its file and lines."""
     names = code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars
-    counts = code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount, code.co_flags
-    return code.co_code.hex(), code.co_exceptiontable.hex(), names, counts, [*map(_constant, code.co_consts)]
+    counts = code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount
+    kind = code.co_flags & 0xFFFF  # without those of __future__, which a cell of a notebook may have from another
+    return code.co_code.hex(), code.co_exceptiontable.hex(), names, counts, kind, [*map(_constant, code.co_consts)]
 
 
 def _constant(value: Any) -> Any:
     if isinstance(value, CodeType):
-        return _words(value)
+        return code_parts(value)
     if isinstance(value, tuple | frozenset):
         items = map(repr, map(_constant, value))
         return type(value).__name__, [*items] if isinstance(value, tuple) else sorted(items)

@@ -1,4 +1,4 @@
-"""Base parameters: of each body's inertia, what its joint's motion cannot tell from the parent's is the parent's.
+"""Base parameters: inertia of a body that its joint's motion cannot distinguish from the parent's moves there.
 
     V = Ad⁻¹ V_λ + ξ v,   K = ½ Σ Vᵀ 𝓜 V:   a δ that the motion leaves as it is, and δ ξ = 0, goes from 𝓜 to 𝓜_λ
 
@@ -40,7 +40,7 @@ def _unchanged(body: Body, inertia: Array) -> Array:
         return _parts(0 * inertia[0, 0], 0 * body.axis, moments)
     a = body.axis
     # The lesser of two moments: what is left is not negative, so that sums over bodies do not cancel. The greater one
-    # costs Kinova's M a factor of ten in accuracy.
+    # costs a factor of ten in accuracy for Kinova's M.
     J = _least(*(across @ moments @ across for across in _across(a)))
     return _parts(inertia[0, 0], a * (a @ first_moment(inertia)), J * (np.eye(3, dtype=a.dtype) - np.outer(a, a)))
 

@@ -1,4 +1,4 @@
-"""Conditions: comparisons of symbols, c ∈ {0, 1}, whose truth depends on the state and is decided by who traces."""
+"""Conditions: comparisons of symbols, c ∈ {0, 1}, whose truth depends on the state and is decided by the trace."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _decision: ContextVar[Callable[[Node], bool]] = ContextVar("decision", default=_
 
 @contextmanager
 def deciding(decision: Callable[[Node], bool]) -> Iterator[None]:
-    """Conditions asked for their truth within take this decision."""
+    """Within, conditions take their truth from this decision."""
     token = _decision.set(decision)
     try:
         yield
@@ -33,7 +33,7 @@ def deciding(decision: Callable[[Node], bool]) -> Iterator[None]:
 
 @final
 class Condition:
-    """A comparison whose outcome depends on the state; asked for its truth, it follows the decision in force."""
+    """A comparison whose outcome depends on the state; its truth is the decision in force."""
 
     __slots__ = ("node",)
 
@@ -56,5 +56,5 @@ class Condition:
 
 
 def truth(condition: Any) -> Node:
-    """0 or 1, of a condition or of what is known to be true or false."""
+    """0 or 1: the node of a condition, or of a known truth value."""
     return condition.node if isinstance(condition, Condition) else ca.SX(bool(condition))

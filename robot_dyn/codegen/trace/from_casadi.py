@@ -1,4 +1,4 @@
-"""From a CasADi Function to a program. Values are numbered, so no text of a file can reach the code."""
+"""From a CasADi Function to a program. Values are numbered, so that no text of a file can reach the code."""
 
 from __future__ import annotations
 
@@ -10,50 +10,12 @@ from robot_dyn.codegen.program import Kind, Op, Program
 from robot_dyn.errors import RobotDynError
 
 _MOVES = {ca.OP_INPUT, ca.OP_OUTPUT, ca.OP_CONST}
-_KINDS = {
-    ca.OP_ADD: Kind.ADD,
-    ca.OP_SUB: Kind.SUBTRACT,
-    ca.OP_MUL: Kind.MULTIPLY,
-    ca.OP_DIV: Kind.DIVIDE,
-    ca.OP_NEG: Kind.NEGATE,
-    ca.OP_SQ: Kind.SQUARE,
-    ca.OP_TWICE: Kind.TWICE,
-    ca.OP_INV: Kind.RECIPROCAL,
-    ca.OP_FABS: Kind.ABSOLUTE,
-    ca.OP_SIGN: Kind.SIGN,
-    ca.OP_FLOOR: Kind.FLOOR,
-    ca.OP_CEIL: Kind.CEILING,
-    ca.OP_FMIN: Kind.MINIMUM,
-    ca.OP_FMAX: Kind.MAXIMUM,
-    ca.OP_COPYSIGN: Kind.COPY_SIGN,
-    ca.OP_FMOD: Kind.REMAINDER,
-    ca.OP_SQRT: Kind.SQUARE_ROOT,
-    ca.OP_HYPOT: Kind.HYPOTENUSE,
-    ca.OP_POW: Kind.POWER,
-    ca.OP_CONSTPOW: Kind.POWER,
-    ca.OP_EXP: Kind.EXPONENTIAL,
-    ca.OP_LOG: Kind.LOGARITHM,
-    ca.OP_TAN: Kind.TANGENT,
-    ca.OP_ASIN: Kind.ARC_SINE,
-    ca.OP_ACOS: Kind.ARC_COSINE,
-    ca.OP_ATAN: Kind.ARC_TANGENT,
-    ca.OP_ATAN2: Kind.ARC_TANGENT_OF_TWO,
-    ca.OP_SINH: Kind.HYPERBOLIC_SINE,
-    ca.OP_COSH: Kind.HYPERBOLIC_COSINE,
-    ca.OP_TANH: Kind.HYPERBOLIC_TANGENT,
-    ca.OP_LT: Kind.LESS,
-    ca.OP_LE: Kind.LESS_OR_EQUAL,
-    ca.OP_EQ: Kind.EQUAL,
-    ca.OP_NE: Kind.NOT_EQUAL,
-    ca.OP_NOT: Kind.NOT,
-    ca.OP_AND: Kind.AND,
-    ca.OP_OR: Kind.OR,
-    ca.OP_IF_ELSE_ZERO: Kind.WHERE,
-}
+_KINDS = {getattr(ca, f"OP_{kind.value.upper()}"): kind for kind in Kind if kind is not Kind.SINE_COSINE}
+_KINDS[ca.OP_CONSTPOW] = Kind.POWER
 
 
 class OperationError(RobotDynError):
-    """A CasADi Function that has no machine code."""
+    """A CasADi Function has no machine code."""
 
 
 def program_of(function: ca.Function) -> Program:
@@ -71,7 +33,7 @@ def program_of(function: ca.Function) -> Program:
     starts = [0, *accumulate(inputs)]
     firsts = [0, *accumulate(function.numel_out(i) for i in range(function.n_out()))]
     constants = _constants(function, starts[-1])
-    made = starts[-1] + len(constants)  # the number of the next value
+    count = starts[-1] + len(constants)  # the number of the next value
     ops: list[Op] = []
     outputs = [0] * firsts[-1]
     sines: dict[int, tuple[int, int]] = {}  # sine and cosine by angle
@@ -90,19 +52,19 @@ def program_of(function: ca.Function) -> Program:
         elif operation in (ca.OP_SIN, ca.OP_COS):
             angle = at[read[0]]
             if angle not in sines:
-                sines[angle] = made, made + 1
+                sines[angle] = count, count + 1
                 ops.append(Op(Kind.SINE_COSINE, sines[angle], (angle,)))
-                made += 2
+                count += 2
             at[written[0]] = sines[angle][operation == ca.OP_COS]
         else:
-            ops.append(Op(_kind(operation), (made,), tuple(at[place] for place in read)))
-            at[written[0]] = made
-            made += 1
+            ops.append(Op(_kind(operation), (count,), tuple(at[place] for place in read)))
+            at[written[0]] = count
+            count += 1
     return Program(inputs, tuple(map(float, constants)), tuple(ops), tuple(outputs))
 
 
 def _constants(function: ca.Function, first: int) -> dict[str, int]:
-    """The numbers of the constants by their digits, which tell −0 from 0 and are equal for NaN."""
+    """The numbers of the constants by their digits, which distinguish −0 from 0 and are equal for NaN."""
     indices = (i for i in range(function.n_instructions()) if function.instruction_id(i) == ca.OP_CONST)
     texts = dict.fromkeys(repr(function.instruction_constant(i)) for i in indices)
     return {text: first + k for k, text in enumerate(texts)}

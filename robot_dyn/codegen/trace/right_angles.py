@@ -16,7 +16,9 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 from robot_dyn.description.description import Description
 from robot_dyn.model.robot import Robot
 
-_LEAST_DECIMALS = 9  # with fewer, the angle meant is a guess, and the change could be seen in a comparison of roads
+_LEAST_DECIMALS = (
+    9  # with fewer, the angle meant is a guess, and the change could be seen in a comparison of implementations
+)
 _FULL = 15  # decimals: nothing to add
 
 
@@ -46,16 +48,16 @@ def completed(robot: Robot) -> tuple[Robot, tuple[RightAngle, ...]]:
 
 
 def robot_of(dynamics: Any) -> Robot | None:
-    """The robot whose equations a dynamics has, its right angles written out in full; None if there is none."""
+    """The robot whose equations a dynamics has, its right angles written out in full; None if it has no robot."""
     robot = _described(dynamics)
     return None if robot is None else completed(robot)[0]
 
 
 def written_out(*given: Any) -> str:
-    """The right angles that machine code of these dynamics writes out in full, in one sentence; "" if none."""
+    """The right angles that machine code of these dynamics writes out in full, in one sentence, or ""."""
     robots = [robot for each in given if (robot := _described(each)) is not None]
     changes = tuple(dict.fromkeys(change for robot in robots for change in completed(robot)[1]))
-    return in_words(changes) if changes else ""
+    return _sentence(changes) if changes else ""
 
 
 def _described(dynamics: Any) -> Robot | None:
@@ -63,8 +65,8 @@ def _described(dynamics: Any) -> Robot | None:
     return robot if isinstance(robot, Robot) and isinstance(robot.description, Description) else None
 
 
-def in_words(changes: tuple[RightAngle, ...]) -> str:
-    """Changes, one at least, in one sentence."""
+def _sentence(changes: tuple[RightAngle, ...]) -> str:
+    """At least one change, in one sentence."""
     names, most = ", ".join(each.joint for each in changes), max(each.change for each in changes)
     return f"rpy of {names} taken as exact multiples of π/2 (changed by {most:.0e} rad at most)"
 

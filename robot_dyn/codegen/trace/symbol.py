@@ -14,7 +14,7 @@ import casadi as ca
 
 from robot_dyn.codegen.trace.condition import Condition, Node
 
-_NOISE = 4 * 2.0**-53  # of a sine or cosine of a constant angle: below this it is rounding of 0
+_NOISE = 4 * 2.0**-53  # a sine or cosine of a constant angle below this is rounding of 0
 
 
 @final
@@ -184,9 +184,9 @@ def select(condition: Any, yes: Any, no: Any) -> Symbol:
 
 def symbol(x: Any) -> Symbol:
     """A number or symbol as a symbol; TypeError if it is not a number."""
-    if (made := _symbol(x)) is None:
+    if (known := _symbol(x)) is None:
         raise TypeError(f"not a number: {x!r}")
-    return made
+    return known
 
 
 def node(expression: Node) -> Symbol:
@@ -204,7 +204,7 @@ def _symbol(x: Any) -> Symbol | None:
 
 
 def _made(constant: float, sign: int, expression: Node) -> Symbol:
-    """The symbol of an expression, which may have turned out constant."""
+    """The symbol of an expression, or of a constant if it is one."""
     if expression.is_constant():
         return Symbol(constant + sign * float(expression))
     return Symbol(constant, sign, expression)

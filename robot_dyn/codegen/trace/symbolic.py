@@ -1,4 +1,4 @@
-"""Symbolic arithmetic: the formulations run on symbols, and an `if` in an effect is followed both ways.
+"""Symbolic arithmetic: the formulations run on symbols, and both branches of an `if` in an effect are followed.
 
 A comparison of symbols has no truth value while tracing. `every_branch` runs a function once for each way its
 comparisons can turn out, and joins the results: x = if_else(c₁, if_else(c₂, x₁₁, x₁₀), x₀).
@@ -52,7 +52,7 @@ class Symbols(np.ndarray):
             options["out"] = tuple(np.asarray(x) if isinstance(x, Symbols) else x for x in options["out"])
         if ufunc in _OF_SYMBOLS:
             function, arguments = _OF_SYMBOLS[ufunc]
-            with np.errstate(all="ignore"):  # NumPy takes flags of the processor that CasADi leaves for its own
+            with np.errstate(all="ignore"):  # NumPy reads processor flags that CasADi leaves set
                 return _symbols(getattr(np.frompyfunc(function, arguments, 1), method)(*plain, **options))
         return _symbols(getattr(ufunc, method)(*plain, **options))
 
@@ -120,22 +120,24 @@ def every_branch(function: Callable[[], Array]) -> Array:
 
     def follow(decided: list[bool]) -> Array:
         nonlocal left
-        asked: list[Node] = []
+        conditions: list[Node] = []
 
         def decide(condition: Node) -> bool:
-            asked.append(condition)
-            return decided[len(asked) - 1] if len(asked) <= len(decided) else True
+            conditions.append(condition)
+            return decided[len(conditions) - 1] if len(conditions) <= len(decided) else True
 
         with deciding(decide):
             yes = np.asarray(function(), dtype=object)
         left -= 1
         if left < 0:
             raise TraceError(f"more than {_MOST_BRANCHES} branches; write the effect with np.where or without if")
-        made = yes
-        for depth in reversed(range(len(decided), len(asked))):  # the last question was answered yes: what if no
+        result = yes
+        for depth in reversed(
+            range(len(decided), len(conditions))
+        ):  # the last condition was taken as true: now as false
             no = follow([*decided, *[True] * (depth - len(decided)), False])
-            made = _joined(Condition(asked[depth]), made, no)
-        return made
+            result = _joined(Condition(conditions[depth]), result, no)
+        return result
 
     return follow([])
 

@@ -73,10 +73,10 @@ class SymbolicDynamics:
         """The same with its inputs of these values, in the order of `known`."""
         if not values:
             return self
-        made = copy(self)
+        other = copy(self)
         inputs = (np.ravel(values[each.key])[list(each.entries)] for each in self._known)
-        made._given = (ca.vertcat(*map(column, inputs)),)
-        return made
+        other._given = (ca.vertcat(*map(column, inputs)),)
+        return other
 
     def formulation(self, quantity: str) -> str:
         """The formulation of a quantity, that of the fewest instructions."""

@@ -1,7 +1,7 @@
 """A plant and its controller in symbols: effects, bounds and control laws, whichever way they branch.
 
-Each wraps the part it traces, and names it where that cannot be traced. What a controller follows and its models of
-the arm are found by what they are, whatever its attributes are called.
+Each part is wrapped in one of its own kind, which traces what it computes and names it where that fails. References
+and models of a controller are found by their types, whatever its attributes are called.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from robot_dyn.control.reference import PiecewisePolynomial, polynomial
 from robot_dyn.effects.carried_payload import CarriedPayload
 from robot_dyn.effects.effect import Active, Bound, Conservative, Drive, Effect, Stateful
 from robot_dyn.effects.plant import Plant
-from robot_dyn.effects.set_valued import Interval, Mode, SetValued
+from robot_dyn.effects.set_valued import Mode, SetValued
 from robot_dyn.foreign import because
 
 _INTERPRETED = "ask the plant itself, or simulate it"
@@ -51,17 +51,18 @@ def symbolic_controller(
         values: Symbols for its parameters, and those of its references.
         pieces: The polynomials that its references are made of on a segment.
     """
-    made: dict[str, Any] = dict(values.get(CONTROLLER, {})) | dict(models)
-    left = list(pieces)
+    parts: dict[str, Any] = dict(values.get(CONTROLLER, {})) | dict(models)
+    remaining = iter(pieces)
     for name, reference in controller.references.items():
         if isinstance(reference, PiecewisePolynomial) and type(reference).at is not PiecewisePolynomial.at:
             raise TraceError(
                 f"reference {type(reference).__name__} cannot be compiled: its at(t) is not that of its polynomials;"
                 " give an rd.PiecewisePolynomial, or take engine='interpreted'"
             )
-        own = {attribute: left.pop(0) for attribute in reference.polynomials}
-        made[name] = own.get("") or with_values(reference, own | dict(values.get(("reference", name), {})))
-    return TracedController(with_values(controller, made), controller)
+        polynomials = {attribute: next(remaining) for attribute in reference.polynomials}
+        given = polynomials | dict(values.get(("reference", name), {}))
+        parts[name] = polynomials.get("") or with_values(reference, given)
+    return TracedController(with_values(controller, parts), controller)
 
 
 def wide(x: Any, n: int) -> np.ndarray:
@@ -70,12 +71,12 @@ def wide(x: Any, n: int) -> np.ndarray:
 
 
 def whichever_way(name: str, function: Callable[[], Any]) -> Any:
-    """What a part gives, whichever way its comparisons turn out; TraceError names the part."""
+    """The result of a part for every outcome of its comparisons; TraceError names the part."""
     try:
-        made = every_branch(function).view(Symbols)
-        column(made)  # reports what is not a number
-        return made
-    except Exception as error:  # whatever a user's code raises on symbols
+        result = every_branch(function).view(Symbols)
+        column(result)  # reports what is not a number
+        return result
+    except Exception as error:  # anything that user-defined code raises on symbols
         raise TraceError(f"{name} cannot be compiled ({because(error)}): {REMEDY}") from error
 
 
@@ -108,26 +109,37 @@ def _traced(effect: Effect, values: Mapping[str, Array]) -> Effect:
     return _TracedConservative(own) if isinstance(effect, Conservative) else _TracedForce(own)
 
 
+def _inner(name: str) -> Any:
+    """An attribute of the effect that is wrapped, as it is."""
+    return property(lambda self: getattr(self.inner, name))
+
+
+def _method(name: str, length: Callable[..., int]) -> Any:
+    """A method of the part that is wrapped, traced; `length` gives that of its result from its arguments."""
+
+    def traced(self: Any, *arguments: Any) -> Array:
+        return self.traced(lambda: getattr(self.inner, name)(*arguments), length(*arguments))
+
+    return traced
+
+
 class _Part:
     """An effect that is traced whichever way it branches."""
+
+    name = _inner("name")
 
     def __init__(self, inner: Any) -> None:
         self.inner = inner
 
-    @property
-    def name(self) -> str:
-        return self.inner.name
-
     def traced(self, function: Callable[[], Any], length: int) -> Array:
-        """Symbols (length,) of what it gives."""
+        """Symbols (length,) of a result."""
         return whichever_way(f"effect {self.name}", lambda: wide(function(), length))
 
 
 class _Torque(_Part):
     """The torque of a force."""
 
-    def torque(self, dynamics: Any, t: Any, q: Array, v: Array, *z: Array) -> Array:
-        return self.traced(lambda: self.inner.torque(dynamics, t, q, v, *z), dynamics.n)
+    torque = _method("torque", lambda dynamics, *_: dynamics.n)
 
 
 class _TracedForce(_Torque, Active):
@@ -137,25 +149,15 @@ class _TracedForce(_Torque, Active):
 class _TracedSetValued(_Torque, SetValued):
     """An effect that may hold joints, in a mode."""
 
+    rubs, stops, at_rest = map(_inner, ("rubs", "stops", "at_rest"))
+    friction = _method("friction", len)
+
     @property
     def held(self) -> Any:
         """1 for each joint that is held."""
         if self.inner.held is None:
-            raise TraceError(f"effect {self.name} holds joints, and which ones a run finds out: {_INTERPRETED}")
+            raise TraceError(f"effect {self.name} holds joints, and a run finds out which ones: {_INTERPRETED}")
         return self.inner.held
-
-    @property
-    def rubs(self) -> bool:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """Whether it is friction."""
-        return self.inner.rubs
-
-    @property
-    def stops(self) -> bool:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """Whether it bounds velocities."""
-        return self.inner.stops
-
-    def friction(self, v: Array) -> Array:
-        return self.traced(lambda: self.inner.friction(v), len(v))
 
     def bounds(self, q: Array, v: Array) -> tuple[Array, Array]:
         n = len(v)
@@ -164,9 +166,6 @@ class _TracedSetValued(_Torque, SetValued):
 
     def in_mode(self, mode: Mode) -> SetValued:
         return _TracedSetValued(self.inner.in_mode(mode))
-
-    def at_rest(self, q: np.ndarray) -> Interval:
-        return self.inner.at_rest(q)
 
 
 class _TracedConservative(_Torque, Conservative):
@@ -179,21 +178,14 @@ class _TracedConservative(_Torque, Conservative):
 class _TracedBound(_Part, Bound):
     """A bound on the actuation."""
 
-    def actuation(self, u: Array, *z: Array) -> Array:
-        return self.traced(lambda: self.inner.actuation(u, *z), len(u))
+    actuation = _method("actuation", lambda u, *_: len(u))
 
 
 class _States(_Part, Stateful):
     """The states of an effect."""
 
-    def state_size(self, n: int) -> int:
-        return self.inner.state_size(n)
-
-    def start(self, dynamics: Any, q: Array, v: Array) -> Array:
-        return self.inner.start(dynamics, q, v)
-
-    def state_rate(self, dynamics: Any, t: Any, q: Array, v: Array, u: Array, z: Array, *a: Array) -> Array:
-        return self.traced(lambda: self.inner.state_rate(dynamics, t, q, v, u, z, *a), len(z))
+    state_size, start = map(_inner, ("state_size", "start"))
+    state_rate = _method("state_rate", lambda dynamics, t, q, v, u, z, *_: len(z))
 
 
 class _StatefulForce(_States, _TracedForce):
@@ -203,32 +195,14 @@ class _StatefulForce(_States, _TracedForce):
 class _TracedDrive(_StatefulForce, Drive):
     """A drive."""
 
-    def driven(self, n: int) -> Sequence[int]:
-        return self.inner.driven(n)
-
-    @property
-    def coupled(self) -> bool:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """Whether its motors may move with their joints."""
-        return self.inner.coupled
-
-    def speeds(self, z: Array) -> Array:
-        return self.inner.speeds(z)
-
-    def reaching(self, u: Array) -> Array:
-        return self.inner.reaching(u)
-
-    def added_inertia(self, n: int) -> Array:
-        return self.inner.added_inertia(n)
-
-    def power(self, v: Array, u: Array, torque: Array, z: Array, a: Array) -> Array:
-        return self.inner.power(v, u, torque, z, a)
+    driven, coupled, speeds = map(_inner, ("driven", "coupled", "speeds"))
+    reaching, added_inertia, power = map(_inner, ("reaching", "added_inertia", "power"))
 
 
 class _TracedSetValuedDrive(_TracedDrive, _TracedSetValued):
     """A drive with a mode."""
 
-    def drag(self, n: int, z: Array) -> Array:
-        return self.inner.drag(n, z)
+    drag = _inner("drag")
 
 
 class _StatefulBound(_States, _TracedBound):
@@ -252,17 +226,9 @@ class TracedController(Controller):
         """Number of states of the controller."""
         return self.original.state_size
 
-    def torque(self, t: Any, q: Array, v: Array, z: Array) -> Array:
-        return self._traced(lambda: self.inner.torque(t, q, v, z), self.n)
+    torque, demand = (_method(name, lambda t, q, v, z: len(v)) for name in ("torque", "demand"))
+    state_rate, next_state = (_method(name, lambda t, q, v, z: len(z)) for name in ("state_rate", "next_state"))
 
-    def demand(self, t: Any, q: Array, v: Array, z: Array) -> Array:
-        return self._traced(lambda: self.inner.demand(t, q, v, z), self.n)
-
-    def state_rate(self, t: Any, q: Array, v: Array, z: Array) -> Array:
-        return self._traced(lambda: self.inner.state_rate(t, q, v, z), self.state_size)
-
-    def next_state(self, t: Any, q: Array, v: Array, z: Array) -> Array:
-        return self._traced(lambda: self.inner.next_state(t, q, v, z), self.state_size)
-
-    def _traced(self, function: Callable[[], Any], length: int) -> Array:
+    def traced(self, function: Callable[[], Any], length: int) -> Array:
+        """Symbols (length,) of a result."""
         return whichever_way(f"controller {self.original.name}", lambda: wide(function(), length))

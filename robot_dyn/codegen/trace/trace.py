@@ -16,13 +16,13 @@ import casadi as ca
 import numpy as np
 
 from robot_dyn.arithmetic import Array, in_arithmetic
-from robot_dyn.codegen.interrupts import interrupts_later
 from robot_dyn.codegen.trace.base_parameters import regrouped
 from robot_dyn.codegen.trace.condition import Node
 from robot_dyn.codegen.trace.from_casadi import instructions
 from robot_dyn.codegen.trace.origins import slid
 from robot_dyn.codegen.trace.symbol import symbol
 from robot_dyn.codegen.trace.symbolic import Symbolic, array_of, column, inputs
+from robot_dyn.codegen.waiting import interrupts_later
 from robot_dyn.lagrange.christoffel import christoffel
 from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.linkage import Linkage
@@ -35,9 +35,9 @@ from robot_dyn.lagrange.tree import Described
 from robot_dyn.queries.dynamics import acceleration
 from robot_dyn.queries.quantity import EQUATION, FORWARD_DYNAMICS_DERIVATIVES, by_name
 
-QUANTITIES = EQUATION | by_name(FORWARD_DYNAMICS_DERIVATIVES)  # what has formulations
+QUANTITIES = EQUATION | by_name(FORWARD_DYNAMICS_DERIVATIVES)  # those with formulations
 _SOLVED_MOST = 8  # joints one after the other; with more, to solve M a = τ − … outnumbers articulated bodies
-_DERIVED_MOST = 6  # joints; with more, to derive C v from K is longer yet, and takes as long to trace as all the rest
+_DERIVED_MOST = 6  # joints; with more, C v derived from K is longer, and takes as long to trace as all the rest
 _CLOSED_FORM_MOST = 4  # joints; with more its O(n³) terms outnumber the recursions' everywhere, except of C
 
 
@@ -48,7 +48,7 @@ class Traced:
 
     Attributes:
         function: Of the quantity's arguments, each (n,); its result row by row.
-        formulation: The one that won.
+        formulation: The shortest, that of the function.
         counts: Instructions by formulation.
     """
 
@@ -64,7 +64,7 @@ class Trace:
 
     Attributes:
         robot: The robot; its file, edits and order of joints are used.
-        parameters: Inputs that its numbers are made of, CasADi symbols: one vector, the last argument of each function.
+        parameters: CasADi symbols that its numbers depend on: one vector, the last argument of each function.
     """
 
     robot: Described
@@ -88,7 +88,7 @@ class Trace:
 
     @property
     def given(self) -> tuple[Node, ...]:
-        """The vector of the parameters; nothing without."""
+        """The vector of the parameters, if there are any."""
         return (ca.vertcat(*self.parameters),) if self.parameters else ()
 
     @cached_property
@@ -103,11 +103,11 @@ class Trace:
     @interrupts_later()
     @in_arithmetic
     def formulations(self, name: str) -> dict[str, ca.Function]:
-        """A quantity by each formulation that is worth a trace."""
+        """A quantity by each formulation that is worth tracing."""
         arguments = [*(self.symbols[argument][0] for argument in QUANTITIES[name].arguments), *self.given]
         return {
-            formulation: ca.Function("f", arguments, [ca.cse(ca.densify(make()))])
-            for formulation, make in self._roads(name)
+            formulation: ca.Function("f", arguments, [ca.cse(ca.densify(formula()))])
+            for formulation, formula in self._formulations(name)
         }
 
     def quantity(self, name: str) -> Traced:
@@ -117,7 +117,7 @@ class Trace:
         least = min(counts, key=counts.__getitem__)
         return Traced(functions[least], least, counts)
 
-    def _roads(self, name: str) -> Iterator[tuple[str, Callable[[], Node]]]:
+    def _formulations(self, name: str) -> Iterator[tuple[str, Callable[[], Node]]]:
         """The formulations of a quantity."""
         own, coupled = self.lagrangian, self.lagrangian.linkage.couplings.S.shape[0] != self.lagrangian.n
         if name != "forward_dynamics_derivatives" and (own.n <= _CLOSED_FORM_MOST or name == "C"):
@@ -136,7 +136,7 @@ class Trace:
         (_, q), (_, v), (_, a), (_, tau) = self.symbols.values()
         linkage = self.linkage
         zero = self.arithmetic.array(np.zeros(len(q)))
-        made: dict[str, Callable[[], Any]] = {
+        formulas: dict[str, Callable[[], Any]] = {
             "M": lambda: self._mass,
             "inverse_dynamics": lambda: newton_euler(linkage, q, v, a),
             "coriolis_torque": lambda: newton_euler(linkage, q, v, zero, gravity=False),
@@ -150,8 +150,8 @@ class Trace:
             "C": lambda: christoffel(self._mass_derivative, v),
             "regressor": lambda: regressor(self.lagrangian.linkage, q, v, a),  # of the bodies as the file has them
         }
-        if name in made:
-            yield "recursion", lambda: column(made[name]())
+        if name in formulas:
+            yield "recursion", lambda: column(formulas[name]())
         if name == "forward_dynamics_derivatives":
             yield "recursion", self._derivatives
 
@@ -159,7 +159,7 @@ class Trace:
         (q, _), (v, _), (a, _), (_, tau) = self.symbols.values()
         K, V = symbol(self._kinetic).expression, symbol(self._potential).expression
         p = ca.gradient(K, v)
-        made = {
+        formulas = {
             "M": lambda: ca.vec(ca.jacobian(p, v)),  # symmetric: its columns are its rows
             "N": lambda: ca.gradient(V, q),
             "momentum": lambda: p,
@@ -176,8 +176,8 @@ class Trace:
                 )
             ),
         }
-        if name in made:
-            yield "energies", made[name]
+        if name in formulas:
+            yield "energies", formulas[name]
 
     @cached_property
     def _mass(self) -> Array:

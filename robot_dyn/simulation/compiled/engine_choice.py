@@ -10,7 +10,7 @@ import sys
 from math import inf
 from typing import TYPE_CHECKING, Any
 
-from robot_dyn.codegen.waiting import told
+from robot_dyn.codegen.waiting import announced
 from robot_dyn.errors import RobotDynError
 from robot_dyn.simulation.compiled.programs import Identified, Traces, identify, interpreted, stored
 from robot_dyn.simulation.dynamics.declarations import named, undeclared
@@ -74,7 +74,7 @@ def _checked(setup: Setup, equation: StateEquation, found: CompiledStateEquation
     if found is not None:
         check(found, setup)
         return found
-    with told("compiling the equations of this run, once for its structure"):
+    with announced("compiling the equations of this run, once for its structure"):
         compiled = compiled_for(setup, equation)
         check(compiled, setup)
     return compiled

@@ -8,12 +8,12 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from robot_dyn.codegen.interrupts import interrupts_later
 from robot_dyn.codegen.parameters import Parameter, Part, parameters
 from robot_dyn.codegen.program import Programs
 from robot_dyn.codegen.store.cache import default_store
-from robot_dyn.codegen.store.identity import digest, sources_of_programs
+from robot_dyn.codegen.store.keys import digest, sources_of_programs
 from robot_dyn.codegen.trace.right_angles import robot_of
+from robot_dyn.codegen.waiting import interrupts_later
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import TraceError
 from robot_dyn.model.robot import Robot

@@ -13,7 +13,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from robot_dyn.codegen.store.identity import version_of
+from robot_dyn.codegen.store.keys import version_of
 from robot_dyn.codegen.trace.right_angles import written_out
 from robot_dyn.description import catalog
 from robot_dyn.description.description import check

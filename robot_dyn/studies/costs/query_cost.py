@@ -16,8 +16,8 @@ import casadi as ca
 import numpy as np
 
 from robot_dyn.codegen.kernel import Kernel
+from robot_dyn.codegen.llvm.one_state import Status
 from robot_dyn.codegen.program import Program
-from robot_dyn.codegen.status import Status
 from robot_dyn.codegen.store.cache import default_store
 from robot_dyn.codegen.trace.from_casadi import program_of
 from robot_dyn.codegen.trace.right_angles import completed

@@ -49,9 +49,9 @@ def straight_line(program: Program) -> Function:
     for op in program.ops:
         if op.kind not in _OPERATIONS:
             raise ProofError(f"{op.kind.name.lower()} is not analytic: no theorem is proven across it")
-    steps = [(_OPERATIONS[op.kind], op.of, op.made) for op in program.ops]
+    steps = [(_OPERATIONS[op.kind], op.operands, op.results) for op in program.ops]
     constants = [arb(each) for each in program.constants]
-    count = 1 + max([sum(program.inputs) + len(constants) - 1, *(i for op in program.ops for i in op.made)])
+    count = 1 + max([sum(program.inputs) + len(constants) - 1, *(i for op in program.ops for i in op.results)])
 
     def function(x: Sequence[Any]) -> Sequence[Any]:
         values = [*x, *constants]

@@ -65,11 +65,11 @@ def _in_heyoka(hy: Any, program: Program, y: list[Any], parameters: np.ndarray) 
         Kind.RECIPROCAL: lambda a: 1.0 / a, Kind.SQUARE_ROOT: hy.sqrt,
     }  # fmt: skip
     for op in program.ops:
-        of = [values[i] for i in op.of]
+        of = [values[i] for i in op.operands]
         if op.kind is Kind.SINE_COSINE:
-            values[op.made[0]], values[op.made[1]] = hy.sin(of[0]), hy.cos(of[0])
+            values[op.results[0]], values[op.results[1]] = hy.sin(of[0]), hy.cos(of[0])
         elif (known := two.get(op.kind) if len(of) == 2 else one.get(op.kind)) is not None:
-            values[op.made[0]] = known(*of)
+            values[op.results[0]] = known(*of)
         else:
             raise PeerError(f"its equations have a {op.kind.name.lower()}, which is not translated")
     return [values[i] for i in program.outputs[: len(y)]]
