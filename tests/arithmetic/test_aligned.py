@@ -15,10 +15,10 @@ from robot_dyn.codegen.llvm.lanes import F64
 from robot_dyn.codegen.llvm.lock_step import write_function
 from robot_dyn.codegen.llvm.one_state import Limits
 from robot_dyn.codegen.trace.from_casadi import program_of
+from robot_dyn.simulation.dynamics.loop_state import runs_of
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.observation.guard_levels import levels
 from robot_dyn.simulation.observation.observation import observations_of
-from robot_dyn.simulation.run.fixed_step import runs_of
 
 W = 64
 

@@ -8,10 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.run.event_run import TooLongError
 from robot_dyn.simulation.run.make_run import prepared
 from robot_dyn.simulation.run.outcome import Ending
-from robot_dyn.simulation.run.recording import Path
+from robot_dyn.simulation.run.recording import Path, Recording
 from robot_dyn.simulation.setup.segment_table import segment_table
 from robot_dyn.simulation.setup.setup import Setup
 
@@ -66,9 +65,8 @@ def _first_second(setup: Setup) -> Path:
             setup, duration_s=span, record_period_s=0.0, estimate_error=False, accuracy=None, engine="interpreted"
         )
         equation = StateEquation(short.plant, short.controller, short.integrator.canonical, short.events)
-        try:
-            record = prepared(short, equation, None, samples=False, most=_MOST).record()
-        except TooLongError:
+        record = prepared(short, equation, None, samples=False, most=_MOST).run()
+        if not isinstance(record, Recording):
             span /= 10
             continue
         if record.outcome.ending is Ending.STOPPED:

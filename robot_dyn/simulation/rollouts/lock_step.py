@@ -21,7 +21,7 @@ from robot_dyn.coefficients import with_values
 from robot_dyn.effects.plant import Plant
 from robot_dyn.integrate.integrator import PlainMethod
 from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
-from robot_dyn.simulation.dynamics.loop_state import Ended, Now, Runs, Why
+from robot_dyn.simulation.dynamics.loop_state import Ended, Now, Runs, Why, rules_of, runs_of
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.events.detection import Detecting
 from robot_dyn.simulation.observation.guard_levels import levels
@@ -32,9 +32,9 @@ from robot_dyn.simulation.rollouts.one_by_one import OneByOne, Single, said
 from robot_dyn.simulation.rollouts.pool import in_threads
 from robot_dyn.simulation.rollouts.result import Rollouts
 from robot_dyn.simulation.rollouts.thresholds import Thresholds
-from robot_dyn.simulation.run.fixed_step import rules_of, runs_of, samples_at_most
+from robot_dyn.simulation.run.fixed_step import samples_at_most
 from robot_dyn.simulation.run.outcome import Ending, Outcome
-from robot_dyn.simulation.run.time_loop import Records
+from robot_dyn.simulation.run.recording import records_of
 from robot_dyn.simulation.run.watch import LARGEST, diverged_advice
 from robot_dyn.simulation.setup.schedule import ON_STEP
 from robot_dyn.simulation.setup.segment_table import segment_table
@@ -88,7 +88,7 @@ class Batch:
         numbers = np.minimum(np.arange(width), len(self.y) - 1)
         start = np.vstack([q0[numbers].T, v0[numbers].T, np.full((n, width), np.nan)])
         self.observations = observations_of(start, self.levels.of_runs(numbers), tiles)
-        self.place = np.zeros((0, 2), np.int64)  # segment and step of each sample, of the tile that has most
+        self.t = np.zeros(0)  # of the samples of the tile that has most, in [s]
         self.lock = threading.Lock()
         self.unfinished = np.ones(tiles, dtype=bool)
         self.why, self.last = np.zeros(width, np.int64), np.zeros((equation.size, width))
@@ -169,9 +169,10 @@ class Batch:
         stepper = method.stepper(FLOAT64, equation.size, n, rows, LANES)
         functions, now = self.compiled_equation.equations.functions, np.zeros(len(Now), dtype=np.int64)
         now[Now.BUDGET] = np.iinfo(np.int64).max
-        records = Records(
-            np.array(self.columns, np.int64), np.empty((len(self.out_y), 2), np.int64), self.out_y, self.made,
-            np.empty((0, equation.size + 2)), np.empty((1 + 3 * n, 0)), self.observations[tile],
+        none = np.empty((0, equation.size))
+        records = records_of(
+            np.array(self.columns, np.int64), self.out_y, self.made, none, none, np.empty((1 + 3 * n, 0)),
+            self.observations[tile],
         )  # fmt: skip
         rules = rules_of(equation, False, LARGEST, base=run_parameters.start, apart=self.apart)
         work = stepper.work
@@ -185,8 +186,8 @@ class Batch:
         )
         self.unfinished[tile], self.evaluations[tile] = ended != Ended.DONE, now[Now.EVALUATIONS]
         with self.lock:
-            if now[Now.ROW] > len(self.place):
-                self.place = records.place[: now[Now.ROW]]
+            if now[Now.ROW] > len(self.t):
+                self.t = records.t[: now[Now.ROW]]
         self.why[run_parameters], self.last[:, run_parameters] = runs.why, runs.last
         self.ended[run_parameters] = np.where(runs.why > 0, runs.ended, self.setup.duration_s)
         if ended != Ended.DONE:
@@ -197,8 +198,7 @@ class Batch:
 
     def _result(self) -> Rollouts:
         B, equation, n = len(self.y), self.compiled_equation.equation, self.compiled_equation.equation.plant.dynamics.n
-        segment, step = self.place.T
-        t = self.table.starts[segment] + step * self.table.lengths[segment]
+        t = self.t
         self._write_again(t)
         why, ended = self.why[:B], self.ended[:B].copy()
         diverged, advice, steps = why > 0, self._advice(why), self._steps(ended)
