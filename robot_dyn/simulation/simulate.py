@@ -26,7 +26,7 @@ from robot_dyn.simulation.observation.observer import Observer
 from robot_dyn.simulation.observation.remarks import Remark
 from robot_dyn.simulation.results.error_estimate import ErrorEstimate, no_estimate
 from robot_dyn.simulation.results.trajectory import Statistics, Trajectory
-from robot_dyn.simulation.run.make_run import prepared
+from robot_dyn.simulation.run.make_run import make_run
 from robot_dyn.simulation.run.outcome import Accumulation, Ending, Outcome, Stiff, TooLong
 from robot_dyn.simulation.run.recording import Recording
 from robot_dyn.simulation.setup.options import Options, setup_of, starts, takes_options
@@ -122,7 +122,7 @@ def _by_choice(setup: Setup, on_progress: Callable[[float], object] | None) -> _
         most = (
             inf if seen else most_interpreted(setup, setup.equation, compiled_equation)
         )  # else what cannot compile never ends
-        run = prepared(
+        run = make_run(
             setup,
             setup.equation,
             compiled_equation,
@@ -175,7 +175,7 @@ def _with_estimate(
 
     def companion(pace: Any, of: Setup) -> Recording:
         nonlocal spent, companions
-        made = prepared(of, setup.equation, ran.compiled_equation, pace, at_the_end, samples=False).record()
+        made = make_run(of, setup.equation, ran.compiled_equation, pace, at_the_end, samples=False).record()
         if made.outcome.ending is Ending.STOPPED:
             raise KeyboardInterrupt
         spent, companions = spent + made.evaluations, companions + 1

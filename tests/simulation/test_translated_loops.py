@@ -24,10 +24,10 @@ from robot_dyn.simulation.compiled.build import compiled_equation
 from robot_dyn.simulation.compiled.engine_choice import choose
 from robot_dyn.simulation.dynamics.loop_state import Ended, Now, rules_of, runs_of
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.observation.guard_levels import levels
+from robot_dyn.simulation.observation.guard_levels import guard_levels
 from robot_dyn.simulation.observation.observation import observation_of
 from robot_dyn.simulation.run.fixed_step import samples_at_most
-from robot_dyn.simulation.run.make_run import prepared
+from robot_dyn.simulation.run.make_run import make_run
 from robot_dyn.simulation.run.recording import records_of
 from robot_dyn.simulation.run.time_loop import time_loop
 from robot_dyn.simulation.setup.segment_table import segment_table
@@ -71,7 +71,7 @@ def both(setup: Setup) -> tuple[Any, Any]:
     equation = StateEquation(setup.plant, setup.controller, False, setup.events)
     code, _ = choose(setup, equation)
     assert code is not None
-    runs = [prepared(setup, equation, each) for each in (code, replace(code, loop=None))]
+    runs = [make_run(setup, equation, each) for each in (code, replace(code, loop=None))]
     for each in runs:
         room = each.runs._replace(y=0, run_parameters=0, alive=0, scale=0, energy=0, keys=0), each.stepper.work
         for _, x in numbers(room):  # what is not written yet
@@ -167,7 +167,7 @@ def test_a_loop_is_compiled_once_for_arms_of_any_number_of_joints() -> None:
         equation = StateEquation(each.plant, None)
         code, _ = choose(each, equation)
         assert code is not None
-        prepared(each, equation, code).record()
+        make_run(each, equation, code).record()
         loops.append((code.loop, {id(entry) for entry in code.loop._known.values()}))
     assert loops[0] == loops[1]
 
@@ -176,7 +176,7 @@ def test_the_end_of_a_mode_is_no_end_of_a_call_of_machine_code() -> None:
     """Hundreds of impacts, of sticking and of sliding: the loop returns for progress and for room alone."""
     made = setup(HELD, "DOP853", duration_s=6.0, controller=rd.PD(rd.hold([1.4, -1.9]), [60.0, 30.0], [0.1, 0.1]))
     equation = StateEquation(made.plant, made.controller)
-    run, calls = prepared(made, equation, choose(made, equation)[0]), []
+    run, calls = make_run(made, equation, choose(made, equation)[0]), []
     inner = run.advance
     run.advance = lambda *given: calls.append(inner(*given)) or calls[-1]
     events = len(run.record().events)
@@ -202,7 +202,7 @@ def test_lanes_in_lock_step_give_the_same_bits(name: str, controller: rd.Control
     rng = np.random.default_rng(3)
     starts = np.stack([equation.start(q, v) for q, v in rng.normal(size=(W, 2, 2))]).T
     starts[n, 5] = 1e200  # overflows at once
-    of_levels = levels(made.plant.dynamics, made.plant.effects, made.controller, W)
+    of_levels = guard_levels(made.plant.dynamics, made.plant.effects, made.controller, W)
     rules = rules_of(equation, False, 1e100, apart=0 if equation.sampled else 3)
     results = []
     for interpreted in (False, True):

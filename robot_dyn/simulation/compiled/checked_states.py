@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.run.make_run import prepared
+from robot_dyn.simulation.run.make_run import make_run
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.run.recording import Path, Recording
 from robot_dyn.simulation.setup.segment_table import segment_table
@@ -65,7 +65,7 @@ def _first_second(setup: Setup) -> Path:
             setup, duration_s=span, record_period_s=0.0, estimate_error=False, accuracy=None, engine="interpreted"
         )
         equation = StateEquation(short.plant, short.controller, short.integrator.canonical, short.events)
-        record = prepared(short, equation, None, samples=False, most=_MOST).run()
+        record = make_run(short, equation, None, samples=False, most=_MOST).run()
         if not isinstance(record, Recording):
             span /= 10
             continue

@@ -24,7 +24,7 @@ from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateE
 from robot_dyn.simulation.dynamics.loop_state import Ended, Now, Runs, Why, rules_of, runs_of
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.events.detection import Detecting
-from robot_dyn.simulation.observation.guard_levels import levels
+from robot_dyn.simulation.observation.guard_levels import guard_levels
 from robot_dyn.simulation.observation.observation import observations_of, observed
 from robot_dyn.simulation.results.provenance import origin
 from robot_dyn.simulation.results.trajectory import Statistics
@@ -69,7 +69,8 @@ class Batch:
             sweep,
         )
         self.q0, self.v0, self.y, self.thresholds = q0, v0, _starts(equation, q0, v0), thresholds
-        self.levels = levels(equation.plant.dynamics, *over_runs(equation.plant, equation.controller, sweep), len(q0))
+        parts = over_runs(equation.plant, equation.controller, sweep)
+        self.levels = guard_levels(equation.plant.dynamics, *parts, len(q0))
         self.columns = [*range(n)] * ("q" in recorded)
         if "v" in recorded and not equation.canonical:
             self.columns += range(n, 2 * n)

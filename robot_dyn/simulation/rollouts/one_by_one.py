@@ -15,14 +15,14 @@ from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateE
 from robot_dyn.simulation.compiled.engine_choice import machine_of
 from robot_dyn.simulation.diagnostics.step_remarks import observer_of
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.observation.guard_levels import GuardLevels, levels
+from robot_dyn.simulation.observation.guard_levels import GuardLevels, guard_levels
 from robot_dyn.simulation.observation.observation import Observation, Observed, observation_of, observed
 from robot_dyn.simulation.results.provenance import origin
 from robot_dyn.simulation.results.samples import columns
 from robot_dyn.simulation.results.trajectory import Statistics
 from robot_dyn.simulation.rollouts.pool import in_threads
 from robot_dyn.simulation.rollouts.result import Rollouts
-from robot_dyn.simulation.run.make_run import prepared
+from robot_dyn.simulation.run.make_run import make_run
 from robot_dyn.simulation.run.outcome import Ending, Outcome
 from robot_dyn.simulation.run.recording import Recording
 from robot_dyn.simulation.setup.setup import Setup
@@ -109,7 +109,7 @@ class OneByOne:
             return
         setup, equation, compiled_equation = self._of(i)
         observer = observer_of(setup, self.levels.of_runs([i]))
-        run = prepared(setup, equation, compiled_equation, observer=observer)
+        run = make_run(setup, equation, compiled_equation, observer=observer)
         run.stop = self.stop
         self.made[i] = self._kept(equation, run.record(), observer.observation)
 
@@ -134,7 +134,7 @@ def one_by_one(
     B, n, equation = len(q0), setup.plant.dynamics.n, StateEquation(setup.plant, setup.controller)
     sizes = {"q": n, "v": n, "u": n, "work": len(equation.sources), "energy": 2}
     check_batch(setup, B, sum(sizes[name] for name in recorded), most)
-    of = levels(setup.plant.dynamics, *over_runs(setup.plant, setup.controller, sweep), B)
+    of = guard_levels(setup.plant.dynamics, *over_runs(setup.plant, setup.controller, sweep), B)
     runs, began = OneByOne(setup, q0, v0, sweep, recorded, of), perf_counter()
     runs.run(threads, on_progress)
     t = max((each.t for each in runs.made if each is not None), key=len, default=np.zeros(1))

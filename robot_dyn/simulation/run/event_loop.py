@@ -1,7 +1,7 @@
 """The time loop of a run whose steps are chosen, or cut at events: samples lie between the ends of steps.
 
 Plain functions of arrays, for one run, as of `time_loop`. The dense output of a step brackets a root of a switching
-function g; the step is then made anew, up to where g vanishes after it, which keeps the order of the method:
+function g; the step is then repeated, up to where g vanishes after it, which keeps the order of the method:
 
     g(step(t, y, θ h)) = 0
 
@@ -37,7 +37,7 @@ from robot_dyn.simulation.run.time_loop import act, acts, conserve
 from robot_dyn.simulation.setup.segment_table import SegmentTable
 
 _EARLY = 1e-9  # of a period: a sample at the end of a segment belongs to the next one
-_ROOTS = 6  # steps made anew for an event, at most
+_ROOTS = 6  # repetitions of a step for an event, at most
 _SHORT = 1e-8  # of a step: over so little of it y is a straight line, to rounding
 _WATCHED = 8  # steps between looks at the energy
 
@@ -77,14 +77,14 @@ def event_loop(
         f: Functions, c: Any, t: float, whole: float, theta: float, p: Array, runs: Runs, work: Any,
         switches: Switches, event: int, control: Array,
     ) -> tuple[int, float, float, float]:  # fmt: skip
-        """The step made anew, up to where a switching function vanishes after it, but for the last bit of its length.
+        """The step repeated, up to where a switching function vanishes after it, but for the last bit of its length.
 
         Its evaluations, its length, that bit, over which y is a straight line, and its error as of `error`: it may pass
         slowly through what the whole step leapt over, as friction near v = 0.
         """
         h, evaluations, y, after, e = theta * whole, 0, runs.y, runs.after, 0.0
         for k in range(_ROOTS):
-            if abs(h) <= np.spacing(abs(t)):  # at once, as right behind another event
+            if abs(h) <= np.spacing(abs(t)):  # immediately, as right behind another event
                 copy(after, y)
                 copy(work.last, work.K[0])
                 return evaluations, 0.0, 0.0, 0.0
@@ -179,7 +179,7 @@ def event_loop(
                     now[Now.EVENT] = event
                     now[Now.STEP] = 1
                     guard = event - switches.thresholds
-                    if sides.restarts and event < len(switches.rows) - switches.asked:
+                    if sides.restarts and event < len(switches.rows) - switches.user_defined:
                         control[At.NEXT] = 0.0
                     if 0 <= guard < switches.guards:
                         ended = end_mode(f, t1, runs, p, switches, holding, guard)

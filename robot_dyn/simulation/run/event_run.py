@@ -224,14 +224,14 @@ def _switching(setup: Setup) -> Switching:
 
 
 def _switches(setup: Setup) -> Switches:
-    """Its switching functions at the start, if no event is asked for."""
+    """Its switching functions at the start, without user-defined events."""
     equation = setup.equation
     held = np.full(equation.plant.dynamics.n, np.nan) if equation.sampled else None
     return kept(setup, _switching).at(0.0, equation.start(setup.q0, setup.v0), 0, None, held)
 
 
 def _method(setup: Setup, equation: StateEquation) -> tuple[ControlledStepper, np.ndarray]:
-    """The method made ready, and the choice of its steps before the first."""
+    """The stepper of the method, and the choice of its steps before the first."""
     method: Any = setup.integrator
     n, m = equation.plant.dynamics.n, equation.size
     if not method.controls_error:

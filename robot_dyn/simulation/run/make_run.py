@@ -1,4 +1,4 @@
-"""A run made ready: its equations as functions, interpreted or machine code, in one of the two time loops.
+"""Build a run: its equations as functions, interpreted or machine code, in one of the two time loops.
 
 run = prepared(setup, equation, machine);   record = run.record()
 """
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
 
 
-def prepared(
+def make_run(
     setup: Setup,
     equation: StateEquation,
     compiled_equation: CompiledStateEquation | None,
