@@ -26,12 +26,9 @@ from robot_dyn.simulation.observation.observer import Observer
 from robot_dyn.simulation.observation.remarks import Remark
 from robot_dyn.simulation.results.error_estimate import ErrorEstimate, no_estimate
 from robot_dyn.simulation.results.trajectory import Statistics, Trajectory
-from robot_dyn.simulation.run.event_run import TooLongError
-from robot_dyn.simulation.run.make_run import prepared
-from robot_dyn.simulation.run.outcome import Ending, Outcome
+from robot_dyn.simulation.run.make_run import make_run
+from robot_dyn.simulation.run.outcome import Accumulation, Ending, Outcome, Stiff, TooLong
 from robot_dyn.simulation.run.recording import Recording
-from robot_dyn.simulation.run.stiffness import StiffError
-from robot_dyn.simulation.run.switched_run import AccumulationError
 from robot_dyn.simulation.setup.options import Options, setup_of, starts, takes_options
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.setup.size import check_record
@@ -126,34 +123,27 @@ def _by_choice(setup: Setup, on_progress: Callable[[float], object] | None) -> _
         most = (
             inf if seen else most_interpreted(setup, setup.equation, compiled_equation)
         )  # else what cannot compile never ends
-        try:
-            run = prepared(
-                setup,
-                setup.equation,
-                compiled_equation,
-                on_progress=on_progress,
-                observer=observer,
-                most=most,
-                chooses=chooses,
-            )
-            before = _spent_on_loops(compiled_equation)
-            record = run.record()
-            observer.end()
-            return _Ran(
-                setup,
-                compiled_equation,
-                engine,
-                observer,
-                record,
-                ready + _spent_on_loops(compiled_equation) - before,
-                said,
-            )
-        except TooLongError as found:
-            seen = found.evaluations
-        except StiffError as found:
-            setup, chooses, said = cached(setup, _stiff), False, (found.remark,)
-        except AccumulationError as found:
-            setup, chooses, said = cached(setup, _nonsmooth), False, (*said, found.remark)
+        run = make_run(
+            setup,
+            setup.equation,
+            compiled_equation,
+            on_progress=on_progress,
+            observer=observer,
+            most=most,
+            chooses=chooses,
+        )
+        before = _spent_on_loops(compiled_equation)
+        match run.run():
+            case TooLong(evaluations):
+                seen = evaluations
+            case Stiff(remark):
+                setup, chooses, said = cached(setup, _stiff), False, (remark,)
+            case Accumulation(remark):
+                setup, chooses, said = cached(setup, _nonsmooth), False, (*said, remark)
+            case record:
+                observer.end()
+                ready += _spent_on_loops(compiled_equation) - before
+                return _Ran(setup, compiled_equation, engine, observer, record, ready, said)
 
 
 def _stiff(setup: Setup) -> Setup:
@@ -183,7 +173,7 @@ def _with_estimate(
 
     def companion(pace: Any, of: Setup) -> Recording:
         nonlocal spent, companions
-        made = prepared(of, setup.equation, ran.compiled_equation, pace, at_the_end, samples=False).record()
+        made = make_run(of, setup.equation, ran.compiled_equation, pace, at_the_end, samples=False).record()
         if made.outcome.ending is Ending.STOPPED:
             raise KeyboardInterrupt
         spent, companions = spent + made.evaluations, companions + 1

@@ -15,10 +15,10 @@ from robot_dyn.codegen.llvm.lock_step import write_function
 from robot_dyn.codegen.llvm.one_state import Limits
 from robot_dyn.codegen.llvm.vectors import F64
 from robot_dyn.codegen.trace.from_casadi import program_of
+from robot_dyn.simulation.dynamics.loop_state import runs_of
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.observation.guard_levels import levels
+from robot_dyn.simulation.observation.guard_levels import guard_levels
 from robot_dyn.simulation.observation.observation import observations_of
-from robot_dyn.simulation.run.fixed_step import runs_of
 
 W = 64
 
@@ -48,7 +48,7 @@ def test_what_each_step_touches_begins_at_cache_lines(method: str) -> None:
         K = rd.method(method).stepper(FLOAT64, m, n, m | 1, W).work.K
         kept += [runs.y, runs.after, K]
     start = np.random.default_rng(3).normal(size=(3 * n, 3 * W))
-    for of in observations_of(start, levels(robot, (), None, 3 * W), 3):
+    for of in observations_of(start, guard_levels(robot, (), None, 3 * W), 3):
         kept += [of.low, of.high]
     assert offsets(kept) == [0] * len(kept)
 

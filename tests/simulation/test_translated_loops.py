@@ -22,13 +22,14 @@ from robot_dyn.integrate.methods import FIXED_STEP, method
 from robot_dyn.integrate.primitives import evaluate
 from robot_dyn.simulation.compiled.build import compiled_equation
 from robot_dyn.simulation.compiled.engine_choice import choose
-from robot_dyn.simulation.dynamics.loop_state import Ended, Now
+from robot_dyn.simulation.dynamics.loop_state import Ended, Now, rules_of, runs_of
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.observation.guard_levels import levels
+from robot_dyn.simulation.observation.guard_levels import guard_levels
 from robot_dyn.simulation.observation.observation import observation_of
-from robot_dyn.simulation.run.fixed_step import rules_of, runs_of, samples_at_most
-from robot_dyn.simulation.run.make_run import prepared
-from robot_dyn.simulation.run.time_loop import Records, time_loop
+from robot_dyn.simulation.run.fixed_step import samples_at_most
+from robot_dyn.simulation.run.make_run import make_run
+from robot_dyn.simulation.run.recording import records_of
+from robot_dyn.simulation.run.time_loop import time_loop
 from robot_dyn.simulation.setup.segment_table import segment_table
 from robot_dyn.simulation.setup.setup import Setup
 from tests.estimates.scenes import arms
@@ -70,7 +71,7 @@ def both(setup: Setup) -> tuple[Any, Any]:
     equation = StateEquation(setup.plant, setup.controller, False, setup.events)
     code, _ = choose(setup, equation)
     assert code is not None
-    runs = [prepared(setup, equation, each) for each in (code, replace(code, loop=None))]
+    runs = [make_run(setup, equation, each) for each in (code, replace(code, loop=None))]
     for each in runs:
         room = each.runs._replace(y=0, run_parameters=0, alive=0, scale=0, energy=0, keys=0), each.stepper.work
         for _, x in numbers(room):  # what is not written yet
@@ -96,9 +97,12 @@ def test_a_fixed_step_gives_the_same_bits(name: str, sampled: bool) -> None:
     assert ours.time == theirs.time == 0.6
     assert_same_bits((ours.runs, ours.stepper.work), (theirs.runs, theirs.stepper.work))
     rows = int(ours.now[Now.ROW])
-    kept = [1, 2, 4] if of.nonsmooth else [1, 2, 3, 4]  # its rates at samples are found afterwards
-    for mine, other in ((ours.records[i], theirs.records[i]) for i in kept):
+    names = ["t", "y"] if of.nonsmooth else ["t", "y", "made"]  # its rates at samples are found afterwards
+    for mine, other in ((getattr(each.records, name) for each in (ours, theirs)) for name in names):
         assert_same_bits(mine[:rows], other[:rows])
+    shared = int(ours.now[Now.SHARED])
+    for i in (4, 5, 6):  # of states shared with companions
+        assert_same_bits(ours.records[i][:shared], theirs.records[i][:shared])
 
 
 REST = [*product([ADAPTIVE[1], "gauss_4", "rosenbrock_5"], [False, True]), (ADAPTIVE[0], False), ("rk4", True)]
@@ -114,7 +118,7 @@ def test_a_run_with_events_gives_the_same_bits(name: str, sampled: bool) -> None
     assert_same_bits((ours.runs, ours.stepper.work, ours.control), (theirs.runs, theirs.stepper.work, theirs.control))
     assert_same_bits(ours.switches._replace(functions=0), theirs.switches._replace(functions=0))
     rows = int(ours.now[Now.ROW])
-    assert_same_bits(*(tuple(x[:rows] for x in each.kept[:3]) for each in (ours, theirs)))
+    assert_same_bits(*(tuple(x[:rows] for x in each.records[1:4]) for each in (ours, theirs)))
 
 
 def test_modes_of_dry_friction_and_rigid_stops_give_the_same_bits() -> None:
@@ -163,7 +167,7 @@ def test_a_loop_is_compiled_once_for_arms_of_any_number_of_joints() -> None:
         equation = StateEquation(each.plant, None)
         code, _ = choose(each, equation)
         assert code is not None
-        prepared(each, equation, code).record()
+        make_run(each, equation, code).record()
         loops.append((code.loop, {id(entry) for entry in code.loop._known.values()}))
     assert loops[0] == loops[1]
 
@@ -172,7 +176,7 @@ def test_the_end_of_a_mode_is_no_end_of_a_call_of_machine_code() -> None:
     """Hundreds of impacts, of sticking and of sliding: the loop returns for progress and for room alone."""
     made = setup(HELD, "DOP853", duration_s=6.0, controller=rd.PD(rd.hold([1.4, -1.9]), [60.0, 30.0], [0.1, 0.1]))
     equation = StateEquation(made.plant, made.controller)
-    run, calls = prepared(made, equation, choose(made, equation)[0]), []
+    run, calls = make_run(made, equation, choose(made, equation)[0]), []
     inner = run.advance
     run.advance = lambda *given: calls.append(inner(*given)) or calls[-1]
     events = len(run.record().events)
@@ -198,7 +202,7 @@ def test_lanes_in_lock_step_give_the_same_bits(name: str, controller: rd.Control
     rng = np.random.default_rng(3)
     starts = np.stack([equation.start(q, v) for q, v in rng.normal(size=(W, 2, 2))]).T
     starts[n, 5] = 1e200  # overflows at once
-    of_levels = levels(made.plant.dynamics, made.plant.effects, made.controller, W)
+    of_levels = guard_levels(made.plant.dynamics, made.plant.effects, made.controller, W)
     rules = rules_of(equation, False, 1e100, apart=0 if equation.sampled else 3)
     results = []
     for interpreted in (False, True):
@@ -207,11 +211,12 @@ def test_lanes_in_lock_step_give_the_same_bits(name: str, controller: rd.Control
         for _, x in numbers((stepper.work, runs.made, runs.command, runs.u, runs.energies, runs.size)):
             x[...] = 0
         rows = samples_at_most(made, plan.counts)
-        records = Records(
-            np.arange(m), np.zeros((rows, 2), np.int64), np.zeros((rows, m, W)), np.zeros((rows, n + 2, W)),
-            np.empty((0, m + 2)), np.empty((1 + 3 * n, 0)),
+        records = records_of(
+            np.arange(m), np.zeros((rows, m, W)), np.zeros((rows, n + 2, W)), np.empty((0, m)), np.empty((0, m)),
+            np.empty((1 + 3 * n, 0)),
             observation_of(np.vstack([starts[: 2 * n], np.full((n, W), np.nan)]), of_levels),
         )  # fmt: skip
+        records.t[...] = 0
         now, clock = np.zeros(len(Now), np.int64), np.array([0.0, 0.02, 1e-12])
         now[Now.BUDGET] = 10**6
         advance: Any = time_loop(stepper.step) if interpreted else code.advance()

@@ -23,10 +23,9 @@ from robot_dyn.simulation.compiled.functions import STEP, States
 from robot_dyn.simulation.dynamics.bodies import bodies
 from robot_dyn.simulation.dynamics.moreau_jean import stepped
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.run.event_run import TooLongError
-from robot_dyn.simulation.run.make_run import prepared
+from robot_dyn.simulation.run.make_run import make_run
 from robot_dyn.simulation.run.outcome import Ending
-from robot_dyn.simulation.run.recording import Path
+from robot_dyn.simulation.run.recording import Path, Recording
 from robot_dyn.simulation.run.state_functions import sample
 from robot_dyn.simulation.setup.segment_table import segment_table
 from robot_dyn.simulation.setup.setup import Setup
@@ -232,9 +231,8 @@ def _first_second(setup: Setup) -> Path:
         short = replace(
             setup, duration_s=span, record_period_s=0.0, estimate_error=False, accuracy=None, engine="interpreted"
         )
-        try:
-            record = prepared(short, short.equation, None, samples=False, most=_MOST).record()
-        except TooLongError:
+        record = make_run(short, short.equation, None, samples=False, most=_MOST).run()
+        if not isinstance(record, Recording):
             span /= 10
             continue
         if record.outcome.ending is Ending.STOPPED:

@@ -16,7 +16,7 @@ from robot_dyn.queries.units import unit
 from robot_dyn.simulation.diagnostics.creep import creeping
 from robot_dyn.simulation.diagnostics.reference_remarks import held, jumps
 from robot_dyn.simulation.observation.chatter import Episode
-from robot_dyn.simulation.observation.guard_levels import GuardLevels, Level, levels
+from robot_dyn.simulation.observation.guard_levels import GuardLevels, Level, guard_levels
 from robot_dyn.simulation.observation.observation import Observation, Observed, Visit, observation_of
 from robot_dyn.simulation.observation.observer import Observer
 from robot_dyn.simulation.observation.remarks import Kind, Remark
@@ -39,7 +39,7 @@ def observer_of(setup: Setup, of: GuardLevels | None = None) -> Observer:
 
 
 def _beginning(setup: Setup) -> tuple[GuardLevels, Observation]:
-    of = levels(setup.plant.dynamics, setup.plant.effects, setup.controller)
+    of = guard_levels(setup.plant.dynamics, setup.plant.effects, setup.controller)
     return of, _observation(setup, of)
 
 

@@ -5,11 +5,18 @@ from __future__ import annotations
 from enum import IntEnum
 from typing import Any, NamedTuple
 
+import numpy as np
+
+from robot_dyn.aligned import aligned
 from robot_dyn.arithmetic import Array
+from robot_dyn.integrate.primitives import below
+from robot_dyn.simulation.dynamics.state_equation import StateEquation
+
+_FIRST = np.zeros(1, np.int64)
 
 
 class Ended(IntEnum):
-    """Why the loop came back."""
+    """Why the loop returned."""
 
     DONE = 0
     PAUSED = 1  # its budget of steps is spent
@@ -20,7 +27,7 @@ class Ended(IntEnum):
     NOT_FINITE = 6  # the rate at y
     FAST = 7  # a joint moves without bound; y is the state after the step
     EVENT = 8  # y is the state at it
-    TRANSFER = 9  # a payload is picked up or dropped; y is the state before it
+    PAYLOAD = 9  # a payload is picked up or dropped; y is the state before it
     CHANGED = 10  # the mode, and with it the side of a threshold; y is the state behind it
     ACCUMULATED = 11  # changes of the mode, in next to no time
     UNSETTLED = 12  # the state and the mode behind an event were not found
@@ -44,7 +51,7 @@ class _Entries(NamedTuple):
     STEPS: int = 3  # done in all
     SEEN: int = 4  # states shared with companions, in all
     SHARED: int = 5  # row of these, next
-    BUDGET: int = 6  # steps to do before it comes back
+    BUDGET: int = 6  # steps to do before it returns
     EVALUATIONS: int = 7  # of the rate, in all
     COLUMN: int = 8  # of what an observer sees, next
     DUE: int = 9  # period of the next sample, where steps do not end at samples
@@ -147,3 +154,50 @@ class Rules(NamedTuple):
     thin: int
     base: int
     apart: int
+
+
+def rules_of(
+    equation: StateEquation, alone: bool, largest: float, every: int = 0, thin: int = 1, base: int = 0, apart: int = 0
+) -> Rules:
+    """The rules of a loop over a state equation."""
+    n, controller = equation.plant.dynamics.n, equation.controller
+    ticks = (1, 0, 0)
+    if controller is not None:
+        ticks = len(controller.instants), controller.acting_instant, controller.deviates
+    return Rules(
+        n, len(equation.sources), equation.state_size, n if equation.sampled else 0, *ticks,
+        equation.canonical, alone, largest, every, thin, base, apart,
+    )  # fmt: skip
+
+
+def runs_of(
+    equation: StateEquation, y: np.ndarray, run_parameters: np.ndarray, made: int, numbers: np.ndarray = _FIRST
+) -> Runs:
+    """Runs at the states y (m, W) with their own numbers (O, W), of these numbers in a batch (W,)."""
+    m, W = y.shape
+    held, states = equation.plant.dynamics.n if equation.sampled else 0, equation.state_size
+    seed, run = (0, 0) if equation.controller is None else equation.controller.noise_key
+    keys = np.array([np.full(W, seed, np.uint64), np.uint64(run) + numbers.astype(np.uint64)])
+    start, after = aligned((2, m, W))
+    start[...] = y
+    return Runs(
+        start, np.array(run_parameters, order="C"), after, np.empty((made, W)),
+        np.empty((held + states, W)), np.empty((equation.plant.dynamics.n, W)), np.empty((2, W)), np.empty(W),
+        np.zeros(W, np.int64), np.ones(W, np.int64), np.zeros(W, np.int64), np.zeros(W), np.zeros((m, W)),
+        np.zeros(W), np.ones(W), np.zeros(W), keys,
+    )  # fmt: skip
+
+
+def erase_ended(x: Array, runs: Runs) -> None:
+    """Nan in x (r, W) for the runs that have ended."""
+    if below(runs.why, 1):
+        return
+    for b in range(len(runs.alive)):
+        if runs.alive[b] == 0:
+            erase(x, b)
+
+
+def erase(x: Array, b: int) -> None:
+    """Nan in place of the numbers of a run."""
+    for e in range(len(x)):
+        x[e, b] = np.nan

@@ -1,1 +1,9 @@
-"""Where a run switches: thresholds, root finding, modes of set-valued effects, impacts, payloads."""
+"""Events within steps: where switching functions vanish, and the equation and the state behind them.
+
+- `detection`, `crossings`: whether and where a switching function changes sign in a step
+- `switching`, `sides`: thresholds of the parts, and the equation on either side, in Python and in the loop
+- `modes`, `holding`: what holds joints (dry friction, rigid stops, backlash), in Python and in the loop
+- `mode_change`, `impacts`: the end of a mode, and impacts
+- `payload_events`: payloads picked up and dropped
+- `event_log`, `occurrence`: what happened, in the loop and for users
+"""

@@ -36,7 +36,7 @@ class Switches(NamedTuple):
         thresholds, guards: Number of the thresholds of coordinates, and of guards.
         zeroed: Entries of y that are set to 0 after each step: of those only the rates matter.
         functions: Gives the F values, as of `evaluate`.
-        asked: Number of the last functions that are looked at in each step, as the user's own.
+        user_defined: Number of the last functions that are looked at in each step.
         then: Room for their values, (F, 1).
         before, change: Those at the start of a step, and by how much they changed in the step before, (F,).
         exact, slack: Rounding of each coordinate near its level, and by how much it passes it before that counts, (E,).
@@ -52,7 +52,7 @@ class Switches(NamedTuple):
     guards: int
     zeroed: Array
     functions: Any
-    asked: int
+    user_defined: int
     then: Array
     before: Array
     change: Array
@@ -93,9 +93,9 @@ def nears(t: float, y: Array, p: Array, run_parameters: Array, switches: Switche
     """Whether a function may pass its level in the step that ends at t: it comes near it, by its latest changes."""
     if not has_functions(switches):
         return False
-    E, found = len(switches.exact), switches.asked > 0
+    E, found = len(switches.exact), switches.user_defined > 0
     evaluate(switches.functions, t, y, p, run_parameters, switches.then)
-    for e in range(E, len(switches.rows) - switches.asked):
+    for e in range(E, len(switches.rows) - switches.user_defined):
         i = switches.rows[e]
         x0, x1, change = switches.before[i], switches.then[i, 0], switches.change[i]
         found = found or function_nears(x0, x1, change, switches.levels[e], switches.sides[e])
@@ -192,7 +192,7 @@ def same_sides(t: float, y: Array, p: Array, run_parameters: Array, switches: Sw
     if has_functions(switches):
         evaluate(switches.functions, t, y, p, run_parameters, switches.then)
         for g in range(len(switches.exact), len(switches.rows)):
-            if g >= len(switches.rows) - switches.asked:
+            if g >= len(switches.rows) - switches.user_defined:
                 switches.sides[g] = np.sign(gap(switches, g))
             elif not switches.sides[g] * gap(switches, g) > 0.0:
                 return False

@@ -1,6 +1,6 @@
 """What happened in a run, row by row as numbers; plain functions of these, for the loop.
 
-A row is (t, number, `What`, side, direction, q, v), v as y has it. Words are made of it when the loop has returned.
+A row is (t, number, `What`, side, direction, q, v), v as y has it. It becomes an `Occurrence` behind the loop.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class What(IntEnum):
     SLIDES = 4
     LEAVES = 5  # a stop
     REVERSES = 6
-    PASSES = 7  # of this number among thresholds and events asked for
+    PASSES = 7  # of this number among thresholds and user-defined events
 
 
 class EventLog(NamedTuple):
@@ -36,7 +36,7 @@ class EventLog(NamedTuple):
         rows: The rows, (R, 5 + 2n).
         filled: How many are filled, (1,).
         room: How many there may be at an event; one event may fill those behind, too.
-        latest, told: Times of the latest events, (CHATTER,), and how many there have been, (1,).
+        latest, total: Times of the latest events, (CHATTER,), and how many there have been, (1,).
         brief: The time in which so many are looked at by Python: one threshold may chatter.
     """
 
@@ -44,7 +44,7 @@ class EventLog(NamedTuple):
     filled: Array
     room: int
     latest: Array
-    told: Array
+    total: Array
     brief: float
 
 
@@ -66,11 +66,11 @@ def note(log: EventLog, t: float, y: Array, number: int, what: int, side: float,
 
 def remember_time(log: EventLog, t: float) -> None:
     """Keep the time of an event."""
-    log.latest[log.told[0] % len(log.latest)] = t
-    log.told[0] += 1
+    log.latest[log.total[0] % len(log.latest)] = t
+    log.total[0] += 1
 
 
 def may_chatter(log: EventLog, t: float) -> bool:
     """Whether the latest events, with one at t, came in next to no time."""
     last = len(log.latest)
-    return log.told[0] + 1 >= last and t - log.latest[(log.told[0] + 1) % last] <= log.brief
+    return log.total[0] + 1 >= last and t - log.latest[(log.total[0] + 1) % last] <= log.brief

@@ -99,7 +99,7 @@ class Room(NamedTuple):
 
 
 class Places(NamedTuple):
-    """Where the mode stands among the own numbers of a run: first row of each n of them, (k,)."""
+    """Where the mode stands among the run parameters: first row of each n of them, (k,)."""
 
     held: Array
     direction: Array
@@ -111,10 +111,10 @@ class Holding(NamedTuple):
 
     Attributes:
         laws: Of what may hold joints.
-        places: Where the mode stands among the own numbers.
+        places: Where the mode stands among the run parameters.
         held, direction: As of `Mode`, of all coordinates, (N,).
         contact: As of `Mode`, (n,).
-        run_parameters: Own numbers of the equation in which nothing is held and parts switch by themselves, (O, 1).
+        run_parameters: Run parameters of the equation in which nothing is held and parts switch by themselves, (O, 1).
         held_actuation: How many of them are the actuation in zero-order hold, the first ones.
         impacts, strikes, latest: Times of the latest impacts, which coordinates struck, (I,) and (I, N); their number.
         changes, changed: Times of the latest changes of the mode, (C,), and the number of all changes, (1,).
@@ -222,7 +222,7 @@ def move_motors(of: Holding, y: Array) -> None:
 
 
 def write_mode(of: Holding, run_parameters: Array) -> None:
-    """Write the mode where the own numbers of the run have it."""
+    """Write the mode where the run parameters have it."""
     for i in range(of.laws.n):
         for first in of.places.held:
             run_parameters[first + i, 0] = of.held[i]

@@ -34,7 +34,7 @@ _STILL = 1e-14  # [rad/s] or [m/s]: joints this slow stop together with the one 
 def end_mode(
     f: Any, t: float, runs: Runs, p: Array, switches: Switches, of: Holding, guard: int
 ) -> int:  # fmt: skip
-    """Go on in another mode, in y, own numbers and guards; DONE, or why the loop is to return.
+    """Go on in another mode, in y, run parameters and guards; DONE, or why the loop is to return.
 
     Args:
         f: The functions of the state equation.
@@ -164,11 +164,11 @@ def guards(of: Holding, y: Array, switches: Switches) -> None:
         watch(switches, e + REACTIONS, slides, 0.0, of.direction[i])
         e += REACTIONS + 1
         for s in range(len(laws.lower)):
-            run_parameters = not held and (s == 0 or i < laws.n)  # ends of gaps are in each
+            free = not held and (s == 0 or i < laws.n)  # ends of gaps are in each
             for side in range(2):
                 level = laws.lower[s, i] if side == 0 else laws.upper[s, i]
                 leaves = x == level and v == 0.0  # then its velocity is watched until it turns
-                watch(switches, e, run_parameters and not leaves, level, 1.0 if side == 0 else -1.0)
+                watch(switches, e, free and not leaves, level, 1.0 if side == 0 else -1.0)
                 e += 1
 
 

@@ -1,4 +1,4 @@
-"""The modes of a run with dry friction or rigid stops: the numbers that the loop has of them, and words for events."""
+"""The modes of a run with dry friction or rigid stops: the arrays that the loop has of them, and names of events."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from robot_dyn.simulation.events.holding import Holding, Laws, Places, Room
 from robot_dyn.simulation.events.mode_change import REACTIONS, at_once, start, width
 from robot_dyn.simulation.events.occurrence import Occurrence
 
-_IMPACTS = 64  # that are remembered
+_IMPACTS = 64  # that are stored
 _STOP = {-1: "lower stop", 1: "upper stop"}
 _END = {-1: "backward end", 1: "forward end"}
-_SAID = {
+_PHRASES = {
     What.STRIKES: "strikes {}", What.RESTS_AT_LAST: "comes to rest at {}", What.STICKS: "sticks",
     What.RESTS: "rests at {}", What.SLIDES: "slides", What.LEAVES: "leaves {}", What.REVERSES: "reverses",
 }  # fmt: skip
@@ -69,21 +69,21 @@ class Modes:
         return self.equation.plant.dynamics.joint_names[self.holding.laws.joints[i]]
 
     def occurrence(self, row: Sequence[float]) -> Occurrence:
-        """What happened, in words, as of a row of the log."""
+        """The event of a row of the log."""
         n, (t, i, what, side, direction, *state) = self.holding.laws.n, row
         joint, end = self._joint(int(i)), ""
         if side:
             end = f"its {_STOP[int(side)]}" if i < n else f"the {_END[int(side)]} of its backlash"
-        name = f"{joint} {_SAID[What(int(what))].format(end)}"
+        name = f"{joint} {_PHRASES[What(int(what))].format(end)}"
         return Occurrence(t, name, int(direction), tuple(state[:n]), tuple(state[n:]), joint)
 
 
-def modes_of(equation: StateEquation, own: np.ndarray, places: Places, most: int, brief: float) -> Modes:
+def modes_of(equation: StateEquation, run_parameters: np.ndarray, places: Places, most: int, brief: float) -> Modes:
     """The modes of a state equation of effects without a mode; nothing is held yet.
 
     Args:
         equation: The state equation.
-        own: Own numbers of it in which nothing is held, (O, 1).
+        run_parameters: Those of it in which nothing is held, (O, 1).
         places: Where they have the mode.
         most: Changes of the mode that are too many in a brief time.
         brief: That time, in [s].
@@ -93,7 +93,7 @@ def modes_of(equation: StateEquation, own: np.ndarray, places: Places, most: int
     held, direction = np.zeros((2, N))
     none, changed = np.zeros((2, 1), np.int64)
     holding = Holding(
-        laws, places, held, direction, np.zeros(n), own, n * equation.sampled, np.zeros(_IMPACTS),
+        laws, places, held, direction, np.zeros(n), run_parameters, n * equation.sampled, np.zeros(_IMPACTS),
         np.zeros((_IMPACTS, max(N, 2))), none, np.zeros(most), changed, brief, event_log(n, at_once(laws), brief),
         _room(equation, N, n),
     )  # fmt: skip
@@ -105,17 +105,19 @@ def laws_of(equation: StateEquation) -> Laws:
     n, motion = equation.plant.dynamics.n, equation.equation_of_motion
     works: list[Any] = [each for each in equation.plant.forces if not isinstance(each, Conservative)]
     first_work, of_states = equation.size - len(equation.sources) + 1, 2 * n + equation.state_size
-    gaps = [_gaps(motion.effects[k], n, of_states + place.start, first_work + works.index(motion.effects[k]))
-            for k, place in motion.states.items() if isinstance(motion.effects[k], RigidBacklash)]  # fmt: skip
-    made = [np.concatenate(each) for each in zip(*gaps, strict=True)] if gaps else [np.zeros(0)] * 9
-    joints, delta, speed, motors, impulse, work, inertia, level, e = made
+    contacts = []
+    for k, place in motion.states.items():
+        if isinstance(effect := motion.effects[k], RigidBacklash):
+            contacts.append(_contact_coordinates(effect, n, of_states + place.start, first_work + works.index(effect)))
+    columns = [np.concatenate(each) for each in zip(*contacts, strict=True)] if contacts else [np.zeros(0)] * 9
+    joints, delta, speed, motors, impulse, work, inertia, level, e = columns
     others = [each for each in motion.set_valued if not isinstance(each, RigidStops)]
     stops = [each for each in motion.set_valued if isinstance(each, RigidStops)]
     intervals = [each.at_rest(np.zeros(n)) for each in others]
     least, most = (sum((each[k] for each in intervals), start=np.zeros(n)) for k in (0, 1))
     sliding = sum((each.sliding(np.zeros(n)) for each in motion.set_valued), start=np.zeros(n))
     lower, upper, restitution = _stops(stops, n, level, e)
-    works_of_stops = [first_work + works.index(each) for each in stops] or [-1] * bool(gaps)
+    works_of_stops = [first_work + works.index(each) for each in stops] or [-1] * bool(contacts)
 
     def rows(of_joints: np.ndarray, of_gaps: np.ndarray) -> np.ndarray:
         return np.concatenate([of_joints, of_gaps.astype(np.int64)])
@@ -141,8 +143,8 @@ def _stops(stops: Sequence[RigidStops], n: int, level: np.ndarray, e: np.ndarray
     return np.ascontiguousarray(np.concatenate([of_joints, of_gaps, unused], axis=2).swapaxes(0, 1))
 
 
-def _gaps(effect: Any, n: int, at: int, work: int) -> tuple[Any, ...]:
-    """Of each gap: joint, entries of y for δ, δ̇, θ̇, the impulse and the work; B, β and e."""
+def _contact_coordinates(effect: Any, n: int, at: int, work: int) -> tuple[Any, ...]:
+    """Of the contact coordinate of each gap: joint, entries of y for δ, δ̇, θ̇, the impulse and the work; B, β and e."""
     joints = np.array(effect.driven(n))
     k = len(joints)
     numbers = [effect.reflected(n), effect.of("gap", n), effect.of("restitution", n)]
@@ -160,7 +162,7 @@ def _room(equation: StateEquation, N: int, n: int) -> Room:
 
 
 def places(known: Sequence[Parameter], effects: Sequence[Effect], first: int) -> Places:
-    """Where the parameters of effects have the mode, behind so many other own numbers."""
+    """Where the parameters of effects have the mode, behind so many other run parameters."""
     at: dict[str, list[int]] = {name: [] for name in _MODE}
     for each in known:
         if each.part[0] == "effect" and isinstance(effects[each.part[1]], SetValued) and each.key in at:
@@ -170,7 +172,7 @@ def places(known: Sequence[Parameter], effects: Sequence[Effect], first: int) ->
 
 
 def alone(n: int, first: int) -> Places:
-    """Where own numbers are the mode and nothing else, behind so many others: held, direction and contact, (3n,)."""
+    """Where run parameters are the mode and nothing else, behind so many others: held, direction and contact, (3n,)."""
     return Places(*(np.array([first + k * n], np.int64) for k in range(3)))
 
 

@@ -17,7 +17,7 @@ class Occurrence:
         direction: 1 where the switching function grows, −1 where it falls.
         q: Position then, n numbers, in [rad] or [m].
         v: Velocity then, in [rad/s] or [m/s].
-        joint: The joint that it is of; empty for the user's own.
+        joint: The joint that it is of; empty for a user-defined event.
     """
 
     t: float

@@ -83,7 +83,7 @@ def _transferred(
     def momentum() -> np.ndarray:
         return carrying(equation.plant, tuple(held)).dynamics.momentum(q, v)
 
-    def told(k: int, what: str, direction: int) -> None:
+    def report(k: int, what: str, direction: int) -> None:
         name = f"payload on {payloads[k].payload.frame} {what}"
         happened.append(Occurrence(t, name, direction, tuple(q.tolist()), tuple(v.tolist())))
 
@@ -93,7 +93,7 @@ def _transferred(
     for k in dropped:
         before, held[k] = energies(v).sum(), False
         y[works[k]] += energies(v).sum() - before
-        told(k, "dropped", -1)
+        report(k, "dropped", -1)
     if caught:
         (kinetic, potential), p = energies(v), momentum()
         for k in caught:
@@ -104,10 +104,10 @@ def _transferred(
         v[:] = acceleration(carrying(equation.plant, tuple(held)).dynamics.M(q), p, names)
         y[place[PICK_UP]] += energies(v)[0] - kinetic
         for k in caught:
-            told(k, "picked up at rest", 1)
+            report(k, "picked up at rest", 1)
     for k in changes:
         if now[k] and not held[k]:
             before, held[k] = energies(v).sum(), True
             y[works[k]] += energies(v).sum() - before
-            told(k, "picked up at the speed of the link", 1)
+            report(k, "picked up at the speed of the link", 1)
     return y, happened

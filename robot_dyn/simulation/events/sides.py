@@ -1,6 +1,6 @@
 """Thresholds that are passed within the loop: parts are other formulas on each side, by other numbers of the run.
 
-Numbers of sides that have not been met before are made in Python, and kept. Plain functions of arrays.
+Parameters of sides that have not been met before are computed in Python, and cached. Plain functions of arrays.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ class Sides(NamedTuple):
     """What runs on each side of the thresholds.
 
     Attributes:
-        sides: Those that are known, as of `Switches` without guards and events asked for, (T, K).
-        run_parameters: Own numbers of the run on them, behind the actuation in zero-order hold, (P, K).
+        sides: Those that are known, as of `Switches` without guards and user-defined events, (T, K).
+        run_parameters: Those of the run on them, behind the actuation in zero-order hold, (P, K).
         known: How many are filled, (1,); 0 where functions of Python change with the sides.
-        directions: Of the events asked for, (G,).
+        directions: Of the user-defined events, (G,).
         terminal: Whether they end the run, (G,).
-        restarts: Whether the first step behind an event of the equation is to be found anew.
+        restarts: Whether the first step behind an event of the equation is to be chosen again.
         log: What happened.
     """
 
@@ -51,15 +51,15 @@ def sides_of(
 
 
 def goes_on(t: float, runs: Runs, switches: Switches, of: Sides, holding: Holding, event: int, held: int) -> bool:
-    """Go on behind a threshold, or an event asked for, that is no guard; whether Python need not be asked."""
+    """Go on behind a threshold or a user-defined event, not a guard; whether the loop need not return to Python."""
     number = event if event < switches.thresholds else event - switches.guards
     side, log = switches.sides[event], of.log
     if log.filled[0] >= log.room:
         return False
-    asked = number - len(of.sides)
-    if asked >= 0:
-        counts = of.directions[asked] * side >= 0.0
-        if of.terminal[asked] and counts:
+    place = number - len(of.sides)  # among the user-defined events
+    if place >= 0:
+        counts = of.directions[place] * side >= 0.0
+        if of.terminal[place] and counts:
             return False
         if counts:
             note(log, t, runs.y, number, What.PASSES, side, side)
@@ -86,7 +86,7 @@ def take_numbers(runs: Runs, switches: Switches, of: Sides, holding: Holding, he
 
 
 def keep_numbers(of: Sides, sides: np.ndarray, parameters: np.ndarray) -> None:
-    """Keep the numbers on sides that were not known; once there is no room, Python is asked each time."""
+    """Cache the parameters on sides that were not known; without room, the loop returns to Python each time."""
     k = int(of.known[0])
     if k < _KNOWN and not (sides == of.sides[:, :k].T).all(axis=1).any():
         of.sides[:, k], of.run_parameters[:, k] = sides, parameters

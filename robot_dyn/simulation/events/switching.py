@@ -1,4 +1,4 @@
-"""Where a state equation switches: thresholds of its parts, events asked for, and what holds on either side."""
+"""Where a state equation switches: thresholds of its parts, user-defined events, and the equation on either side."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from robot_dyn.simulation.events.modes import Modes
 from robot_dyn.simulation.events.occurrence import Occurrence
 from robot_dyn.threshold import Threshold
 
-_MOST = 256  # equations that are kept, each of the sides of all thresholds
+_MOST = 256  # equations that are cached, each of the sides of all thresholds
 Quantity = tuple[int, bool]  # a joint, and whether it is its actuation that passes a level
 
 
 @final
 class Switching:
-    """The switching functions of a run: of coordinates, of the actuation, and the user's own.
+    """The switching functions of a run: of coordinates, of the actuation, and user-defined ones.
 
     Args:
-        equation: The state equation, of parts that switch by themselves, and with events asked for.
+        equation: The state equation, of parts that switch by themselves, and with user-defined events.
         dropped: What is no longer looked at: there the parts switch by themselves.
         modes: What is held; None where nothing may hold a joint.
 
@@ -88,15 +88,16 @@ class Switching:
         K = len(of_guards)
         rows, actuation = np.split(self.rows, [E])
         levels = self.levels
-        gaps = y[rows] - levels[:E]
-        moving = self._moving(t, y, held, rows, gaps)  # on the level itself, where it is going
-        sides = np.where(gaps + (gaps == 0) * moving > 0, 1.0, -1.0)
-        for i in np.flatnonzero((gaps == 0) & (moving == 0)):  # a stop is touched, and not passed
+        distances = y[rows] - levels[:E]
+        moving = self._moving(t, y, held, rows, distances)  # on the level itself, where it is going
+        sides = np.where(distances + (distances == 0) * moving > 0, 1.0, -1.0)
+        for i in np.flatnonzero((distances == 0) & (moving == 0)):  # a stop is touched, and not passed
             sides[i] = 1.0 if self.thresholds[i].falling == "touched" else -1.0
         first = n * len(self.equation.limited)
         values = self.values(t, y, held)
-        gaps = values[actuation] - levels[E:]
-        sides = np.concatenate([sides, np.where(gaps == 0, -np.sign(levels[E:]), np.sign(gaps))])  # a limit is reached
+        distances = values[actuation] - levels[E:]
+        # at distance 0 a limit is reached
+        sides = np.concatenate([sides, np.where(distances == 0, -np.sign(levels[E:]), np.sign(distances))])
         sides = np.append(sides, np.sign(values[first:]))  # 0 where y is a root: the next step tells
         rows = np.concatenate([rows, of_guards, actuation, first + np.arange(G)]).astype(np.int64)
         levels = np.insert(np.append(levels, np.zeros(G)), E, np.zeros(K))
@@ -105,13 +106,13 @@ class Switching:
         slack = np.maximum(exact, [each.slack for each in self.thresholds[:E]] + [0.0] * K)
         rates, active = np.append(np.zeros(E, bool), reactions > 0), np.arange(E + K) < E
         zeroed = np.zeros(0, np.int64) if self.modes is None else self.modes.holding.laws.impulses
-        made = Switches(
+        switches = Switches(
             rows, levels, sides, rates, active, E, K, zeroed, functions, G, np.zeros((len(values), 1)), values,
             np.zeros(len(values)), exact, slack, np.zeros(degree + 1), room(degree),
         )  # fmt: skip
         if self.modes is not None:
-            guards(self.modes.holding, y[:, None].copy(), made)
-        return made
+            guards(self.modes.holding, y[:, None].copy(), switches)
+        return switches
 
     def _row(self, part: int | None, each: Threshold) -> int:
         """The entry of y that passes a threshold."""
@@ -122,10 +123,12 @@ class Switching:
         first = 2 * self._n + self.equation.state_size
         return first + self.equation.equation_of_motion.states[part].start + each.state
 
-    def _moving(self, t: float, y: np.ndarray, held: Array | None, rows: np.ndarray, gaps: np.ndarray) -> np.ndarray:
+    def _moving(
+        self, t: float, y: np.ndarray, held: Array | None, rows: np.ndarray, distances: np.ndarray
+    ) -> np.ndarray:  # fmt: skip
         """The rates of those entries of y; of a velocity where one lies on its level."""
         n = self._n
-        if not (gaps[rows >= n] == 0).any():
+        if not (distances[rows >= n] == 0).any():
             return y[np.where(rows < n, rows + n, rows)]
         if self.equation.sampled and (held is None or np.isnan(held).any()):  # before the first tick
             y, held = self.equation.tick(t, y)
@@ -137,11 +140,11 @@ class Switching:
         demands = self.equation.demands(t, q, v, z, held, self.equation.limited)
         return np.array([*np.ravel(demands), *self.equation.switching(t, q, v)], dtype=float)
 
-    def function(self, t: float, y: Array, p: Array, own: Array, out: Array) -> None:
+    def function(self, t: float, y: Array, p: Array, run_parameters: Array, out: Array) -> None:
         """The same, as of `evaluate`."""
         x = y[:, 0].copy()
         x.setflags(write=False)
-        held = own[: self._n, 0].copy() if self.equation.sampled else None
+        held = run_parameters[: self._n, 0].copy() if self.equation.sampled else None
         out[:, 0] = self.values(min(max(t, p[0]), p[1]), x, held)
 
     def on(self, sides: np.ndarray) -> StateEquation:
@@ -161,14 +164,14 @@ class Switching:
             if controller is not None and at.get(CONTROLLER):
                 controller = controller.on_side(at[CONTROLLER])
             plant = plant if mode is None else in_mode(plant, mode)
-            made = replace(equation, plant=plant, controller=controller)
+            on_sides = replace(equation, plant=plant, controller=controller)
             if len(self._known) >= _MOST:
-                return made
-            self._known[key] = made
+                return on_sides
+            self._known[key] = on_sides
         return self._known[key]
 
     def number(self, index: int) -> int:
-        """The number of a switching function among thresholds and events asked for."""
+        """The number of a switching function among thresholds and user-defined events."""
         return index - (self.guards if index >= self.coordinates else 0)
 
     def of_thresholds(self, sides: np.ndarray) -> np.ndarray:
@@ -177,7 +180,7 @@ class Switching:
         return np.concatenate([sides[:E], sides[E + self.guards :][: len(self.thresholds) - E]])
 
     def occurrence(self, index: int, t: float, y: np.ndarray, side: float) -> Occurrence:
-        """The event of the threshold, or of the function asked for, of this number; its sign is now `side`."""
+        """The event of the threshold, or of the user-defined event, of this number; its sign is now `side`."""
         q, v, joint = *self.equation.state(y)[:2], ""
         if index < len(self.thresholds):
             each = self.thresholds[index]

@@ -59,7 +59,7 @@ class GuardLevels(NamedTuple):
 NO_LEVELS = GuardLevels((), np.empty((0, 1)), np.empty((0, 1)))
 
 
-def levels(dynamics: Any, effects: Iterable[Effect], controller: Controller | None, W: int = 1) -> GuardLevels:
+def guard_levels(dynamics: Any, effects: Iterable[Effect], controller: Controller | None, W: int = 1) -> GuardLevels:
     """All levels of a plant under a controller, whose coefficients may be arrays over W runs, (W, n) or (W, 1)."""
     n, found = dynamics.n, []
     for kind, row, side, bounds, part in _bounds(dynamics, tuple(effects), controller):

@@ -11,7 +11,7 @@ import numpy as np
 from robot_dyn.codegen.parameters import over_runs, with_parameters
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.plant import Plant
-from robot_dyn.simulation.observation.guard_levels import GuardLevels, levels
+from robot_dyn.simulation.observation.guard_levels import GuardLevels, guard_levels
 from robot_dyn.simulation.observation.observation import Observed
 from robot_dyn.simulation.results.provenance import origin
 from robot_dyn.simulation.results.trajectory import Statistics
@@ -68,7 +68,7 @@ class Batch:
 
     def levels(self, plant: Plant, controller: Controller | None) -> GuardLevels:
         """The levels of all runs, of a plant and a controller without their values."""
-        return levels(plant.dynamics, *over_runs(plant, controller, self.sweep), len(self))
+        return guard_levels(plant.dynamics, *over_runs(plant, controller, self.sweep), len(self))
 
     @property
     def sizes(self) -> dict[str, int]:

@@ -20,7 +20,7 @@ from robot_dyn.coefficients import with_values
 from robot_dyn.effects.plant import Plant
 from robot_dyn.integrate.integrator import PlainMethod
 from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
-from robot_dyn.simulation.dynamics.loop_state import Ended, Now, Runs, Why
+from robot_dyn.simulation.dynamics.loop_state import Ended, Now, Runs, Why, rules_of, runs_of
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.events.detection import Detecting
 from robot_dyn.simulation.observation.observation import observations_of, observed
@@ -30,9 +30,9 @@ from robot_dyn.simulation.rollouts.one_by_one import OneByOne, Single
 from robot_dyn.simulation.rollouts.pool import in_threads
 from robot_dyn.simulation.rollouts.result import Rollouts
 from robot_dyn.simulation.rollouts.thresholds import Thresholds
-from robot_dyn.simulation.run.fixed_step import rules_of, runs_of, samples_at_most
+from robot_dyn.simulation.run.fixed_step import samples_at_most
 from robot_dyn.simulation.run.outcome import Ending, Outcome
-from robot_dyn.simulation.run.time_loop import Records
+from robot_dyn.simulation.run.recording import records_of
 from robot_dyn.simulation.run.watch import LARGEST, diverged_advice
 from robot_dyn.simulation.setup.schedule import ON_STEP
 from robot_dyn.simulation.setup.segment_table import segment_table
@@ -89,7 +89,7 @@ class Tiles:
         numbers = np.minimum(np.arange(width), len(batch) - 1)
         start = np.vstack([batch.q0[numbers].T, batch.v0[numbers].T, np.full((n, width), np.nan)])
         self.observations = observations_of(start, self.levels.of_runs(numbers), tiles)
-        self.place = np.zeros((0, 2), np.int64)  # segment and step of each sample, of the tile that has most
+        self.t = np.zeros(0)  # of the samples of the tile that has most, in [s]
         self.lock = threading.Lock()
         self.unfinished = np.ones(tiles, dtype=bool)
         self.why, self.last = np.zeros(width, np.int64), np.zeros((equation.size, width))
@@ -165,9 +165,10 @@ class Tiles:
         stepper = method.stepper(FLOAT64, equation.size, n, rows, LANES)
         functions, now = self.compiled.functions.addresses, np.zeros(len(Now), dtype=np.int64)
         now[Now.BUDGET] = np.iinfo(np.int64).max
-        records = Records(
-            np.array(self.columns, np.int64), np.empty((len(self.out_y), 2), np.int64), self.out_y, self.out_extras,
-            np.empty((0, equation.size + 2)), np.empty((1 + 3 * n, 0)), self.observations[tile],
+        none = np.empty((0, equation.size))
+        records = records_of(
+            np.array(self.columns, np.int64), self.out_y, self.out_extras, none, none, np.empty((1 + 3 * n, 0)),
+            self.observations[tile],
         )  # fmt: skip
         rules = rules_of(equation, False, LARGEST, base=lanes.start, apart=self.apart)
         work = stepper.work
@@ -181,8 +182,8 @@ class Tiles:
         )
         self.unfinished[tile], self.evaluations[tile] = ended != Ended.DONE, now[Now.EVALUATIONS]
         with self.lock:
-            if now[Now.ROW] > len(self.place):
-                self.place = records.place[: now[Now.ROW]]
+            if now[Now.ROW] > len(self.t):
+                self.t = records.t[: now[Now.ROW]]
         self.why[lanes], self.last[:, lanes] = runs.why, runs.last
         self.ended[lanes] = np.where(runs.why > 0, runs.ended, self.setup.duration_s)
         if ended != Ended.DONE:
@@ -192,8 +193,7 @@ class Tiles:
                 array[int(now[Now.ROW]) :, :, lanes] = np.nan
 
     def _result(self) -> Rollouts:
-        B, (segment, step) = len(self.batch), self.place.T
-        t = self.table.starts[segment] + step * self.table.lengths[segment]
+        B, t = len(self.batch), self.t
         self._write_again(t)
         why, ended = self.why[:B], self.ended[:B].copy()
         diverged, advice, steps = why > 0, self._advice(why), self._steps(ended)

@@ -22,7 +22,7 @@ from robot_dyn.simulation.results.trajectory import Statistics
 from robot_dyn.simulation.rollouts.batch import Batch, Ends, advice_of
 from robot_dyn.simulation.rollouts.pool import in_threads
 from robot_dyn.simulation.rollouts.result import Rollouts
-from robot_dyn.simulation.run.make_run import prepared
+from robot_dyn.simulation.run.make_run import make_run
 from robot_dyn.simulation.run.outcome import Ending, Outcome
 from robot_dyn.simulation.run.recording import Recording
 from robot_dyn.simulation.setup.setup import Setup
@@ -95,7 +95,7 @@ class OneByOne:
             return
         setup, equation, compiled = self._run_of(i)
         observer = observer_of(setup, self.levels.of_runs([i]))
-        run = prepared(setup, equation, compiled, observer=observer)
+        run = make_run(setup, equation, compiled, observer=observer)
         run.stop = self.stop
         self.records[i] = self._single(equation, run.record(), observer.observation)
 

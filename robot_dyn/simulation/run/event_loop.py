@@ -1,7 +1,7 @@
 """The time loop of a run whose steps are chosen, or cut at events: samples lie between the ends of steps.
 
 Plain functions of arrays, for one run, as of `time_loop`. The dense output of a step brackets a root of a switching
-function g; the step is then made anew, up to where g vanishes after it, which keeps the order of the method:
+function g; the step is then repeated, up to where g vanishes after it, which keeps the order of the method:
 
     g(step(t, y, θ h)) = 0
 
@@ -17,7 +17,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.integrate.bernstein import NONE
-from robot_dyn.integrate.primitives import between, copy, evaluate
+from robot_dyn.integrate.primitives import between, copy
 from robot_dyn.integrate.step_control import At, chosen_step, finite, first_step, shortened
 from robot_dyn.simulation.dynamics.loop_state import Ended, Functions, Now, Rules, Runs
 from robot_dyn.simulation.events.crossings import (
@@ -32,35 +32,14 @@ from robot_dyn.simulation.events.crossings import (
 from robot_dyn.simulation.events.detection import FASTEST
 from robot_dyn.simulation.events.holding import Holding
 from robot_dyn.simulation.events.sides import Sides, goes_on
-from robot_dyn.simulation.observation.observation import Observation
-from robot_dyn.simulation.run.time_loop import act, acts, conserve, show
+from robot_dyn.simulation.run.recording import Records, log_step, sample, share, show
+from robot_dyn.simulation.run.time_loop import act, acts, conserve
 from robot_dyn.simulation.setup.segment_table import SegmentTable
 
 _EARLY = 1e-9  # of a period: a sample at the end of a segment belongs to the next one
-_ROOTS = 6  # steps made anew for an event, at most
+_ROOTS = 6  # repetitions of a step for an event, at most
 _SHORT = 1e-8  # of a step: over so little of it y is a straight line, to rounding
 _WATCHED = 8  # steps between looks at the energy
-
-
-class Kept(NamedTuple):
-    """What is kept.
-
-    Attributes:
-        t, y, made: Times of samples (R,), the states (R, m, 1), and what else a sample holds (R, d, 1).
-        shared_t, shared: States that companion runs share, (S,) and (S, m).
-        step_log_t, step_log: The ends of steps, (K,), and the states at the first of them, (k, m).
-        columns, observation: As of `time_loop.Records`.
-    """
-
-    t: Array
-    y: Array
-    made: Array
-    shared_t: Array
-    shared: Array
-    step_log_t: Array
-    step_log: Array
-    columns: Array
-    observation: Observation
 
 
 class Times(NamedTuple):
@@ -89,7 +68,7 @@ def event_loop(
 ) -> Callable[..., int]:  # fmt: skip
     """The time loop of the functions of a method, see `ControlledStepper`, and of the end of a mode, as of `end_mode`.
 
-    advance(functions, plan, runs, kept, times, rules, coefficients, work, switches, sides, holding, now, control,
+    advance(functions, plan, runs, records, times, rules, coefficients, work, switches, sides, holding, now, control,
     stop) → Ended, with `control` as of `control_of`; `stop[0]` other than 0 ends it.
     """
     choose = chosen_step(step, error)
@@ -98,14 +77,14 @@ def event_loop(
         f: Functions, c: Any, t: float, whole: float, theta: float, p: Array, runs: Runs, work: Any,
         switches: Switches, event: int, control: Array,
     ) -> tuple[int, float, float, float]:  # fmt: skip
-        """The step made anew, up to where a switching function vanishes after it, but for the last bit of its length.
+        """The step repeated, up to where a switching function vanishes after it, but for the last bit of its length.
 
         Its evaluations, its length, that bit, over which y is a straight line, and its error as of `error`: it may pass
         slowly through what the whole step leapt over, as friction near v = 0.
         """
         h, evaluations, y, after, e = theta * whole, 0, runs.y, runs.after, 0.0
         for k in range(_ROOTS):
-            if abs(h) <= np.spacing(abs(t)):  # at once, as right behind another event
+            if abs(h) <= np.spacing(abs(t)):  # immediately, as right behind another event
                 copy(after, y)
                 copy(work.last, work.K[0])
                 return evaluations, 0.0, 0.0, 0.0
@@ -122,7 +101,7 @@ def event_loop(
         return evaluations, h, 0.0, e
 
     def advance(
-        f: Functions, table: SegmentTable, runs: Runs, kept: Kept, times: Times, rules: Rules, c: Any, work: Any,
+        f: Functions, table: SegmentTable, runs: Runs, records: Records, times: Times, rules: Rules, c: Any, work: Any,
         switches: Switches, sides: Sides, holding: Holding, now: Array, control: Array, stop: Array,
     ) -> int:  # fmt: skip
         last = len(table.counts) - 1
@@ -130,12 +109,12 @@ def event_loop(
         while now[Now.SEGMENT] <= last:
             s = now[Now.SEGMENT]
             start, p = table.starts[s], table.parameters[s]
-            if table.transfers[s] == 1:
-                return Ended.TRANSFER
+            if table.payload_events[s] == 1:
+                return Ended.PAYLOAD
             if now[Now.STEP] == 0:
                 if table.ticks[s] > 0 and not act(f, runs, rules, start, table.at_ticks[s], table.ticks[s]):
                     return Ended.TICK
-                node(f, runs, kept, times, now, start, p)
+                node(f, runs, records, times, now, start, p)
                 times.reached[0] = start
                 now[Now.STEP] = 1
             if s == last:
@@ -179,10 +158,10 @@ def event_loop(
                         t1 = t + (h + rest)
                         control[At.NEXT] = max(control[At.NEXT], abs(control[At.TAKEN]))  # the cut is no error
                         switches.sides[event] = -switches.sides[event]
-                if h > 0.0 and asked(times, now, t1, end):
+                if h > 0.0 and is_due(times, now, t1, end):
                     if not has_dense:
                         now[Now.EVALUATIONS] += dense(f, c, t, h, y, p, run_parameters, after, work)
-                    inside(f, runs, kept, times, now, t, h, t1, end, p, work.F)
+                    inside(f, runs, records, times, now, t, h, t1, end, p, work.F)
                 copy(y, after)
                 if event >= 0:
                     arrive(y, work.last, rest, switches, event)
@@ -191,16 +170,16 @@ def event_loop(
                 times.reached[0] = t1
                 copy(work.K[0], work.last)
                 if times.every and event < 0 and t1 < end:
-                    keep(f, runs, kept, now, t1, y, p)
+                    sample(f, runs, records, 0, now, t1, y, p)
                 now[Now.STEPS] += 1
                 now[Now.BUDGET] -= 1
-                walk(runs, kept, now, t1)
-                show(runs, kept, rules, work.last, now, t, t1, t == start and acts(rules, table.ticks[s]))
+                log_step(records, now, t1, y)
+                show(runs, records, rules, work.last, now, t, t1, t == start and acts(rules, table.ticks[s]))
                 if event >= 0:
                     now[Now.EVENT] = event
                     now[Now.STEP] = 1
                     guard = event - switches.thresholds
-                    if sides.restarts and event < len(switches.rows) - switches.asked:
+                    if sides.restarts and event < len(switches.rows) - switches.user_defined:
                         control[At.NEXT] = 0.0
                     if 0 <= guard < switches.guards:
                         ended = end_mode(f, t1, runs, p, switches, holding, guard)
@@ -237,20 +216,20 @@ def arrive(y: Array, rate: Array, rest: float, switches: Switches, event: int) -
             y[row, 0] = level
 
 
-def node(f: Functions, runs: Runs, kept: Kept, times: Times, now: Array, t: float, p: Array) -> None:
+def node(f: Functions, runs: Runs, records: Records, times: Times, now: Array, t: float, p: Array) -> None:
     """A sample, if there is to be one, and a shared state, at the start of a segment or at the end of the run."""
     due = now[Now.DUE] * times.period <= t + _EARLY * times.period
     if due or times.nodes or (t == times.end and times.period < np.inf):
-        keep(f, runs, kept, now, t, runs.y, p)
+        sample(f, runs, records, 0, now, t, runs.y, p)
     while now[Now.DUE] * times.period <= t + _EARLY * times.period and times.period < np.inf:
         now[Now.DUE] += 1
     if times.compared < np.inf:
-        share(kept, now, t, runs.y)
+        share(records, now, t, runs.y)
         while now[Now.MET] * times.compared <= t + _EARLY * times.compared:
             now[Now.MET] += 1
 
 
-def asked(times: Times, now: Array, t: float, end: float) -> bool:
+def is_due(times: Times, now: Array, t: float, end: float) -> bool:
     """Whether a sample or a shared state is due before t."""
     return due(now[Now.DUE], times.period, t, end) or due(now[Now.MET], times.compared, t, end)
 
@@ -261,7 +240,7 @@ def due(k: int, period: float, t: float, end: float) -> bool:
 
 
 def inside(
-    f: Functions, runs: Runs, kept: Kept, times: Times, now: Array, t: float, h: float, t1: float, end: float,
+    f: Functions, runs: Runs, records: Records, times: Times, now: Array, t: float, h: float, t1: float, end: float,
     p: Array, F: Array,
 ) -> None:  # fmt: skip
     """The samples and shared states within a step."""
@@ -269,40 +248,13 @@ def inside(
     while due(now[Now.DUE], times.period, t1, end):
         at = now[Now.DUE] * times.period
         between(runs.y, F, (at - t) / h, x)
-        keep(f, runs, kept, now, at, x, p)
+        sample(f, runs, records, 0, now, at, x, p)
         now[Now.DUE] += 1
     while due(now[Now.MET], times.compared, t1, end):
         at = now[Now.MET] * times.compared
         between(runs.y, F, (at - t) / h, x)
-        share(kept, now, at, x)
+        share(records, now, at, x)
         now[Now.MET] += 1
-
-
-def keep(f: Functions, runs: Runs, kept: Kept, now: Array, t: float, y: Array, p: Array) -> None:
-    """Keep a sample."""
-    row = now[Now.ROW]
-    kept.t[row] = t
-    copy(kept.y[row], y)
-    evaluate(f.sample, t, y, p, runs.run_parameters, kept.made[row])
-    now[Now.ROW] += 1
-
-
-def share(kept: Kept, now: Array, t: float, y: Array) -> None:
-    """Keep a state for companion runs."""
-    row = now[Now.SHARED]
-    kept.shared_t[row] = t
-    copy(kept.shared[row], y[:, 0])
-    now[Now.SHARED] += 1
-
-
-def walk(runs: Runs, kept: Kept, now: Array, t: float) -> None:
-    """Keep the end of a step, while there is room."""
-    row = now[Now.WALKED]
-    if row < len(kept.step_log_t):
-        kept.step_log_t[row] = t
-        if row < len(kept.step_log):
-            copy(kept.step_log[row], runs.y[:, 0])
-        now[Now.WALKED] += 1
 
 
 def fast(y: Array, n: int) -> bool:

@@ -1,4 +1,4 @@
-"""A run made ready: its equations as functions, interpreted or machine code, in one of the two time loops.
+"""Build a run: its equations as functions, interpreted or machine code, in one of the two time loops.
 
 run = prepared(setup, equation, machine);   record = run.record()
 """
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
 
 
-def prepared(
+def make_run(
     setup: Setup,
     equation: StateEquation,
     compiled_equation: CompiledStateEquation | None,
@@ -50,14 +50,14 @@ def prepared(
         on_progress: Called with the time reached.
         observer: Sees each step.
         samples: Whether samples are kept.
-        most: Evaluations after which it gives up with a TooLongError.
+        most: Evaluations after which it gives up as `TooLong`.
         thresholds: Whether steps end at the thresholds of the effects.
-        chooses: Whether it gives up with a StiffError where another method is to make the run.
+        chooses: Whether it gives up as `Stiff` or `Accumulation` where another method is to make the run.
     """
-    transfers = PayloadEvents(equation)
-    watch = Watch(setup, transfers.equation)
+    payloads = PayloadEvents(equation)
+    watch = Watch(setup, payloads.equation)
 
-    def made(of: StateEquation) -> tuple[Functions, np.ndarray]:
+    def functions_of(of: StateEquation) -> tuple[Functions, np.ndarray]:
         if compiled_equation is None and of.impulses and setup.finds_events:
             return in_modes(of, watch), np.zeros(3 * of.plant.dynamics.n)
         if compiled_equation is None:
@@ -82,10 +82,10 @@ def prepared(
             else places(compiled_equation.known, plant.effects, first)
         )
         return EventRun(
-            watch, transfers, made, ends, of_mode, loop, on_progress, observer, in_python, samples, most, thresholds,
-            chooses,
+            watch, payloads, functions_of, ends, of_mode, loop, on_progress, observer, in_python, samples, most,
+            thresholds, chooses,
         )  # fmt: skip
-    return FixedStep(watch, transfers, made, cast(Fraction, pace), loop, on_progress, observer)
+    return FixedStep(watch, payloads, functions_of, cast(Fraction, pace), loop, on_progress, observer)
 
 
 def _numbers(compiled_equation: CompiledStateEquation, equation: StateEquation) -> np.ndarray:

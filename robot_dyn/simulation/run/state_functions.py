@@ -1,4 +1,4 @@
-"""The state equation as functions for a time loop, (t, y, p, own, out), of one interpreted run.
+"""The state equation as functions for a time loop, (t, y, p, run_parameters, out), of one interpreted run.
 
 rate: y' and u    tick: u, in zero-order hold from then on, and the next states of the controller    energy: K and V
 sample: y', u, K and V    jacobian: as of `RightSide`, by differences    bodies: as of `bodies`
@@ -74,7 +74,7 @@ def interpreted(equation: StateEquation, watch: Watch) -> Functions:
 
 
 def in_modes(equation: StateEquation, watch: Watch) -> Functions:
-    """The same in the mode that the last 3n own numbers are: held, direction and contact."""
+    """The same in the mode that the last 3n run parameters are: held, direction and contact."""
     known: dict[bytes, Functions] = {}
 
     def of(run_parameters: Array) -> Functions:
@@ -111,7 +111,7 @@ def sample(equation: StateEquation, t: float, y: Array, held: Array | None, out:
 
 
 def _state(y: Array) -> Array:
-    """A state (m,) that code of a user's own may keep, and may not change."""
+    """A state (m,) that user-defined code may store, and may not change."""
     x = y[:, 0].copy()
     x.setflags(write=False)
     return x

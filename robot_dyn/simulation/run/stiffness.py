@@ -13,34 +13,17 @@ from robot_dyn.integrate.adaptive import EXPLICIT, STIFF
 from robot_dyn.simulation.dynamics.fastest_motion import Fastest, fastest
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.observation.remarks import Kind, Remark
+from robot_dyn.simulation.run.outcome import Stiff
 from robot_dyn.simulation.setup.setup import Setup
 
 _BOUND = (4.0, 9.0)  # h |λ| of explicit steps that stability bounds: by 6.1 for DOP853, about which they go up and down
-
-
-_WORTH = 1000  # steps yet to be made for which to begin again pays
-
-
+_WORTH = 1000  # steps still to be made for which starting again is worthwhile
 FIRST_LOOK = 500  # steps of a run whose method is to be chosen, then after as many again as there were
-
-
 _MEAN = 20  # steps whose mean length is looked at
 
 
-class StiffError(Exception):
-    """A run by an explicit method that another one is to make.
-
-    Attributes:
-        remark: Why.
-    """
-
-    def __init__(self, remark: Remark):
-        super().__init__(remark.text)
-        self.remark = remark
-
-
-def changes_over(setup: Setup, equation: StateEquation, ends: Array, y: Array, held: Array | None) -> None:
-    """StiffError if stability bounds the latest steps of an explicit method, and many more would follow.
+def changes_over(setup: Setup, equation: StateEquation, ends: Array, y: Array, held: Array | None) -> Stiff | None:
+    """Why a stiff method is to make a run: stability bounds its latest steps, and many more would follow; else None.
 
     Args:
         setup: What is run.
@@ -51,14 +34,13 @@ def changes_over(setup: Setup, equation: StateEquation, ends: Array, y: Array, h
     """
     t, h = float(ends[-1]), float(ends[-1] - ends[-1 - _MEAN]) / _MEAN
     if h * _WORTH > setup.duration_s - t:
-        return
+        return None
     try:
         motion = fastest(equation, t, y, held)
     except (RobotDynError, np.linalg.LinAlgError):
-        return
-    if bounds(motion, h):
-        remedy = f"made by {STIFF} in place of {EXPLICIT}"
-        raise StiffError(remark(motion, 0.0, t, t, remedy))
+        return None
+    remedy = f"made by {STIFF} in place of {EXPLICIT}"
+    return Stiff(remark(motion, 0.0, t, t, remedy)) if bounds(motion, h) else None
 
 
 def bounds(motion: Fastest, h: float) -> bool:

@@ -1,8 +1,7 @@
-"""What a run does in Python behind events: words, sides and modes that are not known yet, payloads, and ends."""
+"""What a run does in Python behind events: sides and modes that are not known yet, payloads, and ends."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from math import inf
 from typing import Any
@@ -13,94 +12,52 @@ from robot_dyn.arithmetic import Array
 from robot_dyn.convex import not_found
 from robot_dyn.errors import NotFiniteError, OverflowedError, RobotDynError
 from robot_dyn.integrate.step_control import At
-from robot_dyn.simulation.dynamics.loop_state import Ended, Functions, Now, Rules, Runs
-from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.dynamics.loop_state import Ended, Functions, Now
 from robot_dyn.simulation.events.crossings import Switches
 from robot_dyn.simulation.events.event_log import CHATTER, EventLog, What, remember_time
 from robot_dyn.simulation.events.holding import Holding, part, write_mode
 from robot_dyn.simulation.events.mode_change import change
 from robot_dyn.simulation.events.modes import Modes
 from robot_dyn.simulation.events.occurrence import Occurrence
-from robot_dyn.simulation.events.payload_events import PayloadEvents
 from robot_dyn.simulation.events.sides import Sides, keep_numbers, sides_of
 from robot_dyn.simulation.events.switching import Switching
 from robot_dyn.simulation.observation.remarks import Kind, Remark
 from robot_dyn.simulation.run.driver import Driver
-from robot_dyn.simulation.run.watch import DivergedError, Watch
-from robot_dyn.simulation.setup.segment_table import SegmentTable
-from robot_dyn.simulation.setup.setup import STEP_S, Setup
+from robot_dyn.simulation.run.outcome import Accumulation
+from robot_dyn.simulation.run.watch import DivergedError
+from robot_dyn.simulation.setup.setup import STEP_S
 from robot_dyn.threshold import Threshold
-
-Made = Callable[[StateEquation], tuple[Functions, np.ndarray]]
-
-
-class AccumulationError(Exception):
-    """Internal: a run whose events accumulate, which time stepping is to make.
-
-    Attributes:
-        remark: Why.
-    """
-
-    def __init__(self, remark: Remark) -> None:
-        super().__init__(remark.text)
-        self.remark = remark
-
-
-class TerminalEvent(Exception):  # noqa: N818
-    """Internal: an event that ends the run, at `t`."""
-
-    def __init__(self, t: float, name: str) -> None:
-        super().__init__(name)
-        self.t = t
 
 
 class SwitchedRun(Driver):
     """A run whose equation switches at events.
 
     Attributes:
-        setup, equation, watch, transfers: Of the run, with what it carries now.
-        made: As of `EventRun`.
-        table, runs, rules, control, switches, sides: What the loop takes.
+        control, switches, sides: What the loop takes, too.
         switching: Its switching functions, and its modes.
-        functions, in_python: Of the state equation on the sides that the run is on; as Python calls them, if that is
-            machine code.
+        in_python: The functions as Python calls them, where they are machine code.
         bodies: The function of that name, of the equation whose parts switch by themselves.
-        events, log: What happened, and what the loop has noted since it was called.
-        samples: Whether samples are kept.
+        log: What the loop has noted since it was called.
+        samples: Whether samples are recorded.
         chooses: Whether another method may make the run.
-        beyond: The time of a terminal event that a companion has passed, in [s].
+        past_horizon: The time of a terminal event that a companion has passed, in [s].
         met: Why the rate had no value.
     """
 
-    setup: Setup
-    equation: StateEquation
-    watch: Watch
-    transfers: PayloadEvents
-    made: Made
-    table: SegmentTable
-    runs: Runs
-    rules: Rules
     control: Array
     switches: Switches
     sides: Sides
     switching: Switching
-    functions: Functions
     in_python: Functions | None
     bodies: Any
-    events: list[Occurrence]
     log: EventLog
     samples: bool
     chooses: bool
-    beyond: float = inf
+    past_horizon: float = inf
     met: RobotDynError | None = None
 
-    @property
-    def y(self) -> np.ndarray:
-        """The state reached."""
-        return self.runs.y[:, 0].copy()
-
-    def _tell(self) -> None:
-        """Keep what happened in the loop, in words."""
+    def _take_log(self) -> None:
+        """Take the events that the loop has noted."""
         count, self.log.filled[0] = int(self.log.filled[0]), 0
         if count:
             happened = [self._occurrence(row) for row in self.log.rows[:count].tolist()]
@@ -123,12 +80,10 @@ class SwitchedRun(Driver):
     def _change_mode(self) -> None:
         """Let the functions be those of the sides that the switching functions are on."""
         switching = self.switching
-        if switching.thresholds or switching.dropped or self.transfers.any:
-            functions, parameters = self.made(switching.on(self.switches.sides))
-            self.functions, self.runs.run_parameters[self.rules.held :, 0] = (
-                functions._replace(bodies=self.bodies),
-                parameters,
-            )
+        if switching.thresholds or switching.dropped or self.payloads.any:
+            functions, parameters = self.functions_of(switching.on(self.switches.sides))
+            self.functions = functions._replace(bodies=self.bodies)
+            self.runs.run_parameters[self.rules.held :, 0] = parameters
             if self.in_python is not None:  # else functions change with the sides
                 keep_numbers(self.sides, switching.of_thresholds(self.switches.sides), parameters)
         if switching.modes is not None:
@@ -152,8 +107,7 @@ class SwitchedRun(Driver):
             except (OverflowedError, NotFiniteError) as error:
                 self.met, out[...] = error, np.nan
 
-        made: Any = functions._replace(rate=rate)
-        return made
+        return functions._replace(rate=rate)
 
     def _chatters(self) -> bool:
         """Whether the latest events were all of one threshold, in next to no time."""
@@ -168,11 +122,10 @@ class SwitchedRun(Driver):
         dropped = self.switching.dropped | {(each.joint, each.of_actuation)}
         self.switching = Switching(self.equation, dropped, self.switching.modes)
         self._forget_sides()
-        held = self.runs.run_parameters[: self.rules.held, 0] if self.rules.held else None
-        self._watch_anew(last.t, held)
+        self._renew_switches(last.t)
 
-    def _end_mode(self, ended: Ended, t: float, y: np.ndarray) -> None:
-        """Behind the end of a mode: what the loop leaves to be done, or cannot do."""
+    def _end_mode(self, ended: Ended, t: float, y: np.ndarray) -> Accumulation | None:
+        """Behind the end of a mode: what the loop leaves to be done, or cannot do; why the run gives up, if it does."""
         modes = self.switching.modes
         assert modes is not None
         if ended is Ended.UNSETTLED:
@@ -180,30 +133,26 @@ class SwitchedRun(Driver):
             raise not_found(room.whole[:, : len(room.load)], room.load)
         if ended is Ended.ACCUMULATED:
             guard = int(self.now[Now.EVENT]) - self.switches.thresholds
-            self._accumulated(t, y, modes.holding, modes.joint(guard))
-        self._watch_anew(t, self.runs.run_parameters[: self.rules.held, 0] if self.rules.held else None)
+            return self._accumulated(t, y, modes.holding, modes.joint(guard))
+        self._renew_switches(t)
         self._change_mode()
+        return None
 
-    def _transfer(self, s: int) -> None:
-        """Go on with what is carried from the start of a segment on."""
-        t, held = (
-            float(self.table.starts[s]),
-            self.runs.run_parameters[: self.rules.held, 0] if self.rules.held else None,
-        )
-        self.runs.y[:, 0], happened = self.transfers.over(t, self.y)
-        self.equation = self.watch.equation = self.transfers.equation
-        self._keep(*happened)
-        functions, parameters = self.made(self.equation)
-        self.bodies = functions.bodies
+    def _change_carried(self) -> None:
+        """Go on with what is carried from the start of a segment on, in a mode of its own."""
+        s = int(self.now[Now.SEGMENT])
+        t = float(self.table.starts[s])
+        self._keep(*self._change_payload())
+        functions, self.bodies = self.functions, self.functions.bodies
         if (modes := self.switching.modes) is not None:
-            run_parameters = np.concatenate([np.full(self.rules.held, np.nan), parameters])[:, None]
+            run_parameters = self.runs.run_parameters.copy()
+            run_parameters[: self.rules.held] = np.nan
             modes = Modes(self.equation, modes.holding._replace(run_parameters=run_parameters))
             self._settle(modes, self.in_python or functions, t, self.table.parameters[s])
         self.switching = Switching(self.equation, self.switching.dropped, modes)
         self._forget_sides()
-        self._tell()
-        self.table.transfers[s] = 0
-        self._watch_anew(t, held)
+        self._take_log()
+        self._renew_switches(t)
         if self.setup.integrator.needs_jacobian:
             self.control[At.NEXT] = 0.0
         self._change_mode()
@@ -217,8 +166,8 @@ class SwitchedRun(Driver):
         if not found:
             raise not_found(holding.room.whole[:, : len(holding.room.load)], holding.room.load)
 
-    def _accumulated(self, t: float, y: np.ndarray, holding: Holding, joint: str) -> None:
-        """AccumulationError if another method may make the run, else DivergedError."""
+    def _accumulated(self, t: float, y: np.ndarray, holding: Holding, joint: str) -> Accumulation:
+        """Why another method is to make the run; DivergedError if none may."""
         first = float(holding.changes[holding.changed[0] % len(holding.changes)])
         what = f"{len(holding.changes)} changes of what holds joints in {t - first:.1e} s, the last of joint {joint!r}"
         motion = self.equation.equation_of_motion
@@ -226,21 +175,18 @@ class SwitchedRun(Driver):
         if alone or not self.chooses:
             remedy = "soft stops and regularised friction" if alone else "integrator='time_stepping' and a step_s"
             raise DivergedError(t, f"events accumulate at t = {t}: {what}; take {remedy}")
-        velocity = float(np.abs(y[self.rules.n : 2 * self.rules.n]).max())
+        speed = float(np.abs(y[self.rules.n : 2 * self.rules.n]).max())
+        text = f"{what}, at t = {t:.6g} s"
         remedy = f"made by time stepping with steps of {STEP_S} s, without an estimate of its error"
-        raise AccumulationError(
-            Remark(
-                Kind.ACCUMULATE, joint, "v", first, t - first, t, velocity, None, f"{what}, at t = {t:.6g} s", remedy
-            )
-        )
+        return Accumulation(Remark(Kind.ACCUMULATE, joint, "v", first, t - first, t, speed, None, text, remedy))
 
-    def _watch_anew(self, t: float, held: Array | None) -> None:
+    def _renew_switches(self, t: float) -> None:
         """The switching functions of the state reached."""
         degree, functions = len(self.switches.b) - 1, self.switches.functions
-        self.switches = self.switching.at(t, self.y, degree, functions, held)
+        self.switches = self.switching.at(t, self.y, degree, functions, self.held)
 
-    def _event(self, t: float, y: np.ndarray) -> None:
-        """Keep an event, and go on behind it; TerminalEvent ends the run."""
+    def _event(self, t: float, y: np.ndarray) -> str | None:
+        """Keep an event, and go on behind it; the name of one that ends the run, else None."""
         index, E = int(self.now[Now.EVENT]), len(self.switching.thresholds)
         side = float(self.switches.sides[index])
         index = self.switching.number(index)
@@ -251,11 +197,14 @@ class SwitchedRun(Driver):
             if self._chatters():
                 self._drop(self.switching.thresholds[index])
             self._change_mode()
-            return
+            return None
         event = self.setup.events[index - E]
-        if event.direction in (0, int(side)):
-            self._keep(self.switching.occurrence(index, t, y, side))
-            if event.terminal and self.samples:
-                raise TerminalEvent(t, event.name)
-            if event.terminal:  # a companion goes on, past the states of the run at which they are compared
-                self.beyond = min(self.beyond, t)
+        if event.direction not in (0, int(side)):
+            return None
+        self._keep(self.switching.occurrence(index, t, y, side))
+        if not event.terminal:
+            return None
+        if self.samples:
+            return event.name
+        self.past_horizon = min(self.past_horizon, t)  # a companion goes on, past the states that are compared
+        return None

@@ -8,40 +8,20 @@ that has ended is nan from there on.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.integrate.primitives import below, copy, evaluate, sizes
-from robot_dyn.simulation.dynamics.loop_state import Ended, Functions, Now, Rules, Runs, Why
+from robot_dyn.simulation.dynamics.loop_state import Ended, Functions, Now, Rules, Runs, Why, erase_ended
 from robot_dyn.simulation.observation.observation import Observation, observe, observe_actuation, observe_motion
 from robot_dyn.simulation.run.philox import draw
+from robot_dyn.simulation.run.recording import Records, sample, share, show
 from robot_dyn.simulation.setup.segment_table import SegmentTable
 
 WATCHED = 64  # steps between looks at the energy
 RUNAWAY = 1e3  # times all the energy there was, that may come from nowhere
-
-
-class Records(NamedTuple):
-    """What is kept.
-
-    Attributes:
-        which: Entries of y that samples hold, (c,).
-        place: Segment and step of each sample, (R, 2).
-        y, made: Those entries, and what else a sample holds, (R, c, B) and (R, d, B).
-        shared: States that companion runs share, with segment and step, (K, m + 2).
-        columns: As of `Observer.columns`; without any, none is written.
-        observation: What was observed of the runs; of none, no step is shown.
-    """
-
-    which: Array
-    place: Array
-    y: Array
-    made: Array
-    shared: Array
-    columns: Array
-    observation: Observation
 
 
 def time_loop(step: Callable[..., int]) -> Callable[..., int]:
@@ -63,17 +43,18 @@ def time_loop(step: Callable[..., int]) -> Callable[..., int]:
         while now[Now.SEGMENT] <= last:
             s = now[Now.SEGMENT]
             start, h, p = table.starts[s], table.lengths[s], table.parameters[s]
-            if table.transfers[s] == 1:
-                return Ended.TRANSFER
+            if table.payload_events[s] == 1:
+                return Ended.PAYLOAD
             tick, at_tick = table.ticks[s], table.at_ticks[s]
             if now[Now.STEP] == 0 and tick > 0 and not act(functions, runs, rules, start, at_tick, tick):
                 return Ended.TICK
             while now[Now.STEP] < table.counts[s]:
                 k = now[Now.STEP]
                 t = start + k * h
-                share(runs, records, rules, now, s == last)
+                share_at_step(runs, records, rules, now, t, s == last)
                 if t >= clock[0] - clock[2] or (s == last and clock[0] < np.inf):
-                    sample(functions, runs, records, rules, now, clock, t, p)
+                    sample(functions, runs, records, rules.base, now, t, runs.y, p)
+                    clock[0] += clock[1]
                     if rules.apart > 0 and t > records.observation.latest[0]:
                         show_actuation(functions, runs, records.observation, t, p, False)
                 if s == last:
@@ -122,34 +103,13 @@ def acts(rules: Rules, tick: int) -> bool:
     return tick > 0 and (tick - 1) % rules.instants == rules.acting
 
 
-def share(runs: Runs, records: Records, rules: Rules, now: Array, last: bool) -> None:
-    """Keep the state for companion runs, at each `every`-th step of a segment, and at the end."""
+def share_at_step(runs: Runs, records: Records, rules: Rules, now: Array, t: float, last: bool) -> None:
+    """Store the state for companion runs, at each `every`-th step of a segment, and at the end."""
     if rules.every == 0 or now[Now.STEP] % rules.every != 0:
         return
     if now[Now.SEEN] % rules.thin == 0 or last:
-        row, m = now[Now.SHARED], len(runs.y)
-        copy(records.shared[row, :m], runs.y[:, 0])
-        records.shared[row, m] = now[Now.SEGMENT]
-        records.shared[row, m + 1] = now[Now.STEP]
-        now[Now.SHARED] += 1
+        share(records, now, t, runs.y)
     now[Now.SEEN] += 1
-
-
-def sample(
-    functions: Functions, runs: Runs, records: Records, rules: Rules, now: Array, clock: Array, t: float, p: Array
-) -> None:
-    """Keep a sample."""
-    row, W = now[Now.ROW], runs.y.shape[1]
-    records.place[row, 0], records.place[row, 1] = now[Now.SEGMENT], now[Now.STEP]
-    base = rules.base
-    for j in range(len(records.which)):
-        copy(records.y[row, j, base : base + W], runs.y[records.which[j]])
-    if len(runs.made) > 0:
-        evaluate(functions.sample, t, runs.y, p, runs.run_parameters, runs.made)
-        erase_ended(runs.made, runs)
-        copy(records.made[row, :, base : base + W], runs.made)
-    now[Now.ROW] += 1
-    clock[0] += clock[1]
 
 
 def take(runs: Runs, rules: Rules, t: float) -> bool:
@@ -205,45 +165,6 @@ def end(runs: Runs, b: int, t: float, why: int) -> None:
     """End a run in lock step."""
     runs.alive[b], runs.why[b], runs.ended[b] = 0, why, t
     copy(runs.last[:, b], runs.y[:, b])
-
-
-def erase_ended(x: Array, runs: Runs) -> None:
-    """Nan in x (r, W) for the runs that have ended."""
-    if below(runs.why, 1):
-        return
-    for b in range(len(runs.alive)):
-        if runs.alive[b] == 0:
-            erase(x, b)
-
-
-def erase(x: Array, b: int) -> None:
-    """Nan in place of the numbers of a run."""
-    for e in range(len(x)):
-        x[e, b] = np.nan
-
-
-def show(
-    runs: Runs, records: Any, rules: Rules, latest: Array, now: Array, began: float, t: float, acted: bool
-) -> None:
-    """Observe a step of a single run: y at its end, and u, or v and u, of its latest evaluation.
-
-    For an observer it is written into a column, too, for which its driver leaves room.
-    """
-    if records.observation.low.shape[1] == 0:
-        return
-    n, m = rules.n, len(runs.y)
-    q, v, u = runs.y[:n], runs.y[n : 2 * n], latest[m : m + n]
-    if rules.canonical:
-        v = latest[:n]
-    observe(records.observation, began, t, q, v, u, acted or rules.held == 0)
-    if records.columns.shape[1] == 0:
-        return
-    c = now[Now.COLUMN]
-    records.columns[0, c] = t
-    copy(records.columns[1 : 1 + n, c], q[:, 0])
-    copy(records.columns[1 + n : 1 + 2 * n, c], v[:, 0])
-    copy(records.columns[1 + 2 * n :, c], u[:, 0])
-    now[Now.COLUMN] += 1
 
 
 def show_lanes(

@@ -28,7 +28,7 @@ class SegmentTable(NamedTuple):
     Attributes:
         starts, lengths: When it starts and its step, (S,), in [s].
         counts, ticks: Its steps, and the number, from 1, of the tick of a sampled controller at its start, or 0, (S,).
-        transfers: 1 where a payload is picked up or dropped at its start, (S,).
+        payload_events: 1 where a payload is picked up or dropped at its start, (S,).
         parameters: p of the state equation on it, (S, P).
         at_ticks: The same at its start alone.
     """
@@ -37,7 +37,7 @@ class SegmentTable(NamedTuple):
     lengths: Array
     counts: Array
     ticks: Array
-    transfers: Array
+    payload_events: Array
     parameters: Array
     at_ticks: Array
 
@@ -47,7 +47,7 @@ def segment_table(setup: Setup, pace: Fraction = Fraction(1)) -> SegmentTable:
     if pace != 1 or len(setup.segments) > _MOST_CACHED:
         return _table(setup, pace)
     table = cached(setup, _table)
-    return table._replace(ticks=table.ticks.copy(), transfers=table.transfers.copy())
+    return table._replace(ticks=table.ticks.copy(), payload_events=table.payload_events.copy())
 
 
 def _table(setup: Setup, pace: Fraction = Fraction(1)) -> SegmentTable:
@@ -66,13 +66,13 @@ def _table(setup: Setup, pace: Fraction = Fraction(1)) -> SegmentTable:
         np.append((ends - starts[:-1]) / counts, 0.0),
         np.append(counts, 1).astype(np.int64),
         np.where(ticks, np.cumsum(ticks), 0),
-        np.append(np.isin(starts[:-1], _transfers(setup)), False).astype(np.int64),
+        np.append(np.isin(starts[:-1], _payload_events(setup)), False).astype(np.int64),
         np.vstack([inside, at_ticks[-1:]]),
         at_ticks,
     )
 
 
-def _transfers(setup: Setup) -> list[float]:
+def _payload_events(setup: Setup) -> list[float]:
     """Times after the start at which payloads are picked up or dropped, in [s]."""
     payloads = setup.plant.equation_of_motion.payloads
     return [t for each in payloads for t in each.switches if t > 0]

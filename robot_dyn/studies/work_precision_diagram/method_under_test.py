@@ -22,7 +22,7 @@ from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.compiled.engine_choice import choose
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.results.samples import ledger
-from robot_dyn.simulation.run.make_run import prepared
+from robot_dyn.simulation.run.make_run import make_run
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.setup.size import MOST_CUT
@@ -200,7 +200,7 @@ def timed(setup: Setup, limit: Limit, events: bool = True) -> Run:
     """
     equation = StateEquation(setup.plant, setup.controller, setup.integrator.canonical)
     machine, _ = choose(setup, equation)
-    run = prepared(setup, equation, machine, on_progress=limit, thresholds=events)
+    run = make_run(setup, equation, machine, on_progress=limit, thresholds=events)
     began = perf_counter()
     record = run.record()
     spent = perf_counter() - began
