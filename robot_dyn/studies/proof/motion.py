@@ -30,7 +30,7 @@ from robot_dyn.lagrange.recursions.newton_euler import newton_euler
 from robot_dyn.lagrange.tree import tree
 from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.studies.proof.tape.literals import Literals
+from robot_dyn.studies.proof.term import Literals
 
 _EFFECTS = (ViscousFriction, RegularisedCoulombFriction, Spring)
 _CONTROLLERS = (PD, ComputedTorque, PDGravity, FeedForward)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from math import inf, log10, nextafter
 from typing import Any, final
@@ -14,9 +12,8 @@ import numpy as np
 from robot_dyn.arithmetic import Array, Ball
 from robot_dyn.errors import QueryError, escaped
 from robot_dyn.result import UNREPORTED, reported
-from robot_dyn.studies.proof.node import Node, on_the_way
-from robot_dyn.studies.proof.packed import Packed, unpacked
-from robot_dyn.studies.proof.start import numbers_of
+from robot_dyn.studies.proof.hypotheses import numbers_of
+from robot_dyn.studies.proof.node import Node, Packed, on_the_way, unpacked
 from robot_dyn.validate import number, numbers
 from robot_dyn.values import Value
 
@@ -95,7 +92,7 @@ class Proof(Value):
         if not 0 <= t <= self.until_s:
             raise QueryError(f"t must be between 0 and {self.until_s!r} s, up to which it is proven, got {t!r}")
         k = bisect_right(self.nodes, t, key=lambda node: node.t) - 1
-        with self._precision():
+        with Ball(self.bits).scope():
             if self.nodes[k].t == t:
                 q, v = ([unpacked(x) for x in known] for known in (self.nodes[k].q, self.nodes[k].v))
             else:
@@ -114,7 +111,7 @@ class Proof(Value):
             QueryError: If one has another shape, or t is beyond what is proven.
         """
         known = dict(zip("qv", self.at(t), strict=True))
-        with self._precision():
+        with Ball(self.bits).scope():
             given = {"q": numbers_of("q", q, self.joint_names)}
             if v is not None:
                 given["v"] = numbers_of("v", v, self.joint_names)
@@ -140,7 +137,7 @@ class Proof(Value):
             raise QueryError(f"no sample lies within the {self.until_s!r} s that are proven")
         ends, most = np.array([node.t for node in self.nodes]), 0.0
         steps = np.clip(np.searchsorted(ends, t[within], side="left"), 1, None)
-        with self._precision():
+        with Ball(self.bits).scope():
             for k in np.unique(steps).tolist() if len(ends) > 1 else ():
                 at = on_the_way(self.nodes[k - 1].t, self.nodes[k])
                 for time, row in zip(t[within][steps == k].tolist(), q[within][steps == k].tolist(), strict=True):
@@ -184,11 +181,6 @@ class Proof(Value):
         if not self.until_s:
             return "nothing is proven."
         return f"the motion exists and is the only one for 0 ≤ t ≤ {self.until_s!r} s, and at its end it is within"
-
-    @contextmanager
-    def _precision(self) -> Iterator[None]:
-        with Ball(self.bits).scope():
-            yield
 
 
 def _far(ball: Any, x: float) -> float:

@@ -11,10 +11,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from robot_dyn.studies.proof.enclosure.balls import Ball, Matrix, NotProvenError, dot, matrix, upper
-from robot_dyn.studies.proof.enclosure.mass import Inverse
+from robot_dyn.studies.proof.enclosure.balls import (
+    Ball,
+    Inverse,
+    Matrix,
+    NotProvenError,
+    absolute_product,
+    matrix,
+    upper,
+)
 from robot_dyn.studies.proof.enclosure.polynomial import coefficient
-from robot_dyn.studies.proof.tape.tape import Tape
+from robot_dyn.studies.proof.tape import Tape
 
 
 def jacobian(tape: Tape, inverse: Inverse, given: Sequence[Any], length: int = 1) -> list[Matrix]:
@@ -64,9 +71,9 @@ def on_a_set(
     ((right, M),) = _parts(tape, (t, q, v, a), 1)
     more = inverse.contraction(M)
     J = -inverse.solve(more, right)
-    sizes = [upper(b) for b in B]
-    for i, (c, d) in enumerate(zip(C, inverse.bound(more, rho), strict=True)):
-        if not d + dot([upper(J[i, j]) for j in range(2 * n)], sizes) < c.upper():
+    spread = absolute_product(J, [upper(b) for b in B])
+    for c, d, x in zip(C, inverse.bound(more, rho), spread, strict=True):
+        if not d + x < c.upper():
             raise NotProvenError("accelerations within the tube are not bounded: the set of states is too wide")
     return J
 
