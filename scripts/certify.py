@@ -15,7 +15,7 @@ import robot_dyn as rd
 from robot_dyn.result import plain
 
 MOST_JOINTS = 12
-ROADS = (
+IMPLEMENTATIONS = (
     "Pinocchio", "Lagrangian, float32", "Lagrangian, float64", "Lagrangian, longdouble", "articulated body",
     "machine code",
 )  # fmt: skip
@@ -36,16 +36,18 @@ def arms() -> list[str]:
 
 def digits(made: Document, quantity: str, implementation: str) -> tuple[float, float] | None:
     """At the worst of the random states, and at the worst that was found."""
-    found = [each for each in made["digits"] if (each["quantity"], each["road"]) == (quantity, implementation)]
+    found = [
+        each for each in made["digits"] if (each["quantity"], each["implementation"]) == (quantity, implementation)
+    ]
     return (found[0]["random"], found[0]["searched"]) if found else None
 
 
 def of_robots(documents: dict[str, Document]) -> None:
     """A row for each robot: κ, and digits of forward dynamics."""
-    print(f"\n| robot | joints | κ, typical | κ, searched | {' | '.join(ROADS)} | decimals |")
-    print("|---|--:|--:|--:|" + "--:|" * (len(ROADS) + 1))
+    print(f"\n| robot | joints | κ, typical | κ, searched | {' | '.join(IMPLEMENTATIONS)} | decimals |")
+    print("|---|--:|--:|--:|" + "--:|" * (len(IMPLEMENTATIONS) + 1))
     for name, made in sorted(documents.items(), key=lambda each: (len(each[1]["joints"]), each[0])):
-        found = [digits(made, FORWARD, implementation) for implementation in ROADS]
+        found = [digits(made, FORWARD, implementation) for implementation in IMPLEMENTATIONS]
         cells = ["—" if each is None else f"{each[0]:.1f} → {each[1]:.1f}" for each in found]
         of, decimals = made["condition"], made["decimals"].get(FORWARD)
         kappa = [f"{of[key]:.3g}" if of[key] and of[key] < 1e15 else "∞" for key in ("typical", "searched")]
@@ -54,17 +56,17 @@ def of_robots(documents: dict[str, Document]) -> None:
 
 
 def of_quantities(documents: dict[str, Document]) -> None:
-    """A row for each quantity and road: the fewest digits of all robots."""
-    print("\n| quantity | road | median of typical | worst random | searched | robot | worse than random |")
+    """A row for each quantity and implementation: the fewest digits of all robots."""
+    print("\n| quantity | implementation | median of typical | worst random | searched | robot | worse than random |")
     print("|---|---|--:|--:|--:|---|--:|")
     for quantity in ("M", "C", "N", "inverse_dynamics", FORWARD):
-        for implementation in ROADS:
+        for implementation in IMPLEMENTATIONS:
             found = {name: each for name, made in documents.items() if (each := digits(made, quantity, implementation))}
             if found:
                 name = min(found, key=lambda name: found[name][1])
                 typical = sorted(
                     each["typical"] for made in documents.values() for each in made["digits"]
-                    if (each["quantity"], each["road"]) == (quantity, implementation)
+                    if (each["quantity"], each["implementation"]) == (quantity, implementation)
                 )  # fmt: skip
                 worse = sum(searched < random for random, searched in found.values())
                 median, at_random = typical[len(typical) // 2], min(x for x, _ in found.values())

@@ -1,4 +1,4 @@
-"""Cross-check M, C, N of robots by two roads: the same as `robot-dyn compare`, with --quick for a few robots."""
+"""Cross-check M, C, N of robots by two implementations, as `robot-dyn compare`, with --quick for a few robots."""
 
 from __future__ import annotations
 

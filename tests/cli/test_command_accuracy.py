@@ -76,16 +76,16 @@ def test_mistakes_are_told_in_one_line_before_the_work(scene, tmp_path, monkeypa
 
 WATCHED = """
 import sys
-from robot_dyn.studies.work_precision_diagram import measured
+from robot_dyn.studies.work_precision_diagram import measurement
 from robot_dyn.cli import main
 
-walk = measured._walk
+walk = measurement._walk
 
 def watched(*arguments):
     walk(*arguments)
     print("at work", file=sys.stderr, flush=True)
 
-measured._walk = watched
+measurement._walk = watched
 main()
 """
 

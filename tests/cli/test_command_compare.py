@@ -1,4 +1,4 @@
-"""What `compare` and `demo` say of the two roads, and the exit code where they disagree."""
+"""What `compare` and `demo` say of the two implementations, and the exit code where they disagree."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_piped_tables_are_whole():
 
 
 def err_by(monkeypatch: pytest.MonkeyPatch, error: float) -> None:
-    """Let the own road say a wrong N."""
+    """Let the library's own implementation say a wrong N."""
     exact = Lagrangian.N
     monkeypatch.setattr(Lagrangian, "N", lambda self, q: exact(self, q) + error)
 
@@ -60,7 +60,7 @@ def test_a_process_of_compare_exits_with_1_when_the_roads_disagree():
     assert (done.returncode, done.stderr) == (1, b"") and b"DISAGREE" in done.stdout
 
 
-def test_a_road_that_says_nan_disagrees_in_valid_json(monkeypatch: pytest.MonkeyPatch):
+def test_a_implementation_that_says_nan_disagrees_in_valid_json(monkeypatch: pytest.MonkeyPatch):
     err_by(monkeypatch, float("nan"))
     done = run("compare", "ur5", "--samples", "1", "--json")
     assert done.returncode == 1

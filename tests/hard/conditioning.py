@@ -1,4 +1,4 @@
-"""Every road against balls, on chains that cost digits.
+"""Every implementation against balls, on chains that cost digits.
 
     |x − x*| ≤ 32 n u · (Σ of the absolute values of the terms added),    ‖a − a*‖_M ≤ 8 n u κ · Σ ‖M⁻¹τ_k‖_M
 
@@ -63,7 +63,7 @@ def implementations(robot: rd.Robot, compiled: bool) -> dict[str, Any]:
 
 
 class Error(NamedTuple):
-    """What a road errs by in units of its law, n u or n u κ; absolutely; and what was said."""
+    """What an implementation errs by in units of its law, n u or n u κ; absolutely; and what was said."""
 
     implementation: str
     quantity: str
@@ -75,7 +75,7 @@ class Error(NamedTuple):
 def errors(
     robot: rd.Robot, engines: dict[str, Any], at: list[dict[str, np.ndarray]], queries: tuple[Quantity, ...] = QUERIES
 ) -> Iterator[Error]:
-    """Of each road and quantity at each state; of forward dynamics where an engine has it."""
+    """Of each implementation and quantity at each state; of forward dynamics where an engine has it."""
     own, truth = rd.Lagrangian(robot), rd.Lagrangian(robot, rd.Ball(BITS))
     for state in at:
         size, absolute = magnitudes(own.linkage, state["q"]), {key: np.abs(x) for key, x in state.items()}
@@ -107,7 +107,7 @@ def errors(
 
 
 def rows(case: str, robot: rd.Robot, engines: dict[str, Any], at: list[dict[str, np.ndarray]]) -> Iterator[Row]:
-    """Of each road the worst of M, C, C v, N and inverse dynamics, and forward dynamics."""
+    """Of each implementation the worst of M, C, C v, N and inverse dynamics, and forward dynamics."""
     found = list(errors(robot, engines, at))
     for implementation in engines:
         own = [each for each in found if each.implementation == implementation]

@@ -29,7 +29,7 @@ BITS = 1400  # 1e160² beside 1e-160
 BATCH, SPOILT = 19, 7
 
 
-class Roads(NamedTuple):
+class Implementations(NamedTuple):
     """A robot with its right angles written out in full, its engines and its balls."""
 
     robot: rd.Robot
@@ -42,18 +42,18 @@ def loaded(name: str) -> rd.Robot:
     return completed(rd.load(name))[0]
 
 
-def implementations(robot: rd.Robot) -> Roads:
+def implementations(robot: rd.Robot) -> Implementations:
     """Of a robot whose right angles are written out in full."""
     engines = {"Pinocchio": robot, "Lagrangian": rd.Lagrangian(robot), "machine code": rd.Compiled(robot)}
-    return Roads(robot, engines, rd.Lagrangian(robot, rd.Ball(BITS)))
+    return Implementations(robot, engines, rd.Lagrangian(robot, rd.Ball(BITS)))
 
 
-def error(of: Roads, implementation: str, quantity: Quantity, state: dict[str, np.ndarray]) -> float:
+def error(of: Implementations, implementation: str, quantity: Quantity, state: dict[str, np.ndarray]) -> float:
     """In units of n u of the terms added."""
     size = magnitudes(rd.Lagrangian(of.robot).linkage, state["q"])
     x = midpoint(quantity.ask(of.truth, state))
     absolute = {key: np.abs(value) for key, value in state.items()}
-    with np.errstate(over="ignore"):  # of the terms where v² overflows, and every road refuses
+    with np.errstate(over="ignore"):  # of the terms where v² overflows, and every implementation refuses
         scale = diagonal_scale(x) if quantity.definite else quantity.terms(size, absolute)
     difference = quantity.ask(of.engines[implementation], state) - x
     return float(scaled(difference, floored(np.asarray(scale))).max() / (of.robot.n * U))
@@ -100,7 +100,7 @@ def spoilt(name: str, bad: float, seed: int) -> Iterator[Row]:
     yield from beside(name, implementations(loaded(name)), bad, seed)
 
 
-def beside(name: str, of: Roads, bad: float, seed: int) -> Iterator[Row]:
+def beside(name: str, of: Implementations, bad: float, seed: int) -> Iterator[Row]:
     """The same of a robot."""
     rng = np.random.default_rng((29, seed))
     n = of.robot.n

@@ -80,14 +80,14 @@ Column = Callable[[str, rd.Robot, int], Iterator[Row]]
 
 
 def implementations(name: str, robot: rd.Robot, seed: int) -> Iterator[Row]:
-    """All roads against balls."""
+    """All implementations against balls."""
     engines = conditioning.implementations(robot, compiled=True)
     found = list(conditioning.errors(robot, engines, conditioning.states(robot.n, seed)))
     sums = max(each.error for each in found if each.quantity != FORWARD_DYNAMICS.name)
-    yield Row(name, "roads: M … ID, n u", sums, conditioning.SUMS)
+    yield Row(name, "implementations: M … ID, n u", sums, conditioning.SUMS)
     solved = [each for each in found if each.quantity == FORWARD_DYNAMICS.name]
     worst = max(solved, key=lambda each: np.nan_to_num(each.error, nan=np.inf))
-    yield Row(name, "roads: FD, n u κ", worst.error, conditioning.SOLVED, worst.said)
+    yield Row(name, "implementations: FD, n u κ", worst.error, conditioning.SOLVED, worst.said)
 
 
 def far(name: str, robot: rd.Robot, seed: int) -> Iterator[Row]:

@@ -36,7 +36,7 @@ def numbers_of(what: str, values: Any, joint_names: tuple[str, ...]) -> list[Any
     Raises:
         QueryError: If they are anything else.
     """
-    made, wanted = [], f"{what} must be {len(joint_names)} finite numbers, or decimals as text, got {shown(values)}"
+    balls, desired = [], f"{what} must be {len(joint_names)} finite numbers, or decimals as text, got {shown(values)}"
     try:
         array = np.asarray(values, dtype=object)
         if isinstance(values, np.ma.MaskedArray):
@@ -46,12 +46,12 @@ def numbers_of(what: str, values: Any, joint_names: tuple[str, ...]) -> list[Any
         for x in array:
             if isinstance(x, bool | np.bool_ | bytes | complex) or (isinstance(x, str) and not isfinite(float(x))):
                 raise ValueError
-            made.append(Ball().number(x))
-            if not made[-1].is_finite():
+            balls.append(Ball().number(x))
+            if not balls[-1].is_finite():
                 raise ValueError
     except (TypeError, ValueError, OverflowError):
-        raise QueryError(wanted) from None
-    return made
+        raise QueryError(desired) from None
+    return balls
 
 
 def assumed(about: Motion, setup: Setup, own_q: bool, own_v: bool, widths: tuple[float, float]) -> tuple[str, ...]:
@@ -65,16 +65,16 @@ def assumed(about: Motion, setup: Setup, own_q: bool, own_v: bool, widths: tuple
         widths: Of the set of starts, in q and in v.
     """
     edits = about.robot.edits
-    made = [
+    sentences = [
         f"of the file of {about.robot.name} the decimals as they stand",
         f"gravity {edits.gravity} m/s² as float64, a binary number",
     ]
     if edits != type(edits)(gravity=edits.gravity):
-        made.append("locks, payloads, armature and other edits as float64")
+        sentences.append("locks, payloads, armature and other edits as float64")
     for name, own, known, width in zip("qv", (own_q, own_v), (setup.q0, setup.v0), widths, strict=True):
         start = "as given, decimals of a text exactly" if own else f"{known.tolist()} as float64"
-        made.append(f"{name}(0) {start}" + (f", and all others within {width:g} of it" if width else ""))
-    made += [f"coefficients of {each.name} as float64" for each in about.effects]
+        sentences.append(f"{name}(0) {start}" + (f", and all others within {width:g} of it" if width else ""))
+    sentences += [f"coefficients of {each.name} as float64" for each in about.effects]
     if about.controller is not None:
-        made.append(f"gains and reference of {about.controller.name} as float64, control without delay")
-    return (*made, "times as float64")
+        sentences.append(f"gains and reference of {about.controller.name} as float64, control without delay")
+    return (*sentences, "times as float64")

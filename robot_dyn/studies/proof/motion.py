@@ -163,7 +163,7 @@ def _check(controller: Controller) -> None:
         )
     for name, each in controller.references.items():
         if not isinstance(each, PiecewisePolynomial):
-            raise ProofError(f"{name} of {controller.name} is no piecewise polynomial")
+            raise ProofError(f"{name} of {controller.name} is not a piecewise polynomial")
 
 
 def _robot(dynamics: Any, what: str) -> Robot:

@@ -54,7 +54,7 @@ class Node:
 
 
 def node_of(state: State, step: Step | None = None) -> Node:
-    """What is kept of a state, and of the step before it."""
+    """Return what is stored of a state, and of the step before it."""
     n = len(state.q)
     wide = [arb(0, bound) for bound in state.error.bounds]
     q, v = (

@@ -55,7 +55,7 @@ def prove(
         on_progress: Called with the time reached, in [s], after each step.
 
     Returns:
-        The theorem, which may reach less far than asked for, and says why.
+        The theorem, which may reach less far than requested, and says why.
 
     Raises:
         QueryError: If an argument is not allowed.

@@ -32,9 +32,9 @@ class Proof(Value):
     Attributes:
         robot: Name of the arm.
         joint_names: Of the n joints.
-        asked_s: Time up to which it was asked for, in [s].
+        requested_s: Time up to which it was requested, in [s].
         until_s: Time up to which it is proven.
-        why_not: Why it is not proven beyond; empty if all that was asked for is.
+        why_not: Why it is not proven beyond; empty if it is proven up to there.
         bits: Precision of the balls.
         assumed: Which numbers are meant, in sentences.
         nodes: Ends of steps, the start first.
@@ -42,7 +42,7 @@ class Proof(Value):
 
     robot: str
     joint_names: tuple[str, ...] = field(metadata=UNREPORTED)
-    asked_s: float
+    requested_s: float
     until_s: float
     why_not: str
     bits: int
@@ -56,7 +56,7 @@ class Proof(Value):
 
     @reported
     def proven(self) -> bool:
-        """Whether it reaches the time that was asked for."""
+        """Whether it reaches the requested time."""
         return not self.why_not
 
     @reported
@@ -147,12 +147,12 @@ class Proof(Value):
     @reported
     def q(self) -> tuple[str, ...]:
         """The balls of q at the end, as decimals with a radius that hold them."""
-        return tuple(map(_told, self.nodes[-1].q))
+        return tuple(map(_decimals, self.nodes[-1].q))
 
     @reported
     def v(self) -> tuple[str, ...]:
         """Those of v."""
-        return tuple(map(_told, self.nodes[-1].v))
+        return tuple(map(_decimals, self.nodes[-1].v))
 
     @reported
     def steps(self) -> int:
@@ -166,7 +166,7 @@ class Proof(Value):
 
     @property
     def summary(self) -> str:
-        """The theorem in words."""
+        """The theorem as text."""
         lines = [f"{self.robot}: " + self._claim]
         rows = zip(self.joint_names, self.q, self.v, strict=True)
         lines += [f"  {name}: q = {q}, v = {v}" for name, q, v in rows]
@@ -190,9 +190,9 @@ def _far(ball: Any, x: float) -> float:
 
 
 def _array(balls: list[Any]) -> Array:
-    made = np.empty(len(balls), dtype=object)
-    made[:] = balls
-    return made
+    array = np.empty(len(balls), dtype=object)
+    array[:] = balls
+    return array
 
 
 def _radii(balls: tuple[Packed, ...]) -> np.ndarray:
@@ -204,7 +204,7 @@ def _digits(error: float) -> float:
     return -log10(error) if error > 0 else inf
 
 
-def _told(x: Packed) -> str:
+def _decimals(x: Packed) -> str:
     with Ball(max(64, x[0].bit_length() + 8)).scope():
         ball = unpacked(x)
         known = ball.rel_accuracy_bits()

@@ -38,12 +38,12 @@ def jacobian(tape: Tape, inverse: Inverse, given: Sequence[Any], length: int = 1
     """
     parts = _parts(tape, given, length)
     more = inverse.contraction(parts[0][1])
-    made: list[Matrix] = []
+    coefficients: list[Matrix] = []
     for k, (right, _) in enumerate(parts):
         for i in range(1, k + 1):
-            right = right + parts[i][1] * made[k - i]
-        made.append(-inverse.solve(more, right))
-    return made
+            right = right + parts[i][1] * coefficients[k - i]
+        coefficients.append(-inverse.solve(more, right))
+    return coefficients
 
 
 def on_a_set(
@@ -80,9 +80,9 @@ def on_a_set(
 
 def _parts(tape: Tape, given: Sequence[Any], length: int) -> list[tuple[Matrix, Matrix]]:
     """∂R/∂(q, v), (n, 2n), and M, (n, n), of each order."""
-    n, made = tape.n, tape.derivatives(*given)
+    n, coefficients = tape.n, tape.derivatives(*given)
     parts = []
     for k in range(length):
-        rows = [[coefficient(x, k) for x in made[3 * n * i : 3 * n * (i + 1)]] for i in range(n)]
+        rows = [[coefficient(x, k) for x in coefficients[3 * n * i : 3 * n * (i + 1)]] for i in range(n)]
         parts.append((matrix([row[: 2 * n] for row in rows]), matrix([row[2 * n :] for row in rows])))
     return parts
