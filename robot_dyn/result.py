@@ -59,6 +59,11 @@ class Result:
     interrupted: bool
 
     @property
+    def sentence(self) -> str:
+        """The result in a sentence."""
+        raise NotImplementedError
+
+    @property
     def rows(self) -> Iterable[Mapping[str, Any]]:
         """Rows of the table, values by column."""
         return ()

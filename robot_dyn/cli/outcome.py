@@ -15,8 +15,8 @@ from robot_dyn.cli.terminal import say, say_json, tell
 
 def outputs(of: Any, output: str | None, csv: str | None, inputs: Iterable[str], force: bool) -> list[Path]:
     """The paths to write a figure and a table of a class of results to, those that are given."""
+    from robot_dyn.studies.figure import ResultError
     from robot_dyn.studies.save import table_kind
-    from robot_dyn.studies.sheet import ResultError
     from robot_dyn.view.plots.plots import PICTURES
 
     paths = [arguments.output(output, PICTURES, ResultError, inputs, force)] if output else []

@@ -8,17 +8,16 @@ from typing import Any
 
 from robot_dyn.cli.terminal import table
 from robot_dyn.seconds import format_duration
-from robot_dyn.studies.certificate.certificate import Certificate, Held
+from robot_dyn.studies.certificate.certificate import DECIMALS, Certificate, Held
 from robot_dyn.studies.costs.ab_comparison import ABComparison
 from robot_dyn.studies.costs.cost import Cost
-from robot_dyn.studies.stress_test.finding import Judged, Limit, Worst
+from robot_dyn.studies.stress_test.finding import JudgedRun, Limit, WorstCase
 from robot_dyn.studies.stress_test.result import Stress
 from robot_dyn.studies.work_precision_diagram.tolerance_ladder import ToleranceLadder
 from robot_dyn.studies.work_precision_diagram.work_precision import WorkPrecision
 
 _DIGITS = (3, 6, 9)
 _OWN = "robot_dyn"
-_DECIMALS = "decimals of the file as float64"
 
 
 def lines(result: Certificate | Cost | Stress | WorkPrecision) -> Iterator[Any]:
@@ -58,7 +57,7 @@ def _cells(each: ABComparison) -> Iterator[str]:
 
 
 def _certificate(result: Certificate) -> Iterator[Any]:
-    """A line for each quantity and road, and what it rests on."""
+    """A line for each quantity and implementation, and what it rests on."""
     yield (
         f"{result.robot}: decimal digits that hold, against balls of {result.bits} bits: error of M_ij relative to"
         " √(M_ii M_jj); of C, N and inverse"
@@ -66,7 +65,7 @@ def _certificate(result: Certificate) -> Iterator[Any]:
     yield "dynamics to the largest entry in the units √M_ii of the joints, or its rms at random states if that is more;"
     yield "of forward dynamics to M⁻¹τ, M⁻¹C v and M⁻¹N, in the norm of M"
     given = any(each.given is not None for each in result.digits)
-    headings = ("quantity", "road", *["given"] * given, "typical", "worst of", "random", "searched", "time")
+    headings = ("quantity", "implementation", *["given"] * given, "typical", "worst of", "random", "searched", "time")
     yield table(headings, _digit_rows(result, given), words=headings[:2])
     of = result.condition
     lose = f": up to {of.digits:.1f} digits for forward dynamics to lose" if isfinite(of.digits) else ""
@@ -85,11 +84,11 @@ def _certificate(result: Certificate) -> Iterator[Any]:
 
 
 def _digit_rows(result: Certificate, given: bool) -> Iterator[list[str]]:
-    """A row for each road, and one for the decimals of the file, by quantity."""
+    """A row for each implementation, and one for the decimals of the file, by quantity."""
     for quantity in result.quantities:
         for k, each in enumerate(each for each in result.digits if each.quantity == quantity):
             yield [quantity if not k else "", *_held(each, given)]
-        yield ["", _DECIMALS, *[""] * (3 + given), f"{result.decimals[quantity]:.1f}", ""]
+        yield ["", DECIMALS, *[""] * (3 + given), f"{result.decimals[quantity]:.1f}", ""]
 
 
 def _held(each: Held, given: bool) -> list[str]:
@@ -116,8 +115,8 @@ def _work_precision(result: WorkPrecision) -> Iterator[Any]:
     headings = ("method", "order", "measured", *(f"{digits} digits" for digits in columns), "least error", "in")
     yield table(headings, _ladder_rows(result, columns), words=headings[:1])
     yield "times of the loop alone, medians of runs that take turns; * the least; ( ) extrapolated by the order"
-    if result.beyond:
-        yield from _beyond(result)
+    if result.past_horizon:
+        yield from _past_horizon(result)
 
 
 def _ladder_rows(result: WorkPrecision, columns: list[int]) -> Iterator[list[str]]:
@@ -134,13 +133,13 @@ def _ladder_rows(result: WorkPrecision, columns: list[int]) -> Iterator[list[str
         yield [each.name, order, seen, *cells, error if isfinite(finest.error) else "—", format_duration(finest.time_s)]
 
 
-def _beyond(result: WorkPrecision) -> Iterator[Any]:
+def _past_horizon(result: WorkPrecision) -> Iterator[Any]:
     """Energy and the way back where no error can be measured, a line for each method."""
-    returns = any(each.returned is not None for each in result.beyond)
+    returns = any(each.returned is not None for each in result.past_horizon)
     yield ""
     yield f"over all of {result.duration_s:g} s, where no error can be measured, the finest runs:"
     rows = []
-    for each in result.beyond:
+    for each in result.past_horizon:
         back = "—" if each.returned is None else f"{each.returned:.1e}"
         rows.append([each.name, f"{each.setting:.3g}", f"{each.energy:.1e}", *[back] * returns])
     yield table(("method", "setting", "energy", *["there and back"] * returns), rows, words=("method",))
@@ -166,7 +165,7 @@ def _stress(result: Stress) -> Iterator[Any]:
     yield from (f"not looked at for lack of time: {each}" for each in result.out_of_time)
 
 
-def _worst_row(each: Worst) -> tuple[str, ...]:
+def _worst_row(each: WorstCase) -> tuple[str, ...]:
     searched = f"{each.searched:.4g}" + ("" if each.found else " (none worse)")
     least = f"{each.minimal:.4g} {each.unit}".rstrip()
     return each.what, each.joint, f"{each.typical:.4g}", f"{each.random:.4g}", searched, least, each.note
@@ -178,9 +177,9 @@ def _limit_row(each: Limit) -> tuple[str, ...]:
     return each.of, each.what, each.joint, limit, each.within, each.beyond, verdict
 
 
-def _run_row(each: Judged) -> tuple[str, ...]:
+def _run_row(each: JudgedRun) -> tuple[str, ...]:
     errors = (f"{x:.4g}" if isfinite(x) else "–" for x in (each.estimated, each.true, each.unsure))
-    return each.what, f"{each.duration_s:g} s", *errors, each.said, "MISLEADS" if each.misleads else ""
+    return each.what, f"{each.duration_s:g} s", *errors, each.report, "MISLEADS" if each.misleads else ""
 
 
 def programs(result: WorkPrecision, error: float) -> Iterator[str]:

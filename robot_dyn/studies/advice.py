@@ -63,8 +63,8 @@ class Advice:
         at: When it was met, in [s].
         limits: Longest stable step of each method of fixed step, in [s]; inf where every step is stable.
         period_s: Period of the sampled control, in [s]; 0 without.
-        longest_period_s: The period up to which the loop is stable, in [s]; 0 if none is, inf if every one is, or
-            without sampled control.
+        longest_period_s: The period up to which the loop is stable, in [s]; 0 if it is stable at
+            none, inf if at every one, or without sampled control.
         at_period: What the loop is at its own period, which may be stable though a shorter one is not.
         period_growth: Spectral radius: the factor by which deviations grow in each period in the long run; 1 without.
         grows_anyway: Rate at which they grow under the same control at all times, in [1/s]; 0 if they do not.
@@ -144,7 +144,7 @@ class Advice:
 
     def _of_error(self) -> str:
         if self.run is None:
-            return "error to expect: not told of a run in which deviations grow so, or of too many steps"
+            return "error to expect: not estimated for a run in which deviations grow so, or of too many steps"
         end = self.run.outcome
         if end.ending is not Ending.FINISHED:
             return f"the run {end.ending} at {end.t:.3g} s: {end.advice}"
@@ -165,9 +165,9 @@ def advise(what: Setup | Plant | Dynamics, q0: Any = None, v0: Any = None, **opt
         QueryError: If the setup is not allowed, or its motion cannot be linearised at any state of the pilot run.
     """
     setup = setup_of("advise", what, {**starts(q0, v0), **options})
-    made = advice_about(setup, _along)
-    makes = made.growth < _BEARS and (setup.integrator.controls_error or setup.steps <= _MOST_STEPS)
-    return replace(made, run=simulate(replace(setup, estimate_error=True))) if makes else made
+    advice = advice_about(setup, _along)
+    worthwhile = advice.growth < _BEARS and (setup.integrator.controls_error or setup.steps <= _MOST_STEPS)
+    return replace(advice, run=simulate(replace(setup, estimate_error=True))) if worthwhile else advice
 
 
 def advice_about(setup: Setup, states_of: Callable[[Setup, StateEquation], list[State]]) -> Advice:

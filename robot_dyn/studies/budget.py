@@ -40,14 +40,14 @@ class Budget:
         """In [s]; negative when it is over."""
         return self.seconds - self.spent
 
-    def tell(self, what: str) -> None:
-        """Say what is being run."""
+    def report(self, what: str) -> None:
+        """Report what is being run."""
         if self._on_progress is not None:
             self._on_progress(min(self.spent, self.seconds), what)
 
     @contextmanager
     def apart(self) -> Iterator[None]:
-        """What is done inside does not count."""
+        """Exclude the time spent inside from the budget."""
         began = self._clock()
         try:
             yield
@@ -55,11 +55,11 @@ class Budget:
             self._apart += self._clock() - began
 
     def within(self, seconds: float) -> Budget:
-        """What is left of it, and no more than so many seconds."""
+        """Return a budget of what is left, and of no more than so many seconds."""
         return Budget(min(seconds, self.left), clock=self._clock)
 
     def check(self, t: float = 0.0) -> None:
-        """Go on, or OvertimeError if it is over; to be given to a run as its `on_progress`."""
+        """Raise OvertimeError if it is over; can be passed to a run as its `on_progress`."""
         if self.left <= 0:
             raise OvertimeError
 
@@ -68,7 +68,7 @@ class Budget:
 class Limit:
     """The longest time of one run: given to it as `on_progress`, it raises OvertimeError.
 
-    The clock starts when the loop comes back first: before that, machine code may be loaded.
+    The clock starts at the second call: before that, machine code may be loaded.
     """
 
     def __init__(self, seconds: float) -> None:

@@ -15,9 +15,9 @@ _PACKAGES = ("robot-dyn", "pin", "numpy", "scipy", "llvmlite", "casadi", "mujoco
 def environment(packages: Iterable[str] = _PACKAGES) -> dict[str, str]:
     """Processor and versions by name, of the packages that are installed."""
     info = Path("/proc/cpuinfo")  # Linux; elsewhere the name of the architecture must do
-    found = re.findall(r"model name\s*: (.*)", info.read_text() if info.exists() else "")
-    made = {"processor": (found or [platform.processor()])[0], "python": platform.python_version()}
+    models = re.findall(r"model name\s*: (.*)", info.read_text() if info.exists() else "")
+    versions = {"processor": (models or [platform.processor()])[0], "python": platform.python_version()}
     for name in packages:
         with suppress(PackageNotFoundError):
-            made[name] = version(name)
-    return made
+            versions[name] = version(name)
+    return versions

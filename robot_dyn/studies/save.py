@@ -14,7 +14,7 @@ from robot_dyn.studies.certificate import diagram as certificate_diagram
 from robot_dyn.studies.certificate.certificate import Certificate
 from robot_dyn.studies.costs import diagram as cost_diagram
 from robot_dyn.studies.costs.cost import Cost
-from robot_dyn.studies.sheet import ResultError
+from robot_dyn.studies.figure import ResultError
 from robot_dyn.studies.work_precision_diagram import diagram
 from robot_dyn.studies.work_precision_diagram.work_precision import WorkPrecision
 from robot_dyn.validate import choice, instance

@@ -1,4 +1,4 @@
-"""Median times of calls that take turns, so that the machine's moods meet all of them."""
+"""Median times of calls that take turns, so that changes of the machine's speed affect all of them."""
 
 from __future__ import annotations
 

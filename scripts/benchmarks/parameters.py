@@ -20,7 +20,7 @@ from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateE
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.events.payload_events import PayloadEvents
 from robot_dyn.simulation.rollouts.batch import Batch
-from robot_dyn.simulation.rollouts.lock_step import LANES
+from robot_dyn.simulation.rollouts.lock_step import LANES, Tiles
 from robot_dyn.simulation.run.fixed_step import FixedStep
 from robot_dyn.simulation.run.watch import Watch
 from robot_dyn.simulation.setup.size import MOST_BYTES

@@ -15,7 +15,7 @@ import numpy as np
 import robot_dyn as rd
 from benchmarks.measure import Effort, panda, row, table
 from robot_dyn.studies.proof.motion import motion
-from robot_dyn.studies.proof.tape.tape import Tape
+from robot_dyn.studies.proof.tape import Tape
 
 LITERAL = (("pendulum", 1.0), ("planar_2r", 1.0), ("ur5", 0.1), ("ur5", 0.5), ("panda", 0.05), ("panda", 0.1))
 HORIZONS = {"pendulum": 20.0, "planar_2r": 10.0, "ur5": 2.0, "panda": 0.5}

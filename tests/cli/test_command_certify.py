@@ -22,7 +22,7 @@ def test_certify_says_digits_beside_times_and_writes_a_diagram_and_a_table(tmp_p
     assert re.search(r"decimals of the file as float64 +16\.9", done.stdout)
     assert "κ of M scaled to a unit diagonal: typical 1, largest at random 1, searched 1" in done.stdout
     assert (tmp_path / "plot.svg").read_bytes().startswith(b"<?xml")
-    assert (tmp_path / "digits.csv").read_text(encoding="utf-8").startswith("quantity,road,given,typical")
+    assert (tmp_path / "digits.csv").read_text(encoding="utf-8").startswith("quantity,implementation,given,typical")
 
 
 def test_document_has_the_keys_that_are_promised_and_no_infinity() -> None:
@@ -48,7 +48,7 @@ def test_document_has_the_keys_that_are_promised_and_no_infinity() -> None:
 )
 def test_mistakes_are_told_in_one_line_before_the_work(tmp_path, monkeypatch, given, message: str) -> None:
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "old.csv").write_text("quantity,road")
+    (tmp_path / "old.csv").write_text("quantity,implementation")
     if "--csv" in given or "-o" in given:
         monkeypatch.setattr(rd, "certify", None)
     assert re.fullmatch(message, refusal(["certify", "pendulum", *given]))

@@ -37,7 +37,7 @@ def test_piped_tables_are_whole():
 
 
 def err_by(monkeypatch: pytest.MonkeyPatch, error: float) -> None:
-    """Let the own implementation say a wrong N."""
+    """Let the library's own implementation say a wrong N."""
     exact = Lagrangian.N
     monkeypatch.setattr(Lagrangian, "N", lambda self, q: exact(self, q) + error)
 

@@ -91,7 +91,7 @@ def test_mistakes_are_told_in_one_line_before_the_work(
 
 WATCHED = {  # where each is at work: behind the first ladder, and before what is timed
     "accuracy": """
-from robot_dyn.studies.work_precision_diagram import measured as study
+from robot_dyn.studies.work_precision_diagram import measurement as study
 work = study._walk
 study._walk = lambda *given: (work(*given), tell())[0]
 """,

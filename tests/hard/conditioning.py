@@ -63,7 +63,7 @@ def implementations(robot: rd.Robot, compiled: bool) -> dict[str, Any]:
 
 
 class Error(NamedTuple):
-    """What a implementation errs by in units of its law, n u or n u κ; absolutely; and what was said."""
+    """What an implementation errs by in units of its law, n u or n u κ; absolutely; and what was said."""
 
     implementation: str
     quantity: str

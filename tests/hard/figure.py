@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from robot_dyn.studies.sheet import styled
+from robot_dyn.studies.figure import styled
 from robot_dyn.view.plots.figure import THEMES
 from tests.hard.case import Row
 

@@ -13,8 +13,8 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.result import UNREPORTED, Result, json_text, plain, reported
+from robot_dyn.studies.figure import ResultError
 from robot_dyn.studies.save import DRAWINGS, kinds
-from robot_dyn.studies.sheet import ResultError
 from tests.cli.test_command_documents import names, promised
 
 

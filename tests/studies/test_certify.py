@@ -1,4 +1,4 @@
-"""Certificates: digits of each implementation against independent counts, worst states, and what is refused."""
+"""Certificates: digits against independent counts, the search for worst states, and what is refused."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from robot_dyn.lagrange.recursions.articulated_body import articulated_body
 from robot_dyn.queries.quantity import FORWARD_DYNAMICS, INVERSE_DYNAMICS, C, M, N
 from robot_dyn.studies.certificate.certificate import Certificate
 from robot_dyn.studies.certificate.diagram import draw
-from robot_dyn.studies.certificate.digit_count import Counting
+from robot_dyn.studies.certificate.digit_count import DigitCount
 from robot_dyn.studies.certificate.implementation import Implementation, implementations
 from robot_dyn.studies.certificate.worst_case_search import random_states
 from tests.long import long
@@ -95,9 +95,9 @@ def test_decimals_of_the_file_are_held_to_their_float64() -> None:
 def test_the_search_finds_worse_than_ten_thousand_random_states(quantity, name: str) -> None:
     """Of two seeds: those that it began with, and others. In M of planar_2r the worst entry is one that is constant."""
     robot, rng = rd.load(name), np.random.default_rng(1)
-    counting = Counting(robot, random_states(robot, 10_000, rng), None, rng)
-    found = counting.count(implementation(robot, "machine code"), quantity)
-    others = Counting(robot, random_states(robot, 10_000, np.random.default_rng(2)), None, rng)
+    digit_count = DigitCount(robot, random_states(robot, 10_000, rng), None, rng)
+    found = digit_count.count(implementation(robot, "machine code"), quantity)
+    others = DigitCount(robot, random_states(robot, 10_000, np.random.default_rng(2)), None, rng)
     errors = others._errors(implementation(robot, "machine code"), quantity, others.states)
     assert found.samples == 10_000
     assert found.searched < found.random < found.typical
@@ -118,10 +118,10 @@ class Moved:
 
 
 @pytest.mark.parametrize("digits", [4, 9, 13])
-def test_a_implementation_with_a_wrong_entry_has_the_digits_before_it(digits: int) -> None:
+def test_an_implementation_with_a_wrong_entry_has_the_digits_before_it(digits: int) -> None:
     robot, rng = rd.load("planar_2r"), np.random.default_rng(1)
-    counting = Counting(robot, random_states(robot, 100, rng), None, rng)
-    found = counting.count(Implementation("moved", robot, Moved(robot, 10.0**-digits), (M,)), M)
+    digit_count = DigitCount(robot, random_states(robot, 100, rng), None, rng)
+    found = digit_count.count(Implementation("moved", robot, Moved(robot, 10.0**-digits), (M,)), M)
     assert found.typical == pytest.approx(digits, abs=0.01)
     assert found.searched == pytest.approx(digits, abs=0.02)
 
@@ -139,9 +139,9 @@ def test_condition_of_two_links_is_largest_where_they_are_in_line(made: Certific
 def test_machine_code_is_judged_by_its_right_angles_and_the_file_by_its_own() -> None:
     """UR5 states 1.57079632679: 5e-12 of a right angle."""
     robot, rng = rd.load("ur5"), np.random.default_rng(0)
-    counting = Counting(robot, random_states(robot, 100, rng), None, rng)
-    assert counting.count(implementation(robot, "machine code"), M).searched > 14
-    assert 10 < counting.right_angles["M"] < 12
+    digit_count = DigitCount(robot, random_states(robot, 100, rng), None, rng)
+    assert digit_count.count(implementation(robot, "machine code"), M).searched > 14
+    assert 10 < digit_count.right_angles["M"] < 12
 
 
 def test_a_joint_without_inertia_is_named_and_the_rest_is_counted() -> None:
@@ -182,7 +182,7 @@ def test_ctrl_c_keeps_what_was_counted() -> None:
 
 
 def test_what_was_not_counted_is_told(made: Certificate) -> None:
-    with pytest.raises(rd.RobotDynError, match=r"^no road 'pinochio'; nearest: Pinocchio$"):
+    with pytest.raises(rd.RobotDynError, match=r"^no implementation 'pinochio'; nearest: Pinocchio$"):
         made.of("M", "pinochio")
     with pytest.raises(rd.RobotDynError, match=r"^'articulated body' does not answer M; look at .*"):
         made.of("M", "articulated body")
@@ -233,7 +233,7 @@ def test_articulated_bodies_answer_a_batch_with_joints_that_slide() -> None:
     np.testing.assert_allclose(articulated_body(own.linkage, q, v, tau), own.forward_dynamics(q, v, tau), rtol=1e-12)
 
 
-def test_a_implementation_whose_numbers_overflow_everywhere_is_left_out_by_name() -> None:
+def test_an_implementation_whose_numbers_overflow_everywhere_is_left_out_by_name() -> None:
     """A joint that turns its follower 1e9 times as fast: C of it is beyond float32."""
     pendulum = """<link name="{0}"><inertial><origin xyz="0 0 0.1"/><mass value="1"/>
     <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>"""

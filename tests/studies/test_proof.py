@@ -23,17 +23,14 @@ from robot_dyn.errors import ProofError, QueryError
 from robot_dyn.lagrange.exact import RoundedLiterals
 from robot_dyn.studies.proof.enclosure import step as steps
 from robot_dyn.studies.proof.enclosure import tube as tubes
-from robot_dyn.studies.proof.enclosure.balls import NotProvenError, between, exact, largest, matrix, upper
-from robot_dyn.studies.proof.enclosure.defect import defect
+from robot_dyn.studies.proof.enclosure.balls import Inverse, NotProvenError, between, exact, largest, matrix, upper
 from robot_dyn.studies.proof.enclosure.linearised import on_a_set
 from robot_dyn.studies.proof.enclosure.lohner import box
-from robot_dyn.studies.proof.enclosure.mass import Inverse
-from robot_dyn.studies.proof.enclosure.polynomial import Polynomial, taylor
+from robot_dyn.studies.proof.enclosure.polynomial import Polynomial, defect, taylor
 from robot_dyn.studies.proof.motion import Motion
-from robot_dyn.studies.proof.packed import packed, unpacked
+from robot_dyn.studies.proof.node import packed, unpacked
 from robot_dyn.studies.proof.prove import _precision
-from robot_dyn.studies.proof.tape.straight_line import straight_line
-from robot_dyn.studies.proof.tape.tape import Tape
+from robot_dyn.studies.proof.tape import Tape, straight_line
 from tests.long import long
 from tests.studies.extrapolation import BITS, motion
 

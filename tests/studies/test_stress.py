@@ -20,7 +20,7 @@ from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.studies.budget import Budget
 from robot_dyn.studies.certificate.worst_case_search import random_states
 from robot_dyn.studies.stress_test import confirm, runs, steps
-from robot_dyn.studies.stress_test.finding import Judged
+from robot_dyn.studies.stress_test.finding import JudgedRun
 from robot_dyn.studies.stress_test.loads import payload_limit
 from robot_dyn.studies.stress_test.scenes import FAMILIES, scenes
 from robot_dyn.studies.stress_test.stress import stressed
@@ -203,9 +203,9 @@ def test_numbers_beyond_a_float64_are_left_out_by_name() -> None:
 
 
 def test_joints_without_limits_are_named() -> None:
-    said = made("pendulum").left_out
-    assert "joints without an effort limit: pivot" in said
-    assert any(each.startswith("joints without a velocity limit: pivot") for each in said)
+    report = made("pendulum").left_out
+    assert "joints without an effort limit: pivot" in report
+    assert any(each.startswith("joints without a velocity limit: pivot") for each in report)
 
 
 def test_what_is_found_depends_on_the_seed_alone() -> None:
@@ -277,13 +277,13 @@ def test_a_run_ends_at_its_deadline_and_so_do_the_companions_of_its_error_estima
 def test_shrinking_that_has_no_time_keeps_the_failure(monkeypatch) -> None:
     """It is told as it was found."""
 
-    def judged(setup: rd.Setup, what: str, budget: Budget) -> Judged:
+    def judged(setup: rd.Setup, what: str, budget: Budget) -> JudgedRun:
         while True:
             budget.check()
 
     monkeypatch.setattr(runs, "judged", judged)
     setup = rd.Setup(rd.Plant(rd.load("pendulum")), [0.7312], duration_s=0.1)
-    found = Judged("swing", 0.1, 1e-9, 1.0, 0.0, "", True, setup)
+    found = JudgedRun("swing", 0.1, 1e-9, 1.0, 0.0, "", True, setup)
     work = Work(Budget(4, clock=ticking()))
     assert runs.shrunk_run(setup, found, "shrinking of run 1", work) is found
     assert work.out_of_time == ["shrinking of run 1"]

@@ -22,9 +22,9 @@ from robot_dyn.integrate.tableau import ButcherTableau
 from robot_dyn.result import json_text
 from robot_dyn.seconds import format_duration
 from robot_dyn.studies.budget import Budget, Limit
-from robot_dyn.studies.work_precision_diagram.measured import Rung, Walk, measured
+from robot_dyn.studies.work_precision_diagram.measurement import Rung, Walk, measure
 from robot_dyn.studies.work_precision_diagram.method_under_test import MethodUnderTest, own, recorded, whole
-from robot_dyn.studies.work_precision_diagram.past_horizon import beyond
+from robot_dyn.studies.work_precision_diagram.past_horizon import past_horizon
 from robot_dyn.studies.work_precision_diagram.peers import found
 from robot_dyn.studies.work_precision_diagram.reference_run import HorizonError, Reference, reference
 from robot_dyn.studies.work_precision_diagram.tolerance_ladder import Point, ToleranceLadder
@@ -122,12 +122,12 @@ def test_beyond_the_horizon_energy_and_the_way_back_judge() -> None:
         for name, order, step in (("rk4", 4, 0.02), ("order_8", 8, 0.02))
     ]
     other = ToleranceLadder("MuJoCo RK4", "", True, 4, "step", made[0].points, "", 0.0)
-    rk4, order_8 = beyond(setup, 1.0, [*made, other], methods, Budget(1e3))
+    rk4, order_8 = past_horizon(setup, 1.0, [*made, other], methods, Budget(1e3))
     assert (rk4.name, order_8.name) == ("rk4", "order_8")
     assert 1e-10 < order_8.returned < 1e-2 * rk4.returned < 1e-2  # swung through, where both magnify what they err
     assert order_8.energy < 1e-2 * rk4.energy < 1e-4
-    assert [each.returned for each in beyond(rubbed, 1.0, made, methods, Budget(1e3))] == [None, None]
-    assert beyond(setup, 1.0, made, methods, Budget(1e-6)) == ()  # no run is short enough
+    assert [each.returned for each in past_horizon(rubbed, 1.0, made, methods, Budget(1e3))] == [None, None]
+    assert past_horizon(setup, 1.0, made, methods, Budget(1e-6)) == ()  # no run is short enough
 
 
 def test_an_accuracy_of_the_setup_is_not_used() -> None:
@@ -197,10 +197,10 @@ def test_points_near_the_error_of_the_reference_do_not_count_for_the_order() -> 
 
 def test_prices_are_interpolated_between_runs_and_extrapolated_by_the_order() -> None:
     found = of("rk4", points(1e-2, 1e-2 / 16, 1e-2 / 256))
-    between, beyond = found.price(1e-2 / 64), found.price(1e-2 / 256 / 10**4)
-    assert between is not None and beyond is not None
+    between, finer = found.price(1e-2 / 64), found.price(1e-2 / 256 / 10**4)
+    assert between is not None and finer is not None
     assert (between.value, between.extrapolated) == (pytest.approx(1e-3 * 2**1.5), False)
-    assert (beyond.value, beyond.extrapolated) == (pytest.approx(4e-3 * 10), True)
+    assert (finer.value, finer.extrapolated) == (pytest.approx(4e-3 * 10), True)
 
 
 def test_an_error_that_finer_runs_exceed_again_was_not_reached() -> None:
@@ -288,7 +288,7 @@ def test_evaluations_are_counted_exactly() -> None:
 
 def test_a_budget_that_ends_says_what_was_left_out(smooth) -> None:
     setup, truth = smooth
-    (walk,), _ = measured([own(setup, rd.method("rk4"), "interpreted")], truth, Budget(1e-9), 1)
+    (walk,), _ = measure([own(setup, rd.method("rk4"), "interpreted")], truth, Budget(1e-9), 1)
     assert not walk.rungs and walk.ended == "the budget of 1e-09 s ended"
 
 

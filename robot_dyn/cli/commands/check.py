@@ -55,16 +55,16 @@ def check(
     targets = {file: _target(file, force) for file in files} if fix else {}
     if len({*targets.values()}) < len(targets):
         raise QueryError("--fix: two of the files would be written under one name; repair them one by one")
-    made = [
+    checkups = [
         rd.check(file, package_dirs=package_dir or (), density=density, units=units)
         for file in progress(files, "checking")
     ]
     written = {}
-    for file, each in zip(files, made, strict=True):
+    for file, each in zip(files, checkups, strict=True):
         if fix and each.repaired is not None:
             text, to = each.repaired, targets[file]
             written[file] = str(save(to, lambda stream, text=text: stream.write(text), RepairError))
-    checked = [(file, each, written.get(file)) for file, each in zip(files, made, strict=True)]
+    checked = [(file, each, written.get(file)) for file, each in zip(files, checkups, strict=True)]
     if as_json:
         say_json({"files": [{"file": file, "written": to} | plain(each) for file, each, to in checked]})
     else:
@@ -73,7 +73,7 @@ def check(
         for file in files:
             if file not in written:
                 tell(f"{file}: nothing that can be repaired")
-    if not all(each.ok for each in made):
+    if not all(each.ok for each in checkups):
         raise typer.Exit(1)
 
 
@@ -82,14 +82,14 @@ def _target(file: str, force: bool) -> Path:
     return arguments.output(f"{stem}.fixed.urdf", _URDF, RepairError, [file] if Path(file).is_file() else [], force)
 
 
-def _lines(file: str, made: Checkup, written: str | None) -> Iterator[str]:
+def _lines(file: str, checkup: Checkup, written: str | None) -> Iterator[str]:
     """A file, its findings, and what was written."""
     from robot_dyn.studies.doctor.finding import Severity
 
-    counts = Counter(each.severity for each in made.findings)
+    counts = Counter(each.severity for each in checkup.findings)
     said = [f"{counts[each]} {each.value}{'s' * (counts[each] > 1)}" for each in Severity if counts[each]]
-    yield f"{file}: {', '.join(said) or 'nothing found'}{'' if made.loads else '; it does not load'}"
-    for each in made.findings:
+    yield f"{file}: {', '.join(said) or 'nothing found'}{'' if checkup.loads else '; it does not load'}"
+    for each in checkup.findings:
         line = f" (line {each.line})" if each.line else ""
         by = "[--fix --units]" if each.supposed else "[--fix]"
         fixed = f" {by}" if each.changes and (each.supposed or written is None) else ""

@@ -24,7 +24,7 @@ def prove(
     """Prove where the arm of a scene will be: balls that hold q and v; exit code 1 if not up to the end."""
     setup = rd.read_scene(scene)
     with bar(setup.duration_s if until is None else until) as advance:
-        made = rd.prove(setup, until, bits, budget_s=budget, on_progress=advance)
-    say_json(made) if as_json else say(*made.summary.split("\n"))
-    if not made.proven:
+        proof = rd.prove(setup, until, bits, budget_s=budget, on_progress=advance)
+    say_json(proof) if as_json else say(*proof.summary.split("\n"))
+    if not proof.proven:
         raise typer.Exit(1)

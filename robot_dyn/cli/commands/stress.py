@@ -36,8 +36,8 @@ def stress(
 
     Ctrl-C ends it and keeps what was found.
     """
+    from robot_dyn.studies.figure import ResultError
     from robot_dyn.studies.save import JSON
-    from robot_dyn.studies.sheet import ResultError
 
     inputs = [robot] if os.path.isfile(robot) else []
     paths = [arguments.output(output, JSON, ResultError, inputs, force)] if output else []

@@ -1,1 +1,9 @@
-"""What a digit of M, C, N, inverse and forward dynamics costs."""
+"""Certificates: true digits of M, C, N, inverse and forward dynamics, and the time of each query.
+
+certify            the study
+certificate        its result
+implementation     the implementations that are compared
+digit_count        errors against finer numbers and balls
+worst_case_search  the search for the state of largest error
+diagram            the figure
+"""

@@ -1,10 +1,10 @@
-"""A certificate: how many digits of each quantity are true by each road, and what they cost."""
+"""A certificate: how many digits of each quantity are true by each implementation, and what they cost."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from math import log10
+from math import log10, nan
 from typing import Any, ClassVar, final
 
 from robot_dyn.errors import QueryError
@@ -12,11 +12,13 @@ from robot_dyn.result import Result, reported
 from robot_dyn.seconds import format_duration
 from robot_dyn.validate import choice
 
+DECIMALS = "decimals of the file as float64"  # the implementation that computes exactly with these
+
 
 @final
 @dataclass(frozen=True)
 class Held:
-    """The digits of one quantity by one road, from 0 to 20.
+    """The digits of one quantity by one implementation, from 0 to 20.
 
     Attributes:
         quantity: Its name.
@@ -38,9 +40,9 @@ class Held:
     random: float
     searched: float
     samples: int
-    time_s: float
-    repeats: int
-    state: dict[str, list[float]] = field(hash=False, repr=False)
+    time_s: float = nan
+    repeats: int = 0
+    state: dict[str, list[float]] = field(default_factory=dict, hash=False, repr=False)
 
 
 @final
@@ -76,7 +78,7 @@ class Certificate(Result):
     Attributes:
         robot: Its name.
         joints: Their names.
-        digits: Of each quantity by each road.
+        digits: Of each quantity by each implementation.
         decimals: By quantity, digits that the float64 nearest to the decimals of the file leave, at the worst state.
         right_angles: By quantity, digits of the file that machine code leaves where it writes right angles out in full.
         condition: Of M.
@@ -88,7 +90,7 @@ class Certificate(Result):
     """
 
     columns: ClassVar[tuple[str, ...]] = (
-        "quantity", "road", "given", "typical", "samples", "random", "searched", "time_s", "repeats",
+        "quantity", "implementation", "given", "typical", "samples", "random", "searched", "time_s", "repeats",
     )  # fmt: skip
     robot: str
     joints: tuple[str, ...]
@@ -103,38 +105,35 @@ class Certificate(Result):
     interrupted: bool = False
 
     def of(self, quantity: str, implementation: str) -> Held:
-        """The digits of one quantity by one road.
+        """The digits of one quantity by one implementation.
 
         Raises:
             QueryError: If they were not counted.
         """
         choice("quantity", quantity, self.quantities)
-        choice("road", implementation, self.implementations)
-        for each in self.digits:
-            if (each.quantity, each.implementation) == (quantity, implementation):
+        choice("implementation", implementation, self.implementations)
+        for each in self._of(quantity):
+            if each.implementation == implementation:
                 return each
         raise QueryError(
-            f"{implementation!r} does not answer {quantity}; look at the quantities of each road in digits"
+            f"{implementation!r} does not answer {quantity}; look at the quantities of each implementation in digits"
         )
 
     @property
     def rows(self) -> Iterator[Mapping[str, Any]]:
         yield from map(vars, self.digits)
         for quantity, digits in self.decimals.items():
-            yield {"quantity": quantity, "road": "decimals of the file as float64", "searched": digits}
+            yield {"quantity": quantity, "implementation": DECIMALS, "searched": digits}
 
     @reported
     def lost(self) -> dict[str, float]:
-        """By road, digits of inverse dynamics less those of forward dynamics, at the worst states."""
-        found = {(each.quantity, each.implementation): each.searched for each in self.digits if each.samples > 1}
-        pairs = (
-            (implementation, ("inverse_dynamics", implementation), ("forward_dynamics", implementation))
-            for implementation in self.implementations
+        """By implementation, digits of inverse dynamics less those of forward dynamics, at the worst states."""
+        inverse, forward = (
+            {each.implementation: each.searched for each in self._of(quantity) if each.samples > 1}
+            for quantity in ("inverse_dynamics", "forward_dynamics")
         )
         return {
-            implementation: found[one] - found[two]
-            for implementation, one, two in pairs
-            if one in found and two in found
+            name: inverse[name] - forward[name] for name in self.implementations if name in inverse.keys() & forward
         }
 
     @property

@@ -1,15 +1,16 @@
-"""What a digit costs in M, C, N, inverse and forward dynamics: true digits of each road beside its time.
+"""What a digit costs in M, C, N, inverse and forward dynamics: true digits of each implementation beside its time.
 
     digits = −log₁₀(error),   error against balls of radius 1e-20
 
 Errors of M_ij are relative to √(M_ii M_jj); of accelerations, in the norm of M, to Σ ‖M⁻¹ τ_k‖ of τ, C v and N; of C, N
 and inverse dynamics to the largest entry in the units √M_ii of the joints, or its root mean square over the random
-states if that is more: an answer that vanishes at a state is no loss.
+states if that is more: an answer that vanishes at a state does not count as lost digits.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from math import inf
 from typing import Any
 
@@ -23,8 +24,8 @@ from robot_dyn.lagrange.scale import unit_diagonal_conditions
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.quantity import MOST_DIGITS, M, Quantity
 from robot_dyn.studies.certificate.certificate import Certificate, Condition, Held
-from robot_dyn.studies.certificate.digit_count import Counting
-from robot_dyn.studies.certificate.implementation import Implementation, asked, implementations
+from robot_dyn.studies.certificate.digit_count import DigitCount
+from robot_dyn.studies.certificate.implementation import Implementation, evaluate, implementations
 from robot_dyn.studies.certificate.worst_case_search import Batch, Search, random_states, row
 from robot_dyn.studies.environment import environment
 from robot_dyn.studies.timing import in_turns
@@ -46,12 +47,13 @@ def certify(
     repeats: int = 7,
     on_progress: Callable[[float, str], object] | None = None,
 ) -> Certificate:
-    """True digits of M, C, N, inverse and forward dynamics by each road, at random and searched-for states, and times.
+    """Count the true digits of M, C, N, inverse and forward dynamics by each implementation, and time its queries.
 
-    Roads are Pinocchio, the Lagrangian in float32, float64 and longdouble, articulated bodies, machine code (judged
-    by its own right angles) and balls. Random states are as of `compare`, in numbers of float32, so that no road rounds
-    them. Their errors, and those of the search that begins at the worst of them, are taken against longdouble; balls
-    judge the worst of each. Errors of longdouble are taken against balls, at 1/250 of the states.
+    Implementations are Pinocchio, the Lagrangian in float32, float64 and longdouble, articulated bodies, machine code
+    (judged by its own right angles) and balls. Random states are those of `compare`, in numbers of float32, so that no
+    implementation rounds them. Errors at these states, and in the search that begins at the worst of them, are taken
+    against longdouble; balls judge the worst of each. Errors of longdouble are taken against balls, at 1/250 of the
+    states.
 
     Args:
         robot: The robot.
@@ -70,26 +72,26 @@ def certify(
     robot = instance("robot", robot, Robot, "give one of rd.load").warn_below(None)
     samples = integer("samples", samples, least=_LEAST_SAMPLES, most=_MOST_SAMPLES)
     seed, repeats = integer("seed", seed, most=2**128 - 1), integer("repeats", repeats, least=1, most=_MOST_REPEATS)
-    tell = function("on_progress", on_progress, "(part, what)") or (lambda part, what: None)
+    report = function("on_progress", on_progress, "(part, what)") or (lambda part, what: None)
     given = _given(robot, q, v, a, tau)
     rng = np.random.default_rng(seed)
     states = random_states(robot, samples, rng)
-    tell(0.0, "machine code")
+    report(0.0, "machine code")
     found, left_out = implementations(robot)
-    counting, held, interrupted = Counting(robot, states, given, rng), list[Held](), False
-    asked_for = [each for each in QUANTITIES.values() if each in found[0].quantities]
+    digit_count, held, interrupted = DigitCount(robot, states, given, rng), list[Held](), False
+    quantities = [each for each in QUANTITIES.values() if each in found[0].quantities]
     try:
-        for k, quantity in enumerate(asked_for):
+        for k, quantity in enumerate(quantities):
             held += _quantity(
-                counting, quantity, [each for each in found if quantity in each.quantities], repeats, left_out,
-                lambda part, what, k=k: tell((k + part) / len(asked_for), what),
+                digit_count, quantity, [each for each in found if quantity in each.quantities], repeats, left_out,
+                lambda part, what, k=k: report((k + part) / len(quantities), what),
             )  # fmt: skip
     except KeyboardInterrupt:
         interrupted = True
         left_out.append("what was to come when it was interrupted")
     return Certificate(
-        robot.name, robot.joint_names, tuple(held), counting.decimals, counting.right_angles,
-        _condition(robot, states, given, rng), counting.bits, tuple(left_out), environment(), seed, interrupted,
+        robot.name, robot.joint_names, tuple(held), digit_count.decimals, digit_count.right_angles,
+        _condition(robot, states, given, rng), digit_count.bits, tuple(left_out), environment(), seed, interrupted,
     )  # fmt: skip
 
 
@@ -109,45 +111,35 @@ def _given(robot: Robot, q: Any, v: Any, a: Any, tau: Any) -> dict[str, np.ndarr
 
 
 def _quantity(
-    counting: Counting, quantity: Quantity, found: list[Implementation], repeats: int, left_out: list[str],
-    tell: Callable[[float, str], object],
+    digit_count: DigitCount, quantity: Quantity, found: list[Implementation], repeats: int, left_out: list[str],
+    report: Callable[[float, str], object],
 ) -> list[Held]:  # fmt: skip
-    """The digits and times of one quantity by each road, and by balls; `left_out` takes those without an answer."""
-    counted = {}
+    """Return digits and times of one quantity by each implementation; `left_out` takes those without an answer."""
+    held, calls, state = list[Held](), {}, digit_count.given or row(digit_count.states, 0)
     for k, implementation in enumerate(found):
-        tell(k / len(found), f"{quantity.name}: {implementation.name}")
+        report(k / len(found), f"{quantity.name}: {implementation.name}")
         try:
-            counted[implementation.name] = counting.count(implementation, quantity)
+            held.append(digit_count.count(implementation, quantity))
+            calls[implementation.name] = implementation.call(quantity, state)
         except QueryError as error:
             left_out.append(str(error))
-    state = counting.given or row(counting.states, 0)
-    balls = Lagrangian(counting.robot, Ball(counting.truth(counting.robot, quantity, state).bits))
-    proven = Implementation(f"balls, {balls.dtype.bits} bits", counting.robot, balls, (quantity,))
-    calls = {
-        implementation.name: implementation.call(quantity, state)
-        for implementation in (*found, proven)
-        if implementation.name in counted or implementation is proven
-    }
-    tell(1.0, f"{quantity.name}: times")
-    times = in_turns(calls, repeats, _AT_LEAST_S)
-    held = [
-        Held(
-            quantity.name, name, each.given, each.typical, each.random, each.searched, each.samples, times[name],
-            repeats, {key: x.tolist() for key, x in each.state.items() if key in quantity.arguments},
-        )
-        for name, each in counted.items()
-    ]  # fmt: skip
+    balls = Lagrangian(digit_count.robot, Ball(digit_count.truth(digit_count.robot, quantity, state).bits))
+    proven = Implementation(f"balls, {balls.dtype.bits} bits", digit_count.robot, balls, (quantity,))
+    calls[proven.name] = proven.call(quantity, state)
     most = float(MOST_DIGITS)
-    own = None if counting.given is None else most
+    given = None if digit_count.given is None else most
     at = {key: state[key].tolist() for key in quantity.arguments}
-    return [*held, Held(quantity.name, proven.name, own, most, most, most, 1, times[proven.name], repeats, at)]
+    held.append(Held(quantity.name, proven.name, given, most, most, most, 1, state=at))
+    report(1.0, f"{quantity.name}: times")
+    times = in_turns(calls, repeats, _AT_LEAST_S)
+    return [replace(each, time_s=times[each.implementation], repeats=repeats) for each in held]
 
 
 def _condition(robot: Robot, states: Batch, given: dict[str, np.ndarray] | None, rng: np.random.Generator) -> Condition:
     """κ of M, and its largest."""
 
     def conditions(states: Batch) -> np.ndarray:
-        return unit_diagonal_conditions(asked(robot, M, states))
+        return unit_diagonal_conditions(evaluate(robot, M, states))
 
     if robot.joint_without_inertia is not None:
         return Condition(None if given is None else inf, inf, inf, inf, ())

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from robot_dyn.studies.certificate.certificate import Certificate, Held
-from robot_dyn.studies.sheet import Colours, ResultError, legend, lines, sheet, styled
-from robot_dyn.view.plots.figure import THEMES
+from robot_dyn.studies.certificate.certificate import DECIMALS, Certificate, Held
+from robot_dyn.studies.figure import Colours, ResultError, key, legend, lines, sheet, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_WORDS = {"inverse_dynamics": "inverse dynamics", "forward_dynamics": "forward dynamics"}
 _WIDTH, _HEIGHT = 15.0, 5.2  # [inch]
 _TOP = 21.0  # digits
 
@@ -22,33 +20,21 @@ def draw(result: Certificate, theme: str = "light") -> Figure:
     Raises:
         ResultError: If no digits were counted.
     """
-    from matplotlib.lines import Line2D
-
-    colours = THEMES[theme]
     if not result.digits:
         raise ResultError("no digits were counted, so there is nothing to draw; look at left_out")
-    figure = sheet(_WIDTH, _HEIGHT, result.sentence, _caption(result), colours)
+    figure, colours = sheet(_WIDTH, _HEIGHT, result, _caption(result), theme)
+    hues = {name: colours["lines"][k % len(colours["lines"])] for k, name in enumerate(result.implementations)}
     grid = figure.add_gridspec(1, len(result.quantities), left=0.04, right=0.99, top=0.76, bottom=0.2, wspace=0.16)
     for k, quantity in enumerate(result.quantities):
         axes = figure.add_subplot(grid[0, k])
         axes.set(xscale="log", ylim=(0, _TOP), yticks=range(0, 21, 5))
-        styled(axes, colours, "time of a query [µs]", _WORDS.get(quantity, quantity), "" if k else "digits")
+        styled(axes, colours, "time of a query [µs]", quantity.replace("_", " "), "" if k else "digits")
         for each in result.digits:
             if each.quantity == quantity:
-                _mark(axes, each, colours["lines"][_hue(result, each.implementation, colours)], colours)
+                _mark(axes, each, hues[each.implementation], colours)
         axes.axhline(result.decimals[quantity], color=colours["ink"], linewidth=0.9, linestyle=(0, (6, 3)))
-    handles = [
-        Line2D(
-            [],
-            [],
-            color=colours["lines"][_hue(result, implementation, colours)],
-            marker="o",
-            linewidth=3,
-            label=lines(implementation),
-        )
-        for implementation in result.implementations
-    ]
-    handles.append(Line2D([], [], color=colours["ink"], linestyle="--", label="decimals of the file as float64"))
+    handles = [key(lines(name), hue, marker="o", linewidth=3) for name, hue in hues.items()]
+    handles.append(key(DECIMALS, colours["ink"], linestyle="--"))
     legend(figure, handles, colours)
     return figure
 
@@ -64,14 +50,10 @@ def _caption(result: Certificate) -> str:
 
 
 def _mark(axes: Any, each: Held, colour: str, colours: Colours) -> None:
-    """One road: the range of its digits at its time."""
+    """One implementation: the range of its digits at its time."""
     t = 1e6 * each.time_s
     axes.plot([t, t], [each.searched, each.typical], color=colour, linewidth=3, solid_capstyle="butt")
     axes.plot([t], [each.random], marker="_", color=colour, markersize=11, markeredgewidth=1.5)
     axes.plot([t], [each.searched], marker="o", color=colour, markersize=5)
     if each.given is not None:
         axes.plot([t], [each.given], marker="x", color=colours["ink"], markersize=6)
-
-
-def _hue(result: Certificate, implementation: str, colours: Colours) -> int:
-    return result.implementations.index(implementation) % len(colours["lines"])

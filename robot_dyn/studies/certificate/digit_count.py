@@ -1,9 +1,8 @@
-"""Counting of digits: errors of a road at many states against finer numbers, and at the worst of them against balls."""
+"""Count of digits: errors of an implementation against finer numbers at many states, and against balls at the worst."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import final
 
 import numpy as np
@@ -15,29 +14,17 @@ from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.scale import diagonal_scale, floored, solved_norm
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.quantity import CORIOLIS_TORQUE, M, N, Quantity
-from robot_dyn.studies.certificate.implementation import Implementation, asked
+from robot_dyn.studies.certificate.certificate import Held
+from robot_dyn.studies.certificate.implementation import Implementation, evaluate
 from robot_dyn.studies.certificate.worst_case_search import Batch, Search, row
 
 FEWER = 250  # random states for each one that balls judge, where no other numbers are fine enough; 8 at least
-_SIDE_BY_SIDE = 8  # states of a batch that machine code answers at once: as in the search, so in the judgement
+_SIDE_BY_SIDE = 8  # states that machine code answers side by side, in the search and in the judgement
 
 
 @final
-@dataclass(frozen=True)
-class Found:
-    """Digits of one quantity by one road; as of `Held`."""
-
-    given: float | None
-    typical: float
-    random: float
-    searched: float
-    samples: int
-    state: dict[str, np.ndarray]
-
-
-@final
-class Counting:
-    """The counting for one robot.
+class DigitCount:
+    """Counts the digits of the implementations of one robot.
 
     Args:
         robot: The robot.
@@ -58,16 +45,16 @@ class Counting:
 
     def count(
         self, implementation: Implementation, quantity: Quantity, check: Callable[[], object] = lambda: None
-    ) -> Found:
-        """The digits of one road.
+    ) -> Held:
+        """Count the digits of one implementation; its time is not measured.
 
         Args:
-            implementation: The road.
+            implementation: The implementation.
             quantity: Of which they are counted.
-            check: Called before each batch of states; what it raises ends the counting.
+            check: Called before each batch of states; what it raises ends the count.
 
         Raises:
-            QueryError: If the road has no finite answer.
+            QueryError: If the implementation has no finite answer.
         """
 
         def errors(states: Batch) -> np.ndarray:
@@ -90,7 +77,9 @@ class Counting:
         given = None if self.given is None else digits_of(self.judged(implementation, quantity, self.given))
         typical = digits_of(float(np.nanmedian(known)))
         self._of_file(implementation, quantity, state)
-        return Found(given, typical, digits_of(judged[0][0]), digits_of(searched), len(known), state)
+        random, searched = digits_of(judged[0][0]), digits_of(searched)
+        at = {name: state[name].tolist() for name in quantity.arguments}
+        return Held(quantity.name, implementation.name, given, typical, random, searched, len(known), state=at)
 
     def truth(self, robot: Robot, quantity: Quantity, state: dict[str, np.ndarray]) -> Truth:
         """True values at a state."""
@@ -102,37 +91,36 @@ class Counting:
     def judged(self, implementation: Implementation, quantity: Quantity, state: dict[str, np.ndarray]) -> float:
         """The error at a state, by balls."""
         several = {name: np.tile(x, (_SIDE_BY_SIDE, 1)) for name, x in state.items()}
-        return self.truth(implementation.robot, quantity, state).error(implementation.ask(quantity, several)[0])
+        return self.truth(implementation.robot, quantity, state).error(implementation.evaluate(quantity, several)[0])
 
     def _errors(self, implementation: Implementation, quantity: Quantity, states: Batch) -> np.ndarray:
         """Errors at states (S, n); NaN where there is no answer."""
         if implementation.fine is None:
-            answers = implementation.ask(quantity, states)
+            answers = implementation.evaluate(quantity, states)
             rows = (row(states, k) for k in range(len(answers)))
             return np.array(
                 [self.truth(implementation.robot, quantity, x).error(y) for x, y in zip(rows, answers, strict=True)]
             )
         key = (implementation.robot, quantity)
         if states is not self.states:
-            fine = asked(implementation.fine, quantity, states)
+            fine = evaluate(implementation.fine, quantity, states)
         elif key in self._fine:
             fine = self._fine[key]
         else:
-            fine = self._fine[key] = asked(implementation.fine, quantity, states)
-        error = (implementation.ask(quantity, states) - fine).astype(float)
+            fine = self._fine[key] = evaluate(implementation.fine, quantity, states)
+        error = (implementation.evaluate(quantity, states) - fine).astype(float)
         relative = self._scale(quantity, states, fine).relative(error)
         return relative.reshape(len(error), -1).max(axis=1)
 
     def _scale(self, quantity: Quantity, states: Batch, fine: np.ndarray) -> Scale:
         """Of errors at states, from fine answers; that of `truth`, but for rounding."""
+        inertia = evaluate(self._own, M, states)
         if not (quantity.definite or quantity.solves):
-            inertia = asked(self._own, M, states)
             return Scale(in_joint_units(fine.astype(float), inertia, self._typical(quantity)))
-        inertia = asked(self._own, M, states)
         if quantity.definite:
             return Scale(np.array([floored(each) for each in diagonal_scale(inertia)]))
         inertia[~np.all(np.isfinite(fine), axis=-1)] = np.eye(self.robot.n)  # where there is no answer
-        torques = (states["tau"], asked(self._own, CORIOLIS_TORQUE, states), asked(self._own, N, states))
+        torques = (states["tau"], evaluate(self._own, CORIOLIS_TORQUE, states), evaluate(self._own, N, states))
         return Scale(solved_norm(inertia, torques), inertia)
 
     def _typical(self, quantity: Quantity) -> float:
@@ -140,7 +128,7 @@ class Counting:
         if quantity.definite or quantity.solves:
             return 0.0
         if quantity not in self._sizes:
-            answers, inertia = asked(self._own, quantity, self.states), asked(self._own, M, self.states)
+            answers, inertia = evaluate(self._own, quantity, self.states), evaluate(self._own, M, self.states)
             ratios = answers / entry_units(answers, inertia)
             largest = float(np.nanmax(np.abs(ratios))) or 1.0  # by which they are divided: squares may overflow
             size = largest * float(np.sqrt(np.nanmean((ratios / largest) ** 2, axis=0)).max())

@@ -1,4 +1,4 @@
-"""The ways to M, C, N, inverse and forward dynamics whose digits and times stand beside each other."""
+"""The implementations of M, C, N, inverse and forward dynamics whose digits and times are compared."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ LONGDOUBLE = "Lagrangian, longdouble"
 @final
 @dataclass(frozen=True, eq=False)
 class ArticulatedBody:
-    """Forward dynamics by articulated bodies, asked as of a `Dynamics`."""
+    """Forward dynamics by articulated bodies, with the signature of `Dynamics`."""
 
     own: Lagrangian
 
@@ -42,7 +42,7 @@ class ArticulatedBody:
 @final
 @dataclass(frozen=True, eq=False)
 class Implementation:
-    """One way.
+    """One implementation of the equations.
 
     Attributes:
         name: Of program or formulation, and numbers.
@@ -58,13 +58,13 @@ class Implementation:
 
     @cached_property
     def fine(self) -> Lagrangian | None:
-        """The same equations in numbers that are finer by far; None if there are none but balls."""
+        """The same equations in numbers that are finer by far; None if only balls are finer."""
         longdouble = np.finfo(np.longdouble).eps < np.finfo(np.float64).eps / 100
         return Lagrangian(self.robot, np.longdouble) if longdouble and self.name != LONGDOUBLE else None
 
-    def ask(self, quantity: Quantity, states: dict[str, np.ndarray]) -> np.ndarray:
+    def evaluate(self, quantity: Quantity, states: dict[str, np.ndarray]) -> np.ndarray:
         """Answers at states (S, n); NaN where there is none."""
-        return asked(self.engine, quantity, states)
+        return evaluate(self.engine, quantity, states)
 
     def call(self, quantity: Quantity, state: dict[str, np.ndarray]) -> Callable[[], object]:
         """A query of one state, ready to be timed."""
@@ -72,7 +72,7 @@ class Implementation:
         return lambda: method(*arguments)
 
 
-def asked(engine: Any, quantity: Quantity, states: dict[str, np.ndarray]) -> np.ndarray:
+def evaluate(engine: Any, quantity: Quantity, states: dict[str, np.ndarray]) -> np.ndarray:
     """Answers at states (S, n), some at a time, eight of machine code side by side; NaN where there is none."""
     rows = [states[name] for name in quantity.arguments]
     parts = [slice(k, k + 512) for k in range(0, len(rows[0]), 512)]
@@ -81,7 +81,7 @@ def asked(engine: Any, quantity: Quantity, states: dict[str, np.ndarray]) -> np.
 
 
 def implementations(robot: Robot) -> tuple[list[Implementation], list[str]]:
-    """Those of a robot, and what is left out and why."""
+    """Return the implementations for a robot, and what is left out and why."""
     every = tuple(QUANTITIES.values())
     left_out: list[str] = []
     if robot.joint_without_inertia is not None:

@@ -41,7 +41,7 @@ class Search:
     Args:
         among: The random states.
         rng: Of the steps.
-        parents, children: How many are kept, and how many each has in a generation.
+        parents, children: Number of states that survive a generation, and of children of each.
         generations: How many there are; five times as many while nothing worse than the random states is found.
     """
 
@@ -70,9 +70,9 @@ class Search:
             young = self._born(best, arguments)
             found = errors(young)
             size = np.concatenate([size, np.where(np.isfinite(found), found, -np.inf)])
-            kept = np.argsort(-size, kind="stable")[: self._parents]
-            best = {name: np.concatenate([x, young[name]])[kept] for name, x in best.items()}
-            size = size[kept]
+            best_of_all = np.argsort(-size, kind="stable")[: self._parents]
+            best = {name: np.concatenate([x, young[name]])[best_of_all] for name, x in best.items()}
+            size = size[best_of_all]
         return {name: x[:1] for name, x in best.items()}, float(size[0])
 
     def _born(self, parents: Batch, arguments: tuple[str, ...]) -> Batch:

@@ -1,6 +1,6 @@
-"""Two ways to one result, or a part on and off: their instructions counted, their times medians of turns.
+"""Comparison of two versions of a computation, or of a part on and off: instructions counted, times in turns.
 
-ratio = first / second, of times in each turn, so that the machine's moods meet both
+ratio = first / second, of times in each turn, so that changes of the machine's speed affect both
 """
 
 from __future__ import annotations
@@ -146,7 +146,7 @@ def in_turns(pairs: Iterable[Pair], budget: Budget, repeats: int) -> list[str]:
             if budget.left <= 0:
                 untimed = [name for name, way in ways.values() if not way.times]
                 return left_out + [f"time of {each}: the budget of {budget.seconds:g} s ended" for each in untimed]
-            budget.tell(f"round {k + 1}: {name}")
+            budget.report(f"round {k + 1}: {name}")
             try:
                 if not k:
                     with budget.apart():

@@ -28,11 +28,11 @@ _MOST_REPEATS = 1000
 @final
 @dataclass(frozen=True, eq=False)
 class Cost(Result):
-    """What the parts of a setup, and ways to its equations, cost.
+    """The cost of the parts of a setup, and of algorithms for its equations.
 
     Attributes:
         robot: Its name.
-        acting: What acts, in words.
+        acting: Descriptions of what acts.
         alternatives: Two of each kind beside each other.
         left_out: What was left out, and why.
         environment: Versions and processor.
@@ -92,13 +92,13 @@ class Cost(Result):
             return "no step was counted"
         on, off = whole.first, whole.second
         time = "" if on.time_s is None else f", {format_duration(on.time_s)}"
-        made = [
+        terms = [
             f"rigid bodies {off.instructions}",
             *(f"{name} {count}".replace(" -", " −") for name, count in self.parts.items()),
         ]
-        made += [f"several of these together {self.shared}"] * (self.shared > 0)
-        made += [f"less {-self.shared} that several of these count"] * (self.shared < 0)
-        return f"a step of RK4 takes {on.instructions} instructions{time}: {', '.join(made)}"
+        terms += [f"several of these together {self.shared}"] * (self.shared > 0)
+        terms += [f"less {-self.shared} that several of these count"] * (self.shared < 0)
+        return f"a step of RK4 takes {on.instructions} instructions{time}: {', '.join(terms)}"
 
 
 def cost(
@@ -138,7 +138,7 @@ def cost(
     try:
         with budget.apart():
             for name, make in _questions(setup):
-                budget.tell(f"counting: {name}")
+                budget.report(f"counting: {name}")
                 try:
                     pairs += make()
                 except (ImportError, RobotDynError) as error:

@@ -8,8 +8,7 @@ from robot_dyn.seconds import format_duration
 from robot_dyn.studies.costs.ab_comparison import ABComparison
 from robot_dyn.studies.costs.cost import Cost
 from robot_dyn.studies.costs.step_cost import EVERYTHING
-from robot_dyn.studies.sheet import Colours, ResultError, lines, sheet, styled
-from robot_dyn.view.plots.figure import THEMES
+from robot_dyn.studies.figure import Colours, ResultError, ink, lines, programs, sheet, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,11 +26,10 @@ def draw(result: Cost, theme: str = "light") -> Figure:
     """
     if not result.alternatives:
         raise ResultError("nothing was counted, so there is nothing to draw; look at left_out")
-    colours = THEMES[theme]
     parts = _parts(result)
     others = [each for each in result.alternatives if each.group != "parts"]
     height = _HEIGHT + _ROW * max(len(parts), len(others))
-    figure = sheet(_WIDTH, height, result.sentence, _caption(result), colours)
+    figure, colours = sheet(_WIDTH, height, result, _caption(result), theme)
     grid = figure.add_gridspec(
         1, 2, left=0.125, right=0.975, top=1 - 1.3 / height, bottom=0.55 / height, wspace=0.55, width_ratios=(1, 1.15)
     )
@@ -43,25 +41,23 @@ def draw(result: Cost, theme: str = "light") -> Figure:
 
 
 def _caption(result: Cost) -> str:
-    versions = result.environment
-    programs = ", ".join(f"{k} {x}" for k, x in versions.items() if k in ("robot-dyn", "pin", "llvmlite", "casadi"))
     return (
         f"{result.robot}: {', '.join(result.acting) or 'no effects'}. Times of the processor: medians over turns."
-        f" {programs}; {versions.get('processor', '')}."
+        f" {programs(result.environment, 'llvmlite', 'casadi')}."
     )
 
 
 def _parts(result: Cost) -> list[tuple[str, int, float | None]]:
     """What a step is made of: names, instructions and times, in [s]."""
     alternatives = [each for each in result.alternatives if each.group == "parts"]
-    made = []
+    rows = []
     for each in alternatives:
         on, off = each.first, each.second
         if each.what == EVERYTHING:
-            made.append(("rigid bodies", off.instructions, off.time_s))
+            rows.append(("rigid bodies", off.instructions, off.time_s))
         else:
-            made.append((each.what, on.instructions - off.instructions, each.time_between_s))
-    return made + ([("of several", result.shared, None)] if result.shared else [])
+            rows.append((each.what, on.instructions - off.instructions, each.time_between_s))
+    return rows + ([("of several", result.shared, None)] if result.shared else [])
 
 
 def _draw_parts(axes: Any, parts: list[tuple[str, int, float | None]], colours: Colours) -> None:
@@ -72,7 +68,7 @@ def _draw_parts(axes: Any, parts: list[tuple[str, int, float | None]], colours: 
     for place, (_, count, spent) in enumerate(parts):
         time = "" if spent is None else f", {'−' * (spent < 0)}{format_duration(abs(spent))}"
         said = f" {count} ({100 * count / whole:.1f} %){time}".replace("-", "−")
-        axes.text(max(count, 0), place, said, va="center", fontsize=8, color=colours["ink"], parse_math=False)
+        axes.text(max(count, 0), place, said, va="center", fontsize=8, **ink(colours))
     _named(axes, [name for name, _, _ in parts], colours)
     axes.set_xlim(min(0, *(count for _, count, _ in parts)), 1.45 * max(count for _, count, _ in parts) or 1)
 
@@ -92,7 +88,7 @@ def _draw_ratios(axes: Any, others: list[ABComparison], colours: Colours) -> Non
             if x is None or not 0 < x < float("inf"):
                 continue
             axes.barh(y, x - 1, _BAR, left=1, color=colour)
-            axes.text(max(x, 1.0), y, f" {x:.2g}", va="center", fontsize=8, color=colours["ink"], parse_math=False)
+            axes.text(max(x, 1.0), y, f" {x:.2g}", va="center", fontsize=8, **ink(colours))
     axes.axvline(1, color=colours["ink"], linewidth=0.9)
     _named(axes, [f"{each.what}:\n{each.first.name} / {each.second.name}" for each in others], colours)
     axes.set_xlim(min(0.7, *(x / 1.2 for x in known)), 1.6 * max(2.0, *known))

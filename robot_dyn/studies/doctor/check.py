@@ -81,7 +81,7 @@ def check(
 def checked(
     text: bytes, source: str, package_dirs: tuple[Path, ...] = (), density: float | None = None, units: bool = False
 ) -> Checkup:
-    """The same of the text of a file."""
+    """Check the text of a file."""
     refusal = _refusal(text, source)
     try:
         document = written = Document(text, source)
@@ -91,7 +91,7 @@ def checked(
     found += [finding for find in _OF_TEXT for finding in find(document)]
     explained = any(each.severity is Severity.ERROR for each in found)
     repairs = [each for each in found if each.changes]
-    declared = any("XML" in each for each in document.assumed)  # which is written anew
+    declared = any("XML" in each for each in document.assumed)  # which is written again
     if repairs or declared:
         document = _rewritten(document, repairs)
     still = _refusal(document.text, source)
@@ -99,7 +99,7 @@ def checked(
         found.append(_of_refusal(source, str(refusal if still is None else still), written))
     robot = None if still is not None else _loaded(document, found)
     if robot is not None:
-        found += [_assumed(each) for each in robot.description.findings if not _told(each, found)]
+        found += [_assumed(each) for each in robot.description.findings if not _reported(each, found)]
         found += masses.masses(robot)
         of, unread = shapes.shapes(robot, package_dirs)
         found += [_of_mesh(each) for each in unread]
@@ -147,8 +147,8 @@ def _assumed(text: str) -> Finding:
     return Finding(Severity.WARNING, "format", where, what, remedy)
 
 
-def _told(text: str, found: Iterable[Finding]) -> bool:
-    """Whether a finding of the read is among those of the check in other words."""
+def _reported(text: str, found: Iterable[Finding]) -> bool:
+    """Whether the check has already found, with another text, what the read found."""
     limits_told = {each.where for each in found if each.kind.startswith("limit")}
     same = {each.what for each in found}
     return text.partition(": ")[0] in limits_told or any(what in text for what in same)

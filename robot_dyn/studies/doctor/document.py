@@ -8,6 +8,15 @@ from typing import Any, final
 
 from robot_dyn.description.markup import parse
 from robot_dyn.errors import DescriptionError
+from robot_dyn.studies.doctor.finding import Change, Finding, Severity
+
+
+def parsed(text: str | None) -> float:
+    """Return the number of a literal; nan if it is not one."""
+    try:
+        return float(text or "nan")
+    except ValueError:
+        return float("nan")
 
 
 @final
@@ -40,13 +49,19 @@ class Document:
         return next(found, None)
 
     def line(self, where: str, what: str) -> int | None:
-        """The line of a link or joint, or of its element, or that of its inertial, of which a refusal speaks."""
+        """Return the line of the link or joint, or of the element in it or in its inertial, that a refusal names."""
         for part in self.root.iter("link", "joint"):
             if self.where(part) == where:
                 tag = re.match(r"<(\w+)>", what)
                 inner = () if tag is None else (*part.iterfind(tag[1]), *part.iterfind(f"inertial/{tag[1]}"))
                 return next(iter(inner), part).sourceline
         return None
+
+    def finding(
+        self, severity: Severity, kind: str, element: Any, what: str, remedy: str, changes: tuple[Change, ...] = ()
+    ) -> Finding:
+        """Return a finding at an element: with its link or joint, and its line."""
+        return Finding(severity, kind, self.where(element), what, remedy, element.sourceline, changes)
 
     @staticmethod
     def where(element: Any) -> str:

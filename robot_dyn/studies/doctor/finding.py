@@ -32,7 +32,7 @@ class Change:
         key: The attribute that is changed; "" for the name of the element itself.
         value: What it is then.
         renames: The attribute that `key` was called before, if it is renamed.
-        text: What it is, in words.
+        text: Its description.
     """
 
     element: Any = field(metadata=UNREPORTED)
@@ -43,7 +43,7 @@ class Change:
 
     def __post_init__(self) -> None:
         tag, before = self.element.tag, self.element.get(self.key or "x", "")
-        text = f'{self.key} of <{tag}> was "{shorten(before)}"'  # told now: once it is made it is not to be seen
+        text = f'{self.key} of <{tag}> was "{shorten(before)}"'  # while the old value is still there
         if not self.key:
             text = f"<{tag}> is now <{self.value}>"
         elif self.renames:
@@ -51,7 +51,7 @@ class Change:
         object.__setattr__(self, "text", text)
 
     def apply(self) -> None:
-        """Make it."""
+        """Apply the change to the element."""
         if not self.key:
             self.element.tag = self.value
         elif self.renames:

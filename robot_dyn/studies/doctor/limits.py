@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from math import isfinite
 from typing import Any
 
-from robot_dyn.studies.doctor.document import Document
+from robot_dyn.studies.doctor.document import Document, parsed
 from robot_dyn.studies.doctor.finding import Change, Finding, Severity
 
 _UNITS = {"effort": "N m or N", "velocity": "rad/s or m/s"}
@@ -20,49 +20,42 @@ def limits(document: Document) -> Iterator[Finding]:
 
 
 def _of_joint(document: Document, joint: Any) -> Iterator[Finding]:
-    where, limit, line = document.where(joint), joint.find("limit"), joint.sourceline
+    limit = joint.find("limit")
     if limit is None:
         if joint.get("type") != "continuous":
-            yield Finding(
-                Severity.WARNING, "limit_missing", where, f"is {joint.get('type')} and has no <limit>",
-                "add one: URDF requires it, and other programs refuse the file", line,
+            yield document.finding(
+                Severity.WARNING, "limit_missing", joint, f"is {joint.get('type')} and has no <limit>",
+                "add one: URDF requires it, and other programs refuse the file",
             )  # fmt: skip
         return
-    stated = {key: x for key in ("lower", "upper", *_UNITS) if isfinite(x := _number(limit.get(key)))}
+    stated = {key: x for key in ("lower", "upper", *_UNITS) if isfinite(x := parsed(limit.get(key)))}
     if missing := [key for key in _UNITS if limit.get(key) is None]:
-        yield Finding(
-            Severity.NOTE, "limit_missing", where, f"its <limit> has no {' and no '.join(missing)}",
-            "add it: URDF requires both, and other programs refuse the file", line,
+        yield document.finding(
+            Severity.NOTE, "limit_missing", joint, f"its <limit> has no {' and no '.join(missing)}",
+            "add it: URDF requires both, and other programs refuse the file",
         )  # fmt: skip
     for key, unit in _UNITS.items():
         if stated.get(key) == 0:
-            yield Finding(
-                Severity.WARNING, "limit_zero", where, f"its {key} limit is 0, which allows no {key} at all",
-                f"write the limit in {unit}", line,
+            yield document.finding(
+                Severity.WARNING, "limit_zero", joint, f"its {key} limit is 0, which allows no {key} at all",
+                f"write the limit in {unit}",
             )  # fmt: skip
         elif stated.get(key, 0.0) < 0:
-            yield Finding(
-                Severity.WARNING, "limit_negative", where, f"its {key} limit is {limit.get(key)}",
-                "write it without the sign", line, (Change(limit, key, limit.get(key).strip().lstrip("-")),),
+            yield document.finding(
+                Severity.WARNING, "limit_negative", joint, f"its {key} limit is {limit.get(key)}",
+                "write it without the sign", (Change(limit, key, limit.get(key).strip().lstrip("-")),),
             )  # fmt: skip
     if joint.get("type") == "continuous" or not {"lower", "upper"} & stated.keys():
         return
     lower, upper = stated.get("lower", 0.0), stated.get("upper", 0.0)
     if lower > upper:
         exchanged = Change(limit, "lower", limit.get("upper", "0")), Change(limit, "upper", limit.get("lower", "0"))
-        yield Finding(
-            Severity.WARNING, "limits_crossed", where, f"its lower limit {lower:g} is above its upper one {upper:g}",
-            "exchange them", line, exchanged,
+        yield document.finding(
+            Severity.WARNING, "limits_crossed", joint, f"its lower limit {lower:g} is above its upper one {upper:g}",
+            "exchange them", exchanged,
         )  # fmt: skip
     elif lower == upper:
-        yield Finding(
-            Severity.WARNING, "limits_equal", where, f"its limits are both {lower:g}, so that it cannot move",
-            "correct them, or make the joint fixed", line,
+        yield document.finding(
+            Severity.WARNING, "limits_equal", joint, f"its limits are both {lower:g}, so that it cannot move",
+            "correct them, or make the joint fixed",
         )  # fmt: skip
-
-
-def _number(text: str | None) -> float:
-    try:
-        return float(text or "nan")
-    except ValueError:
-        return float("nan")

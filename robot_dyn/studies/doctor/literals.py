@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from math import degrees, isfinite, pi
 from typing import Any
 
-from robot_dyn.studies.doctor.document import Document
+from robot_dyn.studies.doctor.document import Document, parsed
 from robot_dyn.studies.doctor.finding import Change, Finding, Severity
 
 NUMBERS = {
@@ -37,11 +37,11 @@ def decimal_commas(document: Document) -> Iterator[Finding]:
     for element, key, words in numbers(document):
         if words and any(_COMMA.fullmatch(word) for word in words):
             text = " ".join(word.replace(",", ".") if _COMMA.fullmatch(word) else word for word in words)
-            yield Finding(
-                Severity.ERROR, "decimal_comma", document.where(element),
+            yield document.finding(
+                Severity.ERROR, "decimal_comma", element,
                 f'{key} of <{element.tag}> is "{" ".join(words)}", with decimal commas',
                 "write a point; many programs read the digits before the comma alone, or drop the element",
-                element.sourceline, (Change(element, key, text),),
+                (Change(element, key, text),),
             )  # fmt: skip
 
 
@@ -61,10 +61,10 @@ def line_breaks(document: Document) -> Iterator[Finding]:
         if element.sourceline in lines.get((element.tag, key), ()):  # the line where its start tag ends
             inertial = element.getparent().tag == "inertial"
             drops = "urdfdom drops the whole <inertial> for that" if inertial else "urdfdom refuses that"
-            yield Finding(
-                Severity.ERROR if inertial else Severity.WARNING, "line_break", document.where(element),
+            yield document.finding(
+                Severity.ERROR if inertial else Severity.WARNING, "line_break", element,
                 f"{key} of <{element.tag}> has a line break or tab between its numbers; {drops}",
-                "write its numbers in one line", element.sourceline, (Change(element, key, " ".join(words)),),
+                "write its numbers in one line", (Change(element, key, " ".join(words)),),
             )  # fmt: skip
 
 
@@ -78,10 +78,10 @@ def near_right_angles(document: Document) -> Iterator[Finding]:
             off = max(abs(float(a) - float(b)) for a, b in zip(full, words, strict=True) if a != b)
             drawn = element.getparent().tag in ("visual", "collision")
             severity = Severity.WARNING if off > 1e-6 and not drawn else Severity.NOTE
-            yield Finding(
-                severity, "near_right_angle", document.where(element),
+            yield document.finding(
+                severity, "near_right_angle", element,
                 f'rpy "{" ".join(words)}" is off a right angle by {off:.1e} rad', "write π/2 to 16 digits",
-                element.sourceline, (Change(element, key, " ".join(full)),),
+                (Change(element, key, " ".join(full)),),
             )  # fmt: skip
 
 
@@ -101,23 +101,16 @@ def angles_in_degrees(document: Document) -> Iterator[Finding]:
     """Angles of more than a turn that are whole degrees."""
     for element, key, words in numbers(document):
         angles = key == "rpy" or (key in ("lower", "upper") and element.getparent().get("type") == "revolute")
-        values = [x for word in words if isfinite(x := _number(word))]
+        values = [x for word in words if isfinite(x := parsed(word))]
         if not angles or len(values) != len(words) or not any(_TURN * 1.01 < abs(x) <= 720 for x in values):
             continue
         whole = all(x % (_WHOLE if key == "rpy" else 1.0) == 0 for x in values)
         if key != "rpy" and not whole:  # some joints turn several times
             continue
         meant = " ".join(repr(x * pi / 180) for x in values)
-        yield Finding(
-            Severity.WARNING, "degrees", document.where(element),
+        yield document.finding(
+            Severity.WARNING, "degrees", element,
             f'{key} "{" ".join(words)}" is more than a turn ({degrees(max(map(abs, values))):.0f}°)'
             + (": degrees are suspected" if whole else ""),
-            "write radians", element.sourceline, (Change(element, key, meant),) if whole else (),
+            "write radians", (Change(element, key, meant),) if whole else (),
         )  # fmt: skip
-
-
-def _number(word: str) -> float:
-    try:
-        return float(word)
-    except ValueError:
-        return float("nan")

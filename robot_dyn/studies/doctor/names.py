@@ -13,10 +13,10 @@ _EXPRESSION = re.compile(r"\$[{(][^})]*[})]")
 
 
 def names(document: Document) -> Iterator[Finding]:
-    """Names with blanks around or within them, of other alphabets, or of a link and a joint at once."""
-    seen = {kind: [(each.get("name") or "") for each in document.root.iterfind(kind)] for kind in ("link", "joint")}
-    for kind, listed in seen.items():
-        for name, count in Counter(x.strip() for x in listed).items():
+    """Names with blanks around or within them, of other alphabets, or shared by a link and a joint."""
+    listed = {kind: [(each.get("name") or "") for each in document.root.iterfind(kind)] for kind in ("link", "joint")}
+    for kind, names_of_kind in listed.items():
+        for name, count in Counter(x.strip() for x in names_of_kind).items():
             if count > 1:
                 yield Finding(
                     Severity.ERROR, "name_twice", f"{kind} {name!r}", f"is defined {count} times", "rename all but one"
@@ -26,19 +26,17 @@ def names(document: Document) -> Iterator[Finding]:
             name = element.get(key)
             if element.tag not in ("link", "joint", "parent", "child", "mimic") or name is None:
                 continue
-            where = document.where(element)
             if name != name.strip():
-                yield Finding(
-                    Severity.WARNING, "name_blanks", where, f"{key} {name!r} of <{element.tag}> has blanks around it",
-                    "remove them: other programs find no part of that name", element.sourceline,
-                    (Change(element, key, name.strip()),),
+                yield document.finding(
+                    Severity.WARNING, "name_blanks", element, f"{key} {name!r} of <{element.tag}> has blanks around it",
+                    "remove them: other programs find no part of that name", (Change(element, key, name.strip()),),
                 )  # fmt: skip
             elif key == "name" and (not name.isascii() or re.search(r"[\s/]", name)):
-                yield Finding(
-                    Severity.NOTE, "name_letters", where, "its name has blanks, slashes or letters beyond ASCII",
-                    "rename it: programs that use names as topics or variables do not take it", element.sourceline,
+                yield document.finding(
+                    Severity.NOTE, "name_letters", element, "its name has blanks, slashes or letters beyond ASCII",
+                    "rename it: programs that use names as topics or variables do not take it",
                 )  # fmt: skip
-    for name in sorted({*seen["link"]} & {*seen["joint"]}):
+    for name in sorted({*listed["link"]} & {*listed["joint"]}):
         yield Finding(
             Severity.NOTE, "name_shared", f"link {name!r}", "a joint has the same name",
             "rename one of them: programs with one table of names take the other",
@@ -49,8 +47,8 @@ def leftovers(document: Document) -> Iterator[Finding]:
     """Expressions of xacro that nobody expanded."""
     for element in document.root.iter():
         if isinstance(element.tag, str) and (found := _EXPRESSION.search(" ".join(map(str, element.attrib.values())))):
-            yield Finding(
-                Severity.ERROR, "xacro", document.where(element), f"holds {found[0]}, which is still to be computed",
-                "expand the file: xacro robot.xacro > robot.urdf, or robot-dyn … --xacro ''", element.sourceline,
+            yield document.finding(
+                Severity.ERROR, "xacro", element, f"holds {found[0]}, which is still to be computed",
+                "expand the file: xacro robot.xacro > robot.urdf, or robot-dyn … --xacro ''",
             )  # fmt: skip
             return

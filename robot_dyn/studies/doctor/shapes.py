@@ -19,6 +19,7 @@ from robot_dyn.description.structure import StatedLink, structure
 from robot_dyn.model.robot import Robot
 from robot_dyn.studies.doctor.document import Document
 from robot_dyn.studies.doctor.finding import Change, Finding, Severity
+from robot_dyn.studies.doctor.literals import NUMBERS
 from robot_dyn.view.geometry.visuals import Piece, solids
 
 _SLACK = 1.1  # of a shape's extent: collision shapes leave out screws
@@ -26,7 +27,6 @@ _LIGHT, _HEAVY = 2.0, 3e4  # [kg/m³] of a link and its convex hull: below foam,
 _UNITS = {1e3: "g m²", 1e4: "kg cm²", 1e6: "kg mm²", 1e7: "g cm²", 1e9: "g mm²"}
 _WITHIN = 4.0  # a factor on either side, by which the inertia of a link is off that of a uniform body
 _LONG = 100.0  # times the length of the arm that a shape is: millimetres
-_MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
 @final
@@ -65,7 +65,7 @@ def _of_piece(piece: Piece) -> MassProperties | None:
         solid = surface if surface.is_watertight and surface.volume > 0 else surface.convex_hull
         R, p = piece.pose[:3, :3], piece.pose[:3, 3]
         return MassProperties(solid.volume, solid.center_mass, solid.moment_inertia).moved(R, p)
-    except Exception:  # a flat surface, of which SciPy's hull raises its own errors
+    except Exception:  # a flat surface, for which SciPy's hull raises its own errors
         return None
 
 
@@ -135,7 +135,7 @@ def _inertia(name: str, link: StatedLink, shape: Shape, inertial: Any) -> Findin
         if factor / _WITHIN < ratio < factor * _WITHIN:
             suspected, inertia = f": {unit} is suspected", inertial.find("inertia")
             power = -round(np.log10(factor))
-            moments = {key: inertia.get(key) for key in _MOMENTS}
+            moments = {key: inertia.get(key) for key in NUMBERS["inertia"]}
             changes = tuple(Change(inertia, key, _scaled(x, power)) for key, x in moments.items() if float(x))
     return Finding(
         Severity.ERROR, "inertia_shape", f"link {name!r}",

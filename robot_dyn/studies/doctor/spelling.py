@@ -64,15 +64,9 @@ def _only(tag: str, missing: set[str]) -> list[str]:
 
 
 def _finding(document: Document, element: Any, what: str, near: list[str], key: str) -> Finding:
-    where, kind = document.where(element), "unknown_attribute" if key else "unknown_element"
+    kind, found = "unknown_attribute" if key else "unknown_element", f"{what} is not of URDF, and is passed over"
     if not near:
-        remedy = "remove it, or write what URDF calls it"
-        return Finding(
-            Severity.NOTE, kind, where, f"{what} is not of URDF, and is passed over", remedy, element.sourceline
-        )
+        return document.finding(Severity.NOTE, kind, element, found, "remove it, or write what URDF calls it")
     change = Change(element, near[0], "", key) if key else Change(element, "", near[0])
     meant = near[0] if key else f"<{near[0]}>"
-    return Finding(
-        Severity.ERROR, kind, where, f"{what} is not of URDF, and is passed over", f"{meant} is meant; correct it",
-        element.sourceline, (change,),
-    )  # fmt: skip
+    return document.finding(Severity.ERROR, kind, element, found, f"{meant} is meant; correct it", (change,))

@@ -30,7 +30,7 @@ from robot_dyn.lagrange.recursions.newton_euler import newton_euler
 from robot_dyn.lagrange.tree import tree
 from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.studies.proof.tape.literals import Literals
+from robot_dyn.studies.proof.term import Literals
 
 _EFFECTS = (ViscousFriction, RegularisedCoulombFriction, Spring)
 _CONTROLLERS = (PD, ComputedTorque, PDGravity, FeedForward)
@@ -163,7 +163,7 @@ def _check(controller: Controller) -> None:
         )
     for name, each in controller.references.items():
         if not isinstance(each, PiecewisePolynomial):
-            raise ProofError(f"{name} of {controller.name} is no piecewise polynomial")
+            raise ProofError(f"{name} of {controller.name} is not a piecewise polynomial")
 
 
 def _robot(dynamics: Any, what: str) -> Robot:

@@ -1,17 +1,36 @@
-"""What is kept of a proven step: balls at its end, and polynomial and tube on the way, as plain data."""
+"""What is stored of a proven step: balls at its end, and polynomial and tube on the way, as whole numbers."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, final
 
-from flint import arb
+from flint import arb, ctx
 
-from robot_dyn.studies.proof.enclosure.balls import horner
+from robot_dyn.studies.proof.enclosure.balls import Ball, horner
 from robot_dyn.studies.proof.enclosure.polynomial import derivatives
 from robot_dyn.studies.proof.enclosure.step import State, Step
-from robot_dyn.studies.proof.packed import Packed, of_joints, unpacked
+
+Packed = tuple[int, int, int, int]
+
+
+def packed(x: Ball) -> Packed:
+    """The numbers of a ball, exactly."""
+    (m, e), (r, s) = x.mid().man_exp(), x.rad().man_exp()
+    return int(m), int(e), int(r), int(s)
+
+
+def unpacked(x: Packed) -> Ball:
+    """The ball of these numbers; its midpoint exactly, its radius rounded up."""
+    m, e, r, s = x
+    with ctx.workprec(max(m.bit_length(), r.bit_length(), 2)):
+        return arb(arb(m) * arb(2) ** e, arb(r) * arb(2) ** s)
+
+
+def of_joints(balls: Sequence[Ball]) -> tuple[Packed, ...]:
+    """One for each joint."""
+    return tuple(map(packed, balls))
 
 
 @final
@@ -35,7 +54,7 @@ class Node:
 
 
 def node_of(state: State, step: Step | None = None) -> Node:
-    """What is kept of a state, and of the step before it."""
+    """Return what is stored of a state, and of the step before it."""
     n = len(state.q)
     wide = [arb(0, bound) for bound in state.error.bounds]
     q, v = (

@@ -13,13 +13,12 @@ from flint import ctx
 from robot_dyn.arithmetic import Ball
 from robot_dyn.errors import QueryError
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.studies.proof.assumed import assumed
 from robot_dyn.studies.proof.enclosure.balls import NotProvenError
 from robot_dyn.studies.proof.enclosure.step import State, effort, proven_step
+from robot_dyn.studies.proof.hypotheses import assumed, start
 from robot_dyn.studies.proof.motion import Motion, motion
 from robot_dyn.studies.proof.node import Node, node_of
-from robot_dyn.studies.proof.start import start
-from robot_dyn.studies.proof.tape.tape import Tape
+from robot_dyn.studies.proof.tape import Tape
 from robot_dyn.studies.proof.theorem import Proof
 from robot_dyn.validate import duration, function, instance, integer, number
 
@@ -56,7 +55,7 @@ def prove(
         on_progress: Called with the time reached, in [s], after each step.
 
     Returns:
-        The theorem, which may reach less far than asked for, and says why.
+        The theorem, which may reach less far than requested, and says why.
 
     Raises:
         QueryError: If an argument is not allowed.

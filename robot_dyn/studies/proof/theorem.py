@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from math import inf, log10, nextafter
 from typing import Any, final
@@ -14,9 +12,8 @@ import numpy as np
 from robot_dyn.arithmetic import Array, Ball
 from robot_dyn.errors import QueryError, escaped
 from robot_dyn.result import UNREPORTED, reported
-from robot_dyn.studies.proof.node import Node, on_the_way
-from robot_dyn.studies.proof.packed import Packed, unpacked
-from robot_dyn.studies.proof.start import numbers_of
+from robot_dyn.studies.proof.hypotheses import numbers_of
+from robot_dyn.studies.proof.node import Node, Packed, on_the_way, unpacked
 from robot_dyn.validate import number, numbers
 from robot_dyn.values import Value
 
@@ -35,9 +32,9 @@ class Proof(Value):
     Attributes:
         robot: Name of the arm.
         joint_names: Of the n joints.
-        asked_s: Time up to which it was asked for, in [s].
+        requested_s: Time up to which it was requested, in [s].
         until_s: Time up to which it is proven.
-        why_not: Why it is not proven beyond; empty if all that was asked for is.
+        why_not: Why it is not proven beyond; empty if it is proven up to there.
         bits: Precision of the balls.
         assumed: Which numbers are meant, in sentences.
         nodes: Ends of steps, the start first.
@@ -45,7 +42,7 @@ class Proof(Value):
 
     robot: str
     joint_names: tuple[str, ...] = field(metadata=UNREPORTED)
-    asked_s: float
+    requested_s: float
     until_s: float
     why_not: str
     bits: int
@@ -59,7 +56,7 @@ class Proof(Value):
 
     @reported
     def proven(self) -> bool:
-        """Whether it reaches the time that was asked for."""
+        """Whether it reaches the requested time."""
         return not self.why_not
 
     @reported
@@ -95,7 +92,7 @@ class Proof(Value):
         if not 0 <= t <= self.until_s:
             raise QueryError(f"t must be between 0 and {self.until_s!r} s, up to which it is proven, got {t!r}")
         k = bisect_right(self.nodes, t, key=lambda node: node.t) - 1
-        with self._precision():
+        with Ball(self.bits).scope():
             if self.nodes[k].t == t:
                 q, v = ([unpacked(x) for x in known] for known in (self.nodes[k].q, self.nodes[k].v))
             else:
@@ -114,7 +111,7 @@ class Proof(Value):
             QueryError: If one has another shape, or t is beyond what is proven.
         """
         known = dict(zip("qv", self.at(t), strict=True))
-        with self._precision():
+        with Ball(self.bits).scope():
             given = {"q": numbers_of("q", q, self.joint_names)}
             if v is not None:
                 given["v"] = numbers_of("v", v, self.joint_names)
@@ -140,7 +137,7 @@ class Proof(Value):
             raise QueryError(f"no sample lies within the {self.until_s!r} s that are proven")
         ends, most = np.array([node.t for node in self.nodes]), 0.0
         steps = np.clip(np.searchsorted(ends, t[within], side="left"), 1, None)
-        with self._precision():
+        with Ball(self.bits).scope():
             for k in np.unique(steps).tolist() if len(ends) > 1 else ():
                 at = on_the_way(self.nodes[k - 1].t, self.nodes[k])
                 for time, row in zip(t[within][steps == k].tolist(), q[within][steps == k].tolist(), strict=True):
@@ -150,12 +147,12 @@ class Proof(Value):
     @reported
     def q(self) -> tuple[str, ...]:
         """The balls of q at the end, as decimals with a radius that hold them."""
-        return tuple(map(_told, self.nodes[-1].q))
+        return tuple(map(_decimals, self.nodes[-1].q))
 
     @reported
     def v(self) -> tuple[str, ...]:
         """Those of v."""
-        return tuple(map(_told, self.nodes[-1].v))
+        return tuple(map(_decimals, self.nodes[-1].v))
 
     @reported
     def steps(self) -> int:
@@ -169,7 +166,7 @@ class Proof(Value):
 
     @property
     def summary(self) -> str:
-        """The theorem in words."""
+        """The theorem as text."""
         lines = [f"{self.robot}: " + self._claim]
         rows = zip(self.joint_names, self.q, self.v, strict=True)
         lines += [f"  {name}: q = {q}, v = {v}" for name, q, v in rows]
@@ -185,11 +182,6 @@ class Proof(Value):
             return "nothing is proven."
         return f"the motion exists and is the only one for 0 ≤ t ≤ {self.until_s!r} s, and at its end it is within"
 
-    @contextmanager
-    def _precision(self) -> Iterator[None]:
-        with Ball(self.bits).scope():
-            yield
-
 
 def _far(ball: Any, x: float) -> float:
     """The largest distance of a number from a ball, rounded up; inf if it is not a number."""
@@ -198,9 +190,9 @@ def _far(ball: Any, x: float) -> float:
 
 
 def _array(balls: list[Any]) -> Array:
-    made = np.empty(len(balls), dtype=object)
-    made[:] = balls
-    return made
+    array = np.empty(len(balls), dtype=object)
+    array[:] = balls
+    return array
 
 
 def _radii(balls: tuple[Packed, ...]) -> np.ndarray:
@@ -212,7 +204,7 @@ def _digits(error: float) -> float:
     return -log10(error) if error > 0 else inf
 
 
-def _told(x: Packed) -> str:
+def _decimals(x: Packed) -> str:
     with Ball(max(64, x[0].bit_length() + 8)).scope():
         ball = unpacked(x)
         known = ball.rel_accuracy_bits()

@@ -1,1 +1,9 @@
-"""What breaks first: worst configurations, limits that runs confirm, and runs judged against better ones."""
+"""Stress tests: worst configurations, limits that runs confirm, and runs judged against better ones.
+
+stress, result, finding  the study, its result, and what it is made of
+work, shrink             pieces of work within a time; states of few digits
+worst, lost_digits       worst configurations; digits lost at the worst states
+steps, gains, loads      limits of step, gain, speed and payload
+confirm                  runs on both sides of a limit
+scenes, runs             random scenes, and their runs judged
+"""

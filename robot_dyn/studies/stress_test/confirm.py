@@ -45,30 +45,30 @@ def pushed(setup: Setup, matrix: np.ndarray, seed: int) -> Setup:
 
 @final
 @dataclass(frozen=True)
-class Told:
-    """What a run did, and what it said of itself.
+class PushedRun:
+    """What a run from near an equilibrium did, and what it reports about itself.
 
     Attributes:
         growth: As above; inf if the run ended before its time.
-        misleads: Whether it has left an equilibrium that the motion does not leave, and nothing of it says so.
-        words: Both in words.
+        misleads: Whether it has left an equilibrium that the motion does not leave, and reports nothing of it.
+        description: Both as text.
     """
 
     growth: float
     misleads: bool
-    words: str
+    description: str
 
     @property
     def stays(self) -> bool:
         """Whether it stays near the equilibrium."""
         return self.growth < MOST
 
-    def leaves(self, within: Told) -> bool:
+    def leaves(self, within: PushedRun) -> bool:
         """Whether it leaves the equilibrium, and a run within the limit does not."""
         return self.growth > LEFT * max(within.growth, 1.0)
 
 
-def told(setup: Setup, at: np.ndarray, budget: Budget, numerical: bool = False) -> Told:
+def run_from_near(setup: Setup, at: np.ndarray, budget: Budget, numerical: bool = False) -> PushedRun:
     """Run a setup and look how far it goes from an equilibrium.
 
     Args:
@@ -90,18 +90,18 @@ def told(setup: Setup, at: np.ndarray, budget: Budget, numerical: bool = False) 
     how = f"{run.outcome.ending} at {run.outcome.t:.3g} s" if not finished else f"the push grew {growth:.2g}-fold"
     said = says(run)
     silent = numerical and finished and growth > LEFT and not said and not _estimates(run, at)
-    return Told(growth, silent, f"{how}{f' ({said})' if said else ''}")
+    return PushedRun(growth, silent, f"{how}{f' ({said})' if said else ''}")
 
 
 def says(run: Trajectory) -> str:
     """What a run says against itself, or of what it met; empty if its summary is clean."""
-    words = [str(kind).replace("_", " ") for kind in dict.fromkeys(each.kind for each in run.remarks)]
+    description = [str(kind).replace("_", " ") for kind in dict.fromkeys(each.kind for each in run.remarks)]
     if run.error is not None and run.error.note:
         until = run.error.resolved_until
-        words.append(f"error told up to {until:.3g} s only" if until else "no error told")
+        description.append(f"error told up to {until:.3g} s only" if until else "no error told")
     if "does not close" in run.summary:
-        words.append("the ledger does not close")
-    return ", ".join(words)
+        description.append("the ledger does not close")
+    return ", ".join(description)
 
 
 def _estimates(run: Trajectory, at: np.ndarray) -> bool:

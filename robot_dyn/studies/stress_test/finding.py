@@ -11,7 +11,7 @@ from robot_dyn.simulation.setup.setup import Setup
 
 @final
 @dataclass(frozen=True)
-class Worst:
+class WorstCase:
     """The configuration at which a quantity is largest.
 
     Attributes:
@@ -23,7 +23,7 @@ class Worst:
         searched: The largest that was found.
         minimal: At `state`, at least 0.9 of that.
         state: A state of few digits and few entries that are not zero, q, v, a, tau by name.
-        note: More about it, in words.
+        note: More about it.
     """
 
     what: str
@@ -49,12 +49,12 @@ class Limit:
 
     Attributes:
         of: "step", "gain", "speed" or "payload".
-        what: What breaks, in words.
+        what: What breaks.
         joint: That breaks, or empty.
-        value: The limit; inf if there is none.
+        value: The limit; inf without one.
         unit: Of it.
-        within: What came at 0.98 of it, in words.
-        beyond: What came at 1.02 of it, in words.
+        within: What happened at 0.98 of it.
+        beyond: What happened at 1.02 of it.
         confirmed: Whether both came as predicted; None if there is nothing to confirm.
         state: Where it was looked for, q and v by name.
         setups: Of the runs that confirm it, at 0.98 and at 1.02 of it; nothing without runs.
@@ -74,16 +74,16 @@ class Limit:
 
 @final
 @dataclass(frozen=True)
-class Judged:
-    """A random run whose error estimate was held against a better run.
+class JudgedRun:
+    """A random run whose error estimate was compared with a better run.
 
     Attributes:
-        what: Effects, control and method, in words.
+        what: Effects, control and method.
         duration_s: In [s].
         estimated: Error of q by its own estimate; nan without one.
         true: The largest distance from the better run, up to where the estimate holds.
         unsure: How far two better runs are apart there.
-        said: What the run says of its error, or how it ended.
+        report: What the run says of its error, or how it ended.
         misleads: Whether nothing warns, and the estimate is below 0.3 of the true error.
         setup: Of the run.
     """
@@ -93,6 +93,6 @@ class Judged:
     estimated: float
     true: float
     unsure: float
-    said: str
+    report: str
     misleads: bool
     setup: Setup = field(hash=False, repr=False, metadata=UNREPORTED)

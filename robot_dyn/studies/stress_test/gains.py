@@ -18,7 +18,7 @@ from robot_dyn.simulation.dynamics.stability import Stability
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.studies.advice import advice_about, at_rest
 from robot_dyn.studies.budget import Budget
-from robot_dyn.studies.stress_test.confirm import BEYOND, WITHIN, pushed, told
+from robot_dyn.studies.stress_test.confirm import BEYOND, WITHIN, pushed, run_from_near
 from robot_dyn.studies.stress_test.finding import Limit
 from robot_dyn.studies.stress_test.work import Work
 
@@ -84,10 +84,10 @@ def _judged(of: Callable[[float], Setup], low: float, inertia: np.ndarray, seed:
     setups = tuple(replace(each, q0=start.q0, v0=start.v0) for each in both)
     try:
         periods = [advice_about(each, at_rest).longest_period_s for each in both]
-        within, beyond = (told(each, at, budget) for each in setups)
+        within, beyond = (run_from_near(each, at, budget) for each in setups)
     except RobotDynError as error:
         return Limit("gain", _WHAT, "", low, "rad/s", f"not run: {error}", "", None, {"q": at.tolist()}, setups)
     agrees = periods[0] >= PERIOD_S > periods[1]
-    said = beyond.words + f"; THE ADVISOR TAKES IT FOR STABLE UP TO {periods[1]:.3g} s" * (not agrees)
+    said = beyond.description + f"; THE ADVISOR TAKES IT FOR STABLE UP TO {periods[1]:.3g} s" * (not agrees)
     confirmed = agrees and within.stays and beyond.leaves(within)
-    return Limit("gain", _WHAT, "", low, "rad/s", within.words, said, confirmed, {"q": at.tolist()}, setups)
+    return Limit("gain", _WHAT, "", low, "rad/s", within.description, said, confirmed, {"q": at.tolist()}, setups)

@@ -3,7 +3,8 @@
     s² |C(q, u) u|_i = τ_max,i,   |N_i(q) + m n_i(q)| = τ_max,i
 
 u is a velocity whose largest entry is the velocity limit of its joint, and n the gravity torque of 1 kg at the tip.
-Both are searched for over all configurations, and judged at 0.98 and 1.02 by the own road, and by runs under a PD.
+Both are searched for over all configurations, and judged at 0.98 and 1.02 of the limit by the library's own
+implementation, and by runs under a PD.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from robot_dyn.simulation.observation.remarks import Kind
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.simulate import simulate
 from robot_dyn.studies.budget import Budget
-from robot_dyn.studies.certificate.implementation import asked
+from robot_dyn.studies.certificate.implementation import evaluate
 from robot_dyn.studies.certificate.worst_case_search import Batch
 from robot_dyn.studies.stress_test.confirm import BEYOND, WITHIN
 from robot_dyn.studies.stress_test.finding import Limit
@@ -57,7 +58,7 @@ def speed_limit(robot: Robot, states: Batch, rng: np.random.Generator, work: Wor
 
     def measure(batch: Batch) -> np.ndarray:
         at = {"q": batch["q"], "v": direction(batch["v"])}
-        return (np.abs(asked(robot, CORIOLIS_TORQUE, at)) / effort).max(axis=1)
+        return (np.abs(evaluate(robot, CORIOLIS_TORQUE, at)) / effort).max(axis=1)
 
     found = worst(states, rng, ("q", "v"), measure, work, "speed")
     if found is None:
@@ -70,7 +71,7 @@ def speed_limit(robot: Robot, states: Batch, rng: np.random.Generator, work: Wor
 
 
 def _judged_speed(robot: Robot, q: np.ndarray, v: np.ndarray, limit: float, what: str) -> Limit:
-    """The torques at both sides of the limit by the own road."""
+    """The torques at both sides of the limit by the library's own implementation."""
     own, effort = Lagrangian(robot), efforts(robot)
     joint = int(np.argmax(np.abs(robot.coriolis_torque(q, v)) / effort))
     parts = [float((np.abs(own.coriolis_torque(q, part * limit * v)) / effort).max()) for part in (WITHIN, BEYOND)]
@@ -101,8 +102,8 @@ def payload_limit(
 
     def inverse_masses(batch: Batch) -> np.ndarray:
         """1/m of each joint, (S, n)."""
-        own = asked(robot, N, batch)
-        per_kg = asked(loaded, N, batch) - own
+        own = evaluate(robot, N, batch)
+        per_kg = evaluate(loaded, N, batch) - own
         spare = effort - np.sign(per_kg) * own
         made = np.abs(per_kg) / np.where(spare > 0, spare, 1e-300)
         return np.where(np.isfinite(effort), made, 0.0)
@@ -156,7 +157,7 @@ def _tip(robot: Robot, states: Batch) -> str:
 
 
 def _holds(loaded: Robot, q: np.ndarray, setup: Setup | None, budget: Budget) -> tuple[bool, str]:
-    """Whether an arm holds what it is loaded with, by the own road and by a run; and in words."""
+    """Whether an arm holds what it is loaded with, by our Lagrangian and by a run; with a description."""
     part = float((np.abs(Lagrangian(loaded).N(q)) / efforts(loaded)).max())
     said = f"{part:.3f} of the effort limit"
     if setup is None:

@@ -1,4 +1,4 @@
-"""The states at which each road loses most digits of inverse and forward dynamics, judged by balls.
+"""The states at which each implementation loses most digits of inverse and forward dynamics, judged by balls.
 
 lost = −log₁₀(2⁻⁵³) − digits
 """
@@ -14,10 +14,11 @@ from robot_dyn.lagrange.digits import digits_of
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.quantity import FORWARD_DYNAMICS, INVERSE_DYNAMICS, Quantity
 from robot_dyn.studies.budget import Budget
-from robot_dyn.studies.certificate.digit_count import Counting, Found
+from robot_dyn.studies.certificate.certificate import Held
+from robot_dyn.studies.certificate.digit_count import DigitCount
 from robot_dyn.studies.certificate.implementation import Implementation, implementations
 from robot_dyn.studies.certificate.worst_case_search import Batch
-from robot_dyn.studies.stress_test.finding import Worst
+from robot_dyn.studies.stress_test.finding import WorstCase
 from robot_dyn.studies.stress_test.work import Work
 from robot_dyn.studies.stress_test.worst import KEPT, listed, shrunk_state
 
@@ -26,53 +27,53 @@ _ROUNDS, _MOST_TRIES = 3, 60
 _OTHER_NUMBERS = ("Lagrangian, float32", "Lagrangian, longdouble")
 
 
-def lost_digits(robot: Robot, states: Batch, rng: np.random.Generator, work: Work) -> Iterator[Worst]:
-    """The roads in float64, one after the other."""
-    asked = (INVERSE_DYNAMICS, FORWARD_DYNAMICS)
-    names = tuple(f"digits lost in {quantity.name}" for quantity in asked)
-    known = work.do("roads, machine code among them", lambda _: implementations(robot), names)
+def lost_digits(robot: Robot, states: Batch, rng: np.random.Generator, work: Work) -> Iterator[WorstCase]:
+    """The implementations in float64, one after the other."""
+    quantities = (INVERSE_DYNAMICS, FORWARD_DYNAMICS)
+    names = tuple(f"digits lost in {quantity.name}" for quantity in quantities)
+    known = work.do("implementations, machine code among them", lambda _: implementations(robot), names)
     if known is None:
         return
     found, left_out = known
     work.left_out += left_out
-    counting = Counting(robot, states, None, rng)
-    for quantity in asked:
+    digit_count = DigitCount(robot, states, None, rng)
+    for quantity in quantities:
         for implementation in found:
             if quantity in implementation.quantities and implementation.name not in _OTHER_NUMBERS:
-                made = _lost(counting, implementation, quantity, work)
+                made = _lost(digit_count, implementation, quantity, work)
                 if made is not None:
                     yield made
 
 
-def _lost(counting: Counting, implementation: Implementation, quantity: Quantity, work: Work) -> Worst | None:
-    """What one road loses; None for lack of time."""
+def _lost(digit_count: DigitCount, implementation: Implementation, quantity: Quantity, work: Work) -> WorstCase | None:
+    """What one implementation loses; None for lack of time."""
     name = f"digits lost in {quantity.name} by {implementation.name}"
-    made = work.do(name, lambda budget: _counted(counting, implementation, quantity, budget))
+    made = work.do(name, lambda budget: _counted(digit_count, implementation, quantity, budget))
     if made is None:
         return None
     lost = _OF_FLOAT64 - made.searched
 
     def losses(batch: Batch) -> np.ndarray:
         state = {name: batch[name][0] for name in quantity.arguments}
-        return np.array([_OF_FLOAT64 - digits_of(counting.judged(implementation, quantity, state))])
+        return np.array([_OF_FLOAT64 - digits_of(digit_count.judged(implementation, quantity, state))])
 
-    at, least = {name: made.state[name] for name in quantity.arguments}, KEPT * lost if lost > 0 else -np.inf
+    at, least = {name: np.array(x) for name, x in made.state.items()}, KEPT * lost if lost > 0 else -np.inf
     small = work.do(
-        f"shrinking of {name}", lambda until: shrunk_state(at, counting.states, losses, least, until, _MOST_TRIES)
+        f"shrinking of {name}", lambda until: shrunk_state(at, digit_count.states, losses, least, until, _MOST_TRIES)
     )
     state, minimal = small or (at, lost)
     typical, random = _OF_FLOAT64 - made.typical, _OF_FLOAT64 - made.random
     note = f"{implementation.name}: {made.searched:.1f} digits hold, {made.typical:.1f} typically"
     what = f"digits lost in {quantity.name}"
-    return Worst(what, "", "digits", typical, random, max(lost, minimal), minimal, listed(state), note)
+    return WorstCase(what, "", "digits", typical, random, max(lost, minimal), minimal, listed(state), note)
 
 
-def _counted(counting: Counting, implementation: Implementation, quantity: Quantity, budget: Budget) -> Found:
+def _counted(digit_count: DigitCount, implementation: Implementation, quantity: Quantity, budget: Budget) -> Held:
     """The fewest digits of some searches."""
-    made = counting.count(implementation, quantity, budget.check)
+    made = digit_count.count(implementation, quantity, budget.check)
     for _ in range(_ROUNDS - 1):
         if made.searched < made.random:
             break
-        again = counting.count(implementation, quantity, budget.check)
+        again = digit_count.count(implementation, quantity, budget.check)
         made = again if again.searched < made.searched else made
     return made

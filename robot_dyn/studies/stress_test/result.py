@@ -7,13 +7,13 @@ from math import isfinite
 from typing import final
 
 from robot_dyn.result import Result, reported
-from robot_dyn.studies.stress_test.finding import Judged, Limit, Worst
+from robot_dyn.studies.stress_test.finding import JudgedRun, Limit, WorstCase
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Stress(Result):
-    """What an arm does at its worst, what breaks first, and what of that the library fails to tell.
+    """The worst cases of an arm, what breaks first, and what of that the library fails to report.
 
     Attributes:
         robot: Its name.
@@ -31,9 +31,9 @@ class Stress(Result):
 
     robot: str
     joints: tuple[str, ...]
-    worst: tuple[Worst, ...]
+    worst: tuple[WorstCase, ...]
     limits: tuple[Limit, ...]
-    runs: tuple[Judged, ...]
+    runs: tuple[JudgedRun, ...]
     left_out: tuple[str, ...]
     out_of_time: tuple[str, ...]
     environment: dict[str, str] = field(repr=False)
@@ -44,7 +44,7 @@ class Stress(Result):
 
     @reported
     def failures(self) -> tuple[str, ...]:
-        """What the library fails at: limits that runs refute, and runs that mislead; in words."""
+        """What the library fails at: limits that runs refute, and runs that mislead."""
         return (
             *(
                 f"{each.of} {each.what}: {_number(each.value)} [{each.unit}] is refuted: {each.within}; {each.beyond}"

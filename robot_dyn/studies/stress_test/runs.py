@@ -21,7 +21,7 @@ from robot_dyn.simulation.simulate import simulate
 from robot_dyn.studies.budget import Budget
 from robot_dyn.studies.certificate.worst_case_search import Batch
 from robot_dyn.studies.stress_test.confirm import LEAST, says
-from robot_dyn.studies.stress_test.finding import Judged
+from robot_dyn.studies.stress_test.finding import JudgedRun
 from robot_dyn.studies.stress_test.scenes import scenes
 from robot_dyn.studies.stress_test.shrink import shrunk
 from robot_dyn.studies.stress_test.work import Work
@@ -32,7 +32,7 @@ _ONE_TIME = 1e-12  # [s]
 _MOST_TRIES = 25  # of the start of a run that misleads
 
 
-def judged_runs(robot: Robot, states: Batch, count: int, rng: np.random.Generator, work: Work) -> Iterator[Judged]:
+def judged_runs(robot: Robot, states: Batch, count: int, rng: np.random.Generator, work: Work) -> Iterator[JudgedRun]:
     """So many random runs."""
     for k, make in enumerate(scenes(robot, states, count, rng), 1):
         if work.over:
@@ -46,7 +46,7 @@ def judged_runs(robot: Robot, states: Batch, count: int, rng: np.random.Generato
             yield shrunk_run(scene.setup, found, f"shrinking of run {k}", work) if found.misleads else found
 
 
-def judged(setup: Setup, what: str, budget: Budget) -> Judged:
+def judged(setup: Setup, what: str, budget: Budget) -> JudgedRun:
     """A run beside two better ones.
 
     Raises:
@@ -54,10 +54,10 @@ def judged(setup: Setup, what: str, budget: Budget) -> Judged:
         OvertimeError: If the budget ends.
     """
     run = simulate(setup, on_progress=budget.check)
-    said = says(run) if run.outcome.ending is Ending.FINISHED else f"{run.outcome.ending} at {run.outcome.t:.3g} s"
+    report = says(run) if run.outcome.ending is Ending.FINISHED else f"{run.outcome.ending} at {run.outcome.t:.3g} s"
     error = run.error
     if error is None or run.outcome.ending is not Ending.FINISHED or not error.resolved_until:
-        return Judged(what, setup.duration_s, np.nan, np.nan, np.nan, said, False, setup)
+        return JudgedRun(what, setup.duration_s, np.nan, np.nan, np.nan, report, False, setup)
     sure = replace(setup, step_s=None, estimate_error=False, integrator=_BETTER[0])
     better = [simulate(replace(sure, integrator=each), on_progress=budget.check) for each in _BETTER]
     known = run.t <= error.resolved_until
@@ -69,7 +69,7 @@ def judged(setup: Setup, what: str, budget: Budget) -> Judged:
     unsure = float(np.abs(better[1].q - better[0].q)[known].max())
     floor = _ROUNDING * (1 + float(np.abs(run.q).max())) + unsure
     misleads = not says_more(run) and max(error.final, floor) < LEAST * max(true, floor)
-    return Judged(what, setup.duration_s, error.final, true, unsure, said or str(error), misleads, setup)
+    return JudgedRun(what, setup.duration_s, error.final, true, unsure, report or str(error), misleads, setup)
 
 
 def says_more(run: Trajectory) -> bool:
@@ -77,7 +77,7 @@ def says_more(run: Trajectory) -> bool:
     return bool(run.error is not None and run.error.note) or "does not close" in run.summary
 
 
-def shrunk_run(setup: Setup, found: Judged, name: str, work: Work) -> Judged:
+def shrunk_run(setup: Setup, found: JudgedRun, name: str, work: Work) -> JudgedRun:
     """A run that misleads, from the start of fewest digits that was found; itself if that is none."""
     least = found
 

@@ -23,7 +23,7 @@ from robot_dyn.integrate.methods import method
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.quantity import M
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.studies.certificate.implementation import asked
+from robot_dyn.studies.certificate.implementation import evaluate
 from robot_dyn.studies.certificate.worst_case_search import Batch
 
 FAMILIES = ("swing", "friction", "dry friction", "stops", "rigid stops", "PD", "sampled PD")
@@ -35,7 +35,7 @@ _RECORDS = 20
 @final
 @dataclass(frozen=True)
 class Scene:
-    """A setup, and what acts in it, in words."""
+    """A setup, and a description of what acts in it."""
 
     setup: Setup
     what: str
@@ -43,7 +43,7 @@ class Scene:
 
 def scenes(robot: Robot, states: Batch, count: int, rng: np.random.Generator) -> Iterator[Callable[[], Scene]]:
     """So many scenes, each made when it is called; each family comes in its turn."""
-    scale = np.median(np.diagonal(asked(robot, M, {"q": states["q"][:200]}), axis1=-2, axis2=-1), axis=0)
+    scale = np.median(np.diagonal(evaluate(robot, M, {"q": states["q"][:200]}), axis1=-2, axis2=-1), axis=0)
     for k in range(count):
         own = np.random.default_rng(rng.integers(2**63))
         yield partial(_scene, robot, FAMILIES[k % len(FAMILIES)], scale, own)

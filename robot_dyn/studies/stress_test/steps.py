@@ -27,7 +27,7 @@ from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.studies.advice import Advice, advice_about, at_rest
 from robot_dyn.studies.budget import Budget
-from robot_dyn.studies.stress_test.confirm import BEYOND, WITHIN, pushed, told
+from robot_dyn.studies.stress_test.confirm import BEYOND, WITHIN, pushed, run_from_near
 from robot_dyn.studies.stress_test.finding import Limit
 from robot_dyn.studies.stress_test.work import Work
 
@@ -90,21 +90,21 @@ def _confirmed(setup: Setup, at: np.ndarray, name: str, limit: float, joint: str
     if not isfinite(limit):
         longest = setup.duration_s / _PARTS
         longest_steps = replace(setup, step_s=longest)
-        run = told(longest_steps, at, budget, True)
-        told_of = f"step {longest:.3g} s: {run.words}"
+        run = run_from_near(longest_steps, at, budget, True)
+        told_of = f"step {longest:.3g} s: {run.description}"
         holds = run.stays or (_iterates(name) and not isfinite(run.growth))
         return Limit("step", name, "", limit, "s", told_of, "", holds and not run.misleads, where, (longest_steps,))
     what, iterates = name, _iterates(name)
     if iterates:  # every step is stable, and where its stages are not found, about there, the run says so
         setup, what = replace(setup, duration_s=_STEPS * limit), f"{name}, about where its stages are not found"
     setups = tuple(replace(setup, step_s=part * limit) for part in (WITHIN, BEYOND))
-    within, beyond = told(setups[0], at, budget), told(setups[1], at, budget, not iterates)
+    within, beyond = run_from_near(setups[0], at, budget), run_from_near(setups[1], at, budget, not iterates)
     confirmed = within.stays and beyond.leaves(within) and not beyond.misleads
     if iterates:
         grew = any(not each.stays and isfinite(each.growth) for each in (within, beyond))
         confirmed = False if grew else None  # a limit that is not sharp is neither reached nor kept
-    said = beyond.words + " AND DOES NOT SAY SO" * beyond.misleads
-    return Limit("step", what, joint, limit, "s", within.words, said, confirmed, where, setups)
+    said = beyond.description + " AND DOES NOT SAY SO" * beyond.misleads
+    return Limit("step", what, joint, limit, "s", within.description, said, confirmed, where, setups)
 
 
 def _iterates(name: str) -> bool:

@@ -12,7 +12,7 @@ from robot_dyn.model.robot import Robot
 from robot_dyn.studies.budget import Budget
 from robot_dyn.studies.certificate.worst_case_search import random_states
 from robot_dyn.studies.environment import environment
-from robot_dyn.studies.stress_test.finding import Judged, Limit, Worst
+from robot_dyn.studies.stress_test.finding import JudgedRun, Limit, WorstCase
 from robot_dyn.studies.stress_test.gains import gain_limit
 from robot_dyn.studies.stress_test.loads import payload_limit, speed_limit
 from robot_dyn.studies.stress_test.lost_digits import lost_digits
@@ -27,7 +27,7 @@ _LEAST_SAMPLES, _MOST_SAMPLES, _MOST_RUNS = 100, 10**6, 10**5
 
 _PIECES = 8  # of the budget; one piece of work may take this part of it
 
-Found = Worst | Limit | Judged
+Found = WorstCase | Limit | JudgedRun
 
 
 def stress(
@@ -42,8 +42,8 @@ def stress(
     """The worst configurations of an arm, the step, gain, speed and payload at which it breaks, and runs judged.
 
     Worst configurations are searched for from random states on: κ of M, the fastest motion, gravity torque over effort
-    limit, and digits lost by each road. Limits are confirmed at 0.98 and 1.02 of them. Estimated errors of random runs
-    are held against better runs; one that is too small, and says nothing, misleads.
+    limit, and digits lost by each implementation. Limits are confirmed at 0.98 and 1.02 of them. Estimated errors of
+    random runs are compared with better runs; a run misleads if its estimate is too small and nothing warns.
 
     Args:
         robot: The robot.
@@ -83,7 +83,7 @@ def stressed(
         return tuple(each for each in found if isinstance(each, kind))
 
     return Stress(
-        robot.name, robot.joint_names, of(Worst), of(Limit), of(Judged), (*_unlimited(robot), *work.left_out),
+        robot.name, robot.joint_names, of(WorstCase), of(Limit), of(JudgedRun), (*_unlimited(robot), *work.left_out),
         tuple(work.out_of_time), environment(), samples, seed, budget.spent, interrupted,
     )  # fmt: skip
 
@@ -112,7 +112,7 @@ def _found(robot: Robot, samples: int, runs: int, seed: int, work: Work) -> Iter
         work.left_out += [f"{what}: {why}" for what in ("κ of M", "fastest motion, steps and gains", "runs")]
 
 
-def _of_motion(robot: Robot, gains: Any, fastest: Worst | None, seed: int, work: Work) -> Iterator[Limit]:
+def _of_motion(robot: Robot, gains: Any, fastest: WorstCase | None, seed: int, work: Work) -> Iterator[Limit]:
     """The limits of step and gain, where motion is fastest."""
     if gains is None or fastest is None:
         return

@@ -1,4 +1,4 @@
-"""Work within a time: each piece has a name, and what is not done, or not to its end, is kept by that name."""
+"""Work within a time: each piece has a name, and pieces that were not done, or not to their end, are listed by name."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Work:
     """Pieces of work, one after the other.
 
     Args:
-        budget: Of all of them; it is told the name of each piece when it begins.
+        budget: Of all of them; the name of each piece is reported to it when the piece begins.
         longest_s: Time that one piece may take, in [s].
 
     Attributes:
@@ -46,7 +46,7 @@ class Work:
         if self.over:
             self.skip(name, *needed_for)
             return None
-        self._budget.tell(name)
+        self._budget.report(name)
         try:
             with np.errstate(over="raise", divide="raise", invalid="raise"):
                 return piece(self._budget.within(self._longest_s))

@@ -1,6 +1,6 @@
 """The configurations at which an arm is hardest: κ of M, the fastest motion, gravity torque over effort limit.
 
-Each is searched for from the worst of random states on (`accuracy.worst_state`), and shrunk to a state of few digits.
+Each is searched for from the worst of random states on (`certificate.worst_case_search`), and shrunk to few digits.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from robot_dyn.lagrange.scale import unit_diagonal_conditions
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.quantity import M, N
 from robot_dyn.studies.budget import Budget
-from robot_dyn.studies.certificate.implementation import asked
+from robot_dyn.studies.certificate.implementation import evaluate
 from robot_dyn.studies.certificate.worst_case_search import Batch, Search
-from robot_dyn.studies.stress_test.finding import Worst
+from robot_dyn.studies.stress_test.finding import WorstCase
 from robot_dyn.studies.stress_test.shrink import shrunk
 from robot_dyn.studies.stress_test.work import Work
 
@@ -119,7 +119,7 @@ def shrunk_state(
 
 def worst_configurations(
     robot: Robot, states: Batch, rng: np.random.Generator, gains: Gains | None, work: Work
-) -> Iterator[Worst]:
+) -> Iterator[WorstCase]:
     """κ, the fastest motion, and gravity torque of each joint with an effort limit."""
     for what, joint, unit, measure, note in _asked(robot, gains, work):
         of = note if what == FASTEST else joint
@@ -128,7 +128,7 @@ def worst_configurations(
         if found is None or not found[0]["searched"] > _NOTHING:
             continue  # gravity has no torque on the joint
         sizes, state = found
-        yield Worst(what, joint, unit, **sizes, state=listed(state), note=note)
+        yield WorstCase(what, joint, unit, **sizes, state=listed(state), note=note)
 
 
 def listed(state: dict[str, np.ndarray]) -> dict[str, list[float]]:
@@ -139,7 +139,7 @@ def listed(state: dict[str, np.ndarray]) -> dict[str, list[float]]:
 def _asked(robot: Robot, gains: Gains | None, work: Work) -> Iterator[tuple[str, str, str, Measure, str]]:
     """What is looked for: quantity, joint, unit, measure and note."""
     if robot.joint_without_inertia is None:
-        yield "κ of M", "", "", lambda batch: unit_diagonal_conditions(asked(robot, M, batch)), ""
+        yield "κ of M", "", "", lambda batch: unit_diagonal_conditions(evaluate(robot, M, batch)), ""
         yield from _fastest(robot, gains, work)
     for i, joint in enumerate(robot.joint_names):
         limit = robot.effort_limit[i]
@@ -147,7 +147,7 @@ def _asked(robot: Robot, gains: Gains | None, work: Work) -> Iterator[tuple[str,
             note = f"effort limit {limit:g}"
 
             def loaded(batch: Batch, i: int = i, limit: float = limit) -> np.ndarray:
-                return np.abs(asked(robot, N, batch)[:, i]) / limit
+                return np.abs(evaluate(robot, N, batch)[:, i]) / limit
 
             yield "gravity torque / effort limit", joint, "", loaded, note
 
@@ -180,11 +180,11 @@ def _slopes(robot: Robot) -> list[float]:
 
 def _rates(robot: Robot, batch: Batch, damping: np.ndarray) -> np.ndarray:
     """The largest eigenvalue of M⁻¹ diag(b) at each state, that of b^½ M⁻¹ b^½."""
-    inertia, root = asked(robot, M, batch), np.sqrt(damping)
+    inertia, root = evaluate(robot, M, batch), np.sqrt(damping)
     return np.linalg.eigvalsh(root[:, None] * np.linalg.solve(inertia, np.diag(root)[None]))[:, -1]
 
 
 def pd_gains(robot: Robot, states: Batch, frequency: float = _FREQUENCY) -> tuple[np.ndarray, np.ndarray]:
     """Stiffness and damping of a critically damped PD for the median of M_ii at random states."""
     few = {name: x[:1000] for name, x in states.items()}
-    return gains_from(np.median(np.diagonal(asked(robot, M, few), axis1=-2, axis2=-1), axis=0), frequency)
+    return gains_from(np.median(np.diagonal(evaluate(robot, M, few), axis1=-2, axis2=-1), axis=0), frequency)

@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robot_dyn.studies.sheet import Colours, ResultError, legend, sheet, styled
+from robot_dyn.studies.figure import Colours, ResultError, key, legend, programs, sheet, styled
 from robot_dyn.studies.work_precision_diagram.tolerance_ladder import INTERPRETED, Point, ToleranceLadder
 from robot_dyn.studies.work_precision_diagram.work_precision import WorkPrecision
-from robot_dyn.view.plots.figure import THEMES
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -34,10 +33,9 @@ def draw(result: WorkPrecision, theme: str = "light") -> Figure:
     Raises:
         ResultError: If no run ended.
     """
-    colours = THEMES[theme]
     if not any(np.isfinite(p.error) for each in result.ladders for p in each.points):
         raise ResultError("no run ended, so there is nothing to draw; look at left_out")
-    figure = sheet(_WIDTH, _HEIGHT, result.sentence, _caption(result), colours)
+    figure, colours = sheet(_WIDTH, _HEIGHT, result, _caption(result), theme)
     grid = figure.add_gridspec(
         3, 2, width_ratios=(2.1, 1), left=0.065, right=0.985, top=0.845, bottom=0.195, hspace=0.62, wspace=0.17
     )
@@ -49,26 +47,25 @@ def draw(result: WorkPrecision, theme: str = "light") -> Figure:
     main = figure.add_subplot(grid[:, 0])
     _axes(main, result, colours, "time of the loop [ms]", "Error over time: lower left is better")
     _front(main, result, colours)
-    for each in first:
-        _curve(main, each, colours, lambda p: 1e3 * p.time_s, lambda p: p.error, 1.0)
-    for each in without:
-        _curve(main, each, colours, lambda p: 1e3 * p.time_s, lambda p: p.error, 0.9, dashed=True)
-    _limits(main, result, [1e3 * p.time_s for each in first + without for p in _shown(each)])
+    for each in first + without:
+        _curve(main, each, colours, _ms, _error, 1.0 if each.events else 0.9, dashed=not each.events)
+    times = [_ms(p) for each in first + without for p in _shown(each)]
+    main.set(xlim=(min(times) / 1.5, max(times) * 1.5), ylim=(result.reference.error / 10, _MOST_ERROR))
     _believed(main, result, colours, words=True)
     _legend(figure, first, without, colours)
     small = [figure.add_subplot(grid[k, 1]) for k in range(3)]
     _axes(small[0], result, colours, "evaluations of the equation of motion", "Error over evaluations")
     for each in [each for each in first + without if any(p.evaluations for p in each.points)]:
-        _curve(small[0], each, colours, lambda p: p.evaluations, lambda p: p.error, 0.6, dashed=not each.events)
+        _curve(small[0], each, colours, lambda p: p.evaluations, _error, 0.6, dashed=not each.events)
     _axes(small[1], result, colours, "error of q", "Energy residual, as a part of what was exchanged")
     for each in own:
-        _curve(small[1], each, colours, lambda p: p.error, lambda p: p.energy, 0.6)
+        _curve(small[1], each, colours, _error, lambda p: p.energy, 0.6)
     small[1].set_ylabel("residual")
     small[1].set_xlim(_MOST_ERROR, result.reference.error / 3)
     words = "Error over time, interpreted [ms]" if slow else "Error over steps"
     _axes(small[2], result, colours, "time [ms]" if slow else "steps", words)
     for each in slow or own:
-        _curve(small[2], each, colours, _ms if slow else _steps, lambda p: p.error, 0.6)
+        _curve(small[2], each, colours, _ms if slow else _steps, _error, 0.6)
     for axes in (small[0], small[2]):
         axes.set_ylim(result.reference.error / 10, _MOST_ERROR)
         _believed(axes, result, colours, words=False)
@@ -79,22 +76,23 @@ def _ms(p: Point) -> float:
     return 1e3 * p.time_s
 
 
+def _error(p: Point) -> float:
+    return p.error
+
+
 def _steps(p: Point) -> float:
     return float(p.steps or np.nan)
 
 
 def _caption(result: WorkPrecision) -> str:
     """What was run, and what errors are measured against."""
-    of, versions = result.reference, result.environment
+    of = result.reference
     cut = f" of {result.duration_s:g} s, where its references part" if of.parted_s is not None else ""
-    programs = ", ".join(
-        f"{k} {x}" for k, x in versions.items() if k in ("robot-dyn", "pin", "mujoco", "drake", "heyoka")
-    )
     return (
         f"{result.robot}: {', '.join(result.acting) or 'no effects'}; {of.horizon_s:g} s{cut}.  Error: largest"
         f" |q − q_ref| over joints and {of.records} records, in {result.unit}.\n"
         f"Reference: {of.methods[0]}, {of.error:.0e} {result.unit} from {of.methods[1]}: no error below that is"
-        f" believed.  {programs}; {versions['processor']}."
+        f" believed.  {programs(result.environment, 'mujoco', 'drake', 'heyoka')}."
     )
 
 
@@ -144,11 +142,6 @@ def _front(axes: Any, result: WorkPrecision, colours: Colours) -> None:
         axes.plot(x, y, color=colours["grid"], linewidth=9, solid_capstyle="round", solid_joinstyle="round", zorder=0.8)
 
 
-def _limits(axes: Any, result: WorkPrecision, times: list[float]) -> None:
-    axes.set_xlim(min(times) / 1.5, max(times) * 1.5)
-    axes.set_ylim(result.reference.error / 10, _MOST_ERROR)
-
-
 def _believed(axes: Any, result: WorkPrecision, colours: Colours, words: bool) -> None:
     """The error of the reference as a line, and what lies below it."""
     error = result.reference.error
@@ -160,18 +153,14 @@ def _believed(axes: Any, result: WorkPrecision, colours: Colours, words: bool) -
 
 
 def _legend(figure: Any, first: list[ToleranceLadder], without: list[ToleranceLadder], colours: Colours) -> None:
-    from matplotlib.lines import Line2D
-
     handles = []
     for each in first:
         colour, marker = _look(each, colours)
         order = "" if each.order is None else f"{each.order}"
         seen = f"{each.measured_order:.1f}" if each.measured_order is not None else "–"
         label = f"{each.method}: order {seen} ({order})" if order else each.method
-        handles.append(
-            Line2D([], [], color=colour, marker=marker, markersize=5, label=label, linestyle="--" if each.peer else "-")
-        )
-    handles.append(Line2D([], [], color=colours["grid"], linewidth=9, label="no run beats these (Pareto front)"))
+        handles.append(key(label, colour, marker=marker, markersize=5, linestyle="--" if each.peer else "-"))
+    handles.append(key("no run beats these (Pareto front)", colours["grid"], linewidth=9))
     if without:
-        handles.append(Line2D([], [], color=colours["ink"], linestyle=":", label="dotted: the same without events"))
+        handles.append(key("dotted: the same without events", colours["ink"], linestyle=":"))
     legend(figure, handles, colours, "measured order (nominal); hollow: not believed")

@@ -1,6 +1,6 @@
-"""Candidates of a work-precision diagram: methods with a ladder of settings, each of which can be run.
+"""Methods under test in a work-precision diagram, each with a ladder of settings that can be run.
 
-A run is made ready before it is timed: its time is that of the loop alone.
+A run is prepared before it is timed: its time is that of the loop alone.
 """
 
 from __future__ import annotations

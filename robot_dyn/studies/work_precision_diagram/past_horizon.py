@@ -2,9 +2,9 @@
 
     |q − q₀|   of a run to the end and, with its velocity turned round, back to the start
 
-A motion that is not driven and loses nothing comes back. Rounding grows on the way as the errors of the method do: a
-method that errs less comes back nearer, until only rounding is left. [Hairer, Lubich, Wanner, Geometric Numerical
-Integration, 2nd ed., 2006, V.1]
+A motion that is not driven and loses no energy returns to its start. Rounding grows on the way as
+the errors of the method do: a method with smaller errors returns nearer to it, until only rounding is left. [Hairer,
+Lubich, Wanner, Geometric Numerical Integration, 2nd ed., 2006, V.1]
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ _PART = 0.02  # of the budget, for one run
 
 @final
 @dataclass(frozen=True)
-class Beyond:
-    """The finest run of a method over all of the time that was asked for.
+class PastHorizon:
+    """The finest run of a method over the whole requested time.
 
     Attributes:
         name: Of the method.
         setting: Step, in [s], or relative tolerance.
         energy: Largest residual of the energy ledger, as a part of the energy exchanged.
-        returned: Distance from the start of the run there and back, in [rad] or [m]; None if it does not come back, or
+        returned: Distance from the start of the run there and back, in [rad] or [m]; None if it does not return, or
             the motion is driven or loses energy.
     """
 
@@ -49,28 +49,28 @@ class Beyond:
     returned: float | None
 
 
-def beyond(
-    setup: Setup, horizon_s: float, ladders: Iterable[ToleranceLadder], made: Mapping[str, Any], budget: Budget
-) -> tuple[Beyond, ...]:
-    """What can be said of each method beyond the horizon.
+def past_horizon(
+    setup: Setup, horizon_s: float, ladders: Iterable[ToleranceLadder], integrators: Mapping[str, Any], budget: Budget
+) -> tuple[PastHorizon, ...]:
+    """Return energy and distance of return of each method past the horizon.
 
     Args:
         setup: Of the whole time.
         horizon_s: Up to which errors were measured.
         ladders: What was measured; the first one of each method counts.
-        made: The methods, by name.
+        integrators: The methods, by name.
         budget: Of which a run may take a fiftieth.
     """
-    found: dict[str, Beyond] = {}
+    found: dict[str, PastHorizon] = {}
     longest = _PART * budget.seconds
     for ladder in ladders:
         in_time = [p for p in ladder.points if isfinite(p.error) and p.time_s * setup.duration_s / horizon_s < longest]
         if ladder.peer or not ladder.events or ladder.method in found or not in_time:
             continue
-        budget.tell(f"beyond the horizon: {ladder.name}")
+        budget.report(f"beyond the horizon: {ladder.name}")
         with suppress(OvertimeError, RobotDynError):
             found[ladder.method] = _of(
-                _with(setup, made[ladder.method], ladder, in_time[-1]), ladder, in_time[-1], longest
+                _with(setup, integrators[ladder.method], ladder, in_time[-1]), ladder, in_time[-1], longest
             )
     return tuple(found.values())
 
@@ -82,13 +82,13 @@ def _with(setup: Setup, method: Any, ladder: ToleranceLadder, point: Point) -> S
     return replace(setup, integrator=method, step_s=point.setting)
 
 
-def _of(setup: Setup, ladder: ToleranceLadder, point: Point, longest: float) -> Beyond:
+def _of(setup: Setup, ladder: ToleranceLadder, point: Point, longest: float) -> PastHorizon:
     there = _run(setup, longest)
     returned = None
     if setup.controller is None and all(isinstance(each, Conservative) for each in setup.plant.effects):
         back = _run(replace(setup, q0=there.q[-1], v0=-there.v[-1]), longest)
         returned = float(np.abs(back.q[-1] - setup.q0).max())
-    return Beyond(ladder.method, point.setting, there.ledger.closure, returned)
+    return PastHorizon(ladder.method, point.setting, there.ledger.closure, returned)
 
 
 def _run(setup: Setup, longest: float) -> Trajectory:

@@ -37,7 +37,7 @@ _SHARE, _LEAST_S = 0.08, 0.5  # of the budget, for one run; and at least, in [s]
 
 
 class HorizonError(RobotDynError):
-    """A motion of which no reference can be had."""
+    """A motion that has no reference solution."""
 
 
 @final
@@ -83,7 +83,7 @@ def reference(setup: Setup, budget: Budget) -> tuple[Setup, Reference]:
     Raises:
         HorizonError: If there is none.
     """
-    asked = setup.duration_s
+    requested = setup.duration_s
     parted = lost = None
     while True:
         setup = recorded(setup, setup.duration_s)
@@ -100,7 +100,7 @@ def reference(setup: Setup, budget: Budget) -> tuple[Setup, Reference]:
             error = max(float(distance.max()), _ULPS * np.finfo(float).eps * size)
             return setup, Reference(run, q, error, (first, second), setup.duration_s, parted, lost)
         parted = end = float(f"{end:.2g}") if float(f"{end:.2g}") < setup.duration_s else end
-        if end < _LEAST * asked:
+        if end < _LEAST * requested:
             raise HorizonError(
                 f"{first} and {second} part within {_LEAST:g} of the duration, at t = {end:.2g} s: no error can be"
                 " measured; take a shorter run, or a start that is less sensitive"
@@ -111,8 +111,8 @@ def reference(setup: Setup, budget: Budget) -> tuple[Setup, Reference]:
 def _first(setup: Setup, budget: Budget) -> tuple[str, np.ndarray, np.ndarray]:
     """Words for the tightest run that ends in time, its records and its positions there."""
     for each in _FIRST:
-        words = f"{each.name}, rtol {each.rtol:g}"
-        budget.tell(f"reference: {words}")
+        description = f"{each.name}, rtol {each.rtol:g}"
+        budget.report(f"reference: {description}")
         try:
             with budget.apart():
                 warmed(replace(setup, integrator=each))
@@ -120,7 +120,7 @@ def _first(setup: Setup, budget: Budget) -> tuple[str, np.ndarray, np.ndarray]:
         except OvertimeError:
             continue
         if run.q is not None:
-            return words, run.t, run.q
+            return description, run.t, run.q
     raise HorizonError(
         f"no run of {setup.duration_s:g} s ends by {' or '.join(each.name for each in _FIRST)} at tight tolerances:"
         " take a shorter run, a larger budget, or look at rd.simulate(…).summary"
@@ -166,14 +166,14 @@ def _refined(
     setup: Setup, name: str, t: np.ndarray, q: np.ndarray, budget: Budget
 ) -> Iterator[tuple[str, np.ndarray, np.ndarray, bool]]:
     """Runs with ever shorter steps, until these win nothing or take too long."""
-    made, before, limit, late = method(name), np.inf, _longest(budget), 0
+    integrator, before, limit, late = method(name), np.inf, _longest(budget), 0
     with budget.apart():
-        warmed(replace(setup, integrator=made))
+        warmed(replace(setup, integrator=integrator))
     for step in step_ladder(setup.record_period_s, 1):
-        words = f"{name}, step {step:.3g} s"
-        budget.tell(f"reference: {words}")
+        description = f"{name}, step {step:.3g} s"
+        budget.report(f"reference: {description}")
         try:
-            run = timed(replace(setup, integrator=made, step_s=step), Limit(limit))
+            run = timed(replace(setup, integrator=integrator, step_s=step), Limit(limit))
         except OvertimeError:
             late += 1
             if late == _LATE:
@@ -184,7 +184,7 @@ def _refined(
             size = float(np.log10(np.maximum(distance[1:], 1e-17)).mean())
             refined = bool(distance[1] < _ORDERLY and size > before - _STAGNANT)
             refined |= bool(distance.max() < _ENOUGH[setup.engine])
-            yield words, times, distance, refined
+            yield description, times, distance, refined
             before = size if distance[1] < _ORDERLY else np.inf
             if 2 * run.time_s > limit:
                 return

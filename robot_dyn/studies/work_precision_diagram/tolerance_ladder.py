@@ -29,7 +29,7 @@ class Point:
 
     Attributes:
         setting: Step, in [s], or relative tolerance.
-        steps: Number of steps; None of a program that does not tell.
+        steps: Number of steps; None of a program that does not report it.
         evaluations: Evaluations of the equation of motion, those of its Jacobian apart; None as of steps.
         error: Largest |q − q_ref| over joints and records, in [rad] or [m]; inf if the run diverged.
         energy: Largest residual of the energy ledger at the records, as a part of the energy exchanged; nan if it is

@@ -25,9 +25,9 @@ from robot_dyn.simulation.setup.options import setup_of, starts
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.studies.budget import Budget
 from robot_dyn.studies.environment import environment
-from robot_dyn.studies.work_precision_diagram.measured import measured
+from robot_dyn.studies.work_precision_diagram.measurement import measure
 from robot_dyn.studies.work_precision_diagram.method_under_test import own, recorded, whole
-from robot_dyn.studies.work_precision_diagram.past_horizon import Beyond, beyond
+from robot_dyn.studies.work_precision_diagram.past_horizon import PastHorizon, past_horizon
 from robot_dyn.studies.work_precision_diagram.peers import found
 from robot_dyn.studies.work_precision_diagram.reference_run import Reference, reference
 from robot_dyn.studies.work_precision_diagram.tolerance_ladder import (
@@ -42,8 +42,8 @@ from robot_dyn.validate import function, instance, integer, number, truth
 # In this order, should the budget end: first what is most used and what costs least.
 _FIRST = ("DOP853", "rk4", "order_8", "explicit_euler", "Rosenbrock", "gauss_6", "gauss_4", "midpoint")
 _MOST_REPEATS, _MOST_DIGITS = 1000, 20
-_ASKED = 6  # digits, of the sentence
-_SAID = ("rk4", "rk4 (without events)", "explicit_euler")
+_USUAL_DIGITS = 6  # digits, of the sentence
+_ALWAYS_NAMED = ("rk4", "rk4 (without events)", "explicit_euler")
 
 
 @final
@@ -53,9 +53,9 @@ class WorkPrecision(Result):
 
     Attributes:
         robot: Its name.
-        acting: What acts, in words.
+        acting: Descriptions of what acts.
         unit: Of errors, "rad", "m" or both.
-        duration_s: That was asked for, in [s].
+        duration_s: The requested duration, in [s].
         reference: What errors are measured against, and up to when.
         ladders: The runs of each method in each engine, and of each program.
         left_out: What was left out, and why.
@@ -63,7 +63,7 @@ class WorkPrecision(Result):
         budget_s: That was allowed, in [s].
         spent_s: That was spent, without compiling, in [s].
         interrupted: Whether it was ended by the user.
-        beyond: Of chaotic motion, energy and the way back over all of the duration, by method; else nothing.
+        past_horizon: Of chaotic motion, energy and the way back over all of the duration, by method; else nothing.
     """
 
     columns: ClassVar[tuple[str, ...]] = (
@@ -81,7 +81,7 @@ class WorkPrecision(Result):
     budget_s: float
     spent_s: float
     interrupted: bool = False
-    beyond: tuple[Beyond, ...] = ()
+    past_horizon: tuple[PastHorizon, ...] = ()
 
     @property
     def front(self) -> tuple[tuple[ToleranceLadder, Point], ...]:
@@ -104,7 +104,7 @@ class WorkPrecision(Result):
         return [{key: run[key] for key in self.columns} for run in known]
 
     def digits(self, error: float) -> list[tuple[ToleranceLadder, Price]]:
-        """What an error costs by each method that can tell, in time, the cheapest first.
+        """Return what an error costs in time by each method whose runs show it, the cheapest first.
 
         Args:
             error: In [rad] or [m].
@@ -120,7 +120,7 @@ class WorkPrecision(Result):
     def sentence(self) -> str:
         """What 6 digits cost, or as many as were reached, in a sentence."""
         best = min((p.error for ladder in self.ladders for p in ladder.points if p.believed), default=1.0)
-        return self.sentence_of(min(_ASKED, floor(-log10(max(best, self.reference.error)))))
+        return self.sentence_of(min(_USUAL_DIGITS, floor(-log10(max(best, self.reference.error)))))
 
     def sentence_of(self, digits: int) -> str:
         """What so many digits cost, in a sentence.
@@ -133,23 +133,23 @@ class WorkPrecision(Result):
         """
         digits = integer("digits", digits, most=_MOST_DIGITS)
         prices = self.digits(10.0**-digits)
-        measured = [each for each in prices if not each[1].extrapolated]
-        if not measured:
+        measure = [each for each in prices if not each[1].extrapolated]
+        if not measure:
             return f"{digits} digits of q were reached by no run"
-        said, programs = [], set[str]()
-        own = [ladder for ladder, _ in measured if not ladder.peer]
-        best = [measured[0][0], *own[:1], *[ladder for ladder in own if ladder.events][:1]]
+        chosen, programs = [], set[str]()
+        own = [ladder for ladder, _ in measure if not ladder.peer]
+        best = [measure[0][0], *own[:1], *[ladder for ladder in own if ladder.events][:1]]
         for ladder, price in prices:
             program = ladder.method.split(" ")[0] if ladder.peer else ladder.name
-            asked = ladder.peer or ladder.name in _SAID or ladder in best
-            if program not in programs and asked:  # of each program its best method
-                said.append((ladder, price))
+            named = ladder.peer or ladder.name in _ALWAYS_NAMED or ladder in best
+            if program not in programs and named:  # of each program its best method
+                chosen.append((ladder, price))
                 programs.add(program)
         parts = [
             f"{ladder.name} would take {format_duration(price.value)} (extrapolated)"
             if price.extrapolated
             else f"{ladder.name} {format_duration(price.value)}"
-            for ladder, price in said
+            for ladder, price in chosen
         ]
         return f"{digits} digits of q over {self.reference.horizon_s:g} s: {'; '.join(parts)}"
 
@@ -190,32 +190,32 @@ def work_precision(
     """
     given = {"duration_s": duration_s, "controller": controller}
     setup = setup_of("work_precision", what, starts(q0, v0) | {k: x for k, x in given.items() if x is not None})
-    made = [as_method(each) for each in (_ordered(METHODS) if methods is None else _several(methods))]
-    if any(each.name == AUTO for each in made):
+    integrators = [as_method(each) for each in (_ordered(METHODS) if methods is None else _several(methods))]
+    if any(each.name == AUTO for each in integrators):
         raise QueryError(f"methods: {AUTO!r} is one of {EXPLICIT!r} and {STIFF!r}; name these")
     truth("peers", peers)
     integer("repeats", repeats, least=1, most=_MOST_REPEATS)
     budget = Budget(number("budget_s", budget_s, above=0), function("on_progress", on_progress, "(spent, what)"))
     setup, engines, left_out = _engines(whole(setup))
-    asked, everything = setup.duration_s, setup
+    requested, everything = setup.duration_s, setup
     setup, exact = reference(setup, budget)
-    made, unable = _able(setup, made)
+    integrators, unable = _able(setup, integrators)
     variants = [(engines[0], True)] + [(engines[0], False)] * switches(setup) + [(each, True) for each in engines[1:]]
-    candidates = [own(setup, each, engine, events) for engine, events in variants for each in made]
+    candidates = [own(setup, each, engine, events) for engine, events in variants for each in integrators]
     with budget.apart():  # other programs are loaded, and build their models
         others, refused = found(setup) if peers else ([], [])
-    place = len(made)  # programs in machine code come before what is interpreted, which takes longest
+    place = len(integrators)  # programs in machine code come before what is interpreted, which takes longest
     candidates[place:place] = others
-    step_log, interrupted = measured(candidates, exact, budget, repeats)
+    step_log, interrupted = measure(candidates, exact, budget, repeats)
     ladders = tuple(each.ladder(exact.error) for each in step_log if each.rungs)
     left_out += unable + refused + [f"{each.name}: {each.ended}" for each in step_log if not each.rungs]
     left_out += ["what was to come when it was interrupted"] * interrupted
     cut = exact.parted_s is not None and not interrupted
-    later = beyond(everything, exact.horizon_s, ladders, {x.name: x for x in made}, budget) if cut else ()
+    later = past_horizon(everything, exact.horizon_s, ladders, {x.name: x for x in integrators}, budget) if cut else ()
     dynamics: Any = setup.plant.dynamics
     types = getattr(dynamics, "joint_types", (None,))
     return WorkPrecision(
-        getattr(dynamics, "name", type(dynamics).__name__), acting(setup), units("q", types), asked, exact, ladders,
+        getattr(dynamics, "name", type(dynamics).__name__), acting(setup), units("q", types), requested, exact, ladders,
         tuple(left_out), environment(), budget.seconds, budget.spent, interrupted, later,
     )  # fmt: skip
 
@@ -237,10 +237,10 @@ def _engines(setup: Setup) -> tuple[Setup, tuple[str, ...], list[str]]:
     return replace(setup, engine=COMPILED), (COMPILED, INTERPRETED), []
 
 
-def _able(setup: Setup, made: list[Any]) -> tuple[list[Any], list[str]]:
+def _able(setup: Setup, integrators: list[Any]) -> tuple[list[Any], list[str]]:
     """The methods that take the setup, and why not the others."""
     able, why = [], []
-    for each in made:
+    for each in integrators:
         try:
             able.append(replace(setup, integrator=each).integrator)
         except QueryError as error:

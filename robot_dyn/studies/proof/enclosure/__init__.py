@@ -1,1 +1,9 @@
-"""One proven step: polynomial, defect, tube and Lohner's error set, in balls."""
+"""One proven step, in balls.
+
+step        the step: shorter until all bounds hold
+polynomial  the Taylor polynomial and its defect
+tube        a set that the motion does not leave
+linearised  the Jacobian on sets
+lohner      the error set from step to step
+balls       bounds of balls, of matrices, and of solutions of M x = r
+"""

@@ -11,10 +11,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from robot_dyn.studies.proof.enclosure.balls import Ball, Matrix, NotProvenError, dot, matrix, upper
-from robot_dyn.studies.proof.enclosure.mass import Inverse
+from robot_dyn.studies.proof.enclosure.balls import (
+    Ball,
+    Inverse,
+    Matrix,
+    NotProvenError,
+    absolute_product,
+    matrix,
+    upper,
+)
 from robot_dyn.studies.proof.enclosure.polynomial import coefficient
-from robot_dyn.studies.proof.tape.tape import Tape
+from robot_dyn.studies.proof.tape import Tape
 
 
 def jacobian(tape: Tape, inverse: Inverse, given: Sequence[Any], length: int = 1) -> list[Matrix]:
@@ -31,12 +38,12 @@ def jacobian(tape: Tape, inverse: Inverse, given: Sequence[Any], length: int = 1
     """
     parts = _parts(tape, given, length)
     more = inverse.contraction(parts[0][1])
-    made: list[Matrix] = []
+    coefficients: list[Matrix] = []
     for k, (right, _) in enumerate(parts):
         for i in range(1, k + 1):
-            right = right + parts[i][1] * made[k - i]
-        made.append(-inverse.solve(more, right))
-    return made
+            right = right + parts[i][1] * coefficients[k - i]
+        coefficients.append(-inverse.solve(more, right))
+    return coefficients
 
 
 def on_a_set(
@@ -64,18 +71,18 @@ def on_a_set(
     ((right, M),) = _parts(tape, (t, q, v, a), 1)
     more = inverse.contraction(M)
     J = -inverse.solve(more, right)
-    sizes = [upper(b) for b in B]
-    for i, (c, d) in enumerate(zip(C, inverse.bound(more, rho), strict=True)):
-        if not d + dot([upper(J[i, j]) for j in range(2 * n)], sizes) < c.upper():
+    spread = absolute_product(J, [upper(b) for b in B])
+    for c, d, x in zip(C, inverse.bound(more, rho), spread, strict=True):
+        if not d + x < c.upper():
             raise NotProvenError("accelerations within the tube are not bounded: the set of states is too wide")
     return J
 
 
 def _parts(tape: Tape, given: Sequence[Any], length: int) -> list[tuple[Matrix, Matrix]]:
     """∂R/∂(q, v), (n, 2n), and M, (n, n), of each order."""
-    n, made = tape.n, tape.derivatives(*given)
+    n, coefficients = tape.n, tape.derivatives(*given)
     parts = []
     for k in range(length):
-        rows = [[coefficient(x, k) for x in made[3 * n * i : 3 * n * (i + 1)]] for i in range(n)]
+        rows = [[coefficient(x, k) for x in coefficients[3 * n * i : 3 * n * (i + 1)]] for i in range(n)]
         parts.append((matrix([row[: 2 * n] for row in rows]), matrix([row[2 * n :] for row in rows])))
     return parts

@@ -15,12 +15,22 @@ from typing import final
 import numpy as np
 from flint import arb, arb_mat, ctx
 
-from robot_dyn.studies.proof.enclosure.balls import Ball, Matrix, NotProvenError, dot, largest, matrix, upper
+from robot_dyn.studies.proof.enclosure.balls import (
+    Ball,
+    Inverse,
+    Matrix,
+    NotProvenError,
+    absolute_product,
+    identity,
+    largest,
+    matrix,
+    norm,
+    upper,
+)
 from robot_dyn.studies.proof.enclosure.linearised import jacobian
-from robot_dyn.studies.proof.enclosure.mass import Inverse
 from robot_dyn.studies.proof.enclosure.polynomial import Polynomial, series
 from robot_dyn.studies.proof.enclosure.tube import Tube
-from robot_dyn.studies.proof.tape.tape import Tape
+from robot_dyn.studies.proof.tape import Tape
 
 _ORDERS = 3, 6  # of Y: the second where the first does not know it to a thousandth
 _ENOUGH = 1e-3
@@ -43,13 +53,12 @@ class ErrorSet:
     @property
     def bounds(self) -> list[Ball]:
         """Of each |eᵢ|."""
-        m = len(self.r)
-        return [upper(dot([upper(self.Q[i, j]) for j in range(m)], self.r)) for i in range(m)]
+        return [upper(x) for x in absolute_product(self.Q, self.r)]
 
 
 def box(r: Sequence[Ball]) -> ErrorSet:
     """The set |eᵢ| ≤ rᵢ."""
-    return ErrorSet(_identity(len(r)), tuple(r))
+    return ErrorSet(identity(len(r)), tuple(r))
 
 
 def fundamental(
@@ -60,7 +69,7 @@ def fundamental(
     Raises:
         NotProvenError: If δ is too large.
     """
-    Y, delta = [_identity(2 * tape.n)], arb("inf")
+    Y, delta = [identity(2 * tape.n)], arb("inf")
     for order in _ORDERS:
         J = [
             *_coefficients(tape, time, p, inverse, within, order)[:order],
@@ -95,7 +104,7 @@ def _coefficients(
 def _expansion(J: Sequence[Matrix], h: Ball, within: Tube) -> tuple[list[Matrix], Ball]:
     """Y of order m by the m + 1 coefficients of J, and δ."""
     m, size = len(J) - 1, J[0].nrows()
-    Y = [_identity(size)]
+    Y = [identity(size)]
     for k in range(m):
         total = sum((J[i] * Y[k - i] for i in range(1, k + 1)), start=J[0] * Y[k])
         Y.append((total * (arb(1) / (k + 1))).mid())
@@ -104,13 +113,13 @@ def _expansion(J: Sequence[Matrix], h: Ball, within: Tube) -> tuple[list[Matrix]
         defect = Y[k + 1] * arb(k + 1) if k < m else arb_mat(size, size)
         for i in range(max(0, k - m), min(k, m) + 1):
             defect = defect - J[i] * Y[k - i]
-        delta, power = delta + _norm(defect, within.weights) * power, power * h
+        delta, power = delta + norm(defect, within.weights) * power, power * h
     return Y, upper(h * within.growth * delta)
 
 
 def carried(before: ErrorSet, Y: Matrix, delta: Ball, within: Tube, rounding: Sequence[Ball]) -> ErrorSet:
     """The set at the end of a step, of centres with a rounding, (m,)."""
-    w, m = within.weights, len(before.r)
+    w = within.weights
     size = largest(e / x for e, x in zip(before.bounds, w, strict=True))
     local = [upper(x * (delta * size + within.local) + e) for x, e in zip(w, rounding, strict=True)]
     YQ = Y * before.Q
@@ -120,11 +129,8 @@ def carried(before: ErrorSet, Y: Matrix, delta: Ball, within: Tube, rounding: Se
     except ZeroDivisionError:
         raise NotProvenError("the frame of the error set is singular") from None
     Z = inverse * YQ
-    r = [
-        upper(dot([upper(Z[i, j]) for j in range(m)], before.r) + dot([upper(inverse[i, j]) for j in range(m)], local))
-        for i in range(m)
-    ]
-    return ErrorSet(Q, tuple(r))
+    parts = zip(absolute_product(Z, before.r), absolute_product(inverse, local), strict=True)
+    return ErrorSet(Q, tuple(upper(x + y) for x, y in parts))
 
 
 def _turned(YQ: Matrix, r: Sequence[Ball], w: Sequence[Ball]) -> Matrix:
@@ -145,13 +151,3 @@ def _whole(J: Matrix, constant: bool) -> Matrix:
     n = J.nrows()
     top = [[arb(int(constant and j == n + i)) for j in range(2 * n)] for i in range(n)]
     return matrix([*top, *([J[i, j] for j in range(2 * n)] for i in range(n))])
-
-
-def _norm(A: Matrix, w: Sequence[Ball]) -> Ball:
-    """A bound of ‖A‖ in the norm maxᵢ |eᵢ| / wᵢ."""
-    m = len(w)
-    return largest(dot([upper(A[i, j]) for j in range(m)], w) / w[i] for i in range(m))
-
-
-def _identity(m: int) -> Matrix:
-    return matrix([[arb(int(i == j)) for j in range(m)] for i in range(m)])

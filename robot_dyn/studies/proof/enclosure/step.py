@@ -10,14 +10,22 @@ from typing import final
 import numpy as np
 from flint import arb
 
-from robot_dyn.studies.proof.enclosure.balls import Ball, NotProvenError, between, exact, finer, horner, largest, upper
-from robot_dyn.studies.proof.enclosure.defect import defect
+from robot_dyn.studies.proof.enclosure.balls import (
+    Ball,
+    Inverse,
+    NotProvenError,
+    between,
+    exact,
+    finer,
+    horner,
+    largest,
+    upper,
+)
 from robot_dyn.studies.proof.enclosure.linearised import jacobian
 from robot_dyn.studies.proof.enclosure.lohner import ErrorSet, carried, fundamental
-from robot_dyn.studies.proof.enclosure.mass import Inverse
-from robot_dyn.studies.proof.enclosure.polynomial import Polynomial, taylor
+from robot_dyn.studies.proof.enclosure.polynomial import Polynomial, defect, taylor
 from robot_dyn.studies.proof.enclosure.tube import Tube, logarithmic_norm, tube
-from robot_dyn.studies.proof.tape.tape import Tape
+from robot_dyn.studies.proof.tape import Tape
 
 _GRID = 2**40  # steps end at multiples of 1/grid, so that times are floats
 _LONGEST_S = 1.0

@@ -14,12 +14,10 @@ from typing import final
 
 from flint import arb, ctx
 
-from robot_dyn.studies.proof.enclosure.balls import Ball, Matrix, NotProvenError, between, largest, upper
-from robot_dyn.studies.proof.enclosure.defect import Defect
+from robot_dyn.studies.proof.enclosure.balls import Ball, Inverse, Matrix, NotProvenError, between, largest, upper
 from robot_dyn.studies.proof.enclosure.linearised import on_a_set
-from robot_dyn.studies.proof.enclosure.mass import Inverse
-from robot_dyn.studies.proof.enclosure.polynomial import Polynomial
-from robot_dyn.studies.proof.tape.tape import Tape
+from robot_dyn.studies.proof.enclosure.polynomial import Defect, Polynomial
+from robot_dyn.studies.proof.tape import Tape
 
 _PARTS = 4  # of a step
 _WIDER = 3  # than what e starts with

@@ -18,7 +18,8 @@ from robot_dyn.studies.work_precision_diagram.peers.free_motion import FreeMotio
 
 # By the module that each needs.
 PEERS: dict[str, Callable[[FreeMotion], list[MethodUnderTest]]] = {
-    "scipy": scipy.candidates, "mujoco": mujoco.candidates, "pydrake": drake.candidates, "heyoka": heyoka.candidates,
+    "scipy": scipy.methods_under_test, "mujoco": mujoco.methods_under_test,
+    "pydrake": drake.methods_under_test, "heyoka": heyoka.methods_under_test,
 }  # fmt: skip
 
 
@@ -29,14 +30,14 @@ def found(setup: Setup) -> tuple[list[MethodUnderTest], list[str]]:
     if setup.plant.effects or setup.controller is not None or not isinstance(robot, Robot):
         why = "only the free motion of an arm under gravity is the same there"
         return [], [f"other programs ({', '.join(installed)}): {why}"]
-    made: list[MethodUnderTest] = []
+    methods: list[MethodUnderTest] = []
     left_out = [f"{name}: is not installed" for name in PEERS if name not in installed]
     motion = FreeMotion(setup, robot)
     for name in installed:
         try:
-            made += PEERS[name](motion)
+            methods += PEERS[name](motion)
         except PeerError as error:
             left_out.append(f"{name}: {error}")
         except ImportError as error:
             left_out.append(f"{name}: cannot be imported ({shorten(error, 200)})")
-    return made, left_out
+    return methods, left_out

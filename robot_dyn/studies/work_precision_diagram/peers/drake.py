@@ -14,7 +14,7 @@ from robot_dyn.studies.work_precision_diagram.method_under_test import MethodUnd
 from robot_dyn.studies.work_precision_diagram.peers.free_motion import FreeMotion, PeerError, bare_urdf
 
 
-def candidates(motion: FreeMotion) -> list[MethodUnderTest]:
+def methods_under_test(motion: FreeMotion) -> list[MethodUnderTest]:
     """Its default method at growing accuracy."""
     framework, parsing, tree, analysis, mathematics = (
         import_module(f"pydrake.{name}")

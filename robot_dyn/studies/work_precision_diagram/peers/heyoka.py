@@ -20,7 +20,7 @@ from robot_dyn.studies.work_precision_diagram.tolerance_ladder import COMPILED
 _TOLERANCES = (1e-6, 1e-10, 1e-14)  # each is compiled by itself, which takes many seconds
 
 
-def candidates(motion: FreeMotion) -> list[MethodUnderTest]:
+def methods_under_test(motion: FreeMotion) -> list[MethodUnderTest]:
     """Its Taylor method."""
     hy: Any = import_module("heyoka")
     setup, n = motion.setup, motion.robot.n
@@ -30,15 +30,15 @@ def candidates(motion: FreeMotion) -> list[MethodUnderTest]:
     names = [hy.make_vars(f"y{i}") for i in range(2 * n)]
     rates = _in_heyoka(hy, machine.functions.programs["rate"], names, machine.parameters)
     start = np.concatenate([setup.q0, setup.v0])
-    made: dict[float, Any] = {}
+    integrators: dict[float, Any] = {}
 
     def warm() -> None:
         system = list(zip(names, rates, strict=True))
         for tolerance in _TOLERANCES:
-            made[tolerance] = hy.taylor_adaptive(system, start.tolist(), tol=tolerance, compact_mode=True)
+            integrators[tolerance] = hy.taylor_adaptive(system, start.tolist(), tol=tolerance, compact_mode=True)
 
     def run(tolerance: float, limit: Limit) -> Run:
-        integrator = made[tolerance]
+        integrator = integrators[tolerance]
         integrator.time = 0.0
         integrator.state[:] = start
         began = perf_counter()

@@ -64,7 +64,7 @@ def mujoco_model(
     return model
 
 
-def candidates(motion: FreeMotion) -> list[MethodUnderTest]:
+def methods_under_test(motion: FreeMotion) -> list[MethodUnderTest]:
     """Its three methods."""
     module: Any = import_module("mujoco")
     model = mujoco_model(module, motion.robot, bare=True)

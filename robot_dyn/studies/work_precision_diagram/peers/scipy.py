@@ -15,7 +15,7 @@ from robot_dyn.studies.work_precision_diagram.peers.free_motion import FreeMotio
 _LEAST = 3e-14  # SciPy's own bound
 
 
-def candidates(motion: FreeMotion) -> list[MethodUnderTest]:
+def methods_under_test(motion: FreeMotion) -> list[MethodUnderTest]:
     """DOP853 of `solve_ivp`."""
     pin: Any = import_module("pinocchio")
     from scipy.integrate import solve_ivp

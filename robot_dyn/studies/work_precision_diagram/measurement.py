@@ -1,4 +1,4 @@
-"""The measurement of candidates: each walks its ladder as far as it pays, then all runs are timed again in turns."""
+"""Measurement: each method under test runs its ladder as far as is worthwhile, then all runs are timed in turns."""
 
 from __future__ import annotations
 
@@ -42,24 +42,24 @@ class Rung:
 @final
 @dataclass(eq=False)
 class Walk:
-    """A candidate on its ladder."""
+    """A method under test and the runs of its ladder."""
 
-    candidate: MethodUnderTest
+    method: MethodUnderTest
     rungs: list[Rung] = field(default_factory=list)
     ended: str = ""
 
     @property
     def name(self) -> str:
         """Of the candidate, as of its ladder."""
-        return ladder_name(self.candidate.method, self.candidate.engine, self.candidate.events)
+        return ladder_name(self.method.method, self.method.engine, self.method.events)
 
     def longest(self, budget: Budget) -> float:
         """Time that a run may take, in [s]."""
-        return _PART[self.candidate.engine] * budget.seconds
+        return _PART[self.method.engine] * budget.seconds
 
     def ladder(self, floor: float) -> ToleranceLadder:
         """What was found, with errors above `floor` believed."""
-        of = self.candidate
+        of = self.method
         points = tuple(
             Point(
                 each.setting, each.run.steps, each.run.evaluations, each.error, each.run.energy, median(each.times),
@@ -70,7 +70,7 @@ class Walk:
         return ToleranceLadder(of.method, of.engine, of.events, of.order, of.by, points, self.ended, floor)
 
 
-def measured(
+def measure(
     candidates: Iterable[MethodUnderTest], reference: Reference, budget: Budget, repeats: int
 ) -> tuple[list[Walk], bool]:
     """The ladders of all candidates, each run timed so often at most, and whether Ctrl-C ended them."""
@@ -85,7 +85,7 @@ def measured(
                 for walk, rung in among:
                     if budget.left <= 0:
                         return walks, False
-                    budget.tell(f"round {k + 2}: {walk.name}")
+                    budget.report(f"round {k + 2}: {walk.name}")
                     _again(walk, rung, budget)
     except KeyboardInterrupt:
         return walks, True
@@ -94,30 +94,30 @@ def measured(
 
 def _walk(walk: Walk, reference: Reference, budget: Budget) -> None:
     """Run from coarse to fine, until the error of the reference is reached or the next run would take too long."""
-    candidate, longest, before = walk.candidate, walk.longest(budget), 0.0
+    method, longest, before = walk.method, walk.longest(budget), 0.0
     late = 0
-    for setting in candidate.settings():
-        if budget.left <= _KEPT[candidate.engine] * budget.seconds:
+    for setting in method.settings():
+        if budget.left <= _KEPT[method.engine] * budget.seconds:
             walk.ended = f"the budget of {budget.seconds:g} s ended"
             return
         if walk.rungs and isfinite(walk.rungs[-1].error):
-            foreseen = candidate.growth(before, setting) * walk.rungs[-1].times[0]
+            foreseen = method.growth(before, setting) * walk.rungs[-1].times[0]
             if foreseen > longest:
                 walk.ended = f"a finer run would take more than {longest:.2g} s"
                 return
-        budget.tell(f"{walk.name}, {candidate.by} {setting:.3g}")
+        budget.report(f"{walk.name}, {method.by} {setting:.3g}")
         try:
             if not before:
-                budget.tell(f"{walk.name}: loading")
+                budget.report(f"{walk.name}: loading")
                 with budget.apart():  # what is compiled or loaded once
-                    candidate.warm()
+                    method.warm()
             before = setting
-            run = candidate.run(setting, Limit(_HARD * longest))
+            run = method.run(setting, Limit(_HARD * longest))
         except OvertimeError:
-            walk.ended = f"a run with {candidate.by} {setting:.3g} takes more than {_HARD * longest:.2g} s"
+            walk.ended = f"a run with {method.by} {setting:.3g} takes more than {_HARD * longest:.2g} s"
             late += 1
             if late < _LATE and not any(isfinite(each.error) for each in walk.rungs):
-                continue  # steps that are too long may bring forth a motion that takes longer
+                continue  # steps that are too long may lead to a motion that takes longer
             return
         except RobotDynError as error:
             walk.ended = str(error)
@@ -133,4 +133,4 @@ def _walk(walk: Walk, reference: Reference, budget: Budget) -> None:
 def _again(walk: Walk, rung: Rung, budget: Budget) -> None:
     """One more time of a run."""
     with suppress(OvertimeError):
-        rung.times.append(walk.candidate.run(rung.setting, Limit(_HARD * walk.longest(budget))).time_s)
+        rung.times.append(walk.method.run(rung.setting, Limit(_HARD * walk.longest(budget))).time_s)

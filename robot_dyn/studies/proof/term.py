@@ -1,4 +1,4 @@
-"""Terms: the numbers of a trace that rounds nothing, x = c + node, of a ball c and a CasADi node.
+"""The numbers of a trace that rounds nothing, x = c + node, of a ball c and a CasADi node, and their arithmetic.
 
 Where a ball meets a node it becomes an input of the trace, one for each value, so that neither CasADi nor this library
 computes with it in floats. Only an exact 0 or ±1 is folded.
@@ -6,15 +6,17 @@ computes with it in floats. Only an exact 0 or ±1 is folded.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import dataclass, field
 from typing import Any, final
 
 import casadi as ca
 import numpy as np
 from flint import arb
 
-from robot_dyn.arithmetic import Ball
+from robot_dyn.arithmetic import Arithmetic, Array, Ball
 from robot_dyn.codegen.trace.condition import Node
 
 BITS = 400  # of the constants: what they are rounded to, far below all else
@@ -50,10 +52,6 @@ class Constants:
 
 
 CONSTANTS: ContextVar[Constants] = ContextVar("constants")
-
-
-def _zero() -> Any:
-    return arb(0)
 
 
 @final
@@ -180,9 +178,6 @@ class Term:
             return NotImplemented
         return self.node is None and x.node is None and bool(self.constant == x.constant)  # both exact
 
-    def __ne__(self, other: object) -> Any:
-        return not self == other
-
     __hash__ = None  # pyright: ignore[reportAssignmentType]
 
 
@@ -193,7 +188,7 @@ def expressions(array: Any) -> Node:
 
 
 def _of(expression: Node) -> Term:
-    return Term(_zero(), expression)
+    return Term(arb(0), expression)
 
 
 def _term(x: Any) -> Term | None:
@@ -203,3 +198,39 @@ def _term(x: Any) -> Term | None:
         return Term(BALLS.number(x))
     except (TypeError, ValueError):
         return None
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Literals(Arithmetic):
+    """Numbers of a trace, constants in balls of 400 bits.
+
+    Attributes:
+        constants: Those that became inputs.
+    """
+
+    constants: Constants = field(default_factory=Constants, repr=False)
+    dtype: np.dtype = field(default_factory=lambda: np.dtype(object), init=False, repr=False)
+
+    def number(self, literal: Any) -> Term:
+        return literal if isinstance(literal, Term) else Term(BALLS.number(literal))
+
+    @contextmanager
+    def scope(self) -> Iterator[None]:
+        token = CONSTANTS.set(self.constants)
+        try:
+            with BALLS.scope():
+                yield
+        finally:
+            CONSTANTS.reset(token)
+
+    def asarray(self, values: Any) -> Array:
+        return self.array(values)
+
+    def finite(self, x: Array) -> np.ndarray:
+        return np.ones(np.shape(x), dtype=bool)
+
+    def inputs(self, name: str, n: int) -> tuple[Node, Array]:
+        """A CasADi vector of n inputs, and the same as an array of numbers."""
+        vector = ca.SX.sym(name, n)
+        return vector, self.array([Term(BALLS.number(0), vector[i]) for i in range(n)])

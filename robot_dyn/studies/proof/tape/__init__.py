@@ -1,1 +1,0 @@
-"""The equation of motion as a program in balls: a trace that rounds nothing."""
