@@ -6,7 +6,7 @@ estimated, 8 n u κ times what the terms of the answer are more than the answer 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from functools import lru_cache
 from math import log10
 from typing import TYPE_CHECKING, Any
@@ -60,15 +60,17 @@ def digits(robot: Robot, quantity: str, state: tuple[Any, ...]) -> float:
     return _counted(_quiet(robot), asked, arrays)
 
 
-def doubt(robot: Robot, quantity: str, arrays: Mapping[str, np.ndarray], answers: np.ndarray, least: float) -> str:
-    """What is said of answers (..., *shape) with fewer digits than asked for; "" if they have them.
+def doubt(robot: Robot, quantity: str, state: Sequence[Any], answer: Any, least: float | None) -> str:
+    """The warning about answers (..., *shape) that have fewer digits than `least`; "" if they have them.
 
-    Only where the estimate is below that are digits counted, at the worst state; of more than 64 joints the estimate is
-    told.
+    Digits are counted only where the estimate is below that, at the worst state; for more than 64 joints the estimate
+    is reported.
     """
     asked, quiet = QUANTITIES.get(quantity), _quiet(robot)
-    if asked is None:
+    if asked is None or least is None:
         return ""
+    answers = np.asarray(answer)
+    arrays = {name: shaped(name, x, robot.joint_names) for name, x in zip(asked.arguments, state, strict=True)}
     batch = answers.shape[: answers.ndim - len(asked.axes)]
     rows = [
         ({name: np.broadcast_to(x, (*batch, robot.n))[k] for name, x in arrays.items()}, answers[k])

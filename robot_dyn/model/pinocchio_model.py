@@ -14,7 +14,6 @@ from robot_dyn.description.couplings import Couplings, Mimic, resolve
 from robot_dyn.description.description import Description
 from robot_dyn.description.edits import Edits
 from robot_dyn.description.structure import stated_mimics
-from robot_dyn.description.urdf import UNBOUNDED
 from robot_dyn.errors import DescriptionError, EditError, nearest
 
 MAX_MOVING = 250  # Pinocchio's scratch memory for n joints has 63 n³ bytes: 1 GB
@@ -126,12 +125,3 @@ def _couplings(joints: tuple[str, ...], mimics: dict[str, Mimic]) -> tuple[Coupl
 def link_frames(model: Any) -> dict[str, int]:
     """Index of the frame of each link, by name."""
     return {frame.name: i for i, frame in enumerate(model.frames) if frame.type == pin.FrameType.BODY}
-
-
-def per_joint(model: Any, joint_names: tuple[str, ...], full: np.ndarray) -> np.ndarray:
-    """The entries of some joints, ±inf where the file states none; read-only."""
-    ids = joint_ids(model)
-    values = full[[model.idx_vs[ids[name]] for name in joint_names]]
-    values[np.abs(values) >= float(UNBOUNDED)] *= np.inf
-    values.setflags(write=False)
-    return values

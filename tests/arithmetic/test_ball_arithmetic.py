@@ -1,4 +1,4 @@
-"""Ball arithmetic: M, C, N with a proven radius, and the rounding of every floating-point road against them."""
+"""Ball arithmetic: M, C, N with a proven radius, and the rounding of each implementation in floats against them."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def test_balls_follow_the_literals_of_the_file_not_their_float64() -> None:
 
 
 @pytest.mark.parametrize("name", ["ur5", "skew_tree"])
-def test_forward_dynamics_of_balls_encloses_all_roads(name: str) -> None:
+def test_forward_dynamics_of_balls_encloses_all_implementations(name: str) -> None:
     """Cholesky and articulated body in 200 bits meet; Pinocchio's ABA lies at 1e-12 of them in the norm of a."""
     robot = arm(name)
     q, v, tau = general_state(robot)

@@ -1,4 +1,4 @@
-"""The cross-check: every robot of the catalog agrees by both roads, and a wrong road is caught and named."""
+"""The cross-check: every robot of the catalog agrees by both implementations, and a wrong one is caught and named."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def quiet(name: str) -> rd.Robot:
 
 
 @pytest.mark.parametrize("name", robots(without=REFUSED))
-def test_the_roads_agree_on(name: str) -> None:
+def test_the_implementations_agree_on(name: str) -> None:
     """1e-12 on the scale of the terms added; forward dynamics max(1e-12, 8 n u κ) in the norm of M."""
     result = compare(quiet(name), samples=2, seed=3)
     assert result.ok, result.worst
@@ -50,7 +50,7 @@ def test_a_robot_of_69_files_is_each_in_the_catalog() -> None:
 
 @pytest.mark.parametrize("name", ["ur5", "skew_tree", "mimic_chain"])
 def test_edited_robots_agree(name: str) -> None:
-    """Gravity in any direction, armature, payload and a lock are taken by both roads alike."""
+    """Gravity in any direction, armature, payload and a lock are taken by both implementations alike."""
     robot = rd.load(name)
     payload = rd.Payload(robot.frame_names[-1], 0.8, (0.05, -0.02, 0.1), np.diag([0.01, 0.02, 0.025]).tolist())
     edited = robot.with_(gravity=(1.0, -2.0, 3.0), armature=0.3, payload=payload, lock={robot.joint_names[-1]: 0.4})
@@ -69,8 +69,8 @@ def test_edited_robots_agree(name: str) -> None:
         ("armature", lambda a: a + 1e-11, {"M", "momentum", "kinetic_energy"}),
     ],
 )
-def test_a_road_that_errs_by_1e_11_is_caught(monkeypatch, member: str, change, quantities: set[str]) -> None:
-    """One number of the own road moved by 1e-11 of its size: the quantities that depend on it are named, no others."""
+def test_an_implementation_that_errs_by_1e_11_is_caught(monkeypatch, member: str, change, quantities: set[str]) -> None:
+    """One number moved by 1e-11 of its size: only quantities that depend on it are named."""
     robot = rd.load("planar_2r").with_(gravity=(0.3, 0.5, -9.0))
     whole = Lagrangian.linkage.func  # pyright: ignore[reportFunctionMemberAccess]
 

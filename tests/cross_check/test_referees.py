@@ -1,4 +1,4 @@
-"""M, C v + N and forward dynamics of the whole catalog against engines that share no line with either road.
+"""M, C v + N and forward dynamics of the whole catalog against engines that share no line with either implementation.
 
 Their readers, kinematics and algorithms are their own: MuJoCo's, and Drake's where it is installed. What they refuse,
 drop or change, the doctor of files names.

@@ -58,7 +58,7 @@ FAULTS = [
 def test_a_fault_of_the_hardened_read_shows(
     monkeypatch, quantity: str, entry: str, path: str, key: str, change: Callable[[str], str]
 ) -> None:
-    """One number that the read writes wrongly: both roads take it and agree; the second reading names it."""
+    """One number that the read writes wrongly: both implementations take it and agree; the second reading names it."""
     read = urdf.checked_robot
 
     def wrong(robot: etree._Element, source: str):

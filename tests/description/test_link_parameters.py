@@ -32,7 +32,7 @@ def edited(robot: rd.Robot, link: str, mass: float | None = None, inertia: np.nd
 
 
 def test_a_link_with_another_mass_and_inertia_is_that_of_an_edited_file() -> None:
-    """By both roads, in M, C, N and inverse dynamics, with a factor on all masses and a payload besides."""
+    """By both implementations, in M, C, N and inverse dynamics, with a factor on all masses and a payload besides."""
     more = {"mass_scale": 1.3, "payload": rd.Payload("left_tool", 0.7, (0.1, 0.0, 0.2))}
     ours = TREE.with_(masses={LINK: 2.7}, inertias={LINK: INERTIA}, **more)
     theirs = edited(TREE, LINK, 2.7, INERTIA).with_(**more)

@@ -1,4 +1,4 @@
-"""The textbook's closed forms: pendulum, 2R arm, cart and pole, against both roads."""
+"""The textbook's closed forms: pendulum, 2R arm, cart and pole, against both implementations."""
 
 from __future__ import annotations
 

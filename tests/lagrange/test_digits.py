@@ -1,4 +1,4 @@
-"""Digits of an answer: counted against truth by other roads, lost where an answer is wrong, and warned of."""
+"""Digits of an answer: counted against truth by other implementations, lost where an answer is wrong, and warned of."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Laws of Lagrangian mechanics, and the agreement of the roads, on random trees."""
+"""Laws of Lagrangian mechanics, and the agreement of the implementations, on random trees."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def law(few: int, many: int) -> Callable[[Callable[[RandomTree, int], None]], Ca
 
 
 @law(12, 80)
-def test_the_roads_agree(tree: RandomTree, seed: int) -> None:
+def test_the_implementations_agree(tree: RandomTree, seed: int) -> None:
     """All quantities within 1e-12 of the terms added into them; forward dynamics within 8 n u κ."""
     result = rd.compare(tree.robot, samples=2, seed=seed)
     assert result.ok, result.worst
@@ -49,7 +49,7 @@ def test_the_roads_agree(tree: RandomTree, seed: int) -> None:
 
 @law(8, 40)
 def test_mass_matrix_is_symmetric_positive_definite(tree: RandomTree, seed: int) -> None:
-    """Both roads. Symmetric to rounding (u on the scale of the entry); least eigenvalue of D M D above its rounding."""
+    """Both implementations. Symmetric to u on the scale of the entry; least eigenvalue of D M D above its rounding."""
     robot = tree.robot
     q, *_ = state_of(robot, seed)
     for engine in (robot, rd.Lagrangian(robot)):
@@ -62,7 +62,7 @@ def test_mass_matrix_is_symmetric_positive_definite(tree: RandomTree, seed: int)
 
 @law(8, 40)
 def test_rate_of_mass_matrix_is_coriolis_plus_its_transpose(tree: RandomTree, seed: int) -> None:
-    """Ṁ = C + Cᵀ with Ṁ from the exact ∂M/∂q, and C of either road; u · terms, so 1e-13 of them."""
+    """Ṁ = C + Cᵀ with Ṁ from the exact ∂M/∂q, and C of either implementation; u · terms, so 1e-13 of them."""
     robot = tree.robot
     q, v, _ = state_of(robot, seed)
     own = rd.Lagrangian(robot)

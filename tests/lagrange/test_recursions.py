@@ -1,4 +1,4 @@
-"""The recursions over the bodies against the closed form: two roads to the same numbers, in float64."""
+"""The recursions over the bodies against the closed form: two implementations to the same numbers, in float64."""
 
 from __future__ import annotations
 

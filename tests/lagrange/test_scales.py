@@ -71,12 +71,12 @@ def test_where_the_base_stands_changes_no_digit_of_the_dynamics(method: str, xyz
 
 
 @pytest.mark.parametrize("xyz", BASES)
-def test_roads_agree_wherever_the_base_stands(xyz: str) -> None:
+def test_implementations_agree_wherever_the_base_stands(xyz: str) -> None:
     result = rd.compare(standing_at(xyz), samples=3)
     assert result.ok, result.worst
 
 
-def test_roads_agree_on_a_chain_from_a_kilometre_to_a_micrometre() -> None:
+def test_implementations_agree_on_a_chain_from_a_kilometre_to_a_micrometre() -> None:
     """In all quantities to 1e-12 of the terms; C and its products to a few roundings of them, 4u."""
     result = rd.compare(chain(), samples=5)
     assert result.ok, result.worst

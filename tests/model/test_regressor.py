@@ -44,7 +44,7 @@ def test_torques_are_the_regressor_times_the_parameters(name: str, engine: str) 
 
 
 @pytest.mark.parametrize("name", ROBOTS)
-def test_all_roads_give_one_regressor(name: str) -> None:
+def test_all_implementations_give_one_regressor(name: str) -> None:
     """Christoffel symbols of unit inertias, the recursion and machine code against Pinocchio: 1e-13 of the terms."""
     robot = arm(name)
     own, (q, v, a) = rd.Lagrangian(robot), general(robot, 6)

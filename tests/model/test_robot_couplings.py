@@ -69,7 +69,7 @@ def test_couplings_are_read_only():
             array[0] = 1.0
 
 
-@pytest.mark.parametrize("road", ["Pinocchio", "Lagrangian", "machine code"])
+@pytest.mark.parametrize("implementation", ["Pinocchio", "Lagrangian", "machine code"])
 def test_where_rounding_hides_the_joints_that_follow_the_state_is_refused(implementation: str) -> None:
     """Half of 3e6 rad is known to 1e-9 rad, half of 1e15 rad to 0.1 rad, with as few digits of M; balls know both."""
     robot = rd.load("mimic_chain")
@@ -92,10 +92,10 @@ def test_where_rounding_hides_the_joints_that_follow_the_state_is_refused(implem
 @pytest.mark.filterwarnings("ignore::robot_dyn.ModelWarning")
 @pytest.mark.parametrize("name", ["solo", "panda"])
 def test_far_out_a_joint_that_nothing_rounds_is_where_it_is(name: str) -> None:
-    """The roads of solo number joints in two orders, and no joint follows; fingers of the Panda follow as they are."""
+    """Solo's implementations number joints in two orders and none follows; the Panda's fingers follow as they are."""
     robot = rd.load(name)
     q = 1e16 * np.random.default_rng(7).uniform(0.3, 1, robot.n)
-    allowed = 64 * robot.n * 2.0**-53  # two roads, 32 n u each
+    allowed = 64 * robot.n * 2.0**-53  # two implementations, 32 n u each
     expected = robot.M(q)
     size = np.sqrt(np.outer(expected.diagonal(), expected.diagonal()))
     for engine in (rd.Lagrangian(robot), rd.Compiled(robot)):
