@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import fields
 from functools import cached_property
+from math import prod
 from threading import RLock
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
+
+LINE = 64  # bytes of a cache line and of the widest vector: one that lies across two lines is two accesses
 
 Result = TypeVar("Result")
 Late = TypeVar("Late", bound="Derived")
@@ -115,3 +118,13 @@ def _arrays(x: Any) -> list[np.ndarray]:
 
 def _writeable(x: Any) -> bool:
     return any(array.flags.writeable for array in _arrays(x))
+
+
+def aligned(shape: tuple[int, ...], dtype: Any = float) -> np.ndarray:
+    """An array of zeros in row-major order that begins at a cache line; of objects, at any address."""
+    if np.dtype(dtype).hasobject:
+        return np.zeros(shape, dtype)
+    size = prod(shape) * np.dtype(dtype).itemsize
+    room = np.zeros(size + LINE, np.uint8)
+    first = -room.__array_interface__["data"][0] % LINE
+    return room[first : first + size].view(dtype).reshape(shape)

@@ -16,8 +16,7 @@ from typing import Any, ClassVar, cast, final
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.errors import OverflowedError, QueryError, RobotDynError
-from robot_dyn.foreign import is_mistake
+from robot_dyn.errors import OverflowedError, QueryError, RobotDynError, is_mistake
 from robot_dyn.integrate import dop853
 from robot_dyn.integrate.controlled_steps import ControlledSteps
 from robot_dyn.integrate.integrator import System

@@ -15,8 +15,9 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import NotPositiveDefiniteError, apply, cholesky_solve
+from robot_dyn.arithmetic import apply
 from robot_dyn.errors import OverflowedError, QueryError, RobotDynError, SingularError
+from robot_dyn.linear_algebra import NotPositiveDefiniteError, cholesky_solve
 from robot_dyn.validate import integer, rows
 
 Kinetic = Callable[[Any, Any, Any], Any]

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, final
 
@@ -34,19 +33,20 @@ Reduction = Callable[[Couplings, Any], Any]  # from the answer for all joints to
 
 
 @final
-@dataclass(frozen=True, eq=False)
 class Evaluation:
     """Evaluates kernels for one mechanism."""
 
-    mechanism: Mechanism
+    def __init__(self, mechanism: Mechanism) -> None:
+        self._mechanism, self._shape = mechanism, (mechanism.n,)
+        self._couplings, self._scratch = mechanism.couplings, mechanism.scratch
 
     @cached_property
     def regularity(self) -> Regularity:
         """Whether M can be solved for, judged at a configuration without symmetries."""
-        M = self._equation(pin.crba, Couplings.matrix, self.mechanism.model)(np.linspace(0.3, 0.9, self.mechanism.n))
-        return regularity(M, self.mechanism.joint_names)
+        M = self._equation(pin.crba, Couplings.matrix, self._mechanism.model)(np.linspace(0.3, 0.9, self._mechanism.n))
+        return regularity(M, self._mechanism.joint_names)
 
-    def __call__(
+    def answer(
         self, quantity: str, errors: str, kernel: Kernel, reduce: Reduction | None, model: Any, *state: Array
     ) -> Any:
         """The answers of a kernel at one state or a batch.
@@ -60,23 +60,24 @@ class Evaluation:
             *state: Its arguments, (..., n) each.
         """
         if errors.__class__ is str and errors == "raise":
-            shape = (self.mechanism.n,)
+            shape, couplings = self._shape, self._couplings
             for x in state:
                 if not is_plain(x, shape):
                     break
             else:
-                return self._one_state(kernel, reduce, model, *state)
+                if couplings.trivial:
+                    return kernel(model, self._scratch.data, *state)
+                return self._coupled(kernel, reduce, model, *state)
         return self._answered(quantity, errors, self._equation(kernel, reduce, model), state)
 
     def forward_dynamics(self, errors: str, q: Array, v: Array, tau: Array) -> ndarray:
         """M⁻¹ (τ − C v − N): by ABA, and with coupled joints by factorising M; raises where M is singular."""
         if self.regularity.singular is not None:
             raise self.regularity.singular()
-        mechanism = self.mechanism
-        model, names, trivial = mechanism.model, mechanism.joint_names, mechanism.couplings.trivial
-        if not trivial and all(is_plain(x, (mechanism.n,)) for x in (q, v, tau)):
-            inertia = self._one_state(pin.crba, Couplings.matrix, model, q)
-            bias = self._one_state(pin.nonLinearEffects, Couplings.torque, model, q, v)
+        model, names, trivial = self._mechanism.model, self._mechanism.joint_names, self._couplings.trivial
+        if not trivial and all(is_plain(x, self._shape) for x in (q, v, tau)):
+            inertia = self._coupled(pin.crba, Couplings.matrix, model, q)
+            bias = self._coupled(pin.nonLinearEffects, Couplings.torque, model, q, v)
             a = acceleration(inertia, tau - bias, names)
             if is_moderate(a, DOUBTFUL):
                 return a
@@ -92,14 +93,15 @@ class Evaluation:
 
         return self._answered("forward_dynamics", errors, equation, (q, v, tau))
 
-    def _one_state(self, kernel: Kernel, reduce: Reduction | None, model: Any, q: ndarray, *rates: ndarray) -> Any:
-        couplings = self.mechanism.couplings
-        answer = kernel(model, self.mechanism.scratch.data, couplings.position(q), *map(couplings.velocity, rates))
+    def _coupled(self, kernel: Kernel, reduce: Reduction | None, model: Any, q: ndarray, *rates: ndarray) -> Any:
+        """The answer at one state of coupled joints."""
+        couplings = self._couplings
+        answer = kernel(model, self._scratch.data, couplings.position(q), *map(couplings.velocity, rates))
         return answer if reduce is None else reduce(couplings, answer)
 
     def _equation(self, kernel: Kernel, reduce: Reduction | None, model: Any) -> Callable[..., ndarray]:
         """The function (q, …) → answers of a kernel, evaluated state by state of a batch."""
-        couplings, data = self.mechanism.couplings, self.mechanism.scratch.data
+        couplings, data = self._couplings, self._scratch.data
 
         def equation(q: ndarray, *rates: ndarray) -> ndarray:
             full = [couplings.position(q), *(couplings.velocity(x) for x in rates)]
@@ -112,13 +114,23 @@ class Evaluation:
         return equation
 
     def _answered(self, quantity: str, errors: str, equation: Callable[..., ndarray], state: tuple[Array, ...]) -> Any:
-        names, asked = self.mechanism.joint_names, ALL[quantity]
+        names, asked = self._mechanism.joint_names, ALL[quantity]
         arrays = {name: shaped(name, x, names) for name, x in zip(asked.arguments, state, strict=True)}
-        answer = answered(equation, arrays, asked.shape(self.mechanism.sizes), names, errors)
+        answer = answered(equation, arrays, asked.shape(self._mechanism.sizes), names, errors)
         return answer if answer.ndim else float(answer)
 
 
-def warn_of_digits(robot: Robot, quantity: str, answer: Any, *state: Array, stacklevel: int) -> Any:
+def warning_answer(robot: Robot, answer: Callable[..., Any]) -> Callable[..., Any]:
+    """`Evaluation.answer`, followed by `warn_of_digits`."""
+
+    def warned(quantity: str, errors: str, kernel: Kernel, reduce: Reduction | None, model: Any, *state: Array) -> Any:
+        result = answer(quantity, errors, kernel, reduce, model, *state)
+        return warn_of_digits(robot, quantity, result, *state, stacklevel=4)
+
+    return warned
+
+
+def warn_of_digits(robot: Robot, quantity: str, answer: Any, *state: Array, stacklevel: int = 3) -> Any:
     """The answer, after a warning if it has fewer digits than `Robot.warn_below` requests."""
     from robot_dyn.lagrange.digits import doubt  # late: it builds a Lagrangian
 

@@ -6,6 +6,7 @@ straight to Pinocchio, after checks of a fraction of a microsecond; coupled join
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import Any, Unpack, final
@@ -22,10 +23,9 @@ from robot_dyn.errors import announce
 from robot_dyn.model import kernels
 from robot_dyn.model.conditioning import LEAST_DIGITS, checked_digits
 from robot_dyn.model.coriolis import Coriolis
-from robot_dyn.model.evaluation import Evaluation, Reduction, warn_of_digits
+from robot_dyn.model.evaluation import Evaluation, warn_of_digits, warning_answer
 from robot_dyn.model.findings import findings_of
 from robot_dyn.model.gravity import warn_without_torque
-from robot_dyn.model.kernels import Kernel
 from robot_dyn.model.mechanism import Mechanism, forwarded
 from robot_dyn.queries.dynamics import Array, Axes, Dynamics
 from robot_dyn.queries.quantity import DOUBTFUL
@@ -77,7 +77,7 @@ class Robot(Dynamics, Parametrised):
             if is_moderate(a, DOUBTFUL):
                 return a
         a = self._evaluation.forward_dynamics(errors, q, v, tau)
-        return a if self.least_digits is None else warn_of_digits(self, "forward_dynamics", a, q, v, tau, stacklevel=3)
+        return a if self.least_digits is None else warn_of_digits(self, "forward_dynamics", a, q, v, tau)
 
     def coriolis_torque(self, q: Array, v: Array, *, errors: str = "raise") -> ndarray:
         if is_plain(q, self._shape) and is_plain(v, self._shape):
@@ -292,8 +292,8 @@ class Robot(Dynamics, Parametrised):
         """The same for forward dynamics; None if M is singular."""
         return None if self._evaluation.regularity.singular else self._shape
 
-    def _ask(
-        self, quantity: str, errors: str, kernel: Kernel, reduce: Reduction | None, model: Any, *state: Array
-    ) -> Any:
-        answer = self._evaluation(quantity, errors, kernel, reduce, model, *state)
-        return answer if self.least_digits is None else warn_of_digits(self, quantity, answer, *state, stacklevel=4)
+    @cached_property
+    def _ask(self) -> Callable[..., Any]:
+        """`Evaluation.answer`, with a warning where the answer has few digits."""
+        answer = self._evaluation.answer
+        return answer if self.least_digits is None else warning_answer(self, answer)

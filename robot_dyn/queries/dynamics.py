@@ -8,8 +8,9 @@ from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array, NotPositiveDefiniteError, cholesky_solve, rounding
+from robot_dyn.arithmetic import Array, rounding
 from robot_dyn.errors import OverflowedError, SingularError, UndecidedError, shown
+from robot_dyn.linear_algebra import NotPositiveDefiniteError, cholesky_solve
 from robot_dyn.validate import choice
 
 T = TypeVar("T")

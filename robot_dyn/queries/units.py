@@ -55,3 +55,11 @@ def in_words(part: Any, joint_types: Sequence[str | None]) -> dict[str, str]:
 def _one(x: float, known: Coefficient, kind: str | None) -> str:
     """A number and its unit; a limit that does not exist is beyond any."""
     return "none" if known.infinite and abs(x) >= _NONE else f"{x:g} {of_joint(known.unit, kind)}".rstrip()
+
+
+def format_duration(seconds: float) -> str:
+    """A time in two digits, with its unit."""
+    for size, unit in ((86400.0, "days"), (3600.0, "h"), (60.0, "min"), (1.0, "s"), (1e-3, "ms")):
+        if seconds >= size:
+            return f"{float(f'{seconds / size:.2g}'):g} {unit}"
+    return f"{float(f'{seconds * 1e6:.2g}'):g} µs"

@@ -14,8 +14,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.codegen.store.definition import definition
-from robot_dyn.simulation.compiled import build
-from robot_dyn.simulation.compiled import programs
+from robot_dyn.simulation.compiled import build, programs
 from robot_dyn.simulation.compiled.build import compiled_equation
 from robot_dyn.simulation.compiled.lru_by_identity import LRUByIdentity
 from robot_dyn.simulation.compiled.structure import structure

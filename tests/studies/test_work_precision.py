@@ -18,8 +18,8 @@ import robot_dyn as rd
 from robot_dyn.errors import QueryError
 from robot_dyn.integrate.explicit import ExplicitRungeKutta
 from robot_dyn.integrate.tableau import ButcherTableau
+from robot_dyn.queries.units import format_duration
 from robot_dyn.result import json_text
-from robot_dyn.seconds import format_duration
 from robot_dyn.studies.budget import Budget, Limit
 from robot_dyn.studies.work_precision_diagram.measured import Rung, Walk, measured
 from robot_dyn.studies.work_precision_diagram.method_under_test import MethodUnderTest, own, recorded, whole

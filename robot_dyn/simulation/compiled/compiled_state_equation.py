@@ -18,8 +18,7 @@ from robot_dyn.codegen.parameters import CONTROLLER, ROBOT, Parameter, Part, joi
 from robot_dyn.coefficients import value_at
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.effect import Effect
-from robot_dyn.errors import RobotDynError
-from robot_dyn.foreign import because
+from robot_dyn.errors import RobotDynError, because
 from robot_dyn.simulation.compiled.checked_states import States, random_states, some, states_of
 from robot_dyn.simulation.compiled.functions import STEP, Equations
 from robot_dyn.simulation.compiled.jacobian_check import DIFFERENCES, by_differences

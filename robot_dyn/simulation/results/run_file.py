@@ -15,8 +15,7 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 
 from robot_dyn.errors import RobotDynError, shorten
-from robot_dyn.files import Kind, save, target
-from robot_dyn.reading import file_path, reading
+from robot_dyn.files import Kind, file_path, reading, save, target
 from robot_dyn.simulation.results.archive import Archive, ArchiveError, Header, write
 from robot_dyn.simulation.results.provenance import packed, unpacked
 from robot_dyn.simulation.results.schema import MEMBERS, Member, check_headers, member

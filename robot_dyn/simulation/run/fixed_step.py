@@ -13,10 +13,8 @@ from typing import cast, final
 
 import numpy as np
 
-from robot_dyn.aligned import aligned
 from robot_dyn.arithmetic import FLOAT64, Array
-from robot_dyn.errors import RobotDynError
-from robot_dyn.foreign import is_mistake
+from robot_dyn.errors import RobotDynError, is_mistake
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.simulation.dynamics.loop_state import Ended, Functions, Now, Rules, Runs
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
@@ -32,7 +30,7 @@ from robot_dyn.simulation.run.watch import LARGEST, DivergedError, Watch, one_st
 from robot_dyn.simulation.setup.schedule import ON_STEP, paced
 from robot_dyn.simulation.setup.segment_table import segment_table
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.values import kept
+from robot_dyn.values import aligned, kept
 
 _NEEDS_REVIEW = 1e6  # of Σ |y| in machine code, which does not see that M becomes singular
 

@@ -10,8 +10,7 @@ import numpy as np
 from robot_dyn.arithmetic import Array
 from robot_dyn.effects.plant import Plant
 from robot_dyn.effects.rigid_stops import RigidStops
-from robot_dyn.errors import ControlError, EffectError, OverflowedError, QueryError, shown
-from robot_dyn.foreign import call
+from robot_dyn.errors import ControlError, EffectError, OverflowedError, QueryError, call, shown
 from robot_dyn.simulation.setup.size import MOST_CUT
 from robot_dyn.validate import returned
 
