@@ -171,7 +171,7 @@ def with_values(part: Any, values: Mapping[str, Any]) -> Any:
         return part
     made, inside = copy(part), _by_head(values)
     if declared(type(part)).keys() & values.keys():
-        for name in cached(made):  # it may follow from them
+        for name in cached_properties(made):  # it may follow from them
             del vars(made)[name]
     for name, value in values.items():
         if "." not in name:
@@ -181,7 +181,7 @@ def with_values(part: Any, values: Mapping[str, Any]) -> Any:
     return made
 
 
-def cached(part: Any) -> tuple[str, ...]:
+def cached_properties(part: Any) -> tuple[str, ...]:
     """Names of its cached properties that are known."""
     known, kind = getattr(part, "__dict__", ()), type(part)
     return tuple(name for name in known if isinstance(getattr_static(kind, name, None), cached_property))

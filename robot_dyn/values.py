@@ -1,4 +1,4 @@
-"""Values that hold arrays, read-only in copies too; and values whose parts are computed when they are read."""
+"""Values that hold arrays, read-only in copies too; values whose parts are computed when read; aligned arrays."""
 
 from __future__ import annotations
 
@@ -32,34 +32,34 @@ class Value:
                 array.setflags(write=False)
 
 
-class Keeping:
-    """An immutable value that keeps what functions compute from it."""
+class Caching:
+    """An immutable value that caches what functions compute from it."""
 
     @cached_property
-    def known(self) -> dict[Any, Any]:
-        """What was computed, by the functions."""
+    def computed(self) -> dict[Any, Any]:
+        """The cached results, by function."""
         return {}
 
 
-def kept(value: Keeping, compute: Callable[[Any], Result]) -> Result:
-    """What a function of the value alone returns; it is called once."""
-    if compute not in value.known:
-        value.known[compute] = compute(value)
-    return value.known[compute]
+def cached(value: Caching, compute: Callable[[Any], Result]) -> Result:
+    """The result of a function of the value alone, which is called once."""
+    if compute not in value.computed:
+        value.computed[compute] = compute(value)
+    return value.computed[compute]
 
 
 class Derived(Value):
-    """A frozen dataclass that may be made from a source: each field is read from it when it is first asked for.
+    """A frozen dataclass that may be built from a source: each field is read from it at its first use.
 
     A field that may be read later has no default but by a factory: a default of the class would hide it.
     """
 
-    if not TYPE_CHECKING:  # what is no field is an error to a type checker
+    if not TYPE_CHECKING:  # so that a type checker reports names that are not fields
 
         def __getattr__(self, name: str) -> Any:
             held = vars(self)
-            if name in self.__dataclass_fields__ and (known := held.get("_source")) is not None:
-                source, lock = known
+            if name in self.__dataclass_fields__ and (stored := held.get("_source")) is not None:
+                source, lock = stored
                 with lock:
                     if name not in held:
                         held[name] = _frozen(getattr(source, name))
@@ -79,17 +79,17 @@ class Derived(Value):
 
 
 def derived(of: type[Late], source: Any, **known: Any) -> Late:
-    """One whose fields are the attributes of the same name of a source, but for those that are given."""
-    made = object.__new__(of)
-    vars(made).update({name: _frozen(x) for name, x in known.items()}, _source=(source, RLock()))
-    return made
+    """A value whose fields are the attributes of the same names of a source, except for those that are given."""
+    value = object.__new__(of)
+    vars(value).update({name: _frozen(x) for name, x in known.items()}, _source=(source, RLock()))
+    return value
 
 
 def copied(x: Any) -> Any:
-    """A value of arrays in tuples, with arrays of its own."""
+    """A copy of arrays in tuples."""
     if isinstance(x, tuple):
-        made = [copied(each) for each in x]
-        return type(x)(*made) if hasattr(x, "_fields") else tuple(made)
+        copies = [copied(each) for each in x]
+        return type(x)(*copies) if hasattr(x, "_fields") else tuple(copies)
     return x.copy() if isinstance(x, np.ndarray) else x
 
 

@@ -36,7 +36,7 @@ from robot_dyn.simulation.setup.options import Options, setup_of, starts, takes_
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.setup.size import check_record
 from robot_dyn.validate import function
-from robot_dyn.values import derived, kept
+from robot_dyn.values import cached, derived
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
@@ -150,9 +150,9 @@ def _by_choice(setup: Setup, on_progress: Callable[[float], object] | None) -> _
         except TooLongError as found:
             seen = found.evaluations
         except StiffError as found:
-            setup, chooses, said = kept(setup, _stiff), False, (found.remark,)
+            setup, chooses, said = cached(setup, _stiff), False, (found.remark,)
         except AccumulationError as found:
-            setup, chooses, said = kept(setup, _nonsmooth), False, (*said, found.remark)
+            setup, chooses, said = cached(setup, _nonsmooth), False, (*said, found.remark)
 
 
 def _stiff(setup: Setup) -> Setup:
@@ -165,9 +165,9 @@ def _nonsmooth(setup: Setup) -> Setup:
 
 def _chosen(setup: Setup, seen: float) -> tuple[CompiledStateEquation | None, str]:
     """As of `choose`, which chooses machine code once; that of events is compared with them before each run."""
-    found = setup.known.get(choose) or choose(setup, setup.equation, seen)
+    found = setup.computed.get(choose) or choose(setup, setup.equation, seen)
     if found[0] is not None and not setup.events:
-        setup.known[choose] = found
+        setup.computed[choose] = found
     return found
 
 

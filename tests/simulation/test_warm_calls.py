@@ -328,7 +328,7 @@ def test_what_was_not_read_is_copied_pickled_and_saved_with_the_run(name: str, t
 def test_a_setup_that_has_run_is_copied_and_pickled_without_what_is_kept_with_it() -> None:
     setup = setups()["computed torque"]
     run = rd.simulate(setup)
-    assert setup.known
+    assert setup.computed
     for made in (copy, deepcopy, lambda each: pickle.loads(pickle.dumps(each)), replace):
         other = made(setup)
         assert vars(other).keys() <= {each.name for each in fields(setup)} | {"undeclared", "is_value", "equation"}

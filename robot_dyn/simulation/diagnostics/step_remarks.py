@@ -20,7 +20,7 @@ from robot_dyn.simulation.observation.observation import Observation, Observed, 
 from robot_dyn.simulation.observation.observer import Observer
 from robot_dyn.simulation.observation.remarks import Kind, Remark
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.values import copied, kept
+from robot_dyn.values import cached, copied
 
 Units = list[tuple[str, str, str]]  # of q, v and u of each joint
 QUANTITIES = ("q", "v", "u")
@@ -33,7 +33,7 @@ def observer_of(setup: Setup, of: GuardLevels | None = None) -> Observer:
     """An observer of a run that has not begun, for its levels unless others are given."""
     if of is not None:
         return Observer(_observation(setup, of), of, setup.equation.canonical)
-    of, start = kept(setup, _beginning)
+    of, start = cached(setup, _beginning)
     return Observer(copied(start), of, setup.equation.canonical)
 
 

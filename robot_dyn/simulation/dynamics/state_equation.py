@@ -24,7 +24,7 @@ from robot_dyn.effects.plant import Plant, carrying, in_mode
 from robot_dyn.effects.set_valued import Mode
 from robot_dyn.errors import RobotDynError, call
 from robot_dyn.queries.dynamics import acceleration
-from robot_dyn.values import Keeping
+from robot_dyn.values import Caching
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.setup.event import Event
@@ -36,7 +36,7 @@ CONTROLLER = -1  # among the parts that switch, beside the numbers of the effect
 
 @final
 @dataclass(frozen=True)
-class StateEquation(Keeping):
+class StateEquation(Caching):
     """The state equation of a plant under a controller.
 
     Attributes:

@@ -41,7 +41,7 @@ from robot_dyn.simulation.setup.schedule import nodes
 from robot_dyn.simulation.setup.segment_table import segment_table
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.setup.size import samples as most_samples
-from robot_dyn.values import copied, kept
+from robot_dyn.values import cached, copied
 
 _SAMPLES = 1000  # of a run without a record period
 _COMPARED = 1000  # times at which a run is compared with runs of other tolerances
@@ -113,7 +113,7 @@ class EventRun(SwitchedRun):
             modes = modes_of(equation, run_parameters.copy(), places, _ACCUMULATED, _BRIEF * setup.duration_s)
             modes.start(self.start)
         alone = thresholds and modes is None and not transfers.any
-        self.switching = kept(setup, _switching) if alone else Switching(equation, modes=modes)
+        self.switching = cached(setup, _switching) if alone else Switching(equation, modes=modes)
         if not thresholds:
             self.switching = Switching(equation, self.switching.quantities, modes)
         self.runs = runs_of(equation, self.start[:, None], run_parameters, m + n + 2)
@@ -122,7 +122,7 @@ class EventRun(SwitchedRun):
         self.advance = machine_code or event_loop(
             of.begin, of.step, of.error, of.accept, of.dense, without_modes if modes is None else end_mode
         )
-        self.rules = kept(setup, rules_alone)
+        self.rules = cached(setup, rules_alone)
         self.times = _times(setup, mesh, samples)
         compared = self.times.compared
         S, rows = len(self.table.counts), int(most_samples(setup)) + 2 if samples else 0
@@ -134,7 +134,7 @@ class EventRun(SwitchedRun):
         )  # fmt: skip
         events, degree = self.functions.events if self.compiled else self.switching.function, len(of.work.F)
         if alone and not setup.events:
-            known = copied(kept(setup, _switches))
+            known = copied(cached(setup, _switches))
             self.switches = known._replace(functions=events, b=np.zeros(degree + 1), stack=room(degree))
         else:
             self.switches = self.switching.at(0.0, self.start, degree, events, run_parameters[:n, 0] if held else None)
@@ -286,7 +286,7 @@ def _switches(setup: Setup) -> Switches:
     """Its switching functions at the start, if no event is asked for."""
     equation = setup.equation
     held = np.full(equation.plant.dynamics.n, np.nan) if equation.sampled else None
-    return kept(setup, _switching).at(0.0, equation.start(setup.q0, setup.v0), 0, None, held)
+    return cached(setup, _switching).at(0.0, equation.start(setup.q0, setup.v0), 0, None, held)
 
 
 def _method(setup: Setup, equation: StateEquation) -> tuple[ControlledStepper, np.ndarray]:

@@ -30,7 +30,7 @@ from robot_dyn.simulation.run.watch import LARGEST, DivergedError, Watch, one_st
 from robot_dyn.simulation.setup.schedule import ON_STEP, paced
 from robot_dyn.simulation.setup.segment_table import segment_table
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.values import aligned, kept
+from robot_dyn.values import aligned, cached
 
 _NEEDS_REVIEW = 1e6  # of Σ |y| in machine code, which does not see that M becomes singular
 
@@ -78,7 +78,7 @@ class FixedStep(Driver):
         self.advance = machine_code or time_loop(self.stepper.step)
         every, thin = self._shared(pace)
         largest = _NEEDS_REVIEW if self.compiled else LARGEST
-        self.rules = kept(setup, rules_alone)._replace(largest=largest, every=every, thin=thin)
+        self.rules = cached(setup, rules_alone)._replace(largest=largest, every=every, thin=thin)
         rows = samples_at_most(setup, self.table.counts) if pace == 1 else 1
         states = int((-(-self.table.counts // every)).sum()) // thin + 2
         shown = (np.empty((1 + 3 * n, 0)), NOTHING) if observer is None else (observer.columns, observer.observation)

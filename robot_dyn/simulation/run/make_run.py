@@ -90,7 +90,7 @@ def prepared(
 
 def _numbers(compiled_equation: CompiledStateEquation, equation: StateEquation) -> np.ndarray:
     """The parameters of machine code for an equation of other numbers, which keeps those of the latest machine."""
-    latest = equation.known.get(_numbers)
+    latest = equation.computed.get(_numbers)
     if latest is None or latest[0] is not compiled_equation:
-        latest = equation.known[_numbers] = compiled_equation, compiled_equation.of(equation)
+        latest = equation.computed[_numbers] = compiled_equation, compiled_equation.of(equation)
     return latest[1]

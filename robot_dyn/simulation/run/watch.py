@@ -14,7 +14,7 @@ from robot_dyn.simulation.dynamics.fastest_motion import fastest
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.events.payload_events import PayloadEvents
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.values import kept
+from robot_dyn.values import cached
 
 LARGEST = 1e100  # of Σ |y|: beyond it products overflow
 _PACED = 2000  # steps between looks at the pace of an adaptive method
@@ -59,7 +59,7 @@ class Watch:
 
     def __init__(self, setup: Setup, equation: StateEquation) -> None:
         self.setup, self.equation = setup, equation
-        K, V = kept(setup, _start)
+        K, V = cached(setup, _start)
         self.energy, self.scale = K + V, 1.0 + abs(K) + abs(V)
         self.paced, self.looked = 0.0, 0  # time and steps at the last look at the pace
 

@@ -16,7 +16,7 @@ from robot_dyn.control.controller import Controller
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.simulation.setup.schedule import paced
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.values import kept
+from robot_dyn.values import cached
 
 _MOST_KEPT = 1000  # segments: to compute more of them takes little of the time of their run, and to keep them memory
 BOUNDS = 2  # numbers of p before the reference: time is kept between them, so that switches act as between them
@@ -46,7 +46,7 @@ def segment_table(setup: Setup, pace: Fraction = Fraction(1)) -> SegmentTable:
     """The segments of a setup, with steps `pace` times as long, and its end, for one run, which changes it."""
     if pace != 1 or len(setup.segments) > _MOST_KEPT:
         return _plan(setup, pace)
-    plan = kept(setup, _plan)
+    plan = cached(setup, _plan)
     return plan._replace(ticks=plan.ticks.copy(), transfers=plan.transfers.copy())
 
 

@@ -24,7 +24,7 @@ from robot_dyn.simulation.setup.event import Event
 from robot_dyn.simulation.setup.schedule import LEAST_STEPS, ON_STEP, Segment, cuts, near, nodes, steps_on
 from robot_dyn.simulation.setup.size import MOST_CUT, check_segments
 from robot_dyn.validate import choice, duration, instance, integer, one_state, truth
-from robot_dyn.values import Keeping, Value
+from robot_dyn.values import Caching, Value
 
 ENGINES = ("auto", "interpreted", "compiled")
 STEP_S = 1e-3  # of a method of fixed step, unless given
@@ -33,7 +33,7 @@ _LONGEST_STEP_S, _LEAST_STEPS = 0.01, 200  # where a part does not declare where
 
 @final
 @dataclass(frozen=True, eq=False)
-class Setup(Value, Keeping):
+class Setup(Value, Caching):
     """All that a run depends on; what follows from it alone is computed once and kept with it, and not copied.
 
     Attributes:
