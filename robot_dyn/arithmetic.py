@@ -1,6 +1,6 @@
 """The numbers the equations run in: float32, float64, longdouble, or balls with a proven radius.
 
-Every formulation is written once with NumPy's operators; an `Arithmetic` makes its own numbers of the literals a file
+Every formulation is written once with NumPy's operators; an `Arithmetic` converts the literals that a file
 states, and the functions below hide what NumPy does not do for every kind of number. A ball is an interval
 midpoint ± radius that is certain to hold the exact value [Johansson, Arb, 2017].
 """

@@ -20,7 +20,7 @@ from typing import Any, BinaryIO, final
 from robot_dyn.errors import RobotDynError, shown
 
 _NEW_S = 10.0  # a younger file may be open and not yet locked
-# Locks tell a file that is being written from an abandoned one. Windows, where no open file can be removed, needs none.
+# Locks distinguish a file that is being written from an abandoned one; Windows cannot remove open files, so needs none.
 _locks: Any = import_module("fcntl") if os.name == "posix" else None
 # Opening a pipe would wait for its writer; Windows has no O_NONBLOCK, POSIX no O_BINARY.
 _READ = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
@@ -70,7 +70,7 @@ def target(
 def _check(path: Path, real: Path, kind: Kind, error: type[RobotDynError], inputs: Iterable[str | Path]) -> None:
     """That nothing but a file of its kind is replaced, and that there can be one."""
     if not real.parent.is_dir():
-        raise error(f"{path}: there is no folder {real.parent}; make it first, or give another path")
+        raise error(f"{path}: there is no folder {real.parent}; create it first, or give another path")
     if real.is_symlink():
         raise error(f"{path}: is a link to itself; remove it, or give another path")
     for other in map(Path, inputs):
@@ -177,7 +177,7 @@ def _synchronise(folder: Path) -> None:
 
 @contextmanager
 def reading(path: str | Path, error: type[RobotDynError], remedy: str) -> Iterator[BinaryIO]:
-    """A regular file, open for reading; a device, pipe or folder is refused at once.
+    """A regular file, open for reading; a device, pipe or folder is refused.
 
     Raises:
         RobotDynError: Of the kind `error`, with the remedy, if it cannot be read.
@@ -232,5 +232,5 @@ def file_path(value: Any, error: type[RobotDynError]) -> Path:
 
 
 def why(cause: Exception) -> str:
-    """What the system says of an error."""
+    """The system's message of an error."""
     return getattr(cause, "strerror", None) or str(cause)

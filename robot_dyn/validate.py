@@ -43,7 +43,7 @@ def real(values: Any) -> np.ndarray:
         raise ValueError("a number too large for a float") from None
     except (MemoryError, KeyboardInterrupt):
         raise
-    except Exception:  # a ragged list, or whatever an object's own conversion raises
+    except Exception:  # a ragged list, or whatever an object's conversion raises
         raise ValueError(shown(values)) from None
     if array.dtype.kind not in "fiu":
         raise ValueError(shown(values))

@@ -114,9 +114,9 @@ class Evaluation:
         return equation
 
     def _answered(self, quantity: str, errors: str, equation: Callable[..., ndarray], state: tuple[Array, ...]) -> Any:
-        names, asked = self._mechanism.joint_names, ALL[quantity]
-        arrays = {name: shaped(name, x, names) for name, x in zip(asked.arguments, state, strict=True)}
-        answer = answered(equation, arrays, asked.shape(self._mechanism.sizes), names, errors)
+        names, requested = self._mechanism.joint_names, ALL[quantity]
+        arrays = {name: shaped(name, x, names) for name, x in zip(requested.arguments, state, strict=True)}
+        answer = answered(equation, arrays, requested.shape(self._mechanism.sizes), names, errors)
         return answer if answer.ndim else float(answer)
 
 

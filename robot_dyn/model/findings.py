@@ -1,6 +1,6 @@
 """Findings about a robot description that loads: what is doubtful in it, and the remedy, one sentence each.
 
-A refusal (`urdf.py`) is for what has no meaning; a finding is for what has one that is hardly meant. Criteria and
+A refusal (`urdf.py`) is for what has no meaning; a finding is for what has one that is hardly intended. Criteria and
 reasons are in docs/findings.md. Each function yields the findings of one kind.
 """
 

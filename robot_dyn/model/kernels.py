@@ -1,4 +1,4 @@
-"""Kernels: calls of Pinocchio for one state of all joints. M, N and inverse and forward dynamics are its own functions.
+"""Kernels: calls of Pinocchio for one state of all joints that need a line of their own.
 
 A kernel takes (model, data, q, …) and returns a fresh array, or a number; `data` is Pinocchio's working memory.
 """

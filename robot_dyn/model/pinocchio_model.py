@@ -60,7 +60,7 @@ def _state(robot: Any, edits: Edits) -> None:
     known = [name for name, inertial in links.items() if inertial is not None]
     for what, names in (("masses", dict(edits.masses)), ("inertias", dict(edits.inertias))):
         for name in names.keys() - set(known):
-            raise EditError(f"{what}: no link {name!r} of which the file states a mass; {nearest(name, known)}")
+            raise EditError(f"{what}: no link {name!r} with a mass in the file; {nearest(name, known)}")
     for name, mass in edits.masses:
         links[name].find("mass").set("value", repr(float(mass)))
     for name, inertia in edits.inertias:
@@ -69,7 +69,7 @@ def _state(robot: Any, edits: Edits) -> None:
 
 
 def _unmark(model: Any) -> None:
-    """Give the joints their own names again."""
+    """Restore the names of the joints."""
     for i, name in enumerate(model.names):
         model.names[i] = name.removeprefix(_MARK)
     for frame in model.frames:

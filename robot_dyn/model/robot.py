@@ -194,9 +194,9 @@ class Robot(Dynamics, Parametrised):
     def from_pinocchio(model: Any) -> Robot:
         """A robot of a `pinocchio.Model` that was built elsewhere, with its gravity and armature; warns as `load` does.
 
-        A URDF is written of it and read as any other (`model/from_pinocchio.py`), so that `Lagrangian` and `Compiled`
-        take it too; the model itself is neither kept nor changed. An unbounded joint becomes one angle. Where branches
-        come in another order than in the model, a warning says so.
+        It is written as a URDF and read as any other (`model/from_pinocchio.py`), so that `Lagrangian` and `Compiled`
+        take it too; the model is neither stored nor changed. An unbounded joint becomes one angle. Where branches come
+        in another order than in the model, a warning says so.
 
         Raises:
             DescriptionError: If it is not a `pinocchio.Model`, or has joints that are not revolute or prismatic.
@@ -255,9 +255,9 @@ class Robot(Dynamics, Parametrised):
     def warn_below(self, digits: float | None) -> Robot:
         """A robot whose queries warn where their answers have fewer digits, as `digits` counts them.
 
-        Of M, C, N, inverse and forward dynamics. An estimate, 8 n u κ of the terms, is made first; digits are counted
-        only where it is below, and of up to 64 joints. Takes milliseconds a state, and does not reach machine code made
-        of the robot. A robot is loaded with 8 digits if M is nearly singular at a configuration without symmetries.
+        Of M, C, N, inverse and forward dynamics. Digits are counted only where an estimate, 8 n u κ of
+        the terms, is below, and for up to 64 joints. Takes milliseconds a state; machine code of the robot does not
+        warn. A robot is loaded with 8 digits if M is nearly singular at a configuration without symmetries.
 
         Args:
             digits: From above 0 to 20; None for no warnings, and no cost.
