@@ -108,7 +108,7 @@ def test_digits_that_a_lever_of_1000_km_costs_are_seen() -> None:
     x = state(robot)
     assert robot.digits("forward_dynamics", x["q"], x["v"], x["tau"]) < 11
     assert robot.digits("M", x["q"]) > 14
-    with pytest.warns(rd.PrecisionWarning, match=r"^forward_dynamics of far has 10\.\d digits, fewer than 13; ask rd"):
+    with pytest.warns(rd.PrecisionWarning, match=r"^forward_dynamics of far has 10\.\d digits, fewer than 13; use rd"):
         robot.warn_below(13).forward_dynamics(x["q"], x["v"], x["tau"])
 
 
