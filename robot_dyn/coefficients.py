@@ -169,26 +169,26 @@ def with_values(part: Any, values: Mapping[str, Any]) -> Any:
     """
     if not values:
         return part
-    made, inside = copy(part), _by_head(values)
+    changed, inside = copy(part), _by_head(values)
     if declared(type(part)).keys() & values.keys():
-        for name in cached(made):  # it may follow from them
-            del vars(made)[name]
+        for name in cached_properties(changed):  # it may follow from them
+            del vars(changed)[name]
     for name, value in values.items():
         if "." not in name:
-            object.__setattr__(made, name, value)
+            object.__setattr__(changed, name, value)
     for head, below in inside.items():
-        object.__setattr__(made, head, _within(getattr(made, head), below, with_values))
-    return made
+        object.__setattr__(changed, head, _within(getattr(changed, head), below, with_values))
+    return changed
 
 
-def cached(part: Any) -> tuple[str, ...]:
-    """Names of its cached properties that are known."""
+def cached_properties(part: Any) -> tuple[str, ...]:
+    """Names of its cached properties that were read."""
     known, kind = getattr(part, "__dict__", ()), type(part)
     return tuple(name for name in known if isinstance(getattr_static(kind, name, None), cached_property))
 
 
 def rebuilt(part: Any, values: Mapping[str, Any]) -> Any:
-    """The same, made anew, so that its own checks refuse what has no meaning."""
+    """A copy of a part with other coefficients, built so that its checks apply."""
     inside = {head: _within(getattr(part, head), below, rebuilt) for head, below in _by_head(values).items()}
     return replace(part, **{name: value for name, value in values.items() if "." not in name}, **inside)
 
@@ -202,12 +202,12 @@ def value_at(part: Any, path: str) -> Any:
 
 def _by_head(values: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """Of values by path, those inside a part: by its attribute, then by the rest of the path."""
-    made: dict[str, dict[str, Any]] = {}
+    parts: dict[str, dict[str, Any]] = {}
     for name, value in values.items():
         head, _, rest = name.partition(".")
         if rest:
-            made.setdefault(head, {})[rest] = value
-    return made
+            parts.setdefault(head, {})[rest] = value
+    return parts
 
 
 def _within(part: Any, values: dict[str, Any], change: Callable[[Any, Mapping[str, Any]], Any]) -> Any:

@@ -1,10 +1,14 @@
-"""Errors a user can act on: each message says what, where, the value and the remedy."""
+"""Errors a user can act on: each message says what, where, the value and the remedy; and calls of user-written code."""
 
 from __future__ import annotations
 
+import sys
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from difflib import get_close_matches
+from pathlib import Path
+from traceback import walk_tb
+from typing import Any
 from unicodedata import category
 
 
@@ -12,8 +16,8 @@ def escaped(text: str) -> str:
     r"""The text in one line, its control and invisible characters written as Python writes them: \x1b, \n, \u202e."""
     if text.isprintable():
         return text
-    kept = (each if each.isprintable() or category(each) == "Zs" else repr(each)[1:-1] for each in text)
-    return "".join(kept)
+    visible = (each if each.isprintable() or category(each) == "Zs" else repr(each)[1:-1] for each in text)
+    return "".join(visible)
 
 
 class RobotDynError(Exception):
@@ -38,7 +42,7 @@ class DescriptionError(RobotDynError):
 
 
 class EditError(RobotDynError):
-    """An edit of a robot (lock, payload, armature, gravity) that cannot be made."""
+    """An edit of a robot (lock, payload, armature, gravity) that cannot be applied."""
 
 
 class TraceError(RobotDynError):
@@ -54,7 +58,7 @@ class ControlError(RobotDynError):
 
 
 class ProofError(RobotDynError):
-    """A run of which no theorem can be proven: a part of it switches, or is not known to be analytic."""
+    """A run for which no theorem can be proven: a part of it switches, or is not known to be analytic."""
 
 
 class EffectError(RobotDynError):
@@ -113,7 +117,7 @@ class ModelWarning(RobotDynWarning):
 
 
 class PrecisionWarning(RobotDynWarning):
-    """An answer with fewer digits than asked for by `Robot.warn_below`."""
+    """An answer with fewer digits than requested by `Robot.warn_below`."""
 
 
 def announce(robot: str, findings: Sequence[str]) -> None:
@@ -137,7 +141,7 @@ def shown(value: object) -> str:
     """A value in a message."""
     try:
         return shorten(repr(value))
-    except Exception:  # an int of many digits, or whatever an object's own repr raises
+    except Exception:  # an int of many digits, or whatever an object's repr raises
         return f"a value of type {type(value).__name__}"
 
 
@@ -151,3 +155,52 @@ def nearest(name: str, names: Iterable[str]) -> str:
         return "there are none"
     more = "" if close or len(names) == len(shown) else f", … ({len(names)} in all)"
     return ("nearest: " if close else "known: ") + ", ".join(shown) + more
+
+
+# --- user-written code
+
+_NOT_USER_CODE = {"robot_dyn", "numpy", "scipy", "casadi", *sys.stdlib_module_names}
+
+
+def call(method: Callable[..., Any], *arguments: Any) -> Any:
+    """What a method of an effect or controller returns.
+
+    An exception of its code passes as it is, with a note of the part's name; errors of the library name it themselves.
+    """
+    try:
+        return method(*arguments)
+    except RobotDynError:
+        raise
+    except Exception as error:
+        part: Any = getattr(method, "__self__", None)
+        of = "" if part is None else f" of {getattr(part, 'name', type(part).__name__)}"  # None: a plain function
+        error.add_note(f"in {getattr(method, '__name__', 'a method')}{of}")
+        raise
+
+
+def users_line(error: BaseException) -> str:
+    """The innermost line of a user's code on the way to an exception, "line 12 of arm.py"; empty without one."""
+    found = ""
+    for frame, line in walk_tb(error.__traceback__):
+        if str(frame.f_globals.get("__name__", "")).partition(".")[0] not in _NOT_USER_CODE:
+            found = f"line {line} of {Path(frame.f_code.co_filename).name}"
+    return found
+
+
+def is_mistake(error: RobotDynError) -> bool:
+    """Whether user-written code gave the library an invalid argument, such as one of a wrong shape.
+
+    So does a step that cannot be machine code, or fails as such. Other errors of the library, raised or met there, are
+    outcomes of a run: numbers that overflow, a singular M.
+    """
+    if isinstance(error, TraceError | MachineCodeError):
+        return True
+    refused = isinstance(error, QueryError) and not isinstance(error, NotFiniteError | OverflowedError)
+    return refused and bool(users_line(error))
+
+
+def because(error: BaseException) -> str:
+    """The message of an exception, with the line of a user's code that raised it."""
+    line = users_line(error)
+    message = str(error) if isinstance(error, RobotDynError) else f"{type(error).__name__}: {error}"
+    return f"{line}: {message}" if line else str(error)

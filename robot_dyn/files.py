@@ -1,4 +1,4 @@
-"""Files written whole or not at all, and only over files of their kind.
+"""Files: read if regular and within bounds; written whole or not at all, and only over files of their kind.
 
 A file is written beside its target, synchronised and renamed: a reader, or a machine that loses its power, sees the old
 file or the new one. Links are written through, permissions are kept, and what writers that were killed left is removed.
@@ -13,16 +13,17 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from stat import S_IMODE
+from stat import S_IMODE, S_ISDIR, S_ISREG
 from time import time
 from typing import Any, BinaryIO, final
 
-from robot_dyn.errors import RobotDynError
-from robot_dyn.reading import READ, file_path, read_start, why
+from robot_dyn.errors import RobotDynError, shown
 
 _NEW_S = 10.0  # a younger file may be open and not yet locked
-# Locks tell a file that is being written from an abandoned one. Windows, where no open file can be removed, needs none.
+# Locks distinguish a file that is being written from an abandoned one; Windows cannot remove open files, so needs none.
 _locks: Any = import_module("fcntl") if os.name == "posix" else None
+# Opening a pipe would wait for its writer; Windows has no O_NONBLOCK, POSIX no O_BINARY.
+_READ = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
 _NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
 
 
@@ -69,7 +70,7 @@ def target(
 def _check(path: Path, real: Path, kind: Kind, error: type[RobotDynError], inputs: Iterable[str | Path]) -> None:
     """That nothing but a file of its kind is replaced, and that there can be one."""
     if not real.parent.is_dir():
-        raise error(f"{path}: there is no folder {real.parent}; make it first, or give another path")
+        raise error(f"{path}: there is no folder {real.parent}; create it first, or give another path")
     if real.is_symlink():
         raise error(f"{path}: is a link to itself; remove it, or give another path")
     for other in map(Path, inputs):
@@ -152,7 +153,7 @@ def _remove_abandoned(real: Path) -> None:
         with suppress(OSError):  # locked, removed meanwhile, or another user's
             if time() - each.lstat().st_mtime < _NEW_S:
                 continue
-            handle = os.open(each, READ)
+            handle = os.open(each, _READ)
             try:
                 _lock(handle, only_if_free=True)
                 each.unlink()
@@ -172,3 +173,64 @@ def _synchronise(folder: Path) -> None:
             os.fsync(handle)
         finally:
             os.close(handle)
+
+
+@contextmanager
+def reading(path: str | Path, error: type[RobotDynError], remedy: str) -> Iterator[BinaryIO]:
+    """A regular file, open for reading; a device, pipe or folder is refused.
+
+    Raises:
+        RobotDynError: Of the kind `error`, with the remedy, if it cannot be read.
+    """
+    with _opened(path, error, remedy) as stream:
+        yield stream
+
+
+def read(path: str | Path, most: int, error: type[RobotDynError], remedy: str) -> bytes:
+    """The bytes of a regular file of at most `most`; errors as of `reading`."""
+    data = read_start(path, most + 1, error, remedy)
+    if len(data) > most:
+        raise error(f"{path}: is larger than {most / 2**20:.3g} MiB; {remedy}")
+    return data
+
+
+def read_start(path: str | Path, count: int, error: type[RobotDynError], remedy: str) -> bytes:
+    """The first bytes of a regular file, all if it has fewer; errors as of `reading`."""
+    with reading(path, error, remedy) as stream:
+        try:
+            return stream.read(count)
+        except OSError as cause:
+            raise error(f"{path}: cannot be read ({why(cause)}); {remedy}") from None
+
+
+def _opened(path: str | Path, error: type[RobotDynError], remedy: str) -> BinaryIO:
+    path = file_path(path, error)
+    try:
+        _refuse_irregular(path, path.stat().st_mode, error, remedy)
+        handle = os.open(path, _READ)
+        stream = os.fdopen(handle, "rb")
+        _refuse_irregular(path, os.fstat(handle).st_mode, error, remedy)  # it may be another by now
+        return stream
+    except FileNotFoundError:
+        raise error(f"{path}: there is no such file; {remedy}") from None
+    except MemoryError:
+        raise error(f"{path}: cannot be read (not enough memory); free some, or {remedy}") from None
+    except (OSError, ValueError, TypeError) as cause:
+        raise error(f"{path}: cannot be read ({why(cause)}); {remedy}") from None
+
+
+def _refuse_irregular(path: Path, mode: int, error: type[RobotDynError], remedy: str) -> None:
+    if not S_ISREG(mode):
+        raise error(f"{path}: is {'a folder' if S_ISDIR(mode) else 'not a regular file'}; {remedy}")
+
+
+def file_path(value: Any, error: type[RobotDynError]) -> Path:
+    """The path of a file."""
+    if not isinstance(value, str | os.PathLike):
+        raise error(f"path: give the path of a file, got {shown(value)}")
+    return Path(value)
+
+
+def why(cause: Exception) -> str:
+    """The system's message of an error."""
+    return getattr(cause, "strerror", None) or str(cause)

@@ -1,4 +1,4 @@
-"""Saturation: what is asked for is cut at ±u_max; in three pieces, each smooth.
+"""Saturation: what is requested is cut at ±u_max; in three pieces, each smooth.
 
     sat(u) = c + min(max(u − c, −l), l)
 

@@ -43,7 +43,7 @@ def real(values: Any) -> np.ndarray:
         raise ValueError("a number too large for a float") from None
     except (MemoryError, KeyboardInterrupt):
         raise
-    except Exception:  # a ragged list, or whatever an object's own conversion raises
+    except Exception:  # a ragged list, or whatever an object's conversion raises
         raise ValueError(shown(values)) from None
     if array.dtype.kind not in "fiu":
         raise ValueError(shown(values))
@@ -109,10 +109,10 @@ def _bound(above: float | None, least: float | None) -> str:
     return "not be negative" if least == 0 else f"be at least {least:g}"
 
 
-def _fits(shape: tuple[int, ...], wanted: Shape) -> bool:
-    if len(shape) != len(wanted):
+def _fits(shape: tuple[int, ...], expected: Shape) -> bool:
+    if len(shape) != len(expected):
         return False
-    return all(a > 0 if isinstance(b, str) else a == b for a, b in zip(shape, wanted, strict=True))
+    return all(a > 0 if isinstance(b, str) else a == b for a, b in zip(shape, expected, strict=True))
 
 
 def number(
@@ -131,7 +131,7 @@ def number(
 
 
 def duration(what: str, value: Any, *, zero: bool = False, error: Kind = QueryError) -> float:
-    """A time in [s] that a clock can tell, 1e-12 s or more; or 0, where that has a meaning."""
+    """A time in [s], 1e-12 s or more; or 0, where that has a meaning."""
     seconds = number(what, value, error=error)
     if not (seconds >= 1e-12 or (zero and seconds == 0)):
         least = "1e-12 at least, or 0" if zero else "1e-12 at least"
@@ -221,13 +221,13 @@ def converted(what: str, array: Any, joint_names: Sequence[str], arithmetic: Any
 
 
 def _check_rounding(what: str, exact: np.ndarray, rounded: np.ndarray, joint_names: Sequence[str]) -> None:
-    """Raise OverflowedError where numbers were rounded and the arithmetic does not tell them to LEAST_EXACT."""
+    """Raise OverflowedError where numbers were rounded and are not known to LEAST_EXACT in the arithmetic."""
     far = np.finfo(rounded.dtype).eps * np.abs(rounded) > LEAST_EXACT
     if far.any() and (lost := far & (exact.astype(np.longdouble) != rounded)).any():
         place = tuple(np.argwhere(lost)[0])
         joint = "" if what == "t" else f" of joint {joint_names[place[-1]]!r}"
         raise OverflowedError(
-            f"{what}{joint} is so large that {rounded.dtype} does not tell it to {LEAST_EXACT:g} rad, m or s, got"
+            f"{what}{joint} is so large that {rounded.dtype} does not resolve {LEAST_EXACT:g} rad, m or s, got"
             f" {exact[place]}; take a smaller one, or numbers with more digits"
         )
 
@@ -248,20 +248,6 @@ def one_state(what: str, values: Any, joint_names: Sequence[str]) -> np.ndarray:
         raise QueryError(f"{what} must be one state of shape ({len(joint_names)},), got {array.shape}")
     array.setflags(write=False)
     return array
-
-
-def returned(what: str, values: Any, n: int, of: str = "joint", *, error: Kind) -> None:
-    """Raise the error unless a function returned n finite numbers, shape (n,); `what` is its name."""
-    try:
-        array = float64(values)
-        found = f"shape {array.shape}" if array.shape != (n,) else ""
-        if not (found or np.isfinite(array).all()):
-            found = str(array[~np.isfinite(array)][0])
-    except ValueError as problem:
-        found = str(problem)
-    if found:
-        count = f"{n} {of}{'s' if n > 1 else ''}"
-        raise error(f"{what} returned {found} for {count} at the start; it must be finite numbers of shape ({n},)")
 
 
 def check_batches(**arrays: Any) -> tuple[int, ...]:
@@ -295,20 +281,20 @@ def truth(what: str, value: Any, *, error: Kind = QueryError) -> bool:
 def choice(what: str, value: Any, known: Collection[str], *, error: Kind = QueryError) -> str:
     """One of the known names."""
     if not isinstance(value, str) or value not in known:
-        told = nearest(value if isinstance(value, str) else "", known)
-        raise error(f"no {what} {shown(value)}; {told}")
+        advice = nearest(value if isinstance(value, str) else "", known)
+        raise error(f"no {what} {shown(value)}; {advice}")
     return value
 
 
 def function(what: str, value: Any, arguments: str, *, error: Kind = QueryError) -> Any:
-    """A function, or None; `arguments` tells which it takes."""
+    """A function, or None; `arguments` names those that it takes."""
     if not (value is None or callable(value)):
         raise error(f"{what} must be a function of {arguments}, or None, got {shown(value)}")
     return value
 
 
 def instance(what: str, value: Any, kind: Any, remedy: str, *, error: Kind = QueryError) -> Any:
-    """An object of a kind; the remedy says how to make one."""
+    """An object of a kind; the remedy says how to get one."""
     if not isinstance(value, kind):
         raise error(f"{what}: {remedy}, got {shown(value)}")
     return value

@@ -1,4 +1,4 @@
-"""Values that hold arrays, read-only in copies too; values computed when they are read; caches."""
+"""Values that hold arrays, read-only in copies too; values computed when they are read; caches; aligned arrays."""
 
 from __future__ import annotations
 
@@ -6,10 +6,13 @@ import weakref
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from functools import cached_property
+from math import prod
 from threading import RLock
 from typing import TYPE_CHECKING, Any, TypeVar, final
 
 import numpy as np
+
+LINE = 64  # bytes of a cache line and of the widest vector: one that lies across two lines is two accesses
 
 Result = TypeVar("Result")
 Late = TypeVar("Late", bound="Derived")
@@ -111,17 +114,17 @@ class LRUByIdentity:
 
 
 class Derived(Value):
-    """A frozen dataclass that may be made from a source: each field is read from it when it is first asked for.
+    """A frozen dataclass that may be built from a source: each field is read from it at its first use.
 
     A field that may be read later has no default but by a factory: a default of the class would hide it.
     """
 
-    if not TYPE_CHECKING:  # what is no field is an error to a type checker
+    if not TYPE_CHECKING:  # so that a type checker reports names that are not fields
 
         def __getattr__(self, name: str) -> Any:
             held = vars(self)
-            if name in self.__dataclass_fields__ and (known := held.get("_source")) is not None:
-                source, lock = known
+            if name in self.__dataclass_fields__ and (stored := held.get("_source")) is not None:
+                source, lock = stored
                 with lock:
                     if name not in held:
                         held[name] = _frozen(getattr(source, name))
@@ -150,10 +153,10 @@ def derived(of: type[Late], source: Any, **known: Any) -> Late:
 
 
 def copied(x: Any) -> Any:
-    """A value of arrays in tuples, with arrays of its own."""
+    """A copy of arrays in tuples."""
     if isinstance(x, tuple):
-        made = [copied(each) for each in x]
-        return type(x)(*made) if hasattr(x, "_fields") else tuple(made)
+        copies = [copied(each) for each in x]
+        return type(x)(*copies) if hasattr(x, "_fields") else tuple(copies)
     return x.copy() if isinstance(x, np.ndarray) else x
 
 
@@ -194,3 +197,13 @@ class OnFirstUse(dict[str, Any]):
     def __missing__(self, name: str) -> Any:
         value = self[name] = self._compute(name)
         return value
+
+
+def aligned(shape: tuple[int, ...], dtype: Any = float) -> np.ndarray:
+    """An array of zeros in row-major order that begins at a cache line; of objects, at any address."""
+    if np.dtype(dtype).hasobject:
+        return np.zeros(shape, dtype)
+    size = prod(shape) * np.dtype(dtype).itemsize
+    room = np.zeros(size + LINE, np.uint8)
+    first = -room.__array_interface__["data"][0] % LINE
+    return room[first : first + size].view(dtype).reshape(shape)

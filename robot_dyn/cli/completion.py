@@ -8,7 +8,7 @@ from contextlib import suppress
 
 from robot_dyn.description.catalog import find, list_robots
 from robot_dyn.errors import RobotDynError
-from robot_dyn.reading import read_start
+from robot_dyn.files import read_start
 
 _READ = 2**22  # bytes of a URDF in which joints are sought
 _MOVES = re.compile(

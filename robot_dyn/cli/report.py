@@ -20,7 +20,7 @@ from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.model.gravity import gravity_acts, no_torque
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.quantity import PLANT, C, M
-from robot_dyn.queries.units import in_words, unit, units
+from robot_dyn.queries.units import coefficient_texts, unit, units
 from robot_dyn.simulation.dynamics.state_equation import numbered
 from robot_dyn.simulation.results.ledger import largest
 from robot_dyn.simulation.results.trajectory import Trajectory
@@ -96,7 +96,8 @@ def why(plant: Plant, answer: Document, joint: str) -> Document:
     ]
     torques = {name: 0.0 - torque[i] for name, torque in answer["effects"].items()}
     named = zip(_names(plant), plant.forces, strict=True)
-    numbers = {name: list(in_words(_at(force, i), answer["types"][i : i + 1]).values()) for name, force in named}
+    kind = answer["types"][i : i + 1]
+    numbers = {name: list(coefficient_texts(_at(force, i), kind).values()) for name, force in named}
     needed = sum(each["inertia"] + each["coriolis"] + each["gravity"] for each in shares) + sum(torques.values())
     at_rest = answer["tau"][i] - needed if v[i] == 0 and _holding(plant) else 0.0
     share = {"joint": joint, "tau": answer["tau"][i], "unit": unit("tau", answer["types"][i])}

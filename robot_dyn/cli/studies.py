@@ -7,7 +7,7 @@ from math import isfinite
 from typing import Any
 
 from robot_dyn.cli.terminal import table
-from robot_dyn.seconds import format_duration
+from robot_dyn.queries.units import format_duration
 from robot_dyn.studies.certificate.certificate import DECIMALS, Certificate, Held
 from robot_dyn.studies.costs.ab_comparison import ABComparison
 from robot_dyn.studies.costs.cost import Cost

@@ -20,7 +20,7 @@ import numpy as np
 
 from robot_dyn.control.reference import PiecewisePolynomial, hermite, increasing, numbers
 from robot_dyn.errors import ControlError, nearest, shorten
-from robot_dyn.reading import read
+from robot_dyn.files import read
 from robot_dyn.validate import instance
 
 MAX_BYTES = 2**28  # of a table

@@ -1,4 +1,4 @@
-"""Agreements: how far two values of one quantity differ on its scale, the worst kept with its entry and its state."""
+"""Agreements: how far two values of one quantity differ on its scale, the worst with its entry and its state."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from robot_dyn.result import UNREPORTED, reported
 @final
 @dataclass(frozen=True)
 class Agreement:
-    """How well Pinocchio and the own Lagrangian agree on one quantity, at the worst of all states and entries.
+    """How well Pinocchio and the library's Lagrangian agree on one quantity, at the worst of all states and entries.
 
     Attributes:
         quantity: Its name in the `Dynamics` protocol, or the identity that was checked.
         error: Difference on its scale.
         tolerance: What is allowed.
         entry: Joints or frame of the entry.
-        pinocchio, own: The two values; of the file, the number that both roads are given, and yourdfpy's.
+        pinocchio, own: The two values; of the file, the number that both implementations are given, and yourdfpy's.
         state: q, v, a, tau, by name; nothing for what stands in the file.
     """
 
@@ -76,7 +76,7 @@ class Comparison:
 
     @property
     def worst(self) -> Agreement:
-        """The quantity nearest to its tolerance, or farthest beyond it."""
+        """The quantity with the largest share of its tolerance."""
         return max(self.agreements, key=lambda agreement: agreement.share)
 
 
@@ -111,7 +111,7 @@ class Pair:
 
 
 def worst_by_quantity(agreements: Iterable[Agreement]) -> tuple[Agreement, ...]:
-    """Of each quantity the agreement nearest to its tolerance, or farthest beyond it."""
+    """Of each quantity the agreement with the largest share of its tolerance."""
     worst: dict[str, Agreement] = {}
     for each in agreements:
         known = worst.get(each.quantity)

@@ -4,8 +4,8 @@
 
 M_ij is held to √(M_ii M_jj), and forward dynamics to max(1e-12, 8 n u κ) of its terms M⁻¹τ, M⁻¹C v, M⁻¹N in the norm of
 M, or of the terms of τ, C v and N if these are more, with κ the condition number of M scaled to a unit diagonal. An
-entry that has no terms is held to the largest scale in its row and column. What both roads take from the file, its
-numbers, is compared with those that yourdfpy reads there (`second_reading`).
+entry that has no terms is held to the largest scale in its row and column. The numbers that both implementations take
+from the file are compared with those that yourdfpy reads there (`second_reading`).
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def compare(
     tolerance: float = TOLERANCE,
     on_sample: Callable[[], object] | None = None,
 ) -> Comparison:
-    """Cross-check a robot at random states within its joint limits, and the read of its file by yourdfpy's.
+    """Cross-check a robot at random states within its joint limits, and its file by the numbers that yourdfpy reads.
 
     Args:
         robot: The robot; its joints are matched by name.

@@ -1,8 +1,9 @@
-"""The second reading: a robot's file by yourdfpy, against the checked numbers that both roads are made of.
+"""The second reading: a robot's file by yourdfpy, against the checked numbers that both implementations use.
 
-Pinocchio and the own road take what the hardened read has written, so that a fault of that read is in both, where no
-comparison of M, C and N shows it. yourdfpy reads the bytes of the file. The two readings share the XML parser
-(libxml2) and `float`; nothing that looks for elements, attributes, defaults or names. [URDF: wiki.ros.org/urdf/XML]
+Pinocchio and the library's own implementation take what the hardened read has written, so that a fault of that read
+is in both, and no comparison of M, C and N shows it. yourdfpy reads the bytes of the file. The two readings share
+the XML parser (libxml2) and `float`; nothing that looks for elements, attributes, defaults or names.
+[URDF: wiki.ros.org/urdf/XML]
 """
 
 from __future__ import annotations
@@ -35,8 +36,8 @@ def second_reading(description: Description, tolerance: float) -> tuple[list[Pai
         robot = _by_yourdfpy(description.text)
         stated, elements = dict(_stated(robot)), set(_elements_stated(robot))
     except Exception as error:  # whatever yourdfpy raises
-        said = getattr(error, "msg", f"{type(error).__name__}: {error}")  # that of a syntax error, without its place
-        why = shorten(" ".join(str(said).split()), 200)
+        message = getattr(error, "msg", f"{type(error).__name__}: {error}")  # that of a syntax error, without its place
+        why = shorten(" ".join(str(message).split()), 200)
         return [], (f"the file is not read a second time: yourdfpy cannot read it ({why})",)
     taken, known = dict(_taken(description)), set(_elements_taken(description))
     pairs = [
@@ -116,7 +117,7 @@ def _limits(joint: Any) -> np.ndarray:
 
 
 def _taken(description: Description) -> Iterator[tuple[tuple[str, str], np.ndarray]]:
-    """The same numbers in the description, of which both roads are made."""
+    """The same numbers in the description, that both implementations use."""
     taken = tree(description, Edits())
     for link in taken.links:
         where = f"link {link.name!r}"

@@ -13,7 +13,7 @@ from pathlib import Path
 from robot_dyn.description.packages import environment_folders, package_folders
 from robot_dyn.errors import CatalogError, nearest, shorten, shown
 
-# Files whose own stem is shared, or says nothing.
+# Files whose stem is shared, or not descriptive.
 _RENAMED = {
     "anymal_b_simple_description/robots/anymal.urdf": "anymal_b",
     "anymal_b_simple_description/robots/anymal-kinova.urdf": "anymal_b_kinova",
@@ -101,11 +101,11 @@ def _remedy(name: str, urdf: Path, package_dirs: Iterable[str | Path]) -> str:
 @cache
 def _files() -> dict[str, Path]:
     """File by name."""
-    own = {path.stem: path for path in sorted(_own_folder().glob("*.urdf"))}
+    bundled = {path.stem: path for path in sorted(_own_folder().glob("*.urdf"))}
     files = dict(_example_robot_data())
-    clash = own.keys() & files.keys()
+    clash = bundled.keys() & files.keys()
     assert not clash, f"names taken twice: {clash}"
-    return files | own
+    return files | bundled
 
 
 def _own_folder() -> Path:

@@ -1,6 +1,6 @@
 """The hardened read of a URDF file: bytes in, checked bytes out, or a refusal.
 
-It stands before both roads, which only ever see the canonical bytes written here, in which each element occurs
+Both implementations see only the canonical bytes written here, in which each element occurs
 once, every number is a finite decimal literal, and links and joints form one tree; what dynamics does
 not need (meshes, materials, simulator extensions) is left out.
 """
@@ -12,7 +12,6 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from stat import S_ISDIR, S_ISREG
 from typing import final
 
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
@@ -20,6 +19,7 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 from robot_dyn.description import urdf
 from robot_dyn.description.markup import parse
 from robot_dyn.errors import DescriptionError
+from robot_dyn.files import read_start
 from robot_dyn.validate import instance
 
 MAX_BYTES = 16 * 2**20  # the largest robot of example-robot-data has 0.2 MiB
@@ -36,7 +36,7 @@ class Description:
         source: Where it was read from, as shown in messages.
         text: The bytes of the file, in UTF-8.
         xml: The checked bytes: a minimal URDF with the same literals.
-        findings: What was assumed where the file departs from the format, in words.
+        findings: What was assumed where the file departs from the format.
     """
 
     name: str
@@ -88,21 +88,11 @@ def content(path: Path) -> bytes:
     Raises:
         DescriptionError: If it is not a regular file, or cannot be read.
     """
-    try:
-        mode = path.stat().st_mode
-        if not S_ISREG(mode):
-            kind = "a folder" if S_ISDIR(mode) else "not a regular file"
-            raise DescriptionError(f"{path}: is {kind}; give the path of a URDF file")
-        with path.open("rb") as stream:
-            return stream.read(MAX_BYTES + 1)
-    except OSError as error:
-        raise DescriptionError(
-            f"{path}: cannot be read ({error.strerror}); check the path and its permissions"
-        ) from None
+    return read_start(path, MAX_BYTES + 1, DescriptionError, "give the path of a URDF file that you may read")
 
 
 def check(text: bytes | str, source: str, findings: Iterable[str] = ()) -> Description:
-    """Check the text of a URDF; `source` names it in messages, `findings` are those that were made before.
+    """Check the text of a URDF; `source` names it in messages, `findings` are those of earlier steps.
 
     Raises:
         DescriptionError: As `read`.

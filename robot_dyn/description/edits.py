@@ -1,4 +1,4 @@
-"""Edits of a described robot: gravity, locked joints, payloads, armature. Values; each road applies them itself."""
+"""Edits of a robot: gravity, locked joints, payloads, armature. Values, which each implementation applies itself."""
 
 from __future__ import annotations
 

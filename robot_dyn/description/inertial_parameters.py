@@ -21,7 +21,7 @@ _MOMENTS = (0, 0, 1, 0, 1, 2), (0, 1, 1, 2, 2, 2)  # rows and columns of I
 
 
 class Parametrised(Protocol):
-    """A robot whose torques are asked for by the inertial parameters of its bodies."""
+    """A robot whose torques are linear in the inertial parameters of its bodies."""
 
     @property
     def body_names(self) -> tuple[str, ...]:
@@ -43,8 +43,8 @@ class Parametrised(Protocol):
     def regressor(self, q: Array, v: Array, a: Array, *, errors: str = "raise") -> Array:
         """Regressor of the joint torques, Y(q, v, a) with M a + C v + N = Y θ + armature · a, θ `inertial_parameters`.
 
-        Y holds geometry, gravity and couplings and no mass: θ can be identified from measured torques, but for those
-        combinations that no motion tells apart, in which Y has no full rank.
+        Y holds geometry, gravity and couplings and no mass: θ can be identified from measured torques, except for
+        combinations that no motion distinguishes, for which Y is rank-deficient.
 
         Args:
             q: Positions, shape (..., n), in [rad] or [m] by joint.

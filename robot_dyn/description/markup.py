@@ -21,7 +21,7 @@ _PREFIX = re.compile(r"Namespace prefix (\S+) ")
 
 
 def parse(text: bytes, source: str, comments: bool = False) -> tuple[etree._Element, tuple[str, ...]]:
-    """The root of an XML text, with its comments if they are asked for, and what was assumed to read it.
+    """The root of an XML text, with its comments on request, and what was assumed to read it.
 
     Raises:
         DescriptionError: If it is not XML, or uses what is not read; `source` names it.
@@ -34,7 +34,7 @@ def parse(text: bytes, source: str, comments: bool = False) -> tuple[etree._Elem
         return root, findings
     root, _ = _fed(text, source, True, comments)  # which passes over these errors alone: there are no others
     prefixes = dict.fromkeys(match[1] for error in errors if (match := _PREFIX.search(error.message)))
-    prefixes.pop("xacro", None)  # of which the read of the robot speaks
+    prefixes.pop("xacro", None)  # reported where the robot is read
     if not prefixes:
         return root, findings
     listed = ", ".join(shorten(prefix, 40) for prefix in [*prefixes][:5])

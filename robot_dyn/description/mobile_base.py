@@ -1,4 +1,4 @@
-"""Robots that stand, roll or fly by themselves, told by what their file calls its parts.
+"""Robots that stand, roll or fly by themselves, recognised by the names in their file.
 
 No number of a URDF says whether its base is bolted down: a hand has the tree of a quadruped. The names do.
 """

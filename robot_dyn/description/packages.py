@@ -54,8 +54,8 @@ def package_folders(name: str, file: Path, package_dirs: Iterable[str | Path] = 
         yield folder / name
         if name_of(folder) == name:
             yield folder
-    if own := next((folder for folder in above if (folder / "package.xml").is_file()), None):
-        yield from _in(own.parent, name)
+    if package := next((folder for folder in above if (folder / "package.xml").is_file()), None):
+        yield from _in(package.parent, name)
     for folder in environment_folders():
         yield from _in(folder, name)
 

@@ -1,6 +1,6 @@
-"""The elements of a URDF that dynamics needs, each checked and written anew with its own literals.
+"""The elements of a URDF that dynamics needs, each checked and copied with its literals.
 
-What is refused here is what the two parsers would read in silence, in two ways, or not at all.
+Refused is what the two parsers would read silently, in different ways, or not at all.
 """
 
 from __future__ import annotations
@@ -110,11 +110,11 @@ class _Check:
         return name
 
     def distinct(self, kind: str, names: list[str]) -> None:
-        seen: set[str] = set()
+        known: set[str] = set()
         for name in names:
-            if name in seen:
+            if name in known:
                 self.refuse(f"{kind} {name!r}", f"is defined twice; rename or remove one <{kind}>")
-            seen.add(name)
+            known.add(name)
 
     def one(self, parent: etree._Element, tag: str, where: str) -> etree._Element | None:
         """The only child of that tag, or None."""

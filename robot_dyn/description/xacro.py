@@ -1,8 +1,8 @@
 """Expansion of xacro macros, by the reference implementation, the package xacro.
 
 xacro evaluates expressions of the file as Python, with a filter that stops mistakes and not an attacker: **a xacro file
-is a program**. It is expanded only when the caller asks for it, in a process of its own with limits of time and memory,
-since xacro keeps its state in its module and writes to stderr. What it makes goes through the same read as any file.
+is a program**. It is expanded only on request, in a separate process with limits of time and memory,
+since xacro keeps its state in its module and writes to stderr. The result is read as any other file.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ answer()
 
 
 def expand(path: Path, arguments: Mapping[str, Any], package_dirs: Iterable[str | Path]) -> tuple[bytes, list[str]]:
-    """The URDF that a xacro file makes, and the warnings of xacro.
+    """The URDF that a xacro file expands to, and the warnings of xacro.
 
     Args:
         path: The file.
@@ -58,17 +58,17 @@ def expand(path: Path, arguments: Mapping[str, Any], package_dirs: Iterable[str 
         )
     except subprocess.TimeoutExpired:
         raise DescriptionError(f"{path}: its macros take more than {SECONDS} s; simplify them") from None
-    said = [line.removeprefix("warning: ") for line in child.stderr.splitlines() if line.startswith("warning: ")]
+    warnings = [line.removeprefix("warning: ") for line in child.stderr.splitlines() if line.startswith("warning: ")]
     try:
-        made = json.loads(child.stdout)
+        result = json.loads(child.stdout)
     except ValueError:
         last = shorten((child.stderr.splitlines() or ["no memory or no time left"])[-1], 200)
         raise DescriptionError(f"{path}: the expansion ended without a result ({last}); simplify its macros") from None
-    if "error" in made:
-        raise DescriptionError(f"{path}: xacro refuses it: {shorten(made['error'], 400)}; correct the file")
-    for name in made["unknown"]:
-        raise DescriptionError(f"{path}: xacro has no argument {name!r} in it; {nearest(name, made['known'])}")
-    return made["text"].encode(), [f"xacro: {shorten(line, 200)}" for line in dict.fromkeys(said)]
+    if "error" in result:
+        raise DescriptionError(f"{path}: xacro refuses it: {shorten(result['error'], 400)}; correct the file")
+    for name in result["unknown"]:
+        raise DescriptionError(f"{path}: xacro has no argument {name!r} in it; {nearest(name, result['known'])}")
+    return result["text"].encode(), [f"xacro: {shorten(line, 200)}" for line in dict.fromkeys(warnings)]
 
 
 def _text(name: str, value: Any) -> str:
@@ -85,14 +85,14 @@ class _Arguments(dict[str, str]):
 
     def __init__(self, given: Mapping[str, str]) -> None:
         super().__init__(given)
-        self.asked: set[str] = set()
+        self.used: set[str] = set()
 
     def __contains__(self, name: object) -> bool:
-        self.asked.add(str(name))
+        self.used.add(str(name))
         return super().__contains__(name)
 
     def __getitem__(self, name: str) -> str:
-        self.asked.add(name)
+        self.used.add(name)
         return super().__getitem__(name)
 
 
@@ -115,8 +115,8 @@ def answer() -> None:
         file = (xacro.filestack or [path])[-1]
         print(json.dumps({"error": f"{_why(error)} (in {file})"}))
         return
-    unknown = sorted(set(order["arguments"]) - arguments.asked)
-    print(json.dumps({"text": text, "unknown": unknown, "known": sorted(arguments.asked - set(unknown))}))
+    unknown = sorted(set(order["arguments"]) - arguments.used)
+    print(json.dumps({"text": text, "unknown": unknown, "known": sorted(arguments.used - set(unknown))}))
 
 
 def _why(error: BaseException) -> str:

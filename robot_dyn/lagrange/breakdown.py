@@ -44,6 +44,6 @@ def breakdown(lagrangian: Lagrangian, q: Array, v: Array) -> tuple[Part, ...]:
         if armature.any():
             parts.append(("(armature)", [], armature))
         return tuple(
-            Part(name, mass_matrix(at, own, drives), coriolis_matrix(at, own, v), gravity_torque(at, own))
-            for name, own, drives in parts
+            Part(name, mass_matrix(at, terms, drives), coriolis_matrix(at, terms, v), gravity_torque(at, terms))
+            for name, terms, drives in parts
         )

@@ -1,12 +1,12 @@
-"""Digits of an answer that hold: its distance from true values in balls, −log10(error).
+"""Correct digits of an answer: its distance from true values in balls, −log10(error).
 
-An error is counted on the scale of the answer, in the units √M_ii of the joints (`accuracy.exact`). Before that it is
-estimated, 8 n u κ times what the terms of the answer are more than the answer (`compare`, `lagrange.magnitude`).
+An error is relative to the scale of the answer, in the units √M_ii of the joints (`lagrange.exact`). Before digits are
+counted it is estimated, as 8 n u κ times the ratio of the terms of the answer to the answer (`lagrange.magnitude`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from functools import lru_cache
 from math import log10
 from typing import TYPE_CHECKING, Any
@@ -29,7 +29,7 @@ QUANTITIES = by_name(M, C, N, INVERSE_DYNAMICS, FORWARD_DYNAMICS)
 _COUNTED = 64  # joints; balls of more take many seconds
 
 _exact = lru_cache(maxsize=8)(Exact)
-_own = lru_cache(maxsize=8)(Lagrangian)
+_lagrangian = lru_cache(maxsize=8)(Lagrangian)
 
 
 @lru_cache(maxsize=8)
@@ -44,48 +44,48 @@ def digits_of(error: float) -> float:
 
 
 def digits(robot: Robot, quantity: str, state: tuple[Any, ...]) -> float:
-    """As of `Robot.digits`."""
-    asked = QUANTITIES[choice("quantity", quantity, QUANTITIES)]
-    if len(state) != len(asked.arguments):
-        raise QueryError(
-            f"digits of {asked.name} are asked with {', '.join(asked.arguments)}; got {len(state)} of them"
-        )
+    """See `Robot.digits`."""
+    requested = QUANTITIES[choice("quantity", quantity, QUANTITIES)]
+    if len(state) != len(requested.arguments):
+        raise QueryError(f"digits of {requested.name} take {', '.join(requested.arguments)}; got {len(state)} of them")
     arrays = {
         name: np.array(shaped(name, x, robot.joint_names), float)
-        for name, x in zip(asked.arguments, state, strict=True)
+        for name, x in zip(requested.arguments, state, strict=True)
     }
     for name, x in arrays.items():
         if x.ndim != 1:
             raise QueryError(f"digits are counted at one state: {name} must have shape ({robot.n},), got {x.shape}")
-    return _counted(_quiet(robot), asked, arrays)
+    return _counted(_quiet(robot), requested, arrays)
 
 
-def doubt(robot: Robot, quantity: str, arrays: Mapping[str, np.ndarray], answers: np.ndarray, least: float) -> str:
-    """What is said of answers (..., *shape) with fewer digits than asked for; "" if they have them.
+def doubt(robot: Robot, quantity: str, state: Sequence[Any], answer: Any, least: float | None) -> str:
+    """The warning about answers (..., *shape) that have fewer digits than `least`; "" if they have them.
 
-    Only where the estimate is below that are digits counted, at the worst state; of more than 64 joints the estimate is
-    told.
+    Digits are counted only where the estimate is below that, at the worst state; for more than 64 joints the estimate
+    is reported.
     """
-    asked, quiet = QUANTITIES.get(quantity), _quiet(robot)
-    if asked is None:
+    requested, quiet = QUANTITIES.get(quantity), _quiet(robot)
+    if requested is None or least is None:
         return ""
-    batch = answers.shape[: answers.ndim - len(asked.axes)]
+    answers = np.asarray(answer)
+    arrays = {name: shaped(name, x, robot.joint_names) for name, x in zip(requested.arguments, state, strict=True)}
+    batch = answers.shape[: answers.ndim - len(requested.axes)]
     rows = [
         ({name: np.broadcast_to(x, (*batch, robot.n))[k] for name, x in arrays.items()}, answers[k])
         for k in np.ndindex(batch)
     ]
-    bounds = [_bound(quiet, asked, state, answer) if np.isfinite(answer).all() else 0.0 for state, answer in rows]
+    bounds = [_bound(quiet, requested, state, answer) if np.isfinite(answer).all() else 0.0 for state, answer in rows]
     if not bounds or digits_of(max(bounds)) >= least:
         return ""
     worst = int(np.argmax(bounds))
     counts = robot.n <= _COUNTED
-    held = _counted(quiet, asked, rows[worst][0]) if counts else digits_of(bounds[worst])
+    held = _counted(quiet, requested, rows[worst][0]) if counts else digits_of(bounds[worst])
     if held >= least:
         return ""
     where = f" in row {worst} of the batch" if batch else ""
     has = "has" if counts else "is only certain to have"
     return (
-        f"{quantity} of {robot.name} {has} {held:.1f} digits{where}, fewer than {least:g}; ask"
+        f"{quantity} of {robot.name} {has} {held:.1f} digits{where}, fewer than {least:g}; use"
         " rd.Lagrangian(robot, np.longdouble), or rd.Ball(bits) for digits that are proven"
     )
 
@@ -96,7 +96,7 @@ def _bound(robot: Robot, quantity: Quantity, state: dict[str, np.ndarray], answe
     if quantity.definite:
         return least
     absolute = {name: np.abs(x) for name, x in state.items()}
-    terms = np.asarray(quantity.terms(magnitudes(_own(robot).linkage, state["q"]), absolute))
+    terms = np.asarray(quantity.terms(magnitudes(_lagrangian(robot).linkage, state["q"]), absolute))
     if quantity.solves:
         torques = (state["tau"], robot.coriolis_torque(state["q"], state["v"]), robot.N(state["q"]))
         more = acceleration_norm(inertia, torques, terms) / max(float(solved_norm(inertia, torques)), 1e-300)

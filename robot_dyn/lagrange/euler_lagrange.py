@@ -3,7 +3,7 @@
     M a + b = Q,   M = ∂²K/∂v²,   b = (∂²K/∂v∂q) v + ∂²K/∂v∂t − ∂K/∂q + ∂V/∂q
 
 The derivatives are exact, by CasADi's automatic differentiation of the functions the user writes. K need not be
-quadratic in v: moving constraints and relativistic particles are served.
+quadratic in v: moving constraints and relativistic particles are allowed.
 [Goldstein, Poole, Safko, Classical Mechanics, 3rd ed., 2002, ch. 1 and 2]
 """
 
@@ -15,8 +15,9 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import NotPositiveDefiniteError, apply, cholesky_solve
+from robot_dyn.arithmetic import apply
 from robot_dyn.errors import OverflowedError, QueryError, RobotDynError, SingularError
+from robot_dyn.linear_algebra import NotPositiveDefiniteError, cholesky_solve
 from robot_dyn.validate import integer, rows
 
 Kinetic = Callable[[Any, Any, Any], Any]
@@ -26,7 +27,7 @@ Potential = Callable[[Any, Any], Any]
 @final
 @dataclass(frozen=True, eq=False)
 class EulerLagrange:
-    """The equation of motion M(t, q, v) a + b(t, q, v) = Q of a system of n coordinates; made by `euler_lagrange`.
+    """The equation of motion M(t, q, v) a + b(t, q, v) = Q of a system of n coordinates; built by `euler_lagrange`.
 
     Every method takes t (...) in [s], and q, v, a, Q (..., n) in the units of the energies' coordinates; it raises
     QueryError for a wrong shape or a value that is not finite, and OverflowedError where the energies are not finite.
@@ -34,7 +35,7 @@ class EulerLagrange:
     Attributes:
         n: Number of coordinates.
         kernels: CasADi functions of (t, q, v) by name.
-        no_coriolis: Why there is no matrix C, or "" if there is one.
+        no_coriolis: Why there is no matrix C, or "" if there is.
     """
 
     n: int
@@ -80,11 +81,11 @@ class EulerLagrange:
         return self._evaluate("V", t, q, shape=())
 
     def energy(self, t: Any, q: Any, v: Any) -> np.ndarray:
-        """K + V in [J], shape (...); not kept where a moving constraint does work."""
+        """K + V in [J], shape (...); not constant where a moving constraint does work."""
         return self.kinetic_energy(t, q, v) + self.potential_energy(t, q)
 
     def jacobi_integral(self, t: Any, q: Any, v: Any) -> np.ndarray:
-        """Jacobi's integral h = vᵀ p − L in [J], shape (...): kept if Q = 0 and t is not in L; K + V if K = ½ vᵀ M v.
+        """Jacobi's integral h = vᵀ p − L in [J], shape (...): constant if Q = 0 and ∂L/∂t = 0; K + V if K = ½ vᵀ M v.
 
         Source: Goldstein, 3rd ed., §2.7.
         """
@@ -167,10 +168,10 @@ def euler_lagrange(kinetic: Kinetic, potential: Potential | None, n: int) -> Eul
 
 
 def traced(what: str, function: Callable[..., Any], symbols: tuple[Any, ...], shape: tuple[int, int] = (1, 1)) -> Any:
-    """The expression a user's function makes of CasADi symbols.
+    """The expression that a user's function returns for CasADi symbols.
 
     Raises:
-        QueryError: If the function cannot take symbols, or returns another shape, symbols of its own or NaN.
+        QueryError: If the function cannot take symbols, or returns another shape, other symbols or NaN.
     """
     import casadi as ca
 

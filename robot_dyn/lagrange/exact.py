@@ -1,9 +1,9 @@
-"""True values of M, C, N, inverse and forward dynamics: the own equations in balls, of more bits until they are narrow.
+"""True values of M, C, N, inverse and forward dynamics: the equations in balls, of more bits until they are narrow.
 
     radius ≤ 1e-20 · scale
 
 The scale of M_ij is √(M_ii M_jj); of accelerations, in the norm of M, Σ ‖M⁻¹ τ_k‖_M of τ, C v and N; of other entries
-the largest of them in the units √M_ii of the joints, or what they typically are if that is given and more.
+the largest of them in the units √M_ii of the joints, or their typical size if that is given and larger.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from robot_dyn.queries.quantity import CORIOLIS_TORQUE, MOST_DIGITS, M, N, Quant
 RESOLUTION = 10.0**-MOST_DIGITS
 _FIRST_BITS, _MOST_BITS = 128, 4096
 
-NOTHING = 1e-12  # in the units of the joints: a joint, or an answer, that is less is rounding of zero
+NOTHING = 1e-12  # in the units of the joints: a joint or an answer below it is rounding of zero
 
 State = Mapping[str, np.ndarray]  # q, v, a, tau
 
@@ -74,7 +74,7 @@ class Scale:
 def entry_units(values: np.ndarray, M: np.ndarray) -> np.ndarray:
     """√(M_ii M_jj) for entries of C, (..., n, n), √M_ii for torques, (..., n).
 
-    A joint without inertia has no unit of its own: it gets 1e-12 of the largest.
+    A joint without inertia has no unit: it gets 1e-12 of the largest.
     """
     units = joint_units(M)
     units = np.maximum(units, NOTHING * units.max(axis=-1, keepdims=True))
@@ -96,7 +96,7 @@ class Truth:
     Attributes:
         values: Balls, of the shape of the quantity.
         scale: Of errors.
-        bits: It took.
+        bits: Precision that was needed.
     """
 
     values: Array
@@ -119,7 +119,7 @@ class Exact:
 
     Args:
         robot: Its file and edits are used, none of its numbers.
-        rounded: Whether the float64 nearest to each decimal of the file counts, or the decimal itself.
+        rounded: Whether the file's numbers are the float64 nearest to each decimal, or the decimal itself.
     """
 
     def __init__(self, robot: Described, rounded: bool = False) -> None:

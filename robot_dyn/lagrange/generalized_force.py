@@ -23,7 +23,7 @@ Positions = Callable[[Any, Any], Sequence[Any]]
 @final
 @dataclass(frozen=True, eq=False)
 class GeneralizedForce:
-    """Forces on N particles as forces on n coordinates; made by `generalized_force`.
+    """Forces on N particles as forces on n coordinates; built by `generalized_force`.
 
     Arguments are t in [s] and q (n,). QueryError for a wrong shape or a value that is not finite.
 

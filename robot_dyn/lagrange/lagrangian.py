@@ -93,58 +93,48 @@ class Lagrangian(Dynamics, Parametrised):
         return {"n": self.n, "p": len(PARAMETERS) * len(self.linkage.bodies)}
 
     def M(self, q: Array, *, errors: str = "raise") -> Array:
-        return self._answer("M", errors, lambda q: self._M(self.linkage.at(q)), q=q)
+        return self._answer("M", errors, self._M, q)
 
     def C(self, q: Array, v: Array, *, errors: str = "raise") -> Array:
-        return self._answer("C", errors, lambda q, v: self._C(self.linkage.at(q), v), q=q, v=v)
+        return self._answer("C", errors, self._C, q, v)
 
     def N(self, q: Array, *, errors: str = "raise") -> Array:
-        return self._answer("N", errors, lambda q: self._N(self.linkage.at(q)), q=q)
+        return self._answer("N", errors, self._N, q)
 
     def mass_matrix_derivative(self, q: Array, *, errors: str = "raise") -> Array:
         """∂M_ij/∂q_k at index [..., i, j, k], exact; shape (..., n, n, n)."""
-
-        def equation(q: Array) -> Array:
-            at = self.linkage.at(q)
-            return mass_matrix_derivative(at, of_bodies(at))
-
-        return self._answer("mass_matrix_derivative", errors, equation, q=q)
+        return self._answer("mass_matrix_derivative", errors, lambda at: mass_matrix_derivative(at, of_bodies(at)), q)
 
     def coriolis_torque(self, q: Array, v: Array, *, errors: str = "raise") -> Array:
-        return self._answer("coriolis_torque", errors, lambda q, v: apply(self._C(self.linkage.at(q), v), v), q=q, v=v)
+        return self._answer("coriolis_torque", errors, lambda at, v: apply(self._C(at, v), v), q, v)
 
     def coriolis_transpose(self, q: Array, v: Array, *, errors: str = "raise") -> Array:
-        def equation(q: Array, v: Array) -> Array:
-            return apply(transpose(self._C(self.linkage.at(q), v)), v)
-
-        return self._answer("coriolis_transpose", errors, equation, q=q, v=v)
+        return self._answer("coriolis_transpose", errors, lambda at, v: apply(transpose(self._C(at, v)), v), q, v)
 
     def inverse_dynamics(self, q: Array, v: Array, a: Array, *, errors: str = "raise") -> Array:
-        def equation(q: Array, v: Array, a: Array) -> Array:
-            at = self.linkage.at(q)
+        def equation(at: Configuration, v: Array, a: Array) -> Array:
             return apply(self._M(at), a) + apply(self._C(at, v), v) + self._N(at)
 
-        return self._answer("inverse_dynamics", errors, equation, q=q, v=v, a=a)
+        return self._answer("inverse_dynamics", errors, equation, q, v, a)
 
     def forward_dynamics(self, q: Array, v: Array, tau: Array, *, errors: str = "raise") -> Array:
-        def equation(q: Array, v: Array, tau: Array) -> Array:
-            at = self.linkage.at(q)
-            rest = tau - apply(self._C(at, v), v) - self._N(at)
-            return acceleration(self._M(at), rest, self.joint_names)
+        def equation(at: Configuration, v: Array, tau: Array) -> Array:
+            remaining = tau - apply(self._C(at, v), v) - self._N(at)
+            return acceleration(self._M(at), remaining, self.joint_names)
 
-        return self._answer("forward_dynamics", errors, equation, q=q, v=v, tau=tau)
+        return self._answer("forward_dynamics", errors, equation, q, v, tau)
 
     def kinetic_energy(self, q: Array, v: Array, *, errors: str = "raise") -> Array:
-        def equation(q: Array, v: Array) -> Array:
-            return (v * apply(self._M(self.linkage.at(q)), v)).sum(axis=-1) / 2
+        def equation(at: Configuration, v: Array) -> Array:
+            return (v * apply(self._M(at), v)).sum(axis=-1) / 2
 
-        return self._answer("kinetic_energy", errors, equation, q=q, v=v)
+        return self._answer("kinetic_energy", errors, equation, q, v)
 
     def potential_energy(self, q: Array, *, errors: str = "raise") -> Array:
-        return self._answer("potential_energy", errors, lambda q: self._V(self.linkage.at(q)), q=q)
+        return self._answer("potential_energy", errors, self._V, q)
 
     def momentum(self, q: Array, v: Array, *, errors: str = "raise") -> Array:
-        return self._answer("momentum", errors, lambda q, v: apply(self._M(self.linkage.at(q)), v), q=q, v=v)
+        return self._answer("momentum", errors, lambda at, v: apply(self._M(at), v), q, v)
 
     @property
     def body_names(self) -> tuple[str, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
@@ -156,30 +146,27 @@ class Lagrangian(Dynamics, Parametrised):
         return np.concatenate([parameters(self.linkage.inertias[i]) for i in self.linkage.order])
 
     def regressor(self, q: Array, v: Array, a: Array, *, errors: str = "raise") -> Array:
-        return self._answer("regressor", errors, lambda q, v, a: regressor(self.linkage.at(q), v, a), q=q, v=v, a=a)
+        return self._answer("regressor", errors, regressor, q, v, a)
 
     def placement(self, q: Array, frame: str, *, errors: str = "raise") -> Array:
         frame = self._link(frame)
-        return self._answer(
-            "placement", errors, lambda q: homogeneous(*self._placement(self.linkage.at_link(q, frame), frame)), q=q
-        )
+        return self._answer("placement", errors, lambda at: homogeneous(*self._placement(at, frame)), q, link=frame)
 
     def jacobian(self, q: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, errors: str = "raise") -> Array:
         frame, axes = self._link(frame), Axes.of(expressed_in)
 
-        def equation(q: Array) -> Array:
-            at = self.linkage.at_link(q, frame)
+        def equation(at: Configuration) -> Array:
             return self.linkage.couplings.columns(self._change(at, frame, axes) @ self._body_jacobian(at, frame))
 
-        return self._answer("jacobian", errors, equation, q=q)
+        return self._answer("jacobian", errors, equation, q, link=frame)
 
     def jacobian_rate(
         self, q: Array, v: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, errors: str = "raise"
     ) -> Array:
         frame, axes = self._link(frame), Axes.of(expressed_in)
 
-        def equation(q: Array, v: Array) -> Array:
-            at, v = self.linkage.at_link(q, frame), self.linkage.couplings.velocity(v)
+        def equation(at: Configuration, v: Array) -> Array:
+            v = self.linkage.couplings.velocity(v)
             J, rate = self._body_jacobian(at, frame), self._body_jacobian(at, frame, v)
             V = apply(J, v)
             if axes is Axes.WORLD_ALIGNED:  # d/dt diag(R, R) = diag(R, R) diag(ω̂, ω̂)
@@ -188,7 +175,7 @@ class Lagrangian(Dynamics, Parametrised):
                 rate = rate + bracket(V) @ J
             return self.linkage.couplings.columns(self._change(at, frame, axes) @ rate)
 
-        return self._answer("jacobian_rate", errors, equation, q=q, v=v)
+        return self._answer("jacobian_rate", errors, equation, q, v, link=frame)
 
     # --- the equations, at a configuration
 
@@ -236,7 +223,7 @@ class Lagrangian(Dynamics, Parametrised):
         return J
 
     def _change(self, at: Configuration, frame: str, axes: Axes) -> Array:
-        """Matrix that takes a body twist to the axes asked for."""
+        """Matrix that takes a body twist to the requested axes."""
         R, p = self._placement(at, frame)
         if axes is Axes.WORLD:
             return adjoint(R, p)
@@ -245,6 +232,18 @@ class Lagrangian(Dynamics, Parametrised):
     # --- arguments
 
     @in_arithmetic
-    def _answer(self, quantity: str, errors: str, equation: Callable[..., Array], **state: Array) -> Array:
-        arrays = {name: shaped(name, x, self.joint_names, self.arithmetic) for name, x in state.items()}
-        return answered(equation, arrays, ALL[quantity].shape(self.sizes), self.joint_names, errors, self.arithmetic)
+    def _answer(
+        self, quantity: str, errors: str, equation: Callable[..., Array], *state: Array, link: str | None = None
+    ) -> Array:
+        """The answer of an equation (at, …) of the configuration, or of the bodies that carry a link, and the rates."""
+
+        def at_configuration(q: Array, *rates: Array) -> Array:
+            return equation(self.linkage.at(q) if link is None else self.linkage.at_link(q, link), *rates)
+
+        requested = ALL[quantity]
+        arrays = {
+            name: shaped(name, x, self.joint_names, self.arithmetic)
+            for name, x in zip(requested.arguments, state, strict=True)
+        }
+        shape = requested.shape(self.sizes)
+        return answered(at_configuration, arrays, shape, self.joint_names, errors, self.arithmetic)

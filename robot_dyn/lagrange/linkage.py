@@ -89,7 +89,7 @@ class Step:
 
     Attributes:
         pose: Ad⁻¹ of the joint's constant placement, (6, 6).
-        joint: Ad⁻¹ of the joint's own motion, (..., 6, 6).
+        joint: Ad⁻¹ of the joint's motion, (..., 6, 6).
         origin: Of the body's frame in its parent's, (3,) or (..., 3).
     """
 
@@ -123,8 +123,8 @@ class Linkage:
 
     Attributes:
         bodies: Each with its joint.
-        links: By name: the body a link belongs to, its placement in that body's frame, its own 𝓜 in that frame (6, 6).
-        couplings: q_full = S q + s₀, from the coordinates that the user sees to the N joints.
+        links: By name: the body a link belongs to, its placement in that body's frame, its 𝓜 in that frame (6, 6).
+        couplings: q_full = S q + s₀, from the n coordinates of the user to the N joints.
         gravity: (3,) in [m/s²].
         armature: Of the N joints, (N,).
         order: Indices of the bodies, in the order of their inertial parameters.
@@ -156,7 +156,7 @@ class Linkage:
         return self._at(q, range(len(self.bodies)))
 
     def at_link(self, q: Array, link: str) -> Configuration:
-        """What a link hangs on, at coordinates q (..., n): the bodies of its path alone."""
+        """The bodies that carry a link, at coordinates q (..., n)."""
         body, *_ = self.links[link]
         return self._at(q, () if body == BASE else self.bodies[body].path)
 
@@ -168,7 +168,7 @@ class Linkage:
 @final
 @dataclass(frozen=True, eq=False)
 class Configuration:
-    """The linkage, or those of its bodies that are asked for, at one configuration or a batch.
+    """The linkage, or some of its bodies, at one configuration or a batch.
 
     Attributes:
         batch: Shape of the batch axes.
@@ -254,8 +254,8 @@ def _inertia(link: Link, pose: Pose, arithmetic: Arithmetic) -> Array:
         at = pose @ Pose(rotation_rpy(arithmetic.array(part.rpy)), arithmetic.array(part.xyz))
         Ixx, Ixy, Ixz, Iyy, Iyz, Izz = arithmetic.array(part.moments)
         about_com = np.array([[Ixx, Ixy, Ixz], [Ixy, Iyy, Iyz], [Ixz, Iyz, Izz]], dtype=arithmetic.dtype)
-        own = spatial_inertia(arithmetic.number(part.mass), at.p, at.R @ about_com @ at.R.T)
-        total = total + arithmetic.number(part.scale) * own
+        part_inertia = spatial_inertia(arithmetic.number(part.mass), at.p, at.R @ about_com @ at.R.T)
+        total = total + arithmetic.number(part.scale) * part_inertia
     return total
 
 

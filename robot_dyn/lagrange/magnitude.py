@@ -1,9 +1,9 @@
 """Magnitudes: for each entry of M, C, N the sum of the absolute values of the terms added into it.
 
-Rounding in an entry is proportional to its terms, not to their sum, so this is the scale on which two roads must agree,
-and u times this the size of a rounding error. A term is bounded by the lengths of its vectors: in body b the column of
-joint i turns at rate aᵢ ≤ 1 and moves the frame at lᵢ ≤ the lever from i to b. Links that are fixed to each other are
-terms of their own: where they balance, m c is what rounding leaves of their sum.
+Rounding in an entry is proportional to its terms, not to their sum, so this is the scale on which two implementations
+must agree, and u times this the size of a rounding error. A term is bounded by the lengths of its vectors: in body b
+the column of joint i turns at rate aᵢ ≤ 1 and moves the frame at lᵢ ≤ the lever from i to b. Links fixed to each other
+are separate terms: where they balance, m c is what rounding leaves of their sum.
 
     ‖Jᵢᵀ 𝓜 Jⱼ‖ ≤ m lᵢ lⱼ + m c (lᵢ aⱼ + aᵢ lⱼ) + I aᵢ aⱼ       ‖[Jⱼ, J_k]‖: l = aⱼ l_k + lⱼ a_k, a = aⱼ a_k
 """
@@ -95,8 +95,8 @@ def magnitudes(linkage: Linkage, q: np.ndarray) -> Magnitudes:
             lever[name][list(body.path)] = lin + ang * reach[name]
             reach[name] += _reach(linkage.bodies, body, steps)
         lever[name] = couplings.torque(lever[name])
-    own = couplings.matrix(M), couplings.cube(dM), couplings.torque(gravity)
-    return Magnitudes(*own, V, lever, reach, linkage, columns)
+    reduced = couplings.matrix(M), couplings.cube(dM), couplings.torque(gravity)
+    return Magnitudes(*reduced, V, lever, reach, linkage, columns)
 
 
 def _absolute(couplings: Couplings) -> Couplings:
@@ -136,8 +136,8 @@ def _step(body: Body, steps: np.ndarray) -> float:
 def _columns(bodies: tuple[Body, ...], body: Body, steps: np.ndarray) -> np.ndarray:
     """Length of the linear and of the angular part of each column of a body's Jacobian, (2, p)."""
     ang = np.array([1.0 if bodies[i].revolute else 0.0 for i in body.path])
-    beyond = np.array([_step(bodies[i], steps) for i in body.path])
-    lever = np.append(np.cumsum(beyond[:0:-1])[::-1], 0.0)
+    steps_along = np.array([_step(bodies[i], steps) for i in body.path])
+    lever = np.append(np.cumsum(steps_along[:0:-1])[::-1], 0.0)
     return np.stack([ang * lever + (1 - ang), ang])
 
 

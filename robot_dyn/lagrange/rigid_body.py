@@ -15,10 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.arithmetic import NotPositiveDefiniteError, apply, cholesky_solve, transpose
+from robot_dyn.arithmetic import apply, transpose
 from robot_dyn.description.inertia import MassProperties, rotation_matrix
 from robot_dyn.errors import OverflowedError, QueryError
-from robot_dyn.validate import rows
+from robot_dyn.linear_algebra import NotPositiveDefiniteError, cholesky_solve
+from robot_dyn.validate import check_batches, rows
 
 _too_large_shows_in_the_result = np.errstate(over="ignore", invalid="ignore")
 
@@ -28,7 +29,7 @@ def world_wrench(body: MassProperties, R: Any, omega: Any, acceleration: Any) ->
     """Wrench that gives an acceleration, in world axes: (m p̈, I_s ω̇ + ω × I_s ω).
 
     Args:
-        body: Mass and inertia; its `com` plays no part, for p is the centre of mass.
+        body: Mass and inertia; its `com` is not used, since p is the centre of mass.
         R: Rotation from body axes to world axes, shape (..., 3, 3).
         omega: Angular velocity ω in world axes, shape (..., 3), in [rad/s].
         acceleration: (p̈, ω̇) in world axes, shape (..., 6), in [m/s²] and [rad/s²].
@@ -41,7 +42,7 @@ def world_wrench(body: MassProperties, R: Any, omega: Any, acceleration: Any) ->
     """
     R, omega = rotation_matrix(R), rows("omega", omega, 3)
     acceleration = rows("acceleration", acceleration, 6)
-    _batches(R=R[..., 0], omega=omega, acceleration=acceleration)
+    check_batches(R=R[..., 0], omega=omega, acceleration=acceleration)
     I_s = R @ body.inertia @ transpose(R)
     torque = apply(I_s, acceleration[..., 3:]) + np.cross(omega, apply(I_s, omega))
     return _pair(body.mass * acceleration[..., :3], torque)
@@ -64,7 +65,7 @@ def world_acceleration(body: MassProperties, R: Any, omega: Any, wrench: Any) ->
         QueryError: As `world_wrench`, or if the inertia is singular.
     """
     R, omega, wrench = rotation_matrix(R), rows("omega", omega, 3), rows("wrench", wrench, 6)
-    _batches(R=R[..., 0], omega=omega, wrench=wrench)
+    check_batches(R=R[..., 0], omega=omega, wrench=wrench)
     I_s = R @ body.inertia @ transpose(R)
     torque = wrench[..., 3:] - np.cross(omega, apply(I_s, omega))
     return _pair(wrench[..., :3] / body.mass, apply(R, _solve(body, apply(transpose(R), torque))))
@@ -86,7 +87,7 @@ def body_wrench(body: MassProperties, twist: Any, rate: Any) -> np.ndarray:
         QueryError: If a shape is wrong or a value is not finite.
     """
     twist, rate = rows("twist", twist, 6), rows("rate", rate, 6)
-    _batches(twist=twist, rate=rate)
+    check_batches(twist=twist, rate=rate)
     force, torque = _gyroscopic(body, twist)
     return _pair(body.mass * rate[..., :3] + force, apply(body.inertia, rate[..., 3:]) + torque)
 
@@ -107,7 +108,7 @@ def body_acceleration(body: MassProperties, twist: Any, wrench: Any) -> np.ndarr
         QueryError: If a shape is wrong, a value is not finite, or the inertia is singular.
     """
     twist, wrench = rows("twist", twist, 6), rows("wrench", wrench, 6)
-    _batches(twist=twist, wrench=wrench)
+    check_batches(twist=twist, wrench=wrench)
     force, torque = _gyroscopic(body, twist)
     return _pair((wrench[..., :3] - force) / body.mass, _solve(body, wrench[..., 3:] - torque))
 
@@ -116,7 +117,7 @@ def body_acceleration(body: MassProperties, twist: Any, wrench: Any) -> np.ndarr
 def kinetic_energy(body: MassProperties, twist: Any) -> np.ndarray:
     """K = ½ m ‖ṗ‖² + ½ ωᵀ I ω in [J], shape (...), from the twist (v, ω) of the centre of mass in body axes (..., 6).
 
-    There, and only there, no term mixes v and ω; `MassProperties.spatial` serves every other point.
+    Only there does no term mix v and ω; for every other point use `MassProperties.spatial`.
 
     Raises:
         QueryError: If the shape is wrong or a value is not finite.
@@ -138,13 +139,13 @@ def point_velocity(twist: Any, r: Any) -> np.ndarray:
         QueryError: If a shape is wrong or a value is not finite.
     """
     twist, r = rows("twist", twist, 6), rows("r", r, 3)
-    _batches(twist=twist, r=r)
+    check_batches(twist=twist, r=r)
     return _finite(twist[..., :3] + np.cross(twist[..., 3:], r))
 
 
 @_too_large_shows_in_the_result
 def angular_momentum(body: MassProperties, R: Any, omega: Any) -> np.ndarray:
-    """Angular momentum I_s ω about the centre of mass in world axes, (..., 3), in [N m s]; kept when no torque acts.
+    """Angular momentum I_s ω about the centre of mass in world axes, (..., 3), in [N m s]; constant without torque.
 
     Args:
         body: Mass and inertia.
@@ -155,7 +156,7 @@ def angular_momentum(body: MassProperties, R: Any, omega: Any) -> np.ndarray:
         QueryError: If a shape is wrong, a value is not finite, or R is not a rotation.
     """
     R, omega = rotation_matrix(R), rows("omega", omega, 3)
-    _batches(R=R[..., 0], omega=omega)
+    check_batches(R=R[..., 0], omega=omega)
     return _finite(apply(R @ body.inertia @ transpose(R), omega))
 
 
@@ -172,14 +173,6 @@ def _solve(body: MassProperties, torque: np.ndarray) -> np.ndarray:
         raise QueryError(
             "no angular acceleration: the inertia is singular, as of points on a line; give it extent"
         ) from None
-
-
-def _batches(**arrays: np.ndarray) -> None:
-    try:
-        np.broadcast_shapes(*(array.shape[:-1] for array in arrays.values()))
-    except ValueError:
-        shapes = ", ".join(f"{name} {array.shape[:-1]}" for name, array in arrays.items())
-        raise QueryError(f"batch axes do not match: {shapes}") from None
 
 
 def _pair(linear: np.ndarray, angular: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Scales of comparison: what a difference of two values of one quantity is divided by, and what may be left of it.
+"""Scales of comparison: what a difference of two values of one quantity is divided by, and what may remain of it.
 
     |x − y| ≤ tolerance · (Σ of the absolute values of the terms added into x)
 
@@ -25,7 +25,7 @@ def scaled(error: np.ndarray, scale: np.ndarray) -> np.ndarray:
 def floored(scale: np.ndarray) -> np.ndarray:
     """The scale of each entry, (n,), (m, n) or a number; of one without terms, the largest in its row and column.
 
-    Where no term is, rounding of its neighbours is all that an algorithm can leave there.
+    An entry without terms holds only the rounding of its neighbours.
     """
     if scale.ndim != 2:
         return np.where(scale == 0, np.max(scale, initial=0.0), scale)
@@ -57,7 +57,7 @@ def unit_diagonal_conditions(M: np.ndarray) -> np.ndarray:
 
 
 def unit_diagonal_condition(M: np.ndarray) -> float:
-    """The largest of them."""
+    """The largest κ of `unit_diagonal_conditions`."""
     return float(np.max(unit_diagonal_conditions(M)))
 
 

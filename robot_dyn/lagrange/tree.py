@@ -1,7 +1,7 @@
-"""The Tree: joints and links as the file states them, in literals, for the library's own road.
+"""The Tree: joints and links as the file states them, in literals, for the library's own implementation.
 
-Numbers stay the decimal literals of the file, so that each arithmetic makes its own numbers of them. No line is shared
-with Pinocchio or its URDF parser; that the checked file says what the file says, `accuracy.second_reading` looks at.
+Numbers stay the decimal literals of the file, so that each arithmetic converts them itself. No line is shared with
+Pinocchio or its URDF parser; `cross_check.second_reading` compares the checked file with the file.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from robot_dyn.description.edits import Edits
 
 
 class Described(Protocol):
-    """What the own road takes of a robot: its file, its edits and the order of q. None of its numbers."""
+    """What the library's own implementation takes of a robot: its file, its edits and the order of q; no numbers."""
 
     @property
     def description(self) -> Description:
@@ -105,7 +105,7 @@ class Tree:
 
 
 def tree(description: Description, edits: Edits) -> Tree:
-    """The tree of a description, edited."""
+    """The tree of a description with its edits."""
     file = description.element
     links = (Link(link.get("name"), _inertials(link)) for link in file.iterfind("link"))
     joints = (_joint(joint) for joint in file.iterfind("joint"))

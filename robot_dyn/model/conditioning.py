@@ -1,4 +1,4 @@
-"""How near M is to a singular matrix.
+"""Whether M can be solved for: M singular at every configuration, or so near to singular that digits are lost.
 
     κ = λ_max / λ_min  of  D⁻¹ M D⁻¹,  D = diag(√M_ii);    a solution of M a = τ errs by some u κ, by 8 n u κ at most
 
@@ -7,9 +7,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
+
+from robot_dyn.errors import QueryError, SingularError, UndecidedError
+from robot_dyn.queries.dynamics import acceleration
+from robot_dyn.queries.quantity import MOST_DIGITS
+from robot_dyn.validate import number
 
 LEAST_DIGITS = 8  # of forward dynamics; with fewer, M is called nearly singular
 
@@ -28,8 +35,37 @@ class NearlySingular(NamedTuple):
     joint: str
 
 
-def nearly_singular(M: np.ndarray, joint_names: tuple[str, ...]) -> NearlySingular | None:
-    """What M, (n, n) with M_ii > 0, leaves of the digits of forward dynamics, or None if that is enough."""
+class Regularity(NamedTuple):
+    """Whether M can be solved for.
+
+    Attributes:
+        singular: Returns the error to raise if forward dynamics has no answer at any q; None if it has.
+        near: How near M is to singular, or None if it is not, or is singular.
+    """
+
+    singular: Callable[[], SingularError] | None
+    near: NearlySingular | None
+
+    @property
+    def joint(self) -> str | None:
+        """The joint at which M is singular, or None."""
+        return None if self.singular is None else self.singular().joint
+
+
+def regularity(M: np.ndarray, joint_names: tuple[str, ...]) -> Regularity:
+    """The regularity of M (n, n), which is the mass matrix at a configuration without symmetries."""
+    try:
+        acceleration(M, np.ones(len(M)), joint_names)
+    except UndecidedError as error:
+        singular = partial(UndecidedError, error.joint, "at any q", "float64")
+        return Regularity(singular, _nearly_singular(M, joint_names))
+    except SingularError as error:
+        return Regularity(partial(SingularError, error.joint, "at any q; give its link a mass, or lock it"), None)
+    return Regularity(None, _nearly_singular(M, joint_names))
+
+
+def _nearly_singular(M: np.ndarray, joint_names: tuple[str, ...]) -> NearlySingular | None:
+    """What M, with M_ii > 0, leaves of the digits of forward dynamics, or None if that is enough."""
     d = np.sqrt(np.diagonal(M))
     eigenvalues, vectors = np.linalg.eigh(M / np.outer(d, d))
     u = np.finfo(float).eps / 2
@@ -38,3 +74,13 @@ def nearly_singular(M: np.ndarray, joint_names: tuple[str, ...]) -> NearlySingul
     if digits >= LEAST_DIGITS:
         return None
     return NearlySingular(condition, max(digits, 0.0), joint_names[int(np.argmax(np.abs(vectors[:, 0])))])
+
+
+def checked_digits(digits: float | None) -> float | None:
+    """A number of digits to warn below, above 0 and at most MOST_DIGITS, or None; raises QueryError for any other."""
+    if digits is None:
+        return None
+    digits = number("digits", digits, above=0)
+    if digits > MOST_DIGITS:
+        raise QueryError(f"digits must be at most {MOST_DIGITS}, got {digits:g}: no more are counted")
+    return digits

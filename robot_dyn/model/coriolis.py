@@ -7,7 +7,7 @@ C_ij = ∫ ∂ṙ/∂v_i · d/dt(∂ṙ/∂v_j) dm. In the body's axes ∂ṙ/�
 
 a skew matrix: Ṁ = C + Cᵀ. [Echeandia, Wensing 2021, of which this is the factorisation in a body's own axes]
 
-Here no distance occurs but that from a joint to the bodies it moves. Pinocchio's own Coriolis matrix works in the axes
+The only distances here are those from a joint to the bodies it moves. Pinocchio's own Coriolis matrix works in the axes
 of the world; it is taken where a bound of its rounding is small (`regrouped`).
 """
 
@@ -37,7 +37,7 @@ class Coriolis:
 
     Attributes:
         bodies: The bodies of the model, each in its own axes.
-        regrouped: The model that Pinocchio is asked for; None where the bound is more.
+        regrouped: The model of which Pinocchio computes C; None where the bound is larger.
         slides: Index and largest |q| of each prismatic joint for which the bound holds.
         rounding: The bound ε of |δC_ij| ≤ ε Ω √(M_ii M_jj), see `regrouped`.
     """
@@ -50,10 +50,10 @@ class Coriolis:
     @classmethod
     def of(cls, model: Any, couplings: Couplings) -> Coriolis:
         """Of a model and how its joints follow the coordinates."""
-        with np.errstate(all="ignore"):  # of masses that overflow no bound is known
-            own = regrouped(model)
-            bound = rounding(model, own, couplings)
-        return cls(Bodies.of(model), own if bound <= MOST_ROUNDING else None, slides(model), bound)
+        with np.errstate(all="ignore"):  # where masses overflow, the bound is not known
+            near_base = regrouped(model)
+            bound = rounding(model, near_base, couplings)
+        return cls(Bodies.of(model), near_base if bound <= MOST_ROUNDING else None, slides(model), bound)
 
     def matrix(self, data: Any, q: ndarray, v: ndarray) -> ndarray:
         """C of the Christoffel symbols at one state, (N, N)."""

@@ -1,6 +1,6 @@
 """Findings about a robot description that loads: what is doubtful in it, and the remedy, one sentence each.
 
-A refusal (`urdf.py`) is for what has no meaning; a finding is for what has one that is hardly meant. Criteria and
+A refusal (`urdf.py`) is for what has no meaning; a finding is for what has one that is hardly intended. Criteria and
 reasons are in docs/findings.md. Each function yields the findings of one kind.
 """
 
@@ -14,33 +14,30 @@ import numpy as np
 
 from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.description.couplings import resolve
+from robot_dyn.description.description import Description
+from robot_dyn.description.edits import Edits
 from robot_dyn.description.inertia import implausibility
 from robot_dyn.description.mobile_base import stands_on
-from robot_dyn.description.structure import StatedLink, Structure
+from robot_dyn.description.structure import StatedLink, Structure, structure
 from robot_dyn.errors import shorten
-from robot_dyn.model.conditioning import LEAST_DIGITS, NearlySingular
+from robot_dyn.model.conditioning import LEAST_DIGITS, NearlySingular, Regularity
 
 LONGEST = 1e4  # [m], and of a mimic's multiplier: the digits that a sum of lengths of 1e-12 of it leaves
 LIGHTEST = 1e-12  # [kg]
 _LISTED = 6  # names in a finding
 
 
-def findings(
-    structure: Structure, joint_without_inertia: str | None = None, near: NearlySingular | None = None
-) -> tuple[str, ...]:
-    """What is doubtful in a description with its edits, in words: where, what and the remedy; the gravest first.
-
-    Args:
-        structure: The description with its edits.
-        joint_without_inertia: The joint at which M is singular at every configuration, if there is one.
-        near: What M leaves of the digits of forward dynamics, if it is few.
-    """
+def findings_of(description: Description, edits: Edits, regularity: Regularity) -> tuple[str, ...]:
+    """What is doubtful in a description, then in the robot with its edits: where, what, and the remedy."""
     kinds = (
         massless_bodies, moments_without_mass, impossible_inertias, tiny_masses, long_lengths, large_ratios,
         welded_base, zero_limits, equal_limits, impossible_inertias_of_the_base,
     )  # fmt: skip
-    found = (finding for kind in kinds for finding in kind(structure))
-    return (*no_inertia_about_axis(structure, joint_without_inertia), *found, *hardly_any_inertia(near))
+    robot = structure(description, edits)
+    of_kinds = (finding for kind in kinds for finding in kind(robot))
+    joint = None if regularity.near else regularity.joint
+    singular, near = no_inertia_about_axis(robot, joint), hardly_any_inertia(regularity.near)
+    return (*description.findings, *singular, *of_kinds, *near)
 
 
 def impossible_inertias(robot: Structure) -> Iterator[str]:

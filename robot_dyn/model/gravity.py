@@ -1,12 +1,13 @@
-"""Gravity as a robot feels it: whether N(q) = ∂V/∂q is zero at every q, as of an arm that moves in a level plane."""
+"""Whether gravity acts on the joints: N(q) = ∂V/∂q is zero at every q for an arm that moves in a horizontal plane."""
 
 from __future__ import annotations
 
+import warnings
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from robot_dyn.errors import RobotDynError
+from robot_dyn.errors import ModelWarning, RobotDynError
 
 if TYPE_CHECKING:
     from robot_dyn.model.robot import Robot
@@ -28,7 +29,14 @@ def gravity_acts(robot: Robot) -> bool:
 
 
 def no_torque(gravity: tuple[float, float, float]) -> str:
-    """What to tell of a robot on which a gravity does not act."""
+    """The remark on a robot on which a gravity does not act."""
     if not any(gravity):
         return "gravity is zero, so N(q) = 0"
     return f"gravity {gravity} m/s² has no torque on any joint at any position, so N(q) = 0"
+
+
+def warn_without_torque(robot: Robot) -> None:
+    """Warn, at the line that calls the caller, if gravity is not zero and has no torque on any joint."""
+    if any(robot.edits.gravity) and not gravity_acts(robot):
+        remedy = "give its direction in base axes, or (0, 0, 0)"
+        warnings.warn(f"{robot.name}: {no_torque(robot.edits.gravity)}; {remedy}", ModelWarning, stacklevel=3)

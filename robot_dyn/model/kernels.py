@@ -1,6 +1,6 @@
-"""Kernels: calls of Pinocchio for one state of all joints, and how they are asked for coupled ones and for a batch.
+"""Kernels: calls of Pinocchio for one state of all joints that need a line of their own.
 
-x = reduce(kernel(S q + s₀, S v, …))  for each state
+A kernel takes (model, data, q, …) and returns a fresh array, or a number; `data` is Pinocchio's working memory.
 """
 
 from __future__ import annotations
@@ -9,31 +9,23 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy import ndarray
 
 from robot_dyn.description.couplings import Couplings
 from robot_dyn.model.coriolis import Coriolis
 from robot_dyn.model.coriolis import jacobian_rate as rate_of
-from robot_dyn.queries.dynamics import Axes
+from robot_dyn.queries.dynamics import Axes, entry
 from robot_dyn.spatial import hat
 
-Kernel = Callable[..., Any]  # (model or Coriolis, data, q, …) → a fresh array, or a number
-Reduction = Callable[[Couplings, Any], Any]  # of answers of all joints, by virtual work
+Kernel = Callable[..., Any]  # its model may be a `Coriolis`
 
 
 class Scratch(threading.local):
-    """Pinocchio's scratch memory, one for each thread that asks."""
+    """Pinocchio's working memory, one for each thread."""
 
     def __init__(self, model: Any) -> None:
         self.data = model.createData()
-
-
-def frozen(x: ndarray) -> ndarray:
-    """x, read-only from now on."""
-    x.setflags(write=False)
-    return x
 
 
 def coriolis_transpose(coriolis: Coriolis, data: Any, q: ndarray, v: ndarray) -> ndarray:
@@ -55,6 +47,32 @@ def regressor(model: Any, data: Any, q: ndarray, v: ndarray, a: ndarray) -> ndar
     """Regressor of the torques of all joints, its bodies as in the model; Pinocchio gives a flat one of one joint."""
     Y = pin.computeJointTorqueRegressor(model, data, q, v, a)
     return Y if Y.ndim == 2 else Y.reshape(len(q), -1)
+
+
+def regressor_of_coordinates(order: list[int], couplings: Couplings, Y: ndarray) -> ndarray:
+    """The regressor of all joints, (..., N, 10 N), reduced to q, its bodies in the order of their parameters."""
+    N = len(order)
+    return couplings.rows(Y.reshape(*Y.shape[:-1], N, -1)[..., order, :].reshape(Y.shape))
+
+
+class FrameKernels:
+    """Kernels of frames, each built once.
+
+    Args:
+        frames: Indices of the frames in the model, by name.
+    """
+
+    def __init__(self, frames: dict[str, int]) -> None:
+        self._frames, self._cached = frames, {}
+
+    def __call__(self, build: Callable[..., Kernel], frame: str, *axes: str) -> Kernel:
+        """The kernel that `placement`, `jacobian` or `jacobian_rate` builds for a frame; QueryError if unknown."""
+        try:
+            return self._cached[build, frame, axes]
+        except (KeyError, TypeError):  # TypeError: the name is not hashable
+            pass
+        kernel = build(entry(self._frames, frame), *map(Axes.of, axes))
+        return self._cached.setdefault((build, frame, axes), kernel)
 
 
 def placement(frame: int) -> Kernel:
@@ -85,7 +103,7 @@ def jacobian(frame: int, axes: Axes) -> Kernel:
 
 
 def jacobian_rate(frame: int, axes: Axes) -> Kernel:
-    """Its time derivative."""
+    """Time derivative of the Jacobian of a frame."""
 
     def kernel(model: Any, data: Any, q: ndarray, v: ndarray) -> ndarray:
         if axes is Axes.WORLD:
@@ -111,27 +129,3 @@ def _rotation(model: Any, data: Any, frame: int, q: ndarray) -> ndarray:
 def _turned(R: ndarray, J: ndarray) -> ndarray:
     """diag(R, R) J."""
     return (R @ J.reshape(2, 3, -1)).reshape(6, -1)
-
-
-def by_state(
-    kernel: Kernel, reduce: Reduction | None, model: Any, data: Any, couplings: Couplings
-) -> Callable[..., ndarray]:
-    """The equation (q, …) → answers of a kernel, asked state by state of a batch, with the positions of all joints.
-
-    Args:
-        kernel: The call of Pinocchio for one state of all joints.
-        reduce: How its result is reduced to q, or None if it has no axis of joints.
-        model: The model of all joints, or what else the kernel takes.
-        data: Its scratch memory.
-        couplings: How all joints follow q.
-    """
-
-    def equation(q: ndarray, *rates: ndarray) -> ndarray:
-        full = [couplings.position(q), *(couplings.velocity(x) for x in rates)]
-        batch = np.broadcast_shapes(*(x.shape[:-1] for x in full))
-        rows = [np.broadcast_to(x, (*batch, x.shape[-1])).reshape(-1, x.shape[-1]) for x in full]
-        answers = np.array([kernel(model, data, *row) for row in zip(*rows, strict=True)])
-        answers = answers.reshape(batch + answers.shape[1:])
-        return answers if reduce is None else reduce(couplings, answers)
-
-    return equation

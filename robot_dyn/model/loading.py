@@ -40,6 +40,6 @@ def load(
     else:
         from robot_dyn.description.xacro import expand
 
-        text, said = expand(path, xacro, package_dirs)
-        description = check(text, source=str(path), findings=said)
+        text, warnings = expand(path, xacro, package_dirs)
+        description = check(text, source=str(path), findings=warnings)
     return Robot(description).announced()

@@ -14,7 +14,6 @@ from robot_dyn.description.couplings import Couplings, Mimic, resolve
 from robot_dyn.description.description import Description
 from robot_dyn.description.edits import Edits
 from robot_dyn.description.structure import stated_mimics
-from robot_dyn.description.urdf import UNBOUNDED
 from robot_dyn.errors import DescriptionError, EditError, nearest
 
 MAX_MOVING = 250  # Pinocchio's scratch memory for n joints has 63 n³ bytes: 1 GB
@@ -61,7 +60,7 @@ def _state(robot: Any, edits: Edits) -> None:
     known = [name for name, inertial in links.items() if inertial is not None]
     for what, names in (("masses", dict(edits.masses)), ("inertias", dict(edits.inertias))):
         for name in names.keys() - set(known):
-            raise EditError(f"{what}: no link {name!r} of which the file states a mass; {nearest(name, known)}")
+            raise EditError(f"{what}: no link {name!r} with a mass in the file; {nearest(name, known)}")
     for name, mass in edits.masses:
         links[name].find("mass").set("value", repr(float(mass)))
     for name, inertia in edits.inertias:
@@ -70,7 +69,7 @@ def _state(robot: Any, edits: Edits) -> None:
 
 
 def _unmark(model: Any) -> None:
-    """Give the joints their own names again."""
+    """Restore the names of the joints."""
     for i, name in enumerate(model.names):
         model.names[i] = name.removeprefix(_MARK)
     for frame in model.frames:
@@ -126,12 +125,3 @@ def _couplings(joints: tuple[str, ...], mimics: dict[str, Mimic]) -> tuple[Coupl
 def link_frames(model: Any) -> dict[str, int]:
     """Index of the frame of each link, by name."""
     return {frame.name: i for i, frame in enumerate(model.frames) if frame.type == pin.FrameType.BODY}
-
-
-def per_joint(model: Any, joint_names: tuple[str, ...], full: np.ndarray) -> np.ndarray:
-    """The entries of some joints, ±inf where the file states none; read-only."""
-    ids = joint_ids(model)
-    values = full[[model.idx_vs[ids[name]] for name in joint_names]]
-    values[np.abs(values) >= float(UNBOUNDED)] *= np.inf
-    values.setflags(write=False)
-    return values

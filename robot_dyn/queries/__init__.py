@@ -1,1 +1,5 @@
-"""What every implementation answers: the Dynamics protocol, its quantities, units and batches."""
+"""What every implementation answers.
+
+dynamics: the `Dynamics` protocol and `Axes` · quantity: its quantities as values · batch: states without an answer
+units: SI units of joints, and numbers with their units as texts
+"""

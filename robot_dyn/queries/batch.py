@@ -1,6 +1,6 @@
 """Batches: a query answers every state, or names the first that has no answer; errors="nan" answers the others.
 
-A batch is asked for as a whole. Only if it is refused is it halved until the states without an answer stand alone.
+A batch is evaluated as a whole. Only if that fails is it halved, until the states without an answer are found.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _REFUSALS = (NotFiniteError, OverflowedError, SingularError)  # of a state; all 
 
 
 class DoubtError(RobotDynError):
-    """Internal: some state of a batch needs to be asked by itself."""
+    """Internal: some state of a batch must be evaluated by itself."""
 
 
 def answered(
@@ -60,7 +60,7 @@ def answered(
 
     if 0 in batch:
         return np.zeros((*batch, *shape), dtype=arithmetic.dtype)
-    with np.errstate(all="ignore"):  # what overflows is told in words
+    with np.errstate(all="ignore"):  # overflow is reported by an error
         try:
             return attempt(*arrays.values())
         except (*_REFUSALS, DoubtError):
@@ -69,11 +69,11 @@ def answered(
         rows = [np.broadcast_to(x, (*batch, x.shape[-1])).reshape(-1, x.shape[-1]) for x in arrays.values()]
         result = np.full((len(rows[0]), *shape), arithmetic.number("nan"), dtype=arithmetic.dtype)
         _halved(attempt, rows, result, 0, len(result), batch, errors)
-        _at_once(attempt, rows, result, arithmetic)
+        _together(attempt, rows, result, arithmetic)
     return result.reshape((*batch, *shape))
 
 
-def _at_once(attempt: Callable[..., Array], rows: list[Array], result: Array, arithmetic: Arithmetic) -> None:
+def _together(attempt: Callable[..., Array], rows: list[Array], result: Array, arithmetic: Arithmetic) -> None:
     """Answer the states that have an answer in one batch, another state in place of those that have none.
 
     So they are what they would be beside any other states, to the last bit: a kernel may round a part of a batch, or

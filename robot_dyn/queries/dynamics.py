@@ -1,4 +1,4 @@
-"""The protocol that every engine answers: rigid bodies in gravity, M(q) a + C(q, v) v + N(q) = τ, N = ∂V/∂q."""
+"""The protocol of every engine: rigid bodies in gravity, M(q) a + C(q, v) v + N(q) = τ, N = ∂V/∂q."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array, NotPositiveDefiniteError, cholesky_solve, rounding
+from robot_dyn.arithmetic import Array, rounding
 from robot_dyn.errors import OverflowedError, SingularError, UndecidedError, shown
+from robot_dyn.linear_algebra import NotPositiveDefiniteError, cholesky_solve
 from robot_dyn.validate import choice
 
 T = TypeVar("T")
@@ -273,7 +274,7 @@ class Dynamics(Protocol):
             q: Positions, shape (..., n), in [rad] or [m] by joint.
             frame: Name of a link or joint, as of `placement`.
             expressed_in: Axes and point of the twist, "world_aligned" (at the frame's origin, along the base's axes),
-                "body" (along the frame's own axes) or "world" (at the base's origin); or as Pinocchio calls them:
+                "body" (along the frame's axes) or "world" (at the base's origin); or as Pinocchio calls them:
                 "local_world_aligned", "local", "world".
             errors: "raise", or "nan" for NaN in place of the states of a batch that have no answer.
 
@@ -309,7 +310,7 @@ class Dynamics(Protocol):
 
 
 def acceleration(M: Array, tau: Array, joint_names: tuple[str, ...]) -> Array:
-    """Solve M a = τ for M (..., n, n) and what is left of the torque, τ (..., n).
+    """Solve M a = τ for M (..., n, n) and the remaining torque τ (..., n).
 
     Raises:
         SingularError: If M is not positive definite; names the joint. UndecidedError if rounding hides whether it is.
@@ -329,5 +330,5 @@ def acceleration(M: Array, tau: Array, joint_names: tuple[str, ...]) -> Array:
 
 
 def entry(table: Mapping[str, T], frame: str) -> T:
-    """What a table holds for a frame; QueryError with the nearest names if there is no such frame."""
+    """The entry of a table for a frame; QueryError with the nearest names if it is unknown."""
     return table[choice("frame", frame, table)]

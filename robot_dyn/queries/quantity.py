@@ -1,4 +1,4 @@
-"""Quantities of M(q) a + C(q, v) v + N(q) = τ as values: what each is asked with, its shape, and what rounds it.
+"""Quantities of M(q) a + C(q, v) v + N(q) = τ as values: its arguments, its shape, and the terms whose rounding it has.
 
 Engines, machine code, self check, cross-check, command line and tests iterate these values; each engine answers a
 quantity by the method of its name.
@@ -22,7 +22,7 @@ State = Mapping[str, Array]
 
 
 def _no_terms(size: Any, x: State) -> Any:
-    """Of a quantity that no rigid body adds to."""
+    """The terms of a quantity without contributions of rigid bodies."""
     return 0.0
 
 
@@ -38,10 +38,10 @@ class Quantity:
             "p" its inertial parameters.
         terms: Sum of the absolute values of the terms added into each entry, of `lagrange.magnitude.Magnitudes` at q
             and the absolute values of the arguments by name. Where M a = τ is solved, of the entries of that τ.
-        framed: Whether it is asked of a frame.
+        framed: Whether it is a quantity of a frame.
         definite: Whether it is a symmetric positive definite matrix, so that |x_ij| ≤ √(x_ii x_jj).
         solves: Whether M a = τ is solved for it: no answer where M is singular, an error that grows as M's condition.
-        doubtful: Size of a result beyond which M may be singular.
+        doubtful: Size of a result above which M may be singular.
     """
 
     name: str
@@ -58,7 +58,7 @@ class Quantity:
         return tuple(axis if isinstance(axis, int) else sizes[axis] for axis in self.axes)
 
     def ask(self, engine: Any, state: State, *frame: str) -> Any:
-        """What an engine answers at a state, arguments by name."""
+        """The answer of an engine at a state, arguments by name."""
         return getattr(engine, self.name)(*(state[name] for name in self.arguments), *frame)
 
 

@@ -1,4 +1,4 @@
-"""SI units of positions, velocities, accelerations and torques of joints: revolute ones turn, prismatic ones slide."""
+"""SI units of joints, revolute and prismatic, and numbers with their units as texts."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from robot_dyn.coefficients import Coefficient, declared
 
-_NONE = 1e9  # stops beyond it do not exist
+_NONE = 1e9  # a stop farther away does not exist
 _UNITS = {"q": ("rad", "m"), "v": ("rad/s", "m/s"), "a": ("rad/s²", "m/s²"), "tau": ("N m", "N"), "u": ("N m", "N")}
 
 
@@ -35,23 +35,31 @@ def units(quantity: str, joint_types: Iterable[str | None]) -> str:
     return both if both in of_joints else " or ".join(of_joints)
 
 
-def in_words(part: Any, joint_types: Sequence[str | None]) -> dict[str, str]:
+def coefficient_texts(part: Any, joint_types: Sequence[str | None]) -> dict[str, str]:
     """The coefficients of a part on joints of some types, by name: symbol, value and unit, as "b = 0.5 N m s/rad"."""
-    made = {}
+    texts = {}
     for name, each in declared(type(part)).items():
         values, symbol = getattr(part, name), each.symbol.partition(",")[0] or name
-        if values is None or name.startswith("_"):  # a run's own, not its user's
+        if values is None or name.startswith("_"):  # internal to a run
             continue
         if each.of_joints:
             values = np.broadcast_to(values, len(joint_types))
             stated = [_one(x, each, kind) for x, kind in zip(values, joint_types, strict=True)]
-            made[name] = f"{symbol} = {', '.join(stated if len(set(stated)) > 1 else stated[:1])}"
+            texts[name] = f"{symbol} = {', '.join(stated if len(set(stated)) > 1 else stated[:1])}"
         else:
             shown = f"{values:g}" if np.ndim(values) == 0 else np.array2string(np.asarray(values), precision=6)
-            made[name] = f"{symbol} = {shown} {each.unit}".rstrip()
-    return made
+            texts[name] = f"{symbol} = {shown} {each.unit}".rstrip()
+    return texts
 
 
 def _one(x: float, known: Coefficient, kind: str | None) -> str:
-    """A number and its unit; a limit that does not exist is beyond any."""
+    """A number and its unit; for a limit that does not exist, "none"."""
     return "none" if known.infinite and abs(x) >= _NONE else f"{x:g} {of_joint(known.unit, kind)}".rstrip()
+
+
+def format_duration(seconds: float) -> str:
+    """A time in two digits, with its unit."""
+    for size, unit in ((86400.0, "days"), (3600.0, "h"), (60.0, "min"), (1.0, "s"), (1e-3, "ms")):
+        if seconds >= size:
+            return f"{float(f'{seconds / size:.2g}'):g} {unit}"
+    return f"{float(f'{seconds * 1e6:.2g}'):g} µs"

@@ -13,7 +13,7 @@ from robot_dyn.effects.actuator import ActuatorLag, EffortLimit
 from robot_dyn.effects.effect import Effect
 from robot_dyn.errors import RobotDynError
 from robot_dyn.integrate.adaptive import ADAPTIVE
-from robot_dyn.queries.units import in_words
+from robot_dyn.queries.units import coefficient_texts
 from robot_dyn.scene.control import LAWS, Control
 from robot_dyn.scene.declared import Acting, Declared
 from robot_dyn.scene.effects import ACTING, Carried, kind_of
@@ -147,7 +147,7 @@ def _blocks(control: Control) -> Iterator[str]:
 def _in_words(effects: Iterable[Effect], setup: Setup) -> Iterator[str]:
     """Coefficients of the parts of an effect as they act, with units."""
     dynamics: Any = setup.plant.dynamics
-    words = {name: text for effect in effects for name, text in in_words(effect, dynamics.joint_types).items()}
+    words = {name: text for effect in effects for name, text in coefficient_texts(effect, dynamics.joint_types).items()}
     if words:
         yield f"    as it acts: {'; '.join(words.values())}"
 

@@ -13,13 +13,12 @@ from pydantic import ValidationError, WrapValidator
 from robot_dyn.effects.effect import Effect
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import RobotDynError, SceneError, nearest, shorten
-from robot_dyn.files import Kind
+from robot_dyn.files import Kind, read
 from robot_dyn.integrate.adaptive import ADAPTIVE, Adaptive
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.integrate.methods import METHODS, method
 from robot_dyn.model.loading import load
 from robot_dyn.model.robot import Robot
-from robot_dyn.reading import read
 from robot_dyn.scene.complaint import complaint, located, where
 from robot_dyn.scene.control import AnyReference, Control, Hold, Sampled, ViaPoints
 from robot_dyn.scene.declared import Acting

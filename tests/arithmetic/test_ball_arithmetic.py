@@ -1,4 +1,4 @@
-"""Ball arithmetic: M, C, N with a proven radius, against which the rounding of each implementation is held."""
+"""Ball arithmetic: M, C, N with a proven radius, and the rounding of each implementation in floats against them."""
 
 from __future__ import annotations
 

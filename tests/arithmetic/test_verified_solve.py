@@ -9,9 +9,9 @@ import pytest
 from flint import arb, ctx
 
 import robot_dyn as rd
-from robot_dyn.arithmetic import NotPositiveDefiniteError, cholesky_solve
 from robot_dyn.errors import UndecidedError
 from robot_dyn.lagrange.recursions.articulated_body import articulated_body
+from robot_dyn.linear_algebra import NotPositiveDefiniteError, cholesky_solve
 
 LINK = """
 <link name="link_{i}"><inertial><origin xyz="0.25 0 0"/><mass value="1.3"/>

@@ -52,7 +52,7 @@ def test_simulate_prints_a_summary_and_keeps_the_run(scene, tmp_path) -> None:
         (["-o", "run.npz", "--csv", "run.npz"], r"run\.npz: '\.npz' is not the suffix of a table.*"),
         (["-o", "link.npz", "--force"], r"link\.npz: is the same file as .*scene\.toml, which would be lost.*"),
         (["-o", "run.npz", "--csv", "to_run.csv"], r"to_run\.csv: is the same file as run\.npz.*"),
-        (["-o", "none/run.npz"], r"none/run\.npz: there is no folder .*/none; make it first.*"),
+        (["-o", "none/run.npz"], r"none/run\.npz: there is no folder .*/none; create it first.*"),
         (["-o", "old.npz"], r"old\.npz: exists; add --force to replace it.*"),
         (["--csv", "old.npz.csv"], r"old\.npz\.csv: exists; add --force.*"),
         (["--csv", "other.csv", "--force"], r"other\.csv: is not a table of a run, so it is not replaced.*"),

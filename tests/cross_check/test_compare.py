@@ -69,8 +69,8 @@ def test_edited_robots_agree(name: str) -> None:
         ("armature", lambda a: a + 1e-11, {"M", "momentum", "kinetic_energy"}),
     ],
 )
-def test_a_implementation_that_errs_by_1e_11_is_caught(monkeypatch, member: str, change, quantities: set[str]) -> None:
-    """One number of the own implementation moved by 1e-11 of its size: what depends on it is named, nothing else."""
+def test_an_implementation_that_errs_by_1e_11_is_caught(monkeypatch, member: str, change, quantities: set[str]) -> None:
+    """One number moved by 1e-11 of its size: only quantities that depend on it are named."""
     robot = rd.load("planar_2r").with_(gravity=(0.3, 0.5, -9.0))
     whole = Lagrangian.linkage.func  # pyright: ignore[reportFunctionMemberAccess]
 

@@ -108,7 +108,7 @@ def test_other_masses_are_kept_in_run_files(tmp_path) -> None:
         ({"masses": {LINK: 0.0}}, "mass of 'left_lower' must be positive"),
         (
             {"masses": {"left_lowr": 1.0}},
-            "no link 'left_lowr' of which the file states a mass; nearest: left_lower",
+            "no link 'left_lowr' with a mass in the file; nearest: left_lower",
         ),
         ({"masses": 2.0}, "masses must give values by link name"),
         ({"inertias": {LINK: np.diag([1.0, 1.0, 3.0])}}, "no body has it, its inertia breaks the triangle inequality"),

@@ -61,7 +61,7 @@ KINDS = [
     Kind("a link to an endless device", link_to("/dev/zero"), NOT_REGULAR),
     Kind("a dangling link", link_to("nowhere"), NO_FILE),
     Kind("a link to itself", link_to("robot.urdf"), NO_FILE),
-    Kind("a file that fails when read", at("/proc/self/mem"), ("cannot be read (Input/output error); check",)),
+    Kind("a file that fails when read", at("/proc/self/mem"), ("cannot be read (Input/output error); give the path",)),
     Kind("a path longer than the system takes", lambda path: path.with_name("x" * 300 + ".urdf"),
          ("no file", "File name too long", "give the path of a URDF file")),
     Kind("a path with a NUL", lambda path: path.with_name("a\0.urdf"), ("no file",)),

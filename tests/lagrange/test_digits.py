@@ -108,7 +108,7 @@ def test_digits_that_a_lever_of_1000_km_costs_are_seen() -> None:
     x = state(robot)
     assert robot.digits("forward_dynamics", x["q"], x["v"], x["tau"]) < 11
     assert robot.digits("M", x["q"]) > 14
-    with pytest.warns(rd.PrecisionWarning, match=r"^forward_dynamics of far has 10\.\d digits, fewer than 13; ask rd"):
+    with pytest.warns(rd.PrecisionWarning, match=r"^forward_dynamics of far has 10\.\d digits, fewer than 13; use rd"):
         robot.warn_below(13).forward_dynamics(x["q"], x["v"], x["tau"])
 
 
@@ -187,8 +187,8 @@ def test_the_estimate_is_no_less_than_the_error() -> None:
     ("ask", "message"),
     [
         (lambda robot, q: robot.digits("m", q), "no quantity 'm'; nearest: M.*"),
-        (lambda robot, q: robot.digits("M", q, q), "digits of M are asked with q; got 2 of them"),
-        (lambda robot, q: robot.digits("C", q), "digits of C are asked with q, v; got 1 of them"),
+        (lambda robot, q: robot.digits("M", q, q), "digits of M take q; got 2 of them"),
+        (lambda robot, q: robot.digits("C", q), "digits of C take q, v; got 1 of them"),
         (lambda robot, q: robot.digits("N", [q, q]), r"digits are counted at one state: q must have .* got \(2, 2\)"),
         (lambda robot, q: robot.digits("N", [0.1, np.inf]), "q .* finite.*|q: .*inf.*"),
         (lambda robot, q: robot.warn_below(0), "digits must be positive, got 0.0"),

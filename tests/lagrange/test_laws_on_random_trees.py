@@ -49,7 +49,7 @@ def test_the_implementations_agree(tree: RandomTree, seed: int) -> None:
 
 @law(8, 40)
 def test_mass_matrix_is_symmetric_positive_definite(tree: RandomTree, seed: int) -> None:
-    """Both implementations: to rounding (u on the scale of the entry); least eigenvalue of D M D above its rounding."""
+    """Both implementations. Symmetric to u on the scale of the entry; least eigenvalue of D M D above its rounding."""
     robot = tree.robot
     q, *_ = state_of(robot, seed)
     for engine in (robot, rd.Lagrangian(robot)):

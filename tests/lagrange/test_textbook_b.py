@@ -195,7 +195,7 @@ def uniform_bars(rng: np.random.Generator | None) -> tuple[np.ndarray, np.ndarra
 
 
 def test_b5_planar_2r_arm_from_its_energies_is_the_closed_form_and_the_urdf() -> None:
-    """M, C, N of equations.md at random bars, and of urdf/planar_2r by both implementations; sign of ẋ₂ too; 1e-13."""
+    """M, C, N of equations.md at random bars and of urdf/planar_2r by both implementations; sign of ẋ₂; 1e-13."""
     rng = np.random.default_rng(5)
     q, v = rng.uniform(-3, 3, (2, COUNT, 2))
     (q1, q2), (v1, v2) = q.T, v.T

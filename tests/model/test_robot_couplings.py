@@ -92,7 +92,7 @@ def test_where_rounding_hides_the_joints_that_follow_the_state_is_refused(implem
 @pytest.mark.filterwarnings("ignore::robot_dyn.ModelWarning")
 @pytest.mark.parametrize("name", ["solo", "panda"])
 def test_far_out_a_joint_that_nothing_rounds_is_where_it_is(name: str) -> None:
-    """Solo: joints are numbered in two orders, and no joint follows; fingers of the Panda follow as they are."""
+    """Solo: the implementations number joints in two orders and none follows; the fingers of the Panda follow."""
     robot = rd.load(name)
     q = 1e16 * np.random.default_rng(7).uniform(0.3, 1, robot.n)
     allowed = 64 * robot.n * 2.0**-53  # two implementations, 32 n u each

@@ -19,8 +19,8 @@ from robot_dyn.cli import studies
 from robot_dyn.errors import QueryError
 from robot_dyn.integrate.explicit import ExplicitRungeKutta
 from robot_dyn.integrate.tableau import ButcherTableau
+from robot_dyn.queries.units import format_duration
 from robot_dyn.result import json_text
-from robot_dyn.seconds import format_duration
 from robot_dyn.studies.budget import Budget, Limit
 from robot_dyn.studies.work_precision_diagram.measurement import Rung, Walk, measure
 from robot_dyn.studies.work_precision_diagram.method_under_test import MethodUnderTest, own, recorded, whole

@@ -34,7 +34,7 @@ _BUILTIN = {
 # Modules whose functions and classes are identified by their names: they give equal values in every process.
 _PURE = {"abc", "cmath", "dataclasses", "math", "numpy", "numpy.linalg", "typing"}
 _PURE_ROOMS = (
-    "arithmetic", "coefficients", "control", "effects", "errors", "lagrange", "recursive", "spatial",
+    "arithmetic", "coefficients", "control", "effects", "errors", "lagrange", "linear_algebra", "spatial",
     "threshold", "values",
 )  # fmt: skip
 # Functions of NumPy that read or write a file, a clock, a setting or uninitialised memory.

@@ -22,7 +22,7 @@ from robot_dyn.effects.carried_payload import CarriedPayload
 from robot_dyn.effects.effect import Active, Bound, Conservative, Drive, Effect, Stateful
 from robot_dyn.effects.plant import Plant
 from robot_dyn.effects.set_valued import Mode, SetValued
-from robot_dyn.foreign import because
+from robot_dyn.errors import because
 
 _INTERPRETED = "ask the plant itself, or simulate it"
 REMEDY = "write it in robot_dyn.arithmetic and NumPy's operators, or take engine='interpreted'"

@@ -58,9 +58,9 @@ def articulated_body(linkage: Linkage, q: Array, v: Array, tau: Array) -> Array:
     free_fall = np.concatenate([-linkage.gravity, np.zeros_like(linkage.gravity)])
     for i, body in enumerate(linkage.bodies):
         given = X[i].twist(free_fall if body.parent == BASE else A[body.parent]) + bias[i]
-        own = (u[i] - apply(U[i][..., None, :], given)) / d[i]
-        A.append(given + own * body.screw)
-        a[..., i] = own[..., 0]
+        joint = (u[i] - apply(U[i][..., None, :], given)) / d[i]
+        A.append(given + joint * body.screw)
+        a[..., i] = joint[..., 0]
     return a @ S
 
 

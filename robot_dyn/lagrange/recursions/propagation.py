@@ -21,8 +21,8 @@ def twists(linkage: Linkage, steps: list[Step], v: Array) -> list[Array]:
     """V of each body, (..., 6), from the rates of all joints, v (..., N)."""
     V: list[Array] = []
     for i, body in enumerate(linkage.bodies):
-        own = v[..., i, None] * body.screw
-        V.append(own if body.parent == BASE else steps[i].twist(V[body.parent]) + own)
+        relative = v[..., i, None] * body.screw
+        V.append(relative if body.parent == BASE else steps[i].twist(V[body.parent]) + relative)
     return V
 
 

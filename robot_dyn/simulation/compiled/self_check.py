@@ -15,8 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.errors import RobotDynError
-from robot_dyn.foreign import because
+from robot_dyn.errors import RobotDynError, because
 from robot_dyn.integrate.differences import INSIDE, by_state, by_time, rowwise
 from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
 from robot_dyn.simulation.compiled.functions import STEP, States

@@ -14,8 +14,7 @@ import numpy as np
 
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.effect import Force
-from robot_dyn.errors import RobotDynError
-from robot_dyn.foreign import call
+from robot_dyn.errors import RobotDynError, call
 from robot_dyn.simulation.dynamics.declarations import named
 from robot_dyn.simulation.dynamics.smoothness import LOOKS, extremes
 from robot_dyn.simulation.dynamics.state_equation import StateEquation

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.coefficients import cached
+from robot_dyn.coefficients import cached_properties
 from robot_dyn.control.controller import Controller
 from robot_dyn.control.digital_loop.block import Block
 from robot_dyn.control.reference import Reference
@@ -97,7 +97,7 @@ def _of_no_file(dynamics: Any) -> str:
 
 def attributes(part: Any) -> tuple[str, ...]:
     """Names of the attributes that it depends on; what is cached follows from them."""
-    follows = cached(part)
+    follows = cached_properties(part)
     own = (name for name in getattr(part, "__dict__", ()) if name not in follows)
     return tuple(dict.fromkeys([*_fields(type(part)), *own]))
 

@@ -20,8 +20,7 @@ import numpy as np
 from robot_dyn.arithmetic import Array
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.plant import Plant
-from robot_dyn.errors import RobotDynError
-from robot_dyn.foreign import call
+from robot_dyn.errors import RobotDynError, call
 from robot_dyn.integrate.differences import by_state, rowwise
 from robot_dyn.simulation.dynamics.fastest_motion import jacobian
 from robot_dyn.simulation.dynamics.stability import NO_BOUND, STILL, Growth, Stability, first_unstable, growth, lengths

@@ -22,8 +22,7 @@ from robot_dyn.effects.effect import Bound, Conservative, Stateful
 from robot_dyn.effects.equation_of_motion import EquationOfMotion
 from robot_dyn.effects.plant import Plant, carrying, in_mode
 from robot_dyn.effects.set_valued import Mode
-from robot_dyn.errors import RobotDynError
-from robot_dyn.foreign import call
+from robot_dyn.errors import RobotDynError, call
 from robot_dyn.queries.dynamics import acceleration
 from robot_dyn.values import Caching
 

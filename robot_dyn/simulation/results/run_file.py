@@ -15,8 +15,7 @@ from typing import Any, Generic, TypeVar, final
 import numpy as np
 
 from robot_dyn.errors import RobotDynError, shorten
-from robot_dyn.files import Kind, save, target
-from robot_dyn.reading import file_path, reading
+from robot_dyn.files import Kind, file_path, reading, save, target
 from robot_dyn.simulation.results.archive import DIGEST, Archive, ArchiveError, Header, write
 from robot_dyn.simulation.results.provenance import packed, unpacked
 from robot_dyn.simulation.results.serialise import (

@@ -12,8 +12,7 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.errors import RobotDynError
-from robot_dyn.foreign import is_mistake
+from robot_dyn.errors import RobotDynError, is_mistake
 from robot_dyn.integrate import hermite
 from robot_dyn.integrate.adaptive import STEPPERS
 from robot_dyn.integrate.bernstein import room

@@ -8,8 +8,7 @@ from typing import TypeVar, final
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.errors import RobotDynError
-from robot_dyn.foreign import is_mistake
+from robot_dyn.errors import RobotDynError, is_mistake
 from robot_dyn.integrate.integrator import IntegrationError, Integrator, System
 from robot_dyn.simulation.dynamics.fastest_motion import fastest
 from robot_dyn.simulation.dynamics.state_equation import StateEquation

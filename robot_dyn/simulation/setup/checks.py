@@ -11,11 +11,10 @@ import numpy as np
 from robot_dyn.arithmetic import Array
 from robot_dyn.effects.plant import Plant
 from robot_dyn.effects.rigid_stops import RigidStops
-from robot_dyn.errors import ControlError, EffectError, OverflowedError, QueryError, shown
-from robot_dyn.foreign import call
+from robot_dyn.errors import ControlError, EffectError, OverflowedError, QueryError, call, shown
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.simulation.setup.size import MOST_CUT
-from robot_dyn.validate import number, returned
+from robot_dyn.validate import Kind, float64, number
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.setup.setup import Setup
@@ -127,7 +126,7 @@ def _check_torques(setup: Setup) -> None:
     with np.errstate(all="ignore"):
         torques = setup.plant.equation_of_motion.torques(0.0, setup.q0, setup.v0)
         for force, torque in zip(setup.plant.forces, torques, strict=True):
-            returned(f"{type(force).__name__}.torque", torque, dynamics.n, error=EffectError)
+            _check_returned(f"{type(force).__name__}.torque", torque, dynamics.n, error=EffectError)
             if any(each.of_actuation for each in force.thresholds(dynamics.n)):
                 raise EffectError(f"{force.name}: thresholds of the actuation are for bounds")
         equation = setup.plant.equation_of_motion
@@ -136,7 +135,7 @@ def _check_torques(setup: Setup) -> None:
         names = (type(setup.plant.effects[k]).__name__ for k in equation.states)
         rates = equation.state_rates(0.0, setup.q0, setup.v0, u, reached, z)
         for name, (place, rate) in zip(names, rates, strict=True):
-            returned(f"{name}.state_rate", rate, place.stop - place.start, "state", error=EffectError)
+            _check_returned(f"{name}.state_rate", rate, place.stop - place.start, "state", error=EffectError)
 
 
 def _check_control(setup: Setup) -> None:
@@ -147,11 +146,11 @@ def _check_control(setup: Setup) -> None:
     with np.errstate(all="ignore"), suppress(OverflowedError):  # of its model: the outcome of a run
         start = 0.0, setup.q0, setup.v0, np.zeros(controller.state_size)
         torque = call(controller.torque, *start)
-        returned(f"{controller.name}.torque", torque, n, error=ControlError)
+        _check_returned(f"{controller.name}.torque", torque, n, error=ControlError)
         if controller.state_size:
             after = controller.next_state if controller.period_s else controller.state_rate
             what = f"{controller.name}.{after.__name__}"
-            returned(what, call(after, *start), controller.state_size, "state", error=ControlError)
+            _check_returned(what, call(after, *start), controller.state_size, "state", error=ControlError)
 
 
 def _check_events(setup: Setup) -> None:
@@ -178,3 +177,17 @@ def least_accuracy(given: Any, dynamics: Dynamics) -> float:
     if missing := [unit for unit in units if unit not in given]:
         raise QueryError(f"accuracy: none is given for joints in {missing[0]}, got {shown(dict(given))}; add it")
     return min(number(f"accuracy in {unit}", given[unit], above=0) for unit in units)
+
+
+def _check_returned(what: str, values: Any, n: int, of: str = "joint", *, error: Kind) -> None:
+    """Raise the error unless a function returned n finite numbers, shape (n,); `what` is its name."""
+    try:
+        array = float64(values)
+        found = f"shape {array.shape}" if array.shape != (n,) else ""
+        if not (found or np.isfinite(array).all()):
+            found = str(array[~np.isfinite(array)][0])
+    except ValueError as problem:
+        found = str(problem)
+    if found:
+        count = f"{n} {of}{'s' if n > 1 else ''}"
+        raise error(f"{what} returned {found} for {count} at the start; it must be finite numbers of shape ({n},)")

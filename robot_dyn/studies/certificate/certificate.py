@@ -8,8 +8,8 @@ from math import log10, nan
 from typing import Any, ClassVar, final
 
 from robot_dyn.errors import QueryError
+from robot_dyn.queries.units import format_duration
 from robot_dyn.result import Result, reported
-from robot_dyn.seconds import format_duration
 from robot_dyn.validate import choice
 
 DECIMALS = "decimals of the file as float64"  # the implementation that computes exactly with these

@@ -10,8 +10,8 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import RobotDynError
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import Dynamics
+from robot_dyn.queries.units import format_duration
 from robot_dyn.result import Result, reported
-from robot_dyn.seconds import format_duration
 from robot_dyn.simulation.results.acting import acting
 from robot_dyn.simulation.setup.options import setup_of, starts
 from robot_dyn.simulation.setup.setup import Setup

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from robot_dyn.seconds import format_duration
+from robot_dyn.queries.units import format_duration
 from robot_dyn.studies.costs.ab_comparison import ABComparison
 from robot_dyn.studies.costs.cost import Cost
 from robot_dyn.studies.costs.step_cost import EVERYTHING

@@ -15,9 +15,8 @@ from robot_dyn.errors import QueryError, RobotDynError
 from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, STIFF
 from robot_dyn.integrate.methods import METHODS, as_method
 from robot_dyn.queries.dynamics import Dynamics
-from robot_dyn.queries.units import units
+from robot_dyn.queries.units import format_duration, units
 from robot_dyn.result import Result, reported
-from robot_dyn.seconds import format_duration
 from robot_dyn.simulation.compiled.engine_choice import choose
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.results.acting import acting

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from robot_dyn.queries.units import units
-from robot_dyn.seconds import format_duration
+from robot_dyn.queries.units import format_duration, units
 from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.trajectory import Trajectory
 

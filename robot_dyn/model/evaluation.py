@@ -1,0 +1,139 @@
+"""Evaluation of Pinocchio's kernels: one state directly, coupled joints by virtual work, lists and batches row by row.
+
+    x = reduce(kernel(S q + s₀, S v, …))  for each state
+
+What is not one state of moderate float64 numbers is checked, converted and evaluated by `queries.batch`.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, final
+
+import numpy as np
+import pinocchio as pin  # pyright: ignore[reportMissingImports]
+from numpy import ndarray
+
+from robot_dyn.description.couplings import Couplings
+from robot_dyn.errors import PrecisionWarning
+from robot_dyn.model.conditioning import Regularity, regularity
+from robot_dyn.model.kernels import Kernel
+from robot_dyn.model.mechanism import Mechanism
+from robot_dyn.queries.batch import answered
+from robot_dyn.queries.dynamics import Array, acceleration
+from robot_dyn.queries.quantity import ALL, DOUBTFUL
+from robot_dyn.validate import is_moderate, is_plain, shaped
+
+if TYPE_CHECKING:
+    from robot_dyn.model.robot import Robot
+
+Reduction = Callable[[Couplings, Any], Any]  # from the answer for all joints to that for q
+
+
+@final
+class Evaluation:
+    """Evaluates kernels for one mechanism."""
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self._mechanism, self._shape = mechanism, (mechanism.n,)
+        self._couplings, self._scratch = mechanism.couplings, mechanism.scratch
+
+    @cached_property
+    def regularity(self) -> Regularity:
+        """Whether M can be solved for, judged at a configuration without symmetries."""
+        M = self._equation(pin.crba, Couplings.matrix, self._mechanism.model)(np.linspace(0.3, 0.9, self._mechanism.n))
+        return regularity(M, self._mechanism.joint_names)
+
+    def answer(
+        self, quantity: str, errors: str, kernel: Kernel, reduce: Reduction | None, model: Any, *state: Array
+    ) -> Any:
+        """The answers of a kernel at one state or a batch.
+
+        Args:
+            quantity: Its name.
+            errors: "raise", or "nan" for NaN in place of the states of a batch that have no answer.
+            kernel: The call of Pinocchio for one state of all joints.
+            reduce: How its result is reduced to q, or None if it has no axis of joints.
+            model: What the kernel takes as its model.
+            *state: Its arguments, (..., n) each.
+        """
+        if errors.__class__ is str and errors == "raise":
+            shape, couplings = self._shape, self._couplings
+            for x in state:
+                if not is_plain(x, shape):
+                    break
+            else:
+                if couplings.trivial:
+                    return kernel(model, self._scratch.data, *state)
+                return self._coupled(kernel, reduce, model, *state)
+        return self._answered(quantity, errors, self._equation(kernel, reduce, model), state)
+
+    def forward_dynamics(self, errors: str, q: Array, v: Array, tau: Array) -> ndarray:
+        """M⁻¹ (τ − C v − N): by ABA, and with coupled joints by factorising M; raises where M is singular."""
+        if self.regularity.singular is not None:
+            raise self.regularity.singular()
+        model, names, trivial = self._mechanism.model, self._mechanism.joint_names, self._couplings.trivial
+        if not trivial and all(is_plain(x, self._shape) for x in (q, v, tau)):
+            inertia = self._coupled(pin.crba, Couplings.matrix, model, q)
+            bias = self._coupled(pin.nonLinearEffects, Couplings.torque, model, q, v)
+            a = acceleration(inertia, tau - bias, names)
+            if is_moderate(a, DOUBTFUL):
+                return a
+        M = self._equation(pin.crba, Couplings.matrix, model)
+        bias_of = self._equation(pin.nonLinearEffects, Couplings.torque, model)
+        solved = self._equation(pin.aba, None, model)
+
+        def equation(q: ndarray, v: ndarray, tau: ndarray) -> ndarray:
+            a = solved(q, v, tau) if trivial else acceleration(M(q), tau - bias_of(q, v), names)
+            if not np.all(np.abs(a) <= DOUBTFUL) and np.isfinite(here := M(q)).all():
+                acceleration(here, tau, names)  # raises if M is singular at this q
+            return a
+
+        return self._answered("forward_dynamics", errors, equation, (q, v, tau))
+
+    def _coupled(self, kernel: Kernel, reduce: Reduction | None, model: Any, q: ndarray, *rates: ndarray) -> Any:
+        """The answer at one state of coupled joints."""
+        couplings = self._couplings
+        answer = kernel(model, self._scratch.data, couplings.position(q), *map(couplings.velocity, rates))
+        return answer if reduce is None else reduce(couplings, answer)
+
+    def _equation(self, kernel: Kernel, reduce: Reduction | None, model: Any) -> Callable[..., ndarray]:
+        """The function (q, …) → answers of a kernel, evaluated state by state of a batch."""
+        couplings, data = self._couplings, self._scratch.data
+
+        def equation(q: ndarray, *rates: ndarray) -> ndarray:
+            full = [couplings.position(q), *(couplings.velocity(x) for x in rates)]
+            batch = np.broadcast_shapes(*(x.shape[:-1] for x in full))
+            rows = [np.broadcast_to(x, (*batch, x.shape[-1])).reshape(-1, x.shape[-1]) for x in full]
+            answers = np.array([kernel(model, data, *row) for row in zip(*rows, strict=True)])
+            answers = answers.reshape(batch + answers.shape[1:])
+            return answers if reduce is None else reduce(couplings, answers)
+
+        return equation
+
+    def _answered(self, quantity: str, errors: str, equation: Callable[..., ndarray], state: tuple[Array, ...]) -> Any:
+        names, requested = self._mechanism.joint_names, ALL[quantity]
+        arrays = {name: shaped(name, x, names) for name, x in zip(requested.arguments, state, strict=True)}
+        answer = answered(equation, arrays, requested.shape(self._mechanism.sizes), names, errors)
+        return answer if answer.ndim else float(answer)
+
+
+def warning_answer(robot: Robot, answer: Callable[..., Any]) -> Callable[..., Any]:
+    """`Evaluation.answer`, followed by `warn_of_digits`."""
+
+    def warned(quantity: str, errors: str, kernel: Kernel, reduce: Reduction | None, model: Any, *state: Array) -> Any:
+        result = answer(quantity, errors, kernel, reduce, model, *state)
+        return warn_of_digits(robot, quantity, result, *state, stacklevel=4)
+
+    return warned
+
+
+def warn_of_digits(robot: Robot, quantity: str, answer: Any, *state: Array, stacklevel: int = 3) -> Any:
+    """The answer, after a warning if it has fewer digits than `Robot.warn_below` requests."""
+    from robot_dyn.lagrange.digits import doubt  # late: it builds a Lagrangian
+
+    if message := doubt(robot, quantity, state, answer, robot.least_digits):
+        warnings.warn(message, PrecisionWarning, stacklevel=stacklevel)
+    return answer
