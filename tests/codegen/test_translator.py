@@ -239,7 +239,7 @@ LARGE = 2**62
         ("return int(x[0])", (np.full(3, 1e19), 0), "a float does not fit an integer of 64 bits"),
         ("return int(x[0])", (np.full(3, np.nan), 0), "a float does not fit an integer of 64 bits"),
         ("return np.uint64(i)", (np.ones(3), -1), "np.uint64 of a negative number"),
-        ("y = x.reshape((i, 2))\n    return y[0, 0]", (np.ones(3), 2), "a shape holds another number of entries"),
+        ("y = x.reshape((i, 2))\n    return y[0, 0]", (np.ones(3), 2), "a shape has a different number of entries"),
         ("copy(x[i:], x[1:])", (np.ones(3), 2), "a copy of an array into one of another shape"),
     ],
 )  # fmt: skip
