@@ -13,9 +13,8 @@ from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import Array
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.validate import integer
-from robot_dyn.view.document import ReplayError, document
+from robot_dyn.view.document import ReplayError, document, still
 from robot_dyn.view.page import page
-from robot_dyn.view.still import still
 
 if TYPE_CHECKING:
     from robot_dyn.view.live.server import Server

@@ -16,6 +16,7 @@ from robot_dyn.simulation.observation.remarks import lines
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.view.rests import Rest
+from robot_dyn.view.series import extremes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -234,21 +235,13 @@ def _scale(axes: Any, side: str, z: np.ndarray, limit: float, diverged: bool, lo
 
 
 def _thinned(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Which samples to draw of a long run: of each pixel's, the ends, the least and the largest, so peaks survive."""
+    """Which samples to draw of a long run: of each pixel's the least and the largest, so no peak is lost."""
     every = np.arange(len(y))
     if len(y) <= 4 * _PIXELS:
         return every
     if np.all(x[1:] >= x[:-1]):
         column = ((x - x[0]) * (_PIXELS / (x[-1] - x[0] or 1.0))).astype(int)
-        first = np.flatnonzero(np.diff(column, prepend=-1))
-        size = np.diff(first, append=len(y))
-        keep = np.zeros(len(y), dtype=bool)
-        keep[first] = keep[first + size - 1] = True
-        for extreme, blank in ((np.minimum, np.inf), (np.maximum, -np.inf)):
-            filled = np.where(np.isfinite(y), y, blank)
-            hits = np.flatnonzero(filled == np.repeat(extreme.reduceat(filled, first), size))
-            keep[hits[np.diff(np.repeat(np.arange(len(first)), size)[hits], prepend=-1) > 0]] = True
-        return every[keep]
+        return extremes(y[:, None], np.flatnonzero(np.diff(column, prepend=-1, append=-1)))
     moved = np.zeros(len(y), dtype=bool)
     for z in (x, y):
         size = np.abs(z[np.isfinite(z) & (z != 0)])
