@@ -1,6 +1,6 @@
-"""Drawing of panels: rows of cells that say what stands against what, by one renderer, in inches.
+"""Drawing of panels: rows of cells with curves, by one renderer, in inches.
 
-Nothing global is set: no pyplot, no rcParams, so that figures can be drawn in any thread and beside anyone's own.
+Nothing global is set: no pyplot, no rcParams, so that figures can be drawn in any thread and beside other figures.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ NEAR = 0.2  # of its effort limit: a torque that stays below is drawn without it
 _MOST_MARKS = 200  # in a cell
 _LARGEST = 8e307  # on an axis: Matplotlib takes the difference of its ends
 _PIXELS = 1000  # across a cell; of the samples that fall on one, the least and the largest are drawn
-THEMES: dict[str, dict[str, Any]] = {  # colours of Okabe and Ito, told apart by the colour-blind, by contrast
+THEMES: dict[str, dict[str, Any]] = {  # colours of Okabe and Ito, distinguishable for the colour-blind, by contrast
     "light": {"paper": "#ffffff", "ink": "#1a1a1a", "grid": "#dddddd", "veil": "#eeeeee"}
     | {"lines": ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#000000", "#e69f00", "#56b4e9")},
     "dark": {"paper": "#14171c", "ink": "#e6e6e6", "grid": "#363b44", "veil": "#262b33"}
@@ -36,7 +36,7 @@ THEMES: dict[str, dict[str, Any]] = {  # colours of Okabe and Ito, told apart by
 }
 _DASHES = ("-", (0, (4, 2)), (0, (1, 1.2)), (0, (6, 2, 1, 2)))
 _STOP = 1  # colour of a rest at a stop
-DESIRED, _LIMIT = (1, 1), (1, 1)  # colour and dashes of what is asked for, and of what is allowed
+DESIRED, _LIMIT = (1, 1), (1, 1)  # colour and dashes of desired values, and of limits
 
 
 @final
@@ -88,9 +88,9 @@ def draw(panels: list[Panel], run: Trajectory, theme: Mapping[str, Any]) -> Figu
 
     width, left, right, head = 11.0, 0.9, 0.2, 0.5
     end = run.outcome
-    said = f"{run.about.get('robot', 'run')}: {end.ending} at t = {end.t:g} s, {run.statistics.method}"
+    title = f"{run.about.get('robot', 'run')}: {end.ending} at t = {end.t:g} s, {run.statistics.method}"
     remarks = [part for line in lines(run.remarks) for part in wrap(line, _WIDE)]
-    opening = [(line, theme["ink"]) for line in (said, end.advice) if line]
+    opening = [(line, theme["ink"]) for line in (title, end.advice) if line]
     opening += [(line, theme["lines"][1]) for line in remarks]
     tall = (
         0.3
@@ -119,7 +119,7 @@ def draw(panels: list[Panel], run: Trajectory, theme: Mapping[str, Any]) -> Figu
                 axes.yaxis.set_label_coords(-0.6 / (wide - left - right), 0.5)  # one line, however long the numbers
                 if len(panel.rows[0]) == 1:
                     _legend(axes, axes, theme, (1.0, 1.0))
-                elif cell is panel.rows[0][0]:  # all cells of a grid mean the same: said once, beside the heading
+                elif cell is panel.rows[0][0]:  # one legend for all cells of a grid, beside the heading
                     _legend(figure, axes, theme, (1 - right / width, top))
             y -= _below(cells)
     return figure
@@ -137,7 +137,7 @@ def _below(cells: tuple[Cell, ...]) -> float:
 
 
 def _legend(owner: Any, axes: Any, theme: Mapping[str, Any], corner: tuple[float, float]) -> None:
-    """What the curves of the axes are, above that corner of the axes or figure; nothing for a single one."""
+    """A legend above that corner of the axes or figure; none for a single curve."""
     lines = [line for line in axes.lines if not line.get_label().startswith("_")]
     if len(lines) < 2:
         return
@@ -194,7 +194,7 @@ def framed(axes: Any, theme: Mapping[str, Any], size: float) -> None:
 
 
 def _shown(z: np.ndarray) -> np.ndarray:
-    """What is drawn of numbers: nothing where an axis cannot reach."""
+    """Return the numbers, nan beyond the range of an axis."""
     return np.where(np.abs(z) < _LARGEST, z, np.nan)
 
 
