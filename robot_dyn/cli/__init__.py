@@ -1,6 +1,12 @@
 """The command line: parse, call, print. Every command has --help; errors go to stderr with exit code 2.
 
-Ctrl-C ends any command with exit code 130. The guard stands before anything else is imported.
+Ctrl-C ends any command with exit code 130; its handler is installed before anything else is imported.
+
+commands/        the commands, by topic
+app.py           the application, options that commands share, progress bars; completion.py and interrupts.py
+arguments.py     values of arguments; terminal.py: output, escaped
+report.py, state_report.py    documents and tables of robots, comparisons and runs; of one state
+studies.py, outcome.py        what studies print and write
 """
 
 from __future__ import annotations
@@ -15,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def main() -> None:
-    """Entry point: run the command; say what went wrong in one line."""
+    """Entry point: run the command; report errors in one line."""
     guard()
     try:
         code = _run()
@@ -32,14 +38,14 @@ def _run() -> Any:
     import warnings
 
     from robot_dyn.cli.app import app
-    from robot_dyn.cli.commands import ask, cache, check, demo, price, prove, run, show, stress  # noqa: F401
-    from robot_dyn.cli.terminal import failed, finish, open_streams, tell
+    from robot_dyn.cli.commands import cache, check, cost, demo, prove, query, show, simulate, stress  # noqa: F401
+    from robot_dyn.cli.terminal import failed, finish, open_streams, to_stderr
     from robot_dyn.errors import RobotDynError, RobotDynWarning
 
     open_streams()
     with warnings.catch_warnings():
         warnings.simplefilter("always", RobotDynWarning)
-        warnings.showwarning = lambda message, *_, **__: tell(f"robot-dyn: warning: {message}")
+        warnings.showwarning = lambda message, *_, **__: to_stderr(f"robot-dyn: warning: {message}")
         try:
             try:
                 app()
@@ -49,7 +55,7 @@ def _run() -> Any:
             except OSError as error:  # of the help, which typer prints
                 raise failed(error) from None
         except RobotDynError as error:
-            tell(f"robot-dyn: error: {error}")
+            to_stderr(f"robot-dyn: error: {error}")
         except MemoryError:
-            tell("robot-dyn: error: there is not enough memory; ask for less, or free some")
+            to_stderr("robot-dyn: error: there is not enough memory; ask for less, or free some")
     return 2

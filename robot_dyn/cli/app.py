@@ -1,4 +1,4 @@
-"""The application: what all commands share, their options and the ways they print."""
+"""The typer application, the options that commands share, and progress bars."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def _options(
 
 
 def progress(items: Iterable[str], description: str) -> Iterator[str]:
-    """The items, with a bar on stderr while a person watches."""
+    """Yield the items, with a progress bar on stderr if it is a terminal."""
     from rich.console import Console
     from rich.progress import track
 
@@ -89,9 +89,9 @@ def progress(items: Iterable[str], description: str) -> Iterator[str]:
 
 @contextmanager
 def bar(total: float) -> Iterator[Callable[..., object]]:
-    """A progress bar on stderr while a person watches.
+    """A progress bar on stderr if it is a terminal.
 
-    What it gives is called with what is done of the total, and with the name of what is being done.
+    It gives a function of the part of the total that is done, and of the name of what is being done.
     """
     from rich.console import Console
     from rich.progress import Progress

@@ -1,4 +1,4 @@
-"""What the command line is given, as values: robots, numbers for joints, assignments."""
+"""Values of arguments: robots, scenes, numbers by joint, assignments, files to write."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def load(
     xacro: list[str] | None = None,
     quiet: bool = False,
 ) -> Robot:
-    """The robot of a name or path, with joints locked; `quiet` keeps its warnings to itself."""
+    """The robot of a name or path, with joints locked; `quiet` suppresses its warnings."""
     import robot_dyn as rd
 
     with warnings.catch_warnings():
@@ -40,13 +40,13 @@ def expansion(xacro: list[str]) -> dict[str, str]:
 
 
 def scene(what: str, given: Mapping[str, object]) -> Setup | None:
-    """The setup of a scene file; None of a robot. A scene states what it is of: QueryError if options do so too."""
+    """The setup of a scene file; None for a robot. QueryError for options that a scene states itself."""
     import robot_dyn as rd
 
     if not what.lower().endswith(".toml"):
         return None
     if of_robots := [name for name, value in given.items() if value]:
-        raise QueryError(f"{of_robots[0]}: is of a robot; a scene states its own, so leave it out")
+        raise QueryError(f"{of_robots[0]}: is for a robot; a scene states its own, so leave it out")
     return rd.read_scene(what)
 
 

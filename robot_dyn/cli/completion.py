@@ -1,4 +1,4 @@
-"""What the shell completes: names of robots, starter scenes and joints, without anything that takes time to import."""
+"""Shell completion: names of robots, starter scenes and joints, without slow imports."""
 
 from __future__ import annotations
 

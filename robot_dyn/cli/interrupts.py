@@ -1,4 +1,4 @@
-"""Ctrl-C as the command line takes it: after an import, never inside, where packages swallow or half obey it."""
+"""Ctrl-C in the command line: delayed until after an import, inside which packages may swallow it."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ _AGAIN_S = 0.02
 
 
 def guard() -> None:
-    """From now on Ctrl-C raises KeyboardInterrupt, after the import that it may fall into; unless it is ignored."""
+    """From now on Ctrl-C raises KeyboardInterrupt, after any import in progress; unless it is ignored."""
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:  # as a shell asks of what it runs in the background
         signal.signal(signal.SIGINT, _interrupt)
 
 
 def ignore() -> None:
-    """From now on Ctrl-C does nothing: the command has ended, and the interpreter only tidies up."""
+    """From now on Ctrl-C does nothing: the command has ended, and the interpreter shuts down."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 

@@ -10,7 +10,7 @@ import typer
 
 import robot_dyn as rd
 from robot_dyn.cli import arguments
-from robot_dyn.cli.terminal import say, say_json, tell
+from robot_dyn.cli.terminal import say, say_json, to_stderr
 
 
 def outputs(of: Any, output: str | None, csv: str | None, inputs: Iterable[str], force: bool) -> list[Path]:
@@ -32,6 +32,6 @@ def give(result: Any, paths: Iterable[Path], as_json: bool, dark: bool = False) 
     finally:
         say_json(result) if as_json else say(*studies.lines(result))
     for path in written:
-        tell(f"written: {path}")
+        to_stderr(f"written: {path}")
     if result.interrupted:
         raise typer.Exit(130)

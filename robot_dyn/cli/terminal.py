@@ -1,4 +1,4 @@
-"""What the command says, and where it goes: no control character of a file, no traceback of a pipe or full disk."""
+"""Output of the command line: no control characters of files, no traceback for a closed pipe or a full disk."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import os
 import re
 import sys
 from collections.abc import Collection, Iterable, Sequence
+from math import isfinite
 from typing import Any
 
 from robot_dyn.errors import RobotDynError, escaped
@@ -34,7 +35,7 @@ def open_streams() -> None:
 def say(*renderables: Any) -> None:
     """Print tables, and texts of one line each.
 
-    A reader of a pipe that has seen enough is not an error: the rest is dropped.
+    A pipe that its reader has closed is not an error: the rest is dropped.
 
     Raises:
         OutputError: If standard output cannot be written.
@@ -46,8 +47,10 @@ def say(*renderables: Any) -> None:
         def render_str(self, text: str, **options: Any) -> Text:  # a cell of a table, to measure and to print
             return super().render_str(escaped(text), **options)
 
-    watched = sys.stdout.isatty()
-    console = Safe(highlight=False, markup=False, emoji=False, width=None if watched else 1000)  # a pipe has no edge
+    terminal = sys.stdout.isatty()  # lines in a pipe are not wrapped
+    console = Safe(
+        highlight=False, markup=False, emoji=False, width=None if terminal else 1000
+    )  # lines in a pipe are not wrapped
     for each in renderables:
         put(f"{escaped(each)}\n") if isinstance(each, str) else _guarded(lambda each=each: console.print(each))
 
@@ -56,12 +59,22 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[str]], words: Collect
     """A table for `say`; columns under the headings `words` begin at the left, the others hold numbers."""
     from rich.table import Table
 
-    made = Table(box=None, pad_edge=False, header_style="bold")
+    grid = Table(box=None, pad_edge=False, header_style="bold")
     for heading in headings:
-        made.add_column(heading, no_wrap=not wrap, justify="left" if heading in words else "right")
+        grid.add_column(heading, no_wrap=not wrap, justify="left" if heading in words else "right")
     for row in rows:
-        made.add_row(*row)
-    return made
+        grid.add_row(*row)
+    return grid
+
+
+def or_dash(x: float, digits: int = 6) -> str:
+    """Return a number as text, a dash if it is infinite or not a number."""
+    return f"{x:.{digits}g}" if isfinite(x) else "—"
+
+
+def numbers_row(numbers: Sequence[float]) -> str:
+    """Return numbers in columns of equal width."""
+    return " ".join(f"{x:10.5g}" for x in numbers)
 
 
 def put(text: str) -> None:
@@ -76,7 +89,7 @@ def say_json(value: Any) -> None:
     put(re.sub(r"[^\n\x20-\x7e]", lambda match: _json_escaped(match[0]), json_text(value)))
 
 
-def tell(text: str) -> None:
+def to_stderr(text: str) -> None:
     """Write one line to standard error, if there is one."""
     line = escaped(text)
     try:
@@ -100,13 +113,13 @@ def _guarded(write: Any) -> None:
 
 
 def failed(error: OSError) -> OutputError:
-    """What to raise where standard output cannot be written; what is still in its buffer is dropped."""
+    """Return the error for standard output that cannot be written; the rest of its buffer is dropped."""
     _drop(sys.stdout)
     return OutputError(f"standard output cannot be written ({error.strerror}); redirect it elsewhere")
 
 
 def _drop(stream: Any) -> None:
-    """Let all that is written to a stream from now on, and what it still has in its buffer, go nowhere."""
+    """Discard what a stream still has in its buffer, and all that is written to it later."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, stream.fileno())
     os.close(nowhere)

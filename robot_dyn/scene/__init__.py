@@ -1,1 +1,10 @@
-"""Scenes: a TOML file → a validated Setup. What a scene does not name does not act, gravity included."""
+"""Scenes: a TOML file becomes a validated Setup. What a scene does not name does not act, gravity included.
+
+scene.py         the file: its keys, `read_scene`, and the Setup it describes
+effects.py, control.py, references.py    the tables [[effect]], [control] and [reference]
+declared.py      tables whose keys are the coefficients that classes declare; user_effects.py those of the caller
+schema.py        rules for every table: types of values, units, no unknown key
+messages.py, lines.py    error messages, with the line of the key
+explain.py       what a scene integrates, term by term; manual.py writes docs/scenes.md
+starters/        scenes to start from
+"""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import inf
-from typing import Annotated, Literal, Union, get_args
+from typing import Annotated, Any, ClassVar, Literal, Union
 
 from pydantic import Field
 
@@ -24,54 +24,104 @@ from robot_dyn.effects.spring import Spring
 from robot_dyn.effects.wrench import ExternalWrench
 from robot_dyn.errors import SceneError
 from robot_dyn.model.robot import Robot
-from robot_dyn.scene.declared import Acting, declared_part
-from robot_dyn.scene.schema import NotNegative, Number, Part, PerJoint, Positive, Vector3, per_joint
+from robot_dyn.scene.declared import Declared, declared_part
+from robot_dyn.scene.schema import NotNegative, Number, Part, PerJoint, Positive, Vector3, kinds_of, per_joint
+
+Matrix3 = tuple[Vector3, Vector3, Vector3]
 
 
-class Gravity(Part):
-    """Gravity: ∂V/∂q in N, with V = −Σ m gᵀ p."""
+class Edit(Part):
+    """An edit of the robot."""
 
-    kind: Literal["gravity"]
-    acceleration_m_s2: Vector3 = STANDARD_GRAVITY
-    """Acceleration of free fall, in base axes."""
-
-    def edit(self, robot: Robot) -> Robot:
-        """The robot in this gravity."""
-        return robot.with_(gravity=self.acceleration_m_s2)
-
-
-class Lock(Part):
-    """Joints held at a value: their links become part of the links before them."""
-
-    kind: Literal["lock"]
-    joints: dict[str, Number]
-    """Value by joint, in rad, or m for a prismatic joint."""
+    term: ClassVar[str] = ""
+    """What it does, in a line."""
+    kind: Any
 
     def edit(self, robot: Robot) -> Robot:
-        """The robot with these joints locked."""
-        return robot.with_(lock=self.joints)
+        """Return the edited robot."""
+        raise NotImplementedError
 
 
-class Load(Part):
-    """A rigid body fixed to a link, in M, C and N."""
+class Acting(Part):
+    """An effect of the plant."""
 
-    kind: Literal["payload"]
+    term: ClassVar[str] = ""
+    """Its equation in a line."""
+    kind: Any
+
+    def build(self, robot: Robot) -> tuple[Effect, ...]:
+        """Return the effects of this table."""
+        raise NotImplementedError
+
+
+class DeclaredEffect(Declared, Acting):
+    """An effect made of the coefficients that its classes declare."""
+
+    def build(self, robot: Robot) -> tuple[Effect, ...]:
+        effects = self.call(robot)
+        return effects if isinstance(effects, tuple) else (effects,)
+
+
+class Body(Part):
+    """A rigid body on a link."""
+
+    kind: Any
     frame: str
     """The link that carries it."""
     mass_kg: NotNegative
     """Mass."""
     com_m: Vector3 = (0.0, 0.0, 0.0)
     """Centre of mass, in the frame of the link."""
-    inertia_kg_m2: tuple[Vector3, Vector3, Vector3] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    inertia_kg_m2: Matrix3 = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     """Inertia about the centre of mass, three rows, in axes parallel to the link's."""
 
+    @property
+    def payload(self) -> Payload:
+        """The body and its link."""
+        return Payload(self.frame, self.mass_kg, self.com_m, self.inertia_kg_m2)
+
+
+class Gravity(Edit):
+    """Gravity: ∂V/∂q in N, with V = −Σ m gᵀ p."""
+
+    term = "∂V/∂q in N, with V = −Σ m gᵀ p"
+
+    kind: Literal["gravity"]
+    acceleration_m_s2: Vector3 = STANDARD_GRAVITY
+    """Acceleration of free fall, in base axes."""
+
     def edit(self, robot: Robot) -> Robot:
-        """The robot that carries it."""
-        return robot.with_(payload=Payload(self.frame, self.mass_kg, self.com_m, self.inertia_kg_m2))
+        return robot.with_(gravity=self.acceleration_m_s2)
 
 
-class Armature(Part):
+class Lock(Edit):
+    """Joints held at a value: their links become part of the links before them."""
+
+    term = "a joint held at a value, its link part of the link before"
+
+    kind: Literal["lock"]
+    joints: dict[str, Number]
+    """Value by joint, in rad, or m for a prismatic joint."""
+
+    def edit(self, robot: Robot) -> Robot:
+        return robot.with_(lock=self.joints)
+
+
+class Load(Edit, Body):
+    """A rigid body fixed to a link, in M, C and N."""
+
+    term = "a rigid body on a link, in M, C and N"
+
+    kind: Literal["payload"]
+
+    def edit(self, robot: Robot) -> Robot:
+        return robot.with_(payload=self.payload)
+
+
+class Armature(Edit):
     """Inertia of the drives felt at the joints, added to the diagonal of M."""
+
+    term = "added to the diagonal of M"
 
     kind: Literal["armature"]
     inertia_kg_m2: PerJoint
@@ -80,25 +130,16 @@ class Armature(Part):
     """n: the joint feels n² times the inertia of the rotor; joints left out have 1."""
 
     def edit(self, robot: Robot) -> Robot:
-        """The robot with these drives."""
         inertia = per_joint("armature", self.inertia_kg_m2, robot)
         return robot.with_(armature=per_joint("gear_ratio", self.gear_ratio, robot, elsewhere=1.0) ** 2 * inertia)
 
 
-class Carried(Acting):
+class Carried(Acting, Body):
     """A rigid body on a link that is picked up and dropped: in M, C and N for start_s ≤ t < end_s."""
 
     term = CarriedPayload.term
 
     kind: Literal["carried_payload"]
-    frame: str
-    """The link that carries it."""
-    mass_kg: NotNegative
-    """Mass."""
-    com_m: Vector3 = Load.model_fields["com_m"].default
-    """Centre of mass, in the frame of the link."""
-    inertia_kg_m2: tuple[Vector3, Vector3, Vector3] = Load.model_fields["inertia_kg_m2"].default
-    """Inertia about the centre of mass, three rows, in axes parallel to the link's."""
     start_s: NotNegative = 0.0
     """When it is picked up; 0 if the arm starts with it."""
     end_s: Positive | None = None
@@ -107,9 +148,8 @@ class Carried(Acting):
     """Whether it rests until it is picked up, an impact that loses energy, or moves with the link by then."""
 
     def build(self, robot: Robot) -> tuple[Effect, ...]:
-        body = Payload(self.frame, self.mass_kg, self.com_m, self.inertia_kg_m2)
         end = inf if self.end_s is None else self.end_s
-        return (CarriedPayload(body, self.start_s, end, self.picked_up == "at_rest"),)
+        return (CarriedPayload(self.payload, self.start_s, end, self.picked_up == "at_rest"),)
 
 
 class Wrench(Acting):
@@ -160,43 +200,40 @@ class Line(Acting):
     """ℓ₀, the length without force."""
 
     def build(self, robot: Robot) -> tuple[Effect, ...]:
-        made = LineSpringDamper(
+        line = LineSpringDamper(
             self.frame, self.other_frame, self.point_m, self.other_point_m,
             stiffness=self.stiffness_N_per_m, damping=self.damping_N_s_per_m, length=self.length_m,
         )  # fmt: skip
-        return made.parts
+        return line.parts
+
+
+def _declared(kind: str, *classes: type[Effect], **choices: Any) -> type[DeclaredEffect]:
+    part = declared_part(DeclaredEffect, kind, *classes, **choices)
+    part.term = " ".join(each.term for each in classes).replace(" −", " − ").replace("−  ", "− ")
+    return part
 
 
 EDITS = Gravity, Lock, Load, Armature
 ACTING = (
-    declared_part("viscous_friction", ViscousFriction),
-    declared_part("regularised_coulomb_friction", RegularisedCoulombFriction),
-    declared_part("dry_friction", DryFriction),
-    declared_part("lugre_friction", LuGreFriction),
-    declared_part("dahl_friction", DahlFriction),
-    declared_part("spring", Spring),
-    declared_part(
-        "joint_stops", JointStopSpring, JointStopDamper, make=joint_stops,
+    _declared("viscous_friction", ViscousFriction),
+    _declared("regularised_coulomb_friction", RegularisedCoulombFriction),
+    _declared("dry_friction", DryFriction),
+    _declared("lugre_friction", LuGreFriction),
+    _declared("dahl_friction", DahlFriction),
+    _declared("spring", Spring),
+    _declared(
+        "joint_stops", JointStopSpring, JointStopDamper, factory=joint_stops,
         text="Soft joint stops: τ = k (δ₋ − δ₊) − c (δ₋ + δ₊) v, with δ the depth beyond a stop.",
     ),
-    declared_part("rigid_stops", RigidStops),
+    _declared("rigid_stops", RigidStops),
     Line,
     Wrench,
     Carried,
-    declared_part("series_elastic", SeriesElastic),
-    declared_part("rigid_backlash", RigidBacklash),
-    declared_part("effort_limit", EffortLimit),
-    declared_part("actuator_lag", ActuatorLag),
+    _declared("series_elastic", SeriesElastic),
+    _declared("rigid_backlash", RigidBacklash),
+    _declared("effort_limit", EffortLimit),
+    _declared("actuator_lag", ActuatorLag),
 )  # fmt: skip
-Edit = Gravity | Lock | Load | Armature
+BY_KIND: dict[str, type[Edit | Acting]] = {kinds_of(part)[0]: part for part in (*EDITS, *ACTING)}
+AnyEdit = Annotated[Union[EDITS], Field(discriminator="kind")]  # pyright: ignore  # noqa: UP007
 AnyEffect = Annotated[Union[EDITS + ACTING], Field(discriminator="kind")]  # pyright: ignore  # noqa: UP007
-
-
-def kind_of(part: type[Part]) -> str:
-    """The kind that names a part."""
-    return str(get_args(part.model_fields["kind"].annotation)[0])
-
-
-def kinds() -> tuple[str, ...]:
-    """All kinds of effects that a scene can name."""
-    return tuple(map(kind_of, (*EDITS, *ACTING)))

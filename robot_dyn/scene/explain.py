@@ -1,4 +1,4 @@
-"""What a scene integrates: the equation term by term, what is in it, what is not, and where each number came from."""
+"""Explanation of a scene: its equation term by term, what is not simulated, and the source of each number."""
 
 from __future__ import annotations
 
@@ -8,38 +8,33 @@ from typing import Any
 
 import numpy as np
 
+from robot_dyn.coefficients import URDF
 from robot_dyn.control.digital_loop.loop import LINES
 from robot_dyn.effects.actuator import ActuatorLag, EffortLimit
 from robot_dyn.effects.effect import Effect
 from robot_dyn.errors import RobotDynError
 from robot_dyn.integrate.adaptive import ADAPTIVE
 from robot_dyn.queries.units import coefficient_texts
-from robot_dyn.scene.control import LAWS, Control
-from robot_dyn.scene.declared import Acting, Declared
-from robot_dyn.scene.effects import ACTING, Carried, kind_of
-from robot_dyn.scene.loop import BLOCKS
+from robot_dyn.scene.control import BLOCKS, LAWS, Control
+from robot_dyn.scene.declared import Declared
+from robot_dyn.scene.effects import BY_KIND, Acting, Body, Edit
 from robot_dyn.scene.scene import Scene
-from robot_dyn.scene.schema import Part
+from robot_dyn.scene.schema import Part, kinds_of
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.results.provenance import edits_of_machine_code
 from robot_dyn.simulation.setup.setup import Setup
 
-_TERMS = {kind_of(part): part.term for part in ACTING}
-_BOUNDS = [kind_of(part) for part in ACTING if issubclass(part, Declared) and part.make in (EffortLimit, ActuatorLag)]
-_BODIES = [kind_of(Carried)]  # no torques
+_BOUNDS = [
+    kind for kind, part in BY_KIND.items() if issubclass(part, Declared) and part.factory in (EffortLimit, ActuatorLag)
+]
+_NO_FORCES = [*_BOUNDS, *(kind for kind, part in BY_KIND.items() if issubclass(part, Edit | Body))]
 _DELAYS = "measurement_delay_periods", "actuation_delay_periods"
-_EDITS = {
-    "gravity": "∂V/∂q in N, with V = −Σ m gᵀ p",
-    "lock": "a joint held at a value, its link part of the link before",
-    "payload": "a rigid body on a link, in M, C and N",
-    "armature": "added to the diagonal of M",
-}
 
 
 def explain(scene: Scene, setup: Setup) -> Iterator[str]:
-    """The explanation, line by line."""
+    """Yield the explanation, line by line."""
     named = {effect.kind for effect in scene.effect}
-    forces = [kind for kind in _TERMS if kind in named and kind not in _BOUNDS + _BODIES]
+    forces = [kind for kind in BY_KIND if kind in named and kind not in _NO_FORCES]
     gravity = ["∂V/∂q"] if "gravity" in named else []
     N = " ".join([*gravity, *(f"− τ_{kind}" for kind in forces)]).removeprefix("− ") or "0"
     N = f"−{N}" if not gravity and forces else N
@@ -52,16 +47,15 @@ def explain(scene: Scene, setup: Setup) -> Iterator[str]:
     yield f"    u = {'0' if scene.control is None else LAWS[scene.control.kind].removeprefix('u = ')}{slow}"
     yield ""
     yield "effects:" if scene.effect else "effects: none"
-    made = iter(setup.plant.effects)
+    effects = iter(setup.plant.effects)
     for effect in scene.effect:
-        yield f"  {effect.kind}: {(_TERMS | _EDITS)[effect.kind]}"
+        yield f"  {effect.kind}: {BY_KIND[effect.kind].term}"
         yield from _numbers(effect, "    ")
         if isinstance(effect, Acting):
-            yield from _in_words(islice(made, len(effect.build(setup.plant.dynamics))), setup)  # pyright: ignore
+            yield from _as_it_acts(islice(effects, len(effect.build(setup.plant.dynamics))), setup)  # pyright: ignore
     yield ""
     yield "not simulated, since the scene does not name it:"
-    missing = [kind for kind in (*_EDITS, *_TERMS) if kind not in named]
-    yield f"  {', '.join(missing)}"
+    yield f"  {', '.join(kind for kind in BY_KIND if kind not in named)}"
     if scene.control is not None and (ideal := _ideal(scene.control)):
         yield f"  of the control: {', '.join(ideal)}"
     if scene.control is not None:
@@ -72,14 +66,11 @@ def explain(scene: Scene, setup: Setup) -> Iterator[str]:
         yield from _blocks(scene.control)
         yield f"reference: {scene.reference.kind}"
         yield from _numbers(scene.reference, "  ")
+    method, used = scene.method, ("rtol", "atol") if scene.method in ADAPTIVE else ("step_s",)
     if scene.accuracy is not None:
-        yield ""
-        yield f"method: chosen for an error of q of at most {scene.accuracy:g}, {scene.duration_s:g} s"
-        used = ("accuracy",)
-    else:
-        yield ""
-        yield f"method: {scene.method}, {scene.duration_s:g} s"
-        used = ("rtol", "atol") if scene.method in ADAPTIVE else ("step_s",)
+        method, used = f"chosen for an error of q of at most {scene.accuracy:g}", ("accuracy",)
+    yield ""
+    yield f"method: {method}, {scene.duration_s:g} s"
     for key in (*used, "record_period_s", "estimate_error", "engine"):
         yield f"  {key} = {getattr(scene, key)}  ({_source(scene, key)})"
     yield "start:"
@@ -92,7 +83,7 @@ def explain(scene: Scene, setup: Setup) -> Iterator[str]:
 
 
 def _machine_code(setup: Setup) -> Iterator[str]:
-    """What the compiled right-hand side costs, by effect."""
+    """Instructions of the compiled right-hand side, by effect."""
     from robot_dyn.codegen.plant import Compiled
 
     try:
@@ -111,7 +102,7 @@ def _machine_code(setup: Setup) -> Iterator[str]:
 
 
 def _of_tick(control: Control, setup: Setup) -> Iterator[str]:
-    """What a tick costs, and what of it are the loop and the slow controller."""
+    """Instructions of a tick, and those of the first controller alone."""
     from robot_dyn.simulation.compiled.build import compiled_equation
 
     controller: Any = setup.controller
@@ -122,34 +113,35 @@ def _of_tick(control: Control, setup: Setup) -> Iterator[str]:
             len(compiled_equation(StateEquation(setup.plant, each).in_a_mode, None).functions.programs["tick"])
             for each in dict.fromkeys((controller, inside))
         ]
-    except RobotDynError:  # the reason is told of the acceleration, or the run is interpreted
+    except RobotDynError:  # the reason is given with the acceleration, or the run is interpreted
         return
     more = f"; {control.kind} alone takes {counts[1]}" if len(counts) > 1 else ""
     yield f"machine code of a tick of the control: {counts[0]} instructions{more}"
 
 
 def _ideal(control: Control) -> list[str]:
-    """What a loop could have, and this one has not."""
+    """What a digital loop can have and this one does not."""
     delays = [key.removesuffix("_periods") for key in _DELAYS if not getattr(control, key)]
-    named = {block.kind for line in LINES for block in getattr(control, line)}
-    kinds = dict.fromkeys(kind_of(part) for parts in BLOCKS.values() for part in parts)
+    named = {block.kind for _, block in control.blocks}
+    kinds = dict.fromkeys(kind for parts in BLOCKS.values() for part in parts for kind in kinds_of(part))
     return [*delays, *(kind for kind in kinds if kind not in named)]
 
 
 def _blocks(control: Control) -> Iterator[str]:
     """The blocks of the loop of a controller, line by line."""
-    for line in LINES:
-        for block in getattr(control, line):
-            yield f"  {line}: {block.kind}, {block.make.term}"
-            yield from _numbers(block, "    ")
+    for line, block in control.blocks:
+        yield f"  {line}: {block.kind}, {block.factory.term}"
+        yield from _numbers(block, "    ")
 
 
-def _in_words(effects: Iterable[Effect], setup: Setup) -> Iterator[str]:
+def _as_it_acts(effects: Iterable[Effect], setup: Setup) -> Iterator[str]:
     """Coefficients of the parts of an effect as they act, with units."""
     dynamics: Any = setup.plant.dynamics
-    words = {name: text for effect in effects for name, text in coefficient_texts(effect, dynamics.joint_types).items()}
-    if words:
-        yield f"    as it acts: {'; '.join(words.values())}"
+    values = {
+        name: text for effect in effects for name, text in coefficient_texts(effect, dynamics.joint_types).items()
+    }
+    if values:
+        yield f"    as it acts: {'; '.join(values.values())}"
 
 
 def _numbers(part: Part, indent: str) -> Iterator[str]:
@@ -160,7 +152,7 @@ def _numbers(part: Part, indent: str) -> Iterator[str]:
 
 
 def _source(part: Part, key: str) -> str:
-    if isinstance(getattr(part, key), str) and getattr(part, key) == "urdf":
+    if getattr(part, key) == URDF:
         return "the robot's file"
     return "scene" if key in part.model_fields_set else "default"
 

@@ -1,4 +1,4 @@
-"""Where a TOML text states each key, for messages: tomllib tells no lines."""
+"""Line numbers of the keys of a TOML text, for messages; tomllib does not report them."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from collections.abc import Sequence
 from typing import Any
 
 Path = tuple[str | int, ...]
-_MOST = 200  # lines of one statement; beyond it no more lines are told
+_MOST = 200  # lines of one statement; after a longer one, line numbers are unknown
 
 
 def line_of(text: str, path: Sequence[str | int]) -> int | None:
-    """The line, counted from 1, at which a key is stated, or else the table that it belongs to; None if unknown."""
+    """Return the line, from 1, at which a key is stated, otherwise that of its table; None if unknown."""
     lines = _lines(text)
     return next((lines[tuple(path[:k])] for k in range(len(path), 0, -1) if tuple(path[:k]) in lines), None)
 
 
 def _lines(text: str) -> dict[Path, int]:
-    """The first line of each path. A statement is the least number of lines that are TOML by themselves."""
+    """Return the first line of each path. A statement is the least number of lines that is valid TOML alone."""
     found: dict[Path, int] = {}
     section: Path = ()
     last: dict[Path, int] = {}  # index of the last table of each array of tables

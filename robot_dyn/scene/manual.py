@@ -10,11 +10,11 @@ from pydantic.fields import FieldInfo
 
 from robot_dyn.integrate.adaptive import ADAPTIVE
 from robot_dyn.integrate.methods import FIXED_STEP
-from robot_dyn.scene.control import LAWS, AnyReference, Control, Model, Slow
-from robot_dyn.scene.effects import ACTING, EDITS, kind_of
-from robot_dyn.scene.loop import BLOCKS
+from robot_dyn.scene.control import BLOCKS, LAWS, Control, Model, Slow
+from robot_dyn.scene.effects import ACTING, EDITS
+from robot_dyn.scene.references import AnyReference
 from robot_dyn.scene.scene import Scene, Start
-from robot_dyn.scene.schema import Part
+from robot_dyn.scene.schema import Part, kinds_of
 
 _OPENING = """# Scenes
 
@@ -58,20 +58,23 @@ def manual() -> str:
         *_section("`[start]`", "The state at the start.", Start),
         "## `[[effect]]`\n\nWhat acts; one table for each, with its `kind`.\n",
     ]
-    for part in (*EDITS, *ACTING):
-        parts += _section(f'`kind = "{kind_of(part)}"`', _text(part), part, level=3)
+    parts += _kinds(*EDITS, *ACTING)
     parts += _section("`[control]`", _text(Control), Control)
     parts += ["| kind | law |\n|---|---|", *(f"| `{kind}` | {_cell(law)} |" for kind, law in LAWS.items()), ""]
     parts += _section("`[control.model]`", _text(Model), Model)
     parts += _section("`[control.slow]`", _text(Slow), Slow)
     for line, blocks in BLOCKS.items():
         parts += [f"## `[[control.{line}]]`\n\nBlocks of the {_LINES[line]}; one table for each, with its `kind`.\n"]
-        for part in blocks:
-            parts += _section(f'`kind = "{kind_of(part)}"`', _text(part), part, level=3)
+        parts += _kinds(*blocks)
     parts += ["## `[reference]`\n\nWhat the controller follows; one table, with its `kind`.\n"]
-    for part in get_args(get_args(AnyReference)[0]):
-        parts += _section(f'`kind = "{kind_of(part)}"`', _text(part), part, level=3)
+    parts += _kinds(*get_args(get_args(AnyReference)[0]))
     return "\n".join(parts).rstrip() + "\n"
+
+
+def _kinds(*parts: type[Part]) -> Iterator[str]:
+    """A section for each part."""
+    for part in parts:
+        yield from _section(f'`kind = "{kinds_of(part)[0]}"`', _text(part), part, level=3)
 
 
 def _section(title: str, text: str, part: type[Part], level: int = 2) -> Iterator[str]:
@@ -89,7 +92,7 @@ def _row(key: str, field: FieldInfo) -> str:
 
 
 def _form(field: FieldInfo) -> str:
-    """What a value may be, in words."""
+    """What a value may be, with its sign."""
     form = _of(field.annotation)
     signs = {"Gt": "positive", "Ge": "not negative"}
     sign = next((signs[name] for name in (type(each).__name__ for each in field.metadata) if name in signs), "")
@@ -113,11 +116,7 @@ def _of(annotation: Any) -> str:
     if origin is tuple and Ellipsis not in args:
         return f"list of {len(args)} {'lists' if first.startswith('list') else first + 's'}"
     if origin in (list, tuple):
-        return (
-            "list of tables"
-            if first == "table"
-            else f"list of {'lists of numbers' if first.startswith('list') else first + 's'}"
-        )
+        return f"list of {'lists of numbers' if first.startswith('list') else first + 's'}"
     ways = dict.fromkeys(map(_of, args))
     if "list of numbers" in ways:  # as `PerJoint`
         ways = ["by joint", *(way for way in ways if way.startswith("`"))]

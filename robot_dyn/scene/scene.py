@@ -1,4 +1,4 @@
-"""A scene file read, checked and made a Setup: every number is the file's or a stated default."""
+"""Scene files: read, checked and turned into a Setup. Every number is the file's or a stated default."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.integrate.methods import METHODS, method
 from robot_dyn.model.loading import load
 from robot_dyn.model.robot import Robot
-from robot_dyn.scene.complaint import complaint, located, where
-from robot_dyn.scene.control import AnyReference, Control, Hold, Sampled, ViaPoints
-from robot_dyn.scene.declared import Acting
-from robot_dyn.scene.effects import AnyEffect, Edit, kinds
+from robot_dyn.scene.control import Control
+from robot_dyn.scene.effects import BY_KIND, Acting, AnyEffect, Edit
+from robot_dyn.scene.messages import located, validation_message, where
+from robot_dyn.scene.references import AnyReference, Hold, Sampled, ViaPoints
 from robot_dyn.scene.schema import NotNegative, Part, PerJoint, PlacedError, Positive, Truth, per_joint, placed
-from robot_dyn.scene.user_effects import Makers, OwnEffect, check_makers, own_or
+from robot_dyn.scene.user_effects import Factories, UserEffect, check_factories, user_defined_or
 from robot_dyn.simulation.setup.setup import STEP_S, Setup
 
 MAX_BYTES = 2**20
@@ -32,7 +32,7 @@ SCENE = Kind("a scene", ".toml")
 
 
 class Start(Part):
-    """The state at the start; 0 where nothing is said."""
+    """The state at the start; 0 by default."""
 
     q: PerJoint = 0.0
     """Position."""
@@ -62,10 +62,10 @@ class Scene(Part):
     estimate_error: Truth = Setup.estimate_error
     """Whether the run is repeated with longer steps, to estimate its error."""
     engine: Literal["auto", "interpreted", "compiled"] = "auto"
-    """Which loop runs; "auto" compiles where that pays."""
+    """Which loop runs; "auto" compiles where that is worthwhile."""
     start: Start = Start()
     """The state at the start."""
-    effect: tuple[Annotated[AnyEffect, WrapValidator(own_or)], ...] = ()  # pyright: ignore[reportInvalidTypeForm]
+    effect: tuple[Annotated[AnyEffect, WrapValidator(user_defined_or)], ...] = ()  # pyright: ignore[reportInvalidTypeForm]
     """What acts, gravity included; nothing by default."""
     control: Control | None = None
     """What drives the joints; nothing by default."""
@@ -73,13 +73,13 @@ class Scene(Part):
     """What the controller follows; rest at the start by default."""
 
     def described(self, folder: Path) -> Robot:
-        """The robot as its file says, without gravity."""
+        """Return the robot of its file, without gravity."""
         beside = folder / self.robot
         with placed("robot"):
             return load(beside if os.path.isfile(beside) else self.robot).with_(gravity=(0.0, 0.0, 0.0))
 
     def setup(self, folder: Path, about: dict[str, str]) -> Setup:
-        """The setup it describes; paths are relative to `folder`."""
+        """Return the setup it describes; paths are relative to `folder`."""
         described = robot = self.described(folder)
         for k, effect in enumerate(self.effect):
             if isinstance(effect, Edit):
@@ -87,7 +87,7 @@ class Scene(Part):
                     robot = effect.edit(robot)
         acting: list[Effect] = []
         for k, effect in enumerate(self.effect):
-            if isinstance(effect, Acting | OwnEffect):
+            if isinstance(effect, Acting | UserEffect):
                 with placed("effect", k):
                     acting += effect.build(robot)
         with placed("start"):
@@ -105,29 +105,29 @@ class Scene(Part):
         )  # fmt: skip
 
     def integrator(self) -> Integrator | Adaptive:
-        """The method by its name."""
+        """Return the method by its name."""
         if self.method in ADAPTIVE:
             return Adaptive(self.method, self.rtol, self.atol)
         return method(self.method)
 
 
-def read_scene(path: str | Path, *, effects: Makers | None = None) -> Setup:
-    """The setup of a scene file.
+def read_scene(path: str | Path, *, effects: Factories | None = None) -> Setup:
+    """Return the setup of a scene file.
 
     Args:
-        path: Of the file.
-        effects: Effects of your own that it may name: a class, or a function that returns an effect, by its kind. The
+        path: Path of the file.
+        effects: User-defined effects that it may name: a class, or a function that returns an effect, by kind. The
             keys of such a table are its arguments, those of declared coefficients with their unit, as
             "damping_N_m_s_per_rad": numbers, arrays from lists, arrays (n,) from tables by joint.
 
     Raises:
         SceneError: If the file cannot be read, or a key or value of it is not allowed.
     """
-    return read_both(path, {} if effects is None else check_makers(effects, set(kinds())))[1]
+    return read_both(path, {} if effects is None else check_factories(effects, set(BY_KIND)))[1]
 
 
-def read_both(path: str | Path, effects: Makers | None = None) -> tuple[Scene, Setup]:
-    """A scene file as it is written, and the setup it describes; SceneError as `read_scene`."""
+def read_both(path: str | Path, effects: Factories | None = None) -> tuple[Scene, Setup]:
+    """Return a scene file as it is written, and the setup it describes; SceneError as `read_scene`."""
     data = read(path, MAX_BYTES, SceneError, "see robot-dyn scene for one to start from")
     try:
         text = data.decode("utf-8")
@@ -144,7 +144,7 @@ def read_both(path: str | Path, effects: Makers | None = None) -> tuple[Scene, S
 
 
 def parse_scene(text: str, source: str) -> Scene:
-    """A scene of its text; `source` names it in messages.
+    """Return the scene of a TOML text; `source` names it in messages.
 
     Raises:
         SceneError: If it is not TOML, or a key or value is not allowed.
@@ -152,7 +152,7 @@ def parse_scene(text: str, source: str) -> Scene:
     return _parsed(text, source)[0]
 
 
-def _parsed(text: str, source: str, effects: Makers | None = None) -> tuple[Scene, dict[str, Any]]:
+def _parsed(text: str, source: str, effects: Factories | None = None) -> tuple[Scene, dict[str, Any]]:
     try:
         table = tomllib.loads(text.removeprefix("\ufeff"))  # the mark of some editors for UTF-8
     except (ValueError, RecursionError) as error:
@@ -160,7 +160,7 @@ def _parsed(text: str, source: str, effects: Makers | None = None) -> tuple[Scen
     try:
         scene = Scene.model_validate(table, context=dict(effects or {}))
     except ValidationError as error:
-        raise SceneError(f"{source}: {complaint(error, table, text, Scene)}") from None
+        raise SceneError(f"{source}: {validation_message(error, table, text, Scene)}") from None
     if scene.control is None and "reference" in scene.model_fields_set:
         message = located(text, ["reference"], "reference: nothing follows it; add a [control]")
         raise SceneError(f"{source}: {message}")
@@ -174,12 +174,12 @@ def _parsed(text: str, source: str, effects: Makers | None = None) -> tuple[Scen
 
 
 def _without_effect(scene: Scene) -> str:
-    """What a scene states that has no effect on its run; empty if nothing."""
+    """Return the first statement of a scene without effect on its run; empty if there is none."""
     chosen = [key for key in ("method", "step_s", "rtol", "atol") if key in scene.model_fields_set]
     if scene.accuracy is not None and chosen:
         return f"{chosen[0]}: has no effect, since accuracy chooses method and tolerance; remove one of the two"
-    own = ("step_s",) if scene.method in ADAPTIVE else ("rtol", "atol")
-    if unused := [key for key in own if key in scene.model_fields_set]:
+    of_other_methods = ("step_s",) if scene.method in ADAPTIVE else ("rtol", "atol")
+    if unused := [key for key in of_other_methods if key in scene.model_fields_set]:
         kind = "chooses its own step" if scene.method in ADAPTIVE else "has a fixed step"
         return f"{unused[0]}: has no effect, since {scene.method} {kind}; remove it, or name another method"
     models = [] if scene.control is None else [("control.model.effects", scene.control.model.effects or ())]
@@ -192,7 +192,7 @@ def _without_effect(scene: Scene) -> str:
 
 
 def _syntax(error: Exception) -> str:
-    """What TOML does not allow, after its place."""
+    """Return the TOML error, after its place."""
     if isinstance(error, RecursionError):
         return "is not TOML that can be read: its lists or tables are nested too deeply"
     message = shorten(error, 200)

@@ -1,10 +1,10 @@
-"""What every part of a scene obeys: no unknown key, finite numbers, units in the names of the keys."""
+"""Rules for every part of a scene: no unknown key, finite numbers, units in the names of the keys."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
@@ -25,7 +25,7 @@ class PlacedError(RobotDynError):
 
 @contextmanager
 def placed(*path: str | int) -> Iterator[None]:
-    """Whatever is refused here is refused at the path of a scene."""
+    """Errors raised inside carry the path of a scene."""
     try:
         yield
     except RobotDynError as error:
@@ -40,6 +40,11 @@ class Part(BaseModel):
     )
 
 
+def kinds_of(part: type[Part]) -> tuple[str, ...]:
+    """The values that the key `kind` of a part may have."""
+    return get_args(part.model_fields["kind"].annotation) if "kind" in part.model_fields else ()
+
+
 # Strict: a text or a truth value is not a number.
 Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 Positive = Annotated[float, Field(gt=0, strict=True)]
@@ -51,7 +56,7 @@ Stated = PerJoint | Literal["urdf"]
 
 
 def per_joint(what: str, value: Any, robot: Robot, elsewhere: float = 0.0) -> Any:
-    """The (n,) array of a value for all joints, for each, or by name; "urdf" stays, for an effect to resolve."""
+    """The (n,) array of a value for all joints, for each, or by name; the effect resolves "urdf" itself."""
     if value == URDF:
         return URDF
     values = by_joint(what, value, robot.joint_names)

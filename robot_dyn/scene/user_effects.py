@@ -1,4 +1,4 @@
-"""Effects of a user's own in a scene: kinds that the caller names, each with the class or function that makes one."""
+"""User-defined effects in a scene: the caller names their kinds, each with its class or factory function."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from robot_dyn.scene.declared import keys_of
 from robot_dyn.scene.schema import Part, per_joint
 from robot_dyn.validate import number, numbers
 
-Makers = Mapping[str, Callable[..., Effect]]
+Factories = Mapping[str, Callable[..., Effect]]
 
 
-class OwnEffect(Part):
-    """An effect of a kind that the caller named; its keys are the arguments of what makes it."""
+class UserEffect(Part):
+    """An effect of a user-defined kind; its keys are the arguments of its factory."""
 
     kind: str
     values: dict[str, Any]
     """The other keys."""
-    make: Any
+    factory: Any
     """The class or function."""
 
     def build(self, robot: Robot) -> tuple[Effect, ...]:
-        """The effect; SceneError if its keys are others than the arguments."""
-        known = signature(self.make)
-        of = keys_of(self.make, self.make) if isinstance(self.make, type) else {}
+        """Return the effect; SceneError if its keys are not the arguments."""
+        known = signature(self.factory)
+        of = keys_of(self.factory, self.factory) if isinstance(self.factory, type) else {}
         given = {of[key][0] if key in of else key: (key, value) for key, value in self.values.items()}
         arguments = {name: _argument(key, value, robot, of.get(key)) for name, (key, value) in given.items()}
         try:
@@ -40,21 +40,21 @@ class OwnEffect(Part):
             spelled = {name: key for key, (name, _) in of.items()}
             keys = ", ".join(spelled.get(name, name) for name in known.parameters)
             raise SceneError(f"{self.kind}: {error}; keys: {keys}") from None
-        return (self.make(**arguments),)
+        return (self.factory(**arguments),)
 
 
-def own_or(value: Any, otherwise: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
-    """The table of an effect of the caller's kinds, which stand in the context; or of another."""
-    makers: Makers = info.context or {}
+def user_defined_or(value: Any, otherwise: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
+    """Validate the table of an effect, of a user-defined kind (these stand in the context) or of another."""
+    factories: Factories = info.context or {}
     kind = value.get("kind") if isinstance(value, dict) else None
-    if isinstance(kind, str) and kind in makers:
+    if isinstance(kind, str) and kind in factories:
         rest = {key: each for key, each in value.items() if key != "kind"}
-        return OwnEffect(kind=kind, values=rest, make=makers[kind])
+        return UserEffect(kind=kind, values=rest, factory=factories[kind])
     return otherwise(value)
 
 
-def check_makers(effects: Any, taken: set[str]) -> Makers:
-    """What makes effects, by kind; SceneError if it is nothing that does, or a kind of scenes has its name."""
+def check_factories(effects: Any, taken: set[str]) -> Factories:
+    """Return the factories by kind; SceneError if one is not callable, or is named as a built-in kind."""
     if not isinstance(effects, Mapping) or not all(
         isinstance(kind, str) and callable(effects[kind]) for kind in effects
     ):
@@ -65,7 +65,7 @@ def check_makers(effects: Any, taken: set[str]) -> Makers:
 
 
 def _argument(key: str, value: Any, robot: Robot, known: tuple[str, Coefficient] | None) -> Any:
-    """A number, an array of a list, an array (n,) of a table by joint; a text or truth value as it is."""
+    """Return a number, an array for a list, an array (n,) for a table by joint; texts and truth values as they are."""
     if known is not None and known[1].of_joints:
         return per_joint(key, value, robot, elsewhere=known[1].elsewhere)
     if isinstance(value, dict):

@@ -1,7 +1,7 @@
 """Commands of meshcat's viewer as values, with NumPy arrays in them, and the two ways they reach a page.
 
 A command travels as MessagePack over a web socket, or with all others in one compressed text inside the page, in which
-an array that occurs in several commands stands once. Objects follow three.js's JSON format 4.5.
+an array that occurs in several commands is stored once. Objects follow three.js's JSON format 4.5.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def track(name: str, kind: str, t: np.ndarray, values: np.ndarray) -> Command:
 
 
 def triangles(mesh: Mesh) -> Command:
-    """The geometry of a mesh; normals with 7 bits, which shading cannot tell from more."""
+    """The geometry of a mesh; normals with 7 bits, which are enough for shading."""
     index = mesh.faces.ravel().astype(np.uint16 if len(mesh.vertices) <= 2**16 else np.uint32)
     attributes = {
         "position": _attribute(mesh.vertices.astype(np.float32)),
@@ -141,7 +141,7 @@ def _array_type(array: np.ndarray) -> str:
 
 
 def _name(*contents: str | bytes) -> str:
-    """A name that equal contents share, so that equal runs give equal pages."""
+    """A name that is equal for equal contents, so that equal runs give equal pages."""
     digest = hashlib.sha256()
     for content in contents:
         digest.update(content.encode() if isinstance(content, str) else content)

@@ -1,41 +1,43 @@
-"""The document of a replay: what its page is made of, from runs, their robots and their meshes.
+"""The document of a page, from which it is drawn: runs as they were simulated, or a robot at one configuration.
 
-The first run is drawn as it is, the others as ghosts. What is not drawn as described is said.
+The first run is drawn opaque, the others as ghosts. Problems list what is drawn otherwise than the files describe.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, final
 
 import numpy as np
 
 from robot_dyn.description.packages import searched
-from robot_dyn.errors import QueryError, RobotDynError
+from robot_dyn.errors import QueryError, RobotDynError, shorten
+from robot_dyn.model.robot import Robot
+from robot_dyn.queries.dynamics import Array
+from robot_dyn.queries.units import unit
 from robot_dyn.simulation.observation.remarks import lines
 from robot_dyn.simulation.results.provenance import robot_of
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.spatial import homogeneous
-from robot_dyn.validate import instance, truth
+from robot_dyn.validate import instance, one_state, truth
 from robot_dyn.view import commands
-from robot_dyn.view.arrows import arrows
+from robot_dyn.view.cost_table import cost_table
 from robot_dyn.view.geometry.visuals import Drawing, drawing
 from robot_dyn.view.keyframes import Keyframes, keyframes
-from robot_dyn.view.overlays import GHOST, Overlays, overlays
-from robot_dyn.view.plots.price import price
-from robot_dyn.view.plots.series import plots
+from robot_dyn.view.overlays import GHOST, Overlays, arrows, overlays
 from robot_dyn.view.rests import rests
-from robot_dyn.view.scenery import gravity_arrow, gravity_label, ground, scenery, turned, upright
+from robot_dyn.view.scenery import Scenery, gravity_arrow, gravity_label, ground, scenery, turned, upright
+from robot_dyn.view.series import ghost_mark, plots
 from robot_dyn.view.stage import Stage
 
 _MOST_EVENTS = 200  # of a run
-_FAR = 1e4  # [rad] or [m]; what diverged is not drawn beyond
+_FAR = 1e4  # [rad] or [m]; diverged runs are drawn up to here
 
 
 class ReplayError(RobotDynError):
-    """A replay that cannot be made or written."""
+    """A replay that cannot be built or written."""
 
 
 @final
@@ -45,15 +47,17 @@ class Shown:
 
     Attributes:
         name: In titles and notes.
-        run: What of it can be drawn.
+        prefix: Before its notes where there are several runs.
+        run: The part of it that can be drawn.
         stage: Where its robot stands.
         keys: Keyframes of its joints.
         drawing: The look of its robot.
-        problems: What is drawn otherwise than the files describe, in words.
+        problems: What is drawn otherwise than the files describe.
         notes: What else a reader should know.
     """
 
     name: str
+    prefix: str
     run: Trajectory
     stage: Stage
     keys: Keyframes
@@ -62,11 +66,53 @@ class Shown:
     notes: tuple[str, ...]
 
 
+@final
+@dataclass(eq=False)
+class _Picture:
+    """A scene to which robots are added.
+
+    Attributes:
+        gravity: Of the first robot, in [m/s²], in axes of the base.
+        scenery: What surrounds the robots.
+        turn: Rotation (3, 3) that turns gravity down.
+        commands: What is drawn, gravity and the floor included.
+        tracks: What moves, by path.
+    """
+
+    gravity: tuple[float, float, float]
+    scenery: Scenery
+    turn: np.ndarray
+    commands: list[commands.Command]
+    tracks: dict[str, list[commands.Command]] = field(default_factory=dict)
+
+    @classmethod
+    def about(cls, points: np.ndarray, gravity: tuple[float, float, float]) -> _Picture:
+        """A picture of points (k, 3) in the base of the first robot."""
+        turn = upright(gravity)
+        seen = scenery(points @ turn.T)
+        return cls(gravity, seen, turn, [ground(seen), *gravity_arrow(seen, gravity)])
+
+    def add(self, stage: Stage, look: Drawing, keys: Keyframes, opacity: float = 1.0) -> None:
+        """Draw a robot that moves by keyframes."""
+        self.commands.append(commands.set_transform(stage.root, homogeneous(self.turn, np.zeros(3))))
+        self.commands += stage.draw(look.pieces, opacity)
+        self.tracks |= stage.tracks(keys)
+
+    def document(self, notes: list[str], **entries: Any) -> dict[str, Any]:
+        """The document, with the notes and the camera of the scenery."""
+        floor = f"the squares on the floor are {self.scenery.square:g} m wide"
+        return entries | {
+            "notes": [*notes, *turned(self.gravity), floor],
+            "scene": self.scenery.as_json(),
+            "commands": [*self.commands, commands.set_animation(self.tracks)],
+        }
+
+
 @np.errstate(all="ignore")  # what is far out is drawn as far as it can be
 def document(
     runs: tuple[Trajectory, ...], package_dirs: Iterable[str | Path], frame: str | None, inertia: bool
 ) -> dict[str, Any]:
-    """All that the page is made of; arguments as of `replay`.
+    """Return the document of runs; arguments as of `replay`.
 
     Raises:
         ReplayError: If a run has no samples.
@@ -78,70 +124,98 @@ def document(
     instance("frame", frame, str | None, "give the name of a link, or None")
     shown = [_shown(number, run, len(runs), package_dirs, inertia) for number, run in enumerate(runs)]
     if frame is not None and all(frame not in each.stage.linkage.links for each in shown):
-        shown[0].stage.link_path(frame)  # says so, with the nearest names
-    gravity = shown[0].stage.robot.edits.gravity
-    turn = upright(gravity)
-    seen = scenery(np.concatenate([_corners(each) for each in shown]) @ turn.T)
-    radius = seen.radius
+        shown[0].stage.link_path(frame)  # raises, with the nearest names
+    corners = np.concatenate([_corners(each) for each in shown])
+    picture = _Picture.about(corners, shown[0].stage.robot.edits.gravity)
+    radius = picture.scenery.radius
     layers = [_overlays(each, radius, frame, number > 0) for number, each in enumerate(shown)]
     scale = arrows([(each.stage, each.run, layer) for each, layer in zip(shown, layers, strict=True)], radius)
-    found, tracks, notes, problems, remarks = [ground(seen), *gravity_arrow(seen, gravity)], {}, [], [], []
+    notes, problems, remarks = [], [], []
     for number, (each, layer) in enumerate(zip(shown, layers, strict=True)):
-        clear = GHOST if number else 1.0
-        found.append(commands.set_transform(each.stage.root, homogeneous(turn, np.zeros(3))))
-        found += each.stage.draw(each.drawing.pieces, clear) + layer.commands
-        tracks |= each.stage.tracks(each.keys) | layer.tracks
-        who = "" if len(shown) == 1 else f"{each.name}: "
-        notes += [who + note for note in (*each.notes, *each.drawing.remarks, *layer.notes)]
-        problems += [who + note for note in (*each.problems, *each.drawing.notes)]
-        remarks += [who + line for line in lines(each.run.remarks)]
-    return {
-        "title": " and ".join(each.name for each in shown),
-        "outcome": "; ".join(_outcome(each, len(shown)) for each in shown),
-        "duration": max(float(each.run.t[-1]) for each in shown),
-        "remarks": remarks,
-        "problems": problems,
-        "gravity": _labels(shown),
-        "events": _events(shown),
-        "rests": _rests(shown),
-        "notes": [*notes, *scale, *turned(gravity), f"the squares on the floor are {seen.square:g} m wide"],
-        "scene": seen.as_json(),
-        "plots": plots([each.run for each in shown], [each.stage for each in shown]),
-        "price": price([(each.name, each.run) for each in shown]),
-        "commands": [*found, commands.set_animation(tracks)],
-    }
+        picture.add(each.stage, each.drawing, each.keys, GHOST if number else 1.0)
+        picture.commands += layer.commands
+        picture.tracks |= layer.tracks
+        notes += [each.prefix + note for note in (*each.notes, *each.drawing.remarks, *layer.notes)]
+        problems += [each.prefix + note for note in (*each.problems, *each.drawing.notes)]
+        remarks += [each.prefix + line for line in lines(each.run.remarks)]
+    return picture.document(
+        [*notes, *scale],
+        title=" and ".join(each.name for each in shown),
+        outcome="; ".join(_outcome(each) for each in shown),
+        duration=max(float(each.run.t[-1]) for each in shown),
+        remarks=remarks,
+        problems=problems,
+        gravity=_labels(shown),
+        events=_events(shown),
+        rests=_rests(shown),
+        plots=plots([each.run for each in shown], [each.stage for each in shown]),
+        price=cost_table([(each.name, each.run) for each in shown]),
+    )
+
+
+def still(robot: Robot, q: Array | None, package_dirs: Iterable[str | Path], inertia: bool) -> dict[str, Any]:
+    """Return the document of a robot at one configuration; arguments as of `show`.
+
+    Raises:
+        QueryError: If q is not one configuration of the robot.
+    """
+    instance("robot", robot, Robot, "give one of rd.load")
+    package_dirs, inertia = searched(package_dirs), truth("inertia", inertia)
+    at: Array = np.zeros(robot.n) if q is None else one_state("q", q, robot.joint_names)
+    if np.abs(at).max() > _FAR:
+        raise QueryError(f"q must be within ±{_FAR:g}, got {shorten(at)}")
+    stage, look = Stage("run", robot), drawing(robot, package_dirs, inertia=inertia)
+    picture = _Picture.about(stage.corners(look.pieces, at[None]), robot.edits.gravity)
+    picture.add(stage, look, keyframes(np.zeros(1), stage.linkage.couplings.position(at[None])))
+    values = zip(robot.joint_names, at, robot.joint_types, strict=True)
+    state = "q: " + ", ".join(f"{name} = {value:.4g} {unit('q', kind)}" for name, value, kind in values)
+    return picture.document(
+        [state, *look.remarks],
+        title=robot.name,
+        outcome=f"{robot.n} joint{'s' if robot.n > 1 else ''}, {robot.total_mass:.4g} kg",
+        duration=0.0,
+        remarks=[],
+        problems=list(look.notes),
+        gravity=gravity_label(robot),
+        events=[],
+        rests=[],
+        plots=[],
+        price={"runs": [], "rows": []},
+    )
 
 
 def _overlays(shown: Shown, radius: float, frame: str | None, ghost: bool) -> Overlays:
-    own = frame if frame in shown.stage.linkage.links else None  # a ghost may be another robot
-    return overlays(shown.stage, shown.run, radius, own, ghost)
+    traced = frame if frame in shown.stage.linkage.links else None  # a ghost may be another robot
+    return overlays(shown.stage, shown.run, radius, traced, ghost)
 
 
 def _events(shown: list[Shown]) -> list[dict[str, Any]]:
     """The events of all runs, the first ones of each; they are marked on the plots, and named as they occur."""
     return [
-        {"t": event.t, "name": event.name if len(shown) == 1 else f"{each.name}: {event.name}"}
-        for each in shown
-        for event in each.run.events[:_MOST_EVENTS]
+        {"t": event.t, "name": each.prefix + event.name} for each in shown for event in each.run.events[:_MOST_EVENTS]
     ]
 
 
 def _rests(shown: list[Shown]) -> list[dict[str, Any]]:
-    """A line for each joint that is held for a time, or meets a rigid stop: its rests, and its events."""
-    made = []
+    """The rests and the events of each joint that is held for a time."""
+    lanes = []
     for each in shown:
         for name, spans in zip(each.run.joint_names, rests(each.run), strict=True):
             if spans:
-                who = name if len(shown) == 1 else f"{each.name}: {name}"
-                met = [(event.t, event.name) for event in each.run.events if event.joint == name]
-                made.append({"joint": who, "spans": [list(span) for span in spans], "events": met[:_MOST_EVENTS]})
-    return made
+                events = [(event.t, event.name) for event in each.run.events if event.joint == name]
+                lanes.append(
+                    {
+                        "joint": each.prefix + name,
+                        "spans": [list(span) for span in spans],
+                        "events": events[:_MOST_EVENTS],
+                    }
+                )
+    return lanes
 
 
-def _outcome(shown: Shown, count: int) -> str:
+def _outcome(shown: Shown) -> str:
     end = shown.run.outcome
-    who = "" if count == 1 else f"{shown.name}: "
-    return f"{who}{end.ending} at t = {end.t:g} s" + (f": {end.advice}" if end.advice else "")
+    return f"{shown.prefix}{end.ending} at t = {end.t:g} s" + (f": {end.advice}" if end.advice else "")
 
 
 def _shown(number: int, run: Trajectory, count: int, package_dirs: tuple[Path, ...], inertia: bool) -> Shown:
@@ -160,11 +234,12 @@ def _shown(number: int, run: Trajectory, count: int, package_dirs: tuple[Path, .
         f"drawn at {len(keys.t)} of the {keys.samples} samples; between these, joint positions are interpolated, with"
         f" an error of at most {keys.error[worst]:.1e} {'rad' if joint.revolute else 'm'} ({joint.joint})"
     )
-    mark = "" if not number else " (ghost)" if count == 2 else f" (ghost {number})"
+    mark = ghost_mark(number, count)
     look = drawing(robot, package_dirs, inertia=inertia)
     some = f"the first {_MOST_EVENTS} of {len(run.events)} events are marked on the plots"
     notes = (thinning, some) if len(run.events) > _MOST_EVENTS else (thinning,)
-    return Shown(robot.name + mark, run, stage, keys, look, tuple(problems), notes)
+    name = robot.name + mark
+    return Shown(name, "" if count == 1 else f"{name}: ", run, stage, keys, look, tuple(problems), notes)
 
 
 def _drawable(run: Trajectory) -> Trajectory:

@@ -22,7 +22,7 @@ class Keyframes:
     """Keyframes of N joints.
 
     Attributes:
-        t: Times, (k,), in [s]; numbers of single precision, as a viewer keeps them.
+        t: Times, (k,), in [s]; rounded to single precision, as in the viewer.
         q: Positions, (k, N).
         samples: Number of samples they stand for.
         error: Largest deviation from a sample, for each joint, (N,), in [rad] or [m].
@@ -36,8 +36,8 @@ class Keyframes:
 
 def keyframes(t: np.ndarray, q: np.ndarray, tolerance: float = TOLERANCE) -> Keyframes:
     """Keyframes of samples t (m,), q (m, N)."""
-    kept = np.flatnonzero(corners(t, q, tolerance))
-    times, positions = _short_turns(t[kept], q[kept])
+    index = np.flatnonzero(corners(t, q, tolerance))
+    times, positions = _short_turns(t[index], q[index])
     drawn = times.astype(np.float32).astype(float)
     apart = np.concatenate([[True], np.diff(drawn) > 0])
     drawn, positions = drawn[apart], positions[apart]
@@ -46,9 +46,9 @@ def keyframes(t: np.ndarray, q: np.ndarray, tolerance: float = TOLERANCE) -> Key
 
 
 def corners(t: np.ndarray, q: np.ndarray, tolerance: float) -> np.ndarray:
-    """Which samples are kept, (m,): split each span at its sample farthest from the chord until all are near."""
-    kept = np.zeros(len(t), dtype=bool)
-    kept[[0, -1]] = True
+    """Which samples are keyframes, (m,): split each span at its sample farthest from the chord until all are near."""
+    chosen = np.zeros(len(t), dtype=bool)
+    chosen[[0, -1]] = True
     spans = [(0, len(t) - 1)]
     while spans:
         a, b = spans.pop()
@@ -58,13 +58,13 @@ def corners(t: np.ndarray, q: np.ndarray, tolerance: float) -> np.ndarray:
         away = np.abs(q[a + 1 : b] - (q[a] + part * (q[b] - q[a]))).max(axis=1)
         if away.max() > tolerance:
             middle = a + 1 + int(away.argmax())
-            kept[middle] = True
+            chosen[middle] = True
             spans += [(a, middle), (middle, b)]
-    return kept
+    return chosen
 
 
 def _short_turns(t: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The keyframes with more between, where a joint turns too far in one."""
+    """Add keyframes where a joint turns too far between two."""
     parts = np.ceil(np.abs(np.diff(q, axis=0)).max(axis=1, initial=0.0) / _LARGEST_TURN).astype(int)
     parts = np.maximum(parts, 1)
     at = np.concatenate([k + np.arange(n) / n for k, n in enumerate(parts)] + [[len(t) - 1.0]])

@@ -1,4 +1,4 @@
-"""Overlays of a replay: what a run recorded, drawn into it: p_com = Σ mᵢ pᵢ / Σ mᵢ, a trace, stops.
+"""Overlays of a replay: p_com = Σ mᵢ pᵢ / Σ mᵢ, the trace of a frame, stops, and arrows of external wrenches (f, τ).
 
 Paths are thinned like joints: a straight line replaces the samples between keyframes, to a part of what is seen.
 """
@@ -15,10 +15,10 @@ from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.spatial import first_moment
 from robot_dyn.view import commands
 from robot_dyn.view.commands import Command
-from robot_dyn.view.geometry.shapes import cylinder, sphere
+from robot_dyn.view.geometry.shapes import arrow, cylinder, sphere
 from robot_dyn.view.geometry.triangles import Mesh
-from robot_dyn.view.keyframes import Keyframes, keyframes
-from robot_dyn.view.stage import Stage, placement
+from robot_dyn.view.keyframes import Keyframes, corners, keyframes
+from robot_dyn.view.stage import Stage, placement, plain
 
 Rgba = tuple[float, float, float, float]
 Placements = Mapping[int, tuple[np.ndarray, np.ndarray]]
@@ -27,17 +27,22 @@ _COM: Rgba = (0.94, 0.89, 0.26, 1.0)
 _TRACE: Rgba = (0.0, 0.62, 0.45, 1.0)
 _STOP: Rgba = (0.9, 0.05, 0.05, 0.75)
 GHOST = 0.35  # opacity
-PART = 5e-4  # of what is seen: how far a path may be off between keyframes
+_PART = 5e-4  # of what is seen: how far a path may be off between keyframes
+_LONGEST = 0.4  # of the radius of what is seen: the arrow of the largest force or torque of all runs
+_WRENCH: tuple[tuple[str, str, slice, str, Rgba], ...] = (
+    ("force", "orange", slice(1, 4), "N", (0.84, 0.37, 0.0, 1.0)),
+    ("torque", "pink", slice(4, 7), "N m", (0.8, 0.47, 0.65, 1.0)),
+)
 _CHUNK = 20_000  # samples whose placements are held at a time
 
 
 @final
 @dataclass
 class Overlays:
-    """Commands, tracks by path, and notes, gathered.
+    """Commands, tracks by path, and notes.
 
     Attributes:
-        ghost: Whether what is added lets light through.
+        ghost: Whether the overlays are transparent.
     """
 
     ghost: bool = False
@@ -46,7 +51,7 @@ class Overlays:
     notes: list[str] = field(default_factory=list)
 
     def colour(self, rgba: Rgba) -> Rgba:
-        """A colour, clear if it is a ghost's."""
+        """A colour, transparent if it is a ghost's."""
         return (*rgba[:3], rgba[3] * GHOST) if self.ghost else rgba
 
     def add(self, path: str, mesh: Mesh, rgba: Rgba, *tracks: Command) -> None:
@@ -65,15 +70,15 @@ def overlays(stage: Stage, run: Trajectory, reach: float, frame: str | None = No
         run: Its samples.
         reach: Radius of what is seen, in [m].
         frame: Link whose path is traced; the one under control, or the tip, if not given.
-        ghost: Whether it is drawn clear.
+        ghost: Whether it is drawn transparent.
     """
     found = Overlays(ghost)
-    com = keyframes(run.t, over(stage, run.q, lambda at: centre_of_mass(stage, at)), PART * reach)
+    com = keyframes(run.t, _over(stage, run.q, lambda at: centre_of_mass(stage, at)), _PART * reach)
     place = commands.track("position", "vector", com.t, com.q)
     found.add(f"{stage.root}/centre of mass", sphere(0.02 * reach), _COM, place)
 
     frame = frame or run.about.get("frame") or stage.tip
-    path = keyframes(run.t, of_link(stage, run.q, frame), PART * reach)
+    path = keyframes(run.t, _of_link(stage, run.q, frame), _PART * reach)
     line = commands.polyline(path.q), commands.material(found.colour(_TRACE), line=True)
     found.commands.append(commands.set_object(f"{stage.root}/trace", *line, kind="Line"))
     what = f"the line is the path of {frame}, the yellow ball the centre of mass of what moves"
@@ -88,18 +93,18 @@ def _off(*paths: Keyframes) -> float:
     return max(float(np.linalg.norm(path.error)) for path in paths)
 
 
-def over(stage: Stage, q: np.ndarray, ask: Callable[[Placements], np.ndarray]) -> np.ndarray:
-    """What is asked of the placements of all bodies, at positions q (m, n)."""
+def _over(stage: Stage, q: np.ndarray, function: Callable[[Placements], np.ndarray]) -> np.ndarray:
+    """Evaluate a function of the placements of all bodies at positions q (m, n)."""
     chunks = [q[i : i + _CHUNK] for i in range(0, len(q), _CHUNK)]
-    return np.concatenate([ask(stage.linkage.at(chunk).in_base) for chunk in chunks])
+    return np.concatenate([function(stage.linkage.at(chunk).in_base) for chunk in chunks])
 
 
-def of_link(stage: Stage, q: np.ndarray, link: str) -> np.ndarray:
+def _of_link(stage: Stage, q: np.ndarray, link: str) -> np.ndarray:
     """Positions of a link's frame, (m, 3); QueryError if there is no such link."""
     stage.link_path(link)
     body, pose, _ = stage.linkage.links[link]
     shape = (-1, 3)
-    return over(stage, q, lambda at: np.broadcast_to(placement(at, body, pose)[1], (len(at[0][1]), 3)).reshape(shape))
+    return _over(stage, q, lambda at: np.broadcast_to(placement(at, body, pose)[1], (len(at[0][1]), 3)).reshape(shape))
 
 
 def centre_of_mass(stage: Stage, at: Placements) -> np.ndarray:
@@ -111,7 +116,7 @@ def centre_of_mass(stage: Stage, at: Placements) -> np.ndarray:
 
 
 def _stops(found: Overlays, stage: Stage, run: Trajectory, reach: float) -> None:
-    """A red drum on each joint that comes to a stop, seen while it bears on it."""
+    """A red drum on each joint that comes to a stop, visible while it is there."""
     assert run.at_stop is not None
     for index, name in enumerate(run.joint_names):
         bears = run.at_stop[:, index]
@@ -120,13 +125,53 @@ def _stops(found: Overlays, stage: Stage, run: Trajectory, reach: float) -> None
         first = np.concatenate([[True], bears[1:] != bears[:-1]])
         body = next(i for i, each in enumerate(stage.linkage.bodies) if each.joint == name)
         path, axis = f"{stage.paths[body]}/at its stop", stage.linkage.bodies[body].axis
-        turned = commands.track("quaternion", "quaternion", run.t[:1], along(axis[None]))
+        turned = commands.track("quaternion", "quaternion", run.t[:1], _along(axis[None]))
         seen = commands.track("visible", "bool", run.t[first], bears[first])
         found.add(path, cylinder(0.06 * reach, 0.15 * reach), _STOP, turned, seen)
         found.notes.append(f"{name} is red while it is at a stop")
 
 
-def along(vectors: np.ndarray) -> np.ndarray:
+def arrows(shown: list[tuple[Stage, Trajectory, Overlays]], reach: float) -> list[str]:
+    """Add the arrows of all runs, on one scale; return notes on the scale.
+
+    Args:
+        shown: Stage, samples and overlays of each run.
+        reach: Radius of what is seen, in [m].
+    """
+    notes = []
+    for kind, colour, which, unit, rgba in _WRENCH:
+        sizes = [np.linalg.norm(F[:, which], axis=1).max() for _, run, _ in shown for F in run.wrenches.values()]
+        if not (largest := float(max(sizes, default=0.0))) > 0:
+            continue
+        notes.append(f"{colour} arrows: {kind}s, {_LONGEST * reach:.2g} m long for the largest, {largest:.4g} {unit}")
+        for stage, run, found in shown:
+            for link, F in run.wrenches.items():
+                _arrow(found, stage, run, reach, f"{kind} on {link}", link, F[:, 0], F[:, which] / largest, rgba)
+    return notes
+
+
+def _arrow(
+    found: Overlays, stage: Stage, run: Trajectory, reach: float, name: str, link: str,
+    t: np.ndarray, F: np.ndarray, rgba: Rgba,
+) -> None:  # fmt: skip
+    """One arrow on a link: F (k, 3) at times t (k,), in parts of the largest."""
+    q = np.stack([np.interp(t, run.t, column) for column in run.q.T], axis=1)
+    points = _of_link(stage, q, link)
+    keys = np.flatnonzero(corners(t, np.hstack([points / reach, F]), _PART))
+    t, F, points = t[keys], F[keys], points[keys]
+    lengths = np.linalg.norm(F, axis=1)
+    found.add(
+        f"{stage.root}/{plain(name)}",
+        arrow(_LONGEST * reach),
+        rgba,
+        commands.track("position", "vector", t, points),
+        commands.track("quaternion", "quaternion", t, _along(F)),
+        commands.track("scale", "vector", t, np.maximum(lengths, 1e-6)[:, None] * np.ones(3)),
+        commands.track("visible", "bool", t, lengths > 0),
+    )
+
+
+def _along(vectors: np.ndarray) -> np.ndarray:
     """Quaternions (k, 4) that turn the z axis along vectors (k, 3); none where a vector is 0."""
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     x, y, z = (vectors / np.where(length > 0, length, 1.0)).T

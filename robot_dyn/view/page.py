@@ -1,4 +1,4 @@
-"""The page of a replay: one HTML file with the viewer, the plots, the slider and all data in it."""
+"""The page of a replay: one HTML file that contains the viewer, the plots, the slider and all data."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from typing import Any
 
 from robot_dyn.view.commands import as_text
 
-# Nothing is loaded from anywhere, and only what stands here runs; pictures are data; only the live page has a socket.
+# Nothing is loaded, and only the scripts in the page run; pictures are data; only the live page has a socket.
 _POLICY = "default-src 'none'; base-uri 'none'; form-action 'none'; script-src {}; style-src {}; img-src data: blob:"
 _LIVE = "; connect-src 'self' ws://127.0.0.1:* ws://localhost:*"
 _PANEL = re.compile(r'\}\("(\.dg ul\{(?:[^"\\]|\\.)*)"\)')  # the style that meshcat's panel, dat.gui, gives itself
@@ -23,16 +23,16 @@ _PANEL = re.compile(r'\}\("(\.dg ul\{(?:[^"\\]|\\.)*)"\)')  # the style that mes
 
 def page(document: dict[str, Any]) -> str:
     """The HTML text of a document: title, outcome, notes, duration, scene, plots, and commands unless it is `live`."""
-    own = Path(__file__).parent / "web"
+    web = Path(__file__).parent / "web"
     meshcat = _inline(_read(_meshcat() / "viewer" / "dist" / "main.min.js"))
     scripts = {
         "meshcat": meshcat,
-        "uplot": _inline(_read(own / "uplot" / "uPlot.iife.min.js")),
-        "script": _inline(_read(own / "replay.js")),
+        "uplot": _inline(_read(web / "uplot" / "uPlot.iife.min.js")),
+        "script": _inline(_read(web / "replay.js")),
     }
-    styles = {"uplot_style": _read(own / "uplot" / "uPlot.min.css"), "style": _read(own / "replay.css")}
+    styles = {"uplot_style": _read(web / "uplot" / "uPlot.min.css"), "style": _read(web / "replay.css")}
     policy = _POLICY.format(_hashes(scripts.values()), _hashes([*styles.values(), *_own_styles(meshcat)]))
-    return Template(_read(own / "replay.html")).substitute(
+    return Template(_read(web / "replay.html")).substitute(
         policy=policy + (_LIVE if document["live"] else ""),
         title=html.escape(document["title"]),
         data=json.dumps(as_text(document)),  # base64 has no character that HTML would read
@@ -55,7 +55,7 @@ def _own_styles(meshcat: str) -> Iterator[str]:
 
 
 def _meshcat() -> Path:
-    """The folder of the package meshcat, whose import takes IPython along and is not needed for a file of it."""
+    """The folder of the package meshcat; importing it would import IPython."""
     found = find_spec("meshcat")
     assert found is not None and found.submodule_search_locations, "meshcat is a dependency"
     return Path(found.submodule_search_locations[0])
@@ -66,5 +66,5 @@ def _read(file: Path) -> str:
 
 
 def _inline(script: str) -> str:
-    """A script that no HTML parser ends before its end."""
+    """Return a script that HTML parsers do not end early."""
     return script.replace("</script", "<\\/script").replace("<!--", "<\\!--")

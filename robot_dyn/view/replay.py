@@ -1,4 +1,4 @@
-"""Runs of arms, or an arm at rest, in a browser, live or as one file; between keyframes q(t) ≈ its chord."""
+"""Runs of arms, or an arm at rest, in a browser, live or as one file; between keyframes q(t) is its chord."""
 
 from __future__ import annotations
 
@@ -13,9 +13,8 @@ from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import Array
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.validate import integer
-from robot_dyn.view.document import ReplayError, document
+from robot_dyn.view.document import ReplayError, document, still
 from robot_dyn.view.page import page
-from robot_dyn.view.still import still
 
 if TYPE_CHECKING:
     from robot_dyn.view.live.server import Server
@@ -31,11 +30,11 @@ def replay(
     inertia: bool = False,
     port: int | None = None,
 ) -> Server:
-    """Show runs in the browser, at the `url` of the server that is returned, on this machine alone.
+    """Show runs in the browser, at the `url` of the server that is returned, on this machine only.
 
     Args:
-        run: What is shown.
-        *ghosts: Runs shown with it, clear.
+        run: The run to show.
+        *ghosts: Runs shown with it, transparent.
         package_dirs: Folders in which the packages of meshes are searched first.
         frame: Link whose path is traced.
         inertia: Whether each link's equivalent box, of the same mass and inertia, is drawn.
@@ -79,10 +78,10 @@ def show(
     inertia: bool = False,
     port: int | None = None,
 ) -> Server:
-    """Show a robot in the browser, at the `url` of the server that is returned, on this machine alone.
+    """Show a robot in the browser, at the `url` of the server that is returned, on this machine only.
 
     Args:
-        robot: What is shown.
+        robot: The robot to show.
         q: Its configuration, (n,), in [rad] or [m]; 0 if not given.
         package_dirs: Folders in which the packages of meshes are searched first.
         inertia: Whether each link's equivalent box, of the same mass and inertia, is drawn.
@@ -120,22 +119,22 @@ def _free(port: int | None) -> int | None:
     return None if port is None else integer("port", port, least=1, most=65535)
 
 
-def _served(made: dict[str, Any], port: int | None) -> Server:
-    from robot_dyn.view.live.server import Server  # takes zmq and tornado along
+def _served(document: dict[str, Any], port: int | None) -> Server:
+    from robot_dyn.view.live.server import Server  # imports zmq and tornado
 
-    _tell(made)
-    drawn = made.pop("commands")
-    return Server(page(made | {"live": True}), drawn, port)
+    _warn(document)
+    drawn = document.pop("commands")
+    return Server(page(document | {"live": True}), drawn, port)
 
 
-def _written(made: dict[str, Any], file: Path) -> Path:
-    _tell(made)
-    text = page(made | {"live": False}).encode()
+def _written(document: dict[str, Any], file: Path) -> Path:
+    _warn(document)
+    text = page(document | {"live": False}).encode()
     return save(file, lambda stream: stream.write(text), ReplayError)
 
 
-def _tell(made: dict[str, Any]) -> None:
+def _warn(document: dict[str, Any]) -> None:
     """Warn, once, of what is drawn otherwise than the files describe."""
-    if problems := made["problems"]:
+    if problems := document["problems"]:
         rest = f"; and {len(problems) - 1} more, listed on the page" if len(problems) > 1 else ""
         warnings.warn(f"drawn otherwise than its files describe: {problems[0]}{rest}", ModelWarning, stacklevel=4)

@@ -29,7 +29,7 @@ class Rest(NamedTuple):
 
 
 def rests(run: Trajectory) -> tuple[tuple[Rest, ...], ...]:
-    """The rests of each joint, the first ones, in the order of time; none in a run in which nothing holds joints."""
+    """Return the first rests of each joint, in the order of time; none in a run without effects that hold joints."""
     names = run.joint_names
     if not _HOLD & set(run.acting or ()):
         return ((),) * len(names)
@@ -47,5 +47,5 @@ def _of_joint(run: Trajectory, i: int, t: np.ndarray, q: np.ndarray, v: np.ndarr
     held = (v[1:] == 0) & (v[:-1] == 0) & (q[1:] == q[:-1])
     edges = np.flatnonzero(np.diff(np.concatenate([[False], held, [False]]).astype(int)))
     stops = set() if run.at_stop is None else set(run.q[run.at_stop[:, i], i].tolist())
-    found = (Rest(float(t[a]), float(t[b]), float(q[a]) in stops) for a, b in edges.reshape(-1, 2) if t[b] > t[a])
-    return tuple(found)[:_MOST]
+    intervals = (Rest(float(t[a]), float(t[b]), float(q[a]) in stops) for a, b in edges.reshape(-1, 2) if t[b] > t[a])
+    return tuple(intervals)[:_MOST]

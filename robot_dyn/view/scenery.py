@@ -1,4 +1,4 @@
-"""What surrounds the robots of a page: down is where gravity points, the floor lies below all, the camera looks at all.
+"""The surroundings of the robots of a page: gravity points down, the floor lies below all, the camera sees all.
 
 R g/‖g‖ = −z    the scene is the base turned by the least rotation R that does this
 """
@@ -19,7 +19,7 @@ from robot_dyn.view.geometry.shapes import arrow
 
 _GROUND = (0.7, 0.73, 0.77, 1.0)
 _GRAVITY = (0.42, 0.24, 0.6, 1.0)  # violet
-_CORNER = np.array([0.67, -0.67, 0.32])  # where the camera stands by custom, from the middle of what is seen
+_CORNER = np.array([0.67, -0.67, 0.32])  # default direction of the camera, from the middle of what is seen
 _POINT = 1e-9  # [m], below which nothing has a size
 _FRONTAL = 1.2  # how far it moves to the front of what is flat
 
@@ -79,7 +79,7 @@ def upright(gravity: tuple[float, float, float]) -> np.ndarray:
 
 
 def ground(seen: Scenery) -> Command:
-    """Squares on the floor, each edge a line of its own: viewers drop lines that pass behind the eye."""
+    """Squares on the floor, each edge a separate line: viewers drop lines that pass behind the camera."""
     middle, count = np.round(seen.center[:2] / seen.square), int(np.ceil(4 * seen.radius / seen.square))
     ticks = np.arange(-count, count + 1)
     x, y = np.meshgrid(ticks, ticks[:-1], indexing="ij")
@@ -105,7 +105,7 @@ def gravity_arrow(seen: Scenery, gravity: tuple[float, float, float]) -> list[Co
 
 
 def gravity_label(robot: Robot) -> str:
-    """What the picture says of gravity."""
+    """The label of gravity in the picture."""
     gravity = robot.edits.gravity
     if not any(gravity):
         return "no gravity"
@@ -114,7 +114,7 @@ def gravity_label(robot: Robot) -> str:
 
 
 def turned(gravity: tuple[float, float, float]) -> list[str]:
-    """A note on how the scene stands, if it does not stand as the base does with gravity along −z."""
+    """A note on the orientation of the scene, unless gravity acts along −z of the base."""
     if not any(gravity):
         return ["gravity is zero; up is z of the base"]
     if np.array_equal(upright(gravity), np.eye(3)):

@@ -40,7 +40,7 @@ class Stage:
 
     @cached_property
     def linkage(self) -> Linkage:
-        """The own road's kinematics; no line of it is Pinocchio's."""
+        """Kinematics of the own implementation; it shares no code with Pinocchio."""
         return Lagrangian(self.robot).linkage
 
     @cached_property
@@ -49,7 +49,7 @@ class Stage:
         paths: list[str] = []
         for index, body in enumerate(self.linkage.bodies):
             parent = self.root if body.parent == BASE else paths[body.parent]
-            paths.append(f"{parent}/{index} {_plain(body.joint)}")
+            paths.append(f"{parent}/{index} {plain(body.joint)}")
         return tuple(paths)
 
     def link_path(self, link: str) -> str:
@@ -57,7 +57,7 @@ class Stage:
         if link not in self.linkage.links:
             raise QueryError(f"no link {link!r}; {nearest(link, self.linkage.links)}")
         body, _, _ = self.linkage.links[link]
-        return f"{self.root if body == BASE else self.paths[body]}/link {_plain(link)}"
+        return f"{self.root if body == BASE else self.paths[body]}/link {plain(link)}"
 
     def draw(self, pieces: tuple[Piece, ...], opacity: float = 1.0) -> list[Command]:
         """The commands that put links and their pieces in place."""
@@ -107,14 +107,16 @@ class Stage:
 
 def _tracks(body: Body, t: np.ndarray, q: np.ndarray) -> list[Command]:
     """Placement g exp(ξ̂ q) of a joint's node at keyframes."""
+    from scipy.spatial.transform import Rotation
+
+    zero = Rotation.from_matrix(body.pose.R)
     if body.revolute:
-        half = q[:, None] / 2
-        turns = _product(_quaternion(body.pose.R), np.hstack([np.sin(half) * body.axis, np.cos(half)]))
-        still = commands.track("position", "vector", t[:1], body.pose.p)
-        return [still, commands.track("quaternion", "quaternion", t, turns)]
+        turns = (zero * Rotation.from_rotvec(q[:, None] * body.axis)).as_quat()
+        fixed = commands.track("position", "vector", t[:1], body.pose.p)
+        return [fixed, commands.track("quaternion", "quaternion", t, turns)]
     slides = body.pose.p + q[:, None] * (body.pose.R @ body.axis)
-    still = commands.track("quaternion", "quaternion", t[:1], _quaternion(body.pose.R))
-    return [still, commands.track("position", "vector", t, slides)]
+    fixed = commands.track("quaternion", "quaternion", t[:1], zero.as_quat())
+    return [fixed, commands.track("position", "vector", t, slides)]
 
 
 def placement(at: Mapping[int, tuple[np.ndarray, np.ndarray]], body: int, pose: Pose) -> tuple[np.ndarray, np.ndarray]:
@@ -125,19 +127,6 @@ def placement(at: Mapping[int, tuple[np.ndarray, np.ndarray]], body: int, pose: 
     return R @ pose.R, R @ pose.p + p
 
 
-def _quaternion(R: np.ndarray) -> np.ndarray:
-    """Unit quaternion (x, y, z, w) of a rotation."""
-    from scipy.spatial.transform import Rotation
-
-    return Rotation.from_matrix(R).as_quat()
-
-
-def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Product a b of quaternions (x, y, z, w), a (4,) and b (k, 4)."""
-    vector = a[3] * b[:, :3] + b[:, 3:] * a[:3] + np.cross(a[:3], b[:, :3])
-    return np.hstack([vector, a[3] * b[:, 3:] - (b[:, :3] @ a[:3])[:, None]])
-
-
-def _plain(name: str) -> str:
+def plain(name: str) -> str:
     """A name as one part of a path, which the viewer cuts at slashes."""
     return name.replace("/", "∕")

@@ -204,7 +204,7 @@ def test_of_a_joint_that_breaks_away_the_friction_of_sliding_is_a_share(tmp_path
 @pytest.mark.parametrize("option", [["--effects", "urdf"], ["--lock", "joint_1=0"], ["--package-dir", "."]])
 def test_a_scene_states_its_own_edits(option: list[str], tmp_path: Path):
     (tmp_path / "held.toml").write_text(HELD)
-    assert "is of a robot; a scene states its own" in refusal(["query", str(tmp_path / "held.toml"), *option])
+    assert "is for a robot; a scene states its own" in refusal(["query", str(tmp_path / "held.toml"), *option])
 
 
 def test_query_and_why_as_text():

@@ -66,7 +66,7 @@ def test_a_robot_swings_freely_from_the_start_that_is_given() -> None:
 @pytest.mark.parametrize(
     ("command", "given", "message"),
     [
-        ("accuracy", "scene.toml --q 0.1,0.2", r"--q: is of a robot; a scene states its own, so leave it out"),
+        ("accuracy", "scene.toml --q 0.1,0.2", r"--q: is for a robot; a scene states its own, so leave it out"),
         ("accuracy", "scene.toml --method rk5", r"no integration method 'rk5'; nearest: rk4.*"),
         ("accuracy", "scene.toml --budget 0", r"budget_s must be (positive|above 0), got 0\.0"),
         ("accuracy", "pendulum --duration -1", r"--duration must be positive, got -1"),

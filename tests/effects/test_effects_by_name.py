@@ -7,7 +7,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.errors import EffectError
-from robot_dyn.scene.effects import kinds
+from robot_dyn.scene.effects import BY_KIND
 
 ROBOT = rd.load("cart_pole")
 
@@ -77,8 +77,8 @@ def test_an_effect_has_one_name_in_python_scene_ledger_and_rollouts() -> None:
         "effort_limit": [rd.EffortLimit(5.0)],
         "actuator_lag": [rd.ActuatorLag(0.05)],
     }
-    assert [kind for kind in kinds() if kind in built] == list(built)
-    assert set(kinds()) - set(built) == {"gravity", "lock", "payload", "armature"}
+    assert [kind for kind in BY_KIND if kind in built] == list(built)
+    assert set(BY_KIND) - set(built) == {"gravity", "lock", "payload", "armature"}
     for kind, effects in built.items():
         assert {effect.name for effect in effects} == {kind}
     plant = rd.Plant(robot, [effect for effects in built.values() for effect in effects])

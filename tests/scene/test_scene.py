@@ -7,7 +7,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.errors import SceneError
-from robot_dyn.scene.effects import kinds
+from robot_dyn.scene.effects import BY_KIND
 from robot_dyn.scene.explain import explain
 from robot_dyn.scene.scene import parse_scene, read_both
 from robot_dyn.scene.starters import starter, starters
@@ -107,7 +107,7 @@ EFFECTS = {
 
 
 def test_every_kind_of_effect_is_tried() -> None:
-    assert set(EFFECTS) == set(kinds())
+    assert set(EFFECTS) == set(BY_KIND)
 
 
 @pytest.mark.parametrize("kind", EFFECTS)

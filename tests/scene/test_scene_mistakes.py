@@ -134,7 +134,7 @@ def test_tables_and_documents_hold_no_control_characters(capsys) -> None:
     table.add_row(evil)
     terminal.say(table, evil, "τ", table)
     terminal.say_json({evil: [evil, "τ"]})
-    terminal.tell(evil + "\n")
+    terminal.to_stderr(evil + "\n")
     out, err = capsys.readouterr()
     assert all(letter.isprintable() or letter == "\n" for letter in out + err)
     shown = r"x\x1b[31m\x9b\x07\x7f\u202e\U000e0001"

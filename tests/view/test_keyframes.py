@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robot_dyn.view.keyframes import TOLERANCE, keyframes
-from robot_dyn.view.plots.series import thinned
+from robot_dyn.view.series import thinned
 
 
 def wander(seed: int, m: int, joints: int, size: float) -> tuple[np.ndarray, np.ndarray]:

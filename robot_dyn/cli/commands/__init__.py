@@ -1,1 +1,8 @@
-"""The commands, one topic a file."""
+"""The commands, by topic.
+
+query.py      on robots: list, info, query, compare
+simulate.py   on scenes: simulate, explain, scene
+show.py       pages and pictures: show, replay, plot
+cost.py       what accuracy costs: accuracy, cost, certify, advise
+prove.py, stress.py, check.py, cache.py, demo.py    one command each
+"""

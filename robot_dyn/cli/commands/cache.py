@@ -1,25 +1,49 @@
-"""Commands that keep house: cache."""
+"""The command for the cache of compiled kernels: cache."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Iterator
+from datetime import datetime
+from typing import Annotated, Any
 
 import typer
 
 from robot_dyn.cli.app import Json, app
-from robot_dyn.cli.terminal import say, say_json
+from robot_dyn.cli.terminal import say, say_json, table
 
 
 @app.command()
 def cache(
-    clear: Annotated[bool, typer.Option("--clear", help="Remove them; each is compiled anew when asked for.")] = False,
+    clear: Annotated[bool, typer.Option("--clear", help="Remove them; each is compiled again when needed.")] = False,
     as_json: Json = False,
 ) -> None:
     """List the compiled kernels kept on disk, with their sizes."""
-    from robot_dyn.cli import kernels
     from robot_dyn.codegen.store.cache import default_store
 
     store = default_store()
     removed = store.clear() if store and clear else 0
-    answer = kernels.cache(store, removed)
-    say_json(answer) if as_json else say(*kernels.cache_tables(answer))
+    kernels = list(store.entries()) if store else []
+    answer = {
+        "folder": str(store.folder) if store else None,
+        "removed": removed,
+        "bytes": sum(each.size for each in kernels),
+        "kernels": kernels,
+    }
+    say_json(answer) if as_json else say(*_lines(answer))
+
+
+def _lines(answer: dict[str, Any]) -> Iterator[Any]:
+    """The answer as text."""
+    if answer["folder"] is None:
+        yield "no cache: compiled kernels are not stored"
+        return
+    if answer["removed"]:
+        yield f"removed: {answer['removed']} kernels"
+    if answer["kernels"]:
+        rows = []
+        for each in answer["kernels"]:
+            used = datetime.fromtimestamp(each.used).strftime("%Y-%m-%d %H:%M")
+            rows.append([each.key[:12], each.about, f"{each.size / 1024:.0f}", used])
+        yield table(("kernel", "about", "KiB", "last used"), rows, words=("kernel", "about", "last used"))
+    count = len(answer["kernels"])
+    yield f"{count} kernel{'' if count == 1 else 's'}, {answer['bytes'] / 2**20:.1f} MiB in {answer['folder']}"

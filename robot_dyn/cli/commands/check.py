@@ -12,7 +12,7 @@ import typer
 import robot_dyn as rd
 from robot_dyn.cli import arguments, completion
 from robot_dyn.cli.app import Force, Json, PackageDir, app, progress
-from robot_dyn.cli.terminal import say, say_json, tell
+from robot_dyn.cli.terminal import say, say_json, to_stderr
 from robot_dyn.errors import QueryError, RobotDynError
 from robot_dyn.files import Kind, save
 
@@ -72,7 +72,7 @@ def check(
     if fix and not as_json:
         for file in files:
             if file not in written:
-                tell(f"{file}: nothing that can be repaired")
+                to_stderr(f"{file}: nothing that can be repaired")
     if not all(each.ok for each in checkups):
         raise typer.Exit(1)
 

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from contextlib import suppress
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 import robot_dyn as rd
 from robot_dyn.cli import arguments
-from robot_dyn.cli.app import Force, Lock, Name, PackageDir, app
+from robot_dyn.cli.app import Dark, Force, Lock, Name, PackageDir, app
 from robot_dyn.cli.arguments import output as checked_output
 from robot_dyn.cli.terminal import say
 from robot_dyn.errors import QueryError
+
+if TYPE_CHECKING:
+    from robot_dyn.view.live.server import Server
 
 Html = Annotated[str | None, typer.Option(metavar="OUT.html", help="Write one file that needs no server, and end.")]
 Inertia = Annotated[bool, typer.Option("--inertia", help="Draw each link's equivalent inertia box.")]
@@ -36,21 +39,14 @@ def show_(
     package_dir: PackageDir = None,
 ) -> None:
     """Show a robot in the browser, live on this machine until Ctrl-C, or as one HTML file."""
-    from robot_dyn.view.replay import PAGE, ReplayError
-
-    if html is not None and port is not None:
-        raise QueryError("give --html or --port, not both: a file needs no server")
-    page = None if html is None else checked_output(html, PAGE, ReplayError, [robot], force)
+    page = _page(html, port, [robot], force)
     loaded = arguments.load(robot, lock, package_dir)
     at = arguments.vector("--q", q, loaded.joint_names)
     options = {"inertia": inertia, "package_dirs": package_dir or ()}
     if page is not None:
-        _tell_file(rd.save_show(loaded, page, at, **options), browse)
-        return
-    with rd.show(loaded, at, port=port, **options) as server, suppress(KeyboardInterrupt):
-        say(f"{server.url} shows the robot; Ctrl-C ends it")
-        _open(server.url, browse)
-        server.wait()
+        _written(rd.save_show(loaded, page, at, **options), browse)
+    else:
+        _serve(rd.show(loaded, at, port=port, **options), "robot", browse)
 
 
 @app.command()
@@ -69,20 +65,13 @@ def replay(
     package_dir: PackageDir = None,
 ) -> None:
     """Replay runs in the browser, live on this machine until Ctrl-C, or as one HTML file."""
-    from robot_dyn.view.replay import PAGE, ReplayError
-
-    if html is not None and port is not None:
-        raise QueryError("give --html or --port, not both: a file needs no server")
-    page = None if html is None else checked_output(html, PAGE, ReplayError, runs, force)
+    page = _page(html, port, runs, force)
     trajectories = [rd.load_run(path) for path in runs]
     options = {"frame": frame, "inertia": inertia, "package_dirs": package_dir or ()}
     if page is not None:
-        _tell_file(rd.save_replay(trajectories[0], page, *trajectories[1:], **options), browse)
-        return
-    with rd.replay(*trajectories, port=port, **options) as server, suppress(KeyboardInterrupt):
-        say(f"{server.url} shows the run; Ctrl-C ends it")
-        _open(server.url, browse)
-        server.wait()
+        _written(rd.save_replay(trajectories[0], page, *trajectories[1:], **options), browse)
+    else:
+        _serve(rd.replay(*trajectories, port=port, **options), "run", browse)
 
 
 @app.command()
@@ -100,7 +89,7 @@ def plot(
         ),
     ] = None,
     joint: Annotated[list[str] | None, typer.Option(metavar="JOINT", help="Show this joint; may be repeated.")] = None,
-    dark: Annotated[bool, typer.Option("--dark", help="For dark screens.")] = False,
+    dark: Dark = False,
     force: Force = False,
 ) -> None:
     """Draw a run: joints, torques against limits, energy ledger, tracking error, phase portrait, error."""
@@ -112,7 +101,24 @@ def plot(
     say(f"written: {file}")
 
 
-def _tell_file(file: Path, browse: bool) -> None:
+def _page(html: str | None, port: int | None, inputs: list[str], force: bool) -> Path | None:
+    """The file to write, checked; None if the page is served."""
+    from robot_dyn.view.replay import PAGE, ReplayError
+
+    if html is not None and port is not None:
+        raise QueryError("give --html or --port, not both: a file needs no server")
+    return None if html is None else checked_output(html, PAGE, ReplayError, inputs, force)
+
+
+def _serve(server: Server, what: str, browse: bool) -> None:
+    """Serve a page until Ctrl-C."""
+    with server, suppress(KeyboardInterrupt):
+        say(f"{server.url} shows the {what}; Ctrl-C ends it")
+        _open(server.url, browse)
+        server.wait()
+
+
+def _written(file: Path, browse: bool) -> None:
     say(f"written: {file} ({file.stat().st_size / 1e6:.1f} MB)")
     _open(file.absolute().as_uri(), browse)
 

@@ -17,7 +17,7 @@ _LEVELS = 4  # of folders above a URDF that may be its package, as in package/ro
 
 
 def shown(address: str | None) -> str:
-    """An address as a page shows it: without the folders of a machine, which are nobody else's concern."""
+    """Return an address as a page shows it: without the folders of this machine, which stay private."""
     address = (address or "").strip()
     rooted = address.startswith(("file:", "/", "\\", "~")) or address[1:2] == ":"
     return shorten(re.split(r"[/\\]", address)[-1] if rooted else address)
@@ -26,13 +26,13 @@ def shown(address: str | None) -> str:
 def find_file(
     address: str | None, source: Path, package_dirs: tuple[str | Path, ...], remarks: list[str] | None = None
 ) -> Path:
-    """The file of an address that stands in the URDF `source`; whether it exists is for its reader to say.
+    """Return the file of an address in the URDF `source`; it need not exist.
 
     Where a package is not found, its file is taken from a folder above the URDF that has one at the same place; a
     remark says so.
 
     Raises:
-        MeshError: If the address names none.
+        MeshError: If the address does not name a file.
     """
     address = (address or "").strip()
     kind = address.partition("://")[0] if "://" in address else ""

@@ -1,4 +1,4 @@
-"""What a mesh file may open, and checks of its text before a reader of its format sees it."""
+"""Bounded reading of mesh files: what they may open, and checks of their text before a library parses it."""
 
 from __future__ import annotations
 
@@ -43,21 +43,21 @@ def bounded(path: Path) -> bytes:
 
 
 def beside(folder: Path, missing: list[str], anywhere: bool) -> Any:
-    """What a mesh may open by name: regular files, `MAX_BYTES` in all, from its folder; the others are noted."""
+    """Return a resolver of files that a mesh names: regular ones, `MAX_BYTES` in all; the others are noted."""
     from trimesh.resolvers import FilePathResolver
 
     class Beside(FilePathResolver):
         def get(self, name: str) -> bytes:
             try:
-                return readbeside(name)
+                return read_beside(name)
             except MeshError as error:
-                missing.append(f"{shorten(PureWindowsPath(name).name)} {error}")  # folders are nobody's business
+                missing.append(f"{shorten(PureWindowsPath(name).name)} {error}")  # folders stay private
                 raise
 
     left = MAX_BYTES
 
     @cache
-    def readbeside(name: str) -> bytes:
+    def read_beside(name: str) -> bytes:
         nonlocal left
         path = Path(name.strip().removeprefix("file://").replace("\\", "/"))
         if not anywhere:
@@ -74,7 +74,7 @@ def beside(folder: Path, missing: list[str], anywhere: bool) -> Any:
 
 
 def checked_collada(data: bytes) -> etree._Element:
-    """The document, if it has no DTD, and no instances of instances beyond number."""
+    """Return the document if it has no DTD, and a bounded number of nodes with all instances counted."""
     first, prolog = None, etree.XMLPullParser(events=("start",), resolve_entities=False, no_network=True)
     for start in range(0, len(data), 2**12):
         prolog.feed(data[start : start + 2**12])
@@ -106,16 +106,16 @@ def checked_collada(data: bytes) -> etree._Element:
 
 
 def check_gltf(data: bytes, named: Any) -> None:
-    """Refuse what the reader would draw wrong without a word, and accessors that claim more than there is.
+    """Refuse what trimesh would silently draw wrong, and accessors that claim more numbers than the file holds.
 
-    Of the latter it would make arrays of zeros of that size.
+    For the latter trimesh would allocate arrays of zeros.
     """
     binary = data[:4] == b"glTF"
     head = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")] if binary else data)
     addresses = [each.get("uri", "") for each in head.get("buffers", ())]
     room = len(data) + sum(len(named[uri]) for uri in addresses if uri and not uri.startswith("data:"))
     if sum(each["count"] for each in head.get("accessors", ())) > room:
-        raise MeshError("claims more vertices than it has bytes; export it anew")
+        raise MeshError("claims more vertices than it has bytes; export it again")
     if len(head.get("nodes", ())) > MAX_NODES:
         raise MeshError(f"has more than {MAX_NODES} nodes; simplify it")
     if unread := next(_unread(head), None):
@@ -123,7 +123,7 @@ def check_gltf(data: bytes, named: Any) -> None:
 
 
 def _unread(head: Any) -> Iterator[str]:
-    """What shapes the triangles of a glTF and is passed over by its reader."""
+    """What shapes the triangles of a glTF file and is ignored by trimesh."""
     yield from (what for name, what in _SHAPING.items() if name in head.get("extensionsUsed", ()))
     accessors, meshes, nodes = (head.get(key, ()) for key in ("accessors", "meshes", "nodes"))
     if any("sparse" in each for each in accessors):

@@ -1,14 +1,16 @@
 """Mesh files as plain triangles: one mesh for each material, creased normals, equal corners merged.
 
 The nodes of a scene are applied, and a Collada `<unit>`. In glTF y is up, by its specification; it is turned to z up,
-before the scale of the URDF, as in Drake and rviz. A Collada `<up_axis>` is not followed, as in rviz, but told: Gazebo
-follows it. STL, OBJ and PLY say nothing of an axis. [rviz, mesh_loader.cpp; drake, internal_render_engine_vtk.cc]
+before the scale of the URDF, as in Drake and rviz. A Collada `<up_axis>` is not followed, as in rviz, but reported, as
+Gazebo follows it. STL, OBJ and PLY have no axis. [rviz, mesh_loader.cpp; drake, internal_render_engine_vtk.cc]
 """
 
 from __future__ import annotations
 
 import io
 import logging
+import re
+import struct
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -22,11 +24,14 @@ from numpy import ndarray
 
 from robot_dyn.errors import shorten
 from robot_dyn.view.geometry.mesh_files import MeshError, beside, bounded, check_gltf, checked_collada
-from robot_dyn.view.geometry.stl import read_stl
 from robot_dyn.view.geometry.triangles import Mesh, welded
 
 MAX_PIXELS = 1024  # of a texture's longer side in the page
 FORMATS = ("stl", "dae", "obj", "ply", "glb", "gltf")
+_RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])  # of a binary STL file
+_HEADER = 84  # bytes of it: 80 of text and the count
+_VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
+_BAD_NORMAL = re.compile(rb"\bnormal\b(?!(?:\s+[-+.\deE]+|\s+[-+]?(?:nan|inf)){3}\s)", re.IGNORECASE)
 COLLADA, GLTF = "Collada", "glTF"  # the formats with files in which y is up
 Z_UP = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # from y up: a quarter turn about x
 
@@ -55,7 +60,7 @@ class Part:
 def read(
     path: Path, scale: Any = (1.0, 1.0, 1.0), turned: frozenset[str] = frozenset({GLTF})
 ) -> tuple[tuple[Part, ...], tuple[str, ...]]:
-    """The triangles of a mesh file, each coordinate times its scale (3,); in a mirror image the outside stays outside.
+    """Read the triangles of a mesh file, scaled; faces are flipped where the scale is a mirror image.
 
     Args:
         path: The file.
@@ -73,9 +78,12 @@ def read(
     if kind not in FORMATS:
         raise MeshError(f"its format {path.suffix!r} is not read; convert it to {', '.join(FORMATS)}")
     try:
-        with warnings.catch_warnings(action="ignore"), _heard(missing):  # of numpy and Pillow, on what is refused below
+        with (
+            warnings.catch_warnings(action="ignore"),
+            _logged(missing),
+        ):  # of numpy and Pillow, on what is refused below
             if kind == "stl":
-                corners = read_stl(data, missing)
+                corners = _stl(data, missing)
                 del data  # of 1 GB that a large file would take, this is the part that is not needed
                 parts = _uncoloured(corners, factors)
             else:
@@ -85,15 +93,38 @@ def read(
     except MeshError:
         raise
     except Exception as error:  # a damaged file makes the readers raise anything
-        raise MeshError(f"is damaged ({type(error).__name__}: {shorten(error, 120)}); export it anew") from None
+        raise MeshError(f"is damaged ({type(error).__name__}: {shorten(error, 120)}); export it again") from None
     if not parts:
-        raise MeshError("holds no triangles; export it anew")
+        raise MeshError("holds no triangles; export it again")
     return parts, tuple(dict.fromkeys(missing))
 
 
+def _stl(data: bytes, missing: list[str]) -> ndarray:
+    """Corners (m, 3, 3) float32 of the triangles of an STL file; stated normals are not used.
+
+    A normal that is not three numbers is added to `missing`.
+
+    Raises:
+        ValueError: If it is cut off, or a corner is not three numbers.
+    """
+    count = struct.unpack_from("<I", data, 80)[0] if len(data) >= _HEADER else 0
+    stated = _HEADER + count * _RECORD.itemsize
+    ascii_ = data.lstrip()[:5].lower() == b"solid" and stated != len(data)  # exporters write "solid" in binary ones too
+    if not ascii_:
+        if stated > len(data):
+            raise ValueError(f"it states {count} triangles and holds {(len(data) - _HEADER) // _RECORD.itemsize}")
+        return np.frombuffer(data, _RECORD, count, _HEADER)["corners"].astype("f4")
+    if _BAD_NORMAL.search(data):
+        missing.append("a normal is not three numbers")
+    corners = np.fromiter((float(word) for match in _VERTEX.finditer(data) for word in match.groups()), "f4")
+    if len(corners) % 9:
+        raise ValueError("a facet has not three corners")
+    return corners.reshape(-1, 3, 3)
+
+
 @contextmanager
-def _heard(missing: list[str]) -> Iterator[None]:
-    """Take what trimesh logs, which would go to stderr with its traceback, as something that cannot be read."""
+def _logged(missing: list[str]) -> Iterator[None]:
+    """Add what trimesh logs, which would go to stderr with a traceback, to what cannot be read."""
     logger = logging.getLogger("trimesh")
     handler = logging.Handler(logging.WARNING)
     handler.emit = lambda record: missing.append(f"its reader says: {shorten(record.getMessage(), 120)}")

@@ -1,4 +1,4 @@
-"""Triangles: equal corners merged, and normals creased: smooth where faces meet at less than 35°, else one a face."""
+"""Triangles: equal corners merged, and creased normals: smooth where faces meet at less than 35°, otherwise flat."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy import ndarray
 
 CREASE = np.cos(np.deg2rad(35.0))  # faces that meet at a larger angle keep an edge between them
-_CROWD = 256  # faces at one vertex beyond which it is drawn flat: comparing all pairs would cost its square
+_CROWD = 256  # with more faces at one vertex it is drawn flat: the cost of comparing pairs is quadratic
 
 
 @final
@@ -43,9 +43,9 @@ class Mesh:
 def welded(
     corners: ndarray, normals: ndarray | None = None, uv: ndarray | None = None, colors: ndarray | None = None
 ) -> Mesh | None:
-    """Triangles given by their corners, equal ones merged; None if each is a line, a point or not finite.
+    """Return triangles given by their corners, equal ones merged; None if each is a line, a point or not finite.
 
-    Normals that are missing, not finite or against the triangles are made anew, smooth up to `CREASE`.
+    Normals that are missing, not finite or against the triangles are computed, smooth up to `CREASE`.
 
     Args:
         corners: (m, 3, 3), in [m].
@@ -56,16 +56,16 @@ def welded(
     with np.errstate(over="ignore", invalid="ignore"):
         corners = np.asarray(corners).astype("f4") + np.float32(0)  # −0 becomes 0: equal corners have equal bits
         area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).astype(float)
-        kept = np.isfinite(corners).all(axis=(1, 2)) & np.isfinite(area).all(axis=1) & area.any(axis=1)
-    if not kept.any():
+        good = np.isfinite(corners).all(axis=(1, 2)) & np.isfinite(area).all(axis=1) & area.any(axis=1)
+    if not good.any():
         return None
     columns: Any = (corners, area, normals, uv, colors)
-    if not kept.all():
-        columns = [None if array is None else np.asarray(array)[kept] for array in columns]
+    if not good.all():
+        columns = [None if array is None else np.asarray(array)[good] for array in columns]
     corners, area, normals, uv, colors = columns
     face_normals = np.divide(area, np.linalg.norm(area, axis=1, keepdims=True), out=area)
-    kept_normals = _sane(normals, face_normals)
-    smooth: Any = (_creased(corners, face_normals) if kept_normals is None else kept_normals).astype("f4")
+    given = _sane(normals, face_normals)
+    smooth: Any = (_creased(corners, face_normals) if given is None else given).astype("f4")
     parts = [corners, np.rint(127 * smooth) + np.float32(0)]
     parts += [] if uv is None else [np.asarray(uv).astype("f4") + np.float32(0)]
     parts += [] if colors is None else [np.asarray(colors).astype("f4")]
@@ -76,19 +76,12 @@ def welded(
 
 def _distinct(rows: ndarray) -> tuple[ndarray, ndarray]:
     """Index of the first of each kind of row of float32, in order; and for each row the number of its kind."""
-    words = np.ascontiguousarray(rows).view(np.uint32)
-    odd = np.random.default_rng(0).integers(2**63, size=words.shape[1], dtype=np.uint64) * 2 + 1
-    mixed = np.zeros(len(words), np.uint64)
-    for column, factor in zip(words.T, odd, strict=True):  # column by column, in a sixth of the memory
-        wide = column.astype(np.uint64)
-        mixed += (wide + factor) * factor ^ (wide * factor >> np.uint64(29))
-    _, first, kind = np.unique(mixed, return_index=True, return_inverse=True)  # 20 times faster than by axis
-    if not all(np.array_equal(column[first][kind], column) for column in words.T):  # two rows of one hash
-        _, first, kind = np.unique(words, axis=0, return_index=True, return_inverse=True)
+    bits = np.ascontiguousarray(rows).view(f"V{4 * rows.shape[1]}").ravel()
+    _, first, kind = np.unique(bits, return_index=True, return_inverse=True)
     order = np.argsort(first)
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order))
-    return first[order], rank[kind.reshape(-1)]
+    return first[order], rank[kind]
 
 
 def _sane(normals: ndarray | None, face_normals: ndarray) -> ndarray | None:

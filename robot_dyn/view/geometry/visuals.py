@@ -1,12 +1,12 @@
 """What a robot looks like: every <visual> of its URDF as pieces of triangles fastened to links.
 
-A piece stands at g_link · pose. What cannot be drawn as described is said in a note, with what is drawn instead: the
-link's collision shape, or else the ellipsoid of its inertia.
+A piece stands at g_link · pose. A note says what cannot be drawn as described, and what is drawn instead: the
+collision shape of the link, otherwise the ellipsoid of its inertia.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, partial
@@ -67,7 +67,7 @@ class Drawing:
 
     Attributes:
         pieces: What is drawn.
-        notes: What could not be drawn as described, in words.
+        notes: What could not be drawn as described.
         remarks: What else a reader should know.
     """
 
@@ -107,7 +107,7 @@ def solids(
 
 
 class _Artist:
-    """Draws one robot; remembers its meshes, its named materials and its notes."""
+    """Draws one robot; stores its meshes, its named materials and its notes."""
 
     def __init__(self, robot: Robot, package_dirs: Iterable[str | Path]) -> None:
         self.name, self.source = robot.name, Path(robot.description.source)
@@ -161,30 +161,27 @@ class _Artist:
         for link in self.element.iterfind("link"):
             name = (link.get("name") or "").strip()
             for kind in ("collision", "visual"):
-                found[name] = found.get(name) or tuple(self.readable(name, link, kind))
+                if not found.get(name):
+                    pieces, failed = self.shapes(name, link, kind)
+                    found[name] = tuple(pieces)
+                    self.notes += [f"link {name!r}: <{kind}>: {why}" for why in failed]
         return found
 
-    def visuals(self, name: str, link: Any) -> Iterator[Piece]:
-        failed = []
-        for visual in link.iterfind("visual"):
-            try:
-                yield from self.shape(name, visual, f"link {name!r}")
-            except MeshError as error:
-                failed.append(str(error))
+    def visuals(self, name: str, link: Any) -> list[Piece]:
+        """The pieces of the visuals of a link, and a stand-in for those that cannot be read."""
+        pieces, failed = self.shapes(name, link, "visual")
         if failed:
-            pieces, what = self.stand_in(name, link)
-            yield from pieces
+            substitute, what = self.stand_in(name, link)
+            pieces += substitute
             self.notes += [f"link {name!r}: {why}; {what} drawn in its place" for why in failed]
+        return pieces
 
     def stand_in(self, name: str, link: Any) -> tuple[list[Piece], str]:
-        """The collision shapes of a link that can be read; else the ellipsoid of its inertia; and which of them."""
-        pieces = []
-        for collision in link.iterfind("collision"):
-            try:
-                pieces += self.shape(name, collision, f"collision shape of link {name!r}", _STAND_IN)
-            except MeshError as error:
-                if link.find("visual") is None:  # else the note on the visual stands for both
-                    self.notes.append(f"collision shape of link {name!r}: {error}")
+        """The readable collision shapes of a link, otherwise the ellipsoid of its inertia; and which of them."""
+        where = f"collision shape of link {name!r}"
+        pieces, failed = self.shapes(name, link, "collision", where, _STAND_IN)
+        if link.find("visual") is None:  # otherwise the note on the visual stands for both
+            self.notes += [f"{where}: {why}" for why in failed]
         if pieces:
             return pieces, "the collision shape is"
         inertial = self.checked[name].find("inertial")
@@ -196,17 +193,21 @@ class _Artist:
         pose = self.pose(inertial, f"inertia of link {name!r}") @ homogeneous(axes, np.zeros(3))
         return [Piece(name, pose, mesh, _STAND_IN)], "the ellipsoid of its inertia is"
 
-    def readable(self, name: str, link: Any, kind: str) -> Iterator[Piece]:
-        """The pieces of all shapes of a kind that can be read; what cannot is noted."""
+    def shapes(
+        self, name: str, link: Any, kind: str, where: str = "", color: Rgba | None = None
+    ) -> tuple[list[Piece], list[str]]:
+        """The pieces of all shapes of a kind that can be read, and why the others cannot."""
+        pieces, failed = [], []
         for each in link.iterfind(kind):
             try:
-                yield from self.shape(name, each, f"link {name!r}")
+                pieces += self.shape(name, each, where or f"link {name!r}", color)
             except MeshError as error:
-                self.notes.append(f"link {name!r}: <{kind}>: {error}")
+                failed.append(str(error))
+        return pieces, failed
 
     def shape(self, name: str, element: Any, where: str, color: Rgba | None = None) -> list[Piece]:
         """The pieces of a <visual> or <collision>."""
-        pose, (own, texture) = self.pose(element, where), self.material(element, where)
+        pose, (stated, texture) = self.pose(element, where), self.material(element, where)
         geometry = element.find("geometry")
         if geometry is None or not len(geometry):
             raise MeshError("<geometry> is empty; name a box, cylinder, sphere or mesh")
@@ -214,7 +215,7 @@ class _Artist:
         self._y_up += [(part.y_up, name, pose, part.mesh) for part in parts if part.y_up]
         # As in rviz: a material of the mesh file wins over that of the URDF. [robot_link.cpp]
         return [
-            Piece(name, pose, part.mesh, color or own or GREY, texture if part.mesh.uv is not None else None)
+            Piece(name, pose, part.mesh, color or stated or GREY, texture if part.mesh.uv is not None else None)
             if part.rgba is None
             else Piece(name, pose, part.mesh, part.rgba, part.image)
             for part in parts

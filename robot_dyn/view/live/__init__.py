@@ -1,1 +1,1 @@
-"""A live page: the server on 127.0.0.1 and the bridge by which meshcat programs draw into it."""
+"""A page served on this machine: server.py (HTTP and web socket) and bridge.py (commands of meshcat programs)."""

@@ -1,8 +1,8 @@
-"""The bridge of a live page: drawing commands come by ZeroMQ, as meshcat programs send them, and go to browsers.
+"""The bridge of a live page: drawing commands arrive by ZeroMQ, as meshcat programs send them, and go to browsers.
 
-    request: command [path message]    answer: one frame, whatever was asked and whoever else waits
+    request: command [path message]    answer: one frame, for any request, and without waiting for other clients
 
-What is drawn is kept for browsers that come later. [meshcat 0.3, servers/zmqserver.py]
+The scene is stored for browsers that connect later. [meshcat 0.3, servers/zmqserver.py]
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import json
 from base64 import b64decode
 from collections import deque
 from collections.abc import Iterator
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import umsgpack
 import zmq
@@ -20,6 +20,9 @@ import zmq.asyncio
 
 from robot_dyn.errors import shorten
 from robot_dyn.view.commands import Command, as_message
+
+if TYPE_CHECKING:
+    from robot_dyn.view.live.server import Browser
 
 _ORDER = ("set_object", "set_property", "set_transform", "set_animation")  # in which a node is drawn
 _PATIENCE_S = 30.0  # for a picture: a browser may be busy, hidden or gone
@@ -30,26 +33,14 @@ class _RequestError(Exception):
     """Internal: a request that has no answer; the message says why."""
 
 
-class Browser(Protocol):
-    """Whoever shows the scene: takes messages; what it sends is handed to `Bridge.answered`."""
-
-    def send(self, message: bytes) -> None:
-        """Take a message."""
-        ...
-
-    def hang_up(self) -> None:
-        """End the connection."""
-        ...
-
-
 class Scene:
-    """What is drawn, as messages: for each node the last of each kind, of properties the last of each name."""
+    """The drawn scene as messages: for each node the last of each kind, and of each property."""
 
     def __init__(self) -> None:
         self._nodes: dict[tuple[str, ...], dict[tuple[int, str], bytes]] = {}
 
     def keep(self, command: Command, message: bytes) -> None:
-        """Take up a command and the message it came as."""
+        """Store a command and the message that carried it."""
         kind, path = command["type"], tuple(part for part in command["path"].split("/") if part)
         if kind == "delete":
             self._nodes = {place: node for place, node in self._nodes.items() if place[: len(path)] != path}
@@ -60,7 +51,7 @@ class Scene:
         node[_ORDER.index(kind), str(command.get("property", ""))] = message
 
     def messages(self) -> Iterator[bytes]:
-        """All of them, in the order of nodes; each node's object first."""
+        """Yield all messages, in the order of nodes; each node's object first."""
         for node in self._nodes.values():
             yield from (node[key] for key in sorted(node))
 
@@ -69,7 +60,7 @@ class Bridge:
     """Answers requests and passes drawings on, inside a running event loop.
 
     Attributes:
-        url: Where requests come.
+        url: Where requests arrive.
         scene: What is drawn.
     """
 
@@ -77,7 +68,7 @@ class Bridge:
         self._web_url, self.scene = web_url, Scene()
         for command in commands:
             self.scene.keep(command, as_message(command))
-        self._pictures: dict[Browser, deque[asyncio.Future[bytes]]] = {}  # what each browser was asked for
+        self._pictures: dict[Browser, deque[asyncio.Future[bytes]]] = {}  # requested of each browser
         self._watched = asyncio.Event()
         self._context = zmq.asyncio.Context()
         self._socket = self._context.socket(zmq.ROUTER)
@@ -86,7 +77,7 @@ class Bridge:
         self.url = self._socket.getsockopt_string(zmq.LAST_ENDPOINT)
 
     async def serve(self) -> None:
-        """Answer requests, each in its own time, until cancelled."""
+        """Answer requests, each in a task of its own, until cancelled."""
         tasks: set[asyncio.Task[None]] = set()
         try:
             while True:
@@ -98,11 +89,11 @@ class Bridge:
 
     @property
     def browsers(self) -> list[Browser]:
-        """Who looks."""
+        """The connected browsers."""
         return list(self._pictures)
 
     def join(self, browser: Browser) -> None:
-        """Draw the scene for a browser, and what comes after."""
+        """Send the scene, and later commands, to a browser."""
         for message in self.scene.messages():
             browser.send(message)
         self._pictures[browser] = deque()
@@ -115,16 +106,16 @@ class Bridge:
             self._watched.clear()
 
     def answered(self, browser: Browser, message: str | bytes) -> None:
-        """A browser's message: a picture, if it was asked for one; nothing else means anything."""
+        """Take a browser's message: the picture that was requested of it; anything else is ignored."""
         try:
             picture = b64decode(json.loads(message)["data"].partition(",")[2], validate=True)
         except (ValueError, TypeError, LookupError, AttributeError, RecursionError):
             return
-        if (asked := self._pictures.get(browser)) and not (request := asked.popleft()).done():
+        if (requests := self._pictures.get(browser)) and not (request := requests.popleft()).done():
             request.set_result(picture)
 
     async def _reply(self, frames: list[bytes]) -> None:
-        envelope = 2 if frames[1:2] == [b""] else 1  # whose request it is
+        envelope = 2 if frames[1:2] == [b""] else 1  # the address of the client
         try:
             answer = await self._answer(*frames[envelope:])
         except _RequestError as error:
@@ -160,14 +151,14 @@ class Bridge:
         self.scene.keep(command, frames[1])
 
     async def _picture(self) -> bytes:
-        """What the first browser that answers shows, as a PNG file."""
+        """Return the picture of the first browser that answers, as a PNG file."""
         request: asyncio.Future[bytes] = asyncio.get_running_loop().create_future()
         message = as_message({"type": "capture_image"})
         try:
             async with asyncio.timeout(_PATIENCE_S):
                 await self._watched.wait()
-                for browser, asked in list(self._pictures.items()):
-                    asked.append(request)
+                for browser, requests in list(self._pictures.items()):
+                    requests.append(request)
                     browser.send(message)
                 return await request
         except TimeoutError:

@@ -1,6 +1,6 @@
-"""The live server: the page on 127.0.0.1 alone, and the bridge by which meshcat programs draw into it.
+"""The live server: the page, on 127.0.0.1 only, and the bridge by which meshcat programs draw into it.
 
-Other meshcat programs may draw into the scene, by `meshcat.Visualizer(zmq_url)`.
+Other programs may draw into the scene, by `meshcat.Visualizer(zmq_url)`.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class ServerError(RobotDynError):
 
 
 class _Local(RequestHandler):
-    """Asked for by another name than this machine's own, it refuses: a web site must not read a run."""
+    """Refuses requests under foreign host names: a web site must not read a run."""
 
     def prepare(self) -> None:
         if self.request.host_name not in (_HOST, "localhost"):
@@ -55,8 +55,8 @@ class _Page(_Local):
         self.finish(self._page)
 
 
-class _Socket(_Local, WebSocketHandler):
-    """The web socket of a browser; whoever asks for a page in its place is sent to it."""
+class Browser(_Local, WebSocketHandler):
+    """The web socket of a browser; a request for a page here is redirected to it."""
 
     def initialize(self, bridge: Bridge) -> None:
         self._bridge = bridge
@@ -71,7 +71,7 @@ class _Socket(_Local, WebSocketHandler):
         self._bridge.join(self)
 
     def hang_up(self) -> None:
-        """End the connection, whatever its other end does."""
+        """End the connection without waiting for the other end."""
         if self.ws_connection is not None:
             self.ws_connection.stream.close()  # pyright: ignore[reportOptionalMemberAccess]
 
@@ -82,21 +82,22 @@ class _Socket(_Local, WebSocketHandler):
         self._bridge.answered(self, message)
 
     def send(self, message: bytes) -> None:
+        """Send a message; a browser that has left is ignored."""
         with suppress(WebSocketClosedError):
             sent = self.write_message(message, binary=True)
-            sent.add_done_callback(lambda done: done.cancelled() or done.exception())  # a browser may leave any time
+            sent.add_done_callback(lambda done: done.cancelled() or done.exception())
 
 
 class Server:
-    """A live replay; `close` ends it, and so does the end of the program.
+    """A live replay; it ends with `close`, or with the program.
 
     Attributes:
-        url: Where to look.
-        zmq_url: Where meshcat programs may draw.
+        url: Address of the page.
+        zmq_url: Address for the requests of meshcat programs.
     """
 
     def __init__(self, page: str, commands: list[Command], port: int | None = None) -> None:
-        """Serve in a thread of its own.
+        """Serve in a separate thread.
 
         Raises:
             ServerError: If the port is taken.
@@ -107,7 +108,7 @@ class Server:
             why = os.strerror(error.errno) if isinstance(error, OSError) and error.errno else error
             raise ServerError(f"port {port}: {why}; choose another, or none for a free one") from None
         listening.setblocking(False)
-        logging.getLogger("tornado").addHandler(logging.NullHandler())  # not on the terminal of whoever looks
+        logging.getLogger("tornado").addHandler(logging.NullHandler())  # not on the user's terminal
         self.url = f"http://{_HOST}:{listening.getsockname()[1]}/static/"
         self._ready, self._failure = threading.Event(), None
         serving = self._serve(page, commands, listening)
@@ -119,15 +120,15 @@ class Server:
 
     async def _serve(self, page: str, commands: list[Command], listening: socket) -> None:
         self._loop, self._closed = asyncio.get_running_loop(), asyncio.Event()
-        self._loop.set_exception_handler(lambda *_: None)  # of sockets whose other end behaves as it likes
+        self._loop.set_exception_handler(lambda *_: None)  # of sockets with a faulty other end
         try:
             bridge = Bridge(commands, self.url)
             self.zmq_url = bridge.url
-            handlers: list[Any] = [(r"/static/", _Page, {"page": page}), (r"/", _Socket, {"bridge": bridge})]
+            handlers: list[Any] = [(r"/static/", _Page, {"page": page}), (r"/", Browser, {"bridge": bridge})]
             quiet: Any = {"log_function": lambda _: None, "websocket_max_message_size": _MAX_PICTURE}
             server = HTTPServer(Application(handlers, **quiet), max_body_size=0)
             server.add_sockets([listening])
-        except Exception as error:  # of sockets: for the caller, who waits
+        except Exception as error:  # reported to the waiting caller
             self._failure = error
             listening.close()
             return

@@ -1,1 +1,1 @@
-"""Figures of a run."""
+"""Figures of a run: plots.py says what is drawn against what, figure.py draws it."""

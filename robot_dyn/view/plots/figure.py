@@ -1,6 +1,6 @@
-"""Drawing of panels: rows of cells that say what stands against what, by one renderer, in inches.
+"""Drawing of panels: rows of cells with curves, by one renderer, in inches.
 
-Nothing global is set: no pyplot, no rcParams, so that figures can be drawn in any thread and beside anyone's own.
+Nothing global is set: no pyplot, no rcParams, so that figures can be drawn in any thread and beside other figures.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from robot_dyn.simulation.observation.remarks import lines
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.view.rests import Rest
+from robot_dyn.view.series import extremes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,7 +28,7 @@ NEAR = 0.2  # of its effort limit: a torque that stays below is drawn without it
 _MOST_MARKS = 200  # in a cell
 _LARGEST = 8e307  # on an axis: Matplotlib takes the difference of its ends
 _PIXELS = 1000  # across a cell; of the samples that fall on one, the least and the largest are drawn
-THEMES: dict[str, dict[str, Any]] = {  # colours of Okabe and Ito, told apart by the colour-blind, by contrast
+THEMES: dict[str, dict[str, Any]] = {  # colours of Okabe and Ito, distinguishable for the colour-blind, by contrast
     "light": {"paper": "#ffffff", "ink": "#1a1a1a", "grid": "#dddddd", "veil": "#eeeeee"}
     | {"lines": ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#000000", "#e69f00", "#56b4e9")},
     "dark": {"paper": "#14171c", "ink": "#e6e6e6", "grid": "#363b44", "veil": "#262b33"}
@@ -35,7 +36,7 @@ THEMES: dict[str, dict[str, Any]] = {  # colours of Okabe and Ito, told apart by
 }
 _DASHES = ("-", (0, (4, 2)), (0, (1, 1.2)), (0, (6, 2, 1, 2)))
 _STOP = 1  # colour of a rest at a stop
-DESIRED, _LIMIT = (1, 1), (1, 1)  # colour and dashes of what is asked for, and of what is allowed
+DESIRED, _LIMIT = (1, 1), (1, 1)  # colour and dashes of desired values, and of limits
 
 
 @final
@@ -87,9 +88,9 @@ def draw(panels: list[Panel], run: Trajectory, theme: Mapping[str, Any]) -> Figu
 
     width, left, right, head = 11.0, 0.9, 0.2, 0.5
     end = run.outcome
-    said = f"{run.about.get('robot', 'run')}: {end.ending} at t = {end.t:g} s, {run.statistics.method}"
+    title = f"{run.about.get('robot', 'run')}: {end.ending} at t = {end.t:g} s, {run.statistics.method}"
     remarks = [part for line in lines(run.remarks) for part in wrap(line, _WIDE)]
-    opening = [(line, theme["ink"]) for line in (said, end.advice) if line]
+    opening = [(line, theme["ink"]) for line in (title, end.advice) if line]
     opening += [(line, theme["lines"][1]) for line in remarks]
     tall = (
         0.3
@@ -118,7 +119,7 @@ def draw(panels: list[Panel], run: Trajectory, theme: Mapping[str, Any]) -> Figu
                 axes.yaxis.set_label_coords(-0.6 / (wide - left - right), 0.5)  # one line, however long the numbers
                 if len(panel.rows[0]) == 1:
                     _legend(axes, axes, theme, (1.0, 1.0))
-                elif cell is panel.rows[0][0]:  # all cells of a grid mean the same: said once, beside the heading
+                elif cell is panel.rows[0][0]:  # one legend for all cells of a grid, beside the heading
                     _legend(figure, axes, theme, (1 - right / width, top))
             y -= _below(cells)
     return figure
@@ -136,7 +137,7 @@ def _below(cells: tuple[Cell, ...]) -> float:
 
 
 def _legend(owner: Any, axes: Any, theme: Mapping[str, Any], corner: tuple[float, float]) -> None:
-    """What the curves of the axes are, above that corner of the axes or figure; nothing for a single one."""
+    """A legend above that corner of the axes or figure; none for a single curve."""
     lines = [line for line in axes.lines if not line.get_label().startswith("_")]
     if len(lines) < 2:
         return
@@ -193,7 +194,7 @@ def framed(axes: Any, theme: Mapping[str, Any], size: float) -> None:
 
 
 def _shown(z: np.ndarray) -> np.ndarray:
-    """What is drawn of numbers: nothing where an axis cannot reach."""
+    """Return the numbers, nan beyond the range of an axis."""
     return np.where(np.abs(z) < _LARGEST, z, np.nan)
 
 
@@ -234,21 +235,13 @@ def _scale(axes: Any, side: str, z: np.ndarray, limit: float, diverged: bool, lo
 
 
 def _thinned(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Which samples to draw of a long run: of each pixel's, the ends, the least and the largest, so peaks survive."""
+    """Which samples to draw of a long run: of each pixel's the least and the largest, so no peak is lost."""
     every = np.arange(len(y))
     if len(y) <= 4 * _PIXELS:
         return every
     if np.all(x[1:] >= x[:-1]):
         column = ((x - x[0]) * (_PIXELS / (x[-1] - x[0] or 1.0))).astype(int)
-        first = np.flatnonzero(np.diff(column, prepend=-1))
-        size = np.diff(first, append=len(y))
-        keep = np.zeros(len(y), dtype=bool)
-        keep[first] = keep[first + size - 1] = True
-        for extreme, blank in ((np.minimum, np.inf), (np.maximum, -np.inf)):
-            filled = np.where(np.isfinite(y), y, blank)
-            hits = np.flatnonzero(filled == np.repeat(extreme.reduceat(filled, first), size))
-            keep[hits[np.diff(np.repeat(np.arange(len(first)), size)[hits], prepend=-1) > 0]] = True
-        return every[keep]
+        return extremes(y[:, None], np.flatnonzero(np.diff(column, prepend=-1, append=-1)))
     moved = np.zeros(len(y), dtype=bool)
     for z in (x, y):
         size = np.abs(z[np.isfinite(z) & (z != 0)])

@@ -1,6 +1,6 @@
 """Figures of a run: joints, torques against limits, energy ledger, tracking error, phase portrait, error growth.
 
-Each is a `Panel`, which says what stands against what; how it looks is for `drawing` to say.
+Each is a `Panel` of curves, which `figure.draw` draws.
 """
 
 from __future__ import annotations
@@ -32,27 +32,30 @@ PICTURES = (
     files.Kind("a plot", ".svg", b"<?xml"),
     files.Kind("a plot", ".pdf", b"%PDF"),
 )
-_FORCE = {"rad": "N m", "m": "N", "rad or m": "N m or N"}
 
 
 class PlotError(RobotDynError):
-    """A run of which there is nothing to draw, or a picture that cannot be written."""
+    """A run with nothing to draw, or a picture that cannot be written."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class View:
-    """What is shown of a run: joints by column, each with its unit and its effort limit in [N m] or [N]."""
+    """The shown part of a run: joints by column, each with its type, and its effort limit in [N m] or [N]."""
 
     run: Trajectory
     joints: tuple[int, ...]
-    units: tuple[str, ...]
+    types: tuple[str | None, ...]
     limits: np.ndarray
 
     @property
     def names(self) -> list[str]:
-        """Of the joints shown."""
+        """Names of the joints shown."""
         return [self.run.joint_names[i] for i in self.joints]
+
+    def unit(self, quantity: str, i: int) -> str:
+        """Unit of a quantity of a joint; both units where its type is not known."""
+        return unit(quantity, self.types[i])
 
 
 def joints(view: View) -> Panel:
@@ -63,14 +66,14 @@ def joints(view: View) -> Panel:
         if run.desired is not None:
             q.append(Curve("desired", run.t, run.desired[:, i], DESIRED))
         marks = tuple(each.t for each in run.events if each.joint in ("", name))
-        cells.append(Cell(name, "", f"q [{view.units[i]}]", tuple(q), marks=marks, rests=held[i]))
+        cells.append(Cell(name, "", f"q [{view.unit('q', i)}]", tuple(q), marks=marks, rests=held[i]))
         v = (Curve("actual", run.t, run.v[:, i]),)
-        cells.append(Cell("", "t [s]", f"v [{_rate(view.units[i])}]", v, marks=marks, rests=held[i]))
+        cells.append(Cell("", "t [s]", f"v [{view.unit('v', i)}]", v, marks=marks, rests=held[i]))
     pairs = zip(_grid(cells[::2]), _grid(cells[1::2]), strict=True)
     shown = [each for i in view.joints for each in held[i]]
-    said = [("events are dotted", run.events), ("where a joint is held is shaded", shown)]
-    said.append(("at a stop in colour", [each for each in shown if each.at_stop]))
-    marked = "".join(f"; {words}" for words, some in said if some)
+    legend = [("events are dotted", run.events), ("where a joint is held is shaded", shown)]
+    legend.append(("at a stop in colour", [each for each in shown if each.at_stop]))
+    marked = "".join(f"; {text}" for text, some in legend if some)
     return Panel(f"Joint positions and velocities{marked}", tuple(row for pair in pairs for row in pair))
 
 
@@ -89,8 +92,8 @@ def torques(view: View) -> Panel:
         peak = float(np.max(np.abs(every), where=np.isfinite(every), initial=0.0))
         used = f"{peak / limit:.0%}" if peak < 10 * limit else "over 1000%"
         note = f", {used} used" if np.isfinite(limit) else ""
-        curves, unit = (Curve("u", view.run.t, u),), _FORCE[view.units[i]]
-        cells.append(Cell(name, "t [s]", f"u [{unit}]", curves, limit=limit, note=note))
+        curves = (Curve("u", view.run.t, u),)
+        cells.append(Cell(name, "t [s]", f"u [{view.unit('u', i)}]", curves, limit=limit, note=note))
     shown = (
         f"; effort limits are dashed where over {NEAR:.0%} are used"
         if np.isfinite(view.limits[list(view.joints)]).any()
@@ -133,7 +136,7 @@ def tracking(view: View) -> Panel:
         raise PlotError(
             "the run has no tracking error, since it followed no reference; simulate with a controller that has one"
         )
-    names, units, columns = view.names, [view.units[i] for i in view.joints], list(view.joints)
+    names, units, columns = view.names, [view.unit("q", i) for i in view.joints], list(view.joints)
     if run.desired is None:
         names, units, columns = [f"frame, {axis}" for axis in "xyz"], ["m"] * 3, [0, 1, 2]
     off = run.deviation[:, columns]
@@ -147,10 +150,9 @@ def phase(view: View) -> Panel:
     """Phase portrait of each joint: v over q."""
     run, cells = view.run, []
     for i, name in zip(view.joints, view.names, strict=True):
-        unit = view.units[i]
         path = Curve("path", run.q[:, i], run.v[:, i])
         start = Curve("start", run.q[:1, i], run.v[:1, i], (1, 0))
-        cells.append(Cell(name, f"q [{unit}]", f"v [{_rate(unit)}]", (path, start)))
+        cells.append(Cell(name, f"q [{view.unit('q', i)}]", f"v [{view.unit('v', i)}]", (path, start)))
     return Panel("Phase portrait", _grid(cells), 2.0)
 
 
@@ -164,10 +166,11 @@ def error_growth(view: View) -> Panel:
     if error is None or len(error.t) < 2:
         why = "estimate_error was False" if error is None else error.note or "it ended too soon"
         raise PlotError(f"the run has no estimate of its error ({why}); simulate with estimate_error=True")
-    unit = " or ".join(sorted(set(" or ".join(view.units).split(" or ")), reverse=True))
+    units = {unit("q", each) for each in view.types}
+    of_q = units.pop() if len(units) == 1 else unit("q", None)
     until = error.resolved_until if error.resolved_until < error.t[-1] else np.inf
     curve = Curve("estimated error", error.t, error.error)
-    cell = Cell("", "t [s]", f"|q − exact| [{unit}]", (curve,), log=True, until=until)
+    cell = Cell("", "t [s]", f"|q − exact| [{of_q}]", (curve,), log=True, until=until)
     return Panel(f"Error of the positions: {error}", ((cell,),), 1.5)
 
 
@@ -183,7 +186,7 @@ def plot(
     limits: np.ndarray | None = None,
     theme: Literal["light", "dark"] = "light",
 ) -> Figure:
-    """A figure of a run, the asked plots one under the other.
+    """Return a figure of a run, the plots one under the other.
 
     Args:
         run: With m samples of n joints.
@@ -194,7 +197,7 @@ def plot(
 
     Raises:
         QueryError: If a plot, a joint or a theme is unknown, or the limits have another shape.
-        PlotError: If the run has no samples, too many joints, or not what an asked plot shows.
+        PlotError: If the run has no samples, too many joints, or lacks what a requested plot shows.
     """
     instance("run", run, Trajectory, "give the trajectory of rd.simulate, or a run of rollouts, as runs[0]")
     instance("only", only, Collection | None, "give names of joints")
@@ -242,7 +245,7 @@ def save_plot(run: Trajectory, path: str | Path, *names: str, dpi: float = 150, 
 
 
 def _view(run: Trajectory, only: Collection[str] | None, limits: np.ndarray | None) -> View:
-    """Units and effort limits by what the run's own URDF says; a run of no URDF leaves the units open."""
+    """Types of joints and effort limits by the URDF of the run; without one both units are named."""
     shown = tuple(i for i, name in enumerate(run.joint_names) if only is None or name in only)
     if not 0 < len(shown) <= MOST_JOINTS:
         count = f"{len(shown)} joints, and one figure shows 1 to {MOST_JOINTS}"
@@ -253,17 +256,13 @@ def _view(run: Trajectory, only: Collection[str] | None, limits: np.ndarray | No
     except DescriptionError:
         of = {}
     known = [of.get(name) for name in run.joint_names]
-    units = tuple(unit("q", None if j is None else j.get("type")) for j in known)
+    types = tuple(None if j is None else j.get("type") for j in known)
     if limits is None:
         limits = np.array([np.inf if j is None else float(j.find("limit").get("effort")) for j in known])
     efforts = shaped("limits", limits, run.joint_names).astype(float)  # nan: none is known
     if efforts.ndim != 1:
         raise QueryError(f"limits must have shape ({len(known)},), got {efforts.shape}")
-    return View(run, shown, units, np.where((efforts > 0) & (efforts < 1e300), efforts, np.inf))  # 0: none is stated
-
-
-def _rate(unit: str) -> str:
-    return " or ".join(f"{each}/s" for each in unit.split(" or "))
+    return View(run, shown, types, np.where((efforts > 0) & (efforts < 1e300), efforts, np.inf))  # 0: none is stated
 
 
 def _rms(z: np.ndarray) -> float:

@@ -1,4 +1,4 @@
-"""What is wrong with a scene, in words: the line, the key, what it must be, its value, and the keys there are."""
+"""Error messages of scenes: the line, the key, what it must be, its value, and the valid keys."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from pydantic import ValidationError
 
 from robot_dyn.errors import nearest, shorten
 from robot_dyn.scene.lines import line_of
-from robot_dyn.scene.schema import Part
+from robot_dyn.scene.schema import Part, kinds_of
 
-# Branches of a value that may be written in several ways, as pydantic calls them.
+# Branches of a value that may be written in several ways, by pydantic's names.
 _WAYS = {
     "float": "a number",
     "list[float]": "a list of numbers",
@@ -35,39 +35,39 @@ _MUST = {
 
 
 def shown(value: Any) -> str:
-    """A value of a scene, cut if it is long or nested deeply."""
+    """A value of a scene, shortened if it is long or deeply nested."""
     return shorten(bounded_repr(value))
 
 
 def where(table: Any, path: Sequence[str | int]) -> str:
-    """A path as people say it: `effect 2 (spring): rest_rad`."""
-    said: list[str] = []
+    """A path as text: `effect 2 (spring): rest_rad`."""
+    names: list[str] = []
     value: Any = table
     for part in path:
         value = value[part] if _has(value, part) else None
-        if isinstance(part, int) and said:
-            said[-1] += f"{',' if said[-1][-1].isdigit() else ''} {part + 1}"
+        if isinstance(part, int) and names:
+            names[-1] += f"{',' if names[-1][-1].isdigit() else ''} {part + 1}"
         else:
-            said.append(shorten(part))
+            names.append(shorten(part))
         if isinstance(part, int) and isinstance(value, dict) and isinstance(value.get("kind"), str):
-            said[-1] += f" ({shorten(value['kind'])})"
-    return ": ".join(said)
+            names[-1] += f" ({shorten(value['kind'])})"
+    return ": ".join(names)
 
 
 def located(text: str, path: Sequence[str | int], message: str) -> str:
-    """A message after the line at which a path is stated."""
+    """Return the message, preceded by the line at which a path is stated."""
     line = line_of(text, path)
     return message if line is None else f"line {line}: {message}"
 
 
-def complaint(error: ValidationError, table: Mapping[str, Any], text: str, schema: type[Part]) -> str:
-    """The first thing that is wrong with the table of a scene, and how many more there are.
+def validation_message(error: ValidationError, table: Mapping[str, Any], text: str, schema: type[Part]) -> str:
+    """Return the first error in the table of a scene, and the number of the others.
 
     Args:
-        error: What pydantic found.
-        table: What was checked.
-        text: The TOML text of it.
-        schema: What it was checked against.
+        error: As pydantic raised it.
+        table: The table that was checked.
+        text: Its TOML text.
+        schema: The schema of the table.
     """
     found = error.errors(include_url=False)
     first = next((each for each in found if each["type"] == "extra_forbidden"), found[0])
@@ -116,11 +116,11 @@ def _known_kinds(table: Any, path: Sequence[str | int], schema: type[Part]) -> s
     """The kinds that the part at a path may have."""
     key = next(key for key in reversed(path) if isinstance(key, str))
     owner = _section(table, path[: path.index(key)], schema)
-    return ", ".join(str(kind) for part in _parts(owner.model_fields[key].annotation) for kind in _kinds(part))
+    return ", ".join(str(kind) for part in _parts(owner.model_fields[key].annotation) for kind in kinds_of(part))
 
 
 def _path(table: Any, error: Any) -> tuple[str | int, ...]:
-    """The path of an error in the table, without the branches that pydantic tells."""
+    """The path of an error in the table, without the branches that pydantic adds."""
     path: list[str | int] = []
     value: Any = table
     for k, part in enumerate(error["loc"]):
@@ -148,7 +148,7 @@ def _section(table: Any, path: Sequence[str | int], schema: type[Part]) -> type[
         if isinstance(key, str) and key in part.model_fields:
             choice = _parts(part.model_fields[key].annotation)
         kind = value.get("kind") if isinstance(value, dict) else None
-        part = next((each for each in choice if kind in _kinds(each)), choice[0] if choice else part)
+        part = next((each for each in choice if kind in kinds_of(each)), choice[0] if choice else part)
     return part
 
 
@@ -157,7 +157,3 @@ def _parts(annotation: Any) -> list[type[Part]]:
     if isinstance(annotation, type) and issubclass(annotation, Part):
         return [annotation]
     return [part for each in get_args(annotation) for part in _parts(each)]
-
-
-def _kinds(part: type[Part]) -> tuple[Any, ...]:
-    return get_args(part.model_fields["kind"].annotation) if "kind" in part.model_fields else ()

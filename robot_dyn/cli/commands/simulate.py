@@ -1,4 +1,4 @@
-"""Commands that make a run: simulate, explain, scene."""
+"""Commands on scenes: simulate, explain, scene."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import typer
 import robot_dyn as rd
 from robot_dyn.cli import arguments, completion
 from robot_dyn.cli.app import Force, Json, Scene, app, bar
-from robot_dyn.cli.terminal import put, say, say_json, tell
+from robot_dyn.cli.terminal import put, say, say_json, to_stderr
 
 
 @app.command()
@@ -36,16 +36,16 @@ def simulate(
     if accuracy is not None:
         setup = replace(setup, accuracy=accuracy)
     inputs = [scene, setup.plant.dynamics.description.source]  # pyright: ignore[reportAttributeAccessIssue]
-    kept = output and arguments.output(output, RUN, RunFileError, inputs, force)
-    table = csv and arguments.output(csv, TABLE, RunFileError, [*inputs, *([kept] if kept else [])], force)
+    file = output and arguments.output(output, RUN, RunFileError, inputs, force)
+    table = csv and arguments.output(csv, TABLE, RunFileError, [*inputs, *([file] if file else [])], force)
     with bar(setup.duration_s) as advance:
         run = rd.simulate(setup, on_progress=advance)
     try:  # the files first: a terminal or pipe may be gone
-        written = [path for path in (kept and rd.save_run(run, kept), table and export_csv(run, table)) if path]
+        written = [path for path in (file and rd.save_run(run, file), table and export_csv(run, table)) if path]
     finally:
         say_json(report.run(run)) if as_json else say(*run.summary.split("\n"))
     for path in written:
-        tell(f"written: {path}")
+        to_stderr(f"written: {path}")
     if run.outcome.ending != "finished":
         raise typer.Exit(130 if run.outcome.ending == "stopped" else 1)
 

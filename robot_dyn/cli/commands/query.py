@@ -1,4 +1,4 @@
-"""Commands that ask a robot: list, info, query, compare."""
+"""Commands on robots: list, info, query, compare."""
 
 from __future__ import annotations
 
@@ -35,16 +35,16 @@ def info(
     as_json: Json = False,
 ) -> None:
     """Show a robot: joints, limits, friction, mass, and findings on its file."""
-    from robot_dyn.cli import kernels, report
+    from robot_dyn.cli import report
 
     loaded = arguments.load(robot, lock, package_dir, xacro, quiet=True)  # the findings are shown below
-    implementations = {"compiled": kernels.formulations(loaded)} if compiled else {}
+    implementations = {"compiled": report.formulations(loaded)} if compiled else {}
     if as_json:
         say_json(report.info(loaded) | implementations)
         return
     say(*report.info_tables(loaded))
     if compiled:
-        say(*kernels.formulation_table(implementations["compiled"]))
+        say(*report.formulation_table(implementations["compiled"]))
 
 
 @app.command()
@@ -79,7 +79,7 @@ def query(
 
     Of a scene: at its start, under the actuation of its control; what dry friction and rigid stops hold is listed.
     """
-    from robot_dyn.cli import report
+    from robot_dyn.cli import state_report
 
     if a is not None and tau is not None:
         raise QueryError("give --a or --tau, not both: one follows from the other")
@@ -97,10 +97,10 @@ def query(
     torque = None if tau is None else arguments.vector("--tau", tau, names)
     if setup is not None and a is None and tau is None:
         torque = _actuation(setup, at, speed)
-    answer = report.query(plant, at, speed, arguments.vector("--a", a, names), torque)
+    answer = state_report.query(plant, at, speed, arguments.vector("--a", a, names), torque)
     if why is not None:
-        answer |= report.why(plant, answer, why)
-    say_json(answer) if as_json else say(*report.query_tables(answer))
+        answer |= state_report.why(plant, answer, why)
+    say_json(answer) if as_json else say(*state_report.query_tables(answer))
 
 
 def _actuation(setup: rd.Setup, q: np.ndarray, v: np.ndarray) -> np.ndarray:

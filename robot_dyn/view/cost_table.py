@@ -1,4 +1,4 @@
-"""What runs took, beside their plots: method, steps, evaluations, estimated error, time, and the price of a digit."""
+"""The table of costs of runs: method, steps, evaluations, estimated error, time, and the cost of a digit."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from robot_dyn.simulation.results.trajectory import Trajectory
 _NONE = "–"
 
 
-def price(named: Sequence[tuple[str, Trajectory]]) -> dict[str, Any]:
-    """A table: the names of the runs, and rows of a heading and a text for each run; those of none are left out."""
+def cost_table(named: Sequence[tuple[str, Trajectory]]) -> dict[str, Any]:
+    """Return the names of the runs, and rows of a heading and a text for each run; empty rows are left out."""
     columns = [dict(_rows(run)) for _, run in named]
     headings = dict.fromkeys(heading for column in columns for heading in column)
     rows = [[heading, *(column.get(heading, _NONE) for column in columns)] for heading in headings]
@@ -35,7 +35,7 @@ def _rows(run: Trajectory) -> Iterator[tuple[str, str]]:
 
 
 def _accuracy(run: Trajectory) -> Iterator[tuple[str, str]]:
-    """What was asked for, and what one digit more or less would cost, its time in proportion to the evaluations."""
+    """The requested accuracy, and the cost of one digit more or less, its time in proportion to the evaluations."""
     of = run.accuracy
     assert of is not None
     at = f", at rtol {of.rtol:.1e}" if of.rtol else ""
