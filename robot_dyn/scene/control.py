@@ -11,14 +11,10 @@ from robot_dyn.coefficients import URDF
 from robot_dyn.control.cartesian import CartesianReference
 from robot_dyn.control.computed_torque import ComputedTorque, FeedForward, PDGravity
 from robot_dyn.control.controller import Controller
-from robot_dyn.control.digital_loop.block import Block, name_of
-from robot_dyn.control.digital_loop.differences import Differences
+from robot_dyn.control.digital_loop.block import Block, Differences, Noise, Quantisation, RateLimit, name_of
 from robot_dyn.control.digital_loop.loop import LINES, Loop
 from robot_dyn.control.digital_loop.low_pass import LowPass
 from robot_dyn.control.digital_loop.multirate import Multirate
-from robot_dyn.control.digital_loop.noise import Noise
-from robot_dyn.control.digital_loop.quantisation import Quantisation
-from robot_dyn.control.digital_loop.rate_limit import RateLimit
 from robot_dyn.control.independent_joint import PD, PID, gains_from
 from robot_dyn.control.operational_space import OperationalSpace
 from robot_dyn.control.reference import numbers
