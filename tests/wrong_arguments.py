@@ -41,7 +41,7 @@ FOR_LOOPS = {
     for name in dir(kind)
 }
 FOR_LOOPS |= {
-    "task_acceleration", "in_mode", "at_rest", "sliding", "touched", "snapped", "beyond_by", "friction", "bounds",
+    "task_acceleration", "in_mode", "at_rest", "sliding", "touched", "snapped", "penetration", "acts", "reversals", "friction", "bounds",
     "of", "reflected", "drag",
 }  # fmt: skip
 LAX = {  # arguments that may be infinite or unknown, or of any shape
@@ -220,7 +220,7 @@ def examples(folder: Path) -> dict[str, Example]:
             {"robot": robot, "q": q, "v": v, "a": u, "tau": u, "samples": 100, "seed": 3, "repeats": 1,
              "on_progress": lambda part, what: None},
         ),
-        "Certificate.of": (certified.of, {"quantity": "M", "road": "Pinocchio"}),
+        "Certificate.of": (certified.of, {"quantity": "M", "implementation": "Pinocchio"}),
         "save_result": (rd.save_result, {"result": certified, "path": folder / "digits.csv", "theme": "dark"}),
         "stress": (
             rd.stress,

@@ -24,7 +24,7 @@ CLASSES = {name for name in rd.__all__ if isclass(thing := getattr(rd, name)) an
 NO_VALUES = {"Dynamics", "ModelWarning", "PrecisionWarning", "RobotDynError"}  # for types, warned of or raised
 HELD = {  # of values that are made by functions, or held by others
     "CartesianReference", "Compiled", "CompiledPlant", "Couplings", "Edits", "ErrorEstimate", "ExplicitRungeKutta",
-    "Gauss", "Ledger", "Outcome", "SinglyDiagonallyImplicit", "Statistics", "TaskDynamics", "Worst",
+    "Gauss", "Ledger", "Outcome", "SinglyDiagonallyImplicit", "Statistics", "TaskDynamics", "WorstCase",
 }  # fmt: skip
 NAMES = sorted(CLASSES - NO_VALUES | HELD)
 

@@ -170,7 +170,7 @@ def test_an_impulse_in_a_long_run_is_not_merged_away() -> None:
 def test_switches_closer_than_floats_can_tell_are_refused() -> None:
     start = 333.0
     push = rd.ExternalWrench("block", np.ones(6), start_s=start, end_s=start + 2 * np.spacing(start))
-    with pytest.raises(QueryError, match=r"switches at 333\.0 s and .* make them one, or move them apart"):
+    with pytest.raises(QueryError, match=r"switches at 333\.0 s and .* merge them, or move them apart"):
         rd.simulate(rd.Plant(RAIL, [push]), q0=[0.0], duration_s=1000.0)
 
 

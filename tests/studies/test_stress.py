@@ -307,8 +307,8 @@ def test_a_run_that_leaves_an_equilibrium_is_seen_to_say_so() -> None:
     robot = rd.load("pendulum")
     law = rd.PDGravity(robot, rd.hold([0.4]), 133.0, 13.3)
     setup = rd.Setup(rd.Plant(robot), [0.4 + 1e-6], duration_s=2.0, controller=law, integrator="midpoint", step_s=0.11)
-    told = confirm.told(setup, np.array([0.4]), Budget(), True)
-    assert told.growth > 30 and not told.misleads  # it says so
+    pushed = confirm.run_from_near(setup, np.array([0.4]), Budget(), True)
+    assert pushed.growth > 30 and not pushed.misleads  # it says so
 
 
 # --- the command ------------------------------------------------------------------------------------------------

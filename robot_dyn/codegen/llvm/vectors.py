@@ -124,6 +124,7 @@ def _operator(instruction: str, *flags: str, reflected: bool = False) -> Callabl
     """An operator of `Lanes`: one instruction of two values."""
 
     def operator(self: Lanes, other: Any) -> Lanes:
+        """The instruction on two vectors, lane by lane."""
         x, y = self.value, self.of(other)
         return self.like(getattr(self.vectors.builder, instruction)(*((y, x) if reflected else (x, y)), flags=flags))
 

@@ -118,6 +118,7 @@ def _method(name: str, length: Callable[..., int]) -> Any:
     """A method of the part that is wrapped, traced; `length` gives that of its result from its arguments."""
 
     def traced(self: Any, *arguments: Any) -> Array:
+        """As the part that is wrapped, in symbols."""
         return self.traced(lambda: getattr(self.inner, name)(*arguments), length(*arguments))
 
     return traced

@@ -1,5 +1,5 @@
 """The error of a run.
 
-- estimate: which companion runs are needed; companions: the error from their differences, with a verdict.
+- estimate: which companion runs are needed; verdicts: the error from their differences, and what it rests on.
 - requested_accuracy: trial runs until the estimated error is at most the requested one.
 """

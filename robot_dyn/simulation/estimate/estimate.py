@@ -1,4 +1,4 @@
-"""The error estimate of a run: companion runs, until one of the verdicts of `companions` holds to its end.
+"""The error estimate of a run: companion runs, until one of the verdicts (`verdicts.py`) holds to its end.
 
 Longer steps cost about as much as the run and come first; shorter ones cost five times as much, and are taken where
 longer ones are not possible, or do not show the order of the method throughout.
@@ -20,7 +20,7 @@ from robot_dyn.simulation.diagnostics.missed_events import cut_alike, stepped_ov
 from robot_dyn.simulation.diagnostics.stiffness import damped_oscillation
 from robot_dyn.simulation.dynamics.smoothness import first_kink
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.estimate.companions import (
+from robot_dyn.simulation.estimate.verdicts import (
     COARSE,
     FINE,
     PUSH,

@@ -59,15 +59,18 @@ class Browser(_Local, WebSocketHandler):
     """The web socket of a browser; a request for a page here is redirected to it."""
 
     def initialize(self, bridge: Bridge) -> None:
+        """Take the bridge that all browsers share."""
         self._bridge = bridge
 
     async def get(self, *args: Any, **kwargs: Any) -> None:
+        """Open the web socket, or redirect to the page."""
         if self.request.headers.get("Upgrade", "").lower() == "websocket":
             await super().get(*args, **kwargs)
         else:
             self.redirect("/static/")
 
     def open(self, *_: str, **__: str) -> None:
+        """Join the bridge."""
         self._bridge.join(self)
 
     def hang_up(self) -> None:

@@ -1,4 +1,4 @@
-"""Estimates of the error of a run of step h, from companion runs with steps of another length.
+"""Verdicts on the error of a run of step h, from companion runs with steps of another length.
 
 With e(h) = q_h − q the error of a run of step h:
 
