@@ -41,10 +41,11 @@ FOR_LOOPS = {
     for name in dir(kind)
 }
 FOR_LOOPS |= {
-    "task_acceleration", "in_mode", "at_rest", "sliding", "touched", "snapped", "penetration", "acts", "reversals", "friction", "bounds",
-    "of", "reflected", "drag",
+    "task_acceleration", "in_mode", "at_rest", "sliding", "touched", "snapped", "penetration", "reversals", "friction",
+    "bounds", "of", "reflected", "drag",
 }  # fmt: skip
 LAX = {  # arguments that may be infinite or unknown, or of any shape
+    "CarriedPayload.acts": {"t"},
     "ExternalWrench.acts": {"t"},
     "Adaptive": {"max_step_s"}, "Adaptive.with_tolerances": {"longest_s"},
     "CarriedPayload": {"end_s"}, "EffortLimit": {"limit"}, "Event": {"direction"},
@@ -134,6 +135,7 @@ def examples(folder: Path) -> dict[str, Example]:
             rd.ExternalWrench,
             linked | {"wrench": [1.0, 2.0, 3.0, 0.1, 0.2, 0.3], "start_s": 0.1, "end_s": 0.2},
         ),
+        "CarriedPayload.acts": (rd.CarriedPayload(rd.Payload("pole", 1.0), 0.5).acts, {"t": 0.1}),
         "ExternalWrench.acts": (rd.ExternalWrench("pole", np.ones(6)).acts, {"t": 0.1}),
         "ExternalWrench.at": (rd.ExternalWrench("pole", np.ones(6)).at, {"placement": np.eye(4)}),
         "FeedForward": (rd.FeedForward, pair),
