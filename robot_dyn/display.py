@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-MOST_POINTS = 300  # of a curve: its least and largest values in each of half as many parts
+MOST_POINTS = 200  # of a curve: its least and largest values in each of half as many parts
 _COLOURS = ("#4c8bf5", "#e8710a", "#1e9e55", "#d93a8f", "#9a6af0", "#b58900", "#00a3b4", "#8d6e63")
 _WIDTH, _HEIGHT, _LEFT, _BELOW, _ABOVE = 420, 150, 58, 30, 8  # of a plot, in pixels
 _STYLE = (
     "<style>.robot-dyn{font:13px/1.45 system-ui,sans-serif;max-width:70em}"
-    ".robot-dyn table{border-collapse:collapse;margin:.5em 0;background:none}"
+    ".robot-dyn table{border-collapse:collapse;font-size:inherit;margin:.5em 0;background:none}"
     ".robot-dyn th,.robot-dyn td{text-align:left;padding:.12em .8em .12em 0;border:0;background:none;color:inherit;"
     "vertical-align:top}"
     ".robot-dyn th{font-weight:600;border-bottom:1px solid}"
