@@ -70,9 +70,10 @@ def bars(rows: Iterable[tuple[str, float]], unit: str) -> str:
     drawn = []
     for k, (name, x) in enumerate(rows):
         y, start = 4 + 20 * k, 190 + (min(x, 0.0) - least) * scale
+        wide = max(abs(x) * scale, 0.5)
         drawn.append(
             f'<text x="184" y="{y + 12}" text-anchor="end">{escape(name)}</text>'
-            f'<rect x="{start:.1f}" y="{y}" width="{max(abs(x) * scale, 0.5):.1f}" height="15" fill="{_COLOURS[x < 0]}"/>'
+            f'<rect x="{start:.1f}" y="{y}" width="{wide:.1f}" height="15" fill="{_COLOURS[x < 0]}"/>'
             f'<text x="440" y="{y + 12}">{number_text(x)} {escape(unit)}</text>'
         )
     zero = 190 - least * scale

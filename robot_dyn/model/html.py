@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from robot_dyn.display import page, table, text
-from robot_dyn.model.robot import Robot
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from robot_dyn.model.robot import Robot
 
 _COLUMNS = ("lower", "upper", "effort_limit", "velocity_limit", "damping", "friction", "armature")
 
 
 def robot_html(robot: Robot) -> str:
-    """A table of the joints in SI units, then gravity, mass and findings."""
+    """HTML for notebooks: a table of the joints in SI units, then mass, gravity, edits and findings."""
+    from robot_dyn.display import page, table, text
+
     heading = ["joint", "type", *(name.replace("_", " ") for name in _COLUMNS)]
     values = [getattr(robot, name).tolist() for name in _COLUMNS]
     rows = zip(robot.joint_names, robot.joint_types, *values, strict=True)

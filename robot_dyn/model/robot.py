@@ -26,6 +26,7 @@ from robot_dyn.model.coriolis import Coriolis
 from robot_dyn.model.evaluation import Evaluation, warn_of_digits, warning_answer
 from robot_dyn.model.findings import findings_of
 from robot_dyn.model.gravity import warn_without_torque
+from robot_dyn.model.html import robot_html
 from robot_dyn.model.mechanism import Mechanism, forwarded
 from robot_dyn.queries.dynamics import Array, Axes, Dynamics
 from robot_dyn.queries.quantity import DOUBTFUL
@@ -46,6 +47,7 @@ class Robot(Dynamics, Parametrised):
     description: Description
     edits: Edits = field(default_factory=Edits)
     least_digits: float | None = None
+    _repr_html_ = robot_html
 
     def M(self, q: Array, *, errors: str = "raise") -> ndarray:
         if is_plain(q, self._shape):
@@ -237,8 +239,7 @@ class Robot(Dynamics, Parametrised):
 
         Errors are relative to √(M_ii M_jj) for M; for C, N and inverse dynamics to the largest entry in the units
         √M_ii of the joints; for forward dynamics to Σ ‖M⁻¹ τ_k‖ of τ, C v and N, in the norm of M. An answer that
-        cancels to nearly nothing has few digits. Numbers of the file count as the decimals that are written there.
-        Takes milliseconds.
+        cancels to nearly nothing has few digits. Numbers of the file count as the decimals written. Takes milliseconds.
 
         Args:
             quantity: "M", "C", "N", "inverse_dynamics" or "forward_dynamics".
@@ -255,9 +256,9 @@ class Robot(Dynamics, Parametrised):
     def warn_below(self, digits: float | None) -> Robot:
         """A robot whose queries warn where their answers have fewer digits, as `digits` counts them.
 
-        Of M, C, N, inverse and forward dynamics. Digits are counted only where an estimate, 8 n u κ of
-        the terms, is below, and for up to 64 joints. Takes milliseconds a state; machine code of the robot does not
-        warn. A robot is loaded with 8 digits if M is nearly singular at a configuration without symmetries.
+        Of M, C, N, inverse and forward dynamics. Digits are counted only where an estimate, 8 n u κ of the terms, is
+        below, for up to 64 joints, in milliseconds a state; machine code of the robot does not warn. A robot is loaded
+        with 8 digits if M is nearly singular at a configuration without symmetries.
 
         Args:
             digits: From above 0 to 20; None for no warnings, and no cost.

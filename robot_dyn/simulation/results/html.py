@@ -1,4 +1,4 @@
-"""A trajectory in a notebook: its summary, and small plots of q, v, u and the energy ledger."""
+"""A trajectory in a notebook: its summary, and small plots of q, v and u."""
 
 from __future__ import annotations
 

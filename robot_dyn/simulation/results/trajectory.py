@@ -200,6 +200,14 @@ class Trajectory(Derived):
             raise QueryError("the motion of the proof starts elsewhere; give one of this motion")
         return proof.digits_of(self.t, self.q)
 
+    def __repr__(self) -> str:
+        return f"<Trajectory: {self.summary}>"
+
+    def _repr_html_(self) -> str:
+        from robot_dyn.simulation.results.html import trajectory_html
+
+        return trajectory_html(self)
+
     @property
     def summary(self) -> str:
         """A few lines: outcome, what acted, ledger, error, tracking, cost."""

@@ -184,6 +184,14 @@ class Rollouts(Value):
         """
         return self.overview.worst
 
+    def __repr__(self) -> str:
+        return f"<Rollouts: {self.summary}>"
+
+    def _repr_html_(self) -> str:
+        from robot_dyn.simulation.rollouts.html import rollouts_html
+
+        return rollouts_html(self)
+
     @property
     def summary(self) -> str:
         """How many runs, how many ended before their time and why; remarks; tracking error; which run to look at."""
