@@ -39,7 +39,7 @@ class Reference(Value, ABC):
     @property
     @abstractmethod
     def knots(self) -> np.ndarray:
-        """Times in [s] at which it passes to another polynomial."""
+        """Times in [s] at which the polynomial changes."""
 
     @property
     def polynomials(self) -> dict[str, PiecewisePolynomial]:

@@ -51,9 +51,9 @@ def second_reading(description: Description, tolerance: float) -> tuple[list[Pai
     return pairs, ()
 
 
-@np.errstate(all="ignore")  # of infinities in visuals, which are not compared
+@np.errstate(all="ignore")  # infinities in visuals are not compared
 def _by_yourdfpy(text: bytes) -> Any:
-    from yourdfpy import URDF  # heavy: it takes trimesh along
+    from yourdfpy import URDF  # heavy: imports trimesh
 
     etree.fromstring(text)  # raises, where yourdfpy would read on with what the parser can recover
     return URDF.load(BytesIO(text), build_scene_graph=False, load_meshes=False).robot

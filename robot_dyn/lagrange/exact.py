@@ -1,4 +1,4 @@
-"""True values of M, C, N, inverse and forward dynamics: the equations in balls, of more bits until they are narrow.
+"""True values of M, C, N, inverse and forward dynamics: ball arithmetic, with bits added until the balls are narrow.
 
     radius ≤ 1e-20 · scale
 
@@ -54,11 +54,11 @@ class RoundedLiterals(Arithmetic):
 @final
 @dataclass(frozen=True, eq=False)
 class Scale:
-    """What errors are divided by, at one state or at several (S, …).
+    """The divisor of errors, at one state or at several (S, …).
 
     Attributes:
-        size: Of each entry; in the norm of M, of the whole.
-        M: Of that norm, (..., n, n); None for errors entry by entry.
+        size: Scale of each entry, or of the whole vector in the norm of M.
+        M: Mass matrix of the norm, (..., n, n); None for errors entry by entry.
     """
 
     size: np.ndarray
@@ -95,8 +95,8 @@ class Truth:
 
     Attributes:
         values: Balls, of the shape of the quantity.
-        scale: Of errors.
-        bits: Precision that was needed.
+        scale: Scale of errors.
+        bits: Precision needed.
     """
 
     values: Array
@@ -118,7 +118,7 @@ class Exact:
     """The exact equations of a robot.
 
     Args:
-        robot: Its file and edits are used, none of its numbers.
+        robot: Only its file and edits are used, not its computed numbers.
         rounded: Whether the file's numbers are the float64 nearest to each decimal, or the decimal itself.
     """
 

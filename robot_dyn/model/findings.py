@@ -1,6 +1,6 @@
 """Findings about a robot description that loads: what is doubtful in it, and the remedy, one sentence each.
 
-A refusal (`urdf.py`) is for what has no meaning; a finding is for what has one that is hardly intended. Criteria and
+`urdf.py` refuses what has no meaning; a finding reports what is valid but hardly intended. Criteria and
 reasons are in docs/findings.md. Each function yields the findings of one kind.
 """
 
@@ -41,14 +41,14 @@ def findings_of(description: Description, edits: Edits, regularity: Regularity) 
 
 
 def impossible_inertias(robot: Structure) -> Iterator[str]:
-    """Links that move, before any are merged, whose mass and moments no body has."""
+    """Moving links, before merging, with impossible mass and moments."""
     for name, link in robot.links.items():
         if name not in robot.base and (why := _why_impossible(link)):
             yield f"link {name!r}: {why}; correct the inertia of this link"
 
 
 def impossible_inertias_of_the_base(robot: Structure) -> Iterator[str]:
-    """The same of links that are fixed to the world."""
+    """The same for links fixed to the world."""
     for name in robot.base:
         if why := _why_impossible(robot.links[name]):
             yield (
@@ -115,7 +115,7 @@ def long_lengths(robot: Structure) -> Iterator[str]:
 
 
 def large_ratios(robot: Structure) -> Iterator[str]:
-    """Joints that follow another one so fast that digits are lost."""
+    """Mimic joints with a multiplier so large that digits are lost."""
     for name in robot.mimics:
         source, ratio, _ = resolve(name, robot.mimics, FLOAT64)
         if abs(ratio) > LONGEST:

@@ -145,7 +145,7 @@ def _for(f: Function, node: ast.For) -> bool:
 
 @contextmanager
 def counted(f: Function, start: Scalar, stop: Scalar, step: int) -> Iterator[tuple[Scalar, Any]]:
-    """A loop over a range: its number, and the blocks of its next round and behind it."""
+    """A loop over a range: its index, and the blocks of the next iteration and after the loop."""
     b = f.builder
     slot = None if f.silent else _slot(b)
     b.store(start.ir, slot)

@@ -15,7 +15,7 @@ from robot_dyn.simulation.observation.remarks import Kind, Remark
 from robot_dyn.simulation.run.recording import Recording
 from robot_dyn.simulation.setup.setup import Setup
 
-_MOST = 2000  # states that are looked at
+_MOST = 2000  # maximum number of states checked
 
 
 def damped(setup: Setup, record: Recording) -> Iterator[Remark]:
@@ -38,7 +38,7 @@ def damped(setup: Setup, record: Recording) -> Iterator[Remark]:
 def _of(task: OperationalSpace, t: np.ndarray, q: np.ndarray) -> Iterator[Remark]:
     try:
         in_task = task_dynamics(task.model, q, 0 * q, task.frame, rows=task.rows, threshold=task.threshold)
-    except RobotDynError:  # of its model: the outcome of a run
+    except RobotDynError:  # of its model: reported in the outcome of the run
         return
     smallest = np.asarray(in_task.smallest, float)
     below = smallest < task.threshold

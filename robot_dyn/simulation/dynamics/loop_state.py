@@ -23,13 +23,13 @@ class Ended(IntEnum):
     NEEDS_REVIEW = 2  # the next step is to be looked at; y is the state before it
     TICK = 3  # the controller asks for no finite torque
     GAINS = 4  # energy may grow without a source; y is the state after the step
-    TOO_SMALL = 5  # no step that floats can tell from none is within the tolerance
+    TOO_SMALL = 5  # no step large enough to change t in floating point meets the tolerance
     NOT_FINITE = 6  # the rate at y
     FAST = 7  # a joint moves without bound; y is the state after the step
     EVENT = 8  # y is the state at it
     PAYLOAD = 9  # a payload is picked up or dropped; y is the state before it
     CHANGED = 10  # the mode, and with it the side of a threshold; y is the state behind it
-    ACCUMULATED = 11  # changes of the mode, in next to no time
+    ACCUMULATED = 11  # mode changes accumulate in a very short time
     UNSETTLED = 12  # the state and the mode behind an event were not found
 
 
@@ -64,16 +64,16 @@ Now = _Entries()
 
 
 class Functions(NamedTuple):
-    """The state equation, each as of `evaluate`, as a step and the time loop call it.
+    """Functions of the state equation, from `evaluate`, called by steps and the time loop.
 
     Attributes:
         rate: y', of a single run also u.
         tick: The next own numbers.
         energy: K and V.
         sample: What a sample holds.
-        jacobian: As of `RightSide`.
+        jacobian: See `RightSide`.
         events: Values of the events.
-        step, behind: As of `RightSide`.
+        step, behind: See `RightSide`.
         actuation: u, of runs in lock step in which it changes between ticks.
         bodies: Mass matrix and loads, where something may hold joints: as of `bodies`.
     """
@@ -124,14 +124,14 @@ class Runs(NamedTuple):
 
 
 class Rules(NamedTuple):
-    """What the loop does, beside the steps.
+    """Settings of the time loop.
 
     Attributes:
         n, works: Number of joints, and of works at the end of y.
         states: Number of states of the controller, behind q and v.
         held: Number of torques in the zero-order hold of a sampled controller; 0 for any other.
         instants, acting: Ticks of the controller in each of its periods, and which of them changes its torque.
-        deviates: Number of its last states that are drawn anew before each tick.
+        deviates: Number of its last states that are redrawn before each tick.
         canonical: Whether y has momenta in place of velocities.
         alone: Whether what may end a run is looked at by its driver.
         largest: Σ |y| beyond which a step is doubtful, or a run in lock step ends.

@@ -1,4 +1,4 @@
-"""A run to a requested accuracy: a tolerance bounds the error of a step, the error of the run is measured.
+"""A run to a requested accuracy: the tolerance bounds the error per step; the error of the run is estimated.
 
     e = c · tol,   c from a pilot run at a loose tolerance
 
@@ -25,14 +25,14 @@ from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.setup.setup import Setup
 
 _AIM = 0.3  # of the requested error
-_TRUSTED = 0.5  # of the requested error: the estimate of a run at a loose tolerance may be this part of its error
+_TRUSTED = 0.5  # of the requested error: at a loose tolerance, the estimate may be only this fraction of the true error
 _LOOSE = {
     EXPLICIT: 0.75,
     STIFF: 0.5,
 }  # tolerance of the pilot, a power of the requested error; what is fast has decayed
 _LOOSEST = 1e-3
 _ATOL = 0.01  # over rtol
-_TRIES = 4  # runs of a tolerance, at most
+_TRIES = 4  # maximum number of tolerances tried
 _LAST = 0.1  # of the tolerance before, at most, in the last run: coarse steps may show no proportion
 _TOO_MUCH = 1.7  # times the cost of a run with the requested error
 _FEW = 1.5  # steps between ticks, switches and events, where these decide on them
@@ -43,7 +43,7 @@ _WEIGHT = {STIFF: 2}  # of its evaluations, Jacobians and eliminations included
 
 
 class AccuracyError(RobotDynError):
-    """An accuracy that cannot be reached; says which can, and why.
+    """Raised if the requested accuracy cannot be reached; the message states why and what can be.
 
     Attributes:
         best: The least estimated error of the trial runs, in [rad] or [m]; inf if none holds to the end.
@@ -57,8 +57,8 @@ class AccuracyError(RobotDynError):
 def run_to(setup: Setup, requested: float, run: Callable[[Setup], Trajectory]) -> Trajectory:
     """Return a run whose estimated error is at most the requested one; or the first that does not finish.
 
-    The estimate is to be half of it at most. Where no run has that, the best one is returned if its estimate is at
-    most the requested error.
+    The target is an estimate of at most half the requested error. If no run reaches the target, the best run is
+    returned, provided that its estimate is at most the requested error.
 
     Args:
         setup: What to run.
@@ -163,7 +163,7 @@ def _predicted(trial: Trajectory, requested: float) -> float:
 
 
 def _resolved(trial: Trajectory) -> float:
-    """The estimated error of a run; inf where it does not hold to the end."""
+    """The estimated error of a run; inf if the estimate is not valid to the end."""
     error = trial.error
     return error.final if error is not None and not error.note else inf
 

@@ -1,4 +1,4 @@
-"""Impacts at stops, and the bounces behind them that end: plain functions of arrays, for the loop.
+"""Impacts at stops and the bounces that follow: plain functions of arrays, for the time loop.
 
     v⁺ = argmin ½ |v⁺ − v|²_M over v⁺ᵢ ≥ −eᵢ vᵢ at each stop that is struck or touched
 
@@ -59,10 +59,10 @@ def work(n: int, M: Array, before: Array, after: Array) -> float:
 
 
 def impact(M: Array, v: Array, side: Array, e: Array, ended: Array, after: Array, room: Settling) -> bool:
-    """Write the velocity behind an impact at the stops on those sides; whether it was found.
+    """Write the velocity after an impact at the stops on the given sides; return whether it was found.
 
-    Friction is finite, and takes no part. Joints that end at rest have 0: a projection in the norm of M, which adds no
-    energy.
+    Friction forces are finite and do not contribute. Joints that come to rest get 0: a projection in the
+    norm of M, which adds no energy.
     """
     for i in range(len(v)):
         rests, meets = ended[i] < np.inf, side[i] * v[i] >= 0.0
@@ -119,7 +119,7 @@ def come_to_rest(f: Any, t: float, y: Array, p: Array, of: Holding, s: int) -> b
 
 
 def remember(of: Holding, t: float) -> None:
-    """Keep the time of an impact and what strikes, and forget those long ago."""
+    """Store the time of an impact and the joints that strike; drop old impacts."""
     room, count = of.room, 0
     first = 1 if of.latest[0] == len(of.impacts) else 0
     for k in range(first, of.latest[0]):
@@ -150,13 +150,13 @@ def in_turn(of: Holding) -> bool:
 
 
 def lasts(v: float, a: float, side: float, e: float) -> float:
-    """How long the bounces of a joint that leaves its stop at v still take, Σ 2 eᵏ |v| / |a|; inf where it goes on."""
+    """Remaining duration of the bounces of a joint leaving its stop at v, Σ 2 eᵏ |v| / |a|; inf if they never end."""
     returns = side * a > 0.0 and side * v < 0.0 and e < 1.0
     return 2.0 * abs(v) / (abs(a) * (1.0 - e)) if returns else np.inf
 
 
 def next_meeting(laws: Laws, y: Array, a: Array, but: int) -> float:
-    """In how long one of the other coordinates meets a stop, at accelerations that stay."""
+    """Time until one of the other coordinates meets a stop, at constant acceleration."""
     meets = np.inf
     for s in range(len(laws.lower)):
         for i in range(len(a)):

@@ -1,4 +1,4 @@
-"""A certificate: how many digits of each quantity are true by each implementation, and what they cost."""
+"""A certificate: correct digits of each quantity in each implementation, and their computing time."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ class Held:
     Attributes:
         quantity: Its name.
         implementation: Program or formulation, and numbers.
-        given: At the state that was given; None if none was.
-        typical: Median of random states.
-        random: At the worst of them.
-        searched: At the worst state that was found.
+        given: Digits at the given state; None if none was given.
+        typical: Median over the random states.
+        random: Digits at the worst random state.
+        searched: Digits at the worst state found.
         samples: Number of random states; 1 for balls, whose digits are proven.
-        time_s: Of one query from Python, median, in [s].
+        time_s: Median time of one query from Python, in [s].
         repeats: Number of times it was timed.
         state: The worst state, q, v, a, tau by name.
     """
@@ -51,11 +51,11 @@ class Condition:
     """κ of M scaled to a unit diagonal; inf where M is singular.
 
     Attributes:
-        given: At the state that was given; None if none was.
-        typical: Median of random states.
-        random: The largest of them.
-        searched: The largest that was found.
-        q: Where that is.
+        given: κ at the given state; None if none was given.
+        typical: Median over the random states.
+        random: Largest κ over the random states.
+        searched: Largest κ found.
+        q: Configuration of the largest κ found.
     """
 
     given: float | None

@@ -1,4 +1,4 @@
-"""Masses and inertias by themselves: what no body has, links without any, masses out of all proportion.
+"""Checks of masses and inertias: impossible values, missing values, disproportionate masses.
 
 I₁ ≥ 0,   I₁ + I₂ ≥ I₃,   for each link and for the links that joints merge into one body
 """
@@ -66,7 +66,7 @@ def _rods_and_points(stated: Structure) -> Iterator[Finding]:
 
 
 def _merged(robot: Robot, stated: Structure) -> Iterator[Finding]:
-    """Bodies of several links whose sum no body has, though each link may be one."""
+    """Merged bodies with impossible inertia, although that of each link may be possible."""
     for joint, body in zip(robot.model.names[1:], list(robot.model.inertias)[1:], strict=True):
         links = next((links for name, links in stated.bodies.items() if joint.endswith(name)), ())
         if len(links) > 1 and body.mass > 0 and (why := implausibility(body.mass, body.lever, body.inertia)):

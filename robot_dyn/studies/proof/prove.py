@@ -41,21 +41,21 @@ def prove(
     """A theorem: the motion exists, is the only one, and q(t), v(t) lie in balls, for 0 ≤ t ≤ until_s.
 
     It is about the decimals of the URDF as they stand; floats of the setup (start, gravity, payloads, coefficients,
-    gains) are meant as the binary numbers that they are. Integrator and step of the setup do not matter.
+    gains) are taken as exact binary numbers. Integrator and step of the setup do not matter.
 
     Args:
         setup: Plant, start, and continuous controller or none.
-        until_s: In [s]; that of the setup unless given.
+        until_s: End time, in [s]; by default the duration of the setup.
         bits: Precision of the balls, from 40 to 4096; the radius of q comes to about 2^-(0.7 bits), times its growth.
         q0: Start, (n,), in place of that of the setup: numbers, or text for decimals that are meant exactly.
         v0: Its velocity, likewise.
         width_q: The start may be anywhere within so much of each q, in [rad] or [m], not negative.
-        width_v: Likewise of v.
-        budget_s: Time that it may take, in [s].
+        width_v: Likewise for v.
+        budget_s: Limit on computing time, in [s].
         on_progress: Called with the time reached, in [s], after each step.
 
     Returns:
-        The theorem, which may reach less far than requested, and says why.
+        The theorem; if it ends before until_s, it states why.
 
     Raises:
         QueryError: If an argument is not allowed.

@@ -1,4 +1,4 @@
-"""The free motion of an arm under gravity, as other programs are given it."""
+"""The free motion of an arm under gravity, in the form given to other programs."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ class PeerError(Exception):
 @final
 @dataclass(frozen=True, eq=False)
 class FreeMotion:
-    """A motion without effects and control.
+    """A motion without effects or control.
 
     Attributes:
-        setup: As `recorded` gives it.
-        robot: That moves.
+        setup: The setup returned by `recorded`.
+        robot: The robot that moves.
     """
 
     setup: Setup
@@ -38,22 +38,22 @@ class FreeMotion:
 
     @cached_property
     def times(self) -> np.ndarray:
-        """Of the records, the start among them, (k,), in [s]."""
+        """Times of the records, including the start, (k,), in [s]."""
         period, end = self.setup.record_period_s, self.setup.duration_s
         return np.append(period * np.arange(round(end / period)), end)
 
     def run(self, q: np.ndarray, v: np.ndarray, steps: int | None, evaluations: int | None, time_s: float) -> Run:
-        """What a run of another program left behind, (k, n) each."""
+        """The result of a run of another program from its q and v, (k, n) each."""
         if not (np.isfinite(q).all() and np.isfinite(v).all()):
             return Run(self.times, None, np.nan, steps, evaluations, time_s)
         kinetic, potential = self.robot.kinetic_energy(q, v), self.robot.potential_energy(q)
         return Run(self.times, q, Ledger(kinetic, potential, {}).closure, steps, evaluations, time_s)
 
     def check(self, mass_matrix: Any, bias: Any) -> None:
-        """That another program has the same M(q) and C v + N, at random states.
+        """Check that another program has the same M(q) and C v + N at random states.
 
         Raises:
-            PeerError: If it has not.
+            PeerError: If they differ.
         """
         rng = np.random.default_rng(3)
         for _ in range(_STATES):
@@ -67,7 +67,7 @@ class FreeMotion:
 
 
 def bare_urdf(robot: Robot) -> Any:
-    """The file of a robot with dynamics alone: no shapes, limits, friction; joints that it has not are fixed."""
+    """The file of a robot with dynamics alone: no shapes, limits, friction; joints not in the robot are fixed."""
     urdf = deepcopy(robot.description.element)
     etree.strip_elements(urdf, "visual", "collision", "limit", "dynamics", "mimic", "safety_controller")
     for joint in urdf.iter("joint"):
