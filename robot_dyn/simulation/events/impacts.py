@@ -150,7 +150,7 @@ def in_turn(of: Holding) -> bool:
 
 
 def lasts(v: float, a: float, side: float, e: float) -> float:
-    """Remaining duration of the bounces of a joint leaving its stop at v, Σ 2 eᵏ |v| / |a|; inf if they never end."""
+    """Time for which a joint leaving its stop at v still bounces, Σ 2 eᵏ |v| / |a|; inf if it does not come to rest."""
     returns = side * a > 0.0 and side * v < 0.0 and e < 1.0
     return 2.0 * abs(v) / (abs(a) * (1.0 - e)) if returns else np.inf
 
