@@ -1,7 +1,7 @@
-"""Files: read if regular and within bounds; written whole or not at all, and only over files of their kind.
+"""Files: read if regular and within a size limit; written whole or not at all, and only over files of their kind.
 
-A file is written beside its target, synchronised and renamed: a reader, or a machine that loses its power, sees the old
-file or the new one. Links are written through, permissions are kept, and what writers that were killed left is removed.
+A file is written beside its target, synchronised and renamed, so that readers see the old file or the new one, even
+after a power loss. Links are followed, permissions are kept, and leftovers of killed writers are removed.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
 @final
 @dataclass(frozen=True)
 class Kind:
-    """A kind of file: what it is called, the end of its name, and the first bytes that all files of the kind share."""
+    """A kind of file: its name, its suffix, and the first bytes that all files of the kind share."""
 
     name: str
     suffix: str
@@ -43,11 +43,11 @@ def target(
     error: type[RobotDynError],
     inputs: Iterable[str | Path] = (),
 ) -> Path:
-    """The path of a file to write, with the suffix of the first kind if it has none: checked before the work is done.
+    """Check the path of a file before the work is done; return it, with the suffix of the first kind if it has none.
 
     Raises:
-        RobotDynError: Of the kind `error`, if it has another suffix; if its folder is missing or closed; if there is
-            something other than a file of its kind under its name; or if it is one of `inputs`, also by a link.
+        RobotDynError: Of type `error`, if the suffix is wrong; if the folder is missing or not writable; if anything
+            but a file of its kind has that path; or if it is one of `inputs`, even through a link.
     """
     kinds = kinds if isinstance(kinds, tuple) else (kinds,)
     try:
@@ -68,7 +68,7 @@ def target(
 
 
 def _check(path: Path, real: Path, kind: Kind, error: type[RobotDynError], inputs: Iterable[str | Path]) -> None:
-    """That nothing but a file of its kind is replaced, and that there can be one."""
+    """Check that a file can be written, and that it replaces only a file of its kind."""
     if not real.parent.is_dir():
         raise error(f"{path}: there is no folder {real.parent}; create it first, or give another path")
     if real.is_symlink():
@@ -88,10 +88,10 @@ def _check(path: Path, real: Path, kind: Kind, error: type[RobotDynError], input
 
 
 def save(path: Path, write: Callable[[BinaryIO], object], error: type[RobotDynError]) -> Path:
-    """Write a file that a reader sees whole or not at all; `path` is one that `target` gave.
+    """Write a file that readers see whole or not at all; `path` comes from `target`.
 
     Raises:
-        RobotDynError: Of the kind `error`, if it cannot be written; then the old file, if there was one, is unchanged.
+        RobotDynError: Of type `error`, if the file cannot be written; any old file is then unchanged.
     """
     real = Path(os.path.realpath(path))
     try:
@@ -104,7 +104,7 @@ def save(path: Path, write: Callable[[BinaryIO], object], error: type[RobotDynEr
                 _as_before(beside, old)
             os.fsync(stream.fileno())
             if not _locks:
-                stream.close()  # Windows renames no open file; elsewhere it stays locked until it has its name
+                stream.close()  # Windows cannot rename open files; elsewhere it stays locked until renamed
             os.replace(beside, real)
         _synchronise(real.parent)
     except MemoryError:
@@ -115,7 +115,7 @@ def save(path: Path, write: Callable[[BinaryIO], object], error: type[RobotDynEr
 
 
 def _as_before(beside: Path, old: os.stat_result) -> None:
-    """Owner and permissions of the file that is replaced."""
+    """Copy the owner and permissions of the file that is replaced."""
     if hasattr(os, "chown"):
         with suppress(OSError):  # only root may give a file away
             os.chown(beside, old.st_uid, old.st_gid)
@@ -138,7 +138,7 @@ def _unfinished(real: Path, mode: int) -> Iterator[tuple[Path, BinaryIO]]:
 
 
 def _lock(handle: int, only_if_free: bool = False) -> None:
-    """Lock a file until it is closed; a file system without locks has none that are held, either."""
+    """Lock a file until it is closed; unless `only_if_free`, failure to lock is ignored."""
     if _locks and only_if_free:
         _locks.flock(handle, _locks.LOCK_EX | _locks.LOCK_NB)
     elif _locks:
@@ -147,7 +147,7 @@ def _lock(handle: int, only_if_free: bool = False) -> None:
 
 
 def _remove_abandoned(real: Path) -> None:
-    """Remove what writers of this file left when they were killed: files beside it, not new, that nobody has locked."""
+    """Remove what killed writers of this file left: files beside it that are neither new nor locked."""
     name = re.compile(re.escape(_prefix(real)) + r"[0-9a-f]{16}\.unfinished")
     for each in [path for path in real.parent.iterdir() if name.fullmatch(path.name)]:
         with suppress(OSError):  # locked, removed meanwhile, or another user's
@@ -166,7 +166,7 @@ def _prefix(real: Path) -> str:
 
 
 def _synchronise(folder: Path) -> None:
-    """Make a rename last through a loss of power, where the system can: to every reader it has happened."""
+    """Make a rename survive a power loss, where the system can; readers see it already."""
     with suppress(OSError):
         handle = os.open(folder, os.O_RDONLY)
         try:
@@ -180,14 +180,14 @@ def reading(path: str | Path, error: type[RobotDynError], remedy: str) -> Iterat
     """A regular file, open for reading; a device, pipe or folder is refused.
 
     Raises:
-        RobotDynError: Of the kind `error`, with the remedy, if it cannot be read.
+        RobotDynError: Of type `error`, with the remedy, if the file cannot be read.
     """
     with _opened(path, error, remedy) as stream:
         yield stream
 
 
 def read(path: str | Path, most: int, error: type[RobotDynError], remedy: str) -> bytes:
-    """The bytes of a regular file of at most `most`; errors as of `reading`."""
+    """The content of a regular file of at most `most` bytes; errors as in `reading`."""
     data = read_start(path, most + 1, error, remedy)
     if len(data) > most:
         raise error(f"{path}: is larger than {most / 2**20:.3g} MiB; {remedy}")
@@ -195,7 +195,7 @@ def read(path: str | Path, most: int, error: type[RobotDynError], remedy: str) -
 
 
 def read_start(path: str | Path, count: int, error: type[RobotDynError], remedy: str) -> bytes:
-    """The first bytes of a regular file, all if it has fewer; errors as of `reading`."""
+    """The first bytes of a regular file, all if it has fewer; errors as in `reading`."""
     with reading(path, error, remedy) as stream:
         try:
             return stream.read(count)
@@ -209,7 +209,7 @@ def _opened(path: str | Path, error: type[RobotDynError], remedy: str) -> Binary
         _refuse_irregular(path, path.stat().st_mode, error, remedy)
         handle = os.open(path, _READ)
         stream = os.fdopen(handle, "rb")
-        _refuse_irregular(path, os.fstat(handle).st_mode, error, remedy)  # it may be another by now
+        _refuse_irregular(path, os.fstat(handle).st_mode, error, remedy)  # the path may name another file by now
         return stream
     except FileNotFoundError:
         raise error(f"{path}: there is no such file; {remedy}") from None
@@ -232,5 +232,5 @@ def file_path(value: Any, error: type[RobotDynError]) -> Path:
 
 
 def why(cause: Exception) -> str:
-    """The system's message of an error."""
+    """The system's message for an error."""
     return getattr(cause, "strerror", None) or str(cause)

@@ -1,12 +1,12 @@
-"""Derivatives of forward dynamics: ∂a/∂q = −M⁻¹ ∂ID/∂q, ∂a/∂v = −M⁻¹ ∂ID/∂v, ∂a/∂τ = M⁻¹, coupled joints too.
+"""Derivatives of forward dynamics: ∂a/∂q = −M⁻¹ ∂ID/∂q, ∂a/∂v = −M⁻¹ ∂ID/∂v, ∂a/∂τ = M⁻¹, coupled joints included.
 
-In the axes of body b, with V_<j and A_<j its twist and acceleration by the joints before j, and F = 𝓜 A − ad_Vᵀ 𝓜 V:
+In the axes of body b, with V_<j and A_<j its twist and acceleration due to joints before j, and F = 𝓜 A − ad_Vᵀ 𝓜 V:
 
     ∂V/∂q_j = [V_<j, J_j],   ∂A/∂q_j = [A_<j, J_j] + [∂V/∂q_j, V − V_<j],   ∂J_i/∂q_j = [J_i, J_j] for i before j,
     ∂ID_i/∂q_j = Σ (∂J_i/∂q_j)ᵀ F + J_iᵀ ∂F/∂q_j,   ∂ID/∂v = 2 C
 
-[Carpentier, Mansard 2018, in body axes: Pinocchio's own, in those of the world, lose the digits of the distance to its
-origin squared]
+[Carpentier, Mansard 2018, in body axes: Pinocchio's own, in world axes, lose digits with the square of the distance
+from the origin]
 """
 
 from __future__ import annotations

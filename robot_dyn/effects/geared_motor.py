@@ -1,4 +1,4 @@
-"""What drives with a gear share: which joints they drive, and the inertia of the rotor behind the gear, n² J."""
+"""Base of geared drives: which joints they drive, and the rotor inertia reflected through the gear, n² J."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from robot_dyn.errors import EffectError
 
 
 class GearedMotor(Drive):
-    """Motors behind gears, each for one of the joints for which the coefficient `through` is positive.
+    """Geared motors, one for each joint where the coefficient named by `through` is positive.
 
     Attributes:
         inertia: J of the rotor, a scalar or (n,).
@@ -45,10 +45,10 @@ class GearedMotor(Drive):
         return self._driven
 
     def of(self, name: str, n: int) -> Array:
-        """A coefficient of its joints, (k,)."""
+        """Values of a coefficient for the driven joints, (k,)."""
         return np.broadcast_to(getattr(self, name), (n,), subok=True)[self._driven]
 
     def reflected(self, n: int) -> Array:
-        """The inertia of the rotors behind the gear, n² J, (k,)."""
+        """Rotor inertia reflected through the gear, n² J, (k,)."""
         J = self.of("inertia", n)
         return J if self.ratio is None else self.of("ratio", n) ** 2 * J

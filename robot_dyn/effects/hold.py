@@ -2,7 +2,7 @@
 
     M a + C v + ∂V/∂q = u + Σ τ_effect + λ,    load = −λ
 
-λ solves the convex problem of all joints together: the load of one depends on the state of all.
+λ solves one convex problem for all joints, so the load of each joint depends on the state of all.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from robot_dyn.result import reported
 @final
 @dataclass(frozen=True)
 class Hold:
-    """A joint that is held at rest.
+    """A joint held at rest.
 
     Attributes:
-        joint: Its name.
+        joint: Name of the joint.
         by: Names of the effects that can hold it.
-        load: The torque that they balance, in [N m] or [N].
-        least, most: The loads below and above which it breaks away; −inf or inf towards a stop.
+        load: Torque or force that these effects balance, in [N m] or [N].
+        least, most: Loads below and above which the joint breaks away; −inf or inf towards a stop.
     """
 
     joint: str
@@ -36,15 +36,15 @@ class Hold:
 
     @reported
     def margin(self) -> float:
-        """Change of the load, in either direction, at which the joint breaks away, in [N m] or [N]; not negative."""
+        """Smallest change of load, in either direction, that breaks the joint away, in [N m] or [N]; at least 0."""
         return max(min(self.load - self.least, self.most - self.load), 0.0)
 
 
 def held(equation: EquationOfMotion, q: np.ndarray, v: np.ndarray, total: np.ndarray) -> tuple[Hold, ...]:
-    """Return the joints that are held under a total torque; arguments are not checked.
+    """Return the joints held at rest under a total torque; arguments are not checked.
 
     Args:
-        equation: The equation of motion, of effects without a mode.
+        equation: Equation of motion whose effects have no mode.
         q: Position, (n,).
         v: Velocity, (n,).
         total: Υ + Σ τ_effect, (n,).

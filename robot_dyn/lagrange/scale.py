@@ -1,9 +1,10 @@
-"""Scales of comparison: what a difference of two values of one quantity is divided by, and what may remain of it.
+"""Comparison scales: divisors for the difference of two values of a quantity, and the tolerance on the result.
 
-    |x − y| ≤ tolerance · (Σ of the absolute values of the terms added into x)
+    |x − y| ≤ tolerance · (Σ of the absolute values of the terms summed in x)
 
-The terms are those of `Magnitudes`; an entry that has none is held to the largest of its row and column. A solution of
-M a = τ may differ by max(tolerance, 8 n u κ) of the terms of τ, κ the condition number of M scaled to a unit diagonal.
+The terms are those of `Magnitudes`; an entry without terms takes the largest in its row and column. A solution of
+M a = τ may differ by max(tolerance, 8 n u κ) times the terms of τ, where κ is the condition number of M scaled to a
+unit diagonal.
 """
 
 from __future__ import annotations
@@ -16,16 +17,16 @@ from robot_dyn.arithmetic import apply
 
 
 def scaled(error: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    """|error| / scale, with 0 / 0 = 0: no term, no error."""
+    """|error| / scale, with 0 / 0 = 0."""
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.abs(error) / scale
     return np.where(np.asarray(error) == 0, 0.0, ratio)
 
 
 def floored(scale: np.ndarray) -> np.ndarray:
-    """The scale of each entry, (n,), (m, n) or a number; of one without terms, the largest in its row and column.
+    """Scale of each entry, (n,), (m, n) or a number; an entry without terms takes the largest in its row and column.
 
-    An entry without terms holds only the rounding of its neighbours.
+    An entry without terms holds only rounding errors of its neighbours.
     """
     if scale.ndim != 2:
         return np.where(scale == 0, np.max(scale, initial=0.0), scale)
@@ -35,13 +36,13 @@ def floored(scale: np.ndarray) -> np.ndarray:
 
 
 def diagonal_scale(M: np.ndarray) -> np.ndarray:
-    """√(M_ii M_jj), which no |M_ij| of positive definite matrices (..., n, n) exceeds."""
+    """√(M_ii M_jj), an upper bound of |M_ij| for positive definite matrices (..., n, n)."""
     d = np.sqrt(np.abs(np.diagonal(M, axis1=-2, axis2=-1)))
     return d[..., :, None] * d[..., None, :]
 
 
 def joint_units(M: np.ndarray) -> np.ndarray:
-    """D = √M_ii of matrices (..., n, n), in which accelerations of joints of all sizes are alike, (..., n)."""
+    """D = √M_ii of matrices (..., n, n), which makes accelerations of large and small joints comparable, (..., n)."""
     return np.sqrt(np.maximum(np.diagonal(M, axis1=-2, axis2=-1), 1e-300))
 
 
@@ -51,7 +52,7 @@ def mass_norm(M: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def unit_diagonal_conditions(M: np.ndarray) -> np.ndarray:
-    """κ of each of matrices (..., n, n) scaled to a unit diagonal."""
+    """κ of each matrix in (..., n, n), scaled to a unit diagonal."""
     d = joint_units(M)
     return np.linalg.cond(M / (d[..., :, None] * d[..., None, :]))
 
@@ -62,7 +63,7 @@ def unit_diagonal_condition(M: np.ndarray) -> float:
 
 
 def solved_tolerance(least: float, M: np.ndarray, dtype: str = "float64") -> float:
-    """What a solution of M a = τ may err by, max(least, 8 n u κ); of matrices (..., n, n), at the worst of them."""
+    """Error allowed in a solution of M a = τ, max(least, 8 n u κ), with the largest κ of the matrices (..., n, n)."""
     return max(least, 8 * M.shape[-1] * float(np.finfo(dtype).eps) / 2 * unit_diagonal_condition(M))
 
 
@@ -72,20 +73,20 @@ def solved_norm(M: np.ndarray, torques: Iterable[np.ndarray]) -> np.ndarray:
 
 
 def acceleration_norm(M: np.ndarray, torques: Iterable[np.ndarray], terms: np.ndarray) -> float:
-    """Scale of ‖a − a'‖_M at one state: that of the torques that are solved, or ‖D⁻¹ terms‖ if that is more.
+    """Scale of ‖a − a'‖_M at one state: the larger of `solved_norm` of the torques and ‖D⁻¹ terms‖.
 
-    Of sums such as C v and N only their terms, (n,), keep the digits.
+    Cancellation in sums such as C v and N shows only in their terms, (n,).
     """
     return max(float(solved_norm(M, torques)), float(np.linalg.norm(terms / joint_units(M))))
 
 
 def acceleration_entries(d: np.ndarray, terms: np.ndarray, a: np.ndarray) -> np.ndarray:
-    """Scale of each entry of accelerations a (S, n) at S states, from D and the terms of τ, (S, n) each; (S, n)."""
+    """Scales (S, n) of the entries of accelerations a (S, n) at S states, from D and the terms of τ, both (S, n)."""
     return np.max([np.linalg.norm(terms / d, axis=-1), np.linalg.norm(a * d, axis=-1)]) / d
 
 
 def derivative_entries(d: np.ndarray, terms: np.ndarray, derivatives: np.ndarray) -> np.ndarray:
-    """The same of ∂a/∂q, ∂a/∂v and ∂a/∂τ, (S, 3, n, n): of each column the larger of its terms and its entries."""
+    """The same for ∂a/∂q, ∂a/∂v and ∂a/∂τ, (S, 3, n, n): per column, the larger of its terms and its entries."""
     whole = np.linalg.norm(terms / d, axis=-1)
     sides = np.stack([np.broadcast_to(whole[:, None], d.shape)] * 2 + [1 / d], axis=1)  # by q, by v, by τ
     columns = np.abs(derivatives * d[:, None, :, None]).max(axis=-2, keepdims=True)

@@ -1,6 +1,6 @@
-"""Kernels: calls of Pinocchio for one state of all joints that need a line of their own.
+"""Kernels: Pinocchio computations for one state of all joints that need more than a direct call.
 
-A kernel takes (model, data, q, …) and returns a fresh array, or a number; `data` is Pinocchio's working memory.
+A kernel takes (model, data, q, …) and returns a new array or a number; `data` is Pinocchio's working memory.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from robot_dyn.model.coriolis import jacobian_rate as rate_of
 from robot_dyn.queries.dynamics import Axes, entry
 from robot_dyn.spatial import hat
 
-Kernel = Callable[..., Any]  # its model may be a `Coriolis`
+Kernel = Callable[..., Any]  # the model argument may be a `Coriolis`
 
 
 class Scratch(threading.local):
-    """Pinocchio's working memory, one for each thread."""
+    """Pinocchio's working memory, one instance per thread."""
 
     def __init__(self, model: Any) -> None:
         self.data = model.createData()
@@ -44,19 +44,19 @@ def kinetic_energy(model: Any, data: Any, q: ndarray, v: ndarray) -> float:
 
 
 def regressor(model: Any, data: Any, q: ndarray, v: ndarray, a: ndarray) -> ndarray:
-    """Regressor of the torques of all joints, its bodies as in the model; Pinocchio gives a flat one of one joint."""
+    """Regressor of all joint torques, bodies in model order; for one joint Pinocchio returns a flat array."""
     Y = pin.computeJointTorqueRegressor(model, data, q, v, a)
     return Y if Y.ndim == 2 else Y.reshape(len(q), -1)
 
 
 def regressor_of_coordinates(order: list[int], couplings: Couplings, Y: ndarray) -> ndarray:
-    """The regressor of all joints, (..., N, 10 N), reduced to q, its bodies in the order of their parameters."""
+    """Regressor of all joints, (..., N, 10 N), reduced to q, with bodies in the order of their parameters."""
     N = len(order)
     return couplings.rows(Y.reshape(*Y.shape[:-1], N, -1)[..., order, :].reshape(Y.shape))
 
 
 class FrameKernels:
-    """Kernels of frames, each built once.
+    """Frame kernels, each built once.
 
     Args:
         frames: Indices of the frames in the model, by name.
@@ -66,7 +66,7 @@ class FrameKernels:
         self._frames, self._cached = frames, {}
 
     def __call__(self, build: Callable[..., Kernel], frame: str, *axes: str) -> Kernel:
-        """The kernel that `placement`, `jacobian` or `jacobian_rate` builds for a frame; QueryError if unknown."""
+        """The kernel that `placement`, `jacobian` or `jacobian_rate` builds for a frame; QueryError if not found."""
         try:
             return self._cached[build, frame, axes]
         except (KeyError, TypeError):  # TypeError: the name is not hashable
@@ -88,13 +88,13 @@ def placement(frame: int) -> Kernel:
 def jacobian(frame: int, axes: Axes) -> Kernel:
     """Jacobian of a frame.
 
-    Turned from the body's axes to the world's here: Pinocchio's own would lose the digits of the distance to the base.
+    Computed in body axes and rotated here: Pinocchio's world-aligned one loses digits with distance from the base.
     """
     reference = pin.WORLD if axes is Axes.WORLD else pin.LOCAL
 
     def kernel(model: Any, data: Any, q: ndarray) -> ndarray:
         J = pin.computeFrameJacobian(model, data, q, frame, reference)
-        return J if J.ndim == 2 else J.reshape(6, 1)  # Pinocchio gives a flat one if there is one joint
+        return J if J.ndim == 2 else J.reshape(6, 1)  # Pinocchio returns a flat array for one joint
 
     def aligned(model: Any, data: Any, q: ndarray) -> ndarray:
         return _turned(_rotation(model, data, frame, q), kernel(model, data, q))
@@ -121,7 +121,7 @@ def jacobian_rate(frame: int, axes: Axes) -> Kernel:
 
 
 def _rotation(model: Any, data: Any, frame: int, q: ndarray) -> ndarray:
-    """R, from a frame's axes to the base's."""
+    """Rotation R from the axes of a frame to those of the base."""
     pin.forwardKinematics(model, data, q)
     return pin.updateFramePlacement(model, data, frame).rotation
 

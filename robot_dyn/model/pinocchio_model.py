@@ -1,4 +1,4 @@
-"""A `pinocchio.Model` of a description and its edits."""
+"""Building a `pinocchio.Model` from a description and its edits."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from robot_dyn.description.edits import Edits
 from robot_dyn.description.structure import stated_mimics
 from robot_dyn.errors import DescriptionError, EditError, nearest
 
-MAX_MOVING = 250  # Pinocchio's scratch memory for n joints has 63 n³ bytes: 1 GB
-_MARK = "joint:"  # while Pinocchio works by name: a joint may share its name with a link, or be called "universe"
+MAX_MOVING = 250  # Pinocchio's scratch memory for n joints is 63 n³ bytes: here 1 GB
+_MARK = "joint:"  # prefix while Pinocchio works by name: a joint may share a link's name or be called "universe"
 
 
 def build(description: Description, edits: Edits) -> tuple[Any, Couplings, tuple[str, ...]]:
     """The Pinocchio model of all joints that move, the couplings between them, and the names of the independent ones.
 
     Raises:
-        DescriptionError: If Pinocchio refuses it, or no joint moves.
+        DescriptionError: If Pinocchio rejects it, or no joint moves.
         EditError: If a payload's frame is unknown, or no joint is left to move.
     """
     robot = description.element
@@ -33,7 +33,7 @@ def build(description: Description, edits: Edits) -> tuple[Any, Couplings, tuple
     for joint in robot.iterfind("joint"):
         joint.set("name", _MARK + joint.get("name"))
         if joint.get("type") == "continuous":
-            joint.set("type", "revolute")  # with its limits of ±1e308: an angle, one number for q as for v
+            joint.set("type", "revolute")  # with limits of ±1e308: q is then one number, as is v
     try:
         model = pin.buildModelFromXML(etree.tostring(robot, encoding="unicode"))
     except Exception as error:  # Pinocchio raises bare Exceptions of several kinds
@@ -55,7 +55,7 @@ def build(description: Description, edits: Edits) -> tuple[Any, Couplings, tuple
 
 
 def _state(robot: Any, edits: Edits) -> None:
-    """Write the masses and inertias of links in place of those of the file."""
+    """Replace masses and inertias of links in the file by those of the edits."""
     links = {link.get("name"): link.find("inertial") for link in robot.iterfind("link")}
     known = [name for name, inertial in links.items() if inertial is not None]
     for what, names in (("masses", dict(edits.masses)), ("inertias", dict(edits.inertias))):
@@ -78,7 +78,7 @@ def _unmark(model: Any) -> None:
 
 
 def joint_ids(model: Any, mark: str = "") -> dict[str, int]:
-    """Index of each joint by its name, which may be "universe" too; `mark` is taken off."""
+    """Index of each joint by name, even one called "universe"; the prefix `mark` is removed."""
     return {name.removeprefix(mark): i for i, name in enumerate(model.names) if i}
 
 
@@ -100,7 +100,7 @@ def _apply(edits: Edits, model: Any) -> None:
 
 
 def _locked(model: Any, edits: Edits, mimics: dict[str, Mimic]) -> Any:
-    """The model without the joints that are held, and without those that follow a held joint."""
+    """The model without the held joints and the joints that mimic them."""
     values = dict(edits.lock)
     q, held, ids = np.zeros(model.nq), [], joint_ids(model, _MARK)
     for name, index in ids.items():

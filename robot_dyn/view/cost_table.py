@@ -1,4 +1,4 @@
-"""The table of costs of runs: method, steps, evaluations, estimated error, time, and the cost of a digit."""
+"""Table of run costs: method, steps, evaluations, estimated error, time, and the cost of one digit more or fewer."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _NONE = "–"
 
 
 def cost_table(named: Sequence[tuple[str, Trajectory]]) -> dict[str, Any]:
-    """Return the names of the runs, and rows of a heading and a text for each run; empty rows are left out."""
+    """Return the run names and the rows, each a heading and one text per run; empty rows are left out."""
     columns = [dict(_rows(run)) for _, run in named]
     headings = dict.fromkeys(heading for column in columns for heading in column)
     rows = [[heading, *(column.get(heading, _NONE) for column in columns)] for heading in headings]
@@ -35,7 +35,7 @@ def _rows(run: Trajectory) -> Iterator[tuple[str, str]]:
 
 
 def _accuracy(run: Trajectory) -> Iterator[tuple[str, str]]:
-    """The requested accuracy, and the cost of one digit more or less, its time in proportion to the evaluations."""
+    """Requested accuracy, and the cost of one digit more or fewer; time is assumed proportional to evaluations."""
     of = run.accuracy
     assert of is not None
     at = f", at rtol {of.rtol:.1e}" if of.rtol else ""

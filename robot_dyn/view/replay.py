@@ -1,4 +1,4 @@
-"""Runs of arms, or an arm at rest, in a browser, live or as one file; between keyframes q(t) is its chord."""
+"""Show runs of arms, or an arm at rest, in a browser, live or as one file; q(t) is linear between keyframes."""
 
 from __future__ import annotations
 
@@ -30,19 +30,19 @@ def replay(
     inertia: bool = False,
     port: int | None = None,
 ) -> Server:
-    """Show runs in the browser, at the `url` of the server that is returned, on this machine only.
+    """Show runs in the browser, on this machine only, at the `url` of the returned server.
 
     Args:
         run: The run to show.
         *ghosts: Runs shown with it, transparent.
-        package_dirs: Folders in which the packages of meshes are searched first.
+        package_dirs: Folders searched first for the packages of meshes.
         frame: Link whose path is traced.
-        inertia: Whether each link's equivalent box, of the same mass and inertia, is drawn.
-        port: Where to listen; any free one if not given.
+        inertia: Whether to draw each link's equivalent box, of the same mass and inertia.
+        port: Port to listen on; any free one if not given.
 
     Raises:
         ReplayError: If a run has no samples.
-        QueryError: If it carries no robot, or `frame` is not one of its links.
+        QueryError: If a run carries no robot, or `frame` is not one of its links.
         ServerError: If the port is taken.
     """
     port = _free(port)
@@ -57,13 +57,13 @@ def save_replay(
     frame: str | None = None,
     inertia: bool = False,
 ) -> Path:
-    """Write a replay as one HTML file that needs neither server nor network; arguments as of `replay`.
+    """Write a replay as one HTML file that needs neither server nor network; arguments as in `replay`.
 
-    Another page under that name is replaced; a file of another kind is not.
+    An existing page of that name is replaced; a file of another kind is not.
 
     Raises:
         ReplayError: If a run has no samples.
-        QueryError: If it carries no robot, or `frame` is not one of its links.
+        QueryError: If a run carries no robot, or `frame` is not one of its links.
         ReplayError: If the file cannot be written.
     """
     file = target(path, PAGE, ReplayError)
@@ -78,14 +78,14 @@ def show(
     inertia: bool = False,
     port: int | None = None,
 ) -> Server:
-    """Show a robot in the browser, at the `url` of the server that is returned, on this machine only.
+    """Show a robot in the browser, on this machine only, at the `url` of the returned server.
 
     Args:
         robot: The robot to show.
         q: Its configuration, (n,), in [rad] or [m]; 0 if not given.
-        package_dirs: Folders in which the packages of meshes are searched first.
-        inertia: Whether each link's equivalent box, of the same mass and inertia, is drawn.
-        port: Where to listen; any free one if not given.
+        package_dirs: Folders searched first for the packages of meshes.
+        inertia: Whether to draw each link's equivalent box, of the same mass and inertia.
+        port: Port to listen on; any free one if not given.
 
     Raises:
         QueryError: If q is not one configuration of the robot.
@@ -103,9 +103,9 @@ def save_show(
     package_dirs: Iterable[str | Path] = (),
     inertia: bool = False,
 ) -> Path:
-    """Write the page of `show` as one HTML file that needs neither server nor network; arguments as of `show`.
+    """Write the page of `show` as one HTML file that needs neither server nor network; arguments as in `show`.
 
-    Another page under that name is replaced; a file of another kind is not.
+    An existing page of that name is replaced; a file of another kind is not.
 
     Raises:
         QueryError: If q is not one configuration of the robot.
@@ -134,7 +134,7 @@ def _written(document: dict[str, Any], file: Path) -> Path:
 
 
 def _warn(document: dict[str, Any]) -> None:
-    """Warn, once, of what is drawn otherwise than the files describe."""
+    """Warn once if anything is drawn differently from what the files describe."""
     if problems := document["problems"]:
         rest = f"; and {len(problems) - 1} more, listed on the page" if len(problems) > 1 else ""
         warnings.warn(f"drawn otherwise than its files describe: {problems[0]}{rest}", ModelWarning, stacklevel=4)

@@ -1,4 +1,4 @@
-"""The command that proves where an arm will be: prove."""
+"""The `prove` command: proves where an arm will be."""
 
 from __future__ import annotations
 

@@ -1,11 +1,11 @@
-"""The definition of user-defined code: one digest of all that its functions and classes reach by name.
+"""The definition of user-defined code: one digest of everything its functions and classes reach by name.
 
     function → its code, defaults, closure, attributes, globals → …      class → its bases and the values in it → …
 
-The bytecode counts, as it is what runs: a source may have been edited since it was read. Numbers, texts, tuples
-and arrays count by value, functions and classes of this library and of NumPy by name, for their sources and versions
-are in every key. What may differ in the next process has no definition: files, times, random numbers, objects that
-may change, functions that assign to anything but their own variables, and modules as values.
+Code is identified by its bytecode, which is what runs; its source may have been edited since. Numbers, strings, tuples
+and arrays are identified by value, functions and classes of this library and of NumPy by name, since every key includes
+their sources and versions. Anything that may differ in the next process has no definition: files, times, random
+numbers, mutable objects, functions that assign to anything but their own variables, and modules as values.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ _BUILTIN = {
     "isinstance", "issubclass", "len", "list", "map", "max", "min", "object", "pow", "property", "range", "reversed",
     "round", "set", "slice", "sorted", "staticmethod", "classmethod", "sum", "super", "tuple", "type", "zip",
 }  # fmt: skip
-# Modules whose functions and classes are identified by their names: they give equal values in every process.
+# Modules whose functions and classes are identified by name: they return equal values in every process.
 _PURE = {"abc", "cmath", "dataclasses", "math", "numpy", "numpy.linalg", "typing"}
 _PURE_ROOMS = (
     "arithmetic", "coefficients", "control", "effects", "errors", "lagrange", "linear_algebra", "spatial",
     "threshold", "values",
 )  # fmt: skip
-# Functions of NumPy that read or write a file, a clock, a setting or uninitialised memory.
+# NumPy functions that read or write a file, a clock, a setting or uninitialised memory.
 _IMPURE = {
     "datetime64", "empty", "empty_like", "fromfile", "fromregex", "genfromtxt", "get_printoptions",
     "getbufsize", "geterr", "geterrcall", "load", "loadtxt", "memmap", "save", "savetxt", "savez",
@@ -45,7 +45,7 @@ _IMPURE = {
 }  # fmt: skip
 _SPECIAL = {"__call__", "__class__", "__delattr__", "__init__", "__len__", "__name__", "__post_init__", "__setattr__"}
 _FIELDS = "__dataclass_fields__"
-# In a class: what follows from the rest, and what does not affect numbers.
+# Class attributes that follow from the rest or do not affect numbers.
 _FOLLOWS = {
     _FIELDS, "__abstractmethods__", "__annotate__", "__annotate_func__", "__annotations__", "__annotations_cache__",
     "__dataclass_params__", "__dict__", "__doc__", "__firstlineno__", "__hash__", "__match_args__", "__module__",
@@ -55,11 +55,11 @@ _MOST = 500  # functions and classes
 
 
 class _UndefinedError(Exception):
-    """Something without a definition is reached."""
+    """A value without a definition was reached."""
 
 
 def definition(value: Any) -> str | None:
-    """The SHA-256 of all that a value depends on; None if it may differ in another process."""
+    """SHA-256 of everything a value depends on; None if that may differ in another process."""
     reader = _Reader()
     try:
         parts = [reader.text(value), *reader.texts()]
@@ -70,14 +70,14 @@ def definition(value: Any) -> str | None:
 
 @final
 class _Reader:
-    """Texts of values; functions and classes have numbers, in the order in which they are reached."""
+    """Texts of values; functions and classes are numbered in the order in which they are reached."""
 
     def __init__(self) -> None:
         self._reached: list[Any] = []
-        self._numbers: dict[int, int] = {}  # of these, by identity
+        self._numbers: dict[int, int] = {}  # index in `_reached`, by identity
 
     def text(self, value: Any) -> str:
-        """A text that distinguishes a value from all others, together with those of what it reaches."""
+        """Text that, together with `texts`, distinguishes a value from all others."""
         kind: Any = type(value)
         if kind in _NUMBERS:
             return f"{kind.__name__} {value!r}"
@@ -101,8 +101,8 @@ class _Reader:
         raise _UndefinedError
 
     def texts(self) -> Iterator[str]:
-        """Of the functions and classes that are reached."""
-        for value in self._reached:  # it grows
+        """Texts of the functions and classes reached."""
+        for value in self._reached:  # the list grows during the loop
             yield self._of_function(value) if isinstance(value, FunctionType) else self._of_class(value)
 
     def _number(self, value: Any) -> str:
@@ -122,7 +122,7 @@ class _Reader:
             closure = {
                 x: cell.cell_contents for x, cell in zip(code.co_freevars, function.__closure__ or (), strict=True)
             }
-        except ValueError:  # one has no value yet
+        except ValueError:  # a closure variable has no value yet
             raise _UndefinedError from None
         if function.__builtins__ is not vars(builtins):  # pyright: ignore
             raise _UndefinedError
@@ -139,7 +139,7 @@ class _Reader:
         return f"class {kind.__qualname__} {bases} {fields} {own}"
 
     def _of_attribute(self, value: Any) -> str:
-        """What stands in a class under a name."""
+        """Text of a class attribute."""
         if isinstance(value, staticmethod | classmethod):
             return f"{type(value).__name__} {self.text(value.__func__)}"
         if type(value) is property:
@@ -151,7 +151,7 @@ class _Reader:
         return self.text(value)
 
     def _of_fields(self, fields: Mapping[str, Field[Any]]) -> str:
-        """Of a dataclass: defaults stand in its methods."""
+        """Text of dataclass fields, whose defaults are in the methods."""
         return str([(name, each.init, self._of_metadata(each.metadata)) for name, each in fields.items()])
 
     def _of_metadata(self, metadata: Mapping[Any, Any]) -> list[tuple[str, str]]:
@@ -159,7 +159,7 @@ class _Reader:
 
 
 def _is_pure(value: Any) -> bool:
-    """Whether its name identifies a function or class: it is found by it, in a module of constant behaviour."""
+    """Whether a value is a function or class that its name identifies, in a module of constant behaviour."""
     module, name = getattr(value, "__module__", None), getattr(value, "__qualname__", None)
     if not isinstance(module, str) or not isinstance(name, str) or isinstance(value, ModuleType):
         return False
@@ -175,7 +175,7 @@ def _is_pure(value: Any) -> bool:
 
 
 def _at(names: Mapping[str, Any], path: tuple[str, ...]) -> Any:
-    """The value of a global name, or of that in a module."""
+    """Value of a global name, or of an attribute path in a module."""
     value = names[path[0]] if path[0] in names else getattr(builtins, path[0], _at)
     for name in path[1:]:
         if not isinstance(value, ModuleType):
@@ -188,10 +188,10 @@ def _at(names: Mapping[str, Any], path: tuple[str, ...]) -> Any:
 
 @lru_cache(maxsize=1024)
 def _globals(code: CodeType) -> frozenset[tuple[str, ...]]:
-    """Paths to what a code takes from its module, such as (np, linalg, norm): a name, then attributes.
+    """Paths to what a code object takes from its module, such as (np, linalg, norm): a name, then attributes.
 
     Raises:
-        _UndefinedError: If it assigns to anything but its own variables, imports, or inspects what it calls.
+        _UndefinedError: If the code assigns to anything but its own variables, imports, or inspects what it calls.
     """
     found: list[list[str]] = []
     follows = False
@@ -217,10 +217,10 @@ def _globals(code: CodeType) -> frozenset[tuple[str, ...]]:
 
 @lru_cache(maxsize=1024)
 def code_parts(code: CodeType) -> tuple[Any, ...]:
-    """All that determines what a code does, as texts and numbers; not its file and lines."""
+    """Everything that determines what a code object does, as strings and numbers, without its file and lines."""
     names = code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars
     counts = code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount
-    kind = code.co_flags & 0xFFFF  # without those of __future__, which a cell of a notebook may have from another
+    kind = code.co_flags & 0xFFFF  # without __future__ flags, which a notebook cell may inherit from another
     return code.co_code.hex(), code.co_exceptiontable.hex(), names, counts, kind, [*map(_constant, code.co_consts)]
 
 

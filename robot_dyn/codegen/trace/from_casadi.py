@@ -1,4 +1,4 @@
-"""From a CasADi Function to a program. Values are numbered, so that no text of a file can reach the code."""
+"""Conversion of a CasADi Function to a program. Values are numbered, so no text from a file can reach the code."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ _KINDS[ca.OP_CONSTPOW] = Kind.POWER
 
 
 class OperationError(RobotDynError):
-    """A CasADi Function has no machine code."""
+    """A CasADi Function cannot be translated to machine code."""
 
 
 def program_of(function: ca.Function) -> Program:
-    """The program of a Function of dense vectors.
+    """Return the program of a Function of dense vectors.
 
     Args:
-        function: Of SX; each input and output a dense column.
+        function: A Function of SX; each input and output is a dense column.
 
     Raises:
         OperationError: If an operation has no machine code, or a result is sparse.
@@ -37,7 +37,7 @@ def program_of(function: ca.Function) -> Program:
     ops: list[Op] = []
     outputs = [0] * firsts[-1]
     sines: dict[int, tuple[int, int]] = {}  # sine and cosine by angle
-    at: dict[int, int] = {}  # what each place of CasADi's work vector holds now
+    at: dict[int, int] = {}  # value that each element of CasADi's work vector holds now
     for index in range(function.n_instructions()):
         operation = function.instruction_id(index)
         read, written = function.instruction_input(index), function.instruction_output(index)
@@ -64,7 +64,7 @@ def program_of(function: ca.Function) -> Program:
 
 
 def _constants(function: ca.Function, first: int) -> dict[str, int]:
-    """The numbers of the constants by their digits, which distinguish −0 from 0 and are equal for NaN."""
+    """Index of each constant by its text, which distinguishes −0 from 0 and is the same for every NaN."""
     indices = (i for i in range(function.n_instructions()) if function.instruction_id(i) == ca.OP_CONST)
     texts = dict.fromkeys(repr(function.instruction_constant(i)) for i in indices)
     return {text: first + k for k, text in enumerate(texts)}
@@ -80,5 +80,5 @@ def _kind(operation: int) -> Kind:
 
 
 def instructions(function: ca.Function) -> int:
-    """Number of operations of a Function, loads and stores apart."""
+    """Number of operations of a Function, excluding loads and stores."""
     return sum(function.instruction_id(i) not in _MOVES for i in range(function.n_instructions()))

@@ -1,4 +1,4 @@
-"""A `Dynamics` of symbols; each quantity from the formulation of fewest instructions."""
+"""A symbolic `Dynamics`; each quantity uses the formulation with the fewest instructions."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from robot_dyn.queries.dynamics import Dynamics
 
 
 def _least(name: str) -> Any:
-    """A quantity from the formulation of fewest instructions, as a method."""
+    """Method for a quantity, from the formulation with the fewest instructions."""
 
     def ask(self: SymbolicDynamics, *arguments: Array) -> Any:
         return self._ask(name, arguments)
@@ -30,12 +30,12 @@ def _least(name: str) -> Any:
 
 
 def _closed_form(name: str) -> Any:
-    """An attribute of the closed form."""
+    """Property for an attribute of the closed form."""
     return property(lambda self: getattr(self._trace.lagrangian, name), doc=getdoc(getattr(Lagrangian, name)))
 
 
 def _kinematic(name: str) -> Any:
-    """A quantity of the closed form that needs no inertia, as a method."""
+    """Method for a quantity of the closed form that needs no inertia."""
 
     def ask(self: SymbolicDynamics, *arguments: Any, **options: Any) -> Any:
         return getattr(self._trace.lagrangian, name)(*arguments, **options).view(Symbols)
@@ -46,11 +46,11 @@ def _kinematic(name: str) -> Any:
 
 @final
 class SymbolicDynamics:
-    """A robot in symbols.
+    """Symbolic dynamics of a robot.
 
     Args:
-        robot: Its file and edits.
-        known: Those of its numbers that are inputs, gravity and payloads; the others are constants.
+        robot: File and edits of the robot.
+        known: Numbers of the robot that are inputs (gravity and payloads); all others are constants.
     """
 
     M, C, N = map(_least, ("M", "C", "N"))
@@ -70,7 +70,7 @@ class SymbolicDynamics:
         self._known = known
 
     def of(self, values: Mapping[str, Any]) -> SymbolicDynamics:
-        """The same with its inputs of these values, in the order of `known`."""
+        """Return a copy whose inputs take these values, in the order of `known`."""
         if not values:
             return self
         other = copy(self)
@@ -79,7 +79,7 @@ class SymbolicDynamics:
         return other
 
     def formulation(self, quantity: str) -> str:
-        """The formulation of a quantity, that of the fewest instructions."""
+        """Formulation used for a quantity, the one with the fewest instructions."""
         return self._quantity(quantity).formulation
 
     def _quantity(self, name: str) -> Traced:

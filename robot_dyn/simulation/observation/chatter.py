@@ -1,10 +1,10 @@
 """Chatter: actuation that reverses at every tick, (u⁺ − u)(u − u⁻) < 0 many times in a row.
 
-Sampled damping does so where its gain is too large for the period: v⁺ ≈ (1 − M⁻¹ kd T) v changes its sign at each tick
+Sampled damping chatters if its gain is too large for the period: v⁺ ≈ (1 − M⁻¹ kd T) v changes its sign at each tick
 when an eigenvalue of M⁻¹ kd T is above 1, and grows when it is above 2. [Åström, Wittenmark, Computer-Controlled
 Systems, 3rd ed., 1997, ch. 2]
 
-Plain functions of arrays over joints and runs, (n, W), as both time loops call them at each tick.
+Plain functions of arrays (n, W) over joints and runs, since both time loops call them at each tick.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ import numpy as np
 from robot_dyn.arithmetic import Array
 from robot_dyn.integrate.primitives import copy
 
-_REVERSALS = 10  # in a row, at least; no motion that is sampled well has so many
-_PART = 0.02  # of the largest actuation of its joint so far: smaller changes are noise
+_REVERSALS = 10  # in a row, at least; well-sampled motion has fewer
+_PART = 0.02  # of the joint's largest actuation so far: smaller changes are noise
 _LEAST = 1e-6  # of the largest actuation of any joint so far
-_OTHER = 10.0  # times the amplitude: the smaller of two episodes is not told
+_OTHER = 10.0  # ratio of amplitudes above which the smaller of two episodes is not reported
 
 
 @final
 @dataclass
 class Episode:
-    """Reversals in a row, or several such: from `start`, `duration` in all, u going up and down by ± `amplitude`."""
+    """One or more rows of reversals: first `start`, total `duration`, u alternating by ± `amplitude`."""
 
     start: float
     duration: float
@@ -37,13 +37,13 @@ class Chatter(NamedTuple):
     """The reversals of W runs.
 
     Attributes:
-        t: Of the latest tick, (1,), in [s].
-        ticks: Their number, (1,).
-        u: The actuation at the latest three, tick k in place k mod 3, (3, n, W); nan before there are three.
+        t: Time of the latest tick, (1,), in [s].
+        ticks: Number of ticks, (1,).
+        u: Actuation at the latest three ticks, tick k at index k mod 3, (3, n, W); nan until there are three.
         count: Reversals in a row so far, (n, W).
-        streak: Their start, duration and amplitude, (3, n, W).
-        going: In how many runs there are some, (n,).
-        episodes: Start, duration and amplitude of those told, (3, n, W); of amplitude 0 where there are none.
+        streak: Start, duration and amplitude of the current row, (3, n, W).
+        going: Number of runs with a current row, (n,).
+        episodes: Start, duration and amplitude of the reported episodes, (3, n, W); amplitude 0 where there is none.
     """
 
     t: Array
@@ -56,7 +56,7 @@ class Chatter(NamedTuple):
 
 
 def chatters_of(n: int, W: int, tiles: int) -> list[Chatter]:
-    """Of so many times W runs before their first tick."""
+    """Empty records for `tiles` tiles of W runs, before their first tick."""
     t, ticks, going = np.zeros((tiles, 1)), np.zeros((tiles, 1), np.int64), np.zeros((tiles, n), np.int64)
     u, count = np.full((tiles, 3, n, W), np.nan), np.zeros((tiles, n, W), np.int64)
     streak, episodes = (np.zeros((tiles, 3, n, W)) for _ in range(2))
@@ -64,7 +64,7 @@ def chatters_of(n: int, W: int, tiles: int) -> list[Chatter]:
 
 
 def tick(of: Chatter, t: float, u: Array, low: Array, high: Array) -> None:
-    """A tick at t with the actuation u (n, W), which lay between low and high (n, W) before."""
+    """Record a tick at t with the actuation u (n, W), which so far lay between low and high (n, W)."""
     k = of.ticks[0]
     before, middle, now = of.u[(k + 1) % 3], of.u[(k + 2) % 3], of.u[k % 3]
     copy(now, u)
@@ -79,7 +79,7 @@ def tick(of: Chatter, t: float, u: Array, low: Array, high: Array) -> None:
 
 
 def turns(before: Array, middle: Array, now: Array) -> bool:
-    """Whether the actuation (W,) of a joint turns back at the middle one of three ticks in any run."""
+    """Whether the actuation (W,) of a joint reverses at the middle of three ticks in any run."""
     found = False
     for b in range(len(now)):
         found |= (middle[b] - before[b]) * (now[b] - middle[b]) < 0.0
@@ -89,7 +89,7 @@ def turns(before: Array, middle: Array, now: Array) -> bool:
 def count(
     of: Chatter, j: int, b: int, t: float, change: float, next_change: float, low: Array, high: Array
 ) -> None:  # fmt: skip
-    """Count a reversal of joint j in run b at the tick before t, unless it is noise, or the end of a row of them."""
+    """Count a reversal of joint j in run b at the tick before t; without one above the noise, end its row."""
     largest = 0.0
     for i in range(len(low)):
         largest = max(largest, high[i], -low[i])
@@ -106,7 +106,7 @@ def count(
 
 
 def close(of: Chatter, j: int, b: int) -> None:
-    """The end of a row of reversals: an episode if there were enough of them."""
+    """End a row of reversals, which is an episode if it is long enough."""
     if of.count[j, b] >= _REVERSALS:
         duration, amplitude, known = of.streak[1, j, b], of.streak[2, j, b], of.episodes[2, j, b]
         if amplitude > _OTHER * known:
@@ -119,6 +119,6 @@ def close(of: Chatter, j: int, b: int) -> None:
 
 
 def close_all(of: Chatter) -> None:
-    """No more ticks: what goes on has ended."""
+    """End all current rows after the last tick."""
     for j, b in np.argwhere(of.count > 0) if of.ticks[0] else ():
         close(of, j, b)

@@ -28,7 +28,7 @@ from robot_dyn.studies.certificate.worst_case_search import Batch
 
 FAMILIES = ("swing", "friction", "dry friction", "stops", "rigid stops", "PD", "sampled PD")
 _METHODS = ("explicit_euler", "semi_implicit_euler", "midpoint", "rk4", "order_8", "gauss_4", "sdirk_3")
-_DRAWS = 20  # of a method, until the scene takes it
+_DRAWS = 20  # attempts to draw a method that the scene accepts
 _RECORDS = 20
 
 
@@ -42,7 +42,7 @@ class Scene:
 
 
 def scenes(robot: Robot, states: Batch, count: int, rng: np.random.Generator) -> Iterator[Callable[[], Scene]]:
-    """So many scenes, each made when it is called; each family comes in its turn."""
+    """Yield `count` scenes, each built when called; the families take turns."""
     scale = np.median(np.diagonal(evaluate(robot, M, {"q": states["q"][:200]}), axis1=-2, axis2=-1), axis=0)
     for k in range(count):
         own = np.random.default_rng(rng.integers(2**63))
@@ -60,7 +60,7 @@ def _scene(robot: Robot, family: str, scale: np.ndarray, rng: np.random.Generato
         made, step = _method(rng)
         try:
             setup = Setup(Plant(robot, effects), q, v, duration, control, made, record_period_s=record, **step)
-        except RobotDynError:  # not every method takes every effect
+        except RobotDynError:  # not every method supports every effect
             continue
         steps = f", step {setup.nominal_step_s:g} s" if step else f", rtol {setup.integrator.rtol:.0e}"
         return Scene(setup, f"{family}: {setup.integrator.name}{steps}")
@@ -68,7 +68,7 @@ def _scene(robot: Robot, family: str, scale: np.ndarray, rng: np.random.Generato
 
 
 def _effects(robot: Robot, family: str, q: np.ndarray, scale: np.ndarray, rng: np.random.Generator) -> list[Effect]:
-    """What acts: the friction of the file where it states any, and what the family has."""
+    """Effects of a family; some families include the friction stated in the file, if any."""
     stated: list[Effect] = list(Plant(robot, "urdf").effects) if family in ("friction", "PD", "sampled PD") else []
     if family == "friction" and not stated:
         coulomb = RegularisedCoulombFriction(scale * rng.uniform(0.3, 3, robot.n), float(10 ** rng.uniform(-2, -1)))
@@ -76,7 +76,7 @@ def _effects(robot: Robot, family: str, q: np.ndarray, scale: np.ndarray, rng: n
     if family == "dry friction":
         return [DryFriction(scale * rng.uniform(0.3, 8, robot.n))]
     if "stops" in family:
-        reach = rng.uniform(0.01, 0.3, (2, robot.n))  # within the file's limits, so that they are met
+        reach = rng.uniform(0.01, 0.3, (2, robot.n))  # within the file's limits, so that the arm reaches the stops
         lower, upper = np.maximum(robot.lower, q - reach[0]), np.minimum(robot.upper, q + reach[1])
         if family == "rigid stops":
             return [RigidStops(lower, upper, rng.uniform(0, 0.9, robot.n))]
@@ -93,7 +93,7 @@ def _control(family: str, q: np.ndarray, scale: np.ndarray, duration: float, rng
 
 
 def _method(rng: np.random.Generator) -> tuple[Any, dict[str, Any]]:
-    """A method with its step, or with tolerances."""
+    """A random method, with a step or with tolerances."""
     if rng.random() < 0.4:
         rtol = float(f"{10 ** rng.uniform(-10, -5):.0e}")
         return Adaptive(str(rng.choice(["DOP853", "Rosenbrock"])), rtol, rtol / 100), {}

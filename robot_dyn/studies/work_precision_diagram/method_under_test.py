@@ -1,6 +1,6 @@
-"""Methods under test in a work-precision diagram, each with a ladder of settings that can be run.
+"""Methods under test in a work-precision diagram, each with its ladder of settings.
 
-A run is prepared before it is timed: its time is that of the loop alone.
+Preparation is not timed: the time of a run is that of its loop alone.
 """
 
 from __future__ import annotations
@@ -28,27 +28,27 @@ from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.setup.size import MOST_CUT
 from robot_dyn.studies.budget import Limit
 
-RECORDS = 25  # times at which errors are looked at, about
-_MOST_RECORDS = 400  # where they must fall on what switches
-_ON_TIME = 1e-9  # of the record period: times that differ by less are one
+RECORDS = 25  # approximate number of times at which errors are evaluated
+_MOST_RECORDS = 400  # limit where records must fall on switching times
+_ON_TIME = 1e-9  # of the record period: times that differ by less are equal
 _MOST_STEPS = 10**8
-_HIGH = 5  # order from which twice as many steps leave a gap in a ladder
+_HIGH = 5  # from this order on, doubling the steps leaves gaps in a ladder
 _LOOSEST, _TIGHTEST = 2, 13  # tolerances 10⁻ᵏ
-_WARM = 64  # part of the record period, of steps that load machine code
-_UNKNOWN = 15  # an order, of a method that chooses its own
-ATOL = 1e-2  # absolute tolerance, of the relative one, as of `Adaptive`
+_WARM = 64  # steps per record period in runs that load machine code
+_UNKNOWN = 15  # order assumed for a method that chooses its own
+ATOL = 1e-2  # absolute tolerance over the relative one, as in `Adaptive`
 ORDERS = {"DOP853": 8, "Rosenbrock": 5}  # of methods that choose their steps
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Run:
-    """What a run left behind.
+    """Outcome of a run.
 
     Attributes:
-        t: Times of the records, (k,), in [s]; of a method of fixed step those that are ends of steps.
-        q: Positions there, (k, n); None if it diverged.
-        energy: As of `Point`, as are the others.
+        t: Times of the records, (k,), in [s]; for a fixed-step method, only those that are ends of steps.
+        q: Positions at these times, (k, n); None if the run diverged.
+        energy: As in `Point`, as are the other attributes.
     """
 
     t: np.ndarray
@@ -65,10 +65,10 @@ class MethodUnderTest:
     """A method with a ladder of settings.
 
     Attributes:
-        method, engine, events, order, by: As of `ToleranceLadder`.
-        settings: From coarse to fine.
-        run: Runs one of them, within a limit of time.
-        warm: Loads what its runs need.
+        method, engine, events, order, by: As in `ToleranceLadder`.
+        settings: Yields the settings, from coarse to fine.
+        run: Runs one setting within a time limit.
+        warm: Loads the machine code that the runs need.
     """
 
     method: str
@@ -81,14 +81,14 @@ class MethodUnderTest:
     warm: Callable[[], object] = tuple
 
     def growth(self, before: float, after: float) -> float:
-        """By which the cost grows, about, from one setting to the next."""
+        """Approximate factor by which the cost grows from one setting to the next."""
         return (before / after) ** (1.0 if self.by == "step" else 1 / (self.order or _UNKNOWN))
 
 
 def whole(setup: Setup) -> Setup:
-    """The setup with the right angles of its files written out in full, as machine code has them.
+    """The setup with the right angles of its files at full precision, as in machine code.
 
-    So both engines run the same equations.
+    Both engines then run the same equations.
     """
     controller: Any = setup.controller
     models = {} if controller is None else controller.models
@@ -101,7 +101,7 @@ def whole(setup: Setup) -> Setup:
 
 
 def recorded(setup: Setup, duration_s: float) -> Setup:
-    """The setup up to that time, with some RECORDS records and no error estimate."""
+    """The setup up to `duration_s`, with about RECORDS records and no error estimate."""
     return replace(
         setup, integrator=Adaptive(), step_s=None, estimate_error=False, accuracy=None, events=(),
         duration_s=duration_s, record_period_s=_record_period(setup, duration_s),
@@ -109,7 +109,7 @@ def recorded(setup: Setup, duration_s: float) -> Setup:
 
 
 def _record_period(setup: Setup, duration_s: float) -> float:
-    """A period whose multiples are ends of steps, whatever their length: on ticks, and of what is between switches."""
+    """Period whose multiples are ends of steps of any length: whole ticks, or a divisor of switching intervals."""
     controller: Any = setup.controller
     tick = controller.period_s if controller is not None else 0.0
     if tick and RECORDS * tick <= duration_s:
@@ -121,21 +121,21 @@ def _record_period(setup: Setup, duration_s: float) -> float:
         shared = parts.denominator * other.denominator
         parts = Fraction(gcd(int(parts * shared), int(other * shared)), shared)
     if duration_s > _MOST_RECORDS * parts:
-        parts = Fraction(str(duration_s))  # only those that happen to be ends of steps count
+        parts = Fraction(str(duration_s))  # only records that happen to be ends of steps count
     return float(parts) / ceil(RECORDS * float(parts) / duration_s)
 
 
 def common(t: np.ndarray, of: np.ndarray) -> np.ndarray:
-    """The place in ascending times `of` of each of t that is among them; −1 for the others."""
+    """Index in the ascending times `of` of each time in t; −1 for times not found."""
     place = np.clip(np.searchsorted(of, t - _ON_TIME * of[-1] / len(of)), 0, len(of) - 1)
     return np.where(np.abs(of[place] - t) <= _ON_TIME * of[-1], place, -1)
 
 
 def own(setup: Setup, made: Any, engine: str, events: bool = True) -> MethodUnderTest:
-    """A method of this library, or of the same kind.
+    """A method of this library, or one with the same interface.
 
     Args:
-        setup: What to run, as `recorded` gives it.
+        setup: The setup to run, as returned by `recorded`.
         made: The method.
         engine: "compiled" or "interpreted".
         events: Whether steps end at the thresholds of the effects.
@@ -160,7 +160,7 @@ def own(setup: Setup, made: Any, engine: str, events: bool = True) -> MethodUnde
             count, most = changed.steps, MOST_CUT if changed.finds_events else _MOST_STEPS
             if count > most:
                 return
-            if count > before:  # a step longer than a tick, or a segment, is that of the segment
+            if count > before:  # a step longer than a tick or segment is cut to its length
                 yield step
             before = count
 
@@ -171,12 +171,12 @@ def own(setup: Setup, made: Any, engine: str, events: bool = True) -> MethodUnde
 
 
 def tolerances() -> Iterator[float]:
-    """Relative tolerances, a tenth of the one before each."""
+    """Relative tolerances, each a tenth of the one before."""
     yield from (10.0**-k for k in range(_LOOSEST, _TIGHTEST + 1))
 
 
 def step_ladder(period_s: float, order: int) -> Iterator[float]:
-    """Steps, each a whole number of times in the record period: halved; of high orders, by √2 about."""
+    """Steps that divide the record period: each half the one before, or about 1/√2 of it for high orders."""
     k, before = 0, 0
     while True:
         parts = round(2 ** (k / 2)) if order >= _HIGH else 2**k
@@ -186,17 +186,17 @@ def step_ladder(period_s: float, order: int) -> Iterator[float]:
 
 
 def warmed(setup: Setup) -> None:
-    """A run of one step or a few, which loads the machine code that the setup needs."""
+    """Run one or a few steps to load the machine code that the setup needs."""
     step = setup.record_period_s / _WARM
     setup = setup if setup.integrator.controls_error else replace(setup, step_s=step)
     timed(replace(setup, duration_s=2 * step, record_period_s=step), Limit(inf))
 
 
 def timed(setup: Setup, limit: Limit, events: bool = True) -> Run:
-    """A run and the time of its loop; OvertimeError if it takes longer than its limit.
+    """Run a setup and time its loop; OvertimeError if it takes longer than its limit.
 
     Raises:
-        TraceError: As of `choose`.
+        TraceError: As in `choose`.
     """
     equation = StateEquation(setup.plant, setup.controller, setup.integrator.canonical)
     machine, _ = choose(setup, equation)

@@ -1,6 +1,6 @@
 """A ladder: runs of one method, from coarse to fine, with the error and the cost of each.
 
-Where steps are small enough, error ∝ h^p, so that log error against log steps is a line of slope −p.
+For sufficiently small steps, error ∝ h^p, so log error against log steps is a line of slope −p.
 [Hairer, Nørsett, Wanner 1993, II.10]
 """
 
@@ -18,8 +18,8 @@ from robot_dyn.result import UNREPORTED, reported
 
 COMPILED, INTERPRETED = "compiled", "interpreted"
 _RESOLVED = 0.1  # [rad] or [m]: runs with larger errors show no order
-_MORE = 1.1  # times the steps: with fewer, stability and not accuracy chose them
-_ABOVE = 10.0  # times the error of the reference: nearer to it, an error is partly that of the reference
+_MORE = 1.1  # ratio of steps: if smaller, stability rather than accuracy chose the steps
+_ABOVE = 10.0  # times the reference error: below this, an error is partly that of the reference
 
 
 @final
@@ -29,13 +29,13 @@ class Point:
 
     Attributes:
         setting: Step, in [s], or relative tolerance.
-        steps: Number of steps; None of a program that does not report it.
-        evaluations: Evaluations of the equation of motion, those of its Jacobian apart; None as of steps.
+        steps: Number of steps; None if the program does not report it.
+        evaluations: Evaluations of the equation of motion, excluding those of its Jacobian; None if not reported.
         error: Largest |q − q_ref| over joints and records, in [rad] or [m]; inf if the run diverged.
-        energy: Largest residual of the energy ledger at the records, as a part of the energy exchanged; nan if it is
-            not known.
+        energy: Largest residual of the energy ledger at the records, as a fraction of the energy exchanged; nan if
+            unknown.
         time_s: Median time of the loop alone, in [s].
-        repeats: Number of times it was timed.
+        repeats: Number of timed repetitions.
         believed: Whether the error is above that of the reference.
     """
 
@@ -52,7 +52,7 @@ class Point:
 @final
 @dataclass(frozen=True)
 class Price:
-    """What an error costs: a time in [s] or a number of evaluations, and whether it is extrapolated."""
+    """Cost of reaching an error, as a time in [s] or a number of evaluations, and whether it is extrapolated."""
 
     value: float
     extrapolated: bool
@@ -64,13 +64,13 @@ class ToleranceLadder:
     """Runs of one method.
 
     Attributes:
-        method: Its name.
-        engine: "compiled" or "interpreted"; "" of another program.
+        method: Name of the method.
+        engine: "compiled" or "interpreted"; "" for another program.
         events: Whether steps end at the thresholds of the effects.
-        order: Order that its source states; None if there is none.
-        by: What differs from run to run: "step" or "tolerance".
-        points: From coarse to fine.
-        ended: Why there is none that is finer.
+        order: Order stated by the source of the method; None if there is none.
+        by: What varies from run to run: "step" or "tolerance".
+        points: The runs, from coarse to fine.
+        ended: Why there is no finer run.
         floor: Error of the reference, in [rad] or [m].
     """
 
@@ -85,19 +85,19 @@ class ToleranceLadder:
 
     @reported
     def name(self) -> str:
-        """Of the method, with what sets it apart."""
+        """Name of the method, with any marks that distinguish this ladder."""
         return ladder_name(self.method, self.engine, self.events)
 
     @property
     def peer(self) -> bool:
-        """Whether it is another program's."""
+        """Whether the method is from another program."""
         return not self.engine
 
     @reported
     def measured_order(self) -> float | None:
         """Median slope of log error against log steps between neighbours; None if too few runs show it.
 
-        Errors within ten times that of the reference do not count, nor do those above 0.1 rad or m.
+        Errors below ten times that of the reference, or above 0.1 rad or m, are ignored.
         """
         shown = [p for p in self.points if p.steps and _ABOVE * self.floor < p.error < _RESOLVED]
         slopes = [
@@ -108,10 +108,10 @@ class ToleranceLadder:
         return median(slopes) if len(slopes) > 1 else None
 
     def price(self, error: float, of: str = "time_s") -> Price | None:
-        """What an error costs, in `time_s` or `evaluations`; None if nothing can be said.
+        """Cost of reaching an error, in `time_s` or `evaluations`; None if it cannot be estimated.
 
-        Between two runs it is interpolated in the logarithms; an error that a finer run exceeds again does not count
-        as reached. Beyond the finest run it follows from the order, the measured one if that is lower.
+        Between two runs the cost is interpolated logarithmically; an error that a finer run exceeds does not count as
+        reached. Beyond the finest run it is extrapolated with the stated or the measured order, whichever is lower.
         """
         known = [p for p in self.points if isfinite(p.error) and getattr(p, of)]
         if error < self.floor or not known:
@@ -119,7 +119,7 @@ class ToleranceLadder:
         errors = np.maximum([p.error for p in known], self.floor)
         errors = np.maximum.accumulate(errors[::-1])[::-1]
         costs = np.array([getattr(p, of) for p in known], dtype=float)
-        costs = np.minimum.accumulate(costs[::-1])[::-1]  # a finer run that took less time will do
+        costs = np.minimum.accumulate(costs[::-1])[::-1]  # a finer run that cost less serves as well
         reached = np.flatnonzero(errors <= error)
         if len(reached):
             i = int(reached[0])
@@ -134,6 +134,6 @@ class ToleranceLadder:
 
 
 def ladder_name(method: str, engine: str, events: bool) -> str:
-    """The name of a method, with what sets its ladder apart."""
+    """Name of a method, with any marks that distinguish its ladder."""
     apart = [INTERPRETED] * (engine == INTERPRETED) + ["without events"] * (not events)
     return f"{method} ({', '.join(apart)})" if apart else method

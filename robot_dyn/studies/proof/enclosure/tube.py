@@ -3,7 +3,7 @@
     e' = J e − (0, d),  J ∈ J(p + B),   |e(t)| ≤ e^{ht L} (|e₀| + h |d|)   with  L ≥ μ(J) on p + B
 
 in the norm |e| = maxᵢ |eᵢ| / wᵢ, B = {|e| ≤ s}; μ is the logarithmic norm. If the right side is less than s, the motion
-stays inside, by continuation: there it exists, and is the only one. [Hairer, Nørsett, Wanner 1993, I.10; Lohner 1987]
+exists, is unique and stays inside, by continuation. [Hairer, Nørsett, Wanner 1993, I.10; Lohner 1987]
 """
 
 from __future__ import annotations
@@ -20,23 +20,23 @@ from robot_dyn.studies.proof.enclosure.polynomial import Defect, Polynomial
 from robot_dyn.studies.proof.tape import Tape
 
 _PARTS = 4  # of a step
-_WIDER = 3  # than what e starts with
-_GUESS = 8  # times what accelerations are expected to differ by
-_MOST = 0.7  # h L: beyond, the fundamental matrix is not well known
+_WIDER = 3  # times the initial bound of e
+_GUESS = 8  # times the expected difference of accelerations
+_MOST = 0.7  # h L: above this, the fundamental matrix is poorly known
 
 
 @final
 @dataclass(frozen=True)
 class Tube:
-    """A tube.
+    """A tube around the polynomial of a step.
 
     Attributes:
         weights: w, exact, (2n,).
-        size: s: no |eᵢ| exceeds s wᵢ.
+        size: s, where |eᵢ| ≤ s wᵢ for all i.
         growth: Bound of e^{hL}.
         local: Bound of h e^{hL} |d|.
         B: Balls |bᵢ| ≤ s wᵢ, (2n,).
-        C: Balls that hold a − p'' on the tube, (n,).
+        C: Balls that contain a − p'' on the tube, (n,).
     """
 
     weights: tuple[Ball, ...]
@@ -54,18 +54,18 @@ def tube(
     """The tube of a step.
 
     Args:
-        tape: Of the motion.
-        time: At the start of the step.
+        tape: Tape of the motion.
+        time: Time at the start of the step.
         p: The polynomial.
-        inverse: Close to M⁻¹.
+        inverse: Approximate inverse of M.
         h: The step.
-        of: Its defect.
+        of: Defect of the polynomial.
         start: Bounds of |e| at the start, (2n,).
         weights: w, exact and positive, (2n,).
-        rate: About μ at the start.
+        rate: Approximate μ at the start.
 
     Raises:
-        NotProvenError: If the motion may leave it.
+        NotProvenError: If the motion may leave the tube.
     """
     n = tape.n
     first = largest(e / w for e, w in zip(start, weights, strict=True))
@@ -88,7 +88,7 @@ def tube(
 
 
 def logarithmic_norm(J: Matrix, w: Sequence[Ball]) -> Ball:
-    """A bound of μ of [0 1; J] in the norm maxᵢ |eᵢ| / wᵢ: maxᵢ (Jᵢᵢ + Σ |Jᵢⱼ| wⱼ / wᵢ); 0 at least."""
+    """A bound of μ of [0 1; J] in the norm maxᵢ |eᵢ| / wᵢ: maxᵢ (Jᵢᵢ + Σ |Jᵢⱼ| wⱼ / wᵢ); at least 0."""
     n = J.nrows()
     most = largest(w[n + i] / w[i] for i in range(n))
     for i in range(n):

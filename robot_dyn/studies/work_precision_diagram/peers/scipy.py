@@ -1,4 +1,4 @@
-"""SciPy's DOP853 around Pinocchio's articulated-body algorithm: what is usual in Python."""
+"""SciPy's DOP853 with Pinocchio's articulated-body algorithm, the usual combination in Python."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from robot_dyn.studies.budget import Limit
 from robot_dyn.studies.work_precision_diagram.method_under_test import MethodUnderTest, Run, tolerances
 from robot_dyn.studies.work_precision_diagram.peers.free_motion import FreeMotion, PeerError
 
-_LEAST = 3e-14  # SciPy's own bound
+_LEAST = 3e-14  # rtol; SciPy's own lower bound is 100 eps
 
 
 def methods_under_test(motion: FreeMotion) -> list[MethodUnderTest]:
-    """DOP853 of `solve_ivp`."""
+    """DOP853 from `solve_ivp`."""
     pin: Any = import_module("pinocchio")
     from scipy.integrate import solve_ivp
 
