@@ -47,9 +47,7 @@ def table(heading: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
 
 def _cell(value: Any) -> str:
     number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-    return (
-        f"<td{' class=n' * number}>{escape(number_text(value) if number else '' if value is None else str(value))}</td>"
-    )
+    return f"<td{' class=n' * number}>{escape(number_text(float(value)) if number else '' if value is None else str(value))}</td>"
 
 
 def number_text(value: float) -> str:
