@@ -47,7 +47,8 @@ def table(heading: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
 
 def _cell(value: Any) -> str:
     number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-    return f"<td{' class=n' * number}>{escape(number_text(float(value)) if number else '' if value is None else str(value))}</td>"
+    shown = number_text(float(value)) if number else "" if value is None else str(value)
+    return f"<td{' class=n' * number}>{escape(shown)}</td>"
 
 
 def number_text(value: float) -> str:
