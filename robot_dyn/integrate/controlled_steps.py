@@ -48,7 +48,7 @@ class Steps:
     ) -> None:  # fmt: skip
         self.t, self.y, self.evaluations = t0, y0, 0
         self.status, self.message = Status.FINISHED, ""
-        self._stepper, self._control, self._end, self._stop = stepper, control, t1, stop
+        self._stepper, self._start, self._end, self._stop = stepper, control, t1, stop
         self._choose = chosen_step(stepper.step, stepper.error)
         self._after, self._lost = np.empty((len(y0), 1)), np.zeros(1, np.int64)
         counted = System(self._counted(system.rate), system.n, system.widths, system.exact)
@@ -73,6 +73,7 @@ class Steps:
 
     def __iter__(self) -> Iterator[tuple[float, Array, Any]]:
         of, t, now = self._stepper, self.t, self.y[:, None].copy()
+        self._control = self._start.copy()  # a second iteration begins with a first step, too
         try:
             with np.errstate(all="ignore"):
                 of.begin(self._f, of.coefficients, t, now, _NONE, _NONE, of.work)

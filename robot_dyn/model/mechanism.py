@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any, TypeVar, final
 
 import numpy as np
@@ -86,9 +88,9 @@ class Mechanism:
         return len(self.joint_names)
 
     @cached_property
-    def sizes(self) -> dict[str, int]:
+    def sizes(self) -> Mapping[str, int]:
         """The numbers that letters in the shapes of quantities stand for."""
-        return {"n": self.n, "p": len(NAMES) * self.model.nv}
+        return MappingProxyType({"n": self.n, "p": len(NAMES) * self.model.nv})
 
     @cached_property
     def scratch(self) -> Scratch:

@@ -175,3 +175,16 @@ def test_the_table_of_dop853_is_scipys(monkeypatch: pytest.MonkeyPatch) -> None:
         np.testing.assert_array_equal(getattr(table, name), getattr(DOP853, name), err_msg=name)
     monkeypatch.setattr(dop853, "find_spec", lambda name: None)
     assert dop853.table() is DOP853
+
+
+@pytest.mark.parametrize("name", ["DOP853", "Rosenbrock"])
+def test_steps_iterated_again_begin_as_a_run_from_there(name: str) -> None:
+    """After a break the next steps are those of a run that begins at the state reached."""
+    oscillator = System(lambda t, y: np.stack([y[..., 1], -50 * y[..., 0]], axis=-1), 1)
+    method = Adaptive(name)
+    steps = method.steps(oscillator, 0.0, np.array([1.0, 0.0]), 1.0)
+    for count, _ in enumerate(steps, 1):
+        if count == 3:
+            break
+    t, y = steps.t, steps.y.copy()
+    assert [each[0] for each in steps] == [each[0] for each in method.steps(oscillator, t, y, 1.0)]

@@ -32,8 +32,8 @@ from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.setup.size import LONGEST_S
 from robot_dyn.validate import integer
 
-FORMAT = 4
-ROLLOUTS_FORMAT = "rollouts 3"
+FORMAT = 5
+ROLLOUTS_FORMAT = "rollouts 4"
 RUN = Kind("a run file", ".npz", b"PK\x03\x04")
 MAX_BYTES = 4 * 2**30  # of the arrays of a run that is read, unless more is requested
 _MAX_TEXT = 2**28  # bytes of `about`, 4 a character; the largest URDF that loads has 2^24
