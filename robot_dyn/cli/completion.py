@@ -10,14 +10,14 @@ from robot_dyn.description.catalog import find, list_robots
 from robot_dyn.errors import RobotDynError
 from robot_dyn.files import read_start
 
-_READ = 2**22  # bytes of a URDF in which joints are sought
+_READ = 2**22  # bytes of a URDF that are searched for joints
 _MOVES = re.compile(
     rb"""<joint\b(?=[^>]*\btype\s*=\s*["'](?:revolute|continuous|prismatic))[^>]*\bname\s*=\s*["']([^"']+)"""
 )
 
 
 def robots(incomplete: str) -> list[str]:
-    """Names of the catalog."""
+    """Names of robots in the catalog."""
     return [name for name in list_robots() if name.startswith(incomplete)]
 
 
@@ -29,17 +29,17 @@ def scenes(incomplete: str) -> list[str]:
 
 
 def joints(incomplete: str) -> list[str]:
-    """Joints that move, of the robot that the line names."""
+    """Names of the movable joints of the robot named on the command line."""
     return [name for name in _joints() if name.startswith(incomplete)]
 
 
 def locks(incomplete: str) -> list[str]:
-    """JOINT= of these."""
+    """The same names, each followed by `=`, as in JOINT=."""
     return [f"{name}=" for name in joints(incomplete)]
 
 
 def _joints() -> list[str]:
-    """Of the first robot in the line, which shells hand over in their environment."""
+    """Movable joints of the first robot on the command line, which shells pass in environment variables."""
     line = os.environ.get("COMP_WORDS") or os.environ.get("_TYPER_COMPLETE_ARGS") or ""
     for word in line.split()[2:]:
         with suppress(RobotDynError):

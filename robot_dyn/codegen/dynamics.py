@@ -32,14 +32,14 @@ _DERIVATIVES = FORWARD_DYNAMICS_DERIVATIVES.name
 @final
 @dataclass(frozen=True)
 class CompiledDynamics(Dynamics, Parametrised):
-    """A robot as machine code; each quantity is compiled, and checked against Pinocchio, on first use.
+    """A robot as machine code; each quantity is compiled on first use and checked against Pinocchio.
 
-    With out= the result is written into that array, which stays as it was if the query is refused.
+    With out= the result is written into that array, which is left unchanged if the query raises.
 
     Attributes:
         original: The robot as given.
         dtype: np.float64 or np.float32, or its name; stored as the name.
-        threads: For batches; None for all processors.
+        threads: Number of threads for batches; None for all processors.
         cache: Whether compiled code is stored on disk.
     """
 
@@ -63,12 +63,12 @@ class CompiledDynamics(Dynamics, Parametrised):
 
     @property
     def robot(self) -> Robot:
-        """The robot whose equations are compiled: the one given, with its right angles written out in full."""
+        """The robot whose equations are compiled: `original`, with right angles given to full precision."""
         return self._completed[0]
 
     @property
     def right_angles(self) -> tuple[str, ...]:
-        """Angles that the file states with too few digits and that were taken as right angles, as text."""
+        """Descriptions of the angles that the file gives with too few digits and that are treated as right angles."""
         return tuple(map(str, self._completed[1]))
 
     @cached_property
@@ -94,11 +94,11 @@ class CompiledDynamics(Dynamics, Parametrised):
 
     @property
     def instructions(self) -> dict[str, dict[str, int]]:
-        """Instructions by formulation, of each quantity used so far; the shortest first, which is compiled."""
+        """Number of instructions of each quantity used so far, by formulation; the smallest is first and compiled."""
         return self.engine.instructions
 
     def served_by(self, quantity: str) -> str:
-        """The formulation whose machine code computes a quantity; "Pinocchio" if it is too long to be compiled."""
+        """The formulation compiled for a quantity; "Pinocchio" if the code would be too long to compile."""
         if quantity not in QUANTITIES or not self.engine.worthwhile[quantity]:
             return "Pinocchio"
         return self.engine.traces[quantity].formulation
@@ -204,7 +204,7 @@ class CompiledDynamics(Dynamics, Parametrised):
 
 
 def _dtype(given: Any) -> str:
-    """The name of a type of NumPy that machine code is written for."""
+    """Return the name of a NumPy dtype that machine code supports."""
     name = given
     if given is not None and not isinstance(given, str):
         with suppress(Exception):  # a foreign object may raise anything

@@ -1,7 +1,7 @@
 """CompiledPlant: a plant as machine code, M(q) a + C(q, v) v + N(t, q, v) = Υ, effects and bounds in the kernel.
 
-The effects are traced from the lines that the interpreted plant runs; other effects are not in the kernel.
-Coefficients, gravity and payloads are inputs of the code: plants that differ in them alone share it.
+The effects are traced from the code that the interpreted plant runs; other effects are not in the kernel.
+Coefficients, gravity and payloads are inputs of the kernel: plants that differ only in these share compiled code.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.quantity import PLANT
 
-_TIMES = (float, int, np.float64)  # what machine code takes as a time; `Engine.ask` handles others
+_TIMES = (float, int, np.float64)  # types of t that machine code accepts; `Engine.ask` handles others
 
 
 @final
 @dataclass(frozen=True)
 class CompiledPlant:
-    """A plant as machine code; each quantity is compiled, and checked against the interpreted one, on first use.
+    """A plant as machine code; each quantity is compiled on first use and checked against the interpreted plant.
 
     Attributes:
         plant: The plant.
-        dynamics: Its rigid bodies, compiled.
+        dynamics: Compiled rigid-body dynamics of the plant.
     """
 
     plant: Plant
@@ -50,7 +50,7 @@ class CompiledPlant:
 
     @cached_property
     def interpreted(self) -> Plant:
-        """The plant whose equations are compiled: the one given, with right angles written out in full."""
+        """The plant whose equations are compiled: `plant`, with right angles given to full precision."""
         return Plant(self.dynamics.robot, self.plant.effects)
 
     @cached_property
@@ -79,12 +79,12 @@ class CompiledPlant:
 
     @property
     def instructions(self) -> dict[str, dict[str, int]]:
-        """Instructions by formulation, of each quantity used so far, effects included; the least first."""
+        """Number of instructions of each quantity used so far, by formulation and with effects; the smallest first."""
         return self.dynamics.instructions | self.engine.instructions
 
     @property
     def instructions_by_effect(self) -> dict[str, int]:
-        """Instructions of each effect by itself."""
+        """Number of instructions of each effect, compiled separately."""
         (t, ts), (q, qs), (v, vs), _ = self._inputs
         given = [t, q, v, *self._numbers[0]]
         counts: dict[str, int] = {}
@@ -113,7 +113,7 @@ class CompiledPlant:
         return self.dynamics.C(q, v, out=out, errors=errors)
 
     def N(self, t: Any, q: Array, v: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
-        """Every force but actuation, as what must be overcome: N = ∂V/∂q − Σ τ_effect, (..., n)."""
+        """Forces that actuation must overcome: N = ∂V/∂q − Σ τ_effect, (..., n)."""
         return self._ask("N", (t, q, v), out, errors)
 
     def torque(self, t: Any, q: Array, v: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
@@ -149,24 +149,24 @@ class CompiledPlant:
 
     @cached_property
     def _known(self) -> tuple[Parameter, ...]:
-        """The coefficients of the effects, gravity and payloads: inputs, so that to change one compiles nothing."""
+        """The coefficients of the effects, gravity and payloads, as inputs: changing one requires no recompilation."""
         return parameters(self.dynamics.robot, self.plant.effects, None)
 
     @cached_property
     def _numbers(self) -> tuple[tuple[Any, ...], Any]:
-        """Their values as a CasADi vector, if there are any, and as an array of symbols."""
+        """The parameters as a CasADi vector, if there are any, and as an array of symbols."""
         vector, array = inputs("p", sum(each.size for each in self._known))
         return (vector,) if len(array) else (), array.view(Symbols)
 
     @cached_property
     def _bodies(self) -> SymbolicDynamics:
-        """The rigid bodies in symbols."""
+        """The rigid bodies, with symbolic parameters."""
         known = [each for each in self._known if each.part == ROBOT]
         return SymbolicDynamics(self.dynamics.robot, known).of(split(self._known, self._numbers[1]).get(ROBOT, {}))
 
     @cached_property
     def _symbolic(self) -> Plant:
-        """The plant in symbols."""
+        """The plant, with symbolic parameters."""
         return symbolic_plant(self.plant, self._bodies, split(self._known, self._numbers[1]))
 
     @interrupts_later()
@@ -201,16 +201,16 @@ def Compiled(
 def Compiled(
     robot_or_plant: Any, *, dtype: Any = "float64", threads: int | None = 1, cache: bool = True
 ) -> CompiledDynamics | CompiledPlant:
-    """A robot or a plant as machine code, for one state (n,) and batches (..., n).
+    """Compile a robot or a plant to machine code, for one state (n,) and batches (..., n).
 
     Args:
-        robot_or_plant: A Robot, or a Plant whose dynamics is one (or the Lagrangian of one).
+        robot_or_plant: A Robot, or a Plant whose dynamics is a Robot (or the Lagrangian of one).
         dtype: np.float64 or np.float32, or its name.
-        threads: For batches; None for all processors.
+        threads: Number of threads for batches; None for all processors.
         cache: Whether compiled code is stored on disk.
 
     Raises:
-        QueryError: If it is neither, or an option is not allowed.
+        QueryError: If `robot_or_plant` is neither, or an option is not allowed.
     """
     if not isinstance(robot_or_plant, Plant):
         return CompiledDynamics(robot_or_plant, dtype, threads, cache)

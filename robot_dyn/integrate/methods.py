@@ -1,8 +1,8 @@
-"""The list of methods of integration by name, which scenes and every function with a method use.
+"""Integration methods by name, as used by scenes and by every function that takes a method.
 
     y⁺ = method("rk4").step(system, t, y, h)
 
-Each cites its source where it is defined: Hairer, Nørsett, Wanner (two volumes), or Hairer, Lubich, Wanner.
+Each method cites its source where it is defined: Hairer, Nørsett, Wanner (two volumes), or Hairer, Lubich, Wanner.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _READY = (
     TimeStepping(),
 )
 
-# Functions that return each; order_8 reads SciPy's coefficients only when it is used.
+# Factories for the methods; order_8 reads SciPy's coefficients only when it is used.
 METHODS: Mapping[str, Callable[[], Integrator | Adaptive]] = MappingProxyType(
     {
         **{each.name: lambda each=each: each for each in _READY},
@@ -47,19 +47,19 @@ FIXED_STEP = tuple(name for name in METHODS if name not in ADAPTIVE)
 
 
 def method(name: str) -> Any:
-    """Return the method of that name: an `Integrator` of fixed step, or an `Adaptive` one with its default tolerances.
+    """Return a method by name: an `Integrator` with a fixed step, or an `Adaptive` method with default tolerances.
 
     Raises:
-        QueryError: If the name is unknown, with the nearest names.
+        QueryError: If the name is unknown; the message suggests the closest names.
     """
     return METHODS[choice("integration method", name, METHODS)]()
 
 
 def as_method(given: Any) -> Integrator | Adaptive:
-    """Return a method that is given by its name, or itself.
+    """Return the method for a name; a method is returned unchanged.
 
     Raises:
-        QueryError: If it is not a method.
+        QueryError: If `given` is neither a name nor a method.
     """
     if isinstance(given, str):
         return method(given)

@@ -1,4 +1,4 @@
-"""Christoffel symbols of a mass matrix Σ Jᵀ 𝓜 J, whose derivative is exact by brackets of the Jacobian's columns.
+"""Christoffel symbols of a mass matrix Σ Jᵀ 𝓜 J; Lie brackets of the Jacobian's columns give its exact derivative.
 
     ∂J_j/∂q_k = [J_j, J_k] for joint j before joint k, and 0 otherwise
     C_ij = Σ_k ½ (∂M_ij/∂q_k + ∂M_ik/∂q_j − ∂M_kj/∂q_i) v_k
@@ -15,7 +15,7 @@ from robot_dyn.spatial import bracket
 
 
 def jacobian_derivative(J: Array) -> Array:
-    """∂J_j/∂q_k = [J_j, J_k] for j < k, else 0, at index [..., :, j, k]; from columns J (..., 6, p) of one path."""
+    """∂J_j/∂q_k = [J_j, J_k] for j < k, else 0, at index [..., :, j, k]; J (..., 6, p) has the columns of one path."""
     p = J.shape[-1]
     brackets = bracket(transpose(J)) @ J[..., None, :, :]  # at index [..., j, :, k]
     return np.swapaxes(brackets, -3, -2) * np.triu(np.ones((p, p), dtype=J.dtype), 1)
@@ -32,5 +32,5 @@ def christoffel(dM: Array, v: Array) -> Array:
     """C_ij = Σ_k ½ (∂M_ij/∂q_k + ∂M_ik/∂q_j − ∂M_kj/∂q_i) v_k, from ∂M (..., n, n, n) and v (..., n)."""
     v = v[..., None, :, None]
     rate = (dM @ v)[..., 0]  # Ṁ
-    W = (transpose(dM) @ v)[..., 0]  # W_ij = Σ_k ∂M_ik/∂q_j v_k, and its transpose is the last term
+    W = (transpose(dM) @ v)[..., 0]  # W_ij = Σ_k ∂M_ik/∂q_j v_k; Wᵀ is the last term
     return (rate + W - transpose(W)) / 2

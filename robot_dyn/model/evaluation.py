@@ -1,8 +1,8 @@
-"""Evaluation of Pinocchio's kernels: one state directly, coupled joints by virtual work, lists and batches row by row.
+"""Evaluate Pinocchio's kernels: single states directly, coupled joints by virtual work, lists and batches row by row.
 
     x = reduce(kernel(S q + s₀, S v, …))  for each state
 
-What is not one state of moderate float64 numbers is checked, converted and evaluated by `queries.batch`.
+Any input other than a single state of moderate float64 values is checked, converted and evaluated by `queries.batch`.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from robot_dyn.validate import is_moderate, is_plain, shaped
 if TYPE_CHECKING:
     from robot_dyn.model.robot import Robot
 
-Reduction = Callable[[Couplings, Any], Any]  # from the answer for all joints to that for q
+Reduction = Callable[[Couplings, Any], Any]  # maps the result for all joints to the result for q
 
 
 @final
@@ -42,22 +42,22 @@ class Evaluation:
 
     @cached_property
     def regularity(self) -> Regularity:
-        """Whether M can be solved for, judged at a configuration without symmetries."""
+        """Whether M is invertible, judged at a configuration without symmetries."""
         M = self._equation(pin.crba, Couplings.matrix, self._mechanism.model)(np.linspace(0.3, 0.9, self._mechanism.n))
         return regularity(M, self._mechanism.joint_names)
 
     def answer(
         self, quantity: str, errors: str, kernel: Kernel, reduce: Reduction | None, model: Any, *state: Array
     ) -> Any:
-        """The answers of a kernel at one state or a batch.
+        """Return the result of a kernel at one state or a batch.
 
         Args:
-            quantity: Its name.
-            errors: "raise", or "nan" for NaN in place of the states of a batch that have no answer.
-            kernel: The call of Pinocchio for one state of all joints.
-            reduce: How its result is reduced to q, or None if it has no axis of joints.
-            model: What the kernel takes as its model.
-            *state: Its arguments, (..., n) each.
+            quantity: Name of the quantity.
+            errors: "raise", or "nan" for NaN at the states of a batch that cannot be evaluated.
+            kernel: Function that calls Pinocchio for one state of all joints.
+            reduce: Function that reduces the result to q, or None if the result has no joint axis.
+            model: Model passed to the kernel.
+            *state: Arguments of the quantity, (..., n) each.
         """
         if errors.__class__ is str and errors == "raise":
             shape, couplings = self._shape, self._couplings
@@ -71,7 +71,7 @@ class Evaluation:
         return self._answered(quantity, errors, self._equation(kernel, reduce, model), state)
 
     def forward_dynamics(self, errors: str, q: Array, v: Array, tau: Array) -> ndarray:
-        """M⁻¹ (τ − C v − N): by ABA, and with coupled joints by factorising M; raises where M is singular."""
+        """M⁻¹ (τ − C v − N), by ABA, or by factorising M if joints are coupled; raises where M is singular."""
         if self.regularity.singular is not None:
             raise self.regularity.singular()
         model, names, trivial = self._mechanism.model, self._mechanism.joint_names, self._couplings.trivial
@@ -94,13 +94,13 @@ class Evaluation:
         return self._answered("forward_dynamics", errors, equation, (q, v, tau))
 
     def _coupled(self, kernel: Kernel, reduce: Reduction | None, model: Any, q: ndarray, *rates: ndarray) -> Any:
-        """The answer at one state of coupled joints."""
+        """Evaluate a kernel at one state of a mechanism with coupled joints."""
         couplings = self._couplings
         answer = kernel(model, self._scratch.data, couplings.position(q), *map(couplings.velocity, rates))
         return answer if reduce is None else reduce(couplings, answer)
 
     def _equation(self, kernel: Kernel, reduce: Reduction | None, model: Any) -> Callable[..., ndarray]:
-        """The function (q, …) → answers of a kernel, evaluated state by state of a batch."""
+        """Return the function (q, …) → result of a kernel, which evaluates a batch one state at a time."""
         couplings, data = self._couplings, self._scratch.data
 
         def equation(q: ndarray, *rates: ndarray) -> ndarray:
@@ -131,7 +131,7 @@ def warning_answer(robot: Robot, answer: Callable[..., Any]) -> Callable[..., An
 
 
 def warn_of_digits(robot: Robot, quantity: str, answer: Any, *state: Array, stacklevel: int = 3) -> Any:
-    """The answer, after a warning if it has fewer digits than `Robot.warn_below` requests."""
+    """Return the result, with a warning if it has fewer correct digits than `Robot.warn_below` requests."""
     from robot_dyn.lagrange.digits import doubt  # late: it builds a Lagrangian
 
     if message := doubt(robot, quantity, state, answer, robot.least_digits):

@@ -1,12 +1,13 @@
-"""Sine, cosine and hyperbolic tangent without branches, so that they vectorise, by polynomials and rational functions.
+"""Branch-free sine, cosine and hyperbolic tangent, which vectorise, by polynomials and rational functions.
 
     x = k π/2 + r:   sin r ≈ r + r³ (S₁ + S₂ r² + …),   cos r ≈ 1 − r²/2 + r⁴ (C₁ + C₂ r² + …) on |r| ≤ π/4
     tanh x ≈ x + x³ P(x²) / Q(x²) for |x| < 0.625,   else ± (1 − 2 / (e^{2|x|} + 1)),   e^u = 2ᵏ e^r
 
-π/2 is taken in three parts; k times the first two is exact up to |x| = RANGE [Cody, Waite 1980]. The polynomials are
-those of fdlibm, k_sin.c and k_cos.c [Sun Microsystems 1993]; the rational functions those of Cephes, tanh.c and exp.c
-[Moshier 1984]. Measured against balls, sine and cosine are within 1.5 ulp up to RANGE (the C library serves farther
-angles) and tanh within 2 ulp. `reassoc` must not reach these lines: it would add up the parts of π/2.
+π/2 is split into three parts; k times each of the first two is exact up to |x| = RANGE [Cody, Waite 1980]. The
+polynomials are those of fdlibm, k_sin.c and k_cos.c [Sun Microsystems 1993]; the rational functions are those of
+Cephes, tanh.c and exp.c [Moshier 1984]. Compared with ball arithmetic, sine and cosine are within 1.5 ulp up to RANGE
+(larger angles use the C library) and tanh within 2 ulp. The `reassoc` flag must not be set here: it would let LLVM
+combine the parts of π/2.
 """
 
 from __future__ import annotations
@@ -15,11 +16,11 @@ import math
 
 from robot_dyn.codegen.llvm.vectors import F32, F64, I1, I64, Lanes, polynomial, wide
 
-_MAGIC = 1.5 * 2.0**52  # added to |x| < 2⁵¹, it leaves the nearest integer in the low bits
-RANGE = 1e5  # [rad]: k has 16 bits there, and 33 bits of π/2 times 16 bits are exact in 53
+_MAGIC = 1.5 * 2.0**52  # adding it to |x| < 2⁵¹ leaves the nearest integer in the low bits
+RANGE = 1e5  # [rad]: k has up to 16 bits, so its product with 33 bits of π/2 is exact in 53
 _TURN = 2 / math.pi
 _P1, _P2 = 1.57079632673412561417e00, 6.07710050630396597660e-11  # 33 bits of π/2 each
-_P3 = 2.02226624879595063154e-21  # the rest
+_P3 = 2.02226624879595063154e-21  # remainder of π/2
 _S = (
     -1.66666666666666324348e-01,
     8.33333333332248946124e-03,
@@ -36,10 +37,10 @@ _C = (
     2.08757232129817482790e-09,
     -1.13596475577881948265e-11,
 )
-# The same for float32: Cephes, sinf.c [Moshier 1992], rounded to float32.
+# Coefficients for float32: Cephes, sinf.c [Moshier 1992], rounded to float32.
 _S32 = (-1.66666552424430847168e-1, 8.33216123282909393311e-3, -1.95152956992387771606e-4)
 _C32 = (4.16666455566883087158e-2, -1.38873164542019367218e-3, 2.44331568944575637579e-5)
-# tanh: below SMALL the rational function P / Q, as 1 − 2/(…) would cancel; above LARGE the result is 1
+# tanh: below _SMALL it uses P / Q, since 1 − 2/(…) would lose digits to cancellation; above _LARGE the result is 1
 _SMALL, _LARGE = 0.625, 22.0
 _P = (-1.61468768441708447952e3, -9.92877231001918586564e1, -9.64399179425052238628e-1)
 _Q = (4.84406305325125486048e3, 2.23548839060100448583e3, 1.12811678491632931402e2, 1.0)
@@ -74,7 +75,7 @@ def sincos(x: Lanes) -> tuple[Lanes, Lanes]:
 
 
 def _signed(x: Lanes, turns: Lanes, narrow: bool) -> Lanes:
-    """x, or −x where the second bit of the turns is set."""
+    """Return x, or −x where the second bit of `turns` is set."""
     if narrow:
         builder = turns.vectors.builder
         return (x * -1.0).choose(builder.icmp_signed("!=", (turns & 2).value, turns.of(0)), x)
@@ -99,7 +100,7 @@ def tanh(x: Lanes) -> Lanes:
     negative = x.below(0.0)
     size = (x * -1.0).choose(negative, x)
     top = x.like(x.of(_LARGE))
-    size = top.choose(top.below(size), size)  # a NaN stays
+    size = top.choose(top.below(size), size)  # NaN is preserved
     z = size * size
     near = size + size * z * (polynomial(z, _P) / polynomial(z, _Q))
     result = near.choose(size.below(_SMALL), 1.0 - 2.0 * (1.0 / (_exp(size * 2.0) + 1.0)))

@@ -1,4 +1,4 @@
-"""Machine code that outlives its process: a module of LLVM compiled to an object file, stored, and loaded.
+"""Machine code that persists between processes: an LLVM module is compiled to an object file, stored and loaded.
 
 Machine code is never freed, so a process loads each key only once.
 """
@@ -20,7 +20,8 @@ from robot_dyn.codegen.llvm import python_function
 if TYPE_CHECKING:
     from robot_dyn.codegen.store.cache import Store
 
-_LONG = 10_000  # lines: with 15 000, 0.4 s in place of 0.8, at 2 % of the speed; with 31 000, 4 s in place of 12
+# Lines. Less effort compiles 15 000 lines in 0.4 s instead of 0.8 s, for 2 % slower code; 31 000 in 4 s, not 12 s.
+_LONG = 10_000
 _lock = threading.RLock()
 _loaded: dict[str, bytes] = {}  # object files by key
 
@@ -28,12 +29,12 @@ _loaded: dict[str, bytes] = {}  # object files by key
 @final
 @dataclass(frozen=True)
 class Passes:
-    """How hard LLVM works on a module.
+    """Optimisation levels of LLVM for a module.
 
     Attributes:
-        level: Of its passes over instructions, 0 to 3.
-        effort: Of register allocation, 0 to 3; None for 3, or 1 for a long module: in one long block its time grows
-            faster than the block.
+        level: Level of the passes over instructions, 0 to 3.
+        effort: Level of register allocation, 0 to 3; None for 3, or 1 for a long module, as the time of allocation
+            grows faster than linearly with the length of a block.
     """
 
     level: int = 3
@@ -47,15 +48,15 @@ def addresses(
     functions: Sequence[str], key: str, write: Callable[[Any, str], None], store: Store | None, about: str = "",
     passes: Passes = _ALL,
 ) -> tuple[int, ...]:  # fmt: skip
-    """The addresses of functions of a module, which is restored from the store if it is there.
+    """Return the addresses of functions of a module, which is restored from the store if present.
 
     Args:
-        functions: Their names, without the prefix of the module.
-        key: The `digest` of all that determines the module.
-        write: Writes the functions into a module, with a prefix before the name of each.
+        functions: Names of the functions, without the prefix of the module.
+        key: The `digest` of everything that determines the module.
+        write: Writes the functions into a module, each name preceded by a prefix.
         store: Where machine code is stored, or None.
-        about: What the module computes, shown to a reader of the store.
-        passes: How hard LLVM works.
+        about: Description of what the module computes, saved in the store.
+        passes: Optimisation levels.
     """
     name = f"robot_dyn_{key}_"
     with _lock:
@@ -71,7 +72,7 @@ def addresses(
 
 
 def object_file(write: Callable[[Any, str], None], name: str, passes: Passes = _ALL) -> bytes:
-    """The object file of a module."""
+    """Compile a module to an object file."""
     module = _optimised(write, name, passes.level)
     effort = passes.effort
     if effort is None:
@@ -99,18 +100,18 @@ def _optimised(write: Callable[[Any, str], None], name: str, level: int = 3) -> 
 
 
 def _sealed(code: bytes) -> bytes:
-    """An object file after its SHA-256: a damaged one crashes LLVM."""
+    """Prefix an object file with its SHA-256, because a corrupt file crashes LLVM."""
     return sha256(code).digest() + code
 
 
 def _opened(payload: bytes | None) -> bytes | None:
-    """The object file of a payload; None if it is damaged or missing."""
+    """Return the object file in a payload; None if the payload is corrupt or missing."""
     code = (payload or b"")[len(_sealed(b"")) :]
     return code if payload == _sealed(code) else None
 
 
 def _machine(effort: int = 3) -> Any:
-    """LLVM's view of this processor."""
+    """Return the LLVM target machine for this processor."""
     binding.initialize_native_target()
     binding.initialize_native_asmprinter()
     target = binding.Target.from_triple(binding.get_process_triple())
@@ -123,7 +124,7 @@ def _machine(effort: int = 3) -> Any:
 
 @cache
 def _engine() -> Any:
-    """The holder of the machine code of this process."""
+    """Return the execution engine that holds the machine code of this process."""
     for name, location in python_function.addresses().items():
         binding.add_symbol(name, location)
     return binding.create_mcjit_compiler(binding.parse_assembly(""), _machine())

@@ -1,4 +1,4 @@
-"""The instructions of each kind of operation on vectors of any length, except sine and cosine."""
+"""LLVM instructions for each kind of operation except sine and cosine, on vectors of any length."""
 
 from __future__ import annotations
 
@@ -33,17 +33,17 @@ def _chosen(sign: str) -> Operation:
 
 
 def _ordered(vectors: Vectors, sign: str, x: Any, y: Any) -> Any:
-    """The mask of a comparison; it does not hold for NaN."""
+    """The mask of a comparison; false if an operand is NaN."""
     return vectors.builder.fcmp_ordered(sign, x, y)
 
 
 def _holds(vectors: Vectors, x: Any) -> Any:
-    """The mask of a condition: numbers other than 0, including NaN."""
+    """The mask of a condition: true for any value other than 0, including NaN."""
     return vectors.builder.fcmp_unordered("!=", x, vectors.constant(0.0))
 
 
 def _truth(vectors: Vectors, mask: Any) -> Any:
-    """1 or 0 of a mask."""
+    """Convert a mask to 1.0 or 0.0."""
     return vectors.builder.select(mask, vectors.constant(1.0), vectors.constant(0.0))
 
 

@@ -1,9 +1,9 @@
-"""Butterworth low-pass filters of order 1 and 2, by the bilinear transform, prewarped at the cutoff.
+"""Butterworth low-pass filters of order 1 and 2, by the bilinear transform with prewarping at the cutoff.
 
     K = tan(ω T/2),   order 1: y_k = (K (x_k + x_{k−1}) + (1 − K) y_{k−1}) / (1 + K)
     order 2: H(z) = K² (1 + z⁻¹)² / (1 + √2 K + K² + 2 (K² − 1) z⁻¹ + (1 − √2 K + K²) z⁻²)
 
-[Oppenheim, Schafer, Discrete-Time Signal Processing, 3rd ed., 2010, sec. 7.2, and 6.3 for the transposed form]
+[Oppenheim, Schafer, Discrete-Time Signal Processing, 3rd ed., 2010, sec. 7.2; sec. 6.3 for the transposed form]
 """
 
 from __future__ import annotations

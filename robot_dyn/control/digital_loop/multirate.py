@@ -1,4 +1,4 @@
-"""Two rates in one loop: u = u_fast(t_k) + u_slow(t_{rj}), j = ⌊k/r⌋: the slow part acts at each r-th tick.
+"""Two rates in one loop: u = u_fast(t_k) + u_slow(t_{rj}), j = ⌊k/r⌋: the slow part is updated every r-th tick.
 
 [Franklin, Powell, Workman, Digital Control of Dynamic Systems, 3rd ed., 1998, ch. 11]
 """
@@ -18,23 +18,23 @@ from robot_dyn.control.controller import Controller, Nested, check_sampled, nest
 from robot_dyn.errors import ControlError
 from robot_dyn.threshold import smooth
 
-_ROUNDED = 1e-9  # of a ratio of periods: it is a whole number
+_ROUNDED = 1e-9  # relative tolerance for a whole ratio of periods
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Multirate(Controller):
-    """The sum of two sampled controllers, the period of one a whole number of periods of the other.
+    """The sum of two sampled controllers, where one period is an integer multiple of the other.
 
-    As feedback each millisecond beside the torque of a model each ten: `Multirate(PD(…, 1e-3), PDGravity(…, 1e-2))`,
-    the second with gains 0. The torque of the slow one is that of its last tick.
+    For example, feedback every 1 ms plus a model torque every 10 ms: `Multirate(PD(…, 1e-3), PDGravity(…, 1e-2))`,
+    the second with zero gains. The slow controller holds its torque between its ticks.
 
     Attributes:
-        fast: The controller of the shorter period, which is that of the sum.
-        slow: The controller of the longer one.
+        fast: The controller with the shorter period, which is also the period of the sum.
+        slow: The controller with the longer period.
 
     Raises:
-        ControlError: If one is continuous or a `Loop`, or the ratio of the periods is not a whole number.
+        ControlError: If either is continuous or a `Loop`, or the ratio of the periods is not a whole number.
     """
 
     fast: Controller
@@ -59,11 +59,11 @@ class Multirate(Controller):
         object.__setattr__(self, "ratio", whole)
         object.__setattr__(self, "period_s", self.fast.period_s)
         super().__post_init__()
-        self._of_both  # noqa: B018  # while the two have numbers: a trace puts symbols in their place
+        self._of_both  # noqa: B018  # cached while both have numeric values: a trace replaces them by symbols
 
     @cached_property
     def n(self) -> int:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Number of joints it drives."""
+        """Number of driven joints."""
         return self.fast.n
 
     @property
@@ -111,13 +111,13 @@ class Multirate(Controller):
         )  # fmt: skip
 
     def _slow(self, t: float, q: Array, v: Array, z: Array, slow: Array) -> Array:
-        """The torque of the slow part, computed at its ticks."""
+        """Torque of the slow part, updated only at its ticks."""
         if not self.period_s or z[self._of_both] < 0.5:
             return self.slow.torque(t, q, v, slow)
         return z[self._of_both + 1 :]
 
     def _split(self, z: Array) -> tuple[Array, Array]:
-        """The states of both parts."""
+        """Split z into the states of the two parts."""
         return z[: self._of_fast], z[self._of_fast : self._of_both]
 
     def at_period(self, period_s: float) -> Multirate:

@@ -1,4 +1,4 @@
-"""The mass matrix in O(n · depth): the composite-rigid-body algorithm, in body coordinates and any arithmetic.
+"""The mass matrix in O(n · depth): the composite-rigid-body algorithm in body coordinates, for any arithmetic.
 
     𝓜ᶜ_i = 𝓜_i + Σ Ad⁻ᵀ 𝓜ᶜ_child Ad⁻¹,   M_ij = ξ_jᵀ (Ad⁻ᵀ … 𝓜ᶜ_i ξ_i) for j before i
 
@@ -18,7 +18,7 @@ def composite_body(linkage: Linkage, q: Array) -> Array:
 
     Args:
         linkage: The bodies; joints may be coupled.
-        q: Positions, (n,), numbers of the linkage's arithmetic.
+        q: Positions, (n,), in the arithmetic of the linkage.
     """
     X, inertia = linkage.steps(q), list(linkage.inertias)
     N = len(linkage.bodies)

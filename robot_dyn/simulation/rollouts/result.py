@@ -28,36 +28,36 @@ _SHARED = ("joint_names", "t", "statistics", "sources", "about", "setup", "uncut
 @final
 @dataclass(frozen=True, eq=False)
 class Rollouts(Value):
-    """B runs, m samples of each. Samples after the end of a run are nan. What was not recorded is None.
+    """B runs with m samples each. Samples after the end of a run are nan; quantities not recorded are None.
 
-    `runs[i]` is the `Trajectory` of a run, `runs[i:j]` some of the runs, numbered from 0; both copy no samples. The
-    state at an event that ends a run is not among its samples, which are at the same times in all runs.
+    `runs[i]` is the `Trajectory` of one run and `runs[i:j]` a subset, numbered from 0; neither copies samples. All
+    runs are sampled at the same times, so the state at an event that ends a run is not among the samples.
 
     Attributes:
-        joint_names: Of the n joints.
-        t: In [s], (m,).
-        q, v: In [rad] and [rad/s], or [m] and [m/s], (B, m, n).
+        joint_names: Names of the n joints.
+        t: Sample times, in [s], (m,).
+        q, v: Positions and velocities, in [rad] and [rad/s], or [m] and [m/s], (B, m, n).
         u: Actuation within its bounds, (B, m, n), in [N m] or [N].
         kinetic, potential: Energies, (B, m), in [J].
-        work: Done up to each sample by the control and by each other effect, by name, (B, m), in [J].
-        ended: When each run ended, (B,), in [s].
-        diverged: Whether it diverged then, (B,).
-        stopped: Whether it was interrupted, (B,).
-        advice: Why a run diverged and what to do, or which event ended it, as of `simulate`; empty for the others.
-        steps: Of each run, (B,).
-        evaluations: Of the equation of motion, by the 64 runs that each was side by side with, (B,).
-        statistics: Of the longest run; its time is that of all runs.
-        sources: Names of what does work: the control and the effects without a potential.
-        about: Texts, as of a `Trajectory`; of all runs, without `params`.
+        work: Work done up to each sample by the control and by each other effect, by name, (B, m), in [J].
+        ended: Time at which each run ended, (B,), in [s].
+        diverged: Whether each run ended by diverging, (B,).
+        stopped: Whether each run was interrupted, (B,).
+        advice: Why a run diverged and what to do, or which event ended it, as in `simulate`; empty otherwise.
+        steps: Number of steps of each run, (B,).
+        evaluations: Evaluations of the equation of motion by the group of 64 runs that includes each run, (B,).
+        statistics: Statistics of the longest run; the time is that of all runs.
+        sources: Names of the sources of work: the control and the effects without a potential.
+        about: Texts common to all runs, as in `Trajectory`, without `params`.
         params: Values that differ from run to run, by name, (B, n).
-        setup: Of all runs; None for runs that were read from a file.
+        setup: Setup shared by all runs; None for runs read from a file.
         uncut: Names of the thresholds at which steps do not end, with `cuts=False`.
-        q0, v0: Starts, (B, n).
-        observed: Extremes, limits passed and chatter of each run, over all steps but for u of continuous control, see
-            `remarks`; None in files of older versions.
-        saved: Of runs that were read from a file; None for others.
-        numbers: Of a slice, the number of each run in the batch that was run, of which its noise is, (B,); None for
-            all runs of a batch, and for runs that were read from a file.
+        q0, v0: Initial positions and velocities, (B, n).
+        observed: Extremes, limits passed and chatter of each run, over all steps except for u of continuous control
+            (see `remarks`); None in files of older versions.
+        saved: Overview stored with runs read from a file; None otherwise.
+        numbers: For a slice, the number of each run in the original batch, which determines its noise, (B,); None
+            for a full batch, and for runs read from a file.
     """
 
     joint_names: tuple[str, ...]
@@ -101,17 +101,17 @@ class Rollouts(Value):
     def __getitem__(self, run: slice) -> Rollouts: ...
 
     def __getitem__(self, run: int | slice) -> Trajectory | Rollouts:
-        """The trajectory of a run, counted from the end if negative; or the runs of a slice.
+        """Return the trajectory of a run, counted from the end if negative; or the runs in a slice.
 
-        Positions and velocities are those recorded. The rest is recorded, or follows from them and the setup: the
-        acceleration, the powers and energies, and the torque of a continuous controller without an integral. What
-        neither determines is nan: work that was not recorded; the torque of other controllers; and all but what was
-        recorded of runs that were read from a file. It has no error estimate, and of the remarks of `simulate`
-        those on limits, stops, chatter and the reference.
+        Positions and velocities are those recorded. Other quantities are either recorded or computed from them and
+        the setup: the acceleration, the powers and energies, and the torque of a continuous controller without an
+        integral. Quantities available from neither are nan: work that was not recorded, the torque of other
+        controllers and, for runs read from a file, everything that was not recorded. The trajectory has no error
+        estimate, and only the remarks of `simulate` on limits, stops, chatter and the reference.
 
         Raises:
-            QueryError: If q or v was not recorded, a slice has no runs, or `run` is neither a whole number nor a slice.
-            IndexError: If there is no run of that number.
+            QueryError: If q or v was not recorded, a slice is empty, or `run` is neither an integer nor a slice.
+            IndexError: If no run has that number.
         """
         from robot_dyn.simulation.rollouts.run import trajectory
 
@@ -133,7 +133,7 @@ class Rollouts(Value):
         return trajectory(self, number)
 
     def outcome(self, run: int) -> Outcome:
-        """How a run ended; raises QueryError if there is no run of that number."""
+        """Return how a run ended; raises QueryError if no run has that number."""
         run = integer("run", run, least=-len(self), most=len(self) - 1)
         ended = float(self.ended[run])
         if self.stopped[run]:
@@ -143,10 +143,10 @@ class Rollouts(Value):
         return Outcome(Ending.DIVERGED, ended, self.advice[run])
 
     def setup_of(self, run: int) -> Setup:
-        """The setup of a run by itself: `rd.simulate(runs.setup_of(17))` repeats it, and estimates its error.
+        """Return the setup of a single run: `rd.simulate(runs.setup_of(17))` repeats the run with an error estimate.
 
         Raises:
-            QueryError: If there is no run of that number, or the runs were read from a file.
+            QueryError: If no run has that number, or the runs were read from a file.
         """
         from robot_dyn.simulation.rollouts.run import setup_of
 
@@ -163,24 +163,24 @@ class Rollouts(Value):
     def remarks(self) -> tuple[Remark, ...]:
         """The remarks of `simulate` on each run: limits, stops, chatter and the reference, by kind, joint and quantity.
 
-        `Remark.runs` are the numbers of the runs that it is about: first the worst, whose values and text it has, then
-        the others in their order. A sampled loop is linearised in one run alone, `worst`. Under continuous control in
-        lock step a limit of u that is passed between the instants of `Observed.instants` may be missed, and chatter is
-        not looked for.
+        `Remark.runs` lists the affected runs: first the worst, which supplies the values and text of the remark, then
+        the others in order. A sampled loop is linearised only for the run `worst`. Under continuous control in lock
+        step, a violation of a limit of u between the instants counted by `Observed.instants` may be missed, and
+        chatter is not detected.
         """
         return self.overview.remarks
 
     @property
     def tracking_error(self) -> np.ndarray | None:
-        """Of each run, as of a `Trajectory`, (B,); None without a reference, or if q was not recorded."""
+        """Tracking error of each run, as in `Trajectory`, (B,); None without a reference, or if q was not recorded."""
         return self.overview.tracking_error
 
     @property
     def worst(self) -> int:
-        """The run to look at first.
+        """Number of the run to look at first.
 
-        The first to diverge; else that with the largest chatter; that farthest beyond a limit of the file, as a part of
-        it; that with the largest tracking error; or 0.
+        In order of priority: the first run to diverge; the run with the largest chatter; the run that exceeds a limit
+        in the file by the largest fraction; the run with the largest tracking error; or 0.
         """
         return self.overview.worst
 
@@ -194,7 +194,7 @@ class Rollouts(Value):
 
     @property
     def summary(self) -> str:
-        """How many runs, how many ended before their time and why; remarks; tracking error; which run to look at."""
+        """Number of runs, how many ended early and why, remarks, tracking error, and the run to look at first."""
         count = "1 run" if len(self) == 1 else f"{len(self)} runs"
         lines = [f"{count} of {len(self.t)} samples to t = {self.t[-1]:g} s; {self._early()}"]
         if self.uncut:
@@ -216,7 +216,7 @@ class Rollouts(Value):
         return "\n".join(escaped(line) for line in lines)
 
     def _early(self) -> str:
-        """How many runs ended before their time, and why."""
+        """How many runs ended early, and why."""
         at = f" by an interrupt, the first at t = {self.ended[self.stopped].min():g} s" if self.stopped.any() else ""
         by_event = int((np.array([text != "" for text in self.advice]) & ~self.diverged).sum())
         early = f"{int(self.diverged.sum())} diverged, {int(self.stopped.sum())} stopped{at}"
@@ -227,7 +227,7 @@ class Rollouts(Value):
 
 
 def _taken(values: Any, runs: slice) -> Any:
-    """The same of some of the runs."""
+    """Select the values that belong to a slice of the runs."""
     if isinstance(values, dict):
         return {name: x[runs] for name, x in values.items()}
     return None if values is None else values[runs]

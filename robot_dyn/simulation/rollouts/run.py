@@ -1,6 +1,6 @@
-"""One run of a batch as a trajectory: what was recorded, and what follows from it and the setup.
+"""One run of a batch as a trajectory: the recorded quantities, and those computed from them and the setup.
 
-a = M⁻¹ (u + Σ τ − C v − N),   P_k = τ_kᵀ v;   nan where neither record nor setup tells
+a = M⁻¹ (u + Σ τ − C v − N),   P_k = τ_kᵀ v;   nan where neither the record nor the setup determines a value
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 
 
 def trajectory(runs: Rollouts, run: int) -> Trajectory:
-    """The trajectory of a run; see `Rollouts`.
+    """Return the trajectory of a run; see `Rollouts`.
 
     Raises:
-        QueryError: If its positions or velocities were not recorded.
+        QueryError: If positions or velocities were not recorded.
     """
     if runs.q is None or runs.v is None:
         raise QueryError("a run of rollouts is a trajectory if q and v were recorded: add them to record")
@@ -62,7 +62,7 @@ def trajectory(runs: Rollouts, run: int) -> Trajectory:
 
 
 def setup_of(runs: Rollouts, setup: Setup, run: int) -> Setup:
-    """As of `Rollouts`: the setup of a batch with the start, parameters and noise of a run."""
+    """Return the setup of a single run: that of the batch, with the start, parameters and noise of the run."""
     number = run if runs.numbers is None else int(runs.numbers[run])
     plant, controller = parts_of_run(setup, {name: x[run] for name, x in runs.params.items()}, number)
     q0 = setup.q0 if runs.q0 is None else runs.q0[run]
@@ -73,13 +73,13 @@ def setup_of(runs: Rollouts, setup: Setup, run: int) -> Setup:
 def _follows(
     setup: Setup, t: np.ndarray, q: np.ndarray, v: np.ndarray, u: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Acceleration, torque, powers and energies at the samples."""
+    """Compute acceleration, torque, powers and energies at the samples."""
     equation = StateEquation(setup.plant, setup.controller)
     if equation.equation_of_motion.state_size:  # torques depend on states that are not recorded
         nothing, energies = np.full_like(q, np.nan), np.column_stack(equation.energies(0.0, q, v))
         return nothing, nothing if u is None else u, np.full((len(t), len(equation.sources)), np.nan), energies
     if u is None and (equation.sampled or equation.states):
-        u = np.full_like(q, np.nan)  # it depends on what was before
+        u = np.full_like(q, np.nan)  # it depends on earlier states
     derived = np.full((len(t), equation.size + q.shape[1] + 2), np.nan)
     rest = np.zeros((len(t), equation.size - 2 * q.shape[1]))
     y = np.hstack([q, v, rest])

@@ -1,4 +1,4 @@
-"""Build a run: its equations as functions, interpreted or machine code, in one of the two time loops.
+"""Build a run: its equations as interpreted or compiled functions, driven by one of the two time loops.
 
 run = prepared(setup, equation, machine);   record = run.record()
 """
@@ -40,19 +40,19 @@ def make_run(
     thresholds: bool = True,
     chooses: bool = False,
 ) -> EventRun | FixedStep:
-    """The run of a setup, or of a companion.
+    """Return the run of a setup, or a companion run for the error estimate.
 
     Args:
-        setup: What to run.
-        equation: Its state equation.
-        compiled_equation: That equation as machine code; None for the interpreted engine.
-        pace: Length of steps, in steps of the setup; or times at which steps end, in [s].
+        setup: The setup to run.
+        equation: State equation of the setup.
+        compiled_equation: The same equation as machine code; None for the interpreted engine.
+        pace: Step length, as a multiple of the step of the setup; or the times at which steps end, in [s].
         on_progress: Called with the time reached.
-        observer: Sees each step.
+        observer: Called at each step.
         samples: Whether samples are kept.
-        most: Evaluations after which it gives up as `TooLong`.
+        most: Number of evaluations after which the run stops with `TooLong`.
         thresholds: Whether steps end at the thresholds of the effects.
-        chooses: Whether it gives up as `Stiff` or `Accumulation` where another method is to make the run.
+        chooses: Whether the run stops with `Stiff` or `Accumulation` where another method should be used instead.
     """
     payloads = PayloadEvents(equation)
     watch = Watch(setup, payloads.equation)
@@ -89,7 +89,7 @@ def make_run(
 
 
 def _numbers(compiled_equation: CompiledStateEquation, equation: StateEquation) -> np.ndarray:
-    """The parameters of machine code for an equation of other numbers, which keeps those of the latest machine."""
+    """Parameters of the compiled code for an equation with other values, cached for the latest compiled equation."""
     latest = equation.cache.get(_numbers)
     if latest is None or latest[0] is not compiled_equation:
         latest = equation.cache[_numbers] = compiled_equation, compiled_equation.parameters_of(equation)

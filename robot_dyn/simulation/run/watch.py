@@ -1,4 +1,4 @@
-"""The watch over a run: what ends it before its time, and the words for it."""
+"""Monitor a run: detect divergence and stalled steps, and compose the advice for the user."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from robot_dyn.simulation.events.payload_events import PayloadEvents
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.values import cached
 
-LARGEST = 1e100  # of Σ |y|: beyond it products overflow
-_PACED = 2000  # steps between looks at the pace of an adaptive method
-_MOST_AHEAD = 1e7  # steps that such a run may have before it at the pace it has: about an hour
-_STEEP = 1e-3  # of q or v: an effect that bends within less makes a system stiff
+LARGEST = 1e100  # limit on Σ |y|; products of larger numbers overflow
+_PACED = 2000  # steps between checks of the pace of an adaptive method
+_MOST_AHEAD = 1e7  # steps that may remain at the current pace: about an hour
+_STEEP = 1e-3  # in q or v: an effect that bends over a smaller range makes the system stiff
 
 T = TypeVar("T")
 
 
 class DivergedError(Exception):
-    """Internal: the run cannot go on from `t`; the message is advice."""
+    """Internal: the run cannot continue past `t`; the message is advice to the user."""
 
     def __init__(self, t: float, advice: str) -> None:
         super().__init__(advice)
@@ -33,7 +33,7 @@ class DivergedError(Exception):
 
 
 def one_step(method: Integrator, system: System, t: float, y: Array, h: float, watch: Watch) -> Array:
-    """The state after a step; DivergedError if there is none, or a number overflowed."""
+    """Return the state after a step; raises DivergedError if the step fails or a number overflows."""
     after = watch.answer(t, y, lambda: method.step(system, t, y, h))
     if overflowed(after):
         raise watch.diverged(t, y, "a number overflowed")
@@ -41,7 +41,7 @@ def one_step(method: Integrator, system: System, t: float, y: Array, h: float, w
 
 
 def overflowed(y: Array) -> bool:
-    """Whether Σ |y| has reached LARGEST, or is nan, as the time loop judges runs in lock step."""
+    """Whether Σ |y| has reached LARGEST or is nan; the time loop applies the same test to runs in lock step."""
     with np.errstate(over="ignore"):
         return not np.abs(y).sum() < LARGEST
 
@@ -55,31 +55,31 @@ def _start(setup: Setup) -> tuple[float, float]:
 
 @final
 class Watch:
-    """Tells when energy grows without a source: the ledger's residual exceeds all there was and came a thousandfold."""
+    """Detects energy growth without a source: the ledger's residual exceeds 1000 times the initial energy plus work."""
 
     def __init__(self, setup: Setup, equation: StateEquation) -> None:
         self.setup, self.equation = setup, equation
         K, V = cached(setup, _start)
         self.energy, self.scale = K + V, 1.0 + abs(K) + abs(V)
-        self.paced, self.looked = 0.0, 0  # time and steps at the last look at the pace
+        self.paced, self.looked = 0.0, 0  # time and steps at the last check of the pace
 
     def tick(self, t: float, y: Array) -> tuple[Array, Array | None]:
-        """A tick of the controller; DivergedError if it fails, or asks for no finite torque."""
+        """Run one controller tick; raises DivergedError if the tick fails or the torque is not finite."""
         y, held = self.answer(t, y, lambda: self.equation.tick(t, y))
         if held is not None and not np.isfinite(held).all():
             raise self.diverged(t, y, "the controller asks for a torque that is not finite")
         return y, held
 
     def look(self, t: float, y: Array) -> None:
-        """DivergedError if energy grows without a source."""
+        """Raise DivergedError if energy grows without a source."""
         if self.answer(t, y, lambda: self.gains(t, y)):
             raise self.diverged(t, y, "energy grows without a source")
 
     def answer(self, t: float, y: Array, ask: Callable[[], T]) -> T:
-        """What the equations answer; DivergedError if they have no answer."""
+        """Return the result of `ask`; raises DivergedError if the equations cannot be evaluated."""
         try:
             return ask()
-        except IntegrationError as error:  # it names its own remedy
+        except IntegrationError as error:  # the message already suggests a remedy
             raise DivergedError(t, str(error) + self._steepest()) from None
         except RobotDynError as error:
             if is_mistake(error):
@@ -87,7 +87,7 @@ class Watch:
             raise self.diverged(t, y, str(error)) from None
 
     def pace(self, t: float, y: Array, steps: int) -> None:
-        """DivergedError if the steps of an adaptive method have become so short that the run would not end."""
+        """Raise DivergedError if the steps of an adaptive method are too short for the run to finish."""
         since = steps - self.looked
         if since < _PACED:
             return
@@ -102,7 +102,7 @@ class Watch:
             )  # fmt: skip
 
     def _fastest(self, t: float, y: Array, h: float) -> str:
-        """Words for the fastest motion, if it is found at this state and such that steps h are those of stability."""
+        """Describe the fastest motion, if it is found at this state and fast enough for stability to limit h."""
         held = np.zeros(self.equation.plant.dynamics.n) if self.equation.sampled else None
         try:
             motion = fastest(self.equation, t, y, held)
@@ -111,7 +111,7 @@ class Watch:
         return f"{motion}: " if abs(motion.eigenvalue) * h > 1 else ""
 
     def _steepest(self) -> str:
-        """Words for the effect that bends within the least change of q or v, if that is small."""
+        """Describe the effect that bends over the smallest range of q or v, if that range is small."""
         names, found = self.equation.plant.dynamics.joint_names, (_STEEP, "")
         for effect in self.equation.plant.effects:
             for width, unit in zip(effect.widths, ("rad or m", "rad/s or m/s"), strict=True):
@@ -123,18 +123,18 @@ class Watch:
         return found[1] and f" ({found[1]})"
 
     def gains(self, t: float, y: Array) -> bool:
-        """Whether the ledger's residual says so."""
+        """Whether the ledger's residual shows energy growth without a source."""
         q, v, _, W = self.equation.state(y)
         K, V = self.equation.energies(np.array([t]), q[None], v[None])
         return bool((K + V)[0] - self.energy - W.sum() > 1e3 * (self.scale + np.abs(W).sum()))
 
     def diverged(self, t: float, y: Array, why: str) -> DivergedError:
-        """The end of a run at time t and state y, with the fastest joint and the remedy."""
+        """Return the error for a run that diverged at time t and state y; it names the fastest joint and a remedy."""
         return DivergedError(t, diverged_advice(why, self.equation.fastest_joint(y), self.setup))
 
 
 def diverged_advice(why: str, joint: str, setup: Setup) -> str:
-    """Why a run diverged, which joint moved fastest then, and what to do, as long as its loop does not explain it."""
+    """Describe why a run diverged, which joint moved fastest, and what to do, unless the loop explains it."""
     advice = f"take a smaller step than {setup.taken_step_s:g} s, or an implicit method"
     if setup.controller is not None and setup.controller.period_s:
         advice += f"; or, if the sampled loop is unstable, a shorter period than {setup.controller.period_s:g} s"

@@ -1,7 +1,7 @@
-"""The motion that a theorem is about, M(q) a + C(q, v) v + N(q) = Σ τ_effect + u(t, q, v), all of it analytic.
+"""The motion that a theorem describes, M(q) a + C(q, v) v + N(q) = Σ τ_effect + u(t, q, v), with analytic terms only.
 
-What switches has no Taylor series across the switch, and what is written elsewhere may do what cannot be seen: both are
-refused by name. Coefficients and gains are the floats that a part holds, and nothing is computed with them in floats.
+A part that switches has no Taylor series across the switch, and user-defined code cannot be inspected: both are
+refused by name. Coefficients and gains are the exact values of the stored floats, with no floating-point arithmetic.
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ _CONTROLLERS = (PD, ComputedTorque, PDGravity, FeedForward)
 @final
 @dataclass(frozen=True)
 class Motion:
-    """A plant and its controller, if each part is analytic.
+    """A plant and its controller, all of whose parts are analytic.
 
     Attributes:
-        robot: With the payloads that it carries all the time.
-        effects: Torques besides gravity.
-        controller: A continuous one, or None.
+        robot: The robot, with the payloads that it carries throughout.
+        effects: Effects other than gravity and payloads.
+        controller: A continuous controller, or None.
     """
 
     robot: Robot
@@ -53,18 +53,18 @@ class Motion:
 
     @property
     def knots(self) -> tuple[float, ...]:
-        """Times in [s] at which a reference passes to another polynomial."""
+        """Times in [s] at which a reference changes from one polynomial to the next."""
         return self.controller.knots if self.controller is not None else ()
 
     def torque(self, model: Bodies, t: Array, q: Array, v: Array, piece: float) -> Array:
-        """Σ τ_effect + u in numbers of a trace, (n,).
+        """Σ τ_effect + u in the arithmetic of a trace, (n,).
 
         Args:
             model: The bodies.
             t: Time, (1,).
             q: Position, (n,).
             v: Velocity, (n,).
-            piece: A time in [s] on the piece of the reference that counts.
+            piece: A time in [s] within the piece of the reference to use.
         """
         total = model.arithmetic.array(np.zeros(len(q)))
         for effect in self.effects:
@@ -82,11 +82,11 @@ class Motion:
 
 @final
 class Bodies:
-    """The rigid bodies of a robot in gravity, by recursion, in numbers of a trace.
+    """The rigid bodies of a robot under gravity, evaluated recursively in the arithmetic of a trace.
 
     Args:
-        robot: Its file and edits.
-        arithmetic: Of the trace, in whose scope all of this is called.
+        robot: The robot, which provides the file and edits.
+        arithmetic: Arithmetic of the trace; methods must be called within its scope.
     """
 
     def __init__(self, robot: Robot, arithmetic: Literals) -> None:
@@ -94,7 +94,7 @@ class Bodies:
 
     @cached_property
     def linkage(self) -> Linkage:
-        """Other frames and fewer numbers, the same M, C and N."""
+        """An equivalent linkage with other frames and fewer parameters, but the same M, C and N."""
         known = tree(self.robot.description, self.robot.edits)
         return regrouped(slid(linkage(known, self.robot.joint_names, self.arithmetic)))
 
@@ -110,7 +110,7 @@ class Bodies:
 
 @final
 class _Piece:
-    """One polynomial of a reference, of the exact floats that it holds."""
+    """One polynomial of a reference, with the stored floats as exact coefficients."""
 
     def __init__(self, reference: Any, t: float) -> None:
         breaks, table = reference.breaks, reference.coefficients
@@ -120,7 +120,7 @@ class _Piece:
             self._rests = float(breaks[0] if t < breaks[0] else breaks[-1])
 
     def at(self, t: Array) -> tuple[Array, Array, Array]:
-        """Position, velocity and acceleration at t (1,); at rest outside of the breaks."""
+        """Position, velocity and acceleration at t (1,); at rest outside the breaks."""
         if self._rests is None:
             return polynomial(self._coefficients, t - self._start)
         q, _, _ = polynomial(self._coefficients, 0 * t + self._rests - self._start)
@@ -128,10 +128,10 @@ class _Piece:
 
 
 def motion(setup: Setup, until_s: float) -> Motion:
-    """The motion of a setup up to a time.
+    """Return the motion of a setup up to a time.
 
     Raises:
-        ProofError: If a part of it is not analytic, or is not known to be; names it.
+        ProofError: If a part is not analytic, or not known to be; the message names the part.
     """
     plant, controller = setup.plant, setup.controller
     for effect in plant.effects:

@@ -1,4 +1,4 @@
-"""Work within a time: each piece has a name, and pieces that were not done, or not to their end, are listed by name."""
+"""Work within a time limit: each piece has a name, and the pieces that were skipped or not finished are listed."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ _REASONS = {
 
 @final
 class Work:
-    """Pieces of work, one after the other.
+    """Pieces of work, run one after another.
 
     Args:
-        budget: Of all of them; the name of each piece is reported to it when the piece begins.
-        longest_s: Time that one piece may take, in [s].
+        budget: Time budget for all pieces; the name of each piece is reported to it when the piece starts.
+        longest_s: Time limit for one piece, in [s].
 
     Attributes:
-        out_of_time: Names of the pieces that were not begun, or were ended, for lack of time.
-        left_out: Names of those that have no answer, and why.
+        out_of_time: Names of the pieces that were skipped or cut short for lack of time.
+        left_out: Names of the pieces that failed, with the reason.
     """
 
     def __init__(self, budget: Budget | None = None, longest_s: float = np.inf) -> None:
@@ -36,12 +36,12 @@ class Work:
         self.left_out: list[str] = []
 
     def do(self, name: str, piece: Callable[[Budget], T], needed_for: tuple[str, ...] = ()) -> T | None:
-        """What a piece gives, called with its budget; None if it was not done, or not to its end.
+        """Call a piece with its budget and return the result; None if it was skipped or did not finish.
 
         Args:
-            name: Of the piece.
-            piece: The work.
-            needed_for: Names of the pieces that cannot be done without it.
+            name: Name of the piece.
+            piece: The function to call.
+            needed_for: Names of the pieces that depend on this one.
         """
         if self.over:
             self.skip(name, *needed_for)
@@ -65,5 +65,5 @@ class Work:
         return self._budget.left <= 0
 
     def skip(self, *names: str) -> None:
-        """Name pieces that are not done for lack of time."""
+        """Record pieces that are skipped for lack of time."""
         self.out_of_time += names

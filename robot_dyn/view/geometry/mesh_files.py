@@ -1,4 +1,4 @@
-"""Bounded reading of mesh files: what they may open, and checks of their text before a library parses it."""
+"""Bounded reading of mesh files: which files they may open, and checks of their content before a library parses it."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 from robot_dyn.errors import RobotDynError, shorten
 
-MAX_BYTES = 64 * 2**20  # of one mesh or texture; the largest of example-robot-data has 28 MiB
-MAX_NODES = 20_000  # of a scene when every instance is counted
+MAX_BYTES = 64 * 2**20  # of one mesh or texture; the largest in example-robot-data is 28 MiB
+MAX_NODES = 20_000  # of a scene, counting every instance
 _SHAPING = {
     "EXT_mesh_gpu_instancing": "instances by EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression": "buffers compressed by EXT_meshopt_compression",
     "KHR_meshopt_compression": "buffers compressed by KHR_meshopt_compression",
 }
-_FAN = 6  # mode of a primitive of glTF
+_FAN = 6  # glTF primitive mode: triangle fan
 _UNSEEN = ("library_lights", "library_cameras", "library_animations", "instance_light", "instance_camera")
 
 
 class MeshError(RobotDynError):
-    """A shape or texture that cannot be drawn; the message says why, and follows the name of its file or link."""
+    """A shape or texture cannot be drawn; the message gives the reason, to follow the name of the file or link."""
 
 
 def bounded(path: Path) -> bytes:
-    """The bytes of a regular file of at most `MAX_BYTES`; raises MeshError for any other."""
+    """Return the bytes of a regular file of at most `MAX_BYTES`; raises MeshError for any other file."""
     try:
         status = path.stat()
         if not S_ISREG(status.st_mode):
@@ -43,7 +43,7 @@ def bounded(path: Path) -> bytes:
 
 
 def beside(folder: Path, missing: list[str], anywhere: bool) -> Any:
-    """Return a resolver of files that a mesh names: regular ones, `MAX_BYTES` in all; the others are noted."""
+    """Return a resolver for files named by a mesh: regular files, `MAX_BYTES` in total; others go to `missing`."""
     from trimesh.resolvers import FilePathResolver
 
     class Beside(FilePathResolver):
@@ -61,7 +61,7 @@ def beside(folder: Path, missing: list[str], anywhere: bool) -> Any:
         nonlocal left
         path = Path(name.strip().removeprefix("file://").replace("\\", "/"))
         if not anywhere:
-            path = Path(unquote(name))  # an address of glTF
+            path = Path(unquote(name))  # a glTF URI
             if path.is_absolute() or ".." in path.parts or "://" in name:
                 raise MeshError("is not beside the mesh, nor below it; put it there")
         data = bounded(folder / path)
@@ -74,7 +74,7 @@ def beside(folder: Path, missing: list[str], anywhere: bool) -> Any:
 
 
 def checked_collada(data: bytes) -> etree._Element:
-    """Return the document if it has no DTD, and a bounded number of nodes with all instances counted."""
+    """Return the document if it has no DTD and a bounded number of nodes, counting all instances."""
     first, prolog = None, etree.XMLPullParser(events=("start",), resolve_entities=False, no_network=True)
     for start in range(0, len(data), 2**12):
         prolog.feed(data[start : start + 2**12])
@@ -82,10 +82,10 @@ def checked_collada(data: bytes) -> etree._Element:
             break
     if first and first[1].getroottree().docinfo.internalDTD is not None:
         raise MeshError("declares a document type (<!DOCTYPE …>), through which it can read other files; remove it")
-    # geometry exceeds the limits on texts; they are lifted where no entity can be declared any more
+    # geometry exceeds the parser's limits on text; lifting them is safe once no entity can be declared
     safe = {"resolve_entities": False, "no_network": True, "remove_comments": True, "remove_pis": True}
     root = etree.fromstring(data, etree.XMLParser(**safe, huge_tree=True))
-    for tag in _UNSEEN:  # pycollada refuses the scene for a light that is not defined
+    for tag in _UNSEEN:  # pycollada rejects a scene with an undefined light
         for element in root.findall(f".//{{*}}{tag}"):
             element.getparent().remove(element)
     named = {f"#{node.get('id')}": node for node in root.iterfind(".//{*}node[@id]")}
@@ -106,9 +106,9 @@ def checked_collada(data: bytes) -> etree._Element:
 
 
 def check_gltf(data: bytes, named: Any) -> None:
-    """Refuse what trimesh would silently draw wrong, and accessors that claim more numbers than the file holds.
+    """Reject files that trimesh would silently draw wrong, and accessors that claim more numbers than the file holds.
 
-    For the latter trimesh would allocate arrays of zeros.
+    For such accessors, trimesh would allocate arrays of zeros.
     """
     binary = data[:4] == b"glTF"
     head = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")] if binary else data)
@@ -123,7 +123,7 @@ def check_gltf(data: bytes, named: Any) -> None:
 
 
 def _unread(head: Any) -> Iterator[str]:
-    """What shapes the triangles of a glTF file and is ignored by trimesh."""
+    """Yield the features of a glTF file that affect its triangles but are ignored by trimesh."""
     yield from (what for name, what in _SHAPING.items() if name in head.get("extensionsUsed", ()))
     accessors, meshes, nodes = (head.get(key, ()) for key in ("accessors", "meshes", "nodes"))
     if any("sparse" in each for each in accessors):
