@@ -36,12 +36,14 @@ def main() -> None:
 def _run() -> Any:
     """The exit code of the command."""
     import warnings
+    from importlib import import_module
 
     from robot_dyn.cli.app import app
-    from robot_dyn.cli.commands import cache, check, cost, demo, prove, query, show, simulate, stress  # noqa: F401
     from robot_dyn.cli.terminal import failed, finish, open_streams, to_stderr
     from robot_dyn.errors import RobotDynError, RobotDynWarning
 
+    for topic in ("query", "simulate", "show", "check", "cost", "prove", "stress", "demo", "cache"):  # as in --help
+        import_module(f"robot_dyn.cli.commands.{topic}")
     open_streams()
     with warnings.catch_warnings():
         warnings.simplefilter("always", RobotDynWarning)
