@@ -1,9 +1,9 @@
-"""Declared coefficients: the numbers of an effect, a controller or a reference, each with unit, sign and meaning.
+"""Declared coefficients: the parameters of an effect, controller or reference, each with unit, sign and meaning.
 
     damping: Any = field(metadata=coefficient("N m s/rad", symbol="b", least=0, stated="damping"))
 
-From the declaration follow its checks, values by joint name and "urdf", its key in scenes, its name in sweeps, and
-that machine code takes it as an input.
+The declaration determines how a coefficient is checked, whether it may be given by joint name or as "urdf", its key in
+scenes and its name in sweeps, and makes it an input of machine code.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import numpy as np
 from robot_dyn.errors import EffectError, RobotDynError, nearest, shown
 from robot_dyn.validate import instance, number, numbers, truth
 
-URDF = "urdf"  # in place of a coefficient: what the robot's file states
+URDF = "urdf"  # in place of a coefficient: the value in the robot's file
 _KEY = "robot_dyn.coefficients"
 JOINTS = ((), ("n",))  # one number for all joints, or one for each
 
@@ -28,16 +28,16 @@ JOINTS = ((), ("n",))  # one number for all joints, or one for each
 @final
 @dataclass(frozen=True)
 class Coefficient:
-    """What is declared of a coefficient.
+    """The declaration of a coefficient.
 
     Attributes:
-        unit: For a revolute joint, such as "N m s/rad"; "" for a number without.
-        symbol: As in the equation, such as "b".
-        shapes: Shapes it may have; a text stands for any length.
-        least, above: What it must not be less than, and must be greater than; None for any.
-        infinite: Whether ±inf is taken.
-        elsewhere: Its value for joints that are not named.
-        stated: The attribute of a `Robot` that "urdf" stands for; "" if files state none.
+        unit: Unit for a revolute joint, such as "N m s/rad"; "" if dimensionless.
+        symbol: Symbol in the equation, such as "b".
+        shapes: Allowed shapes; a string stands for any length.
+        least, above: Inclusive and exclusive lower bound; None for no bound.
+        infinite: Whether ±inf is allowed.
+        elsewhere: Value for joints that are not named.
+        stated: The attribute of a `Robot` that "urdf" stands for; "" if files do not state this coefficient.
         swept: Whether it may differ from run to run in `rollouts`.
     """
 
@@ -66,16 +66,16 @@ class Coefficient:
 
     @property
     def of_joints(self) -> bool:
-        """Whether it is one number for all joints, or one for each."""
+        """Whether the coefficient is one number for all joints or one per joint."""
         return self.shapes == JOINTS
 
     def checked(self, name: str, values: Any, *, error: type[RobotDynError], resolved: bool) -> Any:
-        """The numbers, copied and frozen, or a float.
+        """Return the checked numbers, as a frozen copy or as a float.
 
-        Values by joint name and "urdf" stay until the joints are known, where they are `resolved` later, by `on`.
+        If `resolved`, values by joint name and "urdf" are kept as given, for `on` to resolve once the joints are known.
 
         Raises:
-            RobotDynError: If they have another shape, a wrong sign, or are not finite; of the class `error`.
+            RobotDynError: If the numbers have the wrong shape or sign, or are not finite; of the class `error`.
         """
         if resolved and self.of_joints and isinstance(values, Mapping):
             if not values:
@@ -89,10 +89,10 @@ class Coefficient:
         return float(found) if self.shapes == ((),) else found
 
     def on(self, name: str, values: Any, dynamics: Any) -> Any:
-        """The numbers for the joints of an arm: of names and "urdf", an array (n,).
+        """Return the numbers for the joints of an arm; values by joint name or "urdf" become (n,).
 
         Raises:
-            EffectError: If a joint is unknown, no file states it, or they are of another number of joints.
+            EffectError: If a joint is unknown, the file states no value, or the number of joints differs.
         """
         names = dynamics.joint_names
         if isinstance(values, Mapping):
@@ -133,7 +133,7 @@ def coefficient(
     stated: str = "",
     swept: bool = True,
 ) -> Mapping[str, Coefficient]:
-    """The metadata of a dataclass field that is a coefficient; arguments as of `Coefficient`."""
+    """Metadata that declares a dataclass field as a coefficient; for the arguments, see `Coefficient`."""
     return {_KEY: Coefficient(unit, symbol, shapes, least, above, infinite, elsewhere, stated, swept)}
 
 
@@ -145,7 +145,7 @@ def declared(kind: type) -> Mapping[str, Coefficient]:
 
 @cache
 def defaults(kind: type) -> Mapping[str, Any]:
-    """The default of each coefficient of a class that has one."""
+    """The defaults of those coefficients of a class that have one."""
     known = declared(kind)
     return {each.name: each.default for each in _fields(kind) if each.name in known and each.default is not MISSING}
 
@@ -158,20 +158,20 @@ def check_coefficients(part: Any, error: type[RobotDynError], *, resolved: bool 
     """Check and freeze the coefficients of a part under construction; see `Coefficient.checked`."""
     for name, each in declared(type(part)).items():
         if getattr(part, name) is None and defaults(type(part)).get(name, 0) is None:
-            continue  # it may be left out
+            continue  # optional
         object.__setattr__(part, name, each.checked(name, getattr(part, name), error=error, resolved=resolved))
 
 
 def with_values(part: Any, values: Mapping[str, Any]) -> Any:
-    """A copy of a part with other coefficients, such as symbols, which its own checks would refuse.
+    """A copy of a part with other coefficients, unchecked: symbols, for example, would not pass the checks.
 
-    A name may be a path to a part of it, as "controller.kp" or "position.0.resolution".
+    A name may be a path into a nested part, such as "controller.kp" or "position.0.resolution".
     """
     if not values:
         return part
     changed, inside = copy(part), _by_head(values)
     if declared(type(part)).keys() & values.keys():
-        for name in cached_properties(changed):  # it may follow from them
+        for name in cached_properties(changed):  # they may depend on the coefficients
             del vars(changed)[name]
     for name, value in values.items():
         if "." not in name:
@@ -182,13 +182,13 @@ def with_values(part: Any, values: Mapping[str, Any]) -> Any:
 
 
 def cached_properties(part: Any) -> tuple[str, ...]:
-    """Names of its cached properties that were read."""
+    """Names of the cached properties of a part that have been evaluated."""
     known, kind = getattr(part, "__dict__", ()), type(part)
     return tuple(name for name in known if isinstance(getattr_static(kind, name, None), cached_property))
 
 
 def rebuilt(part: Any, values: Mapping[str, Any]) -> Any:
-    """A copy of a part with other coefficients, built so that its checks apply."""
+    """A copy of a part with other coefficients, constructed again and thus checked."""
     inside = {head: _within(getattr(part, head), below, rebuilt) for head, below in _by_head(values).items()}
     return replace(part, **{name: value for name, value in values.items() if "." not in name}, **inside)
 
@@ -201,7 +201,7 @@ def value_at(part: Any, path: str) -> Any:
 
 
 def _by_head(values: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Of values by path, those inside a part: by its attribute, then by the rest of the path."""
+    """Values inside nested parts, grouped by the attribute of the part, then by the rest of the path."""
     parts: dict[str, dict[str, Any]] = {}
     for name, value in values.items():
         head, _, rest = name.partition(".")

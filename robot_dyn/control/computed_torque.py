@@ -1,6 +1,6 @@
-"""Control with a model of the arm: τ = M(q)(a_d + kd ė + kp e) + C(q, v) v + N(q) makes ë + kd ė + kp e = 0.
+"""Model-based control: τ = M(q)(a_d + kd ė + kp e) + C(q, v) v + N(q) gives ë + kd ė + kp e = 0.
 
-The model may differ from the arm: then M, C, N do not cancel, and the difference drives the error.
+If the model differs from the arm, M, C and N do not cancel, and the difference drives the error.
 [Murray, Li, Sastry 1994, sec. 4.5; Siciliano et al. 2009, sec. 8.5]
 """
 
@@ -21,17 +21,17 @@ from robot_dyn.threshold import smooth
 
 @dataclass(frozen=True, eq=False)
 class ModelBased(Stateless):
-    """A controller with a model of the arm and a reference.
+    """A controller that tracks a reference with a model of the arm.
 
     Attributes:
         model: The controller's model of the arm.
-        reference: q_d(t) of the n joints.
-        kp: A scalar or (n,), not negative: in [1/s²] for computed torque, else in [N m/rad] or [N/m].
-        kd: A scalar or (n,), not negative: in [1/s] for computed torque, else in [N m s/rad] or [N s/m].
-        period_s: In [s], 0 for continuous control.
+        reference: Desired positions q_d(t) of the n joints.
+        kp: Position gain, a scalar or (n,), nonnegative: in [1/s²] for computed torque, else in [N m/rad] or [N/m].
+        kd: Velocity gain, a scalar or (n,), nonnegative: in [1/s] for computed torque, else in [N m s/rad] or [N s/m].
+        period_s: Sampling period, in [s]; 0 for continuous control.
 
     Raises:
-        ControlError: If model and reference differ in their joints, or a gain is not allowed.
+        ControlError: If the model and the reference differ in the number of joints, or a gain is invalid.
     """
 
     model: Dynamics
@@ -59,7 +59,7 @@ class ModelBased(Stateless):
 class ComputedTorque(ModelBased):
     """Inverse dynamics in the loop (feedback linearisation): τ = M (a_d + kd ė + kp e) + C v + N.
 
-    With the exact model each joint obeys ë + kd ė + kp e = 0; `gains_from(1.0, frequency, damping_ratio)` gives gains.
+    With an exact model, each joint obeys ë + kd ė + kp e = 0. See `gains_from(1.0, frequency, damping_ratio)`.
 
     Source: Murray, Li, Sastry 1994, sec. 4.5.2; Siciliano et al. 2009, sec. 8.5.2.
     """
@@ -74,7 +74,7 @@ class ComputedTorque(ModelBased):
 
 @final
 class PDGravity(ModelBased):
-    """PD with gravity compensation: τ = kp e + kd ė + N(q); asymptotically stable at rest, for the exact N.
+    """PD with gravity compensation: τ = kp e + kd ė + N(q); asymptotically stable at rest if N is exact.
 
     Source: Siciliano et al. 2009, sec. 8.5.1; Takegaki and Arimoto, 1981.
     """
@@ -86,7 +86,7 @@ class PDGravity(ModelBased):
 
 @final
 class FeedForward(ModelBased):
-    """Inverse dynamics along the reference, and PD: τ = M(q_d) a_d + C(q_d, v_d) v_d + N(q_d) + kp e + kd ė.
+    """Inverse dynamics along the reference plus PD feedback: τ = M(q_d) a_d + C(q_d, v_d) v_d + N(q_d) + kp e + kd ė.
 
     Source: Siciliano et al. 2009, sec. 8.4.
     """

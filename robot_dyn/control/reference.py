@@ -114,8 +114,8 @@ class PiecewisePolynomial(Reference):
 
 
 def polynomial(c: Array, s: Array) -> tuple[Array, Array, Array]:
-    """Value and derivatives of Σⱼ cⱼ sʲ by Horner's rule, of c (..., d + 1, n) and s (..., 1), each (..., n)."""
-    q = c[..., -1, :] + 0 * s  # a fresh array, also where the degree is 0
+    """Value and two derivatives of Σⱼ cⱼ sʲ by Horner's rule, each (..., n), for c (..., d + 1, n) and s (..., 1)."""
+    q = c[..., -1, :] + 0 * s  # a new array even if the degree is 0
     v = a = 0 * q
     for j in reversed(range(c.shape[-2] - 1)):
         a = a * s + v
@@ -125,11 +125,11 @@ def polynomial(c: Array, s: Array) -> tuple[Array, Array, Array]:
 
 
 def hold(q: Any) -> PiecewisePolynomial:
-    """Rest at q, shape (n,), at all times; ControlError for any other array."""
+    """Rest at q, shape (n,), at all times; raises ControlError for any other array."""
     return PiecewisePolynomial([0.0, 1.0], numbers("q", q, ("n",))[None, None])
 
 
-@np.errstate(all="ignore")  # what overflows is refused as not finite
+@np.errstate(all="ignore")  # the check for finite values catches overflow
 def quintic(
     q0: Any,
     q1: Any,
@@ -141,15 +141,15 @@ def quintic(
     a0: Any = 0.0,
     a1: Any = 0.0,
 ) -> PiecewisePolynomial:
-    """The quintic from q0 to q1; between rests the motion of least jerk, q0 + (q1 − q0)(10 s³ − 15 s⁴ + 6 s⁵).
+    """The quintic from q0 to q1; from rest to rest, the minimum-jerk motion q0 + (q1 − q0)(10 s³ − 15 s⁴ + 6 s⁵).
 
-    Between rests its greatest velocity is 15/8 · (q1 − q0)/duration_s, halfway.
+    From rest to rest, the velocity peaks halfway, at 15/8 · (q1 − q0)/duration_s.
 
     Args:
-        q0: Start, shape (n,), in [rad] or [m].
-        q1: End, shape (n,).
-        duration_s: In [s], positive.
-        start_s: Time of the start, in [s].
+        q0: Initial position, shape (n,), in [rad] or [m].
+        q1: Final position, shape (n,).
+        duration_s: Duration, in [s], positive.
+        start_s: Start time, in [s].
         v0: Velocity at the start, a scalar or (n,), in [rad/s] or [m/s].
         v1: Velocity at the end, likewise.
         a0: Acceleration at the start, a scalar or (n,), in [rad/s²] or [m/s²].
@@ -170,24 +170,24 @@ def quintic(
     return PiecewisePolynomial([begin, begin + T], hermite(np.array([T]), ends[None]))
 
 
-@np.errstate(all="ignore")  # what overflows is refused as not finite
+@np.errstate(all="ignore")  # the check for finite values catches overflow
 def via_points(
     times_s: Any, points: Any, *, kind: str = "quintic", v0: Any = 0.0, v1: Any = 0.0
 ) -> PiecewisePolynomial:
-    """The spline through points at given times, from rest to rest unless velocities at its ends are given.
+    """The spline through points at given times, from rest to rest unless end velocities are given.
 
     "quintic" has four continuous derivatives and starts and ends with zero acceleration; "cubic" has two, and its
-    acceleration jumps where it starts and ends.
+    acceleration jumps at both ends.
 
     Args:
-        times_s: Increasing, shape (k + 1,), in [s].
+        times_s: Increasing times, shape (k + 1,), in [s].
         points: Shape (k + 1, n), in [rad] or [m].
         kind: "quintic" or "cubic".
         v0: Velocity at the start, a scalar or (n,), in [rad/s] or [m/s].
         v1: Velocity at the end, likewise.
 
     Raises:
-        ControlError: If times do not increase, shapes do not match, the kind is unknown or points are over 2000.
+        ControlError: If times do not increase, shapes do not match, the kind is unknown, or there are over 2000 points.
 
     Source: de Boor, A Practical Guide to Splines, 2001; Siciliano et al. 2009, sec. 4.2.2.
     """
@@ -198,7 +198,7 @@ def via_points(
     if len(points) > _MOST_POINTS:
         raise ControlError(f"points must be {_MOST_POINTS} at most, got {len(points)}; rd.Samples takes more")
     t = increasing("times_s", times_s, len(points))
-    unit = (t[-1] - t[0]) / (len(t) - 1)  # of time: derivatives of one size keep the solve well conditioned
+    unit = (t[-1] - t[0]) / (len(t) - 1)  # time unit: derivatives of similar size keep the solve well conditioned
     shape = points.shape[1:]
     ends = np.stack([np.broadcast_to(numbers(name, v, (), shape), shape) for name, v in (("v0", v0), ("v1", v1))])
     data = _smooth_derivatives(np.diff(t) / unit, points, m, ends * unit)
@@ -207,11 +207,11 @@ def via_points(
 
 
 def hermite(h: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """Coefficients of the polynomials of degree 2m − 1 on [0, h] with m values and derivatives given at each end.
+    """Coefficients of the polynomials of degree 2m − 1 on [0, h] with value and m − 1 derivatives given at each end.
 
     Args:
         h: Lengths of the pieces, shape (k,), in [s].
-        ends: q, q̇, … at the left end, then at the right one, shape (k, 2m, n).
+        ends: q, q̇, … at the left end, then at the right end, shape (k, 2m, n).
 
     Returns:
         Shape (k, 2m, n).
@@ -225,9 +225,9 @@ def hermite(h: np.ndarray, ends: np.ndarray) -> np.ndarray:
 
 
 def _smooth_derivatives(h: np.ndarray, points: np.ndarray, m: int, ends: np.ndarray) -> np.ndarray:
-    """Values and m − 1 derivatives at the knots for which derivatives m … 2m − 2 are continuous, (k + 1, m, n).
+    """Values and m − 1 derivatives at the knots, (k + 1, m, n), that make derivatives m … 2m − 2 continuous.
 
-    Velocities at the ends are given, (2, n); accelerations there are zero.
+    End velocities are given by `ends`, (2, n); end accelerations are zero.
     """
     k, n = len(h), points.shape[-1]
     basis = hermite(h, np.broadcast_to(np.eye(2 * m), (k, 2 * m, 2 * m)))  # coefficients of each piece from its ends
@@ -251,7 +251,7 @@ def _smooth_derivatives(h: np.ndarray, points: np.ndarray, m: int, ends: np.ndar
 
 
 def increasing(name: str, values: Any, count: int) -> np.ndarray:
-    """Increasing times, shape (count,), frozen; raises ControlError if they are not."""
+    """Increasing times, shape (count,), frozen; raises ControlError if they do not increase."""
     times = numbers(name, values, (count,))
     if not (np.diff(times) > 0).all():
         raise ControlError(f"{name} must increase, got {values!r}")

@@ -1,8 +1,8 @@
-"""The second reading: a robot's file by yourdfpy, against the checked numbers that both implementations use.
+"""The second reading: a robot's file as read by yourdfpy, compared with the numbers that both implementations use.
 
-Pinocchio and the library's own implementation take what the hardened read has written, so that a fault of that read
-is in both, and no comparison of M, C and N shows it. yourdfpy reads the bytes of the file. The two readings share
-the XML parser (libxml2) and `float`; nothing that looks for elements, attributes, defaults or names.
+Pinocchio and the library's own implementation both use the output of the hardened reader, so a fault of that reader
+affects both, and comparing M, C and N does not reveal it. yourdfpy reads the bytes of the file. The two readings share
+only the XML parser (libxml2) and `float`, not the code that looks up elements, attributes, defaults or names.
 [URDF: wiki.ros.org/urdf/XML]
 """
 
@@ -31,12 +31,12 @@ Numbers = dict[tuple[str, str], np.ndarray]  # by quantity and element
 
 
 def second_reading(description: Description, tolerance: float) -> tuple[list[Pair], tuple[str, ...]]:
-    """The numbers of a description, each with yourdfpy's; and a note if yourdfpy does not read the file."""
+    """Return the numbers of a description paired with yourdfpy's, and a note if yourdfpy cannot read the file."""
     try:
         robot = _by_yourdfpy(description.text)
         stated, elements = dict(_stated(robot)), set(_elements_stated(robot))
     except Exception as error:  # whatever yourdfpy raises
-        message = getattr(error, "msg", f"{type(error).__name__}: {error}")  # that of a syntax error, without its place
+        message = getattr(error, "msg", f"{type(error).__name__}: {error}")  # for a syntax error, without the position
         why = shorten(" ".join(str(message).split()), 200)
         return [], (f"the file is not read a second time: yourdfpy cannot read it ({why})",)
     taken, known = dict(_taken(description)), set(_elements_taken(description))
@@ -55,12 +55,12 @@ def second_reading(description: Description, tolerance: float) -> tuple[list[Pai
 def _by_yourdfpy(text: bytes) -> Any:
     from yourdfpy import URDF  # heavy: imports trimesh
 
-    etree.fromstring(text)  # raises, where yourdfpy would read on with what the parser can recover
+    etree.fromstring(text)  # raises where yourdfpy would continue with what the parser can recover
     return URDF.load(BytesIO(text), build_scene_graph=False, load_meshes=False).robot
 
 
 def _elements_stated(robot: Any) -> Iterator[str]:
-    """Links, a root that joints only name among them, and joints with their kind and links, by yourdfpy."""
+    """Links, including a root named only by joints, and joints with their kind and links, as read by yourdfpy."""
     names = {link.name for link in robot.links} | {joint.parent for joint in robot.joints}
     yield from (f"link {name.strip()!r}" for name in names)
     for joint in robot.joints:
@@ -81,7 +81,7 @@ def _joint(name: str, kind: str, parent: str, child: str, source: str | None) ->
 
 
 def _stated(robot: Any) -> Iterator[tuple[tuple[str, str], np.ndarray]]:
-    """The numbers of the file by yourdfpy; where the file states none, the format's defaults."""
+    """The numbers of the file as read by yourdfpy, or the format's defaults where the file states none."""
     for link in robot.links:
         where, inertial = f"link {link.name.strip()!r}", link.inertial
         if inertial is not None:
@@ -107,7 +107,7 @@ def _or_identity(origin: np.ndarray | None) -> np.ndarray:
 
 
 def _limits(joint: Any) -> np.ndarray:
-    """Lower, upper, effort, velocity; docs/findings.md says what of the stated ones is not taken."""
+    """Lower, upper, effort and velocity limits; docs/findings.md lists the stated limits that are ignored."""
     lower, upper, *rates = (
         joint.limit and getattr(joint.limit, key) for key in ("lower", "upper", "effort", "velocity")
     )
@@ -117,7 +117,7 @@ def _limits(joint: Any) -> np.ndarray:
 
 
 def _taken(description: Description) -> Iterator[tuple[tuple[str, str], np.ndarray]]:
-    """The same numbers in the description, that both implementations use."""
+    """The same numbers from the description, as both implementations use them."""
     taken = tree(description, Edits())
     for link in taken.links:
         where = f"link {link.name!r}"

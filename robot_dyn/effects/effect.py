@@ -1,6 +1,7 @@
-"""Base classes of effects: an effect is a torque τ_effect(t, q, v) on the joints, so that N = ∂V/∂q − Σ τ_effect.
+"""Base classes of effects. An effect is a torque τ_effect(t, q, v) on the joints: N = ∂V/∂q − Σ τ_effect.
 
-Its class declares what it does to the energy, and a contract test checks that. A plant evaluates only its own effects.
+The class of an effect declares how it changes the energy, and a contract test verifies this. A plant evaluates only
+the effects it has.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from robot_dyn.values import Value
 
 
 class Effect(Value):
-    """Something that acts on the joints: a `Force`, a `Bound`, or several of them as its `parts`.
+    """Anything that acts on the joints: a `Force`, a `Bound`, or a combination of these, its `parts`.
 
     Subclass one of the four kinds below. Its methods are pure functions, called with
 
@@ -33,14 +34,14 @@ class Effect(Value):
         q: position, (..., n), in [rad] or [m] by joint
         v: velocity, (..., n), in [rad/s] or [m/s]
 
-    and with symbols in place of these numbers where it is compiled: written in `robot_dyn.arithmetic` and NumPy's
-    operators it runs in both engines.
+    and with symbols in place of these numbers when it is compiled. Methods that use only `robot_dyn.arithmetic` and
+    NumPy's operators run in both engines.
 
-    Coefficients that are declared (`robot_dyn.coefficients`) are checked on construction, may be given by joint name,
-    or as "urdf" where files state them, and may be swept.
+    Declared coefficients (`robot_dyn.coefficients`) are checked on construction and may be swept. They may be given by
+    joint name, or as "urdf" where files state them.
 
     Attributes:
-        term: Its equation in short, for `explain`.
+        term: Equation in short form, for `explain`.
     """
 
     term: ClassVar[str] = ""
@@ -50,14 +51,14 @@ class Effect(Value):
 
     @property
     def name(self) -> str:
-        """Its name in scenes and ledgers: that of its class, in snake case."""
+        """Name in scenes and ledgers: the class name in snake case."""
         return re.sub(r"(?<!^)(?=[A-Z])", "_", type(self).__name__).lower()
 
     def on(self, dynamics: Any) -> Effect:
-        """Return this effect with arrays (n,) for coefficients that are given by joint name or as "urdf".
+        """Return this effect with coefficients given by joint name or as "urdf" replaced by arrays (n,).
 
         Raises:
-            EffectError: If a joint is unknown, no file states the coefficient, or one is of another number of joints.
+            EffectError: If a joint is unknown, the file states no value, or the number of joints differs.
         """
         known = {
             key: each.on(f"{self.name}: {key}", getattr(self, key), dynamics)
@@ -68,20 +69,21 @@ class Effect(Value):
 
     @property
     def parts(self) -> tuple[Effect, ...]:
-        """The forces and bounds that it consists of; by default itself."""
+        """The forces and bounds that make up this effect; by default the effect itself."""
         return (self,)
 
     @property
     def switches(self) -> tuple[float, ...]:
-        """Times in [s] at which it starts or stops: a step of integration ends there."""
+        """Times in [s] at which the effect starts or stops; integration steps end there."""
         return ()
 
     def thresholds(self, n: int) -> tuple[Threshold, ...]:
-        """Where it switches from one smooth formula to another, on an arm of n joints; () if it is smooth everywhere.
+        """Thresholds between smooth formulas, on an arm with n joints; () if the effect is smooth everywhere.
 
-        A step of integration ends where one is passed; `on_side` returns the effect on either side. A class that does
-        not define this declares nothing: it runs interpreted unless machine code is requested, and error estimates do
-        not rest on the order of a method. Levels of the actuation are for bounds: of what reaches them.
+        Integration steps end where a threshold is passed; `on_side` returns the effect on either side. A class that
+        does not define this method makes no claim: it runs interpreted unless machine code is requested, and error
+        estimates do not rely on the order of the integrator. Thresholds on the actuation are for bounds and apply to
+        the actuation that reaches the bound.
         """
         return ()
 
@@ -91,16 +93,16 @@ class Effect(Value):
 
     @property
     def widths(self) -> tuple[Any, Any]:
-        """Changes of q and of v over which its torque bends, each a scalar or (n,); inf where it is smooth.
+        """Changes in q and in v over which the torque bends, each a scalar or (n,); inf where it is smooth.
 
-        An implicit method takes its Jacobian from differences inside them. Where v reverses within a few steps through
-        such a layer about 0, an error estimate does not rest on the order of the method.
+        Implicit methods compute the Jacobian from differences within these changes. Where v reverses through such a
+        layer around 0 within a few steps, error estimates do not rely on the order of the method.
         """
         return inf, inf
 
 
 class Force(Effect, ABC):
-    """An effect that is a torque on the joints, besides actuation and gravity."""
+    """An effect that exerts a torque on the joints, in addition to actuation and gravity."""
 
     @abstractmethod
     def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
@@ -108,49 +110,49 @@ class Force(Effect, ABC):
 
 
 class Conservative(Force):
-    """An effect with a potential E(t, q), which the energy ledger counts: torque = −∂E/∂q. Contract as of `Effect`."""
+    """An effect with a potential E(t, q), counted in the energy ledger: torque = −∂E/∂q. Contract: see `Effect`."""
 
     @abstractmethod
     def potential(self, dynamics: Dynamics, t: float, q: Array) -> Array:
-        """Its energy E(t, q), shape (...), in [J]."""
+        """Return the potential energy E(t, q), shape (...), in [J]."""
 
 
 class Dissipative(Force):
-    """An effect that never adds energy: torqueᵀ v ≤ 0 at all t, q, v. Contract as of `Effect`."""
+    """An effect that never adds energy: torqueᵀ v ≤ 0 at all t, q, v. For the contract, see `Effect`."""
 
 
 class Active(Force):
-    """An effect whose power torqueᵀ v may have either sign. Contract as of `Effect`."""
+    """An effect whose power torqueᵀ v may have either sign. For the contract, see `Effect`."""
 
 
 class Stateful(Effect, ABC):
     """An effect with states z, ż = rate(t, q, v, u, z), which are integrated with the plant.
 
-    A subclass is also of another kind. The torque of such a force is torque(dynamics, t, q, v, z), and the actuation
-    that such a bound leaves is actuation(u, z). A dissipative one obeys torqueᵀ v + dE/dt ≤ 0, with E the energy that
-    its states store. Queries of a plant at one state use the initial z, and leave the actuation unchanged.
+    A subclass also derives from another kind. A stateful force defines torque(dynamics, t, q, v, z), a stateful bound
+    actuation(u, z). A dissipative effect satisfies torqueᵀ v + dE/dt ≤ 0, where E is the energy stored in its states.
+    Queries of a plant at one state use the initial z and leave the actuation unchanged.
     """
 
     @abstractmethod
     def state_size(self, n: int) -> int:
-        """Number of its states on an arm of n joints."""
+        """Number of states on an arm with n joints."""
 
     def start(self, dynamics: Dynamics, q: Array, v: Array) -> Array:
-        """Return its states at the start of a run from q, v, (..., n), shape (..., state_size); 0 by default."""
+        """Return the states at the start of a run from q, v, (..., n), shape (..., state_size); 0 by default."""
         shape = (*v.shape[:-1], self.state_size(dynamics.n))
         return np.zeros(shape, dtype=v.dtype).view(type(v))
 
     @abstractmethod
     def state_rate(self, dynamics: Dynamics, t: float, q: Array, v: Array, u: Array, z: Array) -> Array:
-        """ż, (state_size,), in the unit of z per s.
+        """Return ż, (state_size,), in the unit of z per second.
 
         Args:
-            dynamics: As of `Effect`, as are t, q and v, of one state.
+            dynamics: See `Effect`; likewise t, q and v, all at one state.
             t: Time.
             q: Position.
             v: Velocity.
-            u: The actuation, (n,), in [N m] or [N]; for a bound, after the bounds before it.
-            z: Its states, (state_size,).
+            u: The actuation, (n,), in [N m] or [N]; for a bound, as left by the preceding bounds.
+            z: States of the effect, (state_size,).
         """
 
     def stored_energy(self, dynamics: Dynamics, t: float, q: Array, z: Array) -> Array:
@@ -159,36 +161,36 @@ class Stateful(Effect, ABC):
 
 
 class Drive(Stateful, Force, ABC):
-    """A force with states whose motors take the actuation of some joints in place of these joints.
+    """A stateful force whose motors receive the actuation of some joints in place of these joints.
 
-    Its work in the ledger is that of its torque on the joints less that of the actuation on its motors.
+    The ledger counts the work of its torque on the joints minus the work of the actuation on its motors.
     """
 
     @abstractmethod
     def driven(self, n: int) -> Sequence[int]:
-        """Indices of the joints whose actuation it takes, on an arm of n joints."""
+        """Indices of the joints whose actuation the motors receive, on an arm with n joints."""
 
-    coupled: ClassVar[bool] = False  # whether its motors may move with their joints: state_rate then takes a as well
+    coupled: ClassVar[bool] = False  # whether motors may move with their joints; state_rate then takes a as well
 
     @abstractmethod
     def speeds(self, z: Array) -> Array:
-        """Velocities at which the actuation of these joints works, in the order of `driven`."""
+        """Velocities at which the actuation of the driven joints does work, in the order of `driven`."""
 
     def reaching(self, u: Array) -> Array:
-        """The part of the actuation u, (..., n), that acts on these joints; 0 by default."""
+        """The part of the actuation u, (..., n), that acts on the driven joints; 0 by default."""
         return 0 * u[..., list(self.driven(u.shape[-1]))]
 
     def added_inertia(self, n: int) -> Array:
-        """Inertia of motors that move with these joints; 0 by default."""
+        """Inertia of motors that move with the driven joints; 0 by default."""
         return np.zeros(len(self.driven(n)))
 
     def power(self, v: Array, u: Array, torque: Array, z: Array, a: Array) -> Array:
-        """Its power at one state: velocity, actuation, its torque, its states, acceleration."""
+        """Power at one state, given velocity, actuation, torque and states of the drive, and acceleration."""
         return torque @ v - u[list(self.driven(len(v)))] @ self.speeds(z)
 
 
 class Bound(Effect, ABC):
-    """An effect that bounds the actuation, by the order of a plant's effects. Contract as of `Effect`."""
+    """An effect that bounds the actuation, applied in the order of the plant's effects. Contract: see `Effect`."""
 
     @abstractmethod
     def actuation(self, u: Array) -> Array:
@@ -196,7 +198,7 @@ class Bound(Effect, ABC):
 
 
 class Timed(Effect):
-    """An effect that is smooth but acts only from its field `start_s` until its field `end_s`, in [s]."""
+    """A smooth effect that acts only from time `start_s` until `end_s`, in [s]."""
 
     start_s: float
     end_s: float
@@ -212,7 +214,7 @@ class Timed(Effect):
         return self.start_s, self.end_s
 
     def acts(self, t: Any) -> Array:
-        """Whether it acts at times t (...,), at `start_s` already and at `end_s` no longer."""
+        """Whether the effect acts at times t (...,), including `start_s` but not `end_s`."""
         t = rows("t", t)
         return (self.start_s <= t) & (t < self.end_s)
 
@@ -220,13 +222,13 @@ class Timed(Effect):
 def require(message: str, relation: Callable[..., Any], *values: Any) -> None:
     """Raise an EffectError unless coefficients satisfy a relation for every joint.
 
-    Values by joint name or "urdf" are checked when a plant knows the joints, as are different numbers of joints.
+    Values by joint name or "urdf", and mismatched numbers of joints, are checked once a plant knows the joints.
     """
     if not all(isinstance(x, float | np.ndarray) for x in values):
         return
     try:
         satisfied = np.all(relation(*values))
-    except ValueError:  # of different numbers of joints
+    except ValueError:  # different numbers of joints
         return
     if not satisfied:
         raise EffectError(f"{message}, got {' and '.join(map(str, values))}")

@@ -2,8 +2,8 @@
 
     radius ≤ 1e-20 · scale
 
-The scale of M_ij is √(M_ii M_jj); of accelerations, in the norm of M, Σ ‖M⁻¹ τ_k‖_M of τ, C v and N; of other entries
-the largest of them in the units √M_ii of the joints, or their typical size if that is given and larger.
+The scale of M_ij is √(M_ii M_jj); that of accelerations, in the norm of M, is Σ ‖M⁻¹ τ_k‖_M over τ, C v and N; that
+of other entries is the largest of them in the units √M_ii of the joints, or a given typical size if that is larger.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from robot_dyn.queries.quantity import CORIOLIS_TORQUE, MOST_DIGITS, M, N, Quant
 RESOLUTION = 10.0**-MOST_DIGITS
 _FIRST_BITS, _MOST_BITS = 128, 4096
 
-NOTHING = 1e-12  # in the units of the joints: a joint or an answer below it is rounding of zero
+NOTHING = 1e-12  # in the units of the joints: smaller values are rounding errors of zero
 
 State = Mapping[str, np.ndarray]  # q, v, a, tau
 
@@ -54,18 +54,18 @@ class RoundedLiterals(Arithmetic):
 @final
 @dataclass(frozen=True, eq=False)
 class Scale:
-    """The divisor of errors, at one state or at several (S, …).
+    """The divisor of errors, at one state or several (S, …).
 
     Attributes:
         size: Scale of each entry, or of the whole vector in the norm of M.
-        M: Mass matrix of the norm, (..., n, n); None for errors entry by entry.
+        M: Mass matrix of the norm, (..., n, n); None for entrywise errors.
     """
 
     size: np.ndarray
     M: np.ndarray | None = None
 
     def relative(self, error: np.ndarray, radius: np.ndarray | float = 0.0) -> np.ndarray:
-        """Errors, known to a radius, on the scale: in the norm of M the bound of it, (...,), else of each entry."""
+        """Bound on errors, known to a radius, relative to the scale: on the norm, (...,), or entrywise if M is None."""
         if self.M is None:
             return scaled(np.abs(error) + radius, self.size)
         return scaled(mass_norm(self.M, error) + (radius * joint_units(self.M)).sum(axis=-1), self.size)
@@ -74,7 +74,7 @@ class Scale:
 def entry_units(values: np.ndarray, M: np.ndarray) -> np.ndarray:
     """√(M_ii M_jj) for entries of C, (..., n, n), √M_ii for torques, (..., n).
 
-    A joint without inertia has no unit: it gets 1e-12 of the largest.
+    A joint without inertia has no unit of its own; 1e-12 of the largest unit is used.
     """
     units = joint_units(M)
     units = np.maximum(units, NOTHING * units.max(axis=-1, keepdims=True))
@@ -82,7 +82,7 @@ def entry_units(values: np.ndarray, M: np.ndarray) -> np.ndarray:
 
 
 def in_joint_units(values: np.ndarray, M: np.ndarray, least: float = 0.0) -> np.ndarray:
-    """The largest entry of C or of torques in the units of the joints, or `least` if that is more, for each entry."""
+    """Scale of each entry: its unit times the largest entry of C or torques in joint units, or `least` if larger."""
     units = entry_units(values, M)
     axes = (-2, -1) if values.ndim == M.ndim else (-1,)
     return units * np.maximum(np.max(np.abs(values) / units, axis=axes, keepdims=True), least)
@@ -104,7 +104,7 @@ class Truth:
     bits: int
 
     def error(self, answer: Any) -> float:
-        """A bound of the largest error of an answer, of floats or balls, on the scale; inf if it is not finite."""
+        """A bound on the largest error of an answer (floats or balls), relative to the scale; inf if not finite."""
         ball = Ball(2 * self.bits)
         with ball.scope():
             difference = ball.asarray(answer) - self.values
@@ -119,7 +119,7 @@ class Exact:
 
     Args:
         robot: Only its file and edits are used, not its computed numbers.
-        rounded: Whether the file's numbers are the float64 nearest to each decimal, or the decimal itself.
+        rounded: Whether to use the float64 nearest to each decimal of the file instead of the decimal itself.
     """
 
     def __init__(self, robot: Described, rounded: bool = False) -> None:
@@ -127,15 +127,15 @@ class Exact:
         self._engines: dict[int, Lagrangian] = {}
 
     def at(self, quantity: Quantity, state: State, typical: float = 0.0) -> Truth:
-        """The truth at one state, (n,) each.
+        """Return the true values at one state.
 
         Args:
             quantity: M, C, N, inverse or forward dynamics.
-            state: Its arguments, by name.
-            typical: Least size of C, N and inverse dynamics that errors are relative to, in the units of the joints.
+            state: Arguments of the quantity by name, (n,) each.
+            typical: Minimum scale of C, N and inverse dynamics, in the units of the joints.
 
         Raises:
-            SingularError: Of forward dynamics where M is singular; names the joint.
+            SingularError: If M is singular and the quantity is forward dynamics; names the joint.
         """
         bits = _FIRST_BITS
         while True:

@@ -1,6 +1,6 @@
-"""Findings about a robot description that loads: what is doubtful in it, and the remedy, one sentence each.
+"""Findings about a robot description that loads: each doubtful item and its remedy, in one sentence.
 
-`urdf.py` refuses what has no meaning; a finding reports what is valid but hardly intended. Criteria and
+`urdf.py` rejects what is meaningless; a finding reports what is valid but probably unintended. Criteria and
 reasons are in docs/findings.md. Each function yields the findings of one kind.
 """
 
@@ -22,13 +22,13 @@ from robot_dyn.description.structure import StatedLink, Structure, structure
 from robot_dyn.errors import shorten
 from robot_dyn.model.conditioning import LEAST_DIGITS, NearlySingular, Regularity
 
-LONGEST = 1e4  # [m], and of a mimic's multiplier: the digits that a sum of lengths of 1e-12 of it leaves
+LONGEST = 1e4  # [m], also for a mimic's multiplier: a sum with such a length is rounded by about 1e-12 m
 LIGHTEST = 1e-12  # [kg]
 _LISTED = 6  # names in a finding
 
 
 def findings_of(description: Description, edits: Edits, regularity: Regularity) -> tuple[str, ...]:
-    """What is doubtful in a description, then in the robot with its edits: where, what, and the remedy."""
+    """Findings about a description, then about the robot with its edits: location, problem and remedy."""
     kinds = (
         massless_bodies, moments_without_mass, impossible_inertias, tiny_masses, long_lengths, large_ratios,
         welded_base, zero_limits, equal_limits, impossible_inertias_of_the_base,
@@ -58,7 +58,7 @@ def impossible_inertias_of_the_base(robot: Structure) -> Iterator[str]:
 
 
 def massless_bodies(robot: Structure) -> Iterator[str]:
-    """Bodies that move, all their links counted, without mass or moments."""
+    """Moving bodies that, with all their links, have neither mass nor moments."""
     for joint in robot.bodies:
         if not _has_mass(robot, joint):
             yield (
@@ -68,7 +68,7 @@ def massless_bodies(robot: Structure) -> Iterator[str]:
 
 
 def moments_without_mass(robot: Structure) -> Iterator[str]:
-    """Links that move with moments of inertia and without mass, which no body has; programs differ in what they do."""
+    """Moving links with moments of inertia but no mass, which is unphysical; programs treat them differently."""
     for name, link in robot.links.items():
         if name not in robot.base and link.mass == 0 and any(link.moments):
             most = np.abs(np.linalg.eigvalsh(link.inertia)).max()
@@ -79,8 +79,8 @@ def moments_without_mass(robot: Structure) -> Iterator[str]:
 
 
 def no_inertia_about_axis(robot: Structure, joint: str | None) -> Iterator[str]:
-    """A joint whose bodies have mass, but on its axis alone, so that M is singular."""
-    # beside a body without mass, the axes of two joints may coincide: then that body is the fault
+    """A joint whose bodies have mass only on its axis, so that M is singular."""
+    # next to a massless body, the axes of two joints may coincide: then that body is at fault
     if joint is not None and all(_has_mass(robot, each) for each in robot.bodies):
         yield (
             f"joint {joint!r}: what it moves has mass but no inertia about its axis, so M is singular; give its link"
@@ -89,7 +89,7 @@ def no_inertia_about_axis(robot: Structure, joint: str | None) -> Iterator[str]:
 
 
 def hardly_any_inertia(near: NearlySingular | None) -> Iterator[str]:
-    """A matrix M so near to a singular one that rounding takes most digits of forward dynamics."""
+    """A mass matrix M so close to singular that rounding destroys most digits of forward dynamics."""
     if near is not None:
         yield (
             f"joint {near.joint!r}: M is nearly singular, κ = {near.condition:.1e}, so that forward dynamics may keep"
@@ -99,7 +99,7 @@ def hardly_any_inertia(near: NearlySingular | None) -> Iterator[str]:
 
 
 def tiny_masses(robot: Structure) -> Iterator[str]:
-    """Links with a mass that is not 0 and less than any part of an arm has."""
+    """Links with a nonzero mass that is smaller than that of any part of an arm."""
     for name, link in robot.links.items():
         if 0 < link.mass < LIGHTEST:
             yield f"link {name!r}: its mass of {link.mass:g} kg is below {LIGHTEST:g} kg; correct it, or its unit"
@@ -126,7 +126,7 @@ def large_ratios(robot: Structure) -> Iterator[str]:
 
 
 def zero_limits(robot: Structure) -> Iterator[str]:
-    """Effort and velocity limits of 0, which allow nothing; most often a number that nobody filled in."""
+    """Effort and velocity limits of 0, which allow no effort or motion; usually a value that was never filled in."""
     for limit, unit in (("effort", "N m or N"), ("velocity", "rad/s or m/s")):
         if names := [name for name in robot.free if getattr(robot.joints[name], limit) == 0]:
             yield (
@@ -136,13 +136,13 @@ def zero_limits(robot: Structure) -> Iterator[str]:
 
 
 def equal_limits(robot: Structure) -> Iterator[str]:
-    """Joints whose lower limit is their upper one."""
+    """Joints whose lower and upper limits are equal."""
     if names := [name for name in robot.free if robot.joints[name].lower == robot.joints[name].upper]:
         yield f"{_joints(names)}: the lower limit is the upper one; correct them, or make the joint fixed"
 
 
 def welded_base(robot: Structure) -> Iterator[str]:
-    """A robot that stands, rolls or flies, fixed to the world at its root link."""
+    """A legged, wheeled or flying robot whose root link is fixed to the world."""
     if signs := stands_on(robot):
         yield (
             f"link {robot.root!r}: the base of a robot with legs, wheels or rotors"
@@ -156,7 +156,7 @@ def _why_impossible(link: StatedLink) -> str | None:
 
 
 def _has_mass(robot: Structure, joint: str) -> bool:
-    """Whether the body that a joint carries has mass or moments, payloads and the armature of the joint included."""
+    """Whether the body that a joint carries has mass or moments, including payloads and the joint's armature."""
     links, edits = robot.bodies[joint], robot.edits
     stated = any(robot.links[name].mass or any(robot.links[name].moments) for name in links)
     carried = any(load.frame in links and (load.mass or np.any(load.inertia)) for load in edits.payloads)

@@ -1,4 +1,4 @@
-"""Sines and cosines of one state side by side: angles that depend on no other sine share a vector."""
+"""Vectorised sines and cosines of one state: angles that depend on no other sine share a vector."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 from robot_dyn.codegen.program import Kind, Op, Program
 
-GROUP = 8  # angles of one state in a vector: a 512-bit register, or two or four smaller ones
+GROUP = 8  # angles of one state per vector: one 512-bit register, or two or four smaller ones
 
 
 def in_groups(program: Program) -> Iterator[tuple[Op, ...]]:
-    """The instructions in an order in which up to GROUP sines and cosines come together, all others alone."""
+    """Reorder the instructions: up to GROUP sines and cosines form one tuple, all others a tuple each."""
     sines = _independent_sines(program)
     first = _needed(program, [op.operands[0] for op in sines])
     yield from ((op,) for op in program.ops if not first.isdisjoint(op.results))
@@ -34,7 +34,7 @@ def _independent_sines(program: Program) -> list[Op]:
 
 
 def _needed(program: Program, values: list[int]) -> set[int]:
-    """The values that instructions compute on the way to these."""
+    """The given values and all values they depend on, as far as instructions compute them."""
     needed = set(values)
     for op in reversed(program.ops):
         if not needed.isdisjoint(op.results):

@@ -1,4 +1,4 @@
-"""Statements of the subset. Each function returns whether what follows the statement is never reached."""
+"""Statements of the subset. Each function returns whether the code after the statement is unreachable."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 def block(f: Function, nodes: list[ast.stmt]) -> bool:
-    """Statements one after the other."""
+    """Compile statements in sequence."""
     for node in nodes:
         if type(node) not in STATEMENTS:
             what = f"the statement {type(node).__name__}"
@@ -65,7 +65,7 @@ def _store(f: Function, target: ast.expr, value: Value, node: ast.AST) -> None:
 
 
 def _augmented(f: Function, node: ast.AugAssign) -> bool:
-    """X op= y, with the place of x found once."""
+    """Compile x op= y, computing the place of x only once."""
     op, target = type(node.op), node.target
     if isinstance(target, ast.Name):
         x = numbers.scalar(f, f.name(ast.copy_location(ast.Name(target.id, ast.Load()), target)), node)

@@ -1,6 +1,6 @@
-"""Blocks of a sampled loop: y = output(x, s), s⁺ = next(x, s) at each tick, of a signal x with one entry a joint.
+"""Blocks of a sampled loop: y = output(x, s), s⁺ = next(x, s) at each tick, for a signal x with one entry per joint.
 
-The base class, and the blocks whose equation is one line: quantisation, noise, rate limit and differences.
+This module holds the base class and the blocks with one-line equations: quantisation, noise, rate limit, differences.
 
 [Åström, Wittenmark, Computer-Controlled Systems, 3rd ed., 1997, ch. 1; Franklin, Powell, Workman, Digital Control of
 Dynamic Systems, 3rd ed., 1998, ch. 1]
@@ -20,7 +20,7 @@ from robot_dyn.coefficients import check_coefficients, coefficient
 from robot_dyn.errors import ControlError
 from robot_dyn.values import Value
 
-SIGNAL = "signal"  # in a unit: that of the signal, which is rad, rad/s or N m by the line that a block stands in
+SIGNAL = "signal"  # within a unit, the unit of the signal: rad, rad/s or N m, depending on the line of the block
 
 
 class Block(Value, ABC):
@@ -28,18 +28,18 @@ class Block(Value, ABC):
 
     Its methods are pure functions, called at ticks with
 
-        x: signal, (n,), in [rad], [rad/s] or [N m], or [m], [m/s] or [N], by line and joint
-        s: its states, (state_size(n),)
-        period_s: of the loop, in [s]
+        x: signal, (n,), in [rad], [rad/s] or [N m], or [m], [m/s] or [N], depending on line and joint
+        s: states of the block, (state_size(n),)
+        period_s: period of the loop, in [s]
 
-    and with symbols in place of these where they are compiled, as of `Controller`.
+    and with symbols in place of these when the block is compiled; see `Controller`.
 
     Attributes:
-        term: Its equation in short.
-        linear: Whether it acts on small signals; otherwise it is left out of linearised loops.
-        rounds: Whether its output jumps where its input does not; a class that does not define it declares nothing.
-        random: Whether its states are standard normal deviates, drawn again at each tick.
-        differentiates: Whether it derives the velocity from the measured position, as the first block of velocity.
+        term: Equation in short form.
+        linear: Whether the block affects small signals; if not, linearised loops omit it.
+        rounds: Whether the output may jump where the input does not; a class that omits this makes no claim.
+        random: Whether the states are standard normal deviates, redrawn at each tick.
+        differentiates: Whether the block derives velocity from the measured position if it is the first velocity block.
     """
 
     term: ClassVar[str] = ""
@@ -53,18 +53,18 @@ class Block(Value, ABC):
 
     @property
     def name(self) -> str:
-        """Its name in sweeps and scenes."""
+        """Name in sweeps and scenes."""
         return name_of(type(self))
 
     def check(self, period_s: float) -> None:
-        """Raise a ControlError if it is not defined for a period."""
+        """Raise a ControlError if the block is not defined for a period."""
 
     def state_size(self, n: int) -> int:
-        """Number of its states."""
+        """Number of states."""
         return 0
 
     def start(self, x: Array, period_s: float) -> Array:
-        """Return the states after a constant signal x, (state_size(n),)."""
+        """Return the states that a constant signal x leads to, (state_size(n),)."""
         return x[:0]
 
     @abstractmethod
@@ -72,12 +72,12 @@ class Block(Value, ABC):
         """Return the output signal, (n,)."""
 
     def next_state(self, x: Array, s: Array, period_s: float) -> Array:
-        """Return its states after the tick, (state_size(n),)."""
+        """Return the states after the tick, (state_size(n),)."""
         return s
 
 
 def name_of(kind: type[Block]) -> str:
-    """The name of a class of blocks in snake case, as "low_pass"."""
+    """The name of a class of blocks in snake case, such as "low_pass"."""
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", kind.__name__).lower()
 
 
@@ -108,7 +108,7 @@ class Noise(Block):
         deviation: σ, the standard deviation, a scalar or (n,), in the unit of the signal, not negative.
     """
 
-    # the deviates ξ of the counter (seed, run, tick, channel): the time loop, which knows the tick, draws them
+    # the time loop, which knows the tick, draws the deviates ξ from the counter (seed, run, tick, channel)
     term = "y = x + σ ξ"
     linear, rounds, random = False, False, True
 

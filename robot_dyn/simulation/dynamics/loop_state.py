@@ -1,4 +1,4 @@
-"""What a time loop works on: functions of the state equation, arrays of runs, rules, and why it returned."""
+"""Data of a time loop: functions of the state equation, arrays of runs, rules, and the reasons for its return."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ class Ended(IntEnum):
 
     DONE = 0
     PAUSED = 1  # its budget of steps is spent
-    NEEDS_REVIEW = 2  # the next step is to be looked at; y is the state before it
-    TICK = 3  # the controller asks for no finite torque
+    NEEDS_REVIEW = 2  # the next step needs a check; y is the state before it
+    TICK = 3  # the torque of the controller is not finite
     GAINS = 4  # energy may grow without a source; y is the state after the step
     TOO_SMALL = 5  # no step large enough to change t in floating point meets the tolerance
-    NOT_FINITE = 6  # the rate at y
+    NOT_FINITE = 6  # the rate at y is not finite
     FAST = 7  # a joint moves without bound; y is the state after the step
-    EVENT = 8  # y is the state at it
+    EVENT = 8  # an event; y is the state at the event
     PAYLOAD = 9  # a payload is picked up or dropped; y is the state before it
-    CHANGED = 10  # the mode, and with it the side of a threshold; y is the state behind it
+    CHANGED = 10  # the mode, and with it the side of a threshold, has changed; y is the state after it
     ACCUMULATED = 11  # mode changes accumulate in a very short time
-    UNSETTLED = 12  # the state and the mode behind an event were not found
+    UNSETTLED = 12  # the state and the mode after an event were not found
 
 
 class Why(IntEnum):
@@ -39,24 +39,24 @@ class Why(IntEnum):
     GOES_ON = 0
     OVERFLOWED = 1
     GAINED = 2
-    NOT_FOUND = 3  # the stages of a step
+    NOT_FOUND = 3  # the stages of a step were not found
 
 
 class _Entries(NamedTuple):
-    """Entries of `now`, where the loop is."""
+    """Entries of `now`, the position of the loop."""
 
     SEGMENT: int = 0
-    STEP: int = 1  # of the segment
-    ROW: int = 2  # of the samples, next
-    STEPS: int = 3  # done in all
-    SEEN: int = 4  # states shared with companions, in all
-    SHARED: int = 5  # row of these, next
-    BUDGET: int = 6  # steps to do before it returns
-    EVALUATIONS: int = 7  # of the rate, in all
-    COLUMN: int = 8  # of what an observer sees, next
+    STEP: int = 1  # within the segment
+    ROW: int = 2  # next row of the samples
+    STEPS: int = 3  # steps done in total
+    SEEN: int = 4  # states shared with companions in total
+    SHARED: int = 5  # next row of the shared states
+    BUDGET: int = 6  # steps to do before the loop returns
+    EVALUATIONS: int = 7  # evaluations of the rate in total
+    COLUMN: int = 8  # next column of the observer's data
     DUE: int = 9  # period of the next sample, where steps do not end at samples
-    MET: int = 10  # the same of the next shared state
-    WALKED: int = 11  # row of the ends of steps, next
+    MET: int = 10  # the same for the next shared state
+    WALKED: int = 11  # next row of the ends of steps
     EVENT: int = 12  # the switching function that has changed sign
 
 
@@ -67,15 +67,15 @@ class Functions(NamedTuple):
     """Functions of the state equation, from `evaluate`, called by steps and the time loop.
 
     Attributes:
-        rate: y', of a single run also u.
-        tick: The next own numbers.
+        rate: y'; for a single run also u.
+        tick: Run parameters after a tick.
         energy: K and V.
-        sample: What a sample holds.
+        sample: Contents of a sample.
         jacobian: See `RightSide`.
         events: Values of the events.
         step, behind: See `RightSide`.
-        actuation: u, of runs in lock step in which it changes between ticks.
-        bodies: Mass matrix and loads, where something may hold joints: as of `bodies`.
+        actuation: u, for runs in lock step where u changes between ticks.
+        bodies: Mass matrix and loads, if joints may be held; see `bodies`.
     """
 
     rate: Any
@@ -91,17 +91,17 @@ class Functions(NamedTuple):
 
 
 class Runs(NamedTuple):
-    """W runs: their states (m, W), own numbers (O, W), and what is known of each (W,); the rest is room to work.
+    """W runs: states (m, W), run parameters (O, W) and the status of each run (W,); the rest is workspace.
 
     Attributes:
-        y, run_parameters: State, and numbers of each run: first what a sampled controller holds.
-        after, made, command, u, energies, size, lost: y⁺, a sample, a tick, the actuation, K and V, Σ |y⁺|, stages
-            not found.
-        alive, why, ended: 1 while it goes on; then the reason and the time.
-        last: Its state where it ended, (m, W).
+        y, run_parameters: State and parameters of each run; the values that a sampled controller holds come first.
+        after, made, command, u, energies, size, lost: y⁺, a sample, a tick, the actuation, K and V, Σ |y⁺|, and
+            whether stages were not found.
+        alive, why, ended: 1 while the run continues; the reason and the time of its end.
+        last: State at the end of each run, (m, W).
         energy, scale: E(0), and 1 + |K(0)| + |V(0)|.
-        peak: Largest K at the looks at the energy.
-        keys: Seed and number of the run, of which its noise is, (2, W), as uint64.
+        peak: Largest K at the energy checks.
+        keys: Seed and number of each run, which determine its noise, (2, W), as uint64.
     """
 
     y: Array
@@ -127,17 +127,17 @@ class Rules(NamedTuple):
     """Settings of the time loop.
 
     Attributes:
-        n, works: Number of joints, and of works at the end of y.
-        states: Number of states of the controller, behind q and v.
-        held: Number of torques in the zero-order hold of a sampled controller; 0 for any other.
-        instants, acting: Ticks of the controller in each of its periods, and which of them changes its torque.
-        deviates: Number of its last states that are redrawn before each tick.
+        n, works: Number of joints, and number of works at the end of y.
+        states: Number of controller states, which follow q and v.
+        held: Number of torques in the zero-order hold of a sampled controller; 0 otherwise.
+        instants, acting: Ticks per controller period, and the index of the one at which the torque changes.
+        deviates: Number of trailing controller states that are redrawn before each tick.
         canonical: Whether y has momenta in place of velocities.
-        alone: Whether what may end a run is looked at by its driver.
+        alone: Whether the driver, not the loop, checks what may end a run.
         largest: Σ |y| beyond which a step is doubtful, or a run in lock step ends.
-        every, thin: Steps between shared states, 0 for none; and how many of these to one that is kept.
-        base: First run of the records.
-        apart: In lock step, steps between the instants at which u is observed; 0 where it is held between ticks.
+        every, thin: Steps between shared states, 0 for none; and number of shared states per state kept.
+        base: Column of the first run in the records.
+        apart: Steps between observations of u in lock step; 0 if u is held between ticks.
     """
 
     n: int
@@ -173,7 +173,7 @@ def rules_of(
 def runs_of(
     equation: StateEquation, y: np.ndarray, run_parameters: np.ndarray, made: int, numbers: np.ndarray = _FIRST
 ) -> Runs:
-    """Runs at the states y (m, W) with their own numbers (O, W), of these numbers in a batch (W,)."""
+    """Runs with states y (m, W), run parameters (O, W), and `numbers` (W,), their positions in a batch."""
     m, W = y.shape
     held, states = equation.plant.dynamics.n if equation.sampled else 0, equation.state_size
     seed, run = (0, 0) if equation.controller is None else equation.controller.noise_key
@@ -189,7 +189,7 @@ def runs_of(
 
 
 def erase_ended(x: Array, runs: Runs) -> None:
-    """Nan in x (r, W) for the runs that have ended."""
+    """Write nan into x (r, W) for the runs that have ended."""
     if below(runs.why, 1):
         return
     for b in range(len(runs.alive)):
@@ -198,6 +198,6 @@ def erase_ended(x: Array, runs: Runs) -> None:
 
 
 def erase(x: Array, b: int) -> None:
-    """Nan in place of the numbers of a run."""
+    """Write nan over the numbers of a run."""
     for e in range(len(x)):
         x[e, b] = np.nan

@@ -29,24 +29,24 @@ _TRUSTED = 0.5  # of the requested error: at a loose tolerance, the estimate may
 _LOOSE = {
     EXPLICIT: 0.75,
     STIFF: 0.5,
-}  # tolerance of the pilot, a power of the requested error; what is fast has decayed
+}  # tolerance of the pilot run, as a power of the requested error; fast motion has decayed
 _LOOSEST = 1e-3
-_ATOL = 0.01  # over rtol
+_ATOL = 0.01  # ratio to rtol
 _TRIES = 4  # maximum number of tolerances tried
-_LAST = 0.1  # of the tolerance before, at most, in the last run: coarse steps may show no proportion
-_TOO_MUCH = 1.7  # times the cost of a run with the requested error
-_FEW = 1.5  # steps between ticks, switches and events, where these decide on them
-_MANY = 20  # segments of sampled control, in each of which one step of RK4 may do
-_LONG = 500.0  # |λ| T: explicit steps, of |λ| h = 6 at most, are then as many as those of a run that is not stiff
+_LAST = 0.1  # of the previous tolerance, at most, in the last run: errors of coarse steps may not be proportional
+_TOO_MUCH = 1.7  # accepted excess cost, relative to a run with the requested error
+_FEW = 1.5  # steps between ticks, switches and events if these determine the steps
+_MANY = 20  # segments of sampled control; from here on, one RK4 step in each may suffice
+_LONG = 500.0  # |λ| T: with |λ| h ≤ 6, as many explicit steps as in a nonstiff run
 _ORDER = {EXPLICIT: 8, STIFF: 5, RK4.name: 4}
-_WEIGHT = {STIFF: 2}  # of its evaluations, Jacobians and eliminations included
+_WEIGHT = {STIFF: 2}  # cost per evaluation, including Jacobians and eliminations
 
 
 class AccuracyError(RobotDynError):
-    """Raised if the requested accuracy cannot be reached; the message states why and what can be.
+    """Raised if the requested accuracy cannot be reached; the message states why, and a remedy.
 
     Attributes:
-        best: The least estimated error of the trial runs, in [rad] or [m]; inf if none holds to the end.
+        best: Smallest estimated error of the trial runs, in [rad] or [m]; inf if no estimate is valid to the end.
     """
 
     def __init__(self, message: str, best: float = inf) -> None:
@@ -55,18 +55,18 @@ class AccuracyError(RobotDynError):
 
 
 def run_to(setup: Setup, requested: float, run: Callable[[Setup], Trajectory]) -> Trajectory:
-    """Return a run whose estimated error is at most the requested one; or the first that does not finish.
+    """Return a run whose estimated error is at most the requested one, or the first run that does not finish.
 
     The target is an estimate of at most half the requested error. If no run reaches the target, the best run is
     returned, provided that its estimate is at most the requested error.
 
     Args:
-        setup: What to run.
+        setup: The setup to run.
         requested: Largest error of q at any time, over the joints, in [rad] and [m].
-        run: Runs a setup, and estimates its error.
+        run: Function that runs a setup and estimates the error.
 
     Raises:
-        AccuracyError: If it cannot be reached.
+        AccuracyError: If the requested accuracy cannot be reached.
     """
     simple, spent = _in_each_segment(setup, requested, run)
     if simple is not None:
@@ -100,7 +100,7 @@ def run_to(setup: Setup, requested: float, run: Callable[[Setup], Trajectory]) -
 def _at(
     setup: Setup, method: str, rtol: float, requested: float, run: Callable[[Setup], Trajectory]
 ) -> tuple[Trajectory, int]:
-    """The run at a tolerance, of the cheaper method where stability bounds explicit steps; what all of it took."""
+    """The run at a tolerance, by the cheaper method if stability limits explicit steps; and the evaluations spent."""
     trial = run(replace(setup, integrator=Adaptive(method, rtol, _ATOL * rtol)))
     if method != AUTO or trial.statistics.method != EXPLICIT or setup.equation.sampled or not _stable_at_most(trial):
         return trial, _in_all(trial)
@@ -109,7 +109,7 @@ def _at(
 
 
 class _Try(NamedTuple):
-    """A run, its tolerance, 0 for a fixed step, and its estimated error."""
+    """A run with its tolerance (0 for a fixed step) and its estimated error."""
 
     error: float
     rtol: float
@@ -119,7 +119,7 @@ class _Try(NamedTuple):
 def _in_each_segment(
     setup: Setup, requested: float, run: Callable[[Setup], Trajectory]
 ) -> tuple[Trajectory | None, int]:
-    """One step of RK4 between ticks of sampled control, if that is accurate enough; what that took."""
+    """One RK4 step between ticks of sampled control, if accurate enough; and the evaluations spent."""
     if not setup.equation.sampled or len(setup.segments) < _MANY:
         return None, 0
     trial = run(replace(setup, integrator=RK4, step_s=setup.duration_s))
@@ -129,7 +129,7 @@ def _in_each_segment(
 
 
 def _stiff(setup: Setup) -> bool:
-    """Whether explicit steps would be many for the fastest decay at the start."""
+    """Whether the fastest decay at the start would require many explicit steps."""
     if setup.equation.sampled:
         return False
     equation = setup.equation.in_a_mode
@@ -141,12 +141,12 @@ def _stiff(setup: Setup) -> bool:
 
 
 def _stable_at_most(trial: Trajectory) -> bool:
-    """Whether stability bounds the steps."""
+    """Whether stability limits the steps."""
     return any(each.kind is Kind.STIFF for each in trial.remarks)
 
 
 def _decides(setup: Setup, trial: Trajectory) -> bool:
-    """Whether the tolerance decides on the steps, and not stability, ticks, switches or events."""
+    """Whether the tolerance, rather than stability, ticks, switches or events, determines the steps."""
     return not _stable_at_most(trial) and trial.statistics.steps > _FEW * (len(setup.segments) + len(trial.events))
 
 
@@ -155,7 +155,7 @@ def _in_all(trial: Trajectory) -> int:
 
 
 def _predicted(trial: Trajectory, requested: float) -> float:
-    """Cost of a run of its method with the requested error, in evaluations."""
+    """Predicted cost, in evaluations, of a run by the same method with the requested error."""
     if trial.outcome.ending is not Ending.FINISHED:
         return inf
     name, factor = trial.statistics.method, _resolved(trial) / (_AIM * requested)
@@ -169,7 +169,7 @@ def _resolved(trial: Trajectory) -> float:
 
 
 def _achieved(chosen: _Try, requested: float, spent: int) -> Trajectory:
-    """With the evaluations of all runs, and those of one ten times as accurate, and of one a tenth: e = O(hᵖ)."""
+    """The chosen run with the evaluations spent in all, and those for 10 and 0.1 times the accuracy by e = O(hᵖ)."""
     trial, s = chosen.trial, chosen.trial.statistics
     factor = 10 ** (1 / _ORDER[s.method])
     return replace(
@@ -182,7 +182,7 @@ def _achieved(chosen: _Try, requested: float, spent: int) -> Trajectory:
 
 
 def _refusal(best: _Try, requested: float, rtol: float) -> str:
-    """Why the best run does not have the requested error, although tolerances went down to the given one."""
+    """Return why the best run misses the requested error, with tolerances down to `rtol`, and the remedy."""
     why = "" if best.trial.error is None else best.trial.error.note
     if not why:
         method = best.trial.statistics.method

@@ -2,8 +2,8 @@
 
     v⁺ = argmin ½ |v⁺ − v|²_M over v⁺ᵢ ≥ −eᵢ vᵢ at each stop that is struck or touched
 
-Impacts that follow each other ever faster end where the sum of their intervals says, Σ 2 eᵏ |v| / |a|, in one impulse
-that takes what velocity their joint has left; what other joints do in that time is followed.
+Impacts at ever shorter intervals end after the sum of these intervals, Σ 2 eᵏ |v| / |a|, in one impulse that removes
+the remaining velocity of their joint; the response of the other joints during that time is tracked.
 [Moreau 1988; Acary, Brogliato, Numerical Methods for Nonsmooth Dynamical Systems, 2008, ch. 8]
 """
 
@@ -19,12 +19,12 @@ from robot_dyn.integrate.primitives import copy
 from robot_dyn.simulation.events.event_log import What, note
 from robot_dyn.simulation.events.holding import Holding, Laws, bodies, intervals, take, touched
 
-_ACCUMULATED = 1e-6  # [s] for all impacts that are still to come: what ends there has no effect beyond its square
-_CROWDED = 20  # impacts within that time: they go on for ever, whatever the restitution
+_ACCUMULATED = 1e-6  # [s] for all remaining impacts: ending them early has an effect of second order only
+_CROWDED = 20  # impacts within that time: they continue forever, whatever the restitution
 
 
 def strike(f: Any, t: float, y: Array, p: Array, of: Holding, s: int) -> bool:
-    """The impact at the stops of one effect, with those that end behind it, its work in y; whether it was found."""
+    """Apply the impact at one effect's stops and the bounces that end after it, work included; return whether found."""
     laws, room, hit = of.laws, of.room, False
     for i in range(len(laws.rows)):
         room.side[i], room.v[i], room.ended[i] = touched(laws, s, y, i), y[laws.speeds[i], 0], np.inf
@@ -83,12 +83,12 @@ def impact(M: Array, v: Array, side: Array, e: Array, ended: Array, after: Array
 
 
 def come_to_rest(f: Any, t: float, y: Array, p: Array, of: Holding, s: int) -> bool:
-    """Write the velocity behind the bounces that follow an impact, and in how long each of their joints rests.
+    """Write the velocity after the bounces that follow an impact, and the time until each bouncing joint rests.
 
-    The stop of a joint pushes that joint alone: its bounces together are one impulse that takes the velocity it has
-    behind the impact. It is not known where another joint strikes in their time. Returns whether it was found.
+    The stop of a joint pushes that joint alone: its bounces together form one impulse that removes its velocity
+    after the impact. The impulse is unknown if another joint strikes meanwhile. Returns whether the velocity was found.
     """
-    laws, room, crowded = of.laws, of.room, of.latest[0] >= _CROWDED  # as several stops in turn
+    laws, room, crowded = of.laws, of.room, of.latest[0] >= _CROWDED  # as when several stops are struck in turn
     copy(room.y, y)
     copy(room.after, room.first)
     while True:  # each joint once, since those at rest do not return
@@ -103,7 +103,7 @@ def come_to_rest(f: Any, t: float, y: Array, p: Array, of: Holding, s: int) -> b
         ):  # fmt: skip
             return False
         if not (crowded and in_turn(of)):
-            first, left = 0, np.inf  # the others are kicked by its bounces, and then loaded with it at rest
+            first, left = 0, np.inf  # its bounces kick the other joints, which are then loaded with it at rest
             for i in range(len(room.a)):
                 e = 0.0 if crowded else laws.restitution[s, i]
                 each = lasts(room.after[i], room.a[i], room.side[i], e)
@@ -135,7 +135,7 @@ def remember(of: Holding, t: float) -> None:
 
 
 def in_turn(of: Holding) -> bool:
-    """End those that throw each other at their stops, faster and faster: all with v = 0; whether there are any more."""
+    """Bring joints to rest that throw each other against their stops ever faster; return whether any were found."""
     room, largest, found = of.room, 0.0, False
     for i in range(len(room.a)):
         largest = max(largest, abs(room.a[i]))
@@ -167,7 +167,7 @@ def next_meeting(laws: Laws, y: Array, a: Array, but: int) -> float:
 
 
 def falls(d: float, v: float, a: float) -> float:
-    """The time t > 0 at which d + v t + a t²/2 first vanishes, d ≥ 0; nan where it never does, or rests."""
+    """The time t > 0 at which d + v t + a t²/2 first vanishes, d ≥ 0; nan if it never does, or at rest."""
     root = np.sqrt(v * v - 2.0 * a * d)
     if v > 0.0:
         return (v + root) / -a if a < 0.0 else np.nan

@@ -12,7 +12,7 @@ from robot_dyn.queries.units import format_duration
 from robot_dyn.result import Result, reported
 from robot_dyn.validate import choice
 
-DECIMALS = "decimals of the file as float64"  # the implementation that computes exactly with these
+DECIMALS = "decimals of the file as float64"  # name of the implementation that computes exactly with these decimals
 
 
 @final
@@ -66,7 +66,7 @@ class Condition:
 
     @property
     def digits(self) -> float:
-        """log₁₀ κ at its largest: what a solution of M a = τ may lose."""
+        """log₁₀ of the largest κ: the digits that solving M a = τ may lose."""
         return log10(self.searched)
 
 
@@ -76,17 +76,17 @@ class Certificate(Result):
     """True digits of a robot's dynamics.
 
     Attributes:
-        robot: Its name.
-        joints: Their names.
-        digits: Of each quantity by each implementation.
-        decimals: By quantity, digits that the float64 nearest to the decimals of the file leave, at the worst state.
-        right_angles: By quantity, digits of the file that machine code leaves where it writes right angles out in full.
-        condition: Of M.
-        bits: Of the balls that the truth took, at most.
+        robot: Name of the robot.
+        joints: Names of the joints.
+        digits: Digits of each quantity by each implementation.
+        decimals: By quantity, digits left after rounding the decimals of the file to float64, at the worst state.
+        right_angles: By quantity, digits left after machine code completes the rounded right angles of the file.
+        condition: Condition number of M.
+        bits: Highest precision of the balls used for the true values.
         left_out: What was left out, and why.
         environment: Versions and processor.
-        seed: Of the random states.
-        interrupted: Whether it was ended by the user.
+        seed: Seed of the random states.
+        interrupted: Whether the user interrupted the computation.
     """
 
     columns: ClassVar[tuple[str, ...]] = (
@@ -127,7 +127,7 @@ class Certificate(Result):
 
     @reported
     def lost(self) -> dict[str, float]:
-        """By implementation, digits of inverse dynamics less those of forward dynamics, at the worst states."""
+        """By implementation, digits of inverse dynamics minus those of forward dynamics, at the worst states."""
         inverse, forward = (
             {each.implementation: each.searched for each in self._of(quantity) if each.samples > 1}
             for quantity in ("inverse_dynamics", "forward_dynamics")
@@ -138,17 +138,17 @@ class Certificate(Result):
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """That were looked at."""
+        """Names of the quantities examined."""
         return tuple(dict.fromkeys(each.quantity for each in self.digits))
 
     @property
     def implementations(self) -> tuple[str, ...]:
-        """That were looked at."""
+        """Names of the implementations examined."""
         return tuple(dict.fromkeys(each.implementation for each in self.digits))
 
     @reported
     def sentence(self) -> str:
-        """The digits of forward dynamics, or of what else there is, in a sentence."""
+        """The digits of forward dynamics, or of the last quantity counted, in a sentence."""
         if not self.digits:
             return "no digits were counted"
         quantity = self.quantities[-1]

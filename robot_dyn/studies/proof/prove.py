@@ -1,4 +1,4 @@
-"""Prove: a theorem about the flow of a setup, step by step, for as long as every bound holds."""
+"""Prove a theorem about the flow of a setup, step by step, for as long as every bound holds."""
 
 from __future__ import annotations
 
@@ -40,26 +40,26 @@ def prove(
 ) -> Proof:
     """A theorem: the motion exists, is the only one, and q(t), v(t) lie in balls, for 0 ≤ t ≤ until_s.
 
-    It is about the decimals of the URDF as they stand; floats of the setup (start, gravity, payloads, coefficients,
-    gains) are taken as exact binary numbers. Integrator and step of the setup do not matter.
+    The theorem holds for the decimals of the URDF as written; floats of the setup (start, gravity, payloads,
+    coefficients, gains) are taken as exact binary numbers. The integrator and step of the setup are irrelevant.
 
     Args:
-        setup: Plant, start, and continuous controller or none.
+        setup: Plant, start, and optionally a continuous controller.
         until_s: End time, in [s]; by default the duration of the setup.
-        bits: Precision of the balls, from 40 to 4096; the radius of q comes to about 2^-(0.7 bits), times its growth.
-        q0: Start, (n,), in place of that of the setup: numbers, or text for decimals that are meant exactly.
-        v0: Its velocity, likewise.
-        width_q: The start may be anywhere within so much of each q, in [rad] or [m], not negative.
+        bits: Precision of the balls, from 40 to 4096; the radius of q is about 2^-(0.7 bits) times its growth.
+        q0: Initial q, (n,), in place of that of the setup: numbers, or strings for exact decimals.
+        v0: Initial velocity, likewise.
+        width_q: The start may be anywhere within this distance of each q, in [rad] or [m], not negative.
         width_v: Likewise for v.
         budget_s: Limit on computing time, in [s].
         on_progress: Called with the time reached, in [s], after each step.
 
     Returns:
-        The theorem; if it ends before until_s, it states why.
+        The theorem; if it ends before until_s, it states the reason.
 
     Raises:
         QueryError: If an argument is not allowed.
-        ProofError: If something switches, is sampled, or is not known to be analytic; names it.
+        ProofError: If a part of the setup switches, is sampled, or is not known to be analytic; names that part.
 
     Source: Lohner 1987; Nedialkov, Jackson, Corliss 1999.
     """
@@ -92,7 +92,7 @@ def _nodes(about: Motion, state: State, until_s: float, bits: int) -> Iterator[N
     """Ends of proven steps, one after the other; a step ends where a reference passes to another polynomial.
 
     Raises:
-        NotProvenError: If no step is proven from the last one on.
+        NotProvenError: If no step can be proven beyond the last one.
     """
     how, before, tape = effort(bits), None, None
     for end in (*sorted(t for t in about.knots if 0 < t < until_s), until_s):
@@ -108,7 +108,7 @@ def _nodes(about: Motion, state: State, until_s: float, bits: int) -> Iterator[N
 
 @contextmanager
 def _precision(bits: int) -> Iterator[None]:
-    """The precision of balls, with the length of power series as it was before."""
+    """Set the precision of balls, and restore the length of power series afterwards."""
     with Ball(bits).scope():
         cap = ctx.cap
         try:

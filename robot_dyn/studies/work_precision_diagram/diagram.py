@@ -1,4 +1,4 @@
-"""The work-precision diagram: error over time and evaluations, energy beside it, the Pareto front, what is believed."""
+"""The work-precision diagram: error over time and evaluations, energy residual, Pareto front, reference error."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from robot_dyn.studies.work_precision_diagram.work_precision import WorkPrecisio
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_LOOK = {  # colour of the theme and marker, by family: explicit, Gauss, for stiff systems, those that choose steps
+_LOOK = {  # theme colour and marker, by family: explicit, Gauss, stiff, adaptive
     "DOP853": (0, "o"), "Rosenbrock": (3, "o"), "order_8": (6, "s"), "rk4": (1, "D"), "midpoint": (5, "<"),
     "explicit_euler": (5, "^"), "semi_implicit_euler": (5, "v"), "gauss_2": (2, "<"), "gauss_4": (2, ">"),
     "gauss_6": (2, "h"), "rosenbrock_5": (3, "s"), "sdirk_3": (3, "^"), "linearly_implicit_euler": (3, "v"),
@@ -23,15 +23,15 @@ _PEERS = {
     "SciPy DOP853 + pin.aba": "x", "MuJoCo RK4": "D", "MuJoCo Euler": "^", "MuJoCo implicitfast": "v",
     "Drake runge_kutta3": "P", "heyoka, Taylor": "*",
 }  # fmt: skip
-_MOST_ERROR = 3.0  # [rad] or [m]: larger ones are lost, and not drawn
+_MOST_ERROR = 3.0  # [rad] or [m]; larger errors are meaningless and not drawn
 _WIDTH, _HEIGHT = 13.0, 8.0  # [inch]
 
 
 def draw(result: WorkPrecision, theme: str = "light") -> Figure:
-    """The diagram.
+    """Draw the diagram.
 
     Raises:
-        ResultError: If no run ended.
+        ResultError: If no run finished.
     """
     if not any(np.isfinite(p.error) for each in result.ladders for p in each.points):
         raise ResultError("no run ended, so there is nothing to draw; look at left_out")
@@ -85,7 +85,7 @@ def _steps(p: Point) -> float:
 
 
 def _caption(result: WorkPrecision) -> str:
-    """What was run, and what errors are measured against."""
+    """The runs, and the reference for their errors."""
     of = result.reference
     cut = f" of {result.duration_s:g} s, where its references part" if of.parted_s is not None else ""
     return (
@@ -113,7 +113,7 @@ def _curve(
     axes: Any, ladder: ToleranceLadder, colours: Colours, x: Callable[[Point], Any], y: Callable[[Point], float],
     size: float, dashed: bool = False,
 ) -> None:  # fmt: skip
-    """The runs of a ladder; those that are not believed are hollow."""
+    """Draw the runs of a ladder, with hollow markers for those that are not believed."""
     colour, marker = _look(ladder, colours)
     points = [p for p in _shown(ladder) if y(p) > 0]
     style = "--" if ladder.peer else ":" if dashed else "-"
@@ -143,7 +143,7 @@ def _front(axes: Any, result: WorkPrecision, colours: Colours) -> None:
 
 
 def _believed(axes: Any, result: WorkPrecision, colours: Colours, words: bool) -> None:
-    """The error of the reference as a line, and what lies below it."""
+    """Draw the error of the reference as a line, and shade the range below it."""
     error = result.reference.error
     axes.axhline(error, color=colours["ink"], linewidth=0.9, linestyle=(0, (6, 3)))
     axes.axhspan(axes.get_ylim()[0], error, color=colours["veil"], zorder=0.5)
