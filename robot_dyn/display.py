@@ -1,4 +1,4 @@
-"""HTML of values for notebooks: tables, bars and line plots as plain HTML and SVG, without scripts.
+"""HTML of values for notebooks: tables and line plots as plain HTML and SVG, without scripts.
 
 Text, axes and rules take the colour of the page (`currentColor`), so that they stand on light and on dark ones.
 """
@@ -61,26 +61,6 @@ def side_by_side(parts: Iterable[str]) -> str:
     return f'<div class="s">{"".join(parts)}</div>'
 
 
-def bars(rows: Iterable[tuple[str, float]], unit: str) -> str:
-    """Horizontal bars from zero, of signed numbers of one unit."""
-    rows = list(rows)
-    least, most = min([0.0, *(x for _, x in rows)]), max([0.0, *(x for _, x in rows)])
-    scale = 240 / ((most - least) or 1.0)
-    drawn = []
-    for k, (name, x) in enumerate(rows):
-        y, start = 4 + 20 * k, 190 + (min(x, 0.0) - least) * scale
-        wide = max(abs(x) * scale, 0.5)
-        drawn.append(
-            f'<text x="184" y="{y + 12}" text-anchor="end">{escape(name)}</text>'
-            f'<rect x="{start:.1f}" y="{y}" width="{wide:.1f}" height="15" fill="{_COLOURS[x < 0]}"/>'
-            f'<text x="440" y="{y + 12}">{number_text(x)} {escape(unit)}</text>'
-        )
-    zero = 190 - least * scale
-    height = 8 + 20 * len(rows)
-    line = f'<path d="M{zero:.1f} 0V{height}" stroke="currentColor" stroke-opacity=".5"/>'
-    return _svg(560, height, line + "".join(drawn), "bars")
-
-
 def plot(label: str, t: np.ndarray, columns: Mapping[str, np.ndarray]) -> str:
     """Curves over time as SVG.
 
@@ -96,8 +76,13 @@ def plot(label: str, t: np.ndarray, columns: Mapping[str, np.ndarray]) -> str:
     low, high = (low - 0.5, high + 0.5) if low == high else (low, high)
     ticks, times = _ticks(low, high), _ticks(float(t[0]), float(t[-1]))
     wide, high_px = _WIDTH - _LEFT - 8, _HEIGHT - _BELOW - _ABOVE
-    x = lambda at: _LEFT + wide * (at - t[0]) / ((t[-1] - t[0]) or 1.0)  # noqa: E731
-    y = lambda at: _ABOVE + high_px * (high - at) / (high - low)  # noqa: E731
+
+    def x(at: float) -> float:
+        return _LEFT + wide * (at - t[0]) / ((t[-1] - t[0]) or 1.0)
+
+    def y(at: float) -> float:
+        return _ABOVE + high_px * (high - at) / (high - low)
+
     grid = "".join(
         f'<path d="M{_LEFT} {y(at):.1f}H{_WIDTH - 8}" stroke="currentColor" stroke-opacity=".18"/>'
         f'<text x="{_LEFT - 5}" y="{y(at) + 4:.1f}" text-anchor="end">{number_text(at)}</text>'

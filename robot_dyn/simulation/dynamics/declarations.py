@@ -107,7 +107,7 @@ def _fields(kind: type) -> tuple[str, ...]:
 
 
 def _not_frozen(part: Any) -> Iterator[str]:
-    """Its attributes that code may set anew; the period of a controller is set by its interface."""
+    """Attributes that code may set after construction; the period of a controller is set by its interface."""
     kind = type(part)
     frozen = is_dataclass(kind) and kind.__dataclass_params__.frozen  # pyright: ignore[reportAttributeAccessIssue]
     known = set(_fields(kind)) if frozen else set()

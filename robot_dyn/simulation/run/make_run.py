@@ -1,6 +1,6 @@
 """Build a run: its equations as interpreted or compiled functions, driven by one of the two time loops.
 
-run = prepared(setup, equation, machine);   record = run.record()
+run = make_run(setup, equation, compiled_equation);   recording = run.record()
 """
 
 from __future__ import annotations
